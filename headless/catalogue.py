@@ -85,7 +85,7 @@ def _assets(name: str) -> Entry:
 
 
 def _materials(name: str) -> Entry:
-    made = read_material_table(material_table_path(name))
+    made = read_material_table(name)
     figures_by_name = {"materials": {key: round(row.reflectivity, 3) for key, row in made.items()}}
     return Entry(name, f"{len(made)} materials in place of the usual ones", material_table_path(name), figures_by_name)
 

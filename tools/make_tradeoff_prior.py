@@ -31,7 +31,7 @@ from synthroads_addon.jobs.choose.knobs import colour_choices, model_knobs  # no
 from synthroads_addon.jobs.choose.table import FILE  # noqa: E402
 from synthroads_addon.jobs.choose.trial import Trial  # noqa: E402
 from synthroads_addon.jobs.measure.errors import beam_errors, shift_points  # noqa: E402
-from synthroads_addon.jobs.road_scene import RoadScene  # noqa: E402
+from synthroads_addon.jobs.open_scene import RoadScene  # noqa: E402
 from synthroads_addon.road.geometry import RoadGeometry  # noqa: E402
 from synthroads_addon.sampling.road import sample_road  # noqa: E402
 from synthroads_addon.scanning.beam import RINGS  # noqa: E402
@@ -105,10 +105,9 @@ def measured(platform: str) -> dict[str, Any]:
 
 def octave_seconds(trial: Trial, octaves: int) -> float:
     """Return the microseconds that the micro-relief takes per point."""
-    plan, results = trial.plan, [one for one in trial.scan_lines(RINGS[1]) if len(one.points)]
-    assert plan.relief is not None
+    results = [one for one in trial.scan_lines(RINGS[1]) if len(one.points)]
     begin = trial.clock()
-    places = shift_points(results, plan.relief, plan.relief_strength, plan.seed, octaves)
+    places = shift_points(results, trial.plan, octaves)
     return 1e6 * (trial.clock() - begin) / max(1, sum(map(len, places)))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..base.crs import wkt
 from ..base.errors import InputError
@@ -16,14 +16,10 @@ from ..road.geometry import RoadGeometry
 from ..road.parameters import RoadParameters, read_parameters
 from ..sampling.road import sample_road
 from ..scanning.scene.classify import check_asset_classes
-from ..scenario.scan import scanner_setting
-from ..scenario.scenario import Scenario
+from ..scenario.scenario import OF_POINTS, Scenario
 from ..twin.formats import check_formats
-from .choose.knobs import check_choice
-from .job_files import FILES, OF_POINTS, JobFiles, empty_scan_warnings
-
-if TYPE_CHECKING:
-    from .road_scene import RoadScene
+from .job_files import FILES, JobFiles, empty_scan_warnings
+from .scan.plan import check_scan
 
 
 @dataclass
@@ -83,12 +79,14 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
         check_asset_classes(job.scenario.cloud.scheme(), road.parameters)
         if set(job.scenario.outputs) & {"scene", *OF_POINTS}:
             from ..blender.files import empty_file  # Blender takes a second to start: other outputs need none
-            from .road_scene import RoadScene
+            from .open_scene import RoadScene
 
             if job.new_file:
                 empty_file()
             scene = RoadScene(job.scenario, road)
         if scene and job.scenario.chooses:
+            from .choose.search import choose_settings  # loads Blender as well
+
             scene, report["choice"] = choose_settings(scene, begun, timer)
             files = JobFiles(scene.scenario)
         files.write_road(folder, road, timer)
@@ -102,14 +100,7 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
 def check(job: Job) -> None:
     """Refuse a job that can't be done before any work starts."""
     scenario = job.scenario
-    check_choice(scenario)
-    if set(scenario.outputs) & set(OF_POINTS):
-        from ..blender.cameras import check_colour  # Blender takes a second to start: other outputs need none
-
-        check_colour(scenario.colour.settings(scenario.fidelity))
-    scanner_setting(scenario.scan)
-    scenario.cloud.scheme()
-    scenario.own_materials()
+    check_scan(scenario)
     wkt(scenario.road.epsg)
     check_formats(scenario.twin)
     if job.parameters and job.axis:
@@ -138,13 +129,3 @@ def refuse_sections(scenario: Scenario, length: float) -> None:
         text = f"can't have scene: a road of {length:g} m is built by sections of {section:g} m; leave scene out, or "
         text += f"set scan.section_length to {length / 2.0:g} or more"
         raise InputError("outputs", list(scenario.outputs), text)
-
-
-def choose_settings(scene: RoadScene, begun: float, timer: StageTimer) -> tuple[RoadScene, dict[str, Any]]:
-    """Choose the settings that a scene's scenario leaves open; return the scene with them, and the choice's report."""
-    from .choose.search import decide  # loads Blender
-
-    with timer.stage("choice"):
-        decision = decide(scene.site, begun, scene.rebuild, scene.area)
-    built = (scene.model, scene.scene) if decision.stands else ()
-    return type(scene)(decision.scenario, scene.road, *built), decision.report

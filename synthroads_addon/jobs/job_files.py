@@ -19,7 +19,7 @@ from ..base.version import generator, version
 from ..road.centerline import centerline_geojson
 from ..road.geometry import RoadGeometry
 from ..road.tessellation import sample_stations
-from ..scenario.scenario import Output, Scenario
+from ..scenario.scenario import OF_POINTS, Output, Scenario
 from ..twin.formats import twin_file_names, write_twin
 
 FILES = {
@@ -30,8 +30,6 @@ FILES = {
     "previews": ("preview_class.png", "preview_intensity.png", "preview_rgb.png"),
 }
 """The files that each output of a scenario stands for, with one format of the cloud; see `JobFiles.names`."""
-OF_POINTS: tuple[Output, ...] = ("cloud", "previews")
-"""Outputs that are made of points: all that a scan of a scene by others writes beside ``report.json``."""
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,6 @@ What only the scanner reads is assumed as follows; `docs/radiometry.md` has the 
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
@@ -102,14 +101,18 @@ def material_table_path(name_or_file: str) -> Path:
     return preset_path(PRESETS / "material_tables", name_or_file, "materials_table")
 
 
-def read_material_table(path: str | os.PathLike[str]) -> dict[str, Material]:
+def read_material_table(name_or_file: str | Path) -> dict[str, Material]:
     """Return the materials of a table of one's own by name; what it doesn't name stays the shipped table's.
+
+    Args:
+        name_or_file: a file, or a text that `material_table_path` takes.
 
     Raises:
         MissingFileError: there is no such file, or it can't be read.
-        InputError: it isn't a material table.
+        InputError: it isn't a material table, or a text that names none.
     """
-    return MaterialTable.from_dict(read_json(Path(path)), source=os.fspath(path)).materials
+    path = material_table_path(name_or_file) if isinstance(name_or_file, str) else name_or_file
+    return MaterialTable.from_dict(read_json(path), source=str(path)).materials
 
 
 def write_material_table(path: Path, rows: Mapping[str, Material], overwrite: bool = False) -> None:

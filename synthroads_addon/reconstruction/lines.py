@@ -252,9 +252,7 @@ def _stretches(profiles: Profiles, middle: Float, share: Float) -> tuple[Float, 
     return grid, np.where(weights > 0.0, mean, np.nan), weights
 
 
-def _between_points(
-    profiles: Profiles, points: SurfacePoints, measured: Float, on: Bool
-) -> tuple[Float, Float, Float]:
+def _between_points(profiles: Profiles, points: SurfacePoints, measured: Float, on: Bool) -> tuple[Float, Float, Float]:
     """Return a line's middle and width (K,) in each stretch, m, from the points on it and beside it; and how far apart
     the points are that its middle lies between.
 

@@ -114,9 +114,7 @@ def make_profiles(cloud: RoadCloud, path: CloudPath, half_width: float, exact: b
     return Profiles(path, stations, offsets, count, paint, paved, height, brightness, points)
 
 
-def _by_stretch(
-    row: Int, station: Float, offset: Float, kind: NDArray[np.uint8], rows: int
-) -> SurfacePoints:
+def _by_stretch(row: Int, station: Float, offset: Float, kind: NDArray[np.uint8], rows: int) -> SurfacePoints:
     stretch = row // STRETCH
     order = np.argsort(stretch * 1000.0 + offset)  # offsets are less than 100 m
     begins = np.searchsorted(stretch[order], np.arange(-(-rows // STRETCH) + 1))

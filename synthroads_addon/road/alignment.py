@@ -297,9 +297,7 @@ class Alignment:
         later = distance_1 < distance_0
         return np.where(later, station_1, station_0), np.where(later, offset_1, offset_0)
 
-    def _find_feet(
-        self, x: Float, y: Float, station: Float, low: Float, high: Float
-    ) -> tuple[Float, Float, Float]:
+    def _find_feet(self, x: Float, y: Float, station: Float, low: Float, high: Float) -> tuple[Float, Float, Float]:
         """Improve stations between low and high until the tangent there is square to the point.
 
         The step is exact on a circle: with g along and d across, the angle at its centre is atan2(k g, 1 - k d). A

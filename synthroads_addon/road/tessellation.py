@@ -18,9 +18,7 @@ _SHARE = 0.57
 root sum of squares stays below the whole."""
 
 
-def sample_stations(
-    geometry: RoadGeometry, tolerance: float, start: float = 0.0, end: float = np.inf
-) -> Float:
+def sample_stations(geometry: RoadGeometry, tolerance: float, start: float = 0.0, end: float = np.inf) -> Float:
     """Return the (N,) increasing stations at which the road is sampled.
 
     Every kink (element, rounding, crossfall point, end of a dash) is a station of its own. Between two kinks the

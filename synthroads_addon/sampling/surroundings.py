@@ -262,9 +262,7 @@ def _wide_stretch(width: AnyWidth, length: float) -> tuple[float, float]:
     return float(starts[longest]), float(ends[longest])
 
 
-def _traffic(
-    rng: np.random.Generator, stretches: Float, heavy: Bool, limits: Interval
-) -> list[tuple[int, float, str]]:
+def _traffic(rng: np.random.Generator, stretches: Float, heavy: Bool, limits: Interval) -> list[tuple[int, float, str]]:
     """Return lane, speed (m/s) and model of vehicles, in this order sorted; none where every lane is closed.
 
     The outer lanes have most. Heavy vehicles drive in the outermost, and of three or more in the second as well; where

@@ -7,7 +7,7 @@ meets the same surfaces whatever the sections are.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +21,7 @@ from ..road.things.overpass import Overpass
 from .blocks import Block, Blocks
 from .devices.shots import shots
 from .platforms.path import Strip
+from .scene.motion import LaneMotion
 
 BORDER = 25.0
 """Length built beyond the reach of a section's rays (m), so that where the model is cut lies beyond it as well."""
@@ -37,6 +38,11 @@ _BRIDGE_SIDE = 160.0
 """Offset to which an overpass's approaches reach, m."""
 _UNEVEN = 5.0
 """Largest deviation of the ground between the places that are looked at, m."""
+
+_LOOK = 1.0
+"""Seconds between two looks at where a vehicle is."""
+_AROUND = 60.0
+"""A vehicle counts as near a section up to so far beyond it: more than it drives and reaches between two looks, m."""
 
 
 @dataclass(frozen=True)
@@ -100,6 +106,28 @@ def strip_parts(cut: Blocks, blocks: Sequence[Block]) -> tuple[Strip, ...]:
             begin, end = cut.time(strip, first), cut.time(strip, last + count - 1)
             parts.append(Strip(strip.index, begin, end - begin))
     return tuple(parts)
+
+
+def vehicles_through(
+    section: Section, cut: Blocks, motions: Mapping[str, LaneMotion], speed_factor: float
+) -> dict[str, LaneMotion]:
+    """Return the vehicles that drive through a section while its blocks are scanned.
+
+    Args:
+        section: of the scan.
+        cut: the scan's blocks.
+        motions: of all vehicles, by id.
+        speed_factor: on their speeds.
+    """
+    look = _LOOK / max(1.0, speed_factor)
+    times = np.concatenate([
+        strip.start_time + np.linspace(0.0, strip.duration, int(np.ceil(strip.duration / look)) + 2)
+        for strip in strip_parts(cut, section.blocks)
+    ])  # fmt: skip
+    low, high = section.low - _AROUND, section.high + _AROUND
+    stations = {name: motion.station(times) for name, motion in motions.items()}
+    near = {name for name, station in stations.items() if ((station > low) & (station < high)).any()}
+    return {name: motion for name, motion in motions.items() if name in near}
 
 
 def _by_strip(blocks: Sequence[Block]) -> list[tuple[Strip, list[int]]]:

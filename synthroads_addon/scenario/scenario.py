@@ -13,8 +13,10 @@ from ..base.errors import InputError
 from ..base.files import PRESETS, preset_names, preset_path
 from ..base.schema import ClosedModel, Model, notes, optional, quantity, read_json
 from ..base.typed_text import typed_value
-from ..materials.table import Material, material_table_path, read_material_table
+from ..cloud.layers import optional_arrays
+from ..materials.table import Material, read_material_table
 from ..road.guidelines import SECTIONS_OF_CLASS
+from ..scanning.beam import RINGS
 from ..twin.formats import IfcSettings, TwinFormat
 from .cloud import CloudScenario
 from .colour import ColourScenario
@@ -26,6 +28,8 @@ SCENARIOS = PRESETS / "scenarios"
 
 Output = Literal["parameters", "cloud", "centerline", "scene", "previews"]
 OUTPUTS: tuple[Output, ...] = get_args(Output)
+OF_POINTS: tuple[Output, ...] = ("cloud", "previews")
+"""Outputs that are made of points: all that a scan of a scene by others writes beside ``report.json``."""
 _DEEPEST = 20
 """Dots in the path of a change: more fields don't lie in each other."""
 LONGEST_WHOLE, SECTION_LENGTH = 5000.0, 500.0
@@ -102,20 +106,40 @@ class Scenario(ClosedModel):
         """Return whether settings are to be chosen before the work begins."""
         return self.tolerance is not None or self.time_budget is not None
 
+    @property
+    def beam_rings(self) -> tuple[int, ...]:
+        """Return the rays on each ring around the beam's axis."""
+        own = self.scan.beam_rings
+        return RINGS[self.settings().rays_per_pulse] if own is None else own
+
+    @property
+    def kept_layers(self) -> frozenset[str]:
+        """Return the names of the optional per-point layers that the files hold."""
+        return self.cloud.arrays() & optional_arrays() if "cloud" in self.outputs else frozenset()
+
+    @property
+    def coloured_layers(self) -> frozenset[str]:
+        """Return the layers that points get besides what the scanner measures: ``rgb`` and material layers."""
+        rgb = {"rgb"} if self.colour.rgb else set()
+        return frozenset(rgb | (self.kept_layers & optional_arrays("material")))
+
+    @property
+    def may_render(self) -> bool:
+        """Return whether a scan may have to render: whether it does depends on the scene's materials as well."""
+        asked = bool(self.coloured_layers) or self.colour.intensity_from_layers
+        return bool(set(self.outputs) & set(OF_POINTS)) and asked and self.colour.source != "material"
+
     def own_materials(self) -> dict[str, Material]:
         """Return the materials of the scenario's own table by name; none if it has none.
 
         Raises:
             InputError: the file isn't there or no material table.
         """
-        if not self.materials_table:
-            return {}
-        path = material_table_path(self.materials_table)
-        return read_material_table(path)
+        return read_material_table(self.materials_table) if self.materials_table else {}
 
     def section_length(self, length: float) -> float | None:
         """Return the length (m) of the sections by which a road of a length (m) is built and scanned; None: whole."""
-        if not set(self.outputs) & {"cloud", "previews"}:
+        if not set(self.outputs) & set(OF_POINTS):
             return None
         given = self.scan.section_length
         section, longest = (SECTION_LENGTH, LONGEST_WHOLE) if given is None else (given, 2.0 * given)

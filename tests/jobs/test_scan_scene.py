@@ -6,7 +6,6 @@ import json
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -21,10 +20,11 @@ from synthroads_addon.blender.model.store import remember
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.blender.scene.foreign import open_scene
 from synthroads_addon.cloud.formats.registry import open_cloud
-from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene, scene_path
+from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.sampling.road import sample_road
-from synthroads_addon.scanning.platforms.tripod import Tripod
+from synthroads_addon.scanning.platforms.over_scene import path_over
+from synthroads_addon.scanning.platforms.tripod import Tripod, TripodPath
 from synthroads_addon.scenario.scenario import Scenario, load_scenario
 from tests.helpers.scenes.scene_hash import digest
 
@@ -207,14 +207,12 @@ def test_tripods_stand_on_the_surface_or_where_they_are_put(scene: Callable[[str
     assert set(np.array(las.point_source_id)) == {1, 2}
     for strip in (1, 2):
         assert np.ptp(las.gps_time[np.array(las.point_source_id) == strip]) == pytest.approx(2.0, abs=0.05)
-    platform = {"kind": "tripod", "height": 1.5}
-    job = SceneScan(Scenario.from_dict({"scan": {"platform": platform}}), tmp_path, tripods=((-15, -5), (10.5, 3.5)))
-    assert np.allclose(scene_path(job, scene_mesh(), None).positions, [[-15, -5, 2.5], [10.5, 3.5, 5.5]])
-    scenario = Scenario.from_dict({"scan": {"platform": {"kind": "tripod"}}})
-    job = replace(job, tripods=((-15, -5, 2.8),), scenario=scenario)
-    assert np.allclose(scene_path(job, scene_mesh(), None).positions, [[-15, -5, 2.8]])
-    job = replace(job, tripods=((-15, -5),))
-    assert np.allclose(scene_path(job, scene_mesh(), None).positions, [[-15, -5, 1.0 + Tripod.usual["height"]]])
+    high = path_over(Tripod(height=1.5), scene_mesh(), places=((-15, -5), (10.5, 3.5)))
+    assert isinstance(high, TripodPath)
+    assert np.allclose(high.positions, [[-15, -5, 2.5], [10.5, 3.5, 5.5]])
+    usual = path_over(Tripod(), scene_mesh(), places=((-15, -5, 2.8), (-15, -5)))
+    assert isinstance(usual, TripodPath)
+    assert np.allclose(usual.positions, [[-15, -5, 2.8], [-15, -5, 1.0 + Tripod.usual["height"]]])
 
 
 def test_a_scene_with_a_vertex_astray_is_scanned_where_it_is(

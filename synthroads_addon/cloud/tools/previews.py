@@ -8,6 +8,7 @@ import numpy as np
 
 from ...base.arrays import AnyArray, Float
 from ...base.classes import ClassScheme, class_scheme
+from ...road.geometry import RoadGeometry
 from ..points import PointBlock
 from .picture import PAPER, Axes, Legend, Raster, add_frame, class_legend, gray, nice_step
 
@@ -16,6 +17,8 @@ WIDTH = 1800
 _LOWEST = 320
 """Height (pixels), more or less, that a cross-section is exaggerated to, if it is lower."""
 _MOST_PIXELS = 1600
+_BORDER = 2.0
+"""Border beside what a raster from above is meant to hold, m."""
 _SECTION_PAPER = (172, 187, 204)
 """White markings and dark pavement, both only points here, stand out from it."""
 
@@ -42,6 +45,31 @@ class TopView:
         # A line is thinner than a pixel: let it win over the pavement.
         self._lift = np.zeros(256)
         self._lift[[row.id for row in self.scheme.rows if row.name == "road_marking"]] = 0.3
+
+    @classmethod
+    def over_road(cls, geometry: RoadGeometry, scheme: ClassScheme | None = None) -> TopView:
+        """Return a raster that holds the whole swath of a road; see the class."""
+        origin = np.array(geometry.parameters.transform.translate)[:2]
+        stations = np.linspace(0.0, geometry.length, 50)
+        terrain = geometry.parameters.terrain
+        reach = terrain.half_width if terrain else float(np.abs(geometry.offsets(stations)).max())
+        plan, heading, _ = geometry.alignment.frame(stations)
+        left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+        chord = plan[-1] - plan[0]
+        normal = np.array([-chord[1], chord[0]]) / max(np.hypot(*chord), 1e-9)
+        edges = np.concatenate([plan + reach * left, plan - reach * left])
+        across = (edges - plan[0]) @ normal
+        low, high = float(across.min()) - _BORDER, float(across.max()) + _BORDER
+        return cls(plan[0] + origin, plan[-1] + origin, low, high, scheme)
+
+    @classmethod
+    def over_box(cls, low: Float, high: Float, scheme: ClassScheme | None = None) -> TopView:
+        """Return a raster that holds a box, given by its corners in map coordinates, its longer side left to right."""
+        start, end = low[:2].copy(), high[:2].copy()
+        axis = int(np.argmax(end - start))
+        reach = float((end - start)[1 - axis]) / 2.0 + _BORDER
+        start[1 - axis] = end[1 - axis] = (start + end)[1 - axis] / 2.0
+        return cls(start, end, -reach, reach, scheme)
 
     def add(self, block: PointBlock) -> None:
         """Add a block's points."""

@@ -7,7 +7,7 @@ settings within a tolerance are the cheapest option of every knob that keeps its
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +20,7 @@ _LEAST = 1e-9
 
 @dataclass(frozen=True)
 class Option:
-    """One setting of a knob.
+    """One setting of a knob, or one of every knob, see `combined`.
 
     Attributes:
         changes: of the scenario: dotted path -> value.
@@ -43,46 +43,27 @@ class Option:
         return all(self.bound(kind) <= limit for kind, limit in limits.items())
 
 
-@dataclass(frozen=True)
-class Choice:
-    """One option of every knob.
-
-    Attributes:
-        options: by name of the knob.
-    """
-
-    options: Mapping[str, Option]
-
-    @property
-    def changes(self) -> dict[str, Any]:
-        """Return the changes of the scenario."""
-        return {path: value for option in self.options.values() for path, value in option.changes.items()}
-
-    @property
-    def found(self) -> Errors:
-        """Return the expected errors and their bounds by kind."""
-        return {kind: pair for option in self.options.values() for kind, pair in option.found.items()}
-
-    @property
-    def seconds(self) -> float:
-        """Return the expected time."""
-        return sum(option.seconds for option in self.options.values())
+Knobs = Sequence[Sequence[Option]]
+"""Options of each knob; what no knob changes is one without a choice."""
 
 
-Knobs = Mapping[str, Sequence[Option]]
-"""Options by name of the knob; what no knob changes is one without a choice."""
+def combined(options: Iterable[Option]) -> Option:
+    """Return one option of every knob as a whole: their changes and errors together, costs and times added up."""
+    several = tuple(options)
+    changes = {path: value for option in several for path, value in option.changes.items()}
+    found = {kind: pair for option in several for kind, pair in option.found.items()}
+    return Option(changes, found, sum(one.cost for one in several), sum(one.seconds for one in several))
 
 
-def options_within(knobs: Knobs, limits: Mapping[str, float]) -> dict[str, list[Option]]:
+def options_within(knobs: Knobs, limits: Mapping[str, float]) -> list[list[Option]]:
     """Return the options that keep a tolerance.
 
     Raises:
         InputError: a knob has none; says what is the best to be had.
     """
-    kept = {name: [option for option in options if option.keeps(limits)] for name, options in knobs.items()}
-    for name, options in kept.items():
-        if not options:
-            raise _impossible(knobs[name], limits)
+    kept = [[option for option in options if option.keeps(limits)] for options in knobs]
+    if [] in kept:
+        raise _impossible(knobs[kept.index([])], limits)
     return kept
 
 
@@ -99,19 +80,18 @@ def _impossible(options: Sequence[Option], limits: Mapping[str, float]) -> Input
     return InputError("tolerance", None, f"{' and '.join(kinds)} can't be kept together: the nearest is {said}")
 
 
-def cheapest(knobs: Knobs, limits: Mapping[str, float]) -> Choice:
+def cheapest(knobs: Knobs, limits: Mapping[str, float]) -> Option:
     """Return the cheapest settings that keep a tolerance.
 
     Raises:
         InputError: there are none; says what is the best to be had.
     """
-    kept = options_within(knobs, limits)
-    return Choice({name: min(options, key=lambda option: option.cost) for name, options in kept.items()})
+    return combined(min(options, key=lambda option: option.cost) for options in options_within(knobs, limits))
 
 
 def best_in_time(
     knobs: Knobs, seconds: float, reference: Mapping[str, float], limits: Mapping[str, float] | None = None
-) -> Choice:
+) -> Option:
     """Return the best settings that fit a time: their largest error, as a multiple of a reference, is the smallest.
 
     Of several as good in that, those whose errors' sum is the smallest, and of these the fastest.
@@ -125,8 +105,7 @@ def best_in_time(
     Raises:
         InputError: not even the fastest settings fit, or none keeps the tolerance.
     """
-    kept = options_within(knobs, limits or {})
-    choices = [Choice(dict(zip(kept, options, strict=True))) for options in itertools.product(*kept.values())]
+    choices = list(map(combined, itertools.product(*options_within(knobs, limits or {}))))
     fitting = [choice for choice in choices if choice.seconds <= seconds]
     if not fitting:
         raise too_short(seconds, min(choice.seconds for choice in choices), bool(limits))
@@ -141,6 +120,6 @@ def too_short(seconds: float, fastest: float, tolerance: bool = False) -> InputE
     return InputError("time_budget", None, text)
 
 
-def _loss(choice: Choice, reference: Mapping[str, float]) -> tuple[float, float, float]:
+def _loss(choice: Option, reference: Mapping[str, float]) -> tuple[float, float, float]:
     ratios = [choice.found.get(kind, (0.0, 0.0))[0] / max(base, _LEAST) for kind, base in reference.items()]
     return round(max(ratios, default=0.0), 6), round(sum(ratios), 6), choice.seconds

@@ -9,20 +9,21 @@ table's then, unless a tolerance is to be kept as well.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
+from ...base.progress import StageTimer
 from ...blender.cameras import HAS_RETURN_CAMERA
 from ...cloud.points import PointBlock
 from ...scanning.beam import RINGS
-from ...scanning.scene.motion import ScannedScene
+from ...scenario.choice import has_kind
 from ...scenario.scenario import FIDELITIES, Scenario
 from ..measure.errors import CONVERGED, Errors, beam_errors
-from ..scan.plan import Site, coloured_layers, may_render
+from ..open_scene import ForeignScene, RoadScene
 from . import knobs as choices
 from .knobs import ModelKnobs
-from .options import Choice, Knobs, Option, best_in_time, cheapest, too_short
+from .options import Knobs, Option, best_in_time, cheapest, too_short
 from .table import JobTimes, nearest_row, table_of
 from .trial import LINES, Trial
 
@@ -33,23 +34,8 @@ _SURE = 0.8
 _HOPELESS = 4.0
 """A time that the shipped table says is exceeded so many times isn't tried out."""
 
-MakeScene = Callable[[Mapping[str, Any]], ScannedScene]
-"""Returns the scene of a model with fields of the scenario changed, built in place of that before."""
 
-
-@dataclass(frozen=True)
-class Decision:
-    """The settings that were chosen.
-
-    Attributes:
-        scenario: the job with the chosen settings, as it can be repeated.
-        report: what was asked for, chosen and expected, as JSON data.
-        stands: whether the scene that was made last is the chosen one.
-    """
-
-    scenario: Scenario
-    report: dict[str, Any]
-    stands: bool
+S = TypeVar("S", ForeignScene, RoadScene)
 
 
 @dataclass(frozen=True)
@@ -64,19 +50,27 @@ class _Findings:
     source: str = f"pilot measurements on {LINES} scan lines"
 
 
-def decide(site: Site, begun: float, make: MakeScene, area: float = 0.0) -> Decision:
-    """Choose the settings that a site's scenario leaves open.
+def choose_settings(scene: S, begun: float, timer: StageTimer) -> tuple[S, dict[str, Any]]:
+    """Choose the settings that a scene's scenario leaves open.
 
     Args:
-        site: of the scan; its scenario has a tolerance or a time budget, or both.
+        scene: its scenario has a tolerance or a time budget, or both.
         begun: when the job began, by `time.perf_counter`.
-        make: gives the scene.
-        area: of the model, m2; 0 if nothing is built.
+        timer: of the job's stages.
+
+    Returns:
+        the scene under the job with the chosen settings, as it can be repeated; and what was asked for, chosen and
+        expected, as JSON data.
 
     Raises:
         InputError: the tolerance can't be kept, which says what is the best to be had; or the time is too short.
     """
-    return _Search(site, begun, make, area).decide()
+    with timer.stage("choice"):
+        search = _Search(scene, begun)
+        scenario, report = search.decide()
+    settings = scenario.settings()
+    built = None if search.trial is None else search.trial[0]
+    return scene.choose(scenario, built in (None, ModelKnobs(settings.tolerance, settings.vegetation_detail))), report
 
 
 class _Search:
@@ -89,27 +83,27 @@ class _Search:
         trial: the model that was built last, and the trial of it.
     """
 
-    def __init__(self, site: Site, begun: float, make: MakeScene, area: float) -> None:
-        self.site, self.scenario, self.begun, self._make = site, site.scenario, begun, make
+    def __init__(self, scene: ForeignScene | RoadScene, begun: float) -> None:
+        self.scene, self.site, self.scenario, self.begun = scene, scene.site, scene.site.scenario, begun
         self.began_here = time.perf_counter()
         self.limits = self.scenario.tolerance.limits() if self.scenario.tolerance else {}
         self.rays, self.octaves = choices.rays_choices(self.scenario), choices.octave_choices(self.scenario)
-        colours = choices.colour_choices(self.scenario, site.path.typical_range, HAS_RETURN_CAMERA)
-        self.colours = colours if _COLOURS & set(self.limits) or may_render(self.scenario) else {}
-        pulses = sum(map(site.cut.pulses, site.path.strips))
-        self.times = JobTimes(table_of(self.scenario.scan.platform.kind), area, pulses)
-        self.models: list[ModelKnobs | None] = [*choices.model_knobs(self.scenario, self.limits)] if area else [None]
+        colours = choices.colour_choices(self.scenario, self.site.path.typical_range, HAS_RETURN_CAMERA)
+        self.colours = colours if _COLOURS & set(self.limits) or self.scenario.may_render else {}
+        pulses = sum(map(self.site.cut.pulses, self.site.path.strips))
+        self.times = JobTimes(table_of(self.scenario.scan.platform.kind), scene.area, pulses)
+        models = choices.model_knobs(self.scenario, self.limits) if scene.area else (None,)
+        self.models: list[ModelKnobs | None] = [*models]
         self.build_seconds: dict[ModelKnobs | None, float] = {}
         self.trial: tuple[ModelKnobs | None, Trial] | None = None
 
-    def decide(self) -> Decision:
-        """Return the decision."""
+    def decide(self) -> tuple[Scenario, dict[str, Any]]:
+        """Return the job with the chosen settings, and the report."""
         budget = self.scenario.time_budget
         found, choice = self._choose_by_tolerance() if budget is None else self._choose_by_time(budget)
-        scenario, here = choices.with_changes(self.scenario, choice.changes), time.perf_counter()
-        kept, settings = choices.given_knobs(self.scenario), scenario.settings()
+        here, kept = time.perf_counter(), choices.given_knobs(self.scenario)
         asked = {"tolerance": self.limits or None, "time_budget": budget}
-        report = {
+        return choices.with_changes(self.scenario, choice.changes), {
             "asked": {name: value for name, value in asked.items() if value is not None},
             "kept": kept,
             "chosen": {path: value for path, value in choice.changes.items() if path not in kept},
@@ -121,16 +115,14 @@ class _Search:
             "by": found.source,
             "pilot_seconds": round(here - self.began_here, 3),
         }
-        built = None if self.trial is None else self.trial[0]
-        return Decision(scenario, report, built in (None, ModelKnobs(settings.tolerance, settings.vegetation_detail)))
 
-    def _choose_by_tolerance(self) -> tuple[_Findings, Choice]:
+    def _choose_by_tolerance(self) -> tuple[_Findings, Option]:
         found = self._measure()
         rays = int(cheapest(self._options(found), self.limits).changes.get("scan.rays_per_pulse", max(self.rays)))
         self.times.calibrate(rays, *self._trial.time_scan(self.rays[rays]))
         return found, cheapest(self._options(found), self.limits)
 
-    def _choose_by_time(self, budget: float) -> tuple[_Findings, Choice]:
+    def _choose_by_time(self, budget: float) -> tuple[_Findings, Option]:
         def left() -> float:
             return budget - (time.perf_counter() - self.begun)
 
@@ -153,7 +145,7 @@ class _Search:
             self._try(self.models[0])
         colour: Mapping[str, Errors] = {name: {} for name in self.colours}
         if self.colours and _COLOURS & limited:
-            colour = self._trial.colour_errors(self.colours, coloured_layers(self.scenario))
+            colour = self._trial.colour_errors(self.colours, self.scenario.coloured_layers)
         return _Findings(beam, self._trial.relief_errors(self.octaves) if self.octaves else {}, colour)
 
     def _measure_beam(self) -> dict[tuple[ModelKnobs | None, int], Errors]:
@@ -175,7 +167,7 @@ class _Search:
             for rays in self.rays if model == self.models[-1] else (min(self.rays),):
                 beam[model, rays] = _exact({**nearest_row(table.beam, rays), **(table.few_plants if few else {})})
         relief = {octaves: _exact({"relief": nearest_row(table.relief, octaves)}) for octaves in self.octaves}
-        kinds = [kind for kind in sorted(_COLOURS) if choices.has_kind(self.scenario, kind)]
+        kinds = [kind for kind in sorted(_COLOURS) if has_kind(self.scenario, kind)]
         colour = {name: _exact({kind: table.colour[name][kind] for kind in kinds}) for name in self.colours}
         return _Findings(beam, relief, colour, "shipped table, scaled by a short run")
 
@@ -188,26 +180,24 @@ class _Search:
 
     def _options(self, found: _Findings) -> Knobs:
         """Return the options of every knob, with the times that are expected by what is known of this machine."""
+        beam = [self._beam_option(*knobs, errors) for knobs, errors in found.beam.items()]
         relief = [
             Option({"scan.relief_octaves": octaves}, errors, octaves, self.times.relief(octaves))
             for octaves, errors in found.relief.items()
         ]
-        knobs = {
-            "beam": [self._beam_option(*knobs, errors) for knobs, errors in found.beam.items()],
-            "relief": relief,
-            "colour": [self._colour_option(name, errors) for name, errors in found.colour.items()],
-            "rest": [Option({}, {}, 0.0, self.times.fixed(self.scenario))],
-        }
-        return {name: options for name, options in knobs.items() if options}
+        colour = [self._colour_option(name, errors) for name, errors in found.colour.items()]
+        rest = [Option({}, {}, 0.0, self.times.fixed(self.scenario))]
+        return [options for options in (beam, relief, colour, rest) if options]
 
     def _beam_option(self, model: ModelKnobs | None, rays: int, errors: Errors) -> Option:
         """Return an option of rays and a model; its time is that of the scan, and of building if it doesn't stand."""
-        changes, cost, seconds = choices.rays_changes(self.scenario, rays), 4.0 + rays, self.times.scan(rays)
+        cost, seconds = 4.0 + rays, self.times.scan(rays)
+        changes: dict[str, Any] = {"scan.rays_per_pulse": rays} if self.scenario.scan.beam_rings is None else {}
         if model is None:
             return Option(changes, errors, cost, seconds)
         estimate, bound = errors.get("position", (0.0, 0.0))
-        errors = {**errors, "height": (model.height_error, model.height_error)}
-        errors["position"] = estimate, bound + model.position_error
+        # The model's vertices lie on the surface: heights are off by its tolerance at most, positions by half of it.
+        errors = {**errors, "height": (model.tolerance,) * 2, "position": (estimate, bound + model.tolerance / 2.0)}
         if self.trial is None or model != self.trial[0]:
             seconds += self.build_seconds.get(model, self.times.model(self.models.index(model)))
         return Option({**model.changes, **changes}, errors, cost + 0.5 * model.detail, seconds)
@@ -226,7 +216,7 @@ class _Search:
         """Return the trial of a model, which is built unless it stands."""
         if self.trial is None or self.trial[0] != model:
             begin = time.perf_counter()
-            self.trial = model, Trial.of(self.site, self._make(model.changes if model else {}))
+            self.trial = model, Trial.of(self.site, self.scene.rebuild(model.changes if model else {}))
             self.build_seconds[model] = time.perf_counter() - begin
         return self.trial[1]
 

@@ -56,8 +56,7 @@ class Table:
     def pulse_seconds(self, rays: int) -> float:
         """Return the seconds of a pulse of so many rays, linear between what was measured."""
         known = sorted((int(number), 1e-6 * value) for number, value in self.pulse.items())
-        if rays <= known[0][0]:
-            return known[0][1]
+        rays = max(rays, known[0][0])
         (a, low), (b, high) = next((pair for pair in pairwise(known) if rays <= pair[1][0]), (known[-2], known[-1]))
         return low + (high - low) * (rays - a) / (b - a)
 

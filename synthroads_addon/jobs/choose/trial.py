@@ -8,29 +8,35 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from ...base.machine import available_cores
 from ...base.progress import StageTimer
-from ...blender.cameras import image_views, layer_source
+from ...blender.cameras import image_views
 from ...blender.services import BlenderServices
 from ...cloud.points import PointBlock
 from ...scanning.beam import RINGS
-from ...scanning.colour.colour import ColourSettings, LayerValues, SeenPoints, sample_points
+from ...scanning.colour.images import views_near
 from ...scanning.colour.request import LayerRequest
-from ...scanning.colour.views import View
 from ...scanning.noise import Noise
 from ...scanning.plan import ScanPlan
 from ...scanning.platforms.stretches import scatter_stretches
 from ...scanning.record import record_as_measured
 from ...scanning.scan import BlockResult, joined_results
 from ...scanning.scene.motion import ScannedScene
-from ..measure.errors import CONVERGED, FINEST, Errors, colour_errors, relief_errors, shift_points, truest_settings
+from ..measure.errors import (
+    CONVERGED,
+    FINEST,
+    Errors,
+    colour_errors,
+    relief_errors,
+    render_layers,
+    shift_points,
+    truest_settings,
+)
 from ..scan.files import record_to_files
 from ..scan.plan import Site
 
@@ -43,10 +49,6 @@ _TIMED_SHARE = 0.1
 """Stretches that are timed at least, and the largest share of the path that twice as many may be."""
 _COLOURED = 8
 """Scan lines that errors of colours are taken of."""
-_NEAREST = 3
-"""Places of images, nearest in time to a line, that are rendered of each strip."""
-_MARGIN = 24
-"""Border of what is rendered around a line, px: what is hidden takes its colour from close by."""
 
 
 @dataclass
@@ -94,14 +96,9 @@ class Trial:
 
     def relief_errors(self, octaves: Iterable[int]) -> dict[int, Errors]:
         """Return the error of the micro-relief by octaves."""
-        plan, results = self.plan, [one for one in self.scan_lines(RINGS[1]) if len(one.points)]
-        assert plan.relief is not None
-
-        def shifted(number: int) -> list[Any]:
-            return shift_points(results, plan.relief, plan.relief_strength, plan.seed, number)  # type: ignore[arg-type]
-
-        truth = shifted(FINEST)
-        return {number: relief_errors(shifted(number), truth) for number in octaves}
+        results = [one for one in self.scan_lines(RINGS[1]) if len(one.points)]
+        truth = shift_points(results, self.plan, FINEST)
+        return {number: relief_errors(shift_points(results, self.plan, number), truth) for number in octaves}
 
     def colour_errors(self, choices: Mapping[str, Mapping[str, Any]], wanted: frozenset[str]) -> dict[str, Errors]:
         """Return the errors of colours and layers by where they come from, see `knobs.colour_choices`.
@@ -113,12 +110,13 @@ class Trial:
             wanted: ``rgb`` and layers.
         """
         seen = [one.seen for one in self.scan_lines(RINGS[1], _COLOURED) if one.seen is not None and len(one.seen)]
-        true = truest_settings(self.layer_request({}))
-        truth = self._layers(true, seen, wanted)
+        request = replace(self.layer_request({}), wanted=wanted, pick=lambda views: views_near(views, seen))
+        true = truest_settings(request)
+        truth = render_layers(replace(request, settings=true), seen)
         errors = {}
         for name, changes in choices.items():
             settings = self.layer_request(changes).settings
-            mine = truth if settings == true else self._layers(settings, seen, wanted)
+            mine = truth if settings == true else render_layers(replace(request, settings=settings), seen)
             errors[name] = colour_errors(mine, truth, wanted)
         return errors
 
@@ -130,16 +128,6 @@ class Trial:
         assert self.plan.request is not None
         settings = colour.settings(scenario.fidelity, self.plan.path.typical_range)
         return replace(self.plan.request, settings=settings)
-
-    def _layers(
-        self, settings: ColourSettings, lines: Sequence[SeenPoints], wanted: frozenset[str]
-    ) -> list[LayerValues]:
-        assert self.plan.request is not None
-        request = replace(
-            self.plan.request, settings=settings, wanted=wanted, pick=lambda views: views_near_lines(views, lines)
-        )
-        with layer_source(request) as source:
-            return [sample_points(source, seen, wanted) for seen in lines]
 
     def count_images(self, changes: Mapping[str, Any]) -> tuple[int, float]:
         """Return how many images the whole path would have, and their megapixels; 0 where none are rendered."""
@@ -176,16 +164,3 @@ class Trial:
             seconds = self.clock() - begin
         # Pulses come in whole lines, so that stretches hold fewer of them than their duration says.
         return sum(map(self.plan.pulses, path.strips)), seconds, files.counts.points
-
-
-def views_near_lines(views: Sequence[View], lines: Sequence[SeenPoints]) -> list[View]:
-    """Return what the nearest images show of each scan line: parts of them."""
-    parts: list[View | None] = []
-    for line in lines:
-        away = np.array([np.linalg.norm(view.position - line.scanner.mean(axis=0)) for view in views])
-        places = np.unique(np.round(away, 6))[:_NEAREST]
-        if not len(places):
-            continue
-        near = np.flatnonzero(away <= places[-1] + 1e-5)
-        parts += [views[number].around(line.position, _MARGIN) for number in near]
-    return [part for part in parts if part is not None]

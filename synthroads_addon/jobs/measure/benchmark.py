@@ -8,8 +8,11 @@ from __future__ import annotations
 import tempfile
 from collections import deque
 from collections.abc import Callable
+from copy import copy
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import laspy
@@ -21,22 +24,23 @@ from ...base.progress import StageTimer, peak_memory_mb
 from ...blender.cameras.benchmark import panel_edit, rendering, seconds_of
 from ...blender.casters.measure import bare_rate
 from ...blender.files import empty_file
-from ...blender.services import BlenderServices
+from ...cloud.formats.registry import open_cloud
 from ...road.geometry import RoadGeometry
 from ...sampling.road import sample_road
 from ...scanning.beam import RINGS
 from ...scanning.plan import ScanPlan
-from ...scanning.record import CollectedBlocks, record, scan_blocks
+from ...scanning.record import scan_blocks
 from ...scanning.scan import BlockScan
-from ...scanning.scene.caster import Caster
 from ...scenario.scenario import Scenario
 from ..job_files import JobFiles
-from ..road_scene import RoadScene
+from ..open_scene import RoadScene
 from ..scan.files import CloudFiles, record_to_files
 
 _CAST_BLOCKS, _WRITTEN_BLOCKS = 48, 96
-"""Blocks, spread over the scan, on which casting and writing are measured beside their floors: so many that what is
+"""Blocks on which casting (spread over the scan) and writing are measured beside their floors: so many that what is
 left over for one core at the end doesn't count."""
+_BLOCK = 1 << 15
+"""Points of a block that is written: about as many as a block of the scan has."""
 _RAYS = (1, 7, 19, 61)
 _TURNS = 4
 """Measurements of each rate, of which the best counts, as other work on the machine only slows."""
@@ -44,6 +48,7 @@ _VIEWS = 4
 """Images that are rendered bare."""
 
 Rate = dict[str, Any]
+Rays = NDArray[np.float32]
 
 
 def measure_demo(scenario: Scenario) -> dict[str, Any]:
@@ -65,16 +70,16 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         with timer.stage("model"):
             model = shown.build()
         with timer.stage("scene mesh"):
-            scene = shown.read()
+            shown.read()
         with timer.stage("caster"):
-            plan = shown.site.plan(scene, BlenderServices())
+            plan = shown.plan()
         files = shown.site.files(folder, plan.target.origin)
         record_to_files([plan], files, timer)
         seconds, memory = timer.seconds, peak_memory_mb()
         # The scene, its caster and the materials are the same for every number of rays.
         bare = replace(plan, targets=False, wanted=frozenset())
         casting = {rays: _cast_beside(replace(bare, rings=RINGS[rays])) for rays in _RAYS}
-        writing = _writing(plan, files, folder)
+        writing = _writing(files)
         floors = [*casting.values(), writing]
         assert plan.request is not None
         if scenario.colour.source != "material":
@@ -93,43 +98,22 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
     return {"cores": available_cores(), "stages": timer.stages, "lines": lines, "floors": floors}
 
 
-def _spread_blocks(plan: ScanPlan, count: int) -> list[Any]:
-    """Return so many whole blocks, spread over a scan."""
-    blocks = list(plan.blocks())
-    return [blocks[i] for i in np.unique(np.linspace(0, len(blocks) - 1, count + 2).astype(int)[1:-1])]
-
-
-class _KeptRays:
-    """A caster that keeps the rays that it is given."""
-
-    main_thread_only = False
-
-    def __init__(self, caster: Caster) -> None:
-        self._caster, self.name = caster, caster.name
-        self.origins: list[NDArray[np.float32]] = []
-        self.directions: list[NDArray[np.float32]] = []
-
-    def cast(
-        self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float
-    ) -> NDArray[np.int32]:
-        """Cast, and keep the rays."""
-        self.origins.append(origins.copy())
-        self.directions.append(directions.copy())
-        return self._caster.cast(origins, directions, maximum_range)
-
-
 def _cast_beside(plan: ScanPlan) -> Rate:
     """Return casting and radiometry beside the bare caster on the same rays."""
-    threads, blocks = available_cores(), _spread_blocks(plan, _CAST_BLOCKS)
-    part = plan.target._parts[0]
-    caster, kept = part.caster, _KeptRays(part.caster)
-    object.__setattr__(part, "caster", kept)
-    try:
-        for block in blocks:
-            BlockScan(plan).block(*block)
-    finally:
-        object.__setattr__(part, "caster", caster)
-    origins, directions = np.concatenate(kept.origins), np.concatenate(kept.directions)
+    threads, every = available_cores(), list(plan.blocks())
+    blocks = [every[i] for i in np.unique(np.linspace(0, len(every) - 1, _CAST_BLOCKS + 2).astype(int)[1:-1])]
+    part, target, kept = plan.target._parts[0], copy(plan.target), list[tuple[Rays, Rays]]()
+    caster = part.caster
+
+    def cast_and_keep(origins: Rays, directions: Rays, maximum_range: float) -> NDArray[np.int32]:
+        kept.append((origins.copy(), directions.copy()))
+        return caster.cast(origins, directions, maximum_range)
+
+    keeping: Any = SimpleNamespace(name=caster.name, main_thread_only=False, cast=cast_and_keep)
+    target._parts = [replace(part, caster=keeping), *target._parts[1:]]
+    for block in blocks:
+        BlockScan(replace(plan, target=target)).block(*block)
+    origins, directions = map(np.concatenate, zip(*kept, strict=True))
     few = replace(plan, only=tuple(blocks), threads=threads)
 
     def ours() -> float:
@@ -149,13 +133,15 @@ def _best_of_both(ours: Callable[[], float], floor: Callable[[], float]) -> dict
     return {"ours": max(own for own, _ in rates) / 1e6, "floor": max(bare for _, bare in rates) / 1e6}
 
 
-def _writing(plan: ScanPlan, files: CloudFiles, folder: Path) -> Rate:
-    """Return the writing of LAZ beside the mere compression of the same records by lazrs through laspy."""
-    few = replace(plan, only=tuple(_spread_blocks(plan, _WRITTEN_BLOCKS)))
-    kept = CollectedBlocks()
-    record(few, kept)
-    blocks = [result.points for result in kept.results]
-    count = sum(len(block) for block in blocks)
+def _writing(files: CloudFiles) -> Rate:
+    """Return the writing of LAZ beside the mere compression of the same records by lazrs through laspy.
+
+    The points are the first of the cloud that the job has written.
+    """
+    folder = files.folder
+    with open_cloud(folder / files.scenario.cloud.file_names()[0]) as cloud:
+        blocks = list(islice(cloud.blocks(_BLOCK), _WRITTEN_BLOCKS))
+    count = sum(map(len, blocks))
 
     def ours() -> None:
         with files.open_writer("ours.laz") as writer:

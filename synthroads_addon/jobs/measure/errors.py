@@ -15,30 +15,36 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.classes import class_id
-from ...base.random_streams import stream
-from ...blender.cameras import HAS_RETURN_CAMERA
+from ...base.statistics import quantile_bound, ratio_bound
+from ...blender.cameras import HAS_RETURN_CAMERA, layer_source
 from ...cloud.points import PointBlock
-from ...road.geometry import RoadGeometry
 from ...scanning.beam import RINGS
-from ...scanning.colour.colour import FROM_MATERIAL, MATERIAL_LAYERS, NEARBY, ColourSettings, LayerValues, source_name
+from ...scanning.colour.colour import (
+    FROM_MATERIAL,
+    MATERIAL_LAYERS,
+    NEARBY,
+    ColourSettings,
+    LayerValues,
+    SeenPoints,
+    sample_points,
+    source_name,
+)
 from ...scanning.colour.difference import cie_lab, ciede2000
 from ...scanning.colour.request import LayerRequest
-from ...scanning.relief import MicroRelief, shift_along_normals
+from ...scanning.plan import ScanPlan
+from ...scanning.relief import shift_along_normals
 from ...scanning.scan import BlockResult
-from ...scanning.scene.mesh import SceneMesh
 from ...scenario.colour import image_scale
 
 Float = NDArray[np.float64]
 Errors = dict[str, tuple[float, float]]
 """Kind of error -> estimate, and its upper bound with the confidence `LEVEL`."""
 
-LEVEL = 0.95
-"""Confidence of the upper bounds that tolerances are held against."""
 QUANTILE = 0.95
 CONVERGED = max(RINGS)
 """Rays per pulse of the footprint that counts as truth."""
@@ -46,42 +52,6 @@ FINEST = 8
 """Octaves of the micro-relief that counts as truth."""
 DENSEST = {"image_spacing": 7.5, "ground_sampling_distance": 0.03}
 """Images that count as true where Blender has no pixel per return: for a range of 60 m. Denser than any preset's."""
-_DRAWS = 400
-_STEPS = 512
-"""Places at which a distribution's shares are counted."""
-_LEAST = 1e-9
-_BESIDE_STEPS = 0.01
-"""To either side of a step, m: faces at it may begin a little aside."""
-
-
-def mesh_height_errors(
-    mesh: SceneMesh, geometry: RoadGeometry, samples: int = 100_000, names: tuple[str, ...] = ("road", "roadside")
-) -> Float:
-    """Return signed height errors (N,) in metres of random points of the mesh's road surface.
-
-    Without the centimetres along which the pavement changes at once, at noses and ends of ramps: faces there go
-    slantwise from one cross-section to quite another one.
-
-    Args:
-        mesh: scene mesh in local coordinates.
-        geometry: the analytic road.
-        samples: points, drawn evenly by area with a fixed seed.
-        names: classes of the faces that belong to the analytic surface.
-    """
-    rng = stream(0, "mesh height errors")
-    faces = np.flatnonzero(np.isin(mesh.class_id, [class_id(name) for name in names]))
-    area = mesh.areas()[faces]
-    chosen = faces[rng.choice(len(faces), size=samples, p=area / area.sum())]
-    corners = mesh.vertices[mesh.triangles[chosen]].astype(np.float64)
-    u, v = rng.random((2, samples))
-    u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
-    points = corners[:, 0] + u[:, None] * (corners[:, 1] - corners[:, 0]) + v[:, None] * (corners[:, 2] - corners[:, 0])
-    station, offset = geometry.alignment.project(points[:, :2])
-    inside = (station >= 0) & (station <= geometry.length)
-    for low, high in (step for section in geometry.sections.values() for step in section.steps()):
-        inside &= (station < low - _BESIDE_STEPS) | (station > high + _BESIDE_STEPS)
-    error = points[inside, 2] - geometry.elevation(station[inside], offset[inside])
-    return np.asarray(error[np.isfinite(error)])
 
 
 def match_pulses(mine: PointBlock, truth: PointBlock) -> tuple[PointBlock, PointBlock]:
@@ -108,15 +78,11 @@ def beam_errors(mine: Sequence[PointBlock], truth: Sequence[PointBlock]) -> Erro
     }
 
 
-def shift_points(
-    results: Sequence[BlockResult], relief: MicroRelief, strength: float, seed: int, octaves: int
-) -> list[Float]:
-    """Return the places (N, 3) of the points of each part as micro-relief shifts them, m."""
-    return [
-        shift_along_normals(one.points, one.seen.position, relief, strength, seed, octaves).xyz
-        for one in results
-        if one.seen is not None
-    ]
+def shift_points(results: Sequence[BlockResult], plan: ScanPlan, octaves: int) -> list[Float]:
+    """Return the places (N, 3) of the points of each part as a plan's micro-relief shifts them, m."""
+    assert plan.relief is not None
+    shift = partial(shift_along_normals, relief=plan.relief, strength=plan.relief_strength, seed=plan.seed)
+    return [shift(one.points, one.seen.position, octaves=octaves).xyz for one in results if one.seen is not None]
 
 
 def relief_errors(mine: Sequence[Float], truth: Sequence[Float]) -> Errors:
@@ -136,6 +102,12 @@ def truest_settings(request: LayerRequest) -> ColourSettings:
     scale = image_scale(request.path.typical_range)
     lengths = {name: scale * length for name, length in DENSEST.items()}
     return replace(true, source="images", **lengths)  # type: ignore[arg-type]
+
+
+def render_layers(request: LayerRequest, parts: Sequence[SeenPoints]) -> list[LayerValues]:
+    """Return the colours and layers of parts of a cloud as a request wants them."""
+    with layer_source(request) as source:
+        return [sample_points(source, seen, request.wanted) for seen in parts]
 
 
 def known_rows(truth: LayerValues) -> NDArray[np.bool_]:
@@ -186,49 +158,3 @@ def errors_by_source(mine: LayerValues, truth: LayerValues) -> tuple[dict[str, f
 
     names = np.array([source_name(number) for number in range(256)])[mine.source[known]]
     return of(np.ones(len(difference), bool)), {str(name): of(names == name) for name in np.unique(names)}
-
-
-def quantile_bound(parts: Sequence[Float], quantile: float, key: str = "") -> tuple[float, float]:
-    """Return a quantile of all values and its upper confidence bound, drawn from whole parts.
-
-    The parts (stretches of a path) are drawn anew, with replacement: values within a part are alike, so that their
-    number says less than that of the parts. Efron & Tibshirani 1993, An Introduction to the Bootstrap.
-
-    Args:
-        parts: values (N,) of each part.
-        quantile: 0 to 1.
-        key: of the random numbers.
-    """
-    every = np.concatenate([*parts, np.empty(0)])
-    if not len(every):
-        return 0.0, 0.0
-    estimate = float(np.quantile(every, quantile))
-    places = np.unique(np.quantile(every, np.linspace(0.0, 1.0, _STEPS)))
-    below = np.stack([np.searchsorted(np.sort(part), places, side="right") for part in parts]).astype(np.float64)
-    total = np.array([len(part) for part in parts], dtype=np.float64)
-    weights = _draw_parts(len(parts), key)
-    share = (weights @ below) / np.maximum(weights @ total, 1.0)[:, None]
-    first = np.minimum((share < quantile).sum(axis=1), len(places) - 1)
-    return estimate, max(estimate, float(np.quantile(places[first], LEVEL)))
-
-
-def ratio_bound(above: Float, below: Float, key: str = "") -> tuple[float, float]:
-    """Return the ratio of two sums over parts, and its upper confidence bound; see `quantile_bound`.
-
-    Args:
-        above, below: (S,) of each part.
-        key: of the random numbers.
-    """
-    if not below.sum() > 0.0:
-        return 0.0, 0.0
-    estimate = float(above.sum() / below.sum())
-    weights = _draw_parts(len(below), key)
-    ratios = (weights @ above) / np.maximum(weights @ below, _LEAST)
-    ratios = ratios[weights @ below > 0.0]
-    return estimate, max(estimate, float(np.quantile(ratios, LEVEL)))
-
-
-def _draw_parts(parts: int, key: str) -> Float:
-    """Return how often each part is drawn (draws, parts)."""
-    rng = stream(0, "choice", key)
-    return rng.multinomial(parts, np.full(parts, 1.0 / parts), size=_DRAWS).astype(np.float64)

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...base.machine import machine
 from ...base.progress import peak_memory_mb
@@ -27,16 +26,17 @@ from ...scanning.platforms.stretches import middle_stretches, spread_stretches
 from ...scanning.record import RETURNS_AT_ONCE, record_as_measured, scan_blocks
 from ...scanning.relief import micro_relief
 from ...scanning.scan import BlockResult, joined_results
+from ...scanning.scene.height_errors import mesh_height_errors
 from ...scenario.scenario import load_scenario
-from ..road_scene import RoadScene
+from ..open_scene import RoadScene
 from ..scan.plan import Site
 from .errors import (
     CONVERGED,
     FINEST,
     beam_errors,
     errors_by_source,
-    mesh_height_errors,
     relief_errors,
+    render_layers,
     shift_points,
     truest_settings,
 )
@@ -73,10 +73,16 @@ def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
     shown.build()
     scene = shown.read()
     built = time.process_time()
-    plan = shown.site.plan(scene, BlenderServices())
+    plan = shown.plan()
     ready = time.process_time()
     costs, sample = _measure_stretches(shown.site, KNOBS[knob], plan)
-    errors, more = _errors(KNOBS[knob], sample)
+    errors: dict[str, float] = {}
+    more: dict[str, Any] = {}
+    if "relief" in KNOBS[knob].errors:
+        errors["relief_mm"] = 1e3 * _relief_error(sample)
+    if "colour" in KNOBS[knob].errors:
+        of_colours, more = _colour_errors(KNOBS[knob], sample)
+        errors |= of_colours
     if "height" in KNOBS[knob].errors:
         errors["height_mm"] = 1e3 * float(np.abs(mesh_height_errors(scene.static, road)).max())
     if "beam" in KNOBS[knob].errors:  # last, as its truth may be another scene
@@ -175,27 +181,7 @@ def _true_plan(shown: RoadScene, part: ScanPlan, plants: float) -> ScanPlan | No
     true = RoadScene(shown.scenario.model_copy(update={"scan": scan, "vegetation_detail": plants}), shown.road)
     if detail != plants:
         true.build()
-    plan = true.site.plan(true.read(), BlenderServices())
-    return replace(plan, path=part.path, rings=RINGS[CONVERGED])
-
-
-def _errors(knob: Knob, sample: Sample) -> tuple[dict[str, float], dict[str, Any]]:
-    """Return errors of relief and colours by name of `tradeoff.ROW_TITLES`, and what more there is to say of colours.
-
-    That is ``colour_truth``, what they were compared with, and ``errors_by_source``, their errors by what gave them to
-    the points.
-    """
-    errors: dict[str, float] = {}
-    more: dict[str, Any] = {}
-    if "relief" in knob.errors:
-        errors["relief_mm"] = 1e3 * _relief_error(sample)
-    if "colour" in knob.errors:
-        assert sample.values is not None
-        truth, more["colour_truth"], chosen = _true_colours(knob, sample)
-        mine = {name: array[chosen] for name, array in sample.values.arrays.items()}
-        of_all, more["errors_by_source"] = errors_by_source(LayerValues(mine, sample.values.source[chosen]), truth)
-        errors |= of_all
-    return errors, more
+    return replace(true.plan(), path=part.path, rings=RINGS[CONVERGED])
 
 
 def _beam_errors(sample: Sample, plan: ScanPlan | None) -> dict[str, float]:
@@ -213,17 +199,22 @@ def _beam_errors(sample: Sample, plan: ScanPlan | None) -> dict[str, float]:
 
 def _relief_error(sample: Sample) -> float:
     """Return how far the points' micro-relief is from the finest with full strength, m, 95th percentile."""
-    plan = sample.plan
-    materials = plan.target.materials
+    plan, materials = sample.plan, sample.plan.target.materials
     relief = plan.relief or micro_relief(materials, BlenderServices().materials(materials))
-    mine = shift_points([sample.result], relief, plan.relief_strength, plan.seed, plan.relief_octaves)
-    return relief_errors(mine, shift_points([sample.result], relief, 1.0, plan.seed, FINEST))["relief"][0]
+    mine = shift_points([sample.result], replace(plan, relief=relief), plan.relief_octaves)
+    truth = shift_points([sample.result], replace(plan, relief=relief, relief_strength=1.0), FINEST)
+    return relief_errors(mine, truth)["relief"][0]
 
 
-def _true_colours(knob: Knob, sample: Sample) -> tuple[LayerValues, str, NDArray[np.intp]]:
-    """Return colours and layers rendered as well as can be, what they are, and which points (K,) they are of."""
+def _colour_errors(knob: Knob, sample: Sample) -> tuple[dict[str, float], dict[str, Any]]:
+    """Return the errors of colours and layers against those rendered as well as can be, and what to say of them.
+
+    That is ``colour_truth``, what they were compared with, and ``errors_by_source``, their errors by what gave them to
+    the points.
+    """
     seen, request = sample.result.seen, sample.request
     assert seen is not None
+    assert sample.values is not None
     settings, chosen, name = truest_settings(request), np.arange(len(seen)), "a pixel per return"
     if knob.whole_paths:
         settings = replace(settings, lighting="path", samples=TRUE_SAMPLES)
@@ -235,5 +226,7 @@ def _true_colours(knob: Knob, sample: Sample) -> tuple[LayerValues, str, NDArray
         chosen = np.flatnonzero(np.any([(low <= seen.time) & (seen.time <= high) for low, high in within], axis=0))
         pixel, spacing = settings.ground_sampling_distance, settings.image_spacing
         name = f"images of {pixel:g} m pixels every {spacing:g} m, of the points that these show"
-    with layer_source(replace(request, settings=settings, wanted=LAYERS)) as source:
-        return sample_points(source, seen.select(chosen), LAYERS), name, chosen
+    (truth,) = render_layers(replace(request, settings=settings, wanted=LAYERS), [seen.select(chosen)])
+    mine = {name: array[chosen] for name, array in sample.values.arrays.items()}
+    errors, by_source = errors_by_source(LayerValues(mine, sample.values.source[chosen]), truth)
+    return errors, {"colour_truth": name, "errors_by_source": by_source}

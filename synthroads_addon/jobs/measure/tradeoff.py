@@ -39,29 +39,12 @@ class Knob:
     whole_paths: bool = False
 
 
-def _read_knob(
-    table: str,
-    errors: list[str],
-    always: list[str],
-    rows: Iterable[tuple[Any, list[str]]] = (),
-    field: str = "",
-    values: Iterable[Any] = (),
-    whole_paths: bool = False,
-) -> Knob:
-    """Return a knob of the shipped file; see `Knob`.
-
-    Args:
-        table, errors, whole_paths: its own.
-        always: changes of every row.
-        rows: value and further changes.
-        field: of the scenario, that takes each of the `values` in rows of their own.
-        values: of it.
-    """
-    further = [*rows, *((value, [f"{field}={value}"]) for value in values)]
-    return Knob(table, {value: (*always, *changes) for value, changes in further}, tuple(errors), whole_paths)
+def _read_knob(table: str, errors: list[str], always: list[str], rows: list[Any], whole_paths: bool = False) -> Knob:
+    """Return a knob of the shipped file: ``always`` are changes of every row, and ``rows`` values with their own."""
+    return Knob(table, {value: (*always, *changes) for value, changes in rows}, tuple(errors), whole_paths)
 
 
-KNOBS: dict[str, Knob] = {name: _read_knob(**data) for name, data in read_json(PRESETS / "tradeoff_rows.json").items()}
+KNOBS = {name: _read_knob(**data) for name, data in read_json(PRESETS / "tradeoff_rows.json").items()}
 """Knobs by name. ``fidelity`` are the presets: points that set several knobs at once; ``between`` are presets with one
 knob of another, which a preset must not be worse than. What is usual in them: no colours and relief where the model and
 the beam are measured, which don't touch these."""

@@ -24,17 +24,12 @@ from ...blender.services import BlenderServices
 from ...road.geometry import RoadGeometry
 from ...scanning.plan import ScanPlan
 from ...scanning.platforms.stretches import PathStretches
-from ...scanning.scene.motion import LaneMotion, ScannedScene, ShiftedMotion, lane_motions
-from ...scanning.sections import Section, sections, shadow_length, strip_parts
+from ...scanning.scene.motion import ScannedScene, ShiftedMotion, lane_motions
+from ...scanning.sections import Section, sections, shadow_length, strip_parts, vehicles_through
 from .files import record_to_files
-from .plan import Site, may_render
+from .plan import Site
 
 Float = NDArray[np.float64]
-
-_LOOK = 1.0
-"""Seconds between two looks at where a vehicle is."""
-_AROUND = 60.0
-"""A vehicle counts as near a section up to so far beyond it: more than it drives and reaches between two looks, m."""
 
 
 def scan_by_section(site: Site, road: RoadGeometry, folder: Path, timer: StageTimer) -> dict[str, Any]:
@@ -78,7 +73,7 @@ class SectionScan:
 
     def sections(self) -> Iterator[Section]:
         """Yield the sections from the road's start to its end."""
-        shadows = shadow_length(self._road) if may_render(self._scenario) else 0.0
+        shadows = shadow_length(self._road) if self._scenario.may_render else 0.0
         length = self._road.length
         return sections(self.cut, self._road, self._scenario.section_length(length) or length, shadows)
 
@@ -115,22 +110,10 @@ class SectionScan:
         frame = model.origin - np.array(whole.transform.translate)
         class_ids = self._scenario.cloud.scheme().source_ids()
         static = scene_mesh(objects=list(model.objects.values()), class_ids=class_ids)
-        passing = self._passing(section)
+        passing = vehicles_through(section, self.cut, self._motions, self._scenario.scan.traffic_speed_factor)
         vehicles = {name: motion.vehicle for name, motion in passing.items()}
         motions = {name: ShiftedMotion(motion, frame) for name, motion in passing.items()}
         scene = self._vehicles.with_traffic(static, vehicles, motions)
         # The vehicles' materials may be new.
         vary(whole.materials, whole.environment, self._scenario.own_materials())
         return scene, frame
-
-    def _passing(self, section: Section) -> dict[str, LaneMotion]:
-        """Return the vehicles that drive through a section while it is scanned."""
-        look = _LOOK / max(1.0, self._scenario.scan.traffic_speed_factor)
-        times = np.concatenate([
-            strip.start_time + np.linspace(0.0, strip.duration, int(np.ceil(strip.duration / look)) + 2)
-            for strip in strip_parts(self.cut, section.blocks)
-        ])  # fmt: skip
-        low, high = section.low - _AROUND, section.high + _AROUND
-        stations = {name: motion.station(times) for name, motion in self._motions.items()}
-        near = {name for name, station in stations.items() if ((station > low) & (station < high)).any()}
-        return {name: motion for name, motion in self._motions.items() if name in near}

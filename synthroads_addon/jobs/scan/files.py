@@ -26,7 +26,7 @@ from ...scenario.scenario import Scenario
 
 _logger = logging.getLogger("synthroads")
 _LONG = 300.0
-"""Seconds from which on a scan's forecast is told unasked."""
+"""Seconds from which on a scan's forecast is told unasked; of a shorter one only where details are asked for."""
 
 
 @dataclass
@@ -52,41 +52,40 @@ class ScanCounts:
             self.by_source += result.sources
 
 
+@dataclass
 class CloudFiles:
     """Sink that writes the cloud and the previews, of one scan or of one section after the other.
 
-    Args:
+    Attributes:
         scenario: says which files are wanted.
         folder: where the files go.
         origin: (3,) map coordinates near the points, m.
         typical_range: usual distance to what is scanned, m.
         epsg: map coordinate system; None if unknown.
         view: raster for the previews, which are written if it is given.
-
-    Attributes:
         counts: what was counted so far.
-        intensity_scale: 16-bit steps per unit of intensity.
     """
 
-    def __init__(
-        self,
-        scenario: Scenario,
-        folder: Path,
-        origin: NDArray[np.float64],
-        typical_range: float,
-        epsg: int | None = None,
-        view: TopView | None = None,
-    ) -> None:
-        self.scenario, self.folder, self.view = scenario, folder, view
-        self.counts = ScanCounts()
-        self._epsg, self._origin = epsg, origin
-        self._writers: list[CloudWriter] = []
-        self._grid: GridSubsampler | None = None
-        # 16 bits are full for a white target at a right angle at half the usual range: only what is nearer or a
-        # retro-reflector is brighter, and the weakest echoes still have hundreds of steps.
-        corrected = scenario.cloud.intensity == "range_corrected"
-        usual = 65535.0 / 4.0 * (1.0 if corrected else max(2.0, typical_range) ** 2)
-        self.intensity_scale = scenario.cloud.intensity_scale or usual
+    scenario: Scenario
+    folder: Path
+    origin: NDArray[np.float64]
+    typical_range: float
+    epsg: int | None = None
+    view: TopView | None = None
+    counts: ScanCounts = field(default_factory=ScanCounts)
+    _writers: list[CloudWriter] = field(default_factory=list)
+    _grid: GridSubsampler | None = None
+
+    @property
+    def intensity_scale(self) -> float:
+        """Return the 16-bit steps per unit of intensity, unless the scenario gives them.
+
+        16 bits are full for a white target at a right angle at half the usual range: only what is nearer or a
+        retro-reflector is brighter, and the weakest echoes still have hundreds of steps.
+        """
+        corrected = self.scenario.cloud.intensity == "range_corrected"
+        usual = 65535.0 / 4.0 * (1.0 if corrected else max(2.0, self.typical_range) ** 2)
+        return self.scenario.cloud.intensity_scale or usual
 
     @contextmanager
     def opened(self) -> Iterator[None]:
@@ -103,7 +102,7 @@ class CloudFiles:
         if self._writers:
             self.counts.points, self.counts.intensity_clipped = self._writers[0].count, self._writers[0].clipped
         if self.view:
-            self.view.save(self.folder, self._epsg)
+            self.view.save(self.folder, self.epsg)
 
     def write(self, result: BlockResult) -> None:
         """Write a block of a scan."""
@@ -116,7 +115,7 @@ class CloudFiles:
     def open_writer(self, name: str) -> CloudWriter:
         """Open a file of the cloud as the scenario asks for it."""
         cloud, path = self.scenario.cloud, self.folder / name
-        return open_writer(path, self._epsg, self._origin, self.intensity_scale, cloud.attributes, cloud.scheme())
+        return open_writer(path, self.epsg, self.origin, self.intensity_scale, cloud.attributes, cloud.scheme())
 
     def _keep(self, points: PointBlock) -> None:
         for writer in self._writers:
@@ -153,26 +152,23 @@ def record_to_files(
     Returns:
         the counts, as JSON data; triangles and vertices are those of the largest scene.
     """
-    figures: dict[str, Any] = {"triangles": 0, "vertices": 0}
+    figures: dict[str, Any] = {}
     rendered: dict[str, Any] = {}
     with ExitStack() as stack:
         stack.enter_context(files.opened())
-        for number, plan in enumerate(plans):
-            if announce and number == 0:  # the path is the whole scan's, whatever section the plan is of
-                _tell_forecast(plan)
-            largest = {name: max(figures[name], plan.summary()[name]) for name in ("triangles", "vertices")}
-            figures = plan.summary() | largest
+        for plan in plans:
+            if announce and not figures:  # the path is the whole scan's, whatever section the plan is of
+                forecast = plan.forecast()
+                level = logging.INFO if forecast.seconds >= _LONG else logging.DEBUG
+                _logger.log(level, "scan: %s", forecast.text())
+            summary = plan.summary()
+            largest = {name: max(figures.get(name, 0), summary[name]) for name in ("triangles", "vertices")}
+            figures = summary | largest
             _add_up(rendered, record(plan, files, timer))
             del plan  # its scene, before the next one is built
         with timer.stage("files"):
             stack.close()
-    return figures | files.summary() | {"rendered": rendered}
-
-
-def _tell_forecast(plan: ScanPlan) -> None:
-    """Say what a scan will take; of a short one only where details are asked for."""
-    forecast = plan.forecast()
-    _logger.log(logging.INFO if forecast.seconds >= _LONG else logging.DEBUG, "scan: %s", forecast.text())
+    return {"triangles": 0, "vertices": 0} | figures | files.summary() | {"rendered": rendered}
 
 
 def _add_up(sums: dict[str, Any], figures: Mapping[str, Any]) -> None:

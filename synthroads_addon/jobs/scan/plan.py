@@ -9,10 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ...base.classes import ClassScheme
+from ...base.arrays import Float
 from ...base.errors import InputError
 from ...base.progress import StageTimer
 from ...cloud.layers import optional_arrays
@@ -20,7 +17,6 @@ from ...cloud.tools.previews import TopView
 from ...materials.surfaces import surfaces_of
 from ...materials.variation import vary_material
 from ...road.geometry import RoadGeometry
-from ...scanning.beam import RINGS
 from ...scanning.blocks import Blocks
 from ...scanning.colour.request import LayerRequest
 from ...scanning.forecast import forecast_scan, refuse_large
@@ -32,9 +28,31 @@ from ...scanning.scene.classify import classify_scene
 from ...scanning.scene.motion import ScannedScene
 from ...scanning.scene.target import Target
 from ...scanning.weather.registry import weather_of
+from ...scenario.choice import check_choice
 from ...scenario.scan import scanner_setting
-from ...scenario.scenario import Scenario
+from ...scenario.scenario import OF_POINTS, Scenario
 from .files import CloudFiles, record_to_files
+
+
+def check_scan(scenario: Scenario, foreign: bool = False) -> None:
+    """Refuse a scan that can't be done, before any work starts.
+
+    Args:
+        scenario: the job.
+        foreign: whether the scene was built elsewhere.
+
+    Raises:
+        InputError: see `check_colour` and `check_choice`; or the device can't do it, or a table of materials or classes
+            can't be read.
+    """
+    if set(scenario.outputs) & set(OF_POINTS):
+        from ...blender.cameras import check_colour  # Blender takes a second to start: other outputs need none
+
+        check_colour(scenario.colour.settings(scenario.fidelity))
+    check_choice(scenario, foreign)
+    scanner_setting(scenario.scan)
+    scenario.cloud.scheme()
+    scenario.own_materials()
 
 
 def plan_scan(
@@ -58,22 +76,23 @@ def plan_scan(
     """
     conditions = conditions or ScanConditions()
     scene = classify_scene(scene, scenario.cloud.scheme(), conditions.road)
-    scan, settings, setting = scenario.scan, scenario.settings(), scanner_setting(scenario.scan)
-    materials, kept = scene.static.materials, kept_layers(scenario)
-    means, by_layers = services.materials(materials), scenario.colour.intensity_from_layers
-    table = scenario.own_materials()
+    kept, coloured, rings = scenario.kept_layers, scenario.coloured_layers, scenario.beam_rings
+    scan, settings, table = scenario.scan, scenario.settings(), scenario.own_materials()
+    by_layers, shifts = scenario.colour.intensity_from_layers, scan.relief > 0.0
+    colour = scenario.colour.settings(scenario.fidelity, path.typical_range)
+    setting, loss = scanner_setting(scan), scan.attenuation
+    weather = scan.weather or weather_of(conditions.environment)
+    cut = Blocks(setting, path, 1 + sum(rings))
+    refuse_large(forecast_scan(cut, len(scene.static), scan.threads), scan.most_pulses)
+    materials, means = scene.static.materials, services.materials(scene.static.materials)
+    target = Target(scene, lambda mesh: services.caster(scan.caster, mesh))
+    relief = micro_relief(materials, means) if shifts else None
     scanned = [
         vary_material(name, conditions.variation, conditions.environment, table) if name in table else mean
         for name, mean in zip(materials, means, strict=True)
     ]
-    loss, weather = scan.attenuation, scan.weather or weather_of(conditions.environment)
-    rings = beam_rings(scenario)
-    forecast = forecast_scan(Blocks(setting, path, 1 + sum(rings)), len(scene.static), scan.threads)
-    refuse_large(forecast, scan.most_pulses)
-    coloured, shifts = coloured_layers(scenario), scan.relief > 0.0
-    colour = scenario.colour.settings(scenario.fidelity, path.typical_range)
     return ScanPlan(
-        target=Target(scene, lambda mesh: services.caster(scan.caster, mesh)),
+        target=target,
         # The layers of each point have the variation of their own already.
         surfaces=surfaces_of(scanned, scan.reflection, spread=not by_layers),
         setting=setting,
@@ -92,7 +111,7 @@ def plan_scan(
         kept=kept,
         means=surfaces_of(means),
         range_corrected=scenario.cloud.intensity == "range_corrected",
-        relief=micro_relief(materials, means) if shifts else None,
+        relief=relief,
         relief_strength=scan.relief,
         relief_octaves=settings.relief_octaves,
         threads=scan.threads,
@@ -107,30 +126,6 @@ def plan_scan(
         ),
         services=services,
     )
-
-
-def beam_rings(scenario: Scenario) -> tuple[int, ...]:
-    """Return the rays on each ring around the beam's axis."""
-    own = scenario.scan.beam_rings
-    return RINGS[scenario.settings().rays_per_pulse] if own is None else own
-
-
-def kept_layers(scenario: Scenario) -> frozenset[str]:
-    """Return the names of the optional per-point layers that the files hold."""
-    return scenario.cloud.arrays() & optional_arrays() if "cloud" in scenario.outputs else frozenset()
-
-
-def coloured_layers(scenario: Scenario) -> frozenset[str]:
-    """Return the layers that points get besides what the scanner measures: ``rgb`` and material layers."""
-    rgb = {"rgb"} if scenario.colour.rgb else set()
-    return frozenset(rgb | (kept_layers(scenario) & optional_arrays("material")))
-
-
-def may_render(scenario: Scenario) -> bool:
-    """Return whether a scan may have to render: whether it does depends on the scene's materials as well."""
-    points = bool(set(scenario.outputs) & {"cloud", "previews"})
-    asked = bool(coloured_layers(scenario)) or scenario.colour.intensity_from_layers
-    return points and asked and scenario.colour.source != "material"
 
 
 @dataclass(frozen=True)
@@ -152,14 +147,14 @@ class Site:
     @classmethod
     def of_road(cls, scenario: Scenario, road: RoadGeometry) -> Site:
         """Return the site of a road's scan."""
-        view = road_view(road, scenario.cloud.scheme().sources()) if "previews" in scenario.outputs else None
+        view = TopView.over_road(road, scenario.cloud.scheme().sources()) if "previews" in scenario.outputs else None
         path = scenario.scan.platform.make_path(RoadGuide(road))
         return cls(scenario, path, ScanConditions.of(road.parameters), view)
 
     @property
     def cut(self) -> Blocks:
         """Return the blocks of pulses that the scan is cut into."""
-        return Blocks(scanner_setting(self.scenario.scan), self.path, 1 + sum(beam_rings(self.scenario)))
+        return Blocks(scanner_setting(self.scenario.scan), self.path, 1 + sum(self.scenario.beam_rings))
 
     def plan(self, scene: ScannedScene, services: SceneServices) -> ScanPlan:
         """Return the scan of a scene, see `plan_scan`.
@@ -171,7 +166,7 @@ class Site:
             raise InputError("Scene", None, "nothing that could be scanned is visible")
         return plan_scan(self.scenario, scene, self.path, services, self.conditions)
 
-    def files(self, folder: Path, origin: NDArray[np.float64]) -> CloudFiles:
+    def files(self, folder: Path, origin: Float) -> CloudFiles:
         """Return the sink that writes the cloud and the previews; the origin (3,) is near the points, map, m."""
         return CloudFiles(self.scenario, folder, origin, self.path.typical_range, self.conditions.epsg, self.view)
 
@@ -184,23 +179,3 @@ class Site:
         with timer.stage("caster"):
             plan = self.plan(scene, services)
         return record_to_files([plan], self.files(folder, plan.target.origin), timer)
-
-
-def road_view(geometry: RoadGeometry, scheme: ClassScheme | None = None) -> TopView:
-    """Return a raster for the previews that holds the whole swath of a road.
-
-    Args:
-        geometry: the road.
-        scheme: of the points' classes; the 17 if None.
-    """
-    origin = np.array(geometry.parameters.transform.translate)[:2]
-    stations = np.linspace(0.0, geometry.length, 50)
-    terrain = geometry.parameters.terrain
-    reach = terrain.half_width if terrain else float(np.abs(geometry.offsets(stations)).max())
-    plan, heading, _ = geometry.alignment.frame(stations)
-    left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
-    chord = plan[-1] - plan[0]
-    normal = np.array([-chord[1], chord[0]]) / max(np.hypot(*chord), 1e-9)
-    edges = np.concatenate([plan + reach * left, plan - reach * left])
-    across = (edges - plan[0]) @ normal
-    return TopView(plan[0] + origin, plan[-1] + origin, float(across.min()) - 2, float(across.max()) + 2, scheme)

@@ -34,6 +34,10 @@ _STEPS = 2
 _ROWS, _COLUMNS = (steps.ravel() for steps in np.mgrid[-_STEPS : _STEPS + 1, -_STEPS : _STEPS + 1])
 _LIT = 0.05
 """Share of the sun's full light from which on a place counts as lit."""
+_NEAREST = 3
+"""Places of images, nearest to some points, that `views_near` takes."""
+_MARGIN = 24
+"""Border around the points in these, px: what is hidden takes its colour from close by."""
 
 
 class ImageLayers:
@@ -269,3 +273,16 @@ def light_nearby(fallback: MaterialLayers, points: SeenPoints, taken: Float32, c
     lit = taken[:, channels["sun"]].sum(axis=1) > _LIT * (color * sun).sum(axis=1)
     result[:, channels["sun"]] = color * fallback.light.sunlight(points.normal) * lit[:, None]
     return result
+
+
+def views_near(views: Sequence[View], lines: Sequence[SeenPoints]) -> list[View]:
+    """Return what the nearest images show of the points of each scan line: parts of them."""
+    parts: list[View | None] = []
+    for line in lines:
+        away = np.array([np.linalg.norm(view.position - line.scanner.mean(axis=0)) for view in views])
+        places = np.unique(np.round(away, 6))[:_NEAREST]
+        if not len(places):
+            continue
+        near = np.flatnonzero(away <= places[-1] + 1e-5)
+        parts += [views[number].around(line.position, _MARGIN) for number in near]
+    return [part for part in parts if part is not None]

@@ -18,7 +18,7 @@ import bpy
 from ...base.errors import InputError
 from ...base.progress import Progress, StageTimer
 from ...blender.cameras import renders_returns
-from ...jobs.road_scene import RoadScene
+from ...jobs.open_scene import RoadScene
 from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ...scenario.scenario import Scenario

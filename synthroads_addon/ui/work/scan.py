@@ -23,12 +23,12 @@ from ...blender.scene.evaluated import CopiedScene, scanned_scene_steps
 from ...blender.services import SnapshotServices
 from ...jobs.generate import Job as PipelineJob
 from ...jobs.generate import check
-from ...jobs.job_files import OF_POINTS, JobFiles, empty_scan_warnings
+from ...jobs.job_files import JobFiles, empty_scan_warnings
 from ...jobs.scan.files import record_to_files
-from ...jobs.scan.plan import Site, may_render
+from ...jobs.scan.plan import Site
 from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
-from ...scenario.scenario import Scenario
+from ...scenario.scenario import OF_POINTS, Scenario
 from ..fields.preferences import with_preferences
 from .common import has_road, is_free
 from .job import Aside, PanelJob, Report, Step, Work
@@ -91,7 +91,7 @@ def scan_work(scan: RoadScan) -> Work[Written]:
     """
     scenario = scan.scenario
     check(PipelineJob(scenario, scan.target, overwrite=scan.overwrite))
-    timer, renders = StageTimer(), may_render(scenario)
+    timer, renders = StageTimer(), scenario.may_render
     with output_folder(scan.target, JobFiles(scenario).names, scan.overwrite) as folder:
         yield Step(0.0, "Reading")
         measure = yield from (_save_copy(scan, folder, timer) if renders else _read_open_scene(scan, timer))

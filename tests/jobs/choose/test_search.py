@@ -20,12 +20,13 @@ from synthroads_addon.jobs.choose.knobs import ModelKnobs
 from synthroads_addon.jobs.choose.table import table_of
 from synthroads_addon.jobs.choose.trial import Trial
 from synthroads_addon.jobs.generate import Job, generate
-from synthroads_addon.jobs.measure.errors import beam_errors, mesh_height_errors
-from synthroads_addon.jobs.road_scene import RoadScene
+from synthroads_addon.jobs.measure.errors import beam_errors
+from synthroads_addon.jobs.open_scene import RoadScene
 from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.beam import RINGS
+from synthroads_addon.scanning.scene.height_errors import mesh_height_errors
 from synthroads_addon.scenario.scenario import Scenario, apply_change, load_scenario
 
 pytestmark = pytest.mark.any_blender

@@ -17,11 +17,11 @@ from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scanned_scene
-from synthroads_addon.jobs.measure.errors import mesh_height_errors
 from synthroads_addon.jobs.measure.rows import measure_row
 from synthroads_addon.jobs.measure.tradeoff import KNOBS, SCENES, row_scenario, rows
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scanning.scene.height_errors import mesh_height_errors
 from synthroads_addon.scenario.scenario import load_scenario
 from tests.helpers.scenes.sparse_scanner import sparse_scanner
 

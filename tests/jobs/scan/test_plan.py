@@ -124,7 +124,16 @@ def test_nothing_is_asked_for_that_nobody_wants() -> None:
     assert not points.more
 
 
+def scan_without_blender() -> None:
+    """Plan and record a scan where importing Blender fails; for a process of its own."""
+    sys.modules |= dict.fromkeys(("bpy", "bmesh", "mathutils", "gpu"))
+    services = StandIns()
+    points = recorded(planned(services, colour={"rgb": False}, cloud={"attributes": ["normal", "roughness"]}))
+    assert np.allclose(points.xyz[:, 2], 180.0, atol=1e-4), "every point lies on the plane"
+    assert [asked[0] for asked in services.asked] == ["caster", "layers"]
+
+
 def test_none_of_it_needs_blender() -> None:
-    program = "import sys; import synthroads_addon.jobs.scan.plan, synthroads_addon.scanning.record; "
-    program += "sys.exit('bpy' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", program], cwd=ROOT, check=False).returncode == 0
+    program = "import tests.jobs.scan.test_plan as of; of.scan_without_blender()"
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr

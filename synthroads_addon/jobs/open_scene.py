@@ -1,12 +1,12 @@
-"""`RoadScene`: a road in Blender's open file, its scan, and the file itself. Must be used in the main thread."""
+"""Scenes in the open file and their scans: a road that is built, or what others made. For the main thread only."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from ..base.progress import StageTimer
 from ..blender.files import save_scene
@@ -16,11 +16,38 @@ from ..blender.model.store import remember
 from ..blender.scene.evaluated import scanned_scene
 from ..blender.services import BlenderServices
 from ..road.geometry import RoadGeometry
+from ..scanning.plan import ScanPlan
 from ..scanning.scene.motion import ScannedScene
-from ..scenario.scenario import Scenario
-from .job_files import OF_POINTS
+from ..scenario.scenario import OF_POINTS, Scenario
 from .scan.by_section import scan_by_section
 from .scan.plan import Site
+
+
+@dataclass(frozen=True)
+class ForeignScene:
+    """A scene that is there and stays as it is: read, and scanned.
+
+    Attributes:
+        site: of its scan.
+        scene: as it was read.
+        area: of what is built of it: nothing, m2.
+    """
+
+    site: Site
+    scene: ScannedScene
+    area: ClassVar[float] = 0.0
+
+    def rebuild(self, changes: Mapping[str, Any]) -> ScannedScene:
+        """Return the scene, which no change of the model's settings touches."""
+        return self.scene
+
+    def choose(self, scenario: Scenario, stands: bool) -> ForeignScene:
+        """Return the scene under a scenario with other settings; see `RoadScene.choose`."""
+        return replace(self, site=replace(self.site, scenario=scenario))
+
+    def scan(self, folder: Path, timer: StageTimer) -> dict[str, Any]:
+        """Scan it and write the cloud and the previews; return the counts as JSON data, see `Site.scan`."""
+        return self.site.scan(self.scene, BlenderServices(), folder, timer)
 
 
 @dataclass
@@ -53,26 +80,36 @@ class RoadScene:
     def build(self) -> RoadModel:
         """Build the road in place of that before, with the materials of the scenario's own table."""
         settings, parameters = self.scenario.settings(), self.road.parameters
-        model = build_road(parameters, settings.tolerance, settings.vegetation_detail)
+        self.model, self.scene = build_road(parameters, settings.tolerance, settings.vegetation_detail), None
         if self.scenario.materials_table:
             vary(parameters.materials, parameters.environment, self.scenario.own_materials())
-        return model
+        return self.model
 
     def read(self) -> ScannedScene:
         """Return the open scene, which shows the road, as it is scanned."""
-        factor, class_ids = self.scenario.scan.traffic_speed_factor, self.scenario.cloud.scheme().source_ids()
-        return scanned_scene(geometry=self.road, speed_factor=factor, class_ids=class_ids)
+        if self.scene is None:
+            factor, class_ids = self.scenario.scan.traffic_speed_factor, self.scenario.cloud.scheme().source_ids()
+            self.scene = scanned_scene(geometry=self.road, speed_factor=factor, class_ids=class_ids)
+        return self.scene
 
     def rebuild(self, changes: Mapping[str, Any]) -> ScannedScene:
         """Return the scene of the model with fields of the scenario changed, which is built in place of that before."""
-        self.model = RoadScene(self.scenario.model_copy(update=changes), self.road).build()
-        self.scene = self.read()
+        changed = RoadScene(self.scenario.model_copy(update=changes), self.road)
+        self.model, self.scene = changed.build(), changed.read()
         return self.scene
+
+    def choose(self, scenario: Scenario, stands: bool) -> RoadScene:
+        """Return the road under a scenario with other settings; ``stands``: the model is theirs already."""
+        return RoadScene(scenario, self.road, *((self.model, self.scene) if stands else ()))
+
+    def plan(self) -> ScanPlan:
+        """Return the scan of the scene, see `Site.plan`."""
+        return self.site.plan(self.read(), BlenderServices())
 
     def scan(self, folder: Path, timer: StageTimer) -> dict[str, Any]:
         """Scan the scene and write the cloud and the previews; return the counts as JSON data, see `Site.scan`."""
         with timer.stage("scene mesh"):
-            scene = self.scene or self.read()
+            scene = self.read()
         return self.site.scan(scene, BlenderServices(), folder, timer)
 
     def write_files(self, folder: Path, timer: StageTimer) -> dict[str, Any]:

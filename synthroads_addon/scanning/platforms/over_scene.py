@@ -1,0 +1,67 @@
+"""Paths over a scene that nobody prepared: along a line, its road or its middle, or at given places."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path as FilePath
+
+from ...base.errors import InputError
+from ...road.geometry import RoadGeometry
+from ..scene.extent import elevation_at, middle_line
+from ..scene.mesh import SceneMesh
+from .guides import RoadGuide
+from .path import Path
+from .platform import Platform
+from .polyline import PolylineGuide
+from .tripod import Tripod, TripodPath
+
+
+def path_over(
+    platform: Platform,
+    mesh: SceneMesh,
+    road: RoadGeometry | None = None,
+    line: FilePath | None = None,
+    places: Sequence[Sequence[float]] = (),
+) -> Path:
+    """Return the scanner's path: at places, along a line or the scene's road, or straight over the scene's middle.
+
+    Along a line or over the middle it has one strip unless the platform has lateral offsets.
+
+    Args:
+        platform: the scanner's.
+        mesh: the scene.
+        road: that the scene shows.
+        line: CSV or GeoJSON, in map coordinates.
+        places: of a tripod, (x, y) or (x, y, z) in map coordinates; z is that of the scanner itself.
+
+    Raises:
+        InputError: places are given and the platform is no tripod, or there is nothing below one; or see
+            `Platform.make_path`.
+    """
+    origin = mesh.origin.tolist()
+    if places:
+        tripod = as_tripod(platform)
+        return TripodPath(tripod, [_scanner_place(tripod, place, mesh) for place in places])
+    if road and not line:
+        return platform.make_path(RoadGuide(road))
+    guide = PolylineGuide.read(line, origin) if line else PolylineGuide(middle_line(mesh), origin)
+    return platform.as_single_strip().make_path(guide, origin)
+
+
+def as_tripod(platform: Platform) -> Tripod:
+    """Return a platform that is a tripod; raise `InputError` if it is another."""
+    if not isinstance(platform, Tripod):
+        raise InputError("scan.platform.kind", platform.kind, "must be tripod where its positions are given")
+    return platform
+
+
+def _scanner_place(tripod: Tripod, place: Sequence[float], mesh: SceneMesh) -> list[float]:
+    """Return the local place (3,) of a tripod's scanner: above the highest surface unless it has a z."""
+    local = [value - base for value, base in zip(place, mesh.origin, strict=False)]
+    if len(local) == 3:
+        return local
+    ground = elevation_at(mesh, *local)
+    if ground is None:
+        shown = ",".join(f"{value:g}" for value in place)
+        raise InputError("--tripod", shown, "there is no surface below: give the scanner's elevation, X,Y,Z")
+    return [*local, ground + tripod.value("height")]

@@ -1,0 +1,48 @@
+"""Which choices of settings, by a tolerance or a time, a scenario can ask for."""
+
+from __future__ import annotations
+
+from ..base.errors import InputError
+from ..scanning.colour.colour import MATERIAL_LAYERS
+from .scenario import OF_POINTS, Scenario
+
+
+def has_kind(scenario: Scenario, kind: str) -> bool:
+    """Return whether points of a job have what a kind of error of colours is of: ``colour`` or ``layers``."""
+    wanted = scenario.coloured_layers
+    return "rgb" in wanted if kind == "colour" else bool(set(MATERIAL_LAYERS) & wanted)
+
+
+def check_choice(scenario: Scenario, foreign: bool = False) -> None:
+    """Refuse a choice that can't be made or promised, before any work starts.
+
+    Args:
+        scenario: the job; nothing is refused if it leaves no choice.
+        foreign: the scene isn't built, so that nothing is known of its height's errors.
+
+    Raises:
+        InputError: names the field.
+    """
+    if not scenario.chooses:
+        return
+    limits = scenario.tolerance.limits() if scenario.tolerance else {}
+    if scenario.tolerance is not None and not limits:
+        raise InputError("tolerance", None, "must limit at least one kind of error")
+    colour, paths = scenario.colour, "can't be promised for whole light paths: colour.lighting must be direct"
+    layers = "can't be promised for intensities from the points' layers: take colour.intensity_from_layers out"
+    relief = "can't be promised for a relief of another strength than the surfaces': scan.relief must be 1"
+    none = "nothing has such an error, as points get no"
+    refusals = (
+        ("intensity", colour.intensity_from_layers, layers),
+        ("relief", scenario.scan.relief != 1.0, relief),
+        ("colour", colour.lighting == "path", paths),
+        ("layers", colour.lighting == "path", paths),
+        ("height", foreign, "can't be promised of a scene that was built elsewhere"),
+        ("colour", not has_kind(scenario, "colour"), f"{none} colours: colour.rgb is false"),
+        ("layers", not has_kind(scenario, "layers"), f"{none} layers: cloud.attributes names none of them"),
+    )
+    for kind, wrong, text in refusals:
+        if wrong and kind in limits:
+            raise InputError(f"tolerance.{kind}", limits[kind], text)
+    if not set(scenario.outputs) & set(OF_POINTS):
+        raise InputError("outputs", list(scenario.outputs), "must have the cloud or previews for settings to be chosen")
