@@ -1,10 +1,23 @@
-"""Random numbers keyed by what they are for, so that no result depends on order, worker or time."""
+"""Random numbers keyed by what they are for, so that no result depends on order, worker or time.
+
+Upper confidence bounds of samples are drawn by them as well: the bootstrap.
+"""
 
 from __future__ import annotations
 
 import zlib
+from collections.abc import Sequence
 
 import numpy as np
+
+from .arrays import Float
+
+LEVEL = 0.95
+"""Confidence of the upper bounds."""
+_DRAWS = 400
+_STEPS = 512
+"""Places at which a distribution's shares are counted."""
+_LEAST = 1e-9
 
 
 def stream(seed: int, *purpose: str | int) -> np.random.Generator:
@@ -14,3 +27,49 @@ def stream(seed: int, *purpose: str | int) -> np.random.Generator:
     """
     key = [zlib.crc32(part.encode()) if isinstance(part, str) else int(part) for part in purpose]
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence([int(seed), *key])))
+
+
+def quantile_bound(parts: Sequence[Float], quantile: float, key: str = "") -> tuple[float, float]:
+    """Return a quantile of all values and its upper confidence bound by the bootstrap.
+
+    The parts (stretches of a path, say) are drawn anew, with replacement: values within a part are alike, so that their
+    number says less than that of the parts. Efron & Tibshirani 1993, An Introduction to the Bootstrap.
+
+    Args:
+        parts: values (N,) of each part.
+        quantile: 0 to 1.
+        key: of the random numbers.
+    """
+    every = np.concatenate([*parts, np.empty(0)])
+    if not len(every):
+        return 0.0, 0.0
+    estimate = float(np.quantile(every, quantile))
+    places = np.unique(np.quantile(every, np.linspace(0.0, 1.0, _STEPS)))
+    below = np.stack([np.searchsorted(np.sort(part), places, side="right") for part in parts]).astype(np.float64)
+    total = np.array([len(part) for part in parts], dtype=np.float64)
+    weights = _draw_parts(len(parts), key)
+    share = (weights @ below) / np.maximum(weights @ total, 1.0)[:, None]
+    first = np.minimum((share < quantile).sum(axis=1), len(places) - 1)
+    return estimate, max(estimate, float(np.quantile(places[first], LEVEL)))
+
+
+def ratio_bound(above: Float, below: Float, key: str = "") -> tuple[float, float]:
+    """Return the ratio of two sums over parts, and its upper confidence bound; see `quantile_bound`.
+
+    Args:
+        above, below: (S,) of each part.
+        key: of the random numbers.
+    """
+    if not below.sum() > 0.0:
+        return 0.0, 0.0
+    estimate = float(above.sum() / below.sum())
+    weights = _draw_parts(len(below), key)
+    ratios = (weights @ above) / np.maximum(weights @ below, _LEAST)
+    ratios = ratios[weights @ below > 0.0]
+    return estimate, max(estimate, float(np.quantile(ratios, LEVEL)))
+
+
+def _draw_parts(parts: int, key: str) -> Float:
+    """Return how often each part is drawn (draws, parts)."""
+    rng = stream(0, "choice", key)
+    return rng.multinomial(parts, np.full(parts, 1.0 / parts), size=_DRAWS).astype(np.float64)

@@ -20,7 +20,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.statistics import quantile_bound, ratio_bound
+from ...base.random_streams import quantile_bound, ratio_bound
 from ...blender.cameras import HAS_RETURN_CAMERA, layer_source
 from ...cloud.points import PointBlock
 from ...scanning.beam import RINGS

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from synthroads_addon.base.statistics import quantile_bound, ratio_bound
+from synthroads_addon.base.random_streams import quantile_bound, ratio_bound
 
 
 def test_the_bound_of_a_quantile_holds_for_what_is_drawn_alike() -> None:
