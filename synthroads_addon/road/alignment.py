@@ -42,6 +42,7 @@ _NODE_SPACING = 20.0  # m, of the coarse nodes that start a projection
 _LEAF = 4096  # points projected at a time: their temporaries stay in the cache
 _PAIRS = 1_000_000  # distances held at a time
 _BLOCK = 65_536  # stations evaluated at a time
+_REACH = 0.98  # of the radius that an offset may use
 
 
 @dataclass(frozen=True)
@@ -367,22 +368,19 @@ def left_vectors(heading: Float) -> Float:
     return np.stack([-np.sin(heading), np.cos(heading)], axis=-1)
 
 
-def clip_offset(offset: ArrayLike, curvature: ArrayLike, share: float = 0.98) -> Float:
-    """Return the offset cut where its curve would fold, so that 1 - curvature x offset >= 1 - share.
+def clip_offset(offset: ArrayLike, curvature: ArrayLike) -> Float:
+    """Return the offset cut where its curve would fold, so that 1 - curvature x offset stays above 0.
 
     Args:
         offset: m, positive to the left; broadcast against `curvature`.
         curvature: 1/m of the axis, positive in a left curve.
-        share: of the radius that may be used, from 0 up to but not 1.
 
     Raises:
-        InputError: `share` out of range, or a value that isn't finite.
+        InputError: a value that isn't finite.
     """
-    if not 0.0 <= share < 1.0:
-        raise InputError("share", share, "from 0 up to but not including 1")
     offsets, bend = np.broadcast_arrays(finite_array("offset", offset), finite_array("curvature", curvature))
-    folds = offsets * bend > share
-    return np.where(folds, share / np.where(folds, bend, 1.0), offsets)[()]
+    folds = offsets * bend > _REACH
+    return np.where(folds, _REACH / np.where(folds, bend, 1.0), offsets)[()]
 
 
 def running_sum(values: Sequence[float]) -> Float:

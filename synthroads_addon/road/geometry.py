@@ -61,16 +61,12 @@ class RoadGeometry:
         self.alignment = alignment_of(parameters.alignment)
         self.profile = profile_of(parameters.alignment)
         self.sections = sections_of(parameters)
-        left, right = self.sections.get("left"), self.sections.get("right")
-        strips: list[SurfaceStrip] = []
-        if left:
-            strips += _strips(left)[::-1]
-        if left and right:
-            median = next(iter(parameters.of_type(Median).values()), left.carriageway)
-            strips.append(SurfaceStrip("median", *_SURFACES["median"], median.instance, None))
-        if right:
-            strips += _strips(right)
-        self.strips: tuple[SurfaceStrip, ...] = tuple(strips)
+        strips = {side: _strips(section) for side, section in self.sections.items()}
+        median: list[SurfaceStrip] = []
+        if len(strips) == 2:
+            owner = next(iter(parameters.of_type(Median).values()), self.sections["left"].carriageway)
+            median = [SurfaceStrip("median", *_SURFACES["median"], owner.instance, None)]
+        self.strips = (*reversed(strips.get("left", [])), *median, *strips.get("right", []))
 
     @property
     def length(self) -> float:
@@ -79,15 +75,8 @@ class RoadGeometry:
 
     def crossfall(self, carriageway: Carriageway, station: ArrayLike) -> Float:
         """Return the crossfall (m/m, positive where the surface falls to the right) at the stations, same shape."""
-        points = carriageway.crossfall
-        return (
-            np.interp(
-                np.asarray(station, dtype=np.float64),
-                [p.station for p in points],
-                [p.crossfall_percent for p in points],
-            )
-            / 100.0
-        )
+        at, percent = zip(*((p.station, p.crossfall_percent) for p in carriageway.crossfall), strict=True)
+        return np.interp(np.asarray(station, dtype=np.float64), at, percent) / 100.0
 
     def offsets(self, station: ArrayLike) -> Float:
         """Return the (N, M + 1) offsets of the strips' boundaries at N stations, from left (largest) to right, m."""
@@ -210,8 +199,6 @@ def _strips(section: CarriagewaySection) -> list[SurfaceStrip]:
     return [SurfaceStrip(kind, *_SURFACES.get(kind, paved), instance, side) for kind in section.kinds]
 
 
-def _pairs(station: ArrayLike, offset: ArrayLike) -> tuple[Float, Float]:
-    pair = np.broadcast_arrays(
-        np.asarray(station, dtype=np.float64).ravel(), np.asarray(offset, dtype=np.float64).ravel()
-    )
-    return pair[0], pair[1]
+def _pairs(*values: ArrayLike) -> list[Float]:
+    """Return values of any shape as flat arrays (N,) of one length."""
+    return np.broadcast_arrays(*(np.asarray(value, dtype=np.float64).ravel() for value in values))

@@ -64,7 +64,7 @@ class LaneLine:
         The pavement's plane goes on beyond its edges.
         """
         rise = self.carriageway.sign * self.geometry.crossfall(self.carriageway, station)
-        across = self.carriageway.sign * offset - self._pivot(station)
+        across = self.carriageway.sign * offset - self._section.pivot(station)
         height = self.geometry.profile.elevation(station) + rise * across
         if self.carriageway.pavement.ruts:
             height -= damage_depth(self._section, station, offset)
@@ -106,15 +106,6 @@ class LaneLine:
         cubic = u * (first + u * (3.0 * step - 2.0 * first - last + u * (first + last - 2.0 * step)))
         within = knots[panel] + np.where(u < 0.0, u * first, np.where(u > 1.0, step + (u - 1.0) * last, cubic))
         return np.asarray(within)
-
-    def _pivot(self, station: Float) -> Float:
-        if self._constant_pivot is not None:
-            return np.full(station.shape, self._constant_pivot)
-        return self._section.pivot(station)
-
-    @cached_property
-    def _constant_pivot(self) -> float | None:
-        return None if self._section.kinks() else float(self._section.pivot(np.zeros(1))[0])
 
     @cached_property
     def _table(self) -> tuple[Float, Float, tuple[Float, Float]]:

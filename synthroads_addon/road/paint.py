@@ -9,9 +9,8 @@ import numpy as np
 
 from ..base.arrays import Float
 from .geometry import RoadGeometry
-from .section import Arrow, Hatching, Turnout
+from .section import Arrow, Hatching
 from .section_geometry import CarriagewaySection
-from .turnout_geometry import TurnoutShape
 
 _EDGE_LINE = 0.3
 """The hatching keeps clear of the lines along both sides of the gore, m."""
@@ -54,8 +53,8 @@ def hatching_outlines(geometry: RoadGeometry, hatching: Hatching) -> list[Float]
     its middle outwards and back.
     """
     turnout = geometry.parameters.objects[hatching.turnout]
-    assert isinstance(turnout, Turnout)
-    section, shape = _shape(geometry, turnout)
+    section = geometry.sections[geometry.parameters.carriageway_of(hatching).side]
+    shape = next(shape for shape in section.turnouts if shape.turnout is turnout)
     tip, nose = shape.gore_tip(), shape.nose_station()
     forward = 1.0 if nose > tip else -1.0
     stations = np.linspace(tip, nose, 400)
@@ -107,14 +106,6 @@ def _clip_outline(outline: Float, station: float, keep: float) -> Float:
         if inside[i]:
             corners.append(corner)
     return np.array(corners).reshape(-1, 2)
-
-
-def _shape(geometry: RoadGeometry, turnout: Turnout) -> tuple[CarriagewaySection, TurnoutShape]:
-    for section in geometry.sections.values():
-        for shape in section.turnouts:
-            if shape.turnout is turnout:
-                return section, shape
-    raise KeyError(turnout.carriageway)
 
 
 def _between(section: CarriagewaySection, station: Float) -> tuple[Float, Float]:

@@ -77,24 +77,17 @@ class TurnoutShape:
 
     def kinks(self) -> list[float]:
         """Return the stations at which a width bends or steps, in no order."""
-        turnout, taper, tip = self.turnout, self._taper, self._tip
-        if turnout.ramp is None:
-            marks = [0.0, taper, tip, turnout.length]
-        else:
-            end = tip + turnout.ramp.length
-            marks = [0.0, taper, tip, end + STEP + BLEND, *(w for step in self._steps() for w in step)]
-        return [self.station(w) for w in marks]
+        last = self.turnout.length + STEP + BLEND if self.turnout.ramp else self.turnout.length
+        marks = [self.station(w) for w in (0.0, self._taper, self._tip, last)]
+        return [*marks, *(station for step in self.steps() for station in step)]
 
     def steps(self) -> list[tuple[float, float]]:
         """Return lowest and highest station of each `STEP` along which the pavement changes at once."""
-        steps = [sorted(map(self.station, step)) for step in self._steps()]
-        return [(low, high) for low, high in steps]
-
-    def _steps(self) -> list[tuple[float, float]]:
-        """Return the w of each step's two ends."""
         if self.turnout.ramp is None:
             return []
-        return [(self._tip + x, self._tip + x + STEP) for x in (self.nose, self.turnout.ramp.length)]
+        begins = [self._tip + x for x in (self.nose, self.turnout.ramp.length)]
+        steps = [sorted((self.station(w), self.station(w + STEP))) for w in begins]
+        return [(low, high) for low, high in steps]
 
     def range(self) -> tuple[float, float]:
         """Return the lowest and the highest station at which it changes anything."""
