@@ -122,3 +122,8 @@ def width_kinks(width: AnyWidth) -> list[float]:
 def nominal_width(width: AnyWidth) -> float:
     """Return the largest width along the road, m: what the cross-section says where nothing is left out."""
     return max(point.width for point in width) if isinstance(width, tuple) else width
+
+
+def least_width(width: AnyWidth) -> float:
+    """Return the smallest width along the road, m."""
+    return min(point.width for point in width) if isinstance(width, tuple) else width

@@ -19,6 +19,7 @@ from ..road.guidelines import LIMITS, LONGEST_STRAIGHT, DesignLimits
 from ..road.parameters import HorizontalElement, VerticalPoint
 from ..scenario.road import RoadScenario
 from .section import cross_section_of
+from .turnouts import bounds
 
 _Pair = tuple[float, float]
 Lengths = tuple[list[float], list[float]]
@@ -66,7 +67,7 @@ class HorizontalSampler:
     def __init__(self, scenario: RoadScenario, rng: np.random.Generator) -> None:
         self.design_class, self.length, self.rng = scenario.design_class, scenario.length, rng
         self.limits: DesignLimits = LIMITS[scenario.design_class]
-        self.radii = radius_limits(scenario)
+        self.radii = bounds(scenario.radius) if scenario.radius else (self.limits.radius, WIDEST_RADIUS)
         self.half_width = cross_section_of(scenario).paved_width / 2.0
         self.shortest_arc = 2.0 * self.limits.speed / 3.6
         self.parts: list[_AlignmentPart] = []
@@ -246,13 +247,6 @@ class HorizontalSampler:
         return tuple(HorizontalElement.between(n, *k) for n, k in zip(lengths, curvatures, strict=True))
 
 
-def radius_limits(scenario: RoadScenario) -> tuple[float, float]:
-    """Return the smallest and the largest radius (m) that may be drawn."""
-    if scenario.radius is None:
-        return LIMITS[scenario.design_class].radius, WIDEST_RADIUS
-    return scenario.radius.minimum, scenario.radius.maximum
-
-
 def _merge_parts(parts: list[_AlignmentPart]) -> list[_AlignmentPart]:
     """Return parts with neighbours of one constant curvature joined."""
     result: list[_AlignmentPart] = []
@@ -271,7 +265,8 @@ def sample_profile(scenario: RoadScenario, rng: np.random.Generator) -> tuple[Ve
     within it. Long roads turn back to the height they came from.
     """
     limits = LIMITS[scenario.design_class]
-    lowest, highest = grade_limits(scenario)
+    steepest = limits.grade_percent
+    lowest, highest = bounds(scenario.grade_percent) if scenario.grade_percent else (-steepest, steepest)
     stations = _intersections(scenario.length, rng)
     grades = [round_value(rng.uniform(lowest, highest))]
     radii: list[float] = []
@@ -296,14 +291,6 @@ def sample_profile(scenario: RoadScenario, rng: np.random.Generator) -> tuple[Ve
     elevations -= np.interp(scenario.length / 2.0, stations, elevations)
     rows = zip(stations, elevations, [0.0, *radii, 0.0], strict=True)
     return tuple(VerticalPoint(station=station, elevation=round_value(z), radius=radius) for station, z, radius in rows)
-
-
-def grade_limits(scenario: RoadScenario) -> tuple[float, float]:
-    """Return the least and the largest grade (%) that may be drawn."""
-    if scenario.grade_percent is None:
-        steepest = LIMITS[scenario.design_class].grade_percent
-        return -steepest, steepest
-    return scenario.grade_percent.minimum, scenario.grade_percent.maximum
 
 
 def _intersections(length: float, rng: np.random.Generator) -> list[float]:

@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from functools import lru_cache
+from operator import attrgetter
 
 from ..base.errors import InputError
-from ..base.schema import ClosedModel, Model
+from ..base.schema import Model
 from ..road.guidelines import (
     CLEARANCE,
     EMERGENCY_BAY_LENGTH,
@@ -124,7 +125,7 @@ def conflicts(scenario: RoadScenario, with_axis: bool = False) -> tuple[str, ...
 def _ranges(scenario: RoadScenario) -> Iterator[str]:
     """Yield intervals that reach beyond what a parameter set may hold."""
     for path, (low, high) in _ALLOWED.items():
-        limits = _interval(scenario, path)
+        limits: Interval = attrgetter(path)(scenario)
         if limits.minimum < low:
             yield f"{path}.minimum is {limits.minimum:g}, {low:g} is the least"
         if limits.maximum > high:
@@ -232,14 +233,6 @@ def _features(scenario: RoadScenario) -> Iterator[str]:
 def _short(path: str, limits: Interval, least: float, what: str) -> Iterator[str]:
     if limits.maximum < least:
         yield f"{path}.maximum is {limits.maximum:g} m, {what} needs {least:g} m"
-
-
-def _interval(scenario: ClosedModel, path: str) -> Interval:
-    value: object = scenario
-    for name in path.split("."):
-        value = getattr(value, name)
-    assert isinstance(value, Interval)
-    return value
 
 
 def _allowed_range(model: type[Model], name: str) -> tuple[float, float]:

@@ -12,6 +12,7 @@ from ..road.guidelines import LIMITS
 from ..road.objects import AnyWidth, Side
 from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Turnout
 from ..road.turnout_geometry import TurnoutShape
+from .placing.ranges import Range, Taken, free_ranges
 from .placing.site import PlacementSite
 
 NARROW, BROAD = 0.15, 0.30
@@ -24,8 +25,6 @@ LANE_THERE = 1.0
 ARROW_SPACING = 60.0
 _ARROWS_AT_LEAST = 3
 _FIRST_MERGE_ARROW = 20.0  # from the beginning of the taper, m
-
-_Span = tuple[float, float]
 
 
 def place_markings(site: PlacementSite) -> Iterator[tuple[str, LineMarking | Hatching | Arrow]]:
@@ -55,8 +54,8 @@ class _Painter:
         """Yield the lines along lane boundaries: solid at the edges, dashed between lanes."""
         lanes, limits = self.carriageway.lanes, self.site.scenario.markings
         dash, gap = limits.lane_dash or LANE_DASH, limits.lane_gap or LANE_GAP
-        blocks = sorted(_block_span(shape) for shape in self.section.turnouts if shape.turnout.ramp)
-        for number, span in enumerate(_gaps_between(blocks, self.length)):
+        blocks = Taken(_block_span(shape) for shape in self.section.turnouts if shape.turnout.ramp)
+        for number, span in enumerate(free_ranges(0.0, self.length, blocks)):
             name = f"{self.name}-line-0" + (f"-{number + 1}" if number else "")
             yield name, self._line("outer_edge", span, boundary=0, width=BROAD)
         for boundary in range(1, len(lanes)):
@@ -105,7 +104,7 @@ class _Painter:
             middle = boundaries[:, index : index + 2].mean(axis=1)
             yield from self._arrows(f"{self.name}-merge-arrow", kind, stations, middle)
 
-    def _line(self, kind: Any, span: _Span, **values: Any) -> LineMarking:
+    def _line(self, kind: Any, span: Range, **values: Any) -> LineMarking:
         given = {"width": NARROW, "dash_length": 0.0, "gap_length": 0.0, "film_thickness": self.film} | values
         start, end = span
         return LineMarking(instance=1, carriageway=self.name, kind=kind, start_station=start, end_station=end, **given)
@@ -125,31 +124,20 @@ class _Painter:
             yield f"{name}-{number}", arrow
 
 
-def _stations(shape: TurnoutShape, begin: float, end: float) -> _Span:
+def _stations(shape: TurnoutShape, begin: float, end: float) -> Range:
     """Return the stations (m), the lower one first, of a stretch between two distances along a turnout."""
     low, high = sorted((shape.station(begin), shape.station(end)))
     return max(0.0, round_value(low)), round_value(high)
 
 
-def _block_span(shape: TurnoutShape) -> _Span:
+def _block_span(shape: TurnoutShape) -> Range:
     """Return the stations (m) between which an exit's or entry's lane is parted from the road by a block marking."""
     turnout = shape.turnout
     taper = turnout.taper_in_length + turnout.taper_out_length
     return _stations(shape, 0.0, taper + max(0.0, turnout.lane_length - SOLID_BEFORE_GORE))
 
 
-def _gaps_between(spans: list[_Span], length: float) -> Iterator[_Span]:
-    """Yield what sorted spans leave of a length, m."""
-    reached = 0.0
-    for start, end in spans:
-        if start > reached:
-            yield reached, start
-        reached = end
-    if length > reached:
-        yield reached, length
-
-
-def _lane_stretch(width: AnyWidth, length: float) -> _Span:
+def _lane_stretch(width: AnyWidth, length: float) -> Range:
     """Return the stations (m) between which a lane that at most begins or ends once is there."""
     if not isinstance(width, tuple):
         return 0.0, length
@@ -159,5 +147,5 @@ def _lane_stretch(width: AnyWidth, length: float) -> _Span:
     return 0.0, round_value(float(np.interp(LANE_THERE, widths[::-1], stations[::-1])))
 
 
-def _overlap(first: _Span, second: _Span) -> _Span:
+def _overlap(first: Range, second: Range) -> Range:
     return max(first[0], second[0]), min(first[1], second[1])

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
 from typing import Any
-
-import numpy as np
 
 from ..base.random_streams import stream
 from ..base.schema import round_value
 from ..base.version import generator
+from ..road.geometry import alignment_of
 from ..road.objects import RoadObject, Side
-from ..road.parameters import EPSG_URI, AlignmentObject, HorizontalElement, Metadata, RoadParameters, Transform
+from ..road.parameters import EPSG_URI, AlignmentObject, Metadata, RoadParameters, Transform
 from ..road.section import Carriageway, Median, Turnout
 from ..scenario.road import RoadScenario
 from .alignment import HorizontalSampler, sample_profile
@@ -30,8 +28,6 @@ from .surroundings import (
     sample_vegetation,
     sample_vehicles,
 )
-
-_NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(16)[0] + 1.0) / 2.0, np.polynomial.legendre.leggauss(16)[1] / 2.0
 
 
 def sample_road(
@@ -89,34 +85,16 @@ def sample_alignment(scenario: RoadScenario, seed: int) -> AlignmentObject:
     """Return an alignment within the limits of its class, its middle at the local origin."""
     rng = stream(seed, "alignment")
     heading = round_value(rng.uniform(-180.0, 180.0), 6)
-    horizontal = HorizontalSampler(scenario, rng).draw()
-    x, y = _position(horizontal, math.radians(heading), scenario.length / 2.0)
-    return AlignmentObject(
+    axis = AlignmentObject(
         instance=1,
-        start_x=round_value(-x, 3),
-        start_y=round_value(-y, 3),
+        start_x=0.0,
+        start_y=0.0,
         start_heading_deg=heading,
-        horizontal=horizontal,
+        horizontal=HorizontalSampler(scenario, rng).draw(),
         vertical=sample_profile(scenario, stream(seed, "profile")),
     )
-
-
-def _position(elements: tuple[HorizontalElement, ...], heading: float, station: float) -> tuple[float, float]:
-    """Return the position (m) at a station of elements that begin at the origin with a heading (rad).
-
-    By Gauss's quadrature over each element: far nearer than the millimetre to which the begin is rounded, and quicker
-    than `Alignment`, which is exact.
-    """
-    lengths = np.array([element.length for element in elements])
-    starts = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
-    first = np.array([element.curvature_start for element in elements])
-    change = (np.array([element.curvature_end for element in elements]) - first) / lengths
-    turns = (first + change * lengths / 2.0) * lengths
-    headings = heading + np.cumsum(turns) - turns
-    reached = np.clip(station - starts, 0.0, lengths)
-    along = reached[:, None] * _NODES
-    angle = headings[:, None] + along * (first[:, None] + along * change[:, None] / 2.0)
-    return float(reached @ (np.cos(angle) @ _WEIGHTS)), float(reached @ (np.sin(angle) @ _WEIGHTS))
+    x, y = alignment_of(axis).position(scenario.length / 2.0).tolist()
+    return axis.model_copy(update={"start_x": round_value(-x, 3), "start_y": round_value(-y, 3)})
 
 
 def _sample_site(scenario: RoadScenario, seed: int, axis: AlignmentObject) -> PlacementSite:

@@ -16,13 +16,13 @@ from ..road.section import Carriageway, Lane, Pavement, Pothole, Rut, Turnout
 from ..scenario.road import FreeCrossSection, RoadScenario
 from .turnouts import (
     BESIDE_LANE_CHANGE,
-    Direction,
     RampLimits,
     TurnoutPlace,
     arrange,
     bounds,
     draw,
     features_of,
+    lowest_station,
     sample_turnout,
 )
 
@@ -68,29 +68,28 @@ class CarriagewaySampler:
     def draw(self, side: Side) -> tuple[Carriageway, dict[str, Turnout]]:
         """Return a carriageway and its turnouts by id, all with instance 1."""
         rng = stream(self.seed, "section", side)
-        direction = Direction(side, self.length)
         turnouts: dict[str, Turnout] = {}
         lanes = tuple(Lane(width=width) for width in self.section.lanes)
         for place in arrange(self.features, self.length, rng):
             if place.kind == "lane_change":
-                lanes = self._change_lane(lanes, place, direction, rng)
+                lanes = self._change_lane(lanes, place, side, rng)
                 continue
             name = f"{place.kind.replace('_', '-')}-{side}"
             number = sum(other.startswith(name) for other in turnouts) + 1
-            turnout = sample_turnout(self.scenario, self.ramps, place, direction, rng)
+            turnout = sample_turnout(self.scenario, self.ramps, place, side, self.length, rng)
             turnouts[name if number == 1 else f"{name}-{number}"] = turnout
         return self._carriageway(side, lanes, rng), turnouts
 
     def _change_lane(
-        self, lanes: tuple[Lane, ...], place: TurnoutPlace, direction: Direction, rng: np.random.Generator
+        self, lanes: tuple[Lane, ...], place: TurnoutPlace, side: Side, rng: np.random.Generator
     ) -> tuple[Lane, ...]:
         """Return the lanes with the outermost or innermost one ending, or beginning, over the taper of a place."""
         index = 0 if rng.random() < 0.5 else len(lanes) - 1
         drops = rng.random() < 0.5
         (taper,) = place.lengths
-        start = direction.lowest_station(place.begin + BESIDE_LANE_CHANGE, taper)
+        start = lowest_station(side, self.length, place.begin + BESIDE_LANE_CHANGE, taper)
         full = self.section.lanes[index]
-        low, high = (full, 0.0) if drops == (direction.side == "right") else (0.0, full)
+        low, high = (full, 0.0) if drops == (side == "right") else (0.0, full)
         stations = (0.0, start, round_value(start + taper), round_value(self.length))
         points = zip(stations, (low, low, high, high), strict=True)
         changed = Lane(width=tuple(WidthPoint(station=station, width=width) for station, width in points))

@@ -13,7 +13,7 @@ from ..base.arrays import Bool, Float, Index
 from ..base.random_streams import stream
 from ..base.schema import round_value
 from ..road.guidelines import OBSTACLE_DISTANCE
-from ..road.objects import AnyWidth, RoadObject, Side, nominal_width, width_at, width_kinks
+from ..road.objects import AnyWidth, RoadObject, Side, least_width, nominal_width, width_at, width_kinks
 from ..road.parameters import AlignmentObject
 from ..road.section_geometry import CarriagewaySection
 from ..road.surroundings import Environment, MaterialVariation, Terrain, Vegetation, Vehicle
@@ -118,8 +118,7 @@ def _room_beside(site: PlacementSite) -> float:
 
 def _first_tree(site: PlacementSite) -> float:
     """Return the distance (m) behind the verge from which trees may stand beside either carriageway."""
-    verges = [road.verge_width for road in site.carriageways.values()]
-    narrowest = min(min(p.width for p in verge) if isinstance(verge, tuple) else verge for verge in verges)
+    narrowest = min(least_width(road.verge_width) for road in site.carriageways.values())
     return round_value(max(0.0, OBSTACLE_DISTANCE[site.design_class] - narrowest))
 
 

@@ -203,34 +203,22 @@ def closest(stretches: Sequence[tuple[Feature, float]]) -> list[float]:
     return [*begins, max(reached, 0.0)]
 
 
-@dataclass(frozen=True)
-class Direction:
-    """Turns distances along a carriageway, in the direction of traffic, into stations.
-
-    Attributes:
-        side: of the carriageway.
-        length: of the road, m.
-    """
-
-    side: Side
-    length: float
-
-    def lowest_station(self, begin: float, length: float) -> float:
-        """Return the lowest station (m) of a stretch that begins at a distance and has a length, both m."""
-        return max(0.0, round_value(begin if self.side == "right" else self.length - begin - length))
+def lowest_station(side: Side, road_length: float, begin: float, length: float) -> float:
+    """Return the lowest station (m) of a stretch that begins at a distance along a carriageway and has a length (m)."""
+    return max(0.0, round_value(begin if side == "right" else road_length - begin - length))
 
 
 def sample_turnout(
-    scenario: RoadScenario, ramps: RampLimits, place: TurnoutPlace, direction: Direction, rng: np.random.Generator
+    scenario: RoadScenario, ramps: RampLimits, place: TurnoutPlace, side: Side, length: float, rng: np.random.Generator
 ) -> Turnout:
-    """Return the turnout at a place, with instance 1."""
+    """Return the turnout at a place beside a road of a length (m), with instance 1."""
     limits = scenario.turnouts
     begin = place.begin + BLEND + STEP if place.kind == "entry" else place.begin
     same: dict[str, Any] = {
         "instance": 1,
-        "carriageway": f"carriageway-{direction.side}",
+        "carriageway": f"carriageway-{side}",
         "kind": place.kind,
-        "start_station": direction.lowest_station(begin, math.fsum(place.lengths)),
+        "start_station": lowest_station(side, length, begin, math.fsum(place.lengths)),
     }
     if place.kind == "emergency_bay":
         return Turnout(

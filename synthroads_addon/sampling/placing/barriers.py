@@ -19,7 +19,7 @@ from ...scenario.road import BarrierLimits
 from .draw import draw, pick
 from .edge import STEP_OF_BARRIERS, Segment
 from .layout import BARRIER_AXIS, FAR_ZONE, Layout, Piece, Roadside
-from .ranges import Range, draw_start, free_ranges, lengthen_range, merge_ranges
+from .ranges import Range, draw_start, draw_stretch, free_ranges, lengthen_range, merge_ranges
 
 POST_SPACINGS = (4.0, 2.0, 1.33)
 """Distances between posts of the guardrail systems, m."""
@@ -181,12 +181,8 @@ def _elsewhere(roadside: Roadside, rng: np.random.Generator) -> Iterator[Range]:
         if rng.random() >= _IN_SLOT:
             continue
         low, high = roadside.length * slot / slots, roadside.length * (slot + 1) / slots
-        free = free_ranges(low, high, roadside.restless)
-        longest = max((end - start for start, end in free), default=0.0)
-        length = SHORTEST_BARRIER + max(0.0, longest - SHORTEST_BARRIER) * rng.random()
-        start = draw_start(rng, free, length)
-        if start is not None:
-            yield start, start + length
+        if stretch := draw_stretch(rng, free_ranges(low, high, roadside.restless), SHORTEST_BARRIER):
+            yield stretch
 
 
 def _inner(roadside: Roadside, segment: Segment) -> Range:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -19,7 +19,6 @@ from ...road.things.temporary_barrier import TemporaryBarrier
 from .draw import draw, pick
 from .layout import Layout, Roadside
 from .ranges import Range, Taken, draw_start, free_ranges
-from .site import PlacementSite
 
 TAPERS_IN, TAPER_OUT = (60.0, 70.0, 80.0), 20.0
 """Lengths over which the lane is closed and opened again, m."""
@@ -73,26 +72,11 @@ def construction_zones(layout: Layout, rng: np.random.Generator) -> tuple[dict[S
     return zones, objects
 
 
-def closed_lanes(objects: Iterable[RoadObject], site: PlacementSite) -> dict[Side, tuple[int, float, float]]:
-    """Return the lane that a construction zone closes, and from where to where (m), by side."""
-    beacons = [item for item in objects if isinstance(item, ConstructionBeacon)]
-    closures: dict[Side, tuple[int, float, float]] = {}
-    for side, section in site.sections.items():
-        on_side = [beacon for beacon in beacons if beacon.offset * section.carriageway.sign > 0.0]
-        if on_side:
-            innermost = min(on_side, key=lambda beacon: abs(beacon.offset))
-            boundaries = section.lane_boundaries(innermost.station)[0]
-            lane = int(np.count_nonzero(boundaries > abs(innermost.offset))) - 1
-            stations = [beacon.station for beacon in on_side]
-            closures[side] = lane, min(stations), max(stations)
-    return closures
-
-
 def _zone(layout: Layout, roadside: Roadside, rng: np.random.Generator) -> Zone | None:
     """Return a zone where the carriageway is wide enough, has no turnouts and keeps its widths; None without room."""
     limits, length = layout.site.scenario.furniture.construction_length, roadside.length
     section = layout.site.sections[roadside.side]
-    turnouts = ((start - _TURNOUT_ROOM, end + _TURNOUT_ROOM) for start, end in roadside.turnouts.all())
+    turnouts = ((start - _TURNOUT_ROOM, end + _TURNOUT_ROOM) for start, end in roadside.turnouts.stretches)
     free = free_ranges(0.0, length, Taken(turnouts), Taken(_changes(section.carriageway)))
     longest = max((end - start for start, end in free), default=0.0)
     least = max(TAPERS_IN[0] + SHORTEST_ALONG + TAPER_OUT, limits.minimum)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Iterator
+from itertools import accumulate
 
 import numpy as np
 
@@ -46,39 +47,33 @@ def delineator_stations(elements: tuple[HorizontalElement, ...]) -> Float:
         length = math.fsum(e.length for e in elements)
         first = min(widest, length) / 2.0
         return first + widest * np.arange(int((length - first) / widest) + 1)
-    spacing = _PostSpacing(elements, widest)
-    stations, station = [], min(spacing.at(0.0), spacing.length) / 2.0
-    while station <= spacing.length:
+    starts = [0.0, *accumulate(e.length for e in elements)]
+    stations, station = [], min(_spacing_behind(elements, starts, 0.0), starts[-1]) / 2.0
+    while station <= starts[-1]:
         stations.append(station)
-        station += spacing.at(station)
+        station += _spacing_behind(elements, starts, station)
     return np.array(stations)
 
 
-class _PostSpacing:
-    """Spacing of delineators by station.
+def _spacing_behind(elements: tuple[HorizontalElement, ...], starts: list[float], station: float) -> float:
+    """Return the spacing (m) behind a post: the table's at the tightest curvature within the widest spacing.
 
-    Attributes:
-        length: of the road, m.
+    Args:
+        elements: of the centreline.
+        starts: stations of their borders, m.
+        station: of the post, m.
     """
+    end = station + DELINEATOR_SPACING[-1][1]
+    first, last = (min(bisect_right(starts, at) - 1, len(elements) - 1) for at in (station, end))
+    # Curvature is linear along an element: its largest values stand at the ends of what lies ahead.
+    ahead = [_curvature(elements[i], at - starts[i]) for i, at in ((first, station), (last, end))]
+    ahead += [element.curvature_end for element in elements[first:last]]
+    ahead += [element.curvature_start for element in elements[first + 1 : last + 1]]
+    radii, spacings = zip(*DELINEATOR_SPACING, strict=True)
+    return float(np.interp(1.0 / max(*map(abs, ahead), 1e-9), radii, spacings))
 
-    def __init__(self, elements: tuple[HorizontalElement, ...], reach: float) -> None:
-        self._elements, self._reach = elements, reach
-        self._starts = np.concatenate([[0.0], np.cumsum([e.length for e in elements])]).tolist()
-        self._radii, self._spacings = np.array(DELINEATOR_SPACING).T
-        self.length = self._starts[-1]
 
-    def at(self, station: float) -> float:
-        """Return the spacing (m) behind a post: the table's at the tightest curvature within the reach."""
-        last = len(self._elements) - 1
-        first = min(bisect_right(self._starts, station) - 1, last)
-        final = min(bisect_right(self._starts, station + self._reach) - 1, last)
-        # Curvature is linear along an element: its largest values stand at the ends of what lies ahead.
-        ahead = [abs(self._curvature(first, station)), abs(self._curvature(final, station + self._reach))]
-        ahead += [abs(element.curvature_end) for element in self._elements[first:final]]
-        ahead += [abs(element.curvature_start) for element in self._elements[first + 1 : final + 1]]
-        return float(np.interp(1.0 / max(*ahead, 1e-9), self._radii, self._spacings))
-
-    def _curvature(self, index: int, station: float) -> float:
-        element = self._elements[index]
-        share = min((station - self._starts[index]) / element.length, 1.0)
-        return element.curvature_start + share * (element.curvature_end - element.curvature_start)
+def _curvature(element: HorizontalElement, along: float) -> float:
+    """Return the curvature (1/m) at a distance (m) from an element's begin; behind its end that of the end."""
+    share = min(along / element.length, 1.0)
+    return element.curvature_start + share * (element.curvature_end - element.curvature_start)

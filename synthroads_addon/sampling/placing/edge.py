@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
 from typing import NamedTuple
 
 import numpy as np
@@ -52,13 +51,6 @@ class EdgeProfile:
     """
 
     def __init__(self, section: CarriagewaySection, length: float) -> None:
-        self._constant = not section.turnouts and not section.kinks()
-        if self._constant:
-            edge = float(section.paved_edge(0.0)[0])
-            self.stations, self.paved, self.island = [0.0, length], [edge, edge], [0.0, 0.0]
-            self.main = self.line = self.paved
-            self.segments = [Segment(0.0, length, edge)]
-            return
         marks, besides = [np.array([0.0, length, *section.kinks()])], []
         for shape in section.turnouts:
             if shape.turnout.ramp:
@@ -66,41 +58,34 @@ class EdgeProfile:
                 marks.append(grid)
                 besides.append(beside_island)
         at = np.unique(np.clip(np.concatenate(marks), 0.0, length))
-        distances, main, island = section.distances(at), section.main_edge(at), np.zeros(at.shape)
-        paved = distances[:, -2]
-        line = paved.copy()
+        distances = section.distances(at)
+        self.stations, self.paved, self.main = at, distances[:, -2], section.main_edge(at)
+        self.island, self.line = np.zeros(at.shape), self.paved.copy()
         if besides:
-            island = np.diff(distances, axis=1)[:, section.kinds.index("island")]
+            self.island = np.diff(distances, axis=1)[:, section.kinds.index("island")]
         for start, end in besides:
             beside = (at > start) & (at < end)
-            line[beside] = main[beside]
-        self.stations, self.paved, self.main = at.tolist(), paved.tolist(), main.tolist()
-        self.line, self.island = line.tolist(), island.tolist()
-        self.segments = _segments(at, line, paved)
+            self.line[beside] = self.main[beside]
+        self.segments = _segments(at, self.line, self.paved)
 
     def largest_paved(self, start: float, end: float) -> float:
         """Return the largest distance of the paved edge between two stations, m."""
-        return self.paved[0] if self._constant else max(self._values(self.paved, start, end))
+        return float(self._values(self.paved, start, end).max())
 
     def largest_main(self, start: float, end: float) -> float:
         """Return the largest distance of the main road's paved edge between two stations, m."""
-        return self.main[0] if self._constant else max(self._values(self.main, start, end))
+        return float(self._values(self.main, start, end).max())
 
     def is_clear_beside_main(self, start: float, end: float, room: float) -> bool:
         """Return whether nothing is paved within so much room (m) outside of the main road between two stations."""
-        if self._constant:
-            return True
-        profiles = (self.paved, self.main, self.island)
-        points = zip(*(self._values(values, start, end) for values in profiles), strict=True)
-        return all(paved - main < _LEVEL or island >= room for paved, main, island in points)
+        paved, main, island = (self._values(values, start, end) for values in (self.paved, self.main, self.island))
+        return bool(((paved - main < _LEVEL) | (island >= room)).all())
 
     def line_beside(self, station: Float, reach: float) -> Float:
         """Return the largest distance (N,) of the line within a reach of stations (N,), all m.
 
         Where the line passes from the ramp's outer side to the main road's, it is the ramp's.
         """
-        if self._constant:
-            return np.full(station.shape, self.line[0])
         at = np.stack([station - reach, station, station + reach])
         line, paved, main = (np.interp(at, self.stations, values) for values in (self.line, self.paved, self.main))
         outside = (line > main + _LEVEL).any(axis=0)
@@ -110,17 +95,10 @@ class EdgeProfile:
         """Return the base of the segment at a station, m."""
         return next((s.base for s in self.segments if station <= s.end), self.segments[-1].base)
 
-    def _values(self, values: list[float], start: float, end: float) -> list[float]:
-        first, last = bisect_right(self.stations, start), bisect_left(self.stations, end)
-        return [self._at(values, start), *values[first:last], self._at(values, end)]
-
-    def _at(self, values: list[float], station: float) -> float:
-        after = bisect_right(self.stations, station)
-        if after == 0 or after == len(values):
-            return values[min(after, len(values) - 1)]
-        low, high = self.stations[after - 1 : after + 1]
-        share = (station - low) / (high - low)
-        return values[after - 1] * (1.0 - share) + values[after] * share
+    def _values(self, values: Float, start: float, end: float) -> Float:
+        """Return the values at two stations, and at those between them at which an edge bends."""
+        inside = values[(self.stations > start) & (self.stations < end)]
+        return np.append(inside, np.interp([start, end], self.stations, values))
 
 
 def ramp_station(shape: TurnoutShape, x: float) -> float:

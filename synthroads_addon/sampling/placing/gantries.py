@@ -128,13 +128,7 @@ def _at(layout: Layout, rng: np.random.Generator, station: float, half: float) -
 
 
 def _reserve_place(layout: Layout, plan: GantryPlan, half: float) -> GantryPlan:
-    low, high = plan.station - half, plan.station + half
-    for roadside in (layout.sides[side] for side in plan.sides):
-        roadside.near.add(low, high)
-        roadside.protect(low, high)
-    if plan.kind != "cantilever":
-        layout.median.taken.add(low, high)
-        layout.median.has_obstacles = True
+    layout.reserve(plan.station - half, plan.station + half, plan.sides, ("near",), plan.kind != "cantilever")
     return plan
 
 

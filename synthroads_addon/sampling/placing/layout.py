@@ -8,14 +8,14 @@ road by reserving their stretches before they are built. A thing's distance is k
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
 from ...base.schema import round_value
 from ...road.guidelines import OBSTACLE_LEAD, OBSTACLE_TAIL, TIGHT_CURVE
-from ...road.objects import AnyWidth, PointObject, Side
+from ...road.objects import PointObject, Side, least_width
 from ...road.things.sign import TrafficSign
 from .edge import EdgeProfile
 from .ranges import Range, Taken
@@ -104,7 +104,7 @@ class Roadside:
         self.edge = EdgeProfile(section, self.length)
         self.near, self.far, self.crossed = Taken(), Taken(), Taken()
         self.turnouts = Taken(shape.range() for shape in section.turnouts)
-        self.restless = Taken((start - _CALM, end + _CALM) for start, end in self.turnouts.all())
+        self.restless = Taken((start - _CALM, end + _CALM) for start, end in self.turnouts.stretches)
         self.spots: list[Spot] = []
         self.protected: list[Range] = []
         self.pieces: list[Piece] = []
@@ -219,7 +219,24 @@ class Layout:
         self.site = site
         self.length = site.length
         self.sides: dict[Side, Roadside] = {side: Roadside(site, side) for side in site.carriageways}
-        self.median = MedianStrip({side: _least(c.inner_offset) for side, c in site.carriageways.items()})
+        self.median = MedianStrip({side: least_width(c.inner_offset) for side, c in site.carriageways.items()})
+
+    def reserve(self, low: float, high: float, sides: Iterable[Side], zones: Iterable[str], in_median: bool) -> None:
+        """Take a stretch for an obstacle, and ask for barriers before it.
+
+        Args:
+            low, high: stations, m.
+            sides: of the carriageways beside which it stands.
+            zones: that it stands in there: ``near``, ``far``, ``crossed``.
+            in_median: whether it stands in the median as well.
+        """
+        for roadside in (self.sides[side] for side in sides):
+            for zone in zones:
+                getattr(roadside, zone).add(low, high)
+            roadside.protect(low, high)
+        if in_median:
+            self.median.taken.add(low, high)
+            self.median.has_obstacles = True
 
     @cached_property
     def tight_arcs(self) -> list[tuple[float, float, float]]:
@@ -230,7 +247,3 @@ class Layout:
                 arcs.append((start, start + element.length, element.curvature_start))
             start += element.length
         return arcs
-
-
-def _least(width: AnyWidth) -> float:
-    return min(point.width for point in width) if isinstance(width, tuple) else width

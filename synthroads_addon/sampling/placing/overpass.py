@@ -74,7 +74,9 @@ def plan_overpass(layout: Layout, rng: np.random.Generator) -> OverpassPlan | No
     start = draw_start(rng, free_ranges(0.0, layout.length, *taken), 2.0 * half)
     if start is None:
         return None
-    return _reserve_place(layout, replace(plan, station=start + half, half=half))
+    zones = ("far", "crossed", "near") if beside else ("far", "crossed")
+    layout.reserve(start, start + 2.0 * half, layout.sides, zones, in_median)
+    return replace(plan, station=start + half, half=half)
 
 
 def overpass(layout: Layout, plan: OverpassPlan, rng: np.random.Generator) -> Overpass:
@@ -105,17 +107,3 @@ def overpass(layout: Layout, plan: OverpassPlan, rng: np.random.Generator) -> Ov
         pier_offsets=tuple(sorted(offsets)),
         pier_width=round_value(plan.pier),
     )
-
-
-def _reserve_place(layout: Layout, plan: OverpassPlan) -> OverpassPlan:
-    low, high = plan.station - plan.half, plan.station + plan.half
-    for roadside in layout.sides.values():
-        roadside.far.add(low, high)
-        roadside.crossed.add(low, high)
-        if plan.beside:
-            roadside.near.add(low, high)
-        roadside.protect(low, high)
-    if plan.in_median:
-        layout.median.taken.add(low, high)
-        layout.median.has_obstacles = True
-    return plan

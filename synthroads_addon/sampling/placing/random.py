@@ -19,7 +19,7 @@ from .barriers import TERMINAL, BarrierSystem
 from .draw import pick
 from .equipment import LARGEST_KILOMETRE, LIGHT_WIDTH, put_kilometre_board, put_phone
 from .layout import BARRIER_AXIS, Layout, Piece, Roadside, Spot
-from .ranges import Taken, draw_start, free_ranges
+from .ranges import Taken, draw_start, draw_stretch, free_ranges
 from .signs import destination_values, stand
 
 SIGNS_PER_KM, BOARDS_PER_KM, PHONES_PER_KM, DELINEATORS_PER_KM, BARRIERS_PER_KM = 5.0, 2.0, 0.5, 20.0, 2.0
@@ -62,7 +62,7 @@ def random_median_barrier(layout: Layout, rng: np.random.Generator) -> Iterator[
     limits, median = layout.site.scenario.barriers, layout.median
     system = BarrierSystem.draw(rng, limits, limits.concrete_median)
     room = median.half_width - BARRIER_AXIS
-    span = _stretch(free_ranges(0.0, layout.length, median.taken), rng)
+    span = draw_stretch(rng, free_ranges(0.0, layout.length, median.taken), *BARRIER_LENGTHS)
     if limits.median and len(median.inner) > 1 and room >= 0.0 and span:
         offset, terminal = room * pick(rng, (-1.0, -0.5, 0.0, 0.5, 1.0)), min(TERMINAL, (span[1] - span[0]) / 4.0)
         yield "guardrail-median", system.rail(span, offset, "both", terminal)
@@ -76,7 +76,7 @@ def random_front(
     system = BarrierSystem.draw(rng, limits, limits.concrete_roadside)
     for _ in range(_count(BARRIERS_PER_KM, layout, rng) if limits.roadside else 0):
         segment = pick(rng, roadside.edge.segments)
-        span = _stretch(free_ranges(segment.start, segment.end, taken), rng)
+        span = draw_stretch(rng, free_ranges(segment.start, segment.end, taken), *BARRIER_LENGTHS)
         if span:
             taken.add(*span)
             roadside.pieces.append(Piece(*span, segment.base, segment.ramp))
@@ -108,14 +108,6 @@ def _stations(roadside: Roadside, per_km: float, layout: Layout, rng: np.random.
         start = draw_start(rng, free_ranges(0.0, layout.length, roadside.near), 2.0 * _HALF)
         if start is not None:
             yield start + _HALF
-
-
-def _stretch(ranges: list[tuple[float, float]], rng: np.random.Generator) -> tuple[float, float] | None:
-    """Return a stretch of random length for a barrier, or None without room."""
-    longest = min(BARRIER_LENGTHS[1], max((end - start for start, end in ranges), default=0.0))
-    length = BARRIER_LENGTHS[0] + (longest - BARRIER_LENGTHS[0]) * rng.random()
-    start = draw_start(rng, ranges, length) if longest >= BARRIER_LENGTHS[0] else None
-    return None if start is None else (start, start + length)
 
 
 def _count(per_km: float, layout: Layout, rng: np.random.Generator) -> int:

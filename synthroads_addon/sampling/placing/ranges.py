@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from bisect import bisect_left, bisect_right
 from collections.abc import Iterable
 
 import numpy as np
@@ -13,34 +12,22 @@ Range = tuple[float, float]
 
 
 class Taken:
-    """Stretches that are taken, merged where they overlap."""
+    """Stretches that are taken; they may overlap."""
 
     def __init__(self, stretches: Iterable[Range] = ()) -> None:
-        self._starts: list[float] = []
-        self._ends: list[float] = []
-        for start, end in stretches:
-            self.add(start, end)
+        self.stretches = list(stretches)
 
     def add(self, start: float, end: float) -> None:
         """Take a stretch."""
-        first, last = bisect_left(self._ends, start), bisect_right(self._starts, end)
-        if first < last:
-            start, end = min(start, self._starts[first]), max(end, self._ends[last - 1])
-        self._starts[first:last], self._ends[first:last] = [start], [end]
+        self.stretches.append((start, end))
+
+    def within(self, start: float, end: float) -> list[Range]:
+        """Return what is taken between two stations; the outermost may reach beyond them, what only touches doesn't."""
+        return [(low, high) for low, high in self.stretches if high > start and low < end]
 
     def is_free(self, start: float, end: float) -> bool:
         """Return whether nothing of a stretch is taken; what only touches it does no harm."""
-        first = bisect_right(self._ends, start)
-        return first == len(self._ends) or self._starts[first] >= end
-
-    def within(self, start: float, end: float) -> list[Range]:
-        """Return what is taken between two stations, in order; the outermost may reach beyond them."""
-        first, last = bisect_right(self._ends, start), bisect_left(self._starts, end)
-        return list(zip(self._starts[first:last], self._ends[first:last], strict=True))
-
-    def all(self) -> list[Range]:
-        """Return all that is taken, in order."""
-        return list(zip(self._starts, self._ends, strict=True))
+        return not self.within(start, end)
 
 
 def free_ranges(low: float, high: float, *taken: Taken) -> list[Range]:
@@ -66,6 +53,14 @@ def draw_start(rng: np.random.Generator, ranges: list[Range], length: float) -> 
             return start + left
         left -= room
     return rooms[-1][0] + rooms[-1][1]
+
+
+def draw_stretch(rng: np.random.Generator, ranges: list[Range], least: float, most: float = math.inf) -> Range | None:
+    """Return a stretch in the ranges of a length from the least to the most (m) that has room; None without room."""
+    longest = min(most, max((end - start for start, end in ranges), default=0.0))
+    length = least + max(0.0, longest - least) * rng.random()
+    start = draw_start(rng, ranges, length)
+    return None if start is None else (start, start + length)
 
 
 def nearest_free(station: float, half: float, room: float, length: float, *taken: Taken) -> float | None:

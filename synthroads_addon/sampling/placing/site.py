@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...base.random_streams import stream
 from ...road.guidelines import LIMITS, DesignLimits
@@ -19,8 +18,6 @@ from ...road.surroundings import Terrain
 from ...road.turnout_geometry import TurnoutShape
 from ...scenario.road import RoadScenario
 
-Float = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class PlacementSite:
@@ -31,7 +28,6 @@ class PlacementSite:
         alignment, terrain: as in the parameter set.
         carriageways: by side; their ids are ``carriageway-left`` and ``carriageway-right``.
         turnouts: by id.
-        sections: the carriageways' cross-sections, made from the above.
     """
 
     scenario: RoadScenario
@@ -40,12 +36,12 @@ class PlacementSite:
     carriageways: dict[Side, Carriageway]
     turnouts: dict[str, Turnout]
     terrain: Terrain
-    sections: dict[Side, CarriagewaySection] = field(init=False)
 
-    def __post_init__(self) -> None:
+    @cached_property
+    def sections(self) -> dict[Side, CarriagewaySection]:
+        """Cross-sections of the carriageways by side."""
         sides = self.carriageways.items()
-        sections = {side: CarriagewaySection(road, self.turnouts_of(side).values()) for side, road in sides}
-        object.__setattr__(self, "sections", sections)
+        return {side: CarriagewaySection(road, self.turnouts_of(side).values()) for side, road in sides}
 
     @cached_property
     def length(self) -> float:

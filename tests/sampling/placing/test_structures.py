@@ -12,7 +12,6 @@ from synthroads_addon.road.things.beacon import ConstructionBeacon
 from synthroads_addon.road.things.gantry import Gantry
 from synthroads_addon.road.things.overpass import Overpass
 from synthroads_addon.road.things.temporary_barrier import TemporaryBarrier
-from synthroads_addon.sampling.placing.furniture import closed_lanes
 from tests.helpers.roads.sites import bay_at, beside, exit_at, make_site, of, place, straight
 
 EDGE, LANES = 14.0, (10.25, 6.5, 2.75)
@@ -185,16 +184,6 @@ def test_yellow_line_and_movable_barrier() -> None:
             assert barrier.offset == barrier.end_offset < -(LANES[1] + 0.55 + 0.125 + barrier.base_width / 2.0)
             assert stations[1] < barrier.start_station < barrier.end_station < stations[2]
     assert barriers > 8
-
-
-def test_closed_lanes() -> None:
-    site = make_site(straight(1000.0), **ZONE)
-    furniture = place(site)
-    closed = closed_lanes(furniture.values(), site)
-    for side in ("right", "left"):
-        stations = [beacon.station for beacon in beside(furniture, side, ConstructionBeacon)]
-        assert closed[side] == (0, min(stations), max(stations))
-    assert closed_lanes([], site) == {}
 
 
 def test_no_construction_zone_beside_turnouts_or_on_a_single_lane() -> None:
