@@ -16,6 +16,7 @@ from ..road.things.concrete_barrier import ConcreteBarrier
 from ..road.things.delineator import Delineator
 from ..road.things.guardrail import Guardrail
 from ..road.things.noise_barrier import NoiseBarrier
+from .smoothing import difference_figures
 
 BARRIER_DISTANCE, POST_DISTANCE = 0.5, 1.0
 """Barriers and delineators within so far of each other are the same, m."""
@@ -70,12 +71,7 @@ def _plan_shift(truth: RoadParameters, found: RoadParameters) -> Float:
 
 
 def _figures(difference: Float) -> dict[str, float]:
-    if not len(difference):
-        return {}
-    size = np.abs(difference)
-    figures = {"mean": difference.mean(), "mae": size.mean(), "rms": np.sqrt((size**2).mean())}
-    figures |= {"p95": np.percentile(size, 95), "largest": size.max()}
-    return {name: round(float(value), 4) for name, value in figures.items()}
+    return difference_figures(difference, "mean", "mae", "rms", "p95", "largest")
 
 
 def _carriageway(
@@ -110,11 +106,10 @@ def _surface(
         for share in (0.1, 0.3, 0.5, 0.7, 0.9):
             bounds = side.distances(station)
             offset = float(side.carriageway.sign) * (bounds[:, 0] + share * (side.main_edge(station) - bounds[:, 0]))
-            at, beside = here.alignment.project(_place(there, station, offset) + _plan_shift(truth, found))
+            at, beside = here.alignment.project(there.alignment.place(station, offset) + _plan_shift(truth, found))
             high = here.elevation(at, beside) + found.transform.translate[2]
             result.append(high - there.elevation(station, offset) - truth.transform.translate[2])
-    difference = np.concatenate(result)
-    return difference[np.isfinite(difference)]
+    return np.concatenate(result)
 
 
 def _barriers(there: RoadGeometry, here: RoadGeometry, apart: Float) -> dict[str, Any]:
@@ -155,7 +150,7 @@ def _match_barriers(
 def _along(road: RoadGeometry, item: LineObject) -> Float:
     end = min(item.end_station, road.length)
     station = np.arange(item.start_station, max(end, item.start_station + 1e-6), _STEP)
-    return _place(road, station, np.full(len(station), item.offset))
+    return road.alignment.place(station, np.full(len(station), item.offset))
 
 
 def _posts(there: RoadGeometry, here: RoadGeometry, apart: Float) -> dict[str, Any]:
@@ -163,7 +158,8 @@ def _posts(there: RoadGeometry, here: RoadGeometry, apart: Float) -> dict[str, A
     points = []
     for road in (there, here):
         items = [item for item in road.parameters.of_type(Delineator).values() if item.station <= road.length]
-        points.append(_place(road, np.array([i.station for i in items]), np.array([i.offset for i in items])))
+        places = np.array([(item.station, item.offset) for item in items]).reshape(-1, 2)
+        points.append(road.alignment.place(*places.T))
     true, reconstructed = points[0] + apart, points[1]
     if not len(true) or not len(reconstructed):
         return {"true": len(true), "found": len(reconstructed), "recall": 0.0 if len(true) else None, "precision": None}
@@ -178,13 +174,6 @@ def _posts(there: RoadGeometry, here: RoadGeometry, apart: Float) -> dict[str, A
         "precision": round(len(matched) / len(reconstructed), 4),
         "distance": _figures(matched),
     }
-
-
-def _place(road: RoadGeometry, station: Float, offset: Float) -> Float:
-    if not len(station):
-        return np.empty((0, 2))
-    position, heading, _ = road.alignment.frame(station)
-    return position + offset[:, None] * np.column_stack([-np.sin(heading), np.cos(heading)])
 
 
 def _share(hits: Bool) -> float | None:

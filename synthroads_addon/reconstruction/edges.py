@@ -10,26 +10,16 @@ import numpy as np
 from ..base.arrays import Float
 from .path import SPACING
 from .profiles import ACROSS, STRETCH, Grid, Profiles, SurfacePoints
+from .smoothing import bisquare, fill_gaps, robust_scale
 
-_FARTHEST = 8.0  # m beyond a carriageway's lines that its edge is looked for
+FARTHEST = 8.0
+"""How far beyond a carriageway's lines its edge is looked for, m."""
 _MIXED = 0.8  # m to either side of an edge in which pavement and verge are weighed
 _FEWEST = 0.15  # of the bins around an edge must have points
 _CLEAR = 0.2  # m inside of the edges: the surface is measured here
 _ROUNDS = 5
-_BISQUARE = 4.685
 _FEWEST_BINS = 20
 _FEWEST_POINTS = 6
-
-
-def stretch_count(profiles: Profiles) -> int:
-    """Return the number of stretches that profiles are cut into."""
-    return -(-len(profiles.stations) // STRETCH)
-
-
-def stretch_middles(profiles: Profiles) -> Float:
-    """Return the (K,) middles of the stretches, m along the path."""
-    first = profiles.stations[0] - 0.5 * SPACING
-    return first + STRETCH * SPACING * (np.arange(stretch_count(profiles)) + 0.5)
 
 
 @dataclass(frozen=True)
@@ -45,7 +35,7 @@ class Edge:
     apart: Float
 
 
-def paved_edge(profiles: Profiles, paved: Grid, begin: Float, sign: int, farthest: float | Float = _FARTHEST) -> Edge:
+def paved_edge(profiles: Profiles, paved: Grid, begin: Float, sign: int, farthest: float | Float = FARTHEST) -> Edge:
     """Return where the pavement ends beyond given offsets (K,), m.
 
     Args:
@@ -116,19 +106,12 @@ class Surface:
     """A carriageway's surface, stretch by stretch.
 
     Attributes:
-        pivot: (K,) offsets at which the heights hold, m.
-        height: (K,) m; NaN where too little was seen.
+        height: (K,) at the pivot line, m; NaN where too little was seen.
         fall: (K,) crossfall, m/m, positive where it falls to the right.
-        height_std, fall_std: (K,) from the scatter about the plane.
-        scatter: (K,) standard deviation of the bins' mean heights about the plane, m.
     """
 
-    pivot: Float
     height: Float
     fall: Float
-    height_std: Float
-    fall_std: Float
-    scatter: Float
 
 
 def surface(profiles: Profiles, low: Float, high: Float, pivot: Float) -> Surface:
@@ -139,10 +122,9 @@ def surface(profiles: Profiles, low: Float, high: Float, pivot: Float) -> Surfac
         low, high: (K,) offsets of the pavement's right and left edge, m.
         pivot: (K,) offsets at which the height is wanted, m.
     """
-    count = len(pivot)
-    result = np.full((5, count), np.nan)
+    result = np.full((2, len(pivot)), np.nan)
     slope = _grade(profiles)
-    for number in range(count):
+    for number in range(len(pivot)):
         if not (np.isfinite(low[number]) and np.isfinite(high[number]) and high[number] - low[number] > 1.0):
             continue
         rows = slice(number * STRETCH, (number + 1) * STRETCH)
@@ -153,9 +135,8 @@ def surface(profiles: Profiles, low: Float, high: Float, pivot: Float) -> Surfac
         across = np.broadcast_to(profiles.offsets[columns] - pivot[number], height.shape)
         known = np.isfinite(height)
         if known.sum() >= _FEWEST_BINS:
-            result[:, number] = _line(across[known], height[known])
-    height, fall, height_std, fall_std, scatter = result
-    return Surface(pivot, height, fall, height_std, fall_std, scatter)
+            result[:, number] = _fit_line(across[known], height[known])
+    return Surface(*result)
 
 
 def _grade(profiles: Profiles) -> Float:
@@ -163,25 +144,18 @@ def _grade(profiles: Profiles) -> Float:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # rows without points
         middle = np.nanmedian(profiles.height, axis=1)
-    rows = np.arange(len(middle))
-    known = np.isfinite(middle)
-    filled = np.interp(rows, rows[known], middle[known])
-    smoothed = np.convolve(np.pad(filled, 15, mode="edge"), np.ones(31) / 31, mode="valid")
+    smoothed = np.convolve(np.pad(fill_gaps(middle), 15, mode="edge"), np.ones(31) / 31, mode="valid")
     grade = np.gradient(smoothed, SPACING)
-    at = np.minimum(np.arange(stretch_count(profiles)) * STRETCH + STRETCH // 2, len(grade) - 1)
-    return grade[at]
+    return grade[np.minimum(np.arange(profiles.stretches) * STRETCH + STRETCH // 2, len(grade) - 1)]
 
 
-def _line(across: Float, height: Float) -> tuple[float, float, float, float, float]:
-    """Return height at 0, slope, their standard deviations, and the scatter of a robust line through bins."""
+def _fit_line(across: Float, height: Float) -> Float:
+    """Return height at 0 and slope (2,) of a robust line through bins (N,)."""
     matrix = np.column_stack([np.ones(len(across)), across])
-    weight = np.ones(len(across))
-    solution, scatter, inverse = np.zeros(2), 0.0, np.eye(2)
+    weight, solution = np.ones(len(across)), np.zeros(2)
     for _ in range(_ROUNDS):
         inverse = np.linalg.pinv(matrix.T @ (weight[:, None] * matrix))
         solution = inverse @ (matrix.T @ (weight * height))
         residual = height - matrix @ solution
-        scatter = max(1.4826 * float(np.median(np.abs(residual))), 1e-6)
-        weight = np.clip(1.0 - (residual / (_BISQUARE * scatter)) ** 2, 0.0, None) ** 2
-    deviation = scatter * np.sqrt(np.maximum(np.diag(inverse), 0.0))
-    return float(solution[0]), float(solution[1]), float(deviation[0]), float(deviation[1]), scatter
+        weight = bisquare(residual, max(robust_scale(residual), 1e-6))
+    return solution

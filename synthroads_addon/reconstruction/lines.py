@@ -161,7 +161,8 @@ def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line |
     if usual < 0.03:
         return None
     share = _painted_share(cover, usual)
-    grid, measured, weights = _stretches(profiles, middle, np.where(inside, share, 0.0))
+    grid = profiles.middles
+    measured, weights = _stretches(profiles, middle, np.where(inside, share, 0.0))
     if (weights > 0.0).sum() < 4:
         return None
     width, width_std = mean_with_std(cover[inside][np.nan_to_num(share[inside]) > 0.5])
@@ -238,18 +239,17 @@ def _painted_share(cover: Float, usual: float) -> Float:
     return np.where(known, np.clip(np.nan_to_num(cover) / full, 0.0, 1.0), np.nan)
 
 
-def _stretches(profiles: Profiles, middle: Float, share: Float) -> tuple[Float, Float, Float]:
-    """Return middles of stretches (K,), the paint's offset in each, and its weight (0 without paint)."""
-    count = -(-len(middle) // STRETCH)
+def _stretches(profiles: Profiles, middle: Float, share: Float) -> tuple[Float, Float]:
+    """Return the paint's offset (K,) in each stretch, and its weight (0 without paint)."""
+    count = profiles.stretches
     index = np.arange(len(middle)) // STRETCH
     weight = np.where(np.isfinite(middle) & np.isfinite(share), np.nan_to_num(share), 0.0)
     weight[weight < _FEWEST] = 0.0
     total = np.bincount(index, weight, count)
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.bincount(index, weight * np.nan_to_num(middle), count) / total
-    grid = profiles.stations[0] - 0.5 * SPACING + STRETCH * SPACING * (np.arange(count) + 0.5)
     weights = np.where(total > 0.15 * STRETCH, np.minimum(total / STRETCH, 1.0), 0.0)
-    return grid, np.where(weights > 0.0, mean, np.nan), weights
+    return np.where(weights > 0.0, mean, np.nan), weights
 
 
 def _between_points(profiles: Profiles, points: SurfacePoints, measured: Float, on: Bool) -> tuple[Float, Float, Float]:

@@ -94,11 +94,6 @@ class CloudPath:
         """Return the path through what lies an offset (M,) to the left of each point."""
         return path_through(self.place(self.stations, offset))
 
-    def cut(self, low: float, high: float) -> CloudPath:
-        """Return the part between two stations, beginning at station 0."""
-        kept = (self.stations >= low - 1e-9) & (self.stations <= high + 1e-9)
-        return CloudPath(self.points[kept], self.heading[kept])
-
 
 def _cells(points: Float) -> tuple[Float, Index]:
     """Return the middles (C, 2) of the cells of 4 m that points (N, 2) lie in, and each point's cell."""

@@ -13,18 +13,15 @@ from ..base.progress import Progress, silent
 from ..fitting.fit import AxisFit, fit_axis
 from ..road.parameters import RoadParameters
 from .assemble import Measured, RotationAxis, assemble_parameters
-from .axis import Centre, centre_of
 from .cloud import PointKind, RoadCloud
-from .edges import Surface, paved_edge, stretch_middles, surface
-from .layout import RoadKind, RoadLayout, find_layout
+from .edges import Surface, paved_edge, surface
+from .layout import Centre, RoadKind, RoadLayout, centre_of, find_layout
 from .lines import find_lines
-from .objects import find_barriers, find_posts
+from .objects import face_guardrails, find_barriers, find_posts, measure_ground, standing_points
 from .path import SPACING, CloudPath, alignment_path, first_path, path_through
-from .profiles import STRETCH, Profiles, make_profiles
-from .registration import register_path
-from .section import MeasuredSection, Side, SideSection, measure_section, snap_to_standard
+from .profiles import STRETCH, Profiles, make_profiles, register_path
+from .section import SIDES, MeasuredSection, Side, SideSection, measure_section, snap_to_standard
 from .smoothing import smooth
-from .surroundings import face_guardrails, measure_ground, standing_points
 
 Predictor = Callable[[RoadCloud, CloudPath], tuple[Float, Float]]
 """Returns offset and standard deviation (M,) of the axis at each point of a path; NaN where it knows none."""
@@ -33,7 +30,6 @@ _HALF_WIDTHS = (12.0, 45.0)  # m: least and largest reach of profiles
 _MARGIN = 8.0  # m of it outside of the surface that the first path was made from
 _AROUND = 12.0  # m beyond that reach in which barriers may stand
 _REGISTRATIONS = 2
-_SIDES: tuple[Side, ...] = ("right", "left")
 
 
 @dataclass(frozen=True)
@@ -104,23 +100,21 @@ def reconstruct(cloud: RoadCloud, options: Options | None = None, progress: Prog
     section = measure_section(profiles, layout, cloud.marked)
     if options.snap:
         section = snap_to_standard(section)
-    surfaces = {side: _surface(profiles, section, side, rotation) for side in _SIDES}
+    surfaces = {side: _surface(profiles, section, side, rotation) for side in SIDES}
     progress("objects", 0.8)
     ground = measure_ground(whole, along, section, fit.profile.elevation(along.stations))
     standing = standing_points(cloud, along, profiles, section)
     barriers, used = find_barriers(standing)
     measured = Measured(
         fit=fit,
-        origin=cloud.origin,
-        epsg=cloud.epsg,
+        cloud=cloud,
         section=section,
-        stations=stretch_middles(profiles),
-        crossfall={side: _smooth_fall(surfaces[side]) for side in _SIDES},
+        stations=profiles.middles,
+        crossfall={side: _smooth_fall(surfaces[side]) for side in SIDES},
         rotation=rotation,
         barriers=face_guardrails(barriers, section),
         posts=find_posts(standing, used),
         ground=ground,
-        marked=cloud.marked,
         title=options.title,
     )
     parameters = assemble_parameters(measured)

@@ -14,6 +14,7 @@ from ..road.section import LineMarking
 from .cloud import PointKind, RoadCloud
 from .reconstruct import Reconstruction
 from .section import MeasuredSection, Side, SideSection, standard_section
+from .smoothing import difference_figures
 
 _MOST_POINTS = 400_000
 _FROM_EDGES = 0.1  # m: nearer to an edge of the pavement than this a point may lie beside it
@@ -154,35 +155,28 @@ def _widenings(side: SideSection, stations: Float) -> list[dict[str, float]]:
 
 
 def _objects(found: Reconstruction) -> dict[str, Any]:
-    measured = found.measured
-    return {
-        "barriers": [
-            {
-                "kind": item.kind,
-                "start_station": round(item.start, 2),
-                "end_station": round(item.end, 2),
-                "offset": {"value": round(item.offset, 3), "std": round(item.offset_std, 4)},
-                "height": round(item.height, 2),
-                "points": item.points,
-            }
-            for item in measured.barriers
-        ],
-        "delineators": [
-            {
-                "station": round(item.station, 2),
-                "offset": round(item.offset, 3),
-                "std": round(item.std, 3),
-                "points": item.points,
-            }
-            for item in measured.posts
-        ],
-    }
+    barriers = [
+        {
+            "kind": item.kind,
+            "start_station": round(item.start, 2),
+            "end_station": round(item.end, 2),
+            "offset": {"value": round(item.offset, 3), "std": round(item.offset_std, 4)},
+            "height": round(item.height, 2),
+            "points": item.points,
+        }
+        for item in found.measured.barriers
+    ]
+    delineators = [
+        {
+            "station": round(item.station, 2),
+            "offset": round(item.offset, 3),
+            "std": round(item.std, 3),
+            "points": item.points,
+        }
+        for item in found.measured.posts
+    ]
+    return {"barriers": barriers, "delineators": delineators}
 
 
-def _figures(difference: Float) -> dict[str, Any]:
-    """Return the usual figures of differences (N,), m; NaN are left out."""
-    known = difference[np.isfinite(difference)]
-    if not len(known):
-        return {}
-    figures = {"mean": known.mean(), "rms": np.sqrt((known**2).mean()), "p95": np.percentile(np.abs(known), 95)}
-    return {name: round(float(value), 4) for name, value in figures.items()}
+def _figures(difference: Float) -> dict[str, float]:
+    return difference_figures(difference, "mean", "rms", "p95")

@@ -10,13 +10,15 @@ from scipy import ndimage
 
 from ..base.arrays import Bool, Float
 from ..road.guidelines import STANDARD_CROSS_SECTIONS, StandardCrossSection
-from .edges import Edge, paved_edge, stretch_count
+from .edges import FARTHEST, Edge, paved_edge
 from .layout import Band, RoadKind, RoadLayout
 from .lines import Line
 from .profiles import Profiles
 from .smoothing import mean_with_std
 
 Side = Literal["left", "right"]
+SIDES: tuple[Side, ...] = ("right", "left")
+LineKind = Literal["outer_edge", "lane", "inner_edge"]
 
 EDGE_LINE, NARROW_LINE = 0.30, 0.15
 """Widths of outer edge lines and of all others on motorways, m (RMS)."""
@@ -59,8 +61,6 @@ class SideSection:
         side: of the axis.
         lines: its lines from inside to outside; those of a single carriageway without the middle one. None where a
             line must be but wasn't seen.
-        boundaries: (K, lanes + 1) distances of the lanes' boundaries from the axis, innermost first, m.
-        apart: (K, lanes + 1) distances of the points that the boundaries lie between, m.
         inner_edge, outer_edge: of the pavement, as distances from the axis; NaN where not seen.
         usual: (K,) where the outer edge is that of the road and not of a turnout.
         inner_offset, inner_strip, outer_width, strip, shoulder: widths, m; ``outer_width`` is that of all pavement
@@ -74,8 +74,6 @@ class SideSection:
 
     side: Side
     lines: list[Line | None]
-    boundaries: Float
-    apart: Float
     inner_edge: Edge
     outer_edge: Edge
     usual: Bool
@@ -114,17 +112,20 @@ class MeasuredSection:
         kind: dual or single carriageway.
         sides: by name.
         middle: the middle line of a single carriageway.
-        standard: name of the standard cross-section that it passes for, or None.
-        distance: largest difference (m) from the nearest standard one, whose name is ``nearest``.
-        nearest: see ``distance``.
+        nearest: name of the nearest standard cross-section; empty for a single carriageway.
+        distance: largest difference from it, m.
     """
 
     kind: RoadKind
     sides: dict[Side, SideSection]
-    middle: Line | None
-    standard: str | None
-    nearest: str
-    distance: float
+    middle: Line | None = None
+    nearest: str = ""
+    distance: float = np.inf
+
+    @property
+    def standard(self) -> str | None:
+        """Return the name of the standard cross-section that it passes for, or None."""
+        return self.nearest if self.distance <= STANDARD_TOLERANCE else None
 
     @property
     def median(self) -> Estimate | None:
@@ -143,22 +144,50 @@ def measure_section(profiles: Profiles, layout: RoadLayout, marked: bool) -> Mea
         layout: of these profiles.
         marked: whether paint is known by class; if not, lines look wider than they are and get the usual widths.
     """
-    names: tuple[Side, ...] = ("right", "left")
+    bands = zip(SIDES, layout.bands * (2 if layout.kind == "single" else 1), strict=True)
+    parts = [_SidePart(profiles, layout, band, side, marked) for side, band in bands]
     if layout.kind == "single":
-        (band,) = layout.bands
-        sides = {name: _half(profiles, layout, band, name, marked) for name in names}
-        return MeasuredSection("single", sides, band.middle, None, "", np.inf)
-    sides = {name: _side(profiles, layout, band, name, marked) for name, band in zip(names, layout.bands, strict=True)}
-    nearest, distance = nearest_standard(sides)
-    standard = nearest if distance <= STANDARD_TOLERANCE else None
-    return MeasuredSection(layout.kind, sides, None, standard, nearest, distance)
+        return MeasuredSection("single", {part.side: _half(part) for part in parts}, layout.bands[0].middle)
+    sides = {part.side: _carriageway(part) if len(part.band.lines) > 1 else _by_width(part) for part in parts}
+    return MeasuredSection("dual", sides, None, *nearest_standard(sides))
 
 
-def line_width(line: Line | None, kind: Literal["edge", "lane", "inner"], road: RoadKind, marked: bool) -> float:
+@dataclass(frozen=True)
+class _SidePart:
+    """One side of the road while it is measured.
+
+    Attributes:
+        profiles, layout, marked: as in `measure_section`.
+        band: the pavement that is its own, or that it has a half of.
+        side: of the axis.
+    """
+
+    profiles: Profiles
+    layout: RoadLayout
+    band: Band
+    side: Side
+    marked: bool
+
+    @property
+    def sign(self) -> int:
+        """Return the sign of the side's offsets."""
+        return 1 if self.side == "left" else -1
+
+    def everywhere(self, value: float) -> Float:
+        """Return a value for each stretch (K,)."""
+        return np.full(self.profiles.stretches, value)
+
+    def edge(self, begin: Float, outwards: bool = True, reach: float | Float = FARTHEST) -> Edge:
+        """Return the pavement's edge beyond distances (K,) from the axis, within a reach (m), as distances."""
+        sign = self.sign if outwards else -self.sign
+        edge = paved_edge(self.profiles, self.layout.paved, self.sign * begin, sign, reach)
+        return Edge(self.sign * edge.offsets, edge.apart)
+
+
+def line_width(line: Line | None, kind: LineKind, road: RoadKind, marked: bool) -> float:
     """Return the width (m) that a line is taken to have: measured, or the usual one if it is near to that."""
-    usual = EDGE_LINE if kind == "edge" else NARROW_LINE
-    if road == "single":
-        usual = _RURAL_EDGE_LINE if kind == "edge" else _RURAL_LINE
+    edge, narrow = (_RURAL_EDGE_LINE, _RURAL_LINE) if road == "single" else (EDGE_LINE, NARROW_LINE)
+    usual = edge if kind == "outer_edge" else narrow
     if line is None or not marked:
         return usual
     known = (_RURAL_LINE, NARROW_LINE, _RURAL_EDGE_LINE, EDGE_LINE)
@@ -168,45 +197,38 @@ def line_width(line: Line | None, kind: Literal["edge", "lane", "inner"], road: 
     return near if abs(near - line.width) <= _LINE_TOLERANCE else float(np.clip(round(line.width, 2), 0.05, 1.0))
 
 
-def _side(profiles: Profiles, layout: RoadLayout, band: Band, name: Side, marked: bool) -> SideSection:
+def _carriageway(part: _SidePart) -> SideSection:
     """Return one carriageway of a dual one."""
-    sign = 1 if name == "left" else -1
-    if len(band.lines) < 2:
-        return _by_width(profiles, layout, band, name)
-    lines, distances, apart = _order_lines(band, sign)
-    distances[:, 0] += 0.5 * line_width(lines[0], "inner", "dual", marked)
-    outer = _outwards(paved_edge(profiles, layout.paved, sign * _everywhere(distances[:, -1]), sign), sign)
+    lines, distances, apart = _order_lines(part.band, part.sign)
+    distances[:, 0] += 0.5 * line_width(lines[0], "inner_edge", "dual", part.marked)
+    outer = part.edge(_everywhere(distances[:, -1]))
     if not _open(lines[-1], outer):
-        distances[:, -1] -= 0.5 * line_width(lines[-1], "edge", "dual", marked)
+        distances[:, -1] -= 0.5 * line_width(lines[-1], "outer_edge", "dual", part.marked)
     first = _everywhere(distances[:, 0])
-    inner = _outwards(paved_edge(profiles, layout.paved, sign * first, -sign, first), sign)
-    return _summarise_side(name, lines, (distances, apart), inner, outer)
+    return _summarise_side(part.side, lines, (distances, apart), part.edge(first, False, first), outer)
 
 
-def _half(profiles: Profiles, layout: RoadLayout, band: Band, name: Side, marked: bool) -> SideSection:
+def _half(part: _SidePart) -> SideSection:
     """Return one direction of a single carriageway, from the axis outwards."""
-    sign = 1 if name == "left" else -1
-    count = stretch_count(profiles)
-    beside = {s: _beside(band, s, marked) for s in (1, -1)}
-    lines: list[Line | None] = [band.middle, *beside[sign]]
-    columns = [np.zeros(count), *(sign * line.offsets for line in lines[1:] if line is not None)]
-    apart = [np.zeros(count), *(line.apart for line in lines[1:] if line is not None)]
-    outer = _outwards(paved_edge(profiles, layout.paved, np.full(count, sign * _NARROWEST), sign, _WIDEST_HALF), sign)
-    mirrored = len(lines) == 1 and bool(beside[-sign])
+    nowhere = part.everywhere(0.0)
+    beside = {s: _beside(part.band, s, part.marked) for s in (1, -1)}
+    lines: list[Line | None] = [part.band.middle, *beside[part.sign]]
+    columns = [nowhere, *(part.sign * line.offsets for line in beside[part.sign])]
+    apart = [nowhere, *(line.apart for line in beside[part.sign])]
+    outer = part.edge(part.everywhere(_NARROWEST), reach=_WIDEST_HALF)
+    mirrored = len(lines) == 1 and bool(beside[-part.sign])
     if len(lines) > 1:
-        columns[-1] = columns[-1] - 0.5 * line_width(lines[-1], "edge", "single", marked)
+        columns[-1] = columns[-1] - 0.5 * line_width(lines[-1], "outer_edge", "single", part.marked)
     elif mirrored:
-        other = min(abs(line.offset) for line in beside[-sign])
-        columns.append(np.full(count, other - 0.5 * line_width(None, "edge", "single", marked)))
-        apart.append(np.zeros(count))
-        lines.append(None)
+        other = min(abs(line.offset) for line in beside[-part.sign])
+        columns.append(part.everywhere(other - 0.5 * line_width(None, "outer_edge", "single", part.marked)))
+        apart.append(nowhere)
     else:  # no edge line at all: the lane reaches to the pavement's edge
-        edge = outer.offsets if np.isfinite(outer.offsets).any() else np.full(count, 0.5 * band.width)
-        columns.append(edge)
+        columns.append(outer.offsets if np.isfinite(outer.offsets).any() else part.everywhere(0.5 * part.band.width))
         apart.append(outer.apart)
-        lines.append(None)
-    inner = Edge(np.zeros(count), np.zeros(count))
-    half = _summarise_side(name, lines, (np.column_stack(columns), np.column_stack(apart)), inner, outer)
+    lines += [None] * (len(columns) - len(lines))
+    inner = Edge(nowhere, nowhere)
+    half = _summarise_side(part.side, lines, (np.column_stack(columns), np.column_stack(apart)), inner, outer)
     nothing = Estimate(0.0, 0.0)
     return replace(half, inner_offset=nothing, inner_strip=nothing, mirrored=mirrored)
 
@@ -225,24 +247,22 @@ def _beside(band: Band, sign: int, marked: bool) -> list[Line]:
     return [max(near, key=lambda line: line.length * line.width)] if near else []
 
 
-def _by_width(profiles: Profiles, layout: RoadLayout, band: Band, name: Side) -> SideSection:
+def _by_width(part: _SidePart) -> SideSection:
     """Return a carriageway whose lines aren't seen: with the lanes of the standard cross-section of about its width."""
-    sign = 1 if name == "left" else -1
-    middle = np.full(stretch_count(profiles), 0.5 * (band.low + band.high))
-    reach = 0.5 * band.width + _WIDEST
-    outer = _outwards(paved_edge(profiles, layout.paved, middle, sign, reach), sign)
-    inner = _outwards(paved_edge(profiles, layout.paved, middle, -sign, np.abs(middle)), sign)
+    middle = part.everywhere(part.sign * 0.5 * (part.band.low + part.band.high))
+    outer = part.edge(middle, reach=0.5 * part.band.width + _WIDEST)
+    inner = part.edge(middle, False, np.abs(middle))
     width = mean_with_std(outer.offsets - inner.offsets)[0]
-    width = width if np.isfinite(width) else band.width
-    name_of = min(STANDARD_CROSS_SECTIONS, key=lambda key: abs(STANDARD_CROSS_SECTIONS[key].paved_width - width))
-    row = STANDARD_CROSS_SECTIONS[name_of]
+    width = width if np.isfinite(width) else part.band.width
+    name = min(STANDARD_CROSS_SECTIONS, key=lambda key: abs(STANDARD_CROSS_SECTIONS[key].paved_width - width))
+    row = STANDARD_CROSS_SECTIONS[name]
     first = inner.offsets + row.inner_edge_strip
     columns = [first + sum(row.lanes[::-1][:i]) for i in range(len(row.lanes) + 1)]
     lines: list[Line | None] = [None] * len(columns)
     apart = np.tile(inner.apart[:, None], len(columns))
-    measured_side = _summarise_side(name, lines, (np.column_stack(columns), apart), inner, outer)
+    measured_side = _summarise_side(part.side, lines, (np.column_stack(columns), apart), inner, outer)
     lanes = [Estimate(lane, np.inf) for lane in reversed(row.lanes)]
-    return replace(measured_side, lanes=lanes, inner_strip=Estimate(row.inner_edge_strip, np.inf), assumed=name_of)
+    return replace(measured_side, lanes=lanes, inner_strip=Estimate(row.inner_edge_strip, np.inf), assumed=name)
 
 
 def _open(line: Line | None, outer: Edge) -> bool:
@@ -257,10 +277,6 @@ def _is_visible(edge: Edge) -> bool:
 def _everywhere(distance: Float) -> Float:
     """Return distances (K,) with the median where they aren't known."""
     return np.where(np.isfinite(distance), distance, np.nanmedian(distance))
-
-
-def _outwards(edge: Edge, sign: int) -> Edge:
-    return Edge(sign * edge.offsets, edge.apart)
 
 
 def _summarise_side(
@@ -284,8 +300,6 @@ def _summarise_side(
     return SideSection(
         side=name,
         lines=lines,
-        boundaries=distance,
-        apart=apart,
         inner_edge=inner,
         outer_edge=outer,
         usual=usual,
@@ -387,22 +401,18 @@ def snap_to_standard(section: MeasuredSection) -> MeasuredSection:
     if section.standard is None:
         return section
     row = STANDARD_CROSS_SECTIONS[section.standard]
-
-    def exact(value: float, measured: Estimate) -> Estimate:
-        return Estimate(value, measured.std)
-
-    sides = {
-        name: replace(
-            side,
-            inner_offset=exact(row.median / 2.0, side.inner_offset),
-            inner_strip=exact(row.inner_edge_strip, side.inner_strip),
-            lanes=[exact(width, lane) for width, lane in zip(reversed(row.lanes), side.lanes, strict=True)],
-            outer_width=exact(row.hard_shoulder + row.outer_edge_strip, side.outer_width),
-            strip=exact(row.outer_edge_strip, side.strip),
-            shoulder=exact(row.hard_shoulder, side.shoulder),
-        )
-        for name, side in section.sides.items()
+    widths = {
+        "inner_offset": row.median / 2.0,
+        "inner_strip": row.inner_edge_strip,
+        "outer_width": row.hard_shoulder + row.outer_edge_strip,
+        "strip": row.outer_edge_strip,
+        "shoulder": row.hard_shoulder,
     }
+    sides: dict[Side, SideSection] = {}
+    for name, side in section.sides.items():
+        lanes = [replace(lane, value=width) for width, lane in zip(reversed(row.lanes), side.lanes, strict=True)]
+        exact = {field: replace(getattr(side, field), value=width) for field, width in widths.items()}
+        sides[name] = replace(side, lanes=lanes, **exact)
     return replace(section, sides=sides)
 
 

@@ -24,13 +24,11 @@ class Smoothed:
         values: (N,).
         std: (N,) standard deviation of each smoothed value, from the scatter of what was measured about it.
         scatter: standard deviation of one measured value about the smoothed ones.
-        used: (N,) weights from 0 (an outlier, or nothing measured) to 1.
     """
 
     values: Float
     std: Float
     scatter: float
-    used: Float
 
 
 def smooth(
@@ -53,7 +51,7 @@ def smooth(
     count = len(values)
     if known.sum() <= order:
         level = float(np.median(values[known])) if known.any() else 0.0
-        return Smoothed(np.full(count, level), np.full(count, np.inf), np.inf, known.astype(np.float64))
+        return Smoothed(np.full(count, level), np.full(count, np.inf), np.inf)
     given = np.where(known, values, 0.0)
     base = np.where(known, weights, 0.0)
     base = base / base[known].mean()
@@ -65,16 +63,15 @@ def smooth(
     for _ in range(_ROUNDS):
         factor, fitted = _solve(penalty, base * robust, given)
         residual = given - fitted
-        scatter = _scale(residual[known] * np.sqrt(base[known]))
-        reach = _BISQUARE * max(scatter, usual, 1e-9)
-        robust = np.where(known, np.clip(1.0 - (residual * np.sqrt(base) / reach) ** 2, 0.0, None) ** 2, 0.0)
+        scatter = robust_scale(residual[known] * np.sqrt(base[known]))
+        robust = np.where(known, bisquare(residual * np.sqrt(base), max(scatter, usual, 1e-9)), 0.0)
     factor, fitted = _solve(penalty, base * robust, given)
     kept = known & (robust > 0.0)
     residual = (given - fitted)[kept] * np.sqrt(base[kept])
     scatter = float(np.sqrt(np.mean(residual**2))) if len(residual) else 0.0
     widening = np.sqrt(correlation_factor(residual))
     std = scatter * widening * np.sqrt(np.maximum(_inverse_diagonal(factor), 0.0))
-    return Smoothed(fitted, std, scatter, robust)
+    return Smoothed(fitted, std, scatter)
 
 
 def correlation_factor(residual: Float) -> float:
@@ -100,13 +97,12 @@ def mean_with_std(values: Float, apart: Float | None = None) -> tuple[float, flo
         return float("nan"), float("inf")
     middle = float(np.median(values))
     for _ in range(_ROUNDS):
-        scale = max(_scale(values - middle), 1e-9)
-        robust = np.clip(1.0 - ((values - middle) / (_BISQUARE * scale)) ** 2, 0.0, None) ** 2
+        robust = bisquare(values - middle, max(robust_scale(values - middle), 1e-9))
         total = float(robust.sum())
         if total <= 0.0:
             break
         middle = float((robust * values).sum() / total)
-    kept = np.abs(values - middle) < _BISQUARE * max(_scale(values - middle), 1e-9)
+    kept = bisquare(values - middle, max(robust_scale(values - middle), 1e-9)) > 0.0
     spread = float(np.sqrt(np.mean((values[kept] - middle) ** 2))) if kept.any() else 0.0
     independent = max(1.0, kept.sum() / correlation_factor(values[kept] - middle))
     std = spread / float(np.sqrt(independent))
@@ -130,9 +126,20 @@ def unseen(apart: Float, scatter: float) -> float:
     return float(np.sqrt(max(0.0, float(np.median(rows)) ** 2 / 12.0 - scatter**2)))
 
 
-def _scale(residual: Float) -> float:
-    """Return a standard deviation from the median of absolute residuals."""
+def robust_scale(residual: Float) -> float:
+    """Return a standard deviation from the median of absolute residuals (N,); 0 without any."""
     return float(1.4826 * np.median(np.abs(residual))) if len(residual) else 0.0
+
+
+def bisquare(residual: Float, scale: float) -> Float:
+    """Return Tukey's weights (N,) of residuals with a standard deviation: 1 at 0, and nothing from 4.685 of it on."""
+    return np.maximum(1.0 - (residual / (_BISQUARE * scale)) ** 2, 0.0) ** 2
+
+
+def fill_gaps(values: Float) -> Float:
+    """Return values (N,) with those missing interpolated between their neighbours; at least one isn't NaN."""
+    rows, known = np.arange(len(values)), np.isfinite(values)
+    return np.interp(rows, rows[known], values[known])
 
 
 def _difference_bands(count: int, order: int) -> Float:
@@ -178,3 +185,17 @@ def _block(inverse: Float, start: int, width: int) -> Float:
         for b in range(a + 1):
             block[a, b] = block[b, a] = inverse[a - b, start + b]
     return block
+
+
+def difference_figures(difference: Float, *names: str) -> dict[str, float]:
+    """Return some of the usual figures of differences (N,), m, by name: mean, mae, rms, p95, largest; NaN are left out.
+
+    Without any number there are no figures.
+    """
+    known = difference[np.isfinite(difference)]
+    if not len(known):
+        return {}
+    size = np.abs(known)
+    figures = {"mean": known.mean(), "mae": size.mean(), "rms": np.sqrt((size**2).mean())}
+    figures |= {"p95": np.percentile(size, 95), "largest": size.max()}
+    return {name: round(float(figures[name]), 4) for name in names}
