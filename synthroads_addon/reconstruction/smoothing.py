@@ -133,7 +133,7 @@ def robust_scale(residual: Float) -> float:
 
 def bisquare(residual: Float, scale: float) -> Float:
     """Return Tukey's weights (N,) of residuals with a standard deviation: 1 at 0, and nothing from 4.685 of it on."""
-    return np.maximum(1.0 - (residual / (_BISQUARE * scale)) ** 2, 0.0) ** 2
+    return np.asarray(np.maximum(1.0 - (residual / (_BISQUARE * scale)) ** 2, 0.0) ** 2)
 
 
 def fill_gaps(values: Float) -> Float:

@@ -18,8 +18,7 @@ from ..road.crossfall import run_off_length
 from ..road.guidelines import LIMITS, LONGEST_STRAIGHT, DesignLimits
 from ..road.parameters import HorizontalElement, VerticalPoint
 from ..scenario.road import RoadScenario
-from .section import cross_section_of
-from .turnouts import bounds
+from .section import bounds, cross_section_of
 
 _Pair = tuple[float, float]
 Lengths = tuple[list[float], list[float]]

@@ -35,8 +35,7 @@ from ..road.things.overpass import Overpass
 from ..road.things.pole import Pole
 from ..scenario.road import EnvironmentLimits, Interval, MaterialLimits, RoadScenario
 from .placing.construction import SHORTEST_ALONG, TAPER_OUT, TAPERS_IN
-from .section import cross_section_of
-from .turnouts import RampLimits, features_of, may_change_lanes
+from .section import RampLimits, cross_section_of, features_of, may_change_lanes
 
 LEAST_MEDIAN = min(section.median for section in STANDARD_CROSS_SECTIONS.values())
 """Narrowest median of the standard cross-sections, m."""

@@ -1,35 +1,264 @@
-"""The carriageways from a seed: their cross-section, lanes that begin or end, turnouts, pavement and its damage."""
+"""The carriageways from a seed: cross-section, lanes that begin or end, turnouts, pavement and its damage.
+
+Turnouts and lane changes are put in a random order along the carriageway as close as they may be, as long as they fit;
+the length that is left is then shared out among them. Nothing is drawn and rejected. Distances along a carriageway
+count in the direction of its traffic until they become stations.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 
 from ..base.random_streams import stream
 from ..base.schema import round_value
 from ..road.crossfall import crossfall_points
-from ..road.guidelines import STANDARD_CROSS_SECTIONS, StandardCrossSection
+from ..road.guidelines import (
+    EMERGENCY_BAY_LENGTH,
+    EMERGENCY_BAY_TAPER,
+    EMERGENCY_BAY_WIDTH,
+    INTERCHANGE_SPACING,
+    LANE_TAPER_LENGTH,
+    STANDARD_CROSS_SECTIONS,
+    TURNOUT_GAP,
+    TURNOUT_LANE_LENGTH,
+    TURNOUT_LANE_WIDTH,
+    TURNOUT_TAPER,
+    StandardCrossSection,
+)
 from ..road.objects import Side, WidthPoint, nominal_width, width_at
 from ..road.parameters import AlignmentObject
-from ..road.section import Carriageway, Lane, Pavement, Pothole, Rut, Turnout
-from ..scenario.road import FreeCrossSection, RoadScenario
-from .turnouts import (
-    BESIDE_LANE_CHANGE,
-    RampLimits,
-    TurnoutPlace,
-    arrange,
-    bounds,
-    draw,
-    features_of,
-    lowest_station,
-    sample_turnout,
-)
+from ..road.section import Carriageway, Lane, Pavement, Pothole, Ramp, Rut, Turnout
+from ..road.turnout_geometry import BLEND, NOSE_BEFORE_END, NOSE_WIDTH, STEP
+from ..scenario.road import FreeCrossSection, Interval, RoadScenario
 
+FeatureKind = Literal["exit", "entry", "emergency_bay", "lane_change"]
+
+RAMP_LANE, RAMP_EDGE_STRIP = 4.5, 0.75
+"""Widths of a ramp's lane and of either edge strip, m."""
+TURNOUT_EDGE_STRIP = 0.5
+"""Width of the edge strip outside a deceleration or acceleration lane, m."""
+FARTHEST_REACH = 90.0
+"""A ramp reaches at most this far from the centreline, so that what stands beside it has an offset below 100 m."""
+BESIDE_LANE_CHANGE = 10.0
+"""Before it begins to close, and behind, a lane is there, and gone, for at least this far, m."""
+_BESIDE_ROAD = 2.0  # ground beside the road's edge that is left within the terrain, m
+_INTERCHANGE_EVERY, _BAY_EVERY = 3000.0, 1000.0  # a long road may have another one after this length, m
 SIDES: tuple[Side, ...] = ("right", "left")
 _WHEEL_TRACK = 1.8  # distance of the two wheel tracks, m
 _RUT_RAMP = 10.0  # length over which ruts begin and end, m
 _SHORTEST_RUT = 0.3  # share of the road that is rutted, at least
+
+
+@dataclass(frozen=True)
+class Feature:
+    """Room that one kind of turnout, or a lane change, needs along a carriageway.
+
+    Attributes:
+        kind: what it is.
+        share: probability that a carriageway has it.
+        lengths: least and largest length of each part that is drawn, m.
+        fixed: what it needs besides, m.
+        apart: least distance between two of its kind, m.
+        every: a road may have another one for each such length, m.
+    """
+
+    kind: FeatureKind
+    share: float
+    lengths: tuple[tuple[float, float], ...]
+    fixed: float = 0.0
+    apart: float = 0.0
+    every: float = math.inf
+
+    @property
+    def least(self) -> float:
+        """Return the shortest stretch that it takes, m."""
+        return self.fixed + math.fsum(low for low, _ in self.lengths)
+
+
+@dataclass(frozen=True)
+class TurnoutPlace:
+    """A feature on its stretch.
+
+    Attributes:
+        kind: what it is.
+        begin: where its stretch begins, m from where the carriageway's traffic comes from.
+        lengths: of its parts, m.
+    """
+
+    kind: FeatureKind
+    begin: float
+    lengths: tuple[float, ...]
+
+
+class RampLimits:
+    """Ramps that lie within the terrain and go on for at least 10 m behind their nose.
+
+    Attributes:
+        shortest: length of the shortest ramp, m.
+        lengths: least and largest length, m; the least is the larger one where no ramp is possible.
+        room_for_bay: whether an emergency bay lies within the terrain.
+    """
+
+    def __init__(self, scenario: RoadScenario, section: StandardCrossSection, tightest: float = math.inf) -> None:
+        """Take the limits, the cross-section, and the tightest radius (m) of the road."""
+        limits = scenario.turnouts
+        # Inside the terrain, and well clear of the centre of a curve.
+        reach = min(scenario.half_width - _BESIDE_ROAD, FARTHEST_REACH, 0.5 * tightest)
+        self.clothoids = limits.ramp_clothoid
+        self.nose_wedge = section.hard_shoulder + NOSE_WIDTH
+        edge = section.median / 2.0 + section.paved_width + section.verge
+        self.room_for_bay = edge + limits.bay_width.maximum <= reach
+        self.shortest = self.nose(self.clothoids.minimum) + NOSE_BEFORE_END
+        self.widest_wedge = reach - edge + section.hard_shoulder - RAMP_LANE - 2.0 * RAMP_EDGE_STRIP
+        beside = limits.lane_width.maximum + TURNOUT_EDGE_STRIP + limits.shoulder_width.maximum
+        if self.widest_wedge <= max(self.nose_wedge, beside - RAMP_LANE - 2.0 * RAMP_EDGE_STRIP):
+            self.lengths = math.inf, 0.0
+            return
+        ratio = (self.widest_wedge / self.nose_wedge) ** (1.0 / 3.0)  # of the ramp's length to the nose's, at most
+        least = max(self.shortest, NOSE_BEFORE_END * ratio / (ratio - 1.0))
+        most = (6.0 * self.clothoids.maximum**2 * self.widest_wedge) ** (1.0 / 3.0)
+        self.lengths = max(limits.ramp_length.minimum, least), min(limits.ramp_length.maximum, most)
+
+    def nose(self, clothoid: float) -> float:
+        """Return the distance (m) from the gore's tip to the nose for a clothoid parameter A (m)."""
+        return (6.0 * clothoid**2 * self.nose_wedge) ** (1.0 / 3.0)
+
+    def clothoid(self, length: float, share: float) -> float:
+        """Return the parameter A (m) at a share (0 to 1) of those that a ramp of this length (m) may have."""
+        low = max(self.clothoids.minimum, math.sqrt(length**3 / (6.0 * self.widest_wedge)))
+        high = min(self.clothoids.maximum, math.sqrt((length - NOSE_BEFORE_END) ** 3 / (6.0 * self.nose_wedge)))
+        return round_value(low + max(0.0, high - low) * share)
+
+
+def bounds(limits: Interval, least: float = -math.inf) -> tuple[float, float]:
+    """Return an interval as (low, high), not below the least that the guidelines ask for."""
+    return max(limits.minimum, least), limits.maximum
+
+
+def features_of(scenario: RoadScenario, section: StandardCrossSection, ramps: RampLimits) -> tuple[Feature, ...]:
+    """Return the features that a carriageway may have. Those that can't be within the limits are left out."""
+    limits, design_class = scenario.turnouts, scenario.design_class
+    taper, lane = limits.taper_length, limits.lane_length
+    with_ramp = (bounds(taper, TURNOUT_TAPER), bounds(lane, TURNOUT_LANE_LENGTH[design_class]), ramps.lengths)
+    apart = INTERCHANGE_SPACING[design_class]
+    every = apart or _INTERCHANGE_EVERY
+    features = [
+        Feature("exit", limits.exits, with_ramp, BLEND + STEP, apart, every),
+        Feature("entry", limits.entries, with_ramp, BLEND + STEP, apart, every),
+    ]
+    if ramps.room_for_bay:
+        bay_tapers = bounds(limits.bay_taper_length, EMERGENCY_BAY_TAPER)
+        bay = (bay_tapers, bounds(limits.bay_length, EMERGENCY_BAY_LENGTH), bay_tapers)
+        features.append(Feature("emergency_bay", limits.emergency_bays, bay, every=_BAY_EVERY))
+    if may_change_lanes(scenario, section):
+        change = scenario.lane_changes
+        tapers = (bounds(change.taper_length, LANE_TAPER_LENGTH[design_class]),)
+        features.append(Feature("lane_change", change.share, tapers, 2.0 * BESIDE_LANE_CHANGE))
+    return tuple(f for f in features if f.share > 0.0 and all(low <= high for low, high in f.lengths))
+
+
+def may_change_lanes(scenario: RoadScenario, section: StandardCrossSection) -> bool:
+    """Return whether a carriageway has lanes enough to drop or gain one: three, or two of a section by hand."""
+    by_hand = isinstance(scenario.cross_section, FreeCrossSection) or scenario.lanes is not None
+    return len(section.lanes) >= (2 if by_hand else 3)
+
+
+def arrange(features: tuple[Feature, ...], length: float, rng: np.random.Generator) -> list[TurnoutPlace]:
+    """Draw which features a carriageway of a length (m) has, and their places in the order of traffic.
+
+    Where they don't all fit, the certain ones (of share 1) come first.
+    """
+    candidates = [
+        (feature.share < 1.0, slot, rng.random(), feature)
+        for feature in features
+        for slot in range(1 + int(length / feature.every))
+        if rng.random() < feature.share
+    ]
+    order: list[tuple[float, Feature]] = []
+    for *_, feature in sorted(candidates, key=lambda item: item[:3]):
+        longer = sorted([*order, (rng.random(), feature)], key=lambda item: item[0])
+        if closest([(chosen, chosen.least) for _, chosen in longer])[-1] <= length:
+            order = longer
+    chosen = [feature for _, feature in order]
+    spare = length - closest([(feature, feature.least) for feature in chosen])[-1]
+    extras = [[(high - low) * rng.random() for low, high in feature.lengths] for feature in chosen]
+    granted = min(1.0, spare / max(math.fsum(map(math.fsum, extras)), 1e-9))
+    lengths = [
+        tuple(round_value(low + extra * granted) for (low, _), extra in zip(feature.lengths, parts, strict=True))
+        for feature, parts in zip(chosen, extras, strict=True)
+    ]
+    begins = closest([(f, f.fixed + math.fsum(parts)) for f, parts in zip(chosen, lengths, strict=True)])
+    spare = max(0.0, length - begins.pop())
+    shifts = sorted(spare * rng.random() for _ in chosen)
+    return [
+        TurnoutPlace(feature.kind, begin + shift, parts)
+        for feature, begin, shift, parts in zip(chosen, begins, shifts, lengths, strict=True)
+    ]
+
+
+def closest(stretches: Sequence[tuple[Feature, float]]) -> list[float]:
+    """Return where features of given lengths (m) begin when each is as far forward as it may be, and where they end."""
+    begins: list[float] = []
+    reached, ends = -TURNOUT_GAP, dict[FeatureKind, float]()
+    for feature, length in stretches:
+        begins.append(max(reached + TURNOUT_GAP, ends.get(feature.kind, -math.inf) + feature.apart))
+        reached = ends[feature.kind] = begins[-1] + length
+    return [*begins, max(reached, 0.0)]
+
+
+def lowest_station(side: Side, road_length: float, begin: float, length: float) -> float:
+    """Return the lowest station (m) of a stretch that begins at a distance along a carriageway and has a length (m)."""
+    return max(0.0, round_value(begin if side == "right" else road_length - begin - length))
+
+
+def sample_turnout(
+    scenario: RoadScenario, ramps: RampLimits, place: TurnoutPlace, side: Side, length: float, rng: np.random.Generator
+) -> Turnout:
+    """Return the turnout at a place beside a road of a length (m), with instance 1."""
+    limits = scenario.turnouts
+    begin = place.begin + BLEND + STEP if place.kind == "entry" else place.begin
+    same: dict[str, Any] = {
+        "instance": 1,
+        "carriageway": f"carriageway-{side}",
+        "kind": place.kind,
+        "start_station": lowest_station(side, length, begin, math.fsum(place.lengths)),
+    }
+    if place.kind == "emergency_bay":
+        return Turnout(
+            **same,
+            taper_in_length=place.lengths[0],
+            lane_length=place.lengths[1],
+            taper_out_length=place.lengths[2],
+            lane_width=draw(rng, bounds(limits.bay_width, EMERGENCY_BAY_WIDTH)),
+            edge_strip_width=0.0,
+        )
+    taper, lane, ramp = place.lengths
+    leaving = place.kind == "exit"
+    return Turnout(
+        **same,
+        taper_in_length=taper if leaving else 0.0,
+        lane_length=lane,
+        taper_out_length=0.0 if leaving else taper,
+        lane_width=draw(rng, bounds(limits.lane_width, TURNOUT_LANE_WIDTH)),
+        edge_strip_width=TURNOUT_EDGE_STRIP,
+        shoulder_width=draw(rng, bounds(limits.shoulder_width)),
+        ramp=Ramp(
+            length=ramp,
+            clothoid_parameter=ramps.clothoid(ramp, rng.random()),
+            lane_width=RAMP_LANE,
+            edge_strip_width=RAMP_EDGE_STRIP,
+        ),
+    )
+
+
+def draw(rng: np.random.Generator, limits: tuple[float, float]) -> float:
+    """Draw a number between two limits."""
+    return round_value(limits[0] + (limits[1] - limits[0]) * rng.random())
 
 
 def cross_section_of(scenario: RoadScenario) -> StandardCrossSection:

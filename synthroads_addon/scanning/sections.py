@@ -15,8 +15,8 @@ import numpy as np
 
 from ..base.arrays import Float
 from ..road.geometry import RoadGeometry
-from ..road.surface import surface_elevation
 from ..road.surroundings import Vegetation
+from ..road.terrain import surface_elevation
 from ..road.things.overpass import Overpass
 from .blocks import Block, Blocks
 from .devices.shots import shots

@@ -10,7 +10,7 @@ from ..road.geometry import RoadGeometry
 from ..road.objects import LineObject
 from ..road.paint import arrow_outlines, hatching_outlines, pieces
 from ..road.section import Arrow, Hatching, LineMarking, Pothole
-from ..road.surface import known_elevation
+from ..road.terrain import known_elevation
 from ..road.tessellation import sample_stations
 from .faces import FLAT, Faces, Int, compact, grid_corners, join_polygons, quads, twist
 

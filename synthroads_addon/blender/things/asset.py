@@ -12,7 +12,7 @@ from mathutils import Vector
 
 from ...base.errors import InputError
 from ...base.stepper import by_caller
-from ...road.surface import surface_elevation
+from ...road.terrain import surface_elevation
 from ...road.things.asset import Asset
 from ...scanning.scene.mesh_files import check_mesh_file
 from ...scenario.assets import LibraryAsset, library_file, read_asset_library

@@ -15,12 +15,11 @@ from .barriers import median_barriers, plan_noise_barrier, roadside_barriers
 from .construction import construction_zones
 from .delineators import delineator_stations, delineators
 from .equipment import plan_cabinets, plan_lighting, plan_periodic, plan_surveillance, plan_traffic_lights
-from .gantries import GantryPlan, gantries, plan_gantries
 from .layout import Layout
-from .overpass import OverpassPlan, overpass, plan_overpass
 from .random import plan_random_equipment, plan_random_signs, random_front, random_median_barrier
 from .signs import median_signs, plan_exit_signs, plan_gore_signs, plan_other_signs
 from .site import PlacementSite
+from .structures import GantryPlan, OverpassPlan, gantries, overpass, plan_gantries, plan_overpass
 
 Streams = dict[str, np.random.Generator]
 """The random numbers of each family of furniture."""

@@ -16,7 +16,7 @@ from ...road.damage import damage_depth
 from ...road.geometry import RoadGeometry
 from ...road.profile import Profile
 from ...road.section_geometry import CarriagewaySection
-from ...road.surface import surface_elevation
+from ...road.terrain import surface_elevation
 
 _SAMPLES = 201  # stations at which a lane's place is looked up
 _FULL_LANE = 1.99  # m; what is narrower is a lane that begins or ends

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...road.geometry import RoadGeometry
 from ...road.objects import PointObject
-from ...road.surface import highest_pavement
+from ...road.terrain import highest_pavement
 from ...road.things.beacon import BEACON_BLADE, BEACON_BLADE_BOTTOM, BEACON_FOOT, ConstructionBeacon
 from ...road.things.cabinet import Cabinet
 from ...road.things.delineator import DELINEATOR, Delineator

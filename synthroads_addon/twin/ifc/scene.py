@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...road.geometry import RoadGeometry
 from ...road.objects import PointObject, RoadObject
-from ...road.surface import highest_pavement
+from ...road.terrain import highest_pavement
 from ...road.things.asset import Asset
 from ..surfaces import on_ground
 from .alignment import Axis, linear_placement, local_placement

@@ -10,7 +10,7 @@ from ...base.errors import InputError
 from ...road.geometry import RoadGeometry
 from ...road.objects import LineObject, PointObject, RoadObject, Side
 from ...road.section import Carriageway, Hatching, Turnout
-from ...road.surface import highest_pavement, known_elevation
+from ...road.terrain import highest_pavement, known_elevation
 from ...road.things.gantry import GantrySign
 from ..surfaces import height_share, ramp_length
 from .pieces import CLOSE, Float, chords, merged_stations

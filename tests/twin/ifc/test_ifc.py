@@ -22,8 +22,8 @@ from synthroads_addon.road.lane_lines import lane_of
 from synthroads_addon.road.objects import LineObject, PointObject, width_at
 from synthroads_addon.road.parameters import AlignmentObject, HorizontalElement, RoadParameters
 from synthroads_addon.road.section import Carriageway, LineMarking, Turnout
-from synthroads_addon.road.surface import surface_elevation
 from synthroads_addon.road.surroundings import Vehicle
+from synthroads_addon.road.terrain import surface_elevation
 from synthroads_addon.road.things.concrete_barrier import ConcreteBarrier
 from synthroads_addon.road.things.gantry import Gantry
 from synthroads_addon.road.things.guardrail import Guardrail

@@ -555,7 +555,7 @@ def test_objects_stand_where_the_set_has_them(road: RoadParameters, read: Roads)
 
 
 def test_barriers_follow_the_ground(road: RoadParameters, read: Roads) -> None:
-    from synthroads_addon.road.surface import surface_elevation
+    from synthroads_addon.road.terrain import surface_elevation
 
     geometry, known = RoadGeometry(road), read.objects()
     for item in road.objects.values():
