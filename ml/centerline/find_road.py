@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from synthroads_addon.base.arrays import Float
 from synthroads_addon.base.progress import Progress, silent
 
 from ..data.corridor import CORRIDOR
@@ -54,20 +54,15 @@ def find_road(
     return Found(frames.select(kept), value[kept], std[kept], widths[kept], ground.header.epsg)
 
 
-def _span(center: NDArray[np.float64]) -> slice:
+def _span(center: Float) -> slice:
     """Return the frames from the first to the last in which something was found; all if nothing was."""
     there = np.flatnonzero(np.isfinite(center))
     return slice(int(there[0]), int(there[-1]) + 1) if len(there) else slice(None)
 
 
-Float = NDArray[np.float64]
-
 DIGITS = 4
 """Decimals: 0.1 mm."""
-UNITS = {
-    "lanes": "1",
-    "heading": "rad",
-}
+UNITS = {"lanes": "1", "heading": "rad"}
 """All other numbers are in metres."""
 
 

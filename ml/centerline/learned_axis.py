@@ -6,8 +6,8 @@ from pathlib import Path as FilePath
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from numpy.typing import NDArray
 
+from synthroads_addon.base.arrays import Float
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import read_json
 from synthroads_addon.reconstruction.cloud import RoadCloud
@@ -16,8 +16,6 @@ from synthroads_addon.reconstruction.reconstruct import Predictor
 
 from ..runs import Run
 from ..tasks import Prediction, kinds, task
-
-Float = NDArray[np.float64]
 
 _USUAL_STD = 0.1  # m, where the model tells none
 _GAP = 5.0  # m between points of a line across which nothing is told

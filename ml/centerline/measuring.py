@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from synthroads_addon.base.arrays import Float
 from synthroads_addon.base.errors import InputError, MissingFileError
 from synthroads_addon.base.files import write_file
 from synthroads_addon.base.progress import Progress, silent
@@ -39,7 +39,6 @@ from .predictor import CenterlinePredictor, errors
 if TYPE_CHECKING:
     from .task import CenterlineConfiguration
 
-Float = NDArray[np.float64]
 
 AXIS_ENDINGS = ("_axis.csv", ".geojson")
 """Ending of the name of a cloud's axis, after the cloud's name."""

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from pydantic import Field
 from torch import Tensor
 
+from synthroads_addon.base.arrays import Bool, Float, Index
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import quantity
 
@@ -23,8 +23,6 @@ from ..data.roads import LearningRoad
 from ..data.slices import FrameSlices, SliceSettings, collate
 from ..networks.centerline.models import LINES, TARGETS, CenterlineModel, both_ways
 from ..scores.calibration import IntervalCalibration, all_calibrated
-
-Float = NDArray[np.float64]
 
 _NEAR = 2
 """A frame with no point in it nor in this many frames to either side has no prediction."""
@@ -173,9 +171,7 @@ class CenterlinePredictor:
         factors = np.array([self.calibration[name].widths for name in TARGETS])
         return found.raw_std[:, :, None] * factors
 
-    def _sequences(
-        self, road: LearningRoad, frames: Frames
-    ) -> Iterator[tuple[NDArray[np.intp], Float, NDArray[np.bool_], Float, Float]]:
+    def _sequences(self, road: LearningRoad, frames: Frames) -> Iterator[tuple[Index, Float, Bool, Float, Float]]:
         """Yield of all slices of some sequences: frame, z origin, whether there are points, values and deviations."""
         data = FrameSlices(road, frames, self.settings, self.use.step)
         device = next(self.model.parameters()).device

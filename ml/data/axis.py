@@ -6,14 +6,13 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
+from synthroads_addon.base.arrays import Bool, Float, Index
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.road.centerline import read_axis
 from synthroads_addon.road.geometry import RoadGeometry
-
-Float = NDArray[np.float64]
 
 GAP = 3.5
 """Neighbouring points of a measured axis (one about every metre) that lie farther apart leave a gap between them, m."""
@@ -95,7 +94,7 @@ class MeasuredAxis:
         every = spacing * np.arange(int(np.floor(self.length / spacing)) + 1)
         return every[self.inside(every)]
 
-    def inside(self, station: ArrayLike) -> NDArray[np.bool_]:
+    def inside(self, station: ArrayLike) -> Bool:
         """Return whether there is a line at the stations (M,): not in a gap, nor beyond the ends."""
         at = np.asarray(station, dtype=np.float64)
         # A vertex at a gap's edge belongs to the line.
@@ -194,7 +193,7 @@ class MeasuredAxis:
         return self.parts[index, 0], self.parts[index, 1]
 
     @cached_property
-    def _samples(self) -> tuple[cKDTree, NDArray[np.intp]]:
+    def _samples(self) -> tuple[cKDTree, Index]:
         """Return a tree of places along the line and the segment that each lies on."""
         counts = np.maximum(1, np.ceil(np.diff(self.station) / _SAMPLE).astype(int))
         owner = np.repeat(np.arange(len(counts)), counts)
@@ -202,7 +201,7 @@ class MeasuredAxis:
         start, end = self.points[owner, :2], self.points[owner + 1, :2]
         return cKDTree(start + share[:, None] * (end - start)), owner
 
-    def _foot(self, points: Float, segment: NDArray[np.intp]) -> tuple[Float, Float, Float]:
+    def _foot(self, points: Float, segment: Index) -> tuple[Float, Float, Float]:
         """Return station, offset and distance of points (M, 2) on one segment each; the outermost have no end."""
         start = self.points[segment, :2]
         length = self.station[segment + 1] - self.station[segment]

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from synthroads_addon.base.arrays import Index
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.progress import Progress, silent
 from synthroads_addon.base.random_streams import stream
@@ -138,7 +138,7 @@ class Batches:
         )
         self.datasets = [SliceDataset(group, settings, self.drawn_per_epoch, seed, effects) for group, _ in there]
 
-    def kinds(self, epoch: int) -> NDArray[np.intp]:
+    def kinds(self, epoch: int) -> Index:
         """Return for each sample that an epoch draws which of `datasets` it comes from."""
         random = stream(self.seed, "kinds of road", epoch)
         return random.choice(len(self.shares), self.drawn_per_epoch, p=self.shares)

@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from synthroads_addon.base.arrays import Float
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
@@ -16,7 +17,6 @@ from synthroads_addon.road.turnout_geometry import TURNOUT_STRIPS
 
 from .axis import MeasuredAxis
 
-Float = NDArray[np.float64]
 TruthKind = Literal["road", "carriageway"]
 TRUTH_KINDS: tuple[TruthKind, ...] = ("road", "carriageway")
 

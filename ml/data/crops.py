@@ -10,14 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 from torch.utils.data import Dataset, IterableDataset, get_worker_info
 
+from synthroads_addon.base.arrays import AnyArray, Float32
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.random_streams import stream
 
@@ -151,7 +151,7 @@ class CropStream(IterableDataset[Item]):
             yield _draw_crop(self, int(random.integers(len(self.tiles))), random)
 
 
-def cut_crop(tile: CloudTile, middle: NDArray[np.float32], points: int, scaling: Scaling) -> Crop:
+def cut_crop(tile: CloudTile, middle: Float32, points: int, scaling: Scaling) -> Crop:
     """Return the points of a tile nearest a place (3,) by horizontal distance, at most as many as given.
 
     Columns rather than balls: a gantry stays with its posts and a crown with its trunk.
@@ -187,7 +187,7 @@ def item(crop: Crop, settings: CropSettings, random: np.random.Generator) -> Ite
     columns = np.concatenate([coord / COORDINATE_SPAN, color, strength], axis=1)
     chosen = [FEATURES.index(name) for name in settings.features]
     grid = np.floor(coord / settings.voxel).astype(np.int32)
-    arrays: dict[str, NDArray[Any]] = {
+    arrays: dict[str, AnyArray] = {
         "coord": coord,
         "grid_coord": grid - grid.min(axis=0),
         "color": color,
@@ -214,5 +214,5 @@ def collate(items: Sequence[Item]) -> Item:
     return batch | {"offset": torch.cumsum(batch["offset"], dim=0)}
 
 
-def _noise(random: np.random.Generator, shape: tuple[int, int]) -> NDArray[np.float32]:
+def _noise(random: np.random.Generator, shape: tuple[int, int]) -> Float32:
     return random.normal(0.0, MISSING_SIGMA, shape).astype(np.float32)

@@ -11,18 +11,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.signal import savgol_filter
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 from scipy.special import ndtr
 
+from synthroads_addon.base.arrays import Bool, Float, Index
 from synthroads_addon.base.errors import InputError
 
 from .axis import MeasuredAxis
-
-Float = NDArray[np.float64]
 
 SPACING = 1.0
 """Distance of the frames along their path, m."""
@@ -53,7 +52,7 @@ class Frames:
     def __len__(self) -> int:
         return len(self.station)
 
-    def select(self, keep: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Frames:
+    def select(self, keep: Bool | Index | slice) -> Frames:
         """Return the frames chosen by a mask, indices or a slice."""
         return Frames(self.position[keep], self.direction[keep], self.station[keep])
 
@@ -115,7 +114,7 @@ def wander(station: Float, rng: np.random.Generator, length: float) -> tuple[Flo
     return ndtr(value) - 0.5, density * slope
 
 
-def sequences(frames: Frames, length: int, step: int | None = None, spacing: float = SPACING) -> NDArray[np.intp]:
+def sequences(frames: Frames, length: int, step: int | None = None, spacing: float = SPACING) -> Index:
     """Return indices (K, length) of runs of frames at equal spacing that together cover all frames.
 
     A run never crosses a gap. The last of a stretch overlaps the one before; a shorter stretch repeats its last frame.
@@ -144,7 +143,7 @@ def interleave_count(frames: Frames, spacing: float) -> int:
     return max(1, round(spacing / _own_spacing(frames, spacing)))
 
 
-def stretches(frames: Frames, spacing: float = SPACING) -> list[NDArray[np.intp]]:
+def stretches(frames: Frames, spacing: float = SPACING) -> list[Index]:
     """Return the indices of the frames of every stretch without a gap; of equal spacing, at most the given one, m."""
     gaps = np.abs(np.diff(frames.station)) > 1.5 * _own_spacing(frames, spacing)
     return [part for part in np.split(np.arange(len(frames)), np.flatnonzero(gaps) + 1) if len(part)]
@@ -210,7 +209,7 @@ def _cells(plan: Float, cell: float) -> Float:
     return np.column_stack([np.bincount(owner, plan[:, column]) for column in (0, 1)]) / counts[:, None]
 
 
-def _way_through(cells: Float, cell: float) -> NDArray[np.intp]:
+def _way_through(cells: Float, cell: float) -> Index:
     """Return the cells on the shortest way between the two that lie farthest apart along the strip."""
     pairs = cKDTree(cells).query_pairs(2.1 * cell, output_type="ndarray")
     pairs = _bridge_cells(cells, pairs)
@@ -226,7 +225,7 @@ def _way_through(cells: Float, cell: float) -> NDArray[np.intp]:
     return np.array(way if tuple(cells[way[0]]) < tuple(cells[way[-1]]) else way[::-1])
 
 
-def _bridge_cells(cells: Float, pairs: NDArray[np.intp]) -> NDArray[np.intp]:
+def _bridge_cells(cells: Float, pairs: Index) -> Index:
     """Return the pairs of cells (P, 2) and those of the shortest ways that join what they leave apart."""
     while True:
         count, part = connected_components(_graph(len(cells), pairs, np.ones(len(pairs))), directed=False)
@@ -238,7 +237,7 @@ def _bridge_cells(cells: Float, pairs: NDArray[np.intp]) -> NDArray[np.intp]:
         pairs = np.concatenate([pairs, [[own[nearest[closest]], others[closest]]]])
 
 
-def _graph(count: int, pairs: NDArray[np.intp], weights: Float) -> Any:
+def _graph(count: int, pairs: Index, weights: Float) -> Any:
     return coo_array((weights, (pairs[:, 0], pairs[:, 1])), shape=(count, count)).tocsr()
 
 

@@ -9,9 +9,8 @@ and a power a factor: the `level` on the whole, and the `contrast` to what is ar
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from synthroads_addon.base.arrays import Float
 
 DARKEST = 0.01
 """Intensities below this share of the median count as it."""

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from synthroads_addon.base.arrays import Float
 from synthroads_addon.base.classes import ClassScheme
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.random_streams import stream
@@ -75,7 +75,7 @@ def _lean(block: PointBlock) -> PointBlock:
     return replace(block, roughness=None, metallic=None, specular=None, color_source=None)
 
 
-def _line(path: Path) -> NDArray[np.float64]:
+def _line(path: Path) -> Float:
     """Return the vertices (M, 2) of a centreline in GeoJSON."""
     data = read_json(path)
     try:
@@ -85,7 +85,7 @@ def _line(path: Path) -> NDArray[np.float64]:
     return line
 
 
-def densify_polyline(line: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:
+def densify_polyline(line: Float, spacing: float) -> Float:
     """Return points (K, 2) every ``spacing`` along a polyline (M, 2), m."""
     along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(line, axis=0).T))]
     at = np.arange(int(along[-1] / spacing) + 1) * spacing

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from synthroads_addon.base.arrays import AnyArray, Int
 from synthroads_addon.base.classes import ClassScheme, stored_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError
 from synthroads_addon.base.files import write_file
@@ -51,7 +52,7 @@ class Packed:
     content: bytes
 
 
-def words_of(tile: CloudTile) -> tuple[NDArray[np.uint64], NDArray[np.int32], NDArray[np.int64]]:
+def words_of(tile: CloudTile) -> tuple[NDArray[np.uint64], NDArray[np.int32], Int]:
     """Return a tile's points as words (N,), the cubes' places (B, 3) and how many points each cube has (B,).
 
     Raises:
@@ -72,7 +73,7 @@ def words_of(tile: CloudTile) -> tuple[NDArray[np.uint64], NDArray[np.int32], ND
     return word[order], cubes[order[starts]].astype(np.int32), counts
 
 
-def _fields(tile: CloudTile, inside: NDArray[np.int64]) -> Iterator[tuple[NDArray[Any], int]]:
+def _fields(tile: CloudTile, inside: Int) -> Iterator[tuple[AnyArray, int]]:
     for axis in range(3):
         yield inside[:, axis], 10 * axis
     if tile.color is not None:
@@ -113,7 +114,7 @@ def unpack_tile(packed: Packed) -> CloudTile:
     planes = np.frombuffer(content, np.uint8, 8 * points, 16 * cubes).reshape(8, points)
     word = np.ascontiguousarray(planes.T).view("<u8").reshape(-1)
 
-    def bits(shift: int, count: int) -> NDArray[np.int64]:
+    def bits(shift: int, count: int) -> Int:
         return ((word >> np.uint64(shift)) & np.uint64((1 << count) - 1)).astype(np.int64)
 
     steps = np.stack([bits(10 * axis, 10) for axis in range(3)], axis=1) + np.repeat(places * CUBE, counts, axis=0)

@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from synthroads_addon.base.arrays import AnyArray, Bool, Float, Float32, Index, Int, UInt8
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.cloud.formats.base import CloudHeader
 from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.cloud.points import PointBlock
-
-Float = NDArray[np.float64]
 
 GROUND_CLASSES = ("ground", "road", "road_marking", "roadside", "road_surface")
 """Names of a road and the ground beside it, in the project's own schemes and in LAS's codes (ASPRS)."""
@@ -43,9 +42,9 @@ class Points:
 
     origin: Float
     xyz: Float
-    intensity: NDArray[np.float32]
-    rgb: NDArray[np.float32]
-    class_id: NDArray[np.uint8]
+    intensity: Float32
+    rgb: Float32
+    class_id: UInt8
     class_names: Mapping[int, str] = field(default_factory=dict)
     has_color: bool = False
     epsg: int | None = None
@@ -53,17 +52,13 @@ class Points:
     def __len__(self) -> int:
         return len(self.xyz)
 
-    def select(self, keep: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Points:
+    def select(self, keep: Bool | Index | slice) -> Points:
         """Return the points chosen by a mask, indices or a slice."""
         return replace(
-            self,
-            xyz=self.xyz[keep],
-            intensity=self.intensity[keep],
-            rgb=self.rgb[keep],
-            class_id=self.class_id[keep],
+            self, xyz=self.xyz[keep], intensity=self.intensity[keep], rgb=self.rgb[keep], class_id=self.class_id[keep]
         )
 
-    def of_class(self, names: Collection[str]) -> NDArray[np.bool_]:
+    def of_class(self, names: Collection[str]) -> Bool:
         """Return a mask (N,) of the points whose class has one of the names."""
         wanted = np.zeros(256, dtype=bool)
         for number, name in self.class_names.items():
@@ -133,11 +128,11 @@ def _points(header: CloudHeader, blocks: list[PointBlock], names: Mapping[int, s
     )
 
 
-def _join_arrays(parts: list[NDArray[Any]]) -> NDArray[Any]:
+def _join_arrays(parts: list[AnyArray]) -> AnyArray:
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
-def thin(coord: NDArray[np.floating[Any]], cell: float) -> NDArray[np.intp]:
+def thin(coord: NDArray[np.floating[Any]], cell: float) -> Index:
     """Return the indices of the points that stay, one per occupied cell of a cubic grid, in order.
 
     The point nearest the cell's centre stays, of equally near ones the first.
@@ -159,7 +154,7 @@ def thin(coord: NDArray[np.floating[Any]], cell: float) -> NDArray[np.intp]:
     return np.sort(order[first])
 
 
-def cell_keys(cells: NDArray[np.float64]) -> NDArray[np.int64]:
+def cell_keys(cells: Float) -> Int:
     """Return one number per cell (N, 3) of whole numbers, unique within the array.
 
     Raises:

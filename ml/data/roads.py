@@ -12,8 +12,8 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from synthroads_addon.base.arrays import Bool, Float, Float32, Index, UInt8
 from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
 from synthroads_addon.base.random_streams import stream
 from synthroads_addon.base.scratch.folders import scratch_folder
@@ -25,8 +25,6 @@ from .axis import MeasuredAxis
 from .corridor import Truth, TruthKind, truths
 from .frames import Frames
 from .points import GROUND_CLASSES, Points, read_ground, read_points
-
-Float = NDArray[np.float64]
 
 REACH = 45.0
 """Points farther from the line that they are sorted along aren't kept, m."""
@@ -64,13 +62,13 @@ class LearningRoad:
 
     name: str
     origin: Float
-    xyz: NDArray[np.float32]
-    intensity: NDArray[np.float32]
-    rgb: NDArray[np.uint8]
-    class_id: NDArray[np.uint8]
+    xyz: Float32
+    intensity: Float32
+    rgb: UInt8
+    class_id: UInt8
     class_names: dict[int, str]
     has_color: bool
-    station: NDArray[np.float32]
+    station: Float32
     reference: MeasuredAxis
     truth: Truth | None = None
 
@@ -99,12 +97,12 @@ class LearningRoad:
             truth=truth,
         )
 
-    def select(self, keep: NDArray[np.bool_]) -> LearningRoad:
+    def select(self, keep: Bool) -> LearningRoad:
         """Return the road with the points (N,) of a mask only."""
         return replace(self, **{name: getattr(self, name)[keep] for name in _CACHED})
 
     @cached_property
-    def belonging(self) -> NDArray[np.bool_]:
+    def belonging(self) -> Bool:
         """Which points (N,) belong to the road: of a carriageway those up to the middle of the median."""
         if self.truth is None or not np.isfinite(self.truth.room).any():
             return np.ones(len(self), dtype=bool)
@@ -155,8 +153,8 @@ class Slices:
         xy: (K, 2) place in that frame, m.
     """
 
-    index: NDArray[np.intp]
-    number: NDArray[np.intp]
+    index: Index
+    number: Index
     xy: Float
 
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from synthroads_addon.base.arrays import AnyArray, Bool, Float, Index
+
 from .corridor import CORRIDOR
 from .frames import Frames
-
-Float = NDArray[np.float64]
 
 LEFT, RIGHT, HEADING, HEIGHT = (CORRIDOR.index(name) for name in ("left_edge", "right_edge", "heading", "height"))
 _NO_SHOULDER = 1.2
@@ -28,15 +28,15 @@ class Sample:
         color: (N, 3) from 0 to 1, or None.
     """
 
-    coord: NDArray[Any]
-    strength: NDArray[Any] | None
-    color: NDArray[Any] | None
+    coord: AnyArray
+    strength: AnyArray | None
+    color: AnyArray | None
     per_point: ClassVar[tuple[str, ...]] = ("coord", "strength", "color")
 
     def __len__(self) -> int:
         return len(self.coord)
 
-    def keep(self, points: NDArray[np.bool_] | NDArray[np.intp]) -> None:
+    def keep(self, points: Bool | Index) -> None:
         """Leave out all points but those of a mask or of ascending indices."""
         for name in self.per_point:
             if (values := getattr(self, name)) is not None:
@@ -70,9 +70,9 @@ class Stretch(Sample):
     """
 
     strength: Float
-    number: NDArray[np.intp]
-    paved: NDArray[np.bool_]
-    marked: NDArray[np.bool_]
+    number: Index
+    paved: Bool
+    marked: Bool
     frames: Frames
     center: Float
     corridor: Float

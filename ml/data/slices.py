@@ -19,11 +19,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from pydantic import Field
 from torch import Tensor
 from torch.utils.data import Dataset, IterableDataset, get_worker_info
 
+from synthroads_addon.base.arrays import Float, Index
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.random_streams import stream
 from synthroads_addon.base.schema import quantity
@@ -38,7 +38,6 @@ from .points import ROAD_CLASSES
 from .roads import LearningRoad, cut_beside_median
 from .samples import HEIGHT, Stretch
 
-Float = NDArray[np.float64]
 Sample = dict[str, Tensor]
 Batch = dict[str, Tensor]
 
@@ -231,9 +230,7 @@ def stretch(road: LearningRoad, frames: Frames, settings: SliceSettings) -> Stre
     return cut
 
 
-def sample(
-    cut: Stretch, settings: SliceSettings, rng: np.random.Generator, road: int, number: NDArray[np.intp]
-) -> Sample:
+def sample(cut: Stretch, settings: SliceSettings, rng: np.random.Generator, road: int, number: Index) -> Sample:
     """Return a sequence as tensors, with at most ``points_per_slice`` points of each slice drawn at random."""
     thin(cut, settings.points_per_slice, rng)
     ends = np.searchsorted(cut.number, np.arange(len(cut.center)), side="right")
@@ -299,7 +296,7 @@ def thin(cut: Stretch, most: int, rng: np.random.Generator) -> None:
     cut.keep(keep)
 
 
-def _medians(z: Float, ends: NDArray[np.intp]) -> Float:
+def _medians(z: Float, ends: Index) -> Float:
     """Return the median height (S,) of each slice's points; of all points where a slice has none, 0 without any."""
     whole = float(np.median(z)) if len(z) else 0.0
     starts = np.concatenate([[0], ends[:-1]])

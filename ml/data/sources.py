@@ -7,13 +7,13 @@ import zipfile
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import laspy
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from synthroads_addon.base.arrays import AnyArray, Float
 from synthroads_addon.base.classes import UNLABELLED, ClassScheme
 from synthroads_addon.base.errors import InputError, MissingFileError
 from synthroads_addon.base.files import files_below
@@ -185,7 +185,7 @@ def _pointcept_tile(folder: Path, table: NDArray[np.int16]) -> CloudTile:
     )
 
 
-def _array(folder: Path, name: str, entry: tuple[int, ...], kind: str) -> NDArray[Any]:
+def _array(folder: Path, name: str, entry: tuple[int, ...], kind: str) -> AnyArray:
     """Return an array (N, *entry) of a folder; what its header claims is held against the file's size."""
     path = folder / f"{name}.npy"
     try:
@@ -224,7 +224,7 @@ def cloud_tiles(path: Path, scheme: ClassScheme, source: Source, scene: str | No
                 yield tile_of(part.points, scene or path.stem, part.corner, scale)
 
 
-def tile_of(points: PointBlock, scene: str, origin: NDArray[np.float64], scale: float) -> CloudTile:
+def tile_of(points: PointBlock, scene: str, origin: Float, scale: float) -> CloudTile:
     """Return points whose ``class_id`` is the place in the scheme (255: ignored) as a tile.
 
     Args:
@@ -266,7 +266,7 @@ def _with_places(block: PointBlock, places: NDArray[np.int16]) -> PointBlock:
     return replace(block, class_id=np.where(places == IGNORED, UNLABELLED, places).astype(np.uint8))
 
 
-def _numbers(cloud: CloudReader, field: str) -> Iterator[NDArray[Any]]:
+def _numbers(cloud: CloudReader, field: str) -> Iterator[AnyArray]:
     """Yield an attribute of a LAS file block by block, as `CloudReader.blocks` yields points."""
     path = cloud.header.path
     if not cloud.header.kind.startswith("LAS"):

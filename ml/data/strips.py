@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from synthroads_addon.base.arrays import Bool, Float
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.progress import Progress, silent
 from synthroads_addon.cloud.formats.base import CloudHeader
@@ -20,8 +21,6 @@ from .axis import MeasuredAxis
 from .frames import Frames, estimated_path
 from .points import GROUND_CLASSES, SIXTEEN_BITS, UNSORTED_CLASSES, Points, full_color
 from .roads import REACH, LearningRoad
-
-Float = NDArray[np.float64]
 
 LENGTH = 500.0
 """Of a strip along the path, m."""
@@ -44,7 +43,7 @@ class GroundReading:
     """
 
     header: CloudHeader
-    classes: NDArray[np.bool_]
+    classes: Bool
     largest_color: int
     cells: Float
 
@@ -87,7 +86,7 @@ def path_through(ground: GroundReading) -> MeasuredAxis:
 
 def strips(
     cloud: Path, ground: GroundReading, path: MeasuredAxis, frames: Frames, progress: Progress = silent
-) -> Iterator[tuple[LearningRoad, Frames, NDArray[np.bool_]]]:
+) -> Iterator[tuple[LearningRoad, Frames, Bool]]:
     """Yield a road strip by strip, from first to last.
 
     The points lie in a temporary folder meanwhile, and in memory only those of one strip.

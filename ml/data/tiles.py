@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from synthroads_addon.base.arrays import AnyArray, Float, Float32, Int, UInt8
 
 from .classes import IGNORED
 from .points import full_color, thin
@@ -27,16 +28,16 @@ class CloudTile:
     """
 
     scene: str
-    origin: NDArray[np.float64]
-    coord: NDArray[np.float32]
-    color: NDArray[np.uint8] | None
-    strength: NDArray[np.float32] | None
+    origin: Float
+    coord: Float32
+    color: UInt8 | None
+    strength: Float32 | None
     segment: NDArray[np.int16]
 
     def __len__(self) -> int:
         return len(self.coord)
 
-    def select(self, keep: NDArray[Any]) -> CloudTile:
+    def select(self, keep: AnyArray) -> CloudTile:
         """Return the points chosen by a mask or indices."""
         return replace(
             self,
@@ -46,12 +47,12 @@ class CloudTile:
             segment=self.segment[keep],
         )
 
-    def class_counts(self, classes: int) -> NDArray[np.int64]:
+    def class_counts(self, classes: int) -> Int:
         """Return the number of labelled points of each class (C,)."""
         return np.bincount(self.segment[self.segment != IGNORED], minlength=classes)
 
 
-def eight_bits(rgb: NDArray[Any], largest: int) -> NDArray[np.uint8]:
+def eight_bits(rgb: AnyArray, largest: int) -> UInt8:
     """Return colours (N, 3) of LAS as 8 bits each.
 
     Args:
@@ -68,12 +69,12 @@ class Scaling:
     shift: float = 0.0
     span: float = 1.0
 
-    def apply(self, strength: NDArray[np.float32]) -> NDArray[np.float32]:
+    def apply(self, strength: Float32) -> Float32:
         """Return the feature (N,) of intensities (N,); a few retro-reflectors are cut at 5 spans."""
         return np.clip((strength - self.shift) / self.span, -5.0, 5.0).astype(np.float32)
 
 
-def robust_scaling(strengths: Sequence[NDArray[np.float32]]) -> Scaling:
+def robust_scaling(strengths: Sequence[Float32]) -> Scaling:
     """Return the scaling that gives a scene the median 0 and the span 1 between its 10th and 90th percentile.
 
     Args:
@@ -97,7 +98,7 @@ def scalings(tiles: Sequence[CloudTile], kind: str, voxel: float | None = None) 
     """
     if kind == "share":
         return dict.fromkeys((tile.scene for tile in tiles), Scaling())
-    parts: dict[str, list[NDArray[np.float32]]] = {}
+    parts: dict[str, list[Float32]] = {}
     for tile in tiles:
         found = parts.setdefault(tile.scene, [])
         if tile.strength is not None:

@@ -23,12 +23,10 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 from skimage.morphology import skeletonize
 
-from synthroads_addon.base.arrays import otsu
+from synthroads_addon.base.arrays import Bool, Float, Index, otsu
 
 from ..data.axis import MeasuredAxis
 
-Float = NDArray[np.float64]
-Index = NDArray[np.intp]
 Rule = Callable[[Float, Float], float]
 """From the points' y (N,), m, and intensities (N,) of one slice to the centre's y, m."""
 
@@ -107,8 +105,6 @@ def slice_centers(rule: Rule, number: Index, y: Float, intensity: Float, count: 
             result[index] = rule(y[own], intensity[own])
     return result
 
-
-Mask = NDArray[np.bool_]
 
 MASKS = ("classes", "ground", "dark")
 WINDOW = 100
@@ -196,7 +192,7 @@ def skeleton_points(xy: Float, intensity: Float | None, settings: SkeletonSettin
     return (pixels + corner + 0.5) * settings.raster
 
 
-def _in_dark_pixels(cell: Index, shape: tuple[int, ...], intensity: Float) -> Mask:
+def _in_dark_pixels(cell: Index, shape: tuple[int, ...], intensity: Float) -> Bool:
     """Return which points (N,) lie in pixels whose median intensity is below Otsu's threshold of the pixels."""
     number = np.ravel_multi_index((cell[:, 0], cell[:, 1]), shape)
     used, owner = np.unique(number, return_inverse=True)
@@ -204,7 +200,7 @@ def _in_dark_pixels(cell: Index, shape: tuple[int, ...], intensity: Float) -> Ma
     return (median <= otsu(median))[owner]
 
 
-def prune_skeleton(skeleton: Mask, shortest: float) -> Mask:
+def prune_skeleton(skeleton: Bool, shortest: float) -> Bool:
     """Return a skeleton without branches shorter than ``shortest`` pixels, thinned again after each round of cuts.
 
     Args:
@@ -219,7 +215,7 @@ def prune_skeleton(skeleton: Mask, shortest: float) -> Mask:
         skeleton = skeletonize(skeleton & ~np.isin(number, short))
 
 
-def _branches(skeleton: Mask) -> tuple[NDArray[np.int32], list[int]]:
+def _branches(skeleton: Bool) -> tuple[NDArray[np.int32], list[int]]:
     """Return the skeleton's pixels numbered by the line that they belong to, and the numbers of those that end freely.
 
     Lines meet at junctions: connected pixels with three or more neighbours that three or more lines touch. Pixels of a

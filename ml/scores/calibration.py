@@ -14,9 +14,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from synthroads_addon.base.arrays import Float
 
 LEVELS = (0.68, 0.95)
 DEVIATIONS = (0.9944578832097532, 1.959963984540054)

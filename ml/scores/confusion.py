@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from synthroads_addon.base.arrays import Float, Int
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.text_table import text_table
 
 from ..data.classes import IGNORED
 from .metrics import Metric, Spread, defined, markdown, or_none
-
-FloatArray = NDArray[np.float64]
 
 
 class Confusion:
@@ -56,21 +55,21 @@ class Confusion:
         self.counts += np.bincount(rows * count + columns, minlength=count * count).reshape(count, count)
 
     @property
-    def right(self) -> NDArray[np.int64]:
+    def right(self) -> Int:
         """Return the number of points rightly given to each class (C,)."""
         return self.counts.diagonal()
 
     @property
-    def found(self) -> NDArray[np.int64]:
+    def found(self) -> Int:
         """Return the number of points given to each class (C,)."""
         return self.counts.sum(axis=0)
 
     @property
-    def support(self) -> NDArray[np.int64]:
+    def support(self) -> Int:
         """Return the number of true points of each class (C,)."""
         return self.counts.sum(axis=1)
 
-    def values(self, metric: str) -> FloatArray:
+    def values(self, metric: str) -> Float:
         """Return one of `METRICS` of each class (C,)."""
         return np.asarray(METRICS[metric].value(self), dtype=np.float64)
 

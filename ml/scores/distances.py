@@ -25,15 +25,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from scipy.special import ndtri
 
+from synthroads_addon.base.arrays import Bool, Float, Index
+
 from .calibration import LEVELS
 from .metrics import Metric
-
-Float = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 WINDOW = 60.0
 GAP = 5.0
@@ -82,12 +80,12 @@ class Comparison:
     intervals: Float | None = None
 
     @cached_property
-    def known(self) -> NDArray[np.bool_]:
+    def known(self) -> Bool:
         """Which slices (M,) have a truth."""
         return np.isfinite(self.true).all(axis=1)
 
     @cached_property
-    def both(self) -> NDArray[np.bool_]:
+    def both(self) -> Bool:
         """Which slices (M,) have a truth and a prediction."""
         return self.known & np.isfinite(self.predicted).all(axis=1)
 
@@ -248,7 +246,7 @@ def chamfer(predicted: Float, true: Float, station: Float, window: float = WINDO
     return Chamfer(float(full), float(common), sum(weights) / whole, len(parts))
 
 
-def windows(station: Float, known: NDArray[np.bool_], window: float = WINDOW) -> list[Index]:
+def windows(station: Float, known: Bool, window: float = WINDOW) -> list[Index]:
     """Return the indices of the slices of each window; see the module's text.
 
     Args:

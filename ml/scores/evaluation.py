@@ -24,8 +24,8 @@ from functools import partial
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from synthroads_addon.base.arrays import Float
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.random_streams import stream
 
@@ -38,7 +38,6 @@ from . import baselines
 from .distances import METRICS, Comparison, over_roads
 from .metrics import Spread, figures, over_seeds
 
-Float = NDArray[np.float64]
 Predictor = Callable[[LearningRoad, Frames], Float]
 
 CORRIDOR_COLUMNS = ("center", "center_std", *CORRIDOR, *(f"{name}_std" for name in CORRIDOR), "center_68", "center_95")

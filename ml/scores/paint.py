@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from synthroads_addon.base.arrays import Float
 from synthroads_addon.base.errors import InputError
 
 from ..data.axis import MeasuredAxis
@@ -19,8 +19,6 @@ from ..data.corridor import Truth
 from ..data.intensity import logarithms
 from ..data.roads import LearningRoad
 from .evaluation import truth_of
-
-Float = NDArray[np.float64]
 
 REACH = 1.2
 """A line is looked for up to so far from the axis, m."""

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy.stats import rankdata
 
+from synthroads_addon.base.arrays import Float, Float32
 from synthroads_addon.base.classes import ClassScheme, class_scheme
 
 from ..data.classes import IGNORED
@@ -24,7 +25,6 @@ from .evaluation import CORRIDOR_COLUMNS, Case, truth_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Float = NDArray[np.float64]
 
 COLORS = ("#d81b60", "#1e88e5", "#ffc107", "#004d40", "#8e24aa", "#6d4c41")
 TRUE = "#00e5a0"
@@ -278,16 +278,14 @@ def comparison(
     return small_png(figure)
 
 
-def class_colors(names: Sequence[str], scheme: ClassScheme | None = None) -> NDArray[np.float64]:
+def class_colors(names: Sequence[str], scheme: ClassScheme | None = None) -> Float:
     """Return the previews' colours of classes (C, 3), from 0 to 1; a group's that isn't a class is grey."""
     schemes = (class_scheme("17"), class_scheme("5"), *([scheme] if scheme else []))
     known = {row.name: row.color for one in schemes for row in one.rows}
     return np.array([known.get(name, (150, 150, 150)) for name in names]) / 255.0
 
 
-def top_view(
-    coord: NDArray[np.float32], labels: NDArray[np.int16], colors: NDArray[np.float64], extent: NDArray[np.floating]
-) -> NDArray[np.float64]:
+def top_view(coord: Float32, labels: NDArray[np.int16], colors: Float, extent: NDArray[np.floating]) -> Float:
     """Return an image (H, W, 3), north up in row order: of each pixel the highest point's colour.
 
     Args:

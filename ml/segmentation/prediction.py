@@ -16,8 +16,8 @@ from typing import Any
 
 import laspy
 import numpy as np
-from numpy.typing import NDArray
 
+from synthroads_addon.base.arrays import AnyArray, Bool, Float, Int, UInt8
 from synthroads_addon.base.classes import ClassScheme
 from synthroads_addon.base.errors import InputError, OutputError
 from synthroads_addon.base.files import sync_file
@@ -185,7 +185,7 @@ class TileStore:
         low, middle, high = (int(np.searchsorted(share, at)) / FULL for at in (0.1, 0.5, 0.9))
         return Scaling(middle, high - low if high > low else 1.0)
 
-    def tiles(self) -> Iterator[tuple[CloudTile, NDArray[np.bool_], NDArray[np.int64]]]:
+    def tiles(self) -> Iterator[tuple[CloudTile, Bool, Int]]:
         """Yield each tile with what lies around it, which points are its own, and where those stand in the file."""
         for row, column in sorted(self._known):
             parts, cores = [], []
@@ -206,7 +206,7 @@ class TileStore:
             )
             yield tile, core, record["index"][core]
 
-    def _near(self, row: int, column: int, north: int, east: int) -> NDArray[Any]:
+    def _near(self, row: int, column: int, north: int, east: int) -> AnyArray:
         """Return a tile's points that the tile which it lies ``north`` and ``east`` of sees, relative to that one."""
         if (row, column) not in self._known:
             return np.empty(0, dtype=_RECORD)
@@ -216,15 +216,15 @@ class TileStore:
         plan = record["place"][:, :2]
         if north == 0 and east == 0:
             return record
-        inside: NDArray[Any] = record[np.all((plan >= -MARGIN) & (plan < self._edge + MARGIN), axis=1)]
+        inside: AnyArray = record[np.all((plan >= -MARGIN) & (plan < self._edge + MARGIN), axis=1)]
         return inside
 
-    def _corner(self, tile: NDArray[np.int64]) -> NDArray[np.float64]:
+    def _corner(self, tile: Int) -> Float:
         """Return the map coordinates (N, 3) of the corners of tiles (N, 2): column and row."""
         plan = self._origin[:2] + tile * self._edge
         return np.concatenate([plan, np.full((len(tile), 1), self._origin[2])], axis=1)
 
-    def _append(self, tile: NDArray[np.int64], record: NDArray[Any]) -> None:
+    def _append(self, tile: Int, record: AnyArray) -> None:
         order = np.lexsort(tile.T)
         tile, record = tile[order], record[order]
         starts = np.flatnonzero(np.r_[True, np.any(tile[1:] != tile[:-1], axis=1)])
@@ -236,13 +236,8 @@ class TileStore:
 
 
 def write_copy(
-    source: Path,
-    target: Path,
-    labels: NDArray[np.uint8],
-    ids: NDArray[np.uint8],
-    codes: ClassScheme | None,
-    progress: Progress,
-) -> NDArray[np.int64]:
+    source: Path, target: Path, labels: UInt8, ids: UInt8, codes: ClassScheme | None, progress: Progress
+) -> Int:
     """Copy a LAS file with one more attribute; return the number of points of each class (C,).
 
     Args:
@@ -310,7 +305,7 @@ def extended_header(old: laspy.LasHeader, needs_codes: bool) -> laspy.LasHeader:
 
 
 def extended_record(
-    old: Any, header: laspy.LasHeader, ids: NDArray[np.uint8], codes: ClassScheme | None
+    old: Any, header: laspy.LasHeader, ids: UInt8, codes: ClassScheme | None
 ) -> laspy.ScaleAwarePointRecord:
     """Return a copy of points with their classes; all other attributes bit by bit as they are."""
     record = laspy.ScaleAwarePointRecord.zeros(len(old), header=header)

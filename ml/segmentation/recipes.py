@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
+from synthroads_addon.base.arrays import Float, Index, Int
 from synthroads_addon.base.classes import ClassScheme, class_scheme
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.random_streams import stream
@@ -118,7 +118,7 @@ class SegmentationConfiguration(Configuration):
         return {domain: found[domain] for domain in wanted}
 
 
-def class_shares(tiles: Sequence[CloudTile], classes: int) -> NDArray[np.float64]:
+def class_shares(tiles: Sequence[CloudTile], classes: int) -> Float:
     """Return the share of the labelled points that each class has (C,).
 
     Raises:
@@ -130,7 +130,7 @@ def class_shares(tiles: Sequence[CloudTile], classes: int) -> NDArray[np.float64
     return np.asarray(counts / counts.sum(), dtype=np.float64)
 
 
-def class_weights(shares: NDArray[np.float64]) -> NDArray[np.float64]:
+def class_weights(shares: Float) -> Float:
     """Return the weights of the loss (C,): 1 / (f + 0.02), scaled to the mean 1."""
     weights = 1.0 / (shares + 0.02)
     return np.asarray(weights / weights.mean(), dtype=np.float64)
@@ -154,12 +154,12 @@ def mapped_intensities(synthetic: Sequence[CloudTile], real: Sequence[CloudTile]
     ]
 
 
-def _levels(tile: CloudTile) -> NDArray[np.intp]:
+def _levels(tile: CloudTile) -> Index:
     assert tile.strength is not None
     return np.rint(np.clip(tile.strength, 0.0, 1.0) * FULL).astype(np.intp)
 
 
-def _histogram(tiles: Sequence[CloudTile], where: str) -> NDArray[np.int64]:
+def _histogram(tiles: Sequence[CloudTile], where: str) -> Int:
     counts = np.zeros(LEVELS, dtype=np.int64)
     for tile in tiles:
         if tile.strength is not None:

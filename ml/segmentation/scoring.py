@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from torch import Tensor, nn
 
+from synthroads_addon.base.arrays import Bool, Float, Float32, Index
 from synthroads_addon.base.classes import ClassScheme
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.progress import Progress, silent
@@ -45,11 +46,11 @@ class Classifier(Protocol):
 
 def pieces(
     plan: NDArray[np.floating[Any]],
-    own: NDArray[np.bool_] | None = None,
+    own: Bool | None = None,
     edge: float = EDGE,
     margin: float = MARGIN,
     largest: int = LARGEST,
-) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+) -> Iterator[tuple[Index, Index]]:
     """Yield pieces: the indices of their own points, and of all points that they see, own ones included.
 
     Every point that is to be in a piece is in exactly one.
@@ -69,14 +70,8 @@ def pieces(
 
 
 def _cut_squares(
-    position: NDArray[np.float64],
-    own: NDArray[np.intp],
-    seen: NDArray[np.intp],
-    low: NDArray[np.float64],
-    edge: float,
-    margin: float,
-    largest: int,
-) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp]]]:
+    position: Float, own: Index, seen: Index, low: Float, edge: float, margin: float, largest: int
+) -> Iterator[tuple[Index, Index]]:
     """Cut points into squares counted from ``low``; ``seen`` holds all that the squares may see."""
     cells = np.floor((position[own] - low) / edge).astype(np.int64)
     for cell in np.unique(cells, axis=0):
@@ -95,7 +90,7 @@ def label_tile(
     scaling: Scaling,
     classifier: Classifier,
     settings: CropSettings,
-    core: NDArray[np.bool_] | None = None,
+    core: Bool | None = None,
     seed: int = 0,
 ) -> NDArray[np.int16]:
     """Return the class of each point of a tile: thinned out, predicted piece by piece, carried back.
@@ -120,9 +115,7 @@ def label_tile(
     return carry(small.coord[own], labels[own], tile.coord if core is None else tile.coord[core])
 
 
-def _needed_points(
-    small: NDArray[np.float32], full: NDArray[np.float32], core: NDArray[np.bool_] | None, voxel: float
-) -> NDArray[np.bool_]:
+def _needed_points(small: Float32, full: Float32, core: Bool | None, voxel: float) -> Bool:
     """Return which of the thinned points are needed for the classes of the core: those within two cells of it."""
     if core is None:
         return np.ones(len(small), dtype=bool)
@@ -130,7 +123,7 @@ def _needed_points(
     return np.asarray(np.all((small[:, :2] >= low) & (small[:, :2] <= high), axis=1))
 
 
-def carry(known: NDArray[np.float32], labels: NDArray[np.int16], points: NDArray[np.float32]) -> NDArray[np.int16]:
+def carry(known: Float32, labels: NDArray[np.int16], points: Float32) -> NDArray[np.int16]:
     """Return for each point (M,) the label of the nearest known point.
 
     Args:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic.fields import FieldInfo
 
+from synthroads_addon.base.arrays import Bool
 from synthroads_addon.base.schema import quantity
 
 from ...configuration import Part
@@ -22,7 +22,7 @@ class PointEffects(Part):
     dropout: float = quantity(0.0, ge=0, lt=1, unit="1", description="Largest share of the points that is left out.")
     color_drop: float = quantity(0.0, ge=0, le=1, unit="1", description="Probability of the colours being left out.")
 
-    def kept_points(self, count: int, random: np.random.Generator) -> NDArray[np.bool_]:
+    def kept_points(self, count: int, random: np.random.Generator) -> Bool:
         """Return which points (count,) are not left out."""
         return random.random(count) >= self.dropout * random.random()
 

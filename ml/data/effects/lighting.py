@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from synthroads_addon.base.arrays import Bool, Float
 
 from ...registry import effect
 from ..samples import Stretch
 from .slices import SequenceEffects
 
-Float = NDArray[np.float64]
 Generator = np.random.Generator
 
 _DARKEST = 1e-5
@@ -56,9 +56,7 @@ def tint(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
         stretch.color = np.clip(stretch.color * factors, 0.0, 1.0)
 
 
-def _repaint_lines(
-    value: Float, stretch: Stretch, probability: float, rng: Generator
-) -> tuple[Float, NDArray[np.bool_]]:
+def _repaint_lines(value: Float, stretch: Stretch, probability: float, rng: Generator) -> tuple[Float, Bool]:
     """Return intensities and what is marked (K,) where the lines of a carriageway without shoulders are others.
 
     Two lanes are parted by dashes on motorways; on rural roads as well by a solid or a double line, or by none; and
@@ -85,9 +83,7 @@ def _repaint_lines(
     return np.where(gone, pavement, value), marked & ~gone
 
 
-def _verges(
-    value: Float, stretch: Stretch, marked: NDArray[np.bool_], widest: float, rng: Generator
-) -> tuple[Float, NDArray[np.bool_]]:
+def _verges(value: Float, stretch: Stretch, marked: Bool, widest: float, rng: Generator) -> tuple[Float, Bool]:
     """Return intensities, and which points (K,) look like pavement, where a rural road has verges of crushed stone.
 
     These are hardly brighter or darker than asphalt: the pavement seems wider than it is.
@@ -105,7 +101,7 @@ def _verges(
     return np.where(verge, value * (tone * float(np.median(value[bare])) / usual), value), stretch.paved | verge
 
 
-def _wear_markings(value: Float, paved: NDArray[np.bool_], marked: NDArray[np.bool_], share: float) -> Float:
+def _wear_markings(value: Float, paved: Bool, marked: Bool, share: float) -> Float:
     """Return intensities whose markings have lost a share of what they are brighter than the pavement."""
     bare = paved & ~marked
     if not marked.any() or not bare.any():

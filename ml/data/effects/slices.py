@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from synthroads_addon.base.schema import quantity
@@ -17,7 +16,6 @@ from ..frames import Frames
 from ..samples import HEADING, HEIGHT, LEFT, RIGHT, Stretch
 from .base import PointEffects, usually
 
-Float = NDArray[np.float64]
 Generator = np.random.Generator
 
 _RIM = 0.7

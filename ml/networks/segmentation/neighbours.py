@@ -23,12 +23,11 @@ import torch
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from synthroads_addon.base.arrays import Float, Int
 from synthroads_addon.base.errors import InputError
 
 from ...data.points import thin
 
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
 Neighbours = dict[str, torch.Tensor]
 """Tensors by name; ``s`` is a stage's number, 0 being the cloud itself, with M_s points:
 
@@ -109,7 +108,7 @@ def build_neighbours(coord: torch.Tensor, offset: torch.Tensor, neighbourhood: N
     return packed
 
 
-def _checked_ends(coord: torch.Tensor, offset: torch.Tensor) -> Indices:
+def _checked_ends(coord: torch.Tensor, offset: torch.Tensor) -> Int:
     if coord.ndim != 2 or coord.shape[1] != 3 or not coord.is_floating_point():
         raise InputError("coord", tuple(coord.shape), "must be floating-point numbers of the shape (N, 3)")
     ends = np.asarray(offset.cpu().numpy(), dtype=np.int64)
@@ -151,7 +150,7 @@ def _about_middle(coord: NDArray[np.floating]) -> NDArray[np.floating]:
     return (exact - 0.5 * (exact.min(axis=0) + exact.max(axis=0))).astype(coord.dtype)
 
 
-def _in_given_order(found: dict[str, NDArray[np.generic]], order: Indices) -> dict[str, NDArray[np.generic]]:
+def _in_given_order(found: dict[str, NDArray[np.generic]], order: Int) -> dict[str, NDArray[np.generic]]:
     """Return arrays that were found in another order of the cloud's points such that they fit the given one."""
     place = np.empty_like(order)
     place[order] = np.arange(len(order))
@@ -159,7 +158,7 @@ def _in_given_order(found: dict[str, NDArray[np.generic]], order: Indices) -> di
     return found | turned | {name: found[name][place] for name in ("nearest1", "weight1")}
 
 
-def geometric_order(points: NDArray[np.floating]) -> Indices:
+def geometric_order(points: NDArray[np.floating]) -> Int:
     """Return an order of points (N, 3) that looks random but follows from their coordinates alone."""
     bits = np.ascontiguousarray(points.astype(np.float64) + 0.0).view(np.uint64)  # + 0.0: one zero, not two
     key = np.zeros(len(points), dtype=np.uint64)
@@ -176,7 +175,7 @@ def _mix_bits(key: NDArray[np.uint64]) -> NDArray[np.uint64]:
     return key ^ (key >> np.uint64(31))
 
 
-def _sample(points: Floats, radius: float, sampling: Sampling) -> Indices:
+def _sample(points: Float, radius: float, sampling: Sampling) -> Int:
     if not len(points):
         return np.zeros(0, dtype=np.int64)
     if sampling == "grid":
@@ -184,7 +183,7 @@ def _sample(points: Floats, radius: float, sampling: Sampling) -> Indices:
     return farthest_sample(points, max(len(points) // _STRIDE, 1))
 
 
-def farthest_sample(points: Floats, count: int) -> Indices:
+def farthest_sample(points: Float, count: int) -> Int:
     """Return points each of which is the farthest from those before it, the first one first; the first of equal ones.
 
     Eldar et al., "The farthest point strategy for progressive image sampling" (1997). Takes N x count distances.
@@ -199,7 +198,7 @@ def farthest_sample(points: Floats, count: int) -> Indices:
     return chosen
 
 
-def _first_in_ball(queries: cKDTree | None, support: cKDTree | None, radius: float, limit: int) -> Indices:
+def _first_in_ball(queries: cKDTree | None, support: cKDTree | None, radius: float, limit: int) -> Int:
     """Return for each query the first `limit` support points nearer than the radius (M, limit), padded with the first.
 
     Every query is a support point itself, so that no ball is empty.
@@ -220,7 +219,7 @@ def _first_in_ball(queries: cKDTree | None, support: cKDTree | None, radius: flo
     return np.where(found < 0, found[:, :1], found)
 
 
-def nearest_three(points: Floats, tree: cKDTree | None) -> tuple[Indices, Floats]:
+def nearest_three(points: Float, tree: cKDTree | None) -> tuple[Int, Float]:
     """Return for each point the nearest three of a tree and their weights, 1 / (distance + 1e-8), of the sum 1.
 
     Where the tree has fewer, index and weight of the others are 0.

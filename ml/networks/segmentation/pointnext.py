@@ -95,9 +95,7 @@ class PointNeXt(nn.Module):
         )
         self.propagations = nn.ModuleList(FeaturePropagation(few, many) for few, many in pairs)
         self.head = nn.Sequential(
-            Pointwise(channels[0], channels[0]),
-            nn.Dropout(options.dropout),
-            nn.Linear(channels[0], classes),
+            Pointwise(channels[0], channels[0]), nn.Dropout(options.dropout), nn.Linear(channels[0], classes)
         )
 
     def forward(self, feat: Tensor, neighbours: Neighbours) -> Tensor:
