@@ -26,9 +26,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads evaluate`."""
     from ml.runs import Run
-    from ml.tasks import Evaluation, kinds, task
+    from ml.tasks import Evaluation, task
 
-    trained = Run.open(arguments.run, kinds())
+    trained = Run.open(arguments.run)
     evaluation = Evaluation(arguments.data, arguments.split, arguments.output, arguments.mapping)
     scores, tables = task(trained.configuration.task).evaluate(trained, evaluation, progress_bar(arguments))
     written = f"written to {arguments.output}: {', '.join(scores['files'])}"

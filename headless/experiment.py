@@ -14,13 +14,13 @@ if __name__ == "__main__":
 
 from headless.commands import Outcome, add_changes_argument, entry
 from headless.messages import progress_bar
-from ml.configuration import experiment_names
+from ml.configuration import EXPERIMENTS, names_in
 from synthroads_addon.base.errors import InputError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `synthroads experiment`."""
-    known = ", ".join(experiment_names())
+    known = ", ".join(names_in(EXPERIMENTS))
     parser.add_argument("experiment", metavar="EXPERIMENT", help=f"YAML file, or one of {known}")
     text = "folder that {NAME} in the experiment's paths stands for (can be repeated)"
     parser.add_argument("--data", type=_folder, action="append", default=[], metavar="NAME=FOLDER", help=text)

@@ -35,10 +35,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
     if arguments.steps < 1:
         raise InputError("--steps", arguments.steps, "must be 1 or more")
     from ml.segmentation.forecast import forecast
-    from ml.segmentation.recipes import SegmentationConfiguration
 
-    kinds = {"segmentation": SegmentationConfiguration}
-    configuration = load_configuration(arguments.configuration, kinds, arguments.changes)
+    configuration = load_configuration(arguments.configuration, arguments.changes, ["segmentation"])
     figures = forecast(configuration, arguments.steps)
     if arguments.output:
         write_file(arguments.output, canonical_json(figures).encode(), overwrite=True)

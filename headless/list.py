@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ if __name__ == "__main__":
 import ml.catalogue
 from headless import catalogue
 from headless.commands import Outcome, entry
+from ml.configuration import configuration_kind
 from synthroads_addon.base.catalogue import Kind, entries
 from synthroads_addon.base.errors import InputError, nearest_name
 from synthroads_addon.base.field_list import FieldEntry, fields_of
@@ -27,19 +29,10 @@ KINDS: dict[str, Kind] = {**catalogue.KINDS, **ml.catalogue.KINDS}
 """Kinds of things that are listed."""
 
 
-def _learning_class(name: str) -> Callable[[], Any]:
-    def kind() -> Any:
-        from ml.tasks import task
-
-        return task(name).configuration_kind()
-
-    return kind
-
-
 _OWNERS: dict[str, Callable[[], Any]] = {
     "scenario": lambda: Scenario,
-    "segmentation": _learning_class("segmentation"),
-    "centerline": _learning_class("centerline"),
+    "segmentation": partial(configuration_kind, "segmentation"),
+    "centerline": partial(configuration_kind, "centerline"),
 }
 """Things that have fields which ``--set`` takes, with their classes: of `train` and `experiment` the task's."""
 

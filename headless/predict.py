@@ -30,9 +30,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads predict`."""
     from ml.runs import Run
-    from ml.tasks import Prediction, kinds, task
+    from ml.tasks import Prediction, task
 
-    trained = Run.open(arguments.run, kinds())
+    trained = Run.open(arguments.run)
     files = (arguments.cloud, arguments.output, arguments.path)
     prediction = Prediction(*files, overwrite=arguments.overwrite, classification=arguments.classification)
     metrics = task(trained.configuration.task).predict(trained, prediction, progress_bar(arguments))

@@ -11,12 +11,12 @@ if __name__ == "__main__":
 
 from headless.commands import Outcome, add_changes_argument, entry
 from headless.messages import detail, progress_bar
-from ml.configuration import load_configuration, shipped_names
+from ml.configuration import SHIPPED, load_configuration, names_in
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments of `synthroads train`."""
-    known = ", ".join(shipped_names())
+    known = ", ".join(names_in(SHIPPED))
     parser.add_argument("configuration", metavar="CONFIGURATION", help=f"YAML file, or one of {known}")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the run")
     parser.add_argument("--resume", action="store_true", help="go on with an interrupted training")
@@ -27,9 +27,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads train`."""
     from ml.runs import Run
-    from ml.tasks import kinds, task
+    from ml.tasks import task
 
-    configuration = load_configuration(arguments.configuration, kinds(), arguments.changes)
+    configuration = load_configuration(arguments.configuration, arguments.changes)
     detail("configuration", configuration.to_dict())
     begun = Run.start(arguments.output, configuration, resume=arguments.resume, overwrite=arguments.overwrite)
     metrics = task(configuration.task).train(begun, progress_bar(arguments))

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from synthroads_addon.base.catalogue import Entry, Kind, figures, preset
+from synthroads_addon.base.catalogue import Entry, Kind, figures
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import read_yaml
 
-from .configuration import EXPERIMENTS, SHIPPED, Schedule, experiment_names, shipped_names
+from .configuration import EXPERIMENTS, SHIPPED, Schedule, names_in, shipped_file
 from .data.classes import MAPPINGS, load_mapping
 
 _YAML = (".yaml", ".yml", ".json")
 
 
 def _training(name: str) -> Entry:
-    data = _object(preset(SHIPPED, ".yaml", name, shipped_names()))
+    file = shipped_file("configuration", SHIPPED, name)
+    data = _object(file)
     own = data.get("data")
     learned = own if isinstance(own, dict) else {}
     told = {
@@ -25,11 +27,11 @@ def _training(name: str) -> Entry:
         "epochs": Schedule.from_dict(data.get("schedule", {}), f"{name}: schedule").epochs,
         "data": _paths([learned.get(key, ()) for key in ("data_sets", "measured", "synthetic", "real")]),
     }
-    return Entry(name, str(data.get("title", "")), preset(SHIPPED, ".yaml", name, shipped_names()), told)
+    return Entry(name, str(data.get("title", "")), file, told)
 
 
 def _experiment(name: str) -> Entry:
-    file = preset(EXPERIMENTS, ".yaml", name, experiment_names())
+    file = shipped_file("experiment", EXPERIMENTS, name)
     data = _object(file)
     variants = data.get("variants")
     told = {
@@ -42,11 +44,7 @@ def _experiment(name: str) -> Entry:
 def _mapping(name: str) -> Entry:
     made = load_mapping(name)
     told = {"field": made.field, "classes": list(dict.fromkeys(made.classes.values()))}
-    return Entry(name, made.title, preset(MAPPINGS, ".json", name, _mapping_names()), told)
-
-
-def _mapping_names() -> list[str]:
-    return sorted(path.stem for path in MAPPINGS.glob("*.json"))
+    return Entry(name, made.title, shipped_file("mapping", MAPPINGS, name, [".json"]), told)
 
 
 def _object(file: Path) -> Mapping[str, Any]:
@@ -69,7 +67,7 @@ KINDS = {
     "trainings": Kind(
         "Trainings",
         "synthroads train NAME",
-        shipped_names,
+        partial(names_in, SHIPPED),
         _training,
         _YAML,
         ("what it is", "task", "epochs", "learned from"),
@@ -78,7 +76,7 @@ KINDS = {
     "experiments": Kind(
         "Experiments",
         "synthroads experiment NAME",
-        experiment_names,
+        partial(names_in, EXPERIMENTS),
         _experiment,
         _YAML,
         ("what it is", "from", "variants"),
@@ -87,7 +85,7 @@ KINDS = {
     "mappings": Kind(
         "Mappings of the classes of others",
         "synthroads evaluate --mapping NAME",
-        _mapping_names,
+        partial(names_in, MAPPINGS),
         _mapping,
         (".json",),
         ("what it is", "attribute", "classes"),

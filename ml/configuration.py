@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Self, TypeVar
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, ModelWrapValidatorHandler, model_validator
 
@@ -14,6 +15,8 @@ from synthroads_addon.scenario.scenario import apply_change
 
 SHIPPED = Path(__file__).parent / "configurations"
 EXPERIMENTS = SHIPPED / "experiments"
+TASKS = {"centerline": "ml.centerline.task", "segmentation": "ml.segmentation.task"}
+"""Task as configurations name it, and its module: a `tasks.Task`."""
 _LARGEST_SEED = 2**63 - 1
 
 
@@ -71,53 +74,60 @@ class Configuration(Part):
     schedule: Schedule = Field(default=Schedule(), description="How the weights are learned.")
 
 
-C = TypeVar("C", bound=Configuration)
+def configuration_kind(task: str) -> type[Configuration]:
+    """Return the class of the configurations of one of `TASKS`."""
+    kind: type[Configuration] = import_module(TASKS[task]).CONFIGURATION
+    return kind
 
 
-def shipped_names() -> list[str]:
-    """Return the names of the configurations that come with the package."""
-    return sorted(path.stem for path in SHIPPED.glob("*.yaml"))
+def names_in(folder: Path) -> list[str]:
+    """Return the names of the files in a folder of what comes with the package."""
+    return sorted(path.stem for path in folder.glob("*.*"))
 
 
-def experiment_names() -> list[str]:
-    """Return the names of the experiments that come with the package."""
-    return sorted(path.stem for path in EXPERIMENTS.glob("*.yaml"))
+def shipped_file(what: str, folder: Path, name_or_file: str, endings: Sequence[str] = (".yaml", ".json")) -> Path:
+    """Return the file of a name out of `names_in`, or the file itself that is named.
+
+    Raises:
+        InputError: there is no such name, and a file would end in one of the endings (or in .yml).
+    """
+    names, path = names_in(folder), Path(name_or_file)
+    if name_or_file in names:
+        return folder / f"{name_or_file}{endings[0]}"
+    if path.suffix.lower().replace(".yml", ".yaml") in endings:
+        return path
+    hint = nearest_name(name_or_file, names)
+    allowed = f"must be a {' or '.join(endings)} file or one of {', '.join(names)}{hint}"
+    raise InputError(what, name_or_file, allowed)
 
 
-def load_configuration(name_or_file: str, kinds: Mapping[str, type[C]], changes: Sequence[str] = ()) -> C:
+def load_configuration(name_or_file: str, changes: Sequence[str] = (), tasks: Sequence[str] = ()) -> Any:
     """Load a shipped configuration or a YAML file and apply ``path=value`` changes.
 
     Args:
-        name_or_file: a name out of `shipped_names`, or a file.
-        kinds: the class of each task.
+        name_or_file: a name out of `SHIPPED`, or a file.
         changes: as ``--set`` takes them, e.g. ``schedule.epochs=5``.
+        tasks: that are possible; all if not given.
 
     Raises:
         MissingFileError: there is no such file.
         InputError: a field is unknown or wrong; the message names it.
     """
-    path = Path(name_or_file)
-    if name_or_file in shipped_names():
-        path = SHIPPED / f"{name_or_file}.yaml"
-    elif path.suffix.lower() not in (".yaml", ".yml", ".json"):
-        known = ", ".join(shipped_names())
-        hint = nearest_name(name_or_file, shipped_names())
-        raise InputError("configuration", name_or_file, f"must be a .yaml or .json file or one of {known}{hint}")
-    data = read_yaml(path)
+    data = read_yaml(shipped_file("configuration", SHIPPED, name_or_file))
     task = data.get("task") if isinstance(data, dict) else None
-    kind = kinds.get(task, Configuration) if isinstance(task, str) else Configuration
+    kind = configuration_kind(task) if isinstance(task, str) and task in TASKS else Configuration
     for change in changes:
         data = apply_change(data, change, kind)
-    return from_data(data, kinds, str(name_or_file))
+    return from_data(data, str(name_or_file), tasks)
 
 
-def from_data(data: Any, kinds: Mapping[str, type[C]], source: str) -> C:
+def from_data(data: Any, source: str, tasks: Sequence[str] = ()) -> Any:
     """Return the configuration that plain data hold.
 
     Raises:
-        InputError: they name no known task, or a field is unknown or wrong.
+        InputError: they name no task that is possible, or a field is unknown or wrong.
     """
     task = data.get("task") if isinstance(data, dict) else None
-    if not isinstance(task, str) or task not in kinds:
-        raise InputError(f"{source}: task", task, f"must be one of {', '.join(kinds)}")
-    return kinds[task].from_dict(data, source=source)
+    if not isinstance(task, str) or task not in (tasks or TASKS):
+        raise InputError(f"{source}: task", task, f"must be one of {', '.join(tasks or TASKS)}")
+    return configuration_kind(task).from_dict(data, source=source)

@@ -77,7 +77,7 @@ class Run(Generic[C]):
         return run
 
     @classmethod
-    def open(cls, folder: Path, kinds: Mapping[str, type[C]]) -> Run[C]:
+    def open(cls, folder: Path) -> Run[Any]:
         """Open a run that was trained, if only in part.
 
         Raises:
@@ -85,7 +85,7 @@ class Run(Generic[C]):
         """
         if not (folder / CONFIGURATION).is_file() or not (folder / CHECKPOINT).is_file():
             raise MissingFileError(str(folder), None, "holds no trained run; `synthroads train` makes one")
-        run = cls(folder, from_data(read_json(folder / CONFIGURATION), kinds, str(folder / CONFIGURATION)))
+        run: Run[Any] = cls(folder, from_data(read_json(folder / CONFIGURATION), str(folder / CONFIGURATION)))
         if (folder / HISTORY).is_file():
             run.history = read_json(folder / HISTORY)
         return run

@@ -10,10 +10,7 @@ from typing import Any, Protocol, cast
 
 from synthroads_addon.base.progress import Progress, silent
 
-from .configuration import Configuration
-
-TASKS = {"centerline": "ml.centerline.task", "segmentation": "ml.segmentation.task"}
-"""Task as configurations name it, and its module."""
+from .configuration import TASKS, Configuration
 
 
 @dataclass(frozen=True)
@@ -53,10 +50,9 @@ class Prediction:
 
 
 class Task(Protocol):
-    """A module of `TASKS`. All results are JSON data, but for tables."""
+    """A module of `TASKS`, with the class of its configurations. Results are JSON data, but for tables."""
 
-    def configuration_kind(self) -> type[Configuration]:
-        """Return the class of its configurations."""
+    CONFIGURATION: type[Configuration]
 
     def train(self, run: Any, progress: Progress = silent) -> dict[str, Any]:
         """Train a `Run`, save it and return its metrics."""
@@ -71,8 +67,3 @@ class Task(Protocol):
 def task(name: str) -> Task:
     """Return the module of a task out of `TASKS`."""
     return cast(Task, import_module(TASKS[name]))
-
-
-def kinds() -> dict[str, type[Configuration]]:
-    """Return the class of configurations of every task."""
-    return {name: task(name).configuration_kind() for name in TASKS}

@@ -48,7 +48,6 @@ from ml.scores.evaluation import (  # noqa: E402
 )
 from ml.scores.metrics import Spread, over_seeds  # noqa: E402
 from ml.scores.paint import with_painted_line  # noqa: E402
-from ml.tasks import kinds  # noqa: E402
 from synthroads_addon.base.errors import SynthRoadsError  # noqa: E402
 from synthroads_addon.base.files import write_file  # noqa: E402
 
@@ -97,7 +96,7 @@ def models(runs: Sequence[str]) -> dict[str, list[Model]]:
     found: dict[str, dict[tuple[TruthKind, frozenset[str], float], list[Predictor]]] = {}
     for text in runs:
         name, _, folder = text.partition("=")
-        run = Run.open(Path(folder), kinds())
+        run = Run.open(Path(folder))
         predictor = import_module("ml.centerline.task").predictor(run).remembering()
         alike = (kind_of(run), learned_by(run), _part(run, SliceSettings).half_width)
         found.setdefault(name, {}).setdefault(alike, []).append(predictor)
@@ -116,7 +115,7 @@ def learned_by(run: Run[Any]) -> frozenset[str]:
     """Return the names of the real roads that a run, or one that it began with, was trained or validated on."""
     data, before = _part(run, DataOptions), run.configuration.begin_with
     own = frozenset(Path(road.cloud).stem for road in (*data.measured, *data.measured_validation))
-    return own | learned_by(Run.open(Path(before), kinds())) if before else own
+    return own | learned_by(Run.open(Path(before))) if before else own
 
 
 def _part(run: Run[Any], kind: type[AnyPart]) -> AnyPart:

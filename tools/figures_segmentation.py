@@ -30,7 +30,6 @@ from ml.scores.confusion import by_class, by_test  # noqa: E402
 from ml.scores.metrics import Spread, defined  # noqa: E402
 from ml.scores.pictures import comparison  # noqa: E402
 from ml.segmentation.experiment import RESULTS  # noqa: E402
-from ml.segmentation.recipes import SegmentationConfiguration  # noqa: E402
 from ml.segmentation.scoring import score, trained_model  # noqa: E402
 from ml.training_loop import chosen_device  # noqa: E402
 from synthroads_addon.base.errors import InputError, SynthRoadsError  # noqa: E402
@@ -76,7 +75,7 @@ def real(runs: Sequence[Path], folder: Path, pictures: Path) -> dict[str, str]:
     """Score the runs on the labelled real clouds; return their tables and draw the first run's classes."""
     found: dict[str, list[dict[str, Any]]] = {name: [] for name in REAL_CLOUDS}
     for place, path in enumerate(runs):
-        run = Run.open(path, {"segmentation": SegmentationConfiguration})
+        run = Run.open(path)
         device = chosen_device(run.configuration)
         model = trained_model(run, device)
         for name, file in REAL_CLOUDS.items():

@@ -15,7 +15,7 @@ from synthroads_addon.reconstruction.path import CloudPath
 from synthroads_addon.reconstruction.reconstruct import Predictor
 
 from ..runs import Run
-from ..tasks import Prediction, kinds, task
+from ..tasks import Prediction, task
 
 _USUAL_STD = 0.1  # m, where the model tells none
 _GAP = 5.0  # m between points of a line across which nothing is told
@@ -32,7 +32,7 @@ def learned_axis(folder: FilePath, cloud_file: FilePath, scratch: FilePath) -> P
     Raises:
         MissingFileError, InputError: it is no run of a centreline model, or its training isn't finished.
     """
-    trained = Run.open(folder, kinds())
+    trained = Run.open(folder)
     name = trained.configuration.task
     if name != "centerline":
         raise InputError("--run", str(folder), f"is a model for {name}, a centreline model is needed")

@@ -60,9 +60,7 @@ class CenterlineConfiguration(Configuration):
     begin_with: str = Field("", description="Folder of a run whose weights this one begins with; random if empty.")
 
 
-def configuration_kind() -> type[CenterlineConfiguration]:
-    """Return the class of this task's configurations."""
-    return CenterlineConfiguration
+CONFIGURATION = CenterlineConfiguration
 
 
 def train(run: Run[CenterlineConfiguration], progress: Progress = silent) -> dict[str, Any]:
@@ -178,8 +176,7 @@ def _first_model(configuration: CenterlineConfiguration) -> CenterlineModel:
     torch.manual_seed(stream_seed(configuration.seed, _FIRST_WEIGHTS))
     model = _empty_model(configuration)
     if configuration.begin_with:
-        kinds = {"centerline": CenterlineConfiguration}
-        state = Run.open(Path(configuration.begin_with), kinds).saved()
+        state = Run.open(Path(configuration.begin_with)).saved()
         if state is None:
             raise MissingFileError("begin_with", configuration.begin_with, "holds no weights")
         try:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -14,7 +13,7 @@ from synthroads_addon.base.classes import UNLABELLED, ClassScheme, ClassSelector
 from synthroads_addon.base.errors import InputError, nearest_name
 from synthroads_addon.base.schema import Model, read_json
 
-from ..configuration import SHIPPED
+from ..configuration import SHIPPED, shipped_file
 
 MAPPINGS = SHIPPED / "classes"
 """Folder of the shipped mappings."""
@@ -85,13 +84,7 @@ def load_mapping(name_or_file: str) -> LabelMapping:
         MissingFileError: there is no such file.
         InputError: it is no mapping.
     """
-    shipped = sorted(path.stem for path in MAPPINGS.glob("*.json"))
-    path = MAPPINGS / f"{name_or_file}.json" if name_or_file in shipped else Path(name_or_file)
-    if path.suffix.lower() != ".json":
-        known = ", ".join(shipped)
-        raise InputError(
-            "mapping", name_or_file, f"must be a .json file or one of {known}{nearest_name(name_or_file, shipped)}"
-        )
+    path = shipped_file("mapping", MAPPINGS, name_or_file, [".json"])
     return LabelMapping.from_dict(read_json(path), str(name_or_file))
 
 

@@ -12,14 +12,14 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
-from synthroads_addon.base.errors import InputError, nearest_name
+from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import write_file
 from synthroads_addon.base.progress import Progress, silent
 from synthroads_addon.base.schema import Model, canonical_json, read_json, read_yaml
 from synthroads_addon.dataset.manifest import checksum
 from synthroads_addon.scenario.scenario import apply_change, apply_values
 
-from ..configuration import EXPERIMENTS, experiment_names, load_configuration
+from ..configuration import EXPERIMENTS, load_configuration, shipped_file
 from ..data.sources import Source
 from ..runs import CHECKPOINT, CONFIGURATION, HISTORY, METRICS, PRETRAINING, Run, lasting
 from ..scores.confusion import by_test
@@ -61,12 +61,8 @@ def load_experiment(name_or_file: str) -> Experiment:
         MissingFileError: there is no such file.
         InputError: a field is unknown or wrong.
     """
-    shipped = experiment_names()
-    path = EXPERIMENTS / f"{name_or_file}.yaml" if name_or_file in shipped else Path(name_or_file)
-    if path.suffix.lower() not in (".yaml", ".yml", ".json"):
-        hint = nearest_name(name_or_file, shipped)
-        raise InputError("experiment", name_or_file, f"must be a .yaml file or one of {', '.join(shipped)}{hint}")
-    experiment = Experiment.from_dict(read_yaml(path), str(name_or_file))
+    data = read_yaml(shipped_file("experiment", EXPERIMENTS, name_or_file))
+    experiment = Experiment.from_dict(data, str(name_or_file))
     for name, variant in experiment.variants.items():
         if variant.of is not None and (variant.of not in experiment.variants or experiment.variants[variant.of].of):
             raise InputError(f"variants.{name}.of", variant.of, "must be a variant that is trained")
@@ -86,8 +82,7 @@ def configurations(
     Raises:
         InputError: a name isn't given, or a change is wrong.
     """
-    kinds = {"segmentation": SegmentationConfiguration}
-    base = load_configuration(experiment.configuration, kinds).to_dict()
+    base = load_configuration(experiment.configuration, tasks=["segmentation"]).to_dict()
     base |= {"data": _fill_sources(experiment.data, folders).to_dict(), "seed": experiment.seeds[0]}
     result = {}
     for name, variant in experiment.variants.items():
@@ -185,7 +180,7 @@ def _test_variant(
     if file.is_file() and (kept := read_json(file)).get("made_from") == made_from:
         tests = kept["tests"]
         return tests
-    run = Run.open(folder, {"segmentation": SegmentationConfiguration})
+    run = Run.open(folder)
     device = chosen_device(configuration)
     model = trained_model(run, device)
     tests = score_all(model, configuration, device, progress)

@@ -20,7 +20,6 @@ from synthroads_addon.base.files import write_file
 from synthroads_addon.base.progress import Progress, peak_memory_mb, silent
 from synthroads_addon.cloud.formats.registry import ENDINGS, open_cloud
 
-from ..configuration import Configuration
 from ..data.classes import IGNORED, class_names
 from ..data.crops import Item, Seeds
 from ..data.sources import Source
@@ -42,9 +41,7 @@ _ONE_TILE = 5_000_000
 SegmentationRun = Run[SegmentationConfiguration]
 
 
-def configuration_kind() -> type[Configuration]:
-    """Return the class of the configurations."""
-    return SegmentationConfiguration
+CONFIGURATION = SegmentationConfiguration
 
 
 def train(run: SegmentationRun, progress: Progress = silent) -> dict[str, Any]:

@@ -12,7 +12,6 @@ from ml.configuration import EXPERIMENTS, SHIPPED, load_configuration
 from ml.data.classes import MAPPINGS, load_mapping
 from ml.runs import CHECKPOINT, CONFIGURATION, Run
 from ml.segmentation.experiment import configurations, load_experiment
-from ml.tasks import kinds
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import read_json, read_yaml
 from tests.helpers.files.mutations import accepted, for_all, fuzz, json_files, yaml_files
@@ -42,8 +41,7 @@ def documents(folder: Path, pattern: str, read: Callable[[Path], Any]) -> list[A
 
 @fuzz(30, 3000)
 def test_configurations(body: Any, count: int) -> None:
-    known = kinds()
-    use = body("training.yaml", lambda path: load_configuration(str(path), known, ["seed=2"]))
+    use = body("training.yaml", lambda path: load_configuration(str(path), ["seed=2"]))
     for_all(yaml_files(documents(SHIPPED, "*.yaml", read_yaml)), count, use)
 
 
@@ -70,13 +68,12 @@ def test_mappings_of_classes(body: Any, count: int) -> None:
 @fuzz(10, 500)
 def test_folders_of_runs(tmp_path: Path, count: int) -> None:
     """Damaged files of a run: opened and resumed, or refused."""
-    known = kinds()
-    sound = load_configuration("segmentation-small", known)
+    sound = load_configuration("segmentation-small")
     (tmp_path / CHECKPOINT).write_bytes(b"no checkpoint")
 
     def use(content: bytes) -> None:
         (tmp_path / CONFIGURATION).write_bytes(content)
-        accepted(lambda: Run.open(tmp_path, known))
+        accepted(lambda: Run.open(tmp_path))
         accepted(lambda: Run.start(tmp_path, sound, resume=True))
 
     for_all(json_files([sound.to_dict()]), count, use)
@@ -85,7 +82,7 @@ def test_folders_of_runs(tmp_path: Path, count: int) -> None:
 def test_a_checkpoint_of_something_else_is_refused(tmp_path: Path) -> None:
     import torch
 
-    sound = load_configuration("segmentation-small", kinds())
+    sound = load_configuration("segmentation-small")
     Run.start(tmp_path, sound)
     torch.save({"weights": torch.zeros(3)}, tmp_path / CHECKPOINT)
     with pytest.raises(InputError, match=r"checkpoint\.pt: is no checkpoint"):

@@ -16,7 +16,7 @@ from ml.networks.base import full_precision
 from ml.networks.centerline.losses import centerline_loss
 from ml.runs import Run
 from ml.segmentation.loading import epoch_batches, read_domains
-from ml.tasks import kinds, task
+from ml.tasks import task
 from ml.training_loop import optimizer_of, train_step
 from synthroads_addon.base.errors import InputError
 from tests.helpers.clouds.centerline_batches import MODELS, batch, small
@@ -46,12 +46,12 @@ def centerline(data: Path, size: int = 4, steps: int = 4, **changes: Any) -> Any
         "batches": {"size": size, "steps": steps, "passes": 2, "validation": 4},
         "schedule": {"epochs": 2, "learning_rate": 0.003},
     }
-    return from_data(plain | changes, kinds(), "test")
+    return from_data(plain | changes, "test")
 
 
 def segmentation(folder: Path, **changes: Any) -> Any:
     few = {"crop_points": 300, "crops_per_tile": 2, "batch": 2}
-    return from_data(toy(folder).to_dict() | few | changes, kinds(), "test")
+    return from_data(toy(folder).to_dict() | few | changes, "test")
 
 
 def trained(folder: Path, configuration: Any) -> tuple[dict[str, torch.Tensor], list[dict[str, float]]]:

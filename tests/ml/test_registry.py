@@ -15,7 +15,7 @@ import torch
 from pydantic import Field
 
 from ml import registry
-from ml.configuration import from_data
+from ml.configuration import TASKS, from_data
 from ml.data.crops import crop_of
 from ml.data.effects import CropEffects, SequenceEffects
 from ml.data.frames import along
@@ -24,7 +24,6 @@ from ml.data.slices import stretch
 from ml.data.tiles import Scaling
 from ml.networks.base import SegmentationNetwork
 from ml.registry import FOLDERS, Change, apply_effects, effect, effect_options, network, networks
-from ml.tasks import kinds
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import quantity, read_yaml
 from tests.helpers.clouds.centerline_batches import SETTINGS
@@ -39,7 +38,7 @@ PAGE = (ROOT / "docs/extend/network.md").read_text(encoding="utf-8")
 def test_networks_are_those_of_the_folders() -> None:
     assert list(networks("segmentation")) == ["pointnext"]
     assert list(networks("centerline")) == ["sequence", "single", "transformer"]
-    assert set(FOLDERS) == set(kinds())
+    assert set(FOLDERS) == set(TASKS)
 
 
 @pytest.mark.parametrize("name", networks("segmentation"))
@@ -75,22 +74,20 @@ def test_two_networks_of_one_name_are_refused() -> None:
 
 
 def test_a_network_takes_its_own_options_only() -> None:
-    known = kinds()
     plain = {"task": "segmentation", "network": {"preset": "S"}}
-    assert from_data(plain, known, "test").network.name == "pointnext"
+    assert from_data(plain, "test").network.name == "pointnext"
     with pytest.raises(InputError, match=r"network.name is 'pointnxt': must be one of pointnext"):
-        from_data(plain | {"network": {"name": "pointnxt"}}, known, "test")
+        from_data(plain | {"network": {"name": "pointnxt"}}, "test")
     with pytest.raises(InputError, match="unknown key 'cells'"):
-        from_data(plain | {"network": {"cells": 4}}, known, "test")
+        from_data(plain | {"network": {"cells": 4}}, "test")
 
 
 def test_a_centerlines_model_is_still_read_by_its_old_name() -> None:
-    known = kinds()
     plain: dict[str, Any] = {"task": "centerline", "data": {"data_sets": ["x"]}}
-    old = from_data(plain | {"model": {"name": "single", "cells": 7}}, known, "test")
-    assert old == from_data(plain | {"network": {"name": "single", "cells": 7}}, known, "test")
+    old = from_data(plain | {"model": {"name": "single", "cells": 7}}, "test")
+    assert old == from_data(plain | {"network": {"name": "single", "cells": 7}}, "test")
     with pytest.raises(InputError, match="unknown key 'model'"):
-        from_data(plain | {"model": {"cells": 7}, "network": {"cells": 7}}, known, "test")
+        from_data(plain | {"model": {"cells": 7}, "network": {"cells": 7}}, "test")
 
 
 def code_of_page(file: str) -> str:

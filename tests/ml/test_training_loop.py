@@ -4,9 +4,11 @@ import json
 import math
 import os
 import signal
+import sys
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -20,6 +22,13 @@ from ml.training_loop import fit, learning_rate
 from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
 
 STEPS = 5
+
+
+@pytest.fixture(autouse=True)
+def _toy(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have one task alone, whose configurations are without fields of their own."""
+    monkeypatch.setitem(sys.modules, "toy", SimpleNamespace(CONFIGURATION=Configuration))
+    monkeypatch.setattr("ml.configuration.TASKS", {"toy": "toy"})
 
 
 def configuration(epochs: int = 6, seed: int = 3) -> Configuration:
@@ -138,11 +147,11 @@ def test_a_run_is_not_lost_by_mistake(tmp_path: Path) -> None:
 
 def test_a_finished_run_opens(tmp_path: Path) -> None:
     train(tmp_path)
-    run = Run.open(tmp_path, {"toy": Configuration})
+    run = Run.open(tmp_path)
     assert run.configuration == configuration()
     assert len(run.history) == 6
     with pytest.raises(MissingFileError, match="holds no trained run"):
-        Run.open(tmp_path / "nowhere", {"toy": Configuration})
+        Run.open(tmp_path / "nowhere")
     (tmp_path / CHECKPOINT).write_bytes(b"PK\x03\x04 torn")
     with pytest.raises(InputError, match="damaged"):
         run.saved()
@@ -179,13 +188,13 @@ def test_wrong_configurations_are_refused(tmp_path: Path, text: str, complaint: 
     path = tmp_path / "wrong.yaml"
     path.write_text(text)
     with pytest.raises(InputError, match=complaint):
-        load_configuration(str(path), {"toy": Configuration})
+        load_configuration(str(path))
 
 
 def test_changes_reach_the_configuration(tmp_path: Path) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text("{task: toy, schedule: {epochs: 4}}")
-    loaded = load_configuration(str(path), {"toy": Configuration}, ["schedule.learning_rate=0.5", "seed=8"])
+    loaded = load_configuration(str(path), ["schedule.learning_rate=0.5", "seed=8"])
     assert (loaded.schedule.epochs, loaded.schedule.learning_rate, loaded.seed) == (4, 0.5, 8)
     with pytest.raises(InputError, match="one of"):
-        load_configuration("no-such", {"toy": Configuration})
+        load_configuration("no-such")

@@ -25,7 +25,6 @@ from tests.helpers.clouds.centerline_batches import SETTINGS
 from tests.helpers.clouds.road_data_sets import write_data_set
 from tests.helpers.roads import analytic_roads
 
-KINDS = {"centerline": task.configuration_kind()}
 Trained = Callable[..., Run[Any]]
 SMALL = {"cells": 4, "point_width": 8, "width": 16, "context": 16, "layers": 1, "heads": 2}
 
@@ -45,7 +44,7 @@ def configuration(folder: Path, name: str = "transformer", **changes: Any) -> ta
         "batches": {"size": 4, "steps": 4, "passes": 2, "validation": 4},
         "schedule": {"epochs": 2, "learning_rate": 0.003, "warmup": 0.2},
     }
-    return from_data(plain | changes, KINDS, "test")
+    return from_data(plain | changes, "test")
 
 
 @pytest.fixture(scope="module")
@@ -123,7 +122,7 @@ def test_what_a_run_writes(trained: Trained):
     assert {"validation_mae", "validation_68", "validation_95", "corridor_mae", "calibration"} <= set(metrics)
     assert metrics["calibration"]["center"]["count"] == 160
     assert {"loss", "center_mae", "validation_mae", "validation_68", "validation_95"} <= set(run.history[0])
-    ready = task.predictor(Run.open(run.folder, KINDS))
+    ready = task.predictor(Run.open(run.folder))
     assert ready.calibration["center"].factor == metrics["calibration"]["center"]["factor"]
 
 
@@ -265,7 +264,7 @@ def test_missing_splits_are_refused(data: Path):
 
 @pytest.mark.parametrize("name", ["single", "sequence", "transformer"])
 def test_shipped_configurations(name: str):
-    shipped = load_configuration(f"centerline-{name}", KINDS)
+    shipped = load_configuration(f"centerline-{name}")
     assert shipped.network.name == name
     assert shipped.network.kernel_points == 25
     assert shipped.slices.slices == 10

@@ -16,7 +16,6 @@ import torch
 from ml.configuration import load_configuration
 from ml.runs import Run
 from ml.segmentation import task
-from ml.segmentation.recipes import SegmentationConfiguration
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -34,7 +33,7 @@ def test_a_small_network_learns_an_unseen_road_within_minutes(tmp_path: Path) ->
         "tests": {"unseen road": [{"path": str(data), "split": "test"}]},
     }
     changes = [f"data={json.dumps(sources)}", "threads=1", "device=cpu"]
-    configuration = load_configuration("segmentation-small", {"segmentation": SegmentationConfiguration}, changes)
+    configuration = load_configuration("segmentation-small", changes)
     begin = time.process_time()
     metrics = task.train(Run.start(tmp_path / "run", configuration))
     seconds = time.process_time() - begin

@@ -30,7 +30,7 @@ from ml.segmentation.loading import adaptation_batches, epoch_batches, read_doma
 from ml.segmentation.network import build
 from ml.segmentation.recipes import Data, SegmentationConfiguration
 from ml.segmentation.task import smoothed_loss
-from ml.tasks import Evaluation, kinds
+from ml.tasks import Evaluation
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError
 from synthroads_addon.base.progress import silent
@@ -44,7 +44,7 @@ FINE_TUNING = {"epochs": 2, "learning_rate": 0.001}
 @pytest.fixture(autouse=True)
 def _only_this_task(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave the other tasks' packages out of what is imported here."""
-    monkeypatch.setattr("ml.tasks.TASKS", {"segmentation": "ml.segmentation.task"})
+    monkeypatch.setattr("ml.configuration.TASKS", {"segmentation": "ml.segmentation.task"})
 
 
 @pytest.fixture(scope="module")
@@ -310,7 +310,7 @@ def test_a_checkpoint_of_another_network_is_refused(data: Path, tmp_path: Path) 
 
 
 def test_evaluation_with_a_mapping_scores_groups(trained: Trained, tmp_path: Path) -> None:
-    run = Run.open(trained(), kinds())
+    run = Run.open(trained())
     las = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
     block = road_block(1500, 4, 20.0)
     las.header.scales, las.header.offsets = np.full(3, 0.001), np.array([4e5, 5.6e6, 100.0])
@@ -329,7 +329,7 @@ def test_shipped_configurations_and_experiments_are_whole() -> None:
     known = ml_segmentation_configurations()
     assert "segmentation" in known
     for name in known:
-        assert load_configuration(name, kinds()).task == "segmentation"
+        assert load_configuration(name).task == "segmentation"
     for path in EXPERIMENTS.glob("*.yaml"):
         found = load_experiment(path.stem)
         made = configurations(found, {"real": "a", "synthetic": "b"})
@@ -344,7 +344,7 @@ def test_shipped_configurations_and_experiments_are_whole() -> None:
 
 def test_changes_are_of_the_type_of_their_field() -> None:
     changes = ["classes=17", "title=2", "schedule.epochs=3", "voxel=0.5"]
-    made = load_configuration("segmentation-small", kinds(), changes)
+    made = load_configuration("segmentation-small", changes)
     assert (made.classes, made.title, made.schedule.epochs, made.voxel) == ("17", "2", 3, 0.5)
     of_all = configurations(load_experiment("gantries"), {"real": "a", "synthetic": "b"}, ["classes=5"])
     assert {configuration.classes for configuration in of_all.values()} == {"5"}
@@ -352,10 +352,10 @@ def test_changes_are_of_the_type_of_their_field() -> None:
 
 def ml_segmentation_configurations() -> list[str]:
     """Return the names of the shipped configurations of this task."""
-    from ml.configuration import SHIPPED, shipped_names
+    from ml.configuration import SHIPPED, names_in
     from synthroads_addon.base.schema import read_yaml
 
-    return [name for name in shipped_names() if read_yaml(SHIPPED / f"{name}.yaml")["task"] == "segmentation"]
+    return [name for name in names_in(SHIPPED) if read_yaml(SHIPPED / f"{name}.yaml")["task"] == "segmentation"]
 
 
 def test_an_experiment_makes_a_table_and_goes_on_where_it_stopped(data: Path, tmp_path: Path) -> None:
@@ -443,7 +443,7 @@ def test_an_experiment_tells_its_scores(data: Path, tmp_path: Path, capsys: pyte
 
 
 def test_clouds_of_one_name_have_results_of_their_own(trained: Trained, tmp_path: Path) -> None:
-    run = Run.open(trained(), kinds())
+    run = Run.open(trained())
     clouds = [tmp_path / scene / "cloud.laz" for scene in ("one", "two")]
     for number, cloud in enumerate(clouds):
         cloud.parent.mkdir()

@@ -228,8 +228,6 @@ def test_build_makes_what_is_named():
 
 
 def test_odd_widths_are_refused():
-    from ml.centerline.task import configuration_kind
-
     data = {"task": "centerline", "data": {"data_sets": ["x"]}, "network": {"width": 30, "heads": 4}}
     with pytest.raises(InputError, match=r"network.*width must be even and a multiple of heads, 4"):
-        from_data(data, {"centerline": configuration_kind()}, "test")
+        from_data(data, "test")
