@@ -97,9 +97,9 @@ _Byte = Annotated[int, Field(ge=0, le=255)]
 class ClassRow(Model):
     """One class of a table in JSON."""
 
-    id: int = quantity(ge=0, le=255, unit="1", description="Value of class_id; 255 is unlabelled.")
+    id: int = quantity(..., "1", "Value of class_id; 255 is unlabelled.", (0, 255))
     name: str = Field(min_length=1, max_length=64, description="Name.")
-    las: int = quantity(ge=0, le=255, unit="1", description="Code in the LAS field classification.")
+    las: int = quantity(..., "1", "Code in the LAS field classification.", (0, 255))
     color: tuple[_Byte, _Byte, _Byte] = Field(description="sRGB for previews.")
     of: _Members = Field(
         (),

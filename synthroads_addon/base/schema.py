@@ -50,33 +50,38 @@ def notes(
 
 def quantity(
     default: Any = ...,
+    unit: str = "",
+    description: str = "",
+    limits: tuple[float | None, float | None] = (None, None),
     *,
-    unit: str,
-    description: str,
-    title: str | None = None,
     ge: float | None = None,
     gt: float | None = None,
     le: float | None = None,
     lt: float | None = None,
     **further: Any,
 ) -> Any:
-    """Declare a numeric field with its unit (``m``, ``deg``, ``1``, ...) and limits; ``further`` are `notes`."""
+    """Declare a numeric field.
+
+    Args:
+        default: value where none is given; None where the field may be left out, ``...`` where it is required.
+        unit: ``m``, ``deg``, ``1``, ...
+        description: what it means.
+        limits: smallest and largest value, which are allowed themselves; `LARGEST` to either side if not given.
+        ge, gt, le, lt: the same as pydantic has them, for limits that aren't allowed themselves.
+        further: ``title``, the name in the panel where the field's own won't do, and `notes`.
+    """
+    least, most = limits
     return Field(
         default,
-        title=title,
+        title=further.pop("title", None),
         description=description,
-        ge=-LARGEST if ge is None and gt is None else ge,
+        ge=-LARGEST if ge is None and gt is None and least is None else least if ge is None else ge,
         gt=gt,
-        le=LARGEST if le is None and lt is None else le,
+        le=LARGEST if le is None and lt is None and most is None else most if le is None else le,
         lt=lt,
         strict=True,
         json_schema_extra=notes(unit=unit, **further),
     )
-
-
-def optional(unit: str, limits: tuple[float, float], description: str, **further: Any) -> Any:
-    """Declare a numeric field that may be left out, within limits that are allowed themselves; see `quantity`."""
-    return quantity(None, unit=unit, description=description, ge=limits[0], le=limits[1], **further)
 
 
 def when(test: dict[str, Any], then: dict[str, Any], otherwise: dict[str, Any] | None = None) -> dict[str, Any]:

@@ -37,7 +37,7 @@ _BLOCK = 1 << 20
 class FileEntry(ClosedModel):
     """One file of a scene."""
 
-    bytes: int = quantity(ge=0, unit="B", description="Size.")
+    bytes: int = quantity(..., "B", "Size.", (0, None))
     sha256: str = Field(pattern=r"^[0-9a-f]{64}$", description="Checksum.")
 
 
@@ -46,11 +46,11 @@ class SceneEntry(ClosedModel):
 
     name: str = Field(description="Name.")
     split: str = Field(description="Split.")
-    seed: int = quantity(ge=0, le=2**63 - 1, unit="1", description="Seed.")
+    seed: int = quantity(..., "1", "Seed.", (0, 2**63 - 1))
     status: Literal["done", "failed"] = Field(description="Whether it was made.")
     error: str | None = Field(None, description="What went wrong, in one line.")
-    points: int | None = quantity(None, ge=0, unit="1", description="Points of its cloud.")
-    length: float | None = quantity(None, ge=0, unit="m", description="Length of its road.")
+    points: int | None = quantity(None, "1", "Points of its cloud.", (0, None))
+    length: float | None = quantity(None, "m", "Length of its road.", (0, None))
     classes: dict[str, int] | None = Field(None, description="Points by class.")
     files: dict[str, FileEntry] | None = Field(None, description="Its files, by path in the data set.")
     folders: tuple[str, ...] | None = Field(None, description="Its folders in the data set.")

@@ -29,7 +29,7 @@ class SceneGroup(ClosedModel):
     """Scenes that differ in their seeds and variants."""
 
     name: Name = Field(description="Name of the group; its scenes are NAME-01, NAME-02 and so on.")
-    scenes: int = quantity(ge=1, le=10_000, unit="1", description="Number of scenes.")
+    scenes: int = quantity(..., "1", "Number of scenes.", (1, 10_000))
     split: Split | dict[Split, int] = Field(
         "train", description="Split that all scenes belong to, or the number of scenes of each, in order."
     )
@@ -60,15 +60,15 @@ class Recipe(ClosedModel):
     title: str = Field(min_length=1, max_length=200, description="Title.")
     description: str = Field("", description="What the set is for, in a few sentences: it stands in the data card.")
     licence: str = Field("CC-BY-4.0", min_length=1, description="Licence of the data (SPDX identifier).")
-    seed: int = quantity(1, ge=0, le=_LARGEST_SEED - 1, unit="1", description="Seed of everything random.")
+    seed: int = quantity(1, "1", "Seed of everything random.", (0, _LARGEST_SEED - 1))
     scenario: str = Field("rq31-600m", description="Built-in scenario or file that the groups start from.")
     set: dict[str, Any] = Field({}, description="Changes of every group's scenario, path: value.")
     layouts: tuple[Layout, ...] = Field((), description="Layouts for training, beside each scene's own files.")
-    tile: float = quantity(60.0, ge=5, le=1000, unit="m", description="Edge of the layouts' tiles.")
+    tile: float = quantity(60.0, "m", "Edge of the layouts' tiles.", (5, 1000))
     point_spacing: float | None = quantity(
-        0.04, ge=0.005, le=10, unit="m", description="Grid of which the layouts keep one point per cell; null: all."
+        0.04, "m", "Grid of which the layouts keep one point per cell; null: all.", (0.005, 10)
     )
-    smallest_tile: int = quantity(1000, ge=1, unit="1", description="Tiles of fewer points are left out.")
+    smallest_tile: int = quantity(1000, "1", "Tiles of fewer points are left out.", (1, None))
     groups: tuple[SceneGroup, ...] = Field(min_length=1, max_length=1000, description="Groups of scenes.")
 
     @field_validator("groups")

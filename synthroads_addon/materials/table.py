@@ -43,30 +43,26 @@ class Material(Model):
     """Mean properties of one material."""
 
     base_color: tuple[_Share, _Share, _Share] = Field(description="Linear red, green, blue.")
-    roughness: float = quantity(ge=0, le=1, unit="1", description="Roughness as a renderer means it.")
-    metallic: float = quantity(0.0, ge=0, le=1, unit="1", description="Share of metal.")
-    specular: float = quantity(ge=0, le=1, unit="1", description="Specular share of the reflectivity.")
+    roughness: float = quantity(..., "1", "Roughness as a renderer means it.", (0, 1))
+    metallic: float = quantity(0.0, "1", "Share of metal.", (0, 1))
+    specular: float = quantity(..., "1", "Specular share of the reflectivity.", (0, 1))
     transmission: float = quantity(
-        0.0, ge=0, lt=1, unit="1", description="Share of the laser's light that goes on through and comes back."
+        0.0, "1", "Share of the laser's light that goes on through and comes back.", ge=0, lt=1
     )
     facet_slope: float | None = quantity(
-        None, ge=0, le=1.5, unit="rad", description="Facets' slope (one sigma); the roughness's if not given."
+        None, "rad", "Facets' slope (one sigma); the roughness's if not given.", (0, 1.5)
     )
     retroreflection: float = quantity(
-        0.0, ge=0, le=10_000, unit="1", description="Effective reflectance of the retro-reflection at a right angle."
+        0.0, "1", "Effective reflectance of the retro-reflection at a right angle.", (0, 10_000)
     )
-    retro_lobe_deg: float = quantity(
-        45.0, gt=0, le=180, unit="deg", description="Entrance angle at which it has fallen to 1/e."
-    )
+    retro_lobe_deg: float = quantity(45.0, "deg", "Entrance angle at which it has fallen to 1/e.", gt=0, le=180)
     spread_below: float = quantity(
-        0.0, ge=0, le=2, unit="1", description="Spread (one sigma of the logarithm) of the brightness below its median."
+        0.0, "1", "Spread (one sigma of the logarithm) of the brightness below its median.", (0, 2)
     )
     spread_above: float = quantity(
-        0.0, ge=0, le=2, unit="1", description="Spread (one sigma of the logarithm) of the brightness above its median."
+        0.0, "1", "Spread (one sigma of the logarithm) of the brightness above its median.", (0, 2)
     )
-    spread_wavelength: float = quantity(
-        1.0, ge=0.01, le=1000, unit="m", description="Longest wavelength of the brightness's variation."
-    )
+    spread_wavelength: float = quantity(1.0, "m", "Longest wavelength of the brightness's variation.", (0.01, 1000))
 
     @property
     def reflectivity(self) -> float:

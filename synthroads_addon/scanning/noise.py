@@ -33,39 +33,28 @@ _AXES = 6
 class Noise(ClosedModel):
     """Random errors of the measurement, one sigma each; 0 is none."""
 
-    range_bias: float = quantity(0.0, ge=-1, le=1, unit="m", description="Systematic error of the range.")
+    range_bias: float = quantity(0.0, "m", "Systematic error of the range.", (-1, 1))
     range_sigma: float | None = quantity(
         None,
-        ge=0,
-        le=1,
-        unit="m",
+        "m",
+        "Standard deviation of the range; the device's if not given.",
+        (0, 1),
         title="Range",
-        description="Standard deviation of the range; the device's if not given.",
         inherits="device.range_sigma",
     )
-    angle_sigma_mrad: float = quantity(
-        0.0, ge=0, le=20, unit="mrad", title="Angle (mrad)", description="Pointing error, each axis."
-    )
-    position_sigma: float = quantity(
-        0.0, ge=0, le=10, unit="m", title="Position", description="Platform's position, each axis."
-    )
-    attitude_sigma_deg: float = quantity(
-        0.0, ge=0, le=5, unit="deg", title="Roll, Pitch (°)", description="Platform's roll and pitch."
-    )
-    heading_sigma_deg: float = quantity(
-        0.0, ge=0, le=5, unit="deg", title="Heading (°)", description="Platform's heading."
-    )
+    angle_sigma_mrad: float = quantity(0.0, "mrad", "Pointing error, each axis.", (0, 20), title="Angle (mrad)")
+    position_sigma: float = quantity(0.0, "m", "Platform's position, each axis.", (0, 10), title="Position")
+    attitude_sigma_deg: float = quantity(0.0, "deg", "Platform's roll and pitch.", (0, 5), title="Roll, Pitch (°)")
+    heading_sigma_deg: float = quantity(0.0, "deg", "Platform's heading.", (0, 5), title="Heading (°)")
     correlation_time: float = quantity(
         30.0,
+        "s",
+        "Time in which a platform's errors fall to 1/e of correlation.",
         gt=0,
         le=10_000,
-        unit="s",
         title="Correlated over",
-        description="Time in which a platform's errors fall to 1/e of correlation.",
     )
-    dropout: float = quantity(
-        0.0, ge=0, le=1, unit="1", title="Lost Returns", description="Share of the returns that is lost at random."
-    )
+    dropout: float = quantity(0.0, "1", "Share of the returns that is lost at random.", (0, 1), title="Lost Returns")
 
 
 def trajectory_errors(noise: Noise, seed: int, strip: Strip, time: Float) -> tuple[Float, Float]:

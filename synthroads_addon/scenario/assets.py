@@ -36,10 +36,8 @@ class AssetPlacement(ClosedModel):
     per_km: Interval | None = Field(
         None, description="How many, at random along the road, instead.", json_schema_extra={"unit": "1/km"}
     )
-    start_station: float = quantity(0.0, ge=0, unit="m", description="Where they begin.")
-    end_station: float | None = quantity(
-        None, ge=0, unit="m", description="Where they end; the road's end if not given."
-    )
+    start_station: float = quantity(0.0, "m", "Where they begin.", (0, None))
+    end_station: float | None = quantity(None, "m", "Where they end; the road's end if not given.", (0, None))
     rotation_deg: Interval = interval(0.0, 0.0, "deg", "About the vertical; at 0 it faces its side's traffic.")
 
     @model_validator(mode="after")
@@ -65,7 +63,7 @@ class LibraryAsset(ClosedModel):
     class_name: str = Field(
         min_length=1, max_length=64, description="Semantic class of its faces: of the 17, or of a scheme of one's own."
     )
-    scale: float = quantity(1.0, gt=0, le=100, unit="1", description="Scale.")
+    scale: float = quantity(1.0, "1", "Scale.", gt=0, le=100)
     placement: AssetPlacement
 
     @field_validator("file")

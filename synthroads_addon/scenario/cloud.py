@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from ..base.classes import ClassScheme, class_scheme
-from ..base.schema import ClosedModel, first_repeated, optional, quantity
+from ..base.schema import ClosedModel, first_repeated, quantity
 from ..cloud.layers import DEFAULT_ATTRIBUTES, LAYERS, Attribute
 from ..scanning.scene.classify import check_selectors
 
@@ -23,10 +23,11 @@ class CloudScenario(ClosedModel):
         DEFAULT_ATTRIBUTES, description="What is kept of each point beyond what every cloud holds."
     )
     classes: str = Field("17", min_length=1, description="17, 5, or a JSON file of classes of one's own.")
-    point_spacing: float | None = optional(
+    point_spacing: float | None = quantity(
+        None,
         "m",
-        (0.001, 10),
         "Grid of which one point per cell is kept; all if not given.",
+        (0.001, 10),
         title="Thin Out to",
         unset="All points",
     )
@@ -34,11 +35,7 @@ class CloudScenario(ClosedModel):
         "received", description="As received, or times the squared range: what instruments call reflectance."
     )
     intensity_scale: float | None = quantity(
-        None,
-        gt=0,
-        unit="1",
-        description="16-bit steps per unit of intensity; by the usual range if not given.",
-        unset="By the range",
+        None, "1", "16-bit steps per unit of intensity; by the usual range if not given.", gt=0, unset="By the range"
     )
 
     @model_validator(mode="after")

@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import Field, model_validator
 
-from ..base.schema import ClosedModel, notes, optional, quantity
+from ..base.schema import ClosedModel, notes, quantity
 from ..scanning.colour.colour import ColourMode, ColourSettings, ColourSource, Engine, Lighting
 
 USUAL_RANGE = 60.0
@@ -50,34 +50,32 @@ class ColourScenario(ClosedModel):
         description="Sun with shadows and an open sky, without noise; or whole light paths, which need more samples.",
         json_schema_extra=notes(only_with={"source": ("auto", "images", "returns")}),
     )
-    image_spacing: float | None = optional(
+    image_spacing: float | None = quantity(
+        None,
         "m",
-        (0.5, 1000),
         "Distance between two images along the path.",
+        (0.5, 1000),
         inherits="images.image_spacing",
         only_with={"source": ("auto", "images")},
     )
-    ground_sampling_distance: float | None = optional(
+    ground_sampling_distance: float | None = quantity(
+        None,
         "m",
-        (0.002, 10),
         "Width of a pixel on the ground, or at the platform's usual range.",
+        (0.002, 10),
         inherits="images.ground_sampling_distance",
         only_with={"source": ("auto", "images")},
     )
-    samples: int | None = optional(
+    samples: int | None = quantity(
+        None,
         "1",
-        (1, 4096),
         "Samples per pixel of the lit colours.",
+        (1, 4096),
         inherits="images.samples",
         only_with={"source": ("auto", "images", "returns"), "lighting": ("path",)},
     )
     max_resolution: int = quantity(
-        4096,
-        ge=16,
-        le=16384,
-        unit="px",
-        description="Largest side of an image.",
-        only_with={"source": ("auto", "images")},
+        4096, "px", "Largest side of an image.", (16, 16384), only_with={"source": ("auto", "images")}
     )
     intensity_from_layers: bool = Field(
         False,

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from ..base.schema import ClosedModel, Finite, notes, optional, quantity
+from ..base.schema import ClosedModel, Finite, notes, quantity
 from ..road.guidelines import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS, USUAL_SECTION, design_class_of
 from ..road.section import SHORTEST_DASH
 from ..road.surroundings import GRASSES, SHRUBS, TREES
@@ -33,7 +33,7 @@ def interval(low: float, high: float, unit: str, description: str, title: str | 
 
 def share(default: float, description: str, title: str | None = None) -> Any:
     """Declare a probability that a road (or a carriageway) has something."""
-    return quantity(default, ge=0, le=1, unit="1", title=title, description=description)
+    return quantity(default, "1", description, (0, 1), title=title)
 
 
 class FreeCrossSection(ClosedModel):
@@ -42,11 +42,11 @@ class FreeCrossSection(ClosedModel):
     lanes: tuple[Annotated[float, Field(strict=True, ge=2, le=6)], ...] = Field(
         min_length=1, max_length=8, description="Widths of the lanes, m.", json_schema_extra=notes(unit="m")
     )
-    hard_shoulder: float = quantity(2.5, ge=0, le=6, unit="m", description="Width of the hard shoulder.")
-    outer_edge_strip: float = quantity(0.5, ge=0.3, le=2, unit="m", description="Width of the outer edge strip.")
-    inner_edge_strip: float = quantity(0.5, ge=0.15, le=2, unit="m", description="Width of the inner edge strip.")
-    median: float = quantity(4.0, ge=0.5, le=40, unit="m", description="Width of the median.")
-    verge: float = quantity(1.5, ge=0.5, le=5, unit="m", description="Width of the verge.")
+    hard_shoulder: float = quantity(2.5, "m", "Width of the hard shoulder.", (0, 6))
+    outer_edge_strip: float = quantity(0.5, "m", "Width of the outer edge strip.", (0.3, 2))
+    inner_edge_strip: float = quantity(0.5, "m", "Width of the inner edge strip.", (0.15, 2))
+    median: float = quantity(4.0, "m", "Width of the median.", (0.5, 40))
+    verge: float = quantity(1.5, "m", "Width of the verge.", (0.5, 5))
 
 
 def _form(section: object) -> str | None:
@@ -104,11 +104,11 @@ class PavementLimits(ClosedModel):
 class MarkingLimits(ClosedModel):
     """Line markings; what isn't given follows the RMS."""
 
-    lane_dash: float | None = optional(
-        "m", (SHORTEST_DASH, 100), "Dash of lane lines; 6 m by the RMS.", inherits="rms.lane_dash"
+    lane_dash: float | None = quantity(
+        None, "m", "Dash of lane lines; 6 m by the RMS.", (SHORTEST_DASH, 100), inherits="rms.lane_dash"
     )
-    lane_gap: float | None = optional(
-        "m", (SHORTEST_DASH, 100), "Gap of lane lines; 12 m by the RMS.", inherits="rms.lane_gap"
+    lane_gap: float | None = quantity(
+        None, "m", "Gap of lane lines; 12 m by the RMS.", (SHORTEST_DASH, 100), inherits="rms.lane_gap"
     )
     film_thickness: Interval = interval(0.0015, 0.004, "m", "Thickness of the film.")
 
@@ -136,8 +136,8 @@ class FurnitureLimits(ClosedModel):
     signs: bool = Field(True, description="Traffic signs.")
     delineators: bool = Field(True, description="Delineator posts.")
     gantries: float = share(0.3, "Probability of a gantry, where no spacing is given.")
-    gantry_spacing: float | None = optional(
-        "m", (1, 10_000), "Spacing of gantries; they then stand all along.", unset="Single ones"
+    gantry_spacing: float | None = quantity(
+        None, "m", "Spacing of gantries; they then stand all along.", (1, 10_000), unset="Single ones"
     )
     gantry_clearance: Interval = interval(5.0, 5.8, "m", "Clearance under gantries.")
     lighting: float = share(0.15, "Probability of lighting poles.", title="Lighting Poles")
@@ -213,20 +213,21 @@ class RoadScenario(ClosedModel):
         title="Cross-Section",
         description="Standard cross-section, or one by hand; if not given, EKA2 has RQ28 and EKA3 RQ25.",
     )
-    lanes: int | None = optional(
+    lanes: int | None = quantity(
+        None,
         "1",
-        (1, 8),
         "Lanes per direction; the cross-section's if not given.",
+        (1, 8),
         title="Lanes Each Way",
         inherits="section.lanes",
     )
-    lane_width: float | None = optional(
-        "m", (2, 6), "Width of every lane; the cross-section's if not given.", inherits="section.lane_width"
+    lane_width: float | None = quantity(
+        None, "m", "Width of every lane; the cross-section's if not given.", (2, 6), inherits="section.lane_width"
     )
-    median_width: float | None = optional(
-        "m", (0.5, 40), "Width of the median; the cross-section's if not given.", inherits="section.median_width"
+    median_width: float | None = quantity(
+        None, "m", "Width of the median; the cross-section's if not given.", (0.5, 40), inherits="section.median_width"
     )
-    length: float = quantity(600.0, ge=1, le=200_000, unit="m", description="Length of the centreline.")
+    length: float = quantity(600.0, "m", "Length of the centreline.", (1, 200_000))
     radius: Interval | None = Field(
         None,
         description="Radii of curves; from the class's smallest to 5000 m if not given.",
@@ -253,31 +254,21 @@ class RoadScenario(ClosedModel):
     undulation: Interval = interval(0.05, 0.8, "m", "Standard deviation of the ground.")
     wavelength: Interval = interval(30.0, 60.0, "m", "Shortest wavelength of the ground's undulation.")
     batter_slope: Interval = interval(1.5, 2.5, "m/m", "Run of the batter per height.")
-    half_width: float = quantity(
-        78.0, ge=5, le=1000, unit="m", title="Reach Each Side", description="Reach built to either side."
-    )
+    half_width: float = quantity(78.0, "m", "Reach built to either side.", (5, 1000), title="Reach Each Side")
     elevation_model: str | None = Field(
         None,
         description="File of a digital elevation model (GeoTIFF, ESRI ASCII grid) instead of generated ground.",
         json_schema_extra=notes(unset="Generated"),
     )
-    epsg: int = quantity(
-        25832, ge=1024, le=99_999_999, unit="1", title="EPSG Code", description="Map coordinate system."
-    )
+    epsg: int = quantity(25832, "1", "Map coordinate system.", (1024, 99_999_999), title="EPSG Code")
     map_origin: tuple[Finite, Finite, Finite] = Field(
         (294_000.0, 5_628_000.0, 180.0),
         title="Map Origin",
         description="Map coordinates (east, north, elevation) of the local origin, m.",
     )
-    grass_density: float = quantity(
-        0.8, ge=0, le=50, unit="1/m2", title="Grass (per m²)", description="Tufts of grass per area."
-    )
-    shrubs_per_hectare: float = quantity(
-        60.0, ge=0, le=5000, unit="1/ha", title="Shrubs (per ha)", description="Shrubs per hectare."
-    )
-    trees_per_hectare: float = quantity(
-        40.0, ge=0, le=2000, unit="1/ha", title="Trees (per ha)", description="Trees per hectare."
-    )
+    grass_density: float = quantity(0.8, "1/m2", "Tufts of grass per area.", (0, 50), title="Grass (per m²)")
+    shrubs_per_hectare: float = quantity(60.0, "1/ha", "Shrubs per hectare.", (0, 5000), title="Shrubs (per ha)")
+    trees_per_hectare: float = quantity(40.0, "1/ha", "Trees per hectare.", (0, 2000), title="Trees (per ha)")
     vegetation: VegetationLimits = Field(VegetationLimits(), description="Species and sizes of plants.")
     environment: EnvironmentLimits = Field(EnvironmentLimits(), description="Light and weather.")
     materials: MaterialLimits = Field(MaterialLimits(), description="Variation of materials.")

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from ..base.schema import notes, optional, quantity
+from ..base.schema import notes, quantity
 from ..scanning.devices.device import DeviceChoice, ScannerSetting, load_device, setting_of
 from ..scanning.noise import Noise
 from ..scanning.platforms.registry import PlatformModel, make_platform
@@ -23,19 +23,22 @@ class ScanScenario(DeviceChoice):
     platform: PlatformModel = Field(make_platform(), description="Platform and path.")
     noise: Noise = Field(Noise(), description="Measurement noise.")
     relief: float = quantity(
-        1.0,
-        ge=0,
-        le=100,
-        unit="1",
-        title="Micro-Relief",
-        description="Strength of the surfaces' micro-relief in the cloud; 0 is none.",
+        1.0, "1", "Strength of the surfaces' micro-relief in the cloud; 0 is none.", (0, 100), title="Micro-Relief"
     )
-    relief_octaves: int | None = optional(
-        "1", (1, 8), "Octaves of the micro-relief; the fidelity's if not given.", inherits="fidelity.relief_octaves"
+    relief_octaves: int | None = quantity(
+        None,
+        "1",
+        "Octaves of the micro-relief; the fidelity's if not given.",
+        (1, 8),
+        inherits="fidelity.relief_octaves",
     )
     reflection: Literal["lambert", "oren_nayar"] = Field("lambert", description="How rough surfaces reflect.")
-    attenuation: float | None = optional(
-        "1/m", (0, 1), "Attenuation per metre of range (there and back); else the weather's.", unset="The weather's"
+    attenuation: float | None = quantity(
+        None,
+        "1/m",
+        "Attenuation per metre of range (there and back); else the weather's.",
+        (0, 1),
+        unset="The weather's",
     )
     weather: WeatherModel | None = Field(
         None, description="Weather; the road's own if not given.", json_schema_extra=notes(unset="The road's")
@@ -55,32 +58,27 @@ class ScanScenario(DeviceChoice):
         "conical", description="Rays diverge from the aperture, or run parallel over the footprint at the first hit."
     )
     traffic_speed_factor: float = quantity(
-        1.0,
-        ge=0,
-        le=10,
-        unit="1",
-        title="Speed of Traffic",
-        description="Factor on the vehicles' speeds; 0 stops the traffic.",
+        1.0, "1", "Factor on the vehicles' speeds; 0 stops the traffic.", (0, 10), title="Speed of Traffic"
     )
-    section_length: float | None = optional(
+    section_length: float | None = quantity(
+        None,
         "m",
-        (20, 1e6),
         "Roads longer than two of these are built and scanned section by section; if not given, roads of "
         "more than 5 km by sections of 500 m.",
+        (20, 1e6),
         unset="500 m beyond 5 km",
     )
     most_pulses: int | None = quantity(
         None,
-        ge=1,
-        le=MOST_POSSIBLE,
-        unit="1",
-        title="Most Pulses",
-        description="Pulses beyond which the scan is refused before it begins; 5 thousand million if not given, and "
+        "1",
+        "Pulses beyond which the scan is refused before it begins; 5 thousand million if not given, and "
         "the scene must then fit into the machine's memory too.",
+        (1, MOST_POSSIBLE),
+        title="Most Pulses",
         unset="5 thousand million",
     )
     caster: Literal["auto", "embree", "bvhtree"] = Field("auto", description="How rays are cast.")
-    threads: int = quantity(0, ge=0, le=1024, unit="1", description="Threads; 0 uses every core.")
+    threads: int = quantity(0, "1", "Threads; 0 uses every core.", (0, 1024))
 
     @model_validator(mode="before")
     @classmethod

@@ -11,7 +11,7 @@ from pydantic import Field, field_validator
 
 from ..base.errors import InputError
 from ..base.files import PRESETS, preset_names, preset_path
-from ..base.schema import ClosedModel, Model, notes, optional, quantity, read_json
+from ..base.schema import ClosedModel, Model, notes, quantity, read_json
 from ..base.typed_text import typed_value
 from ..cloud.layers import optional_arrays
 from ..materials.table import Material, read_material_table
@@ -46,19 +46,21 @@ class Scenario(ClosedModel):
     type: Literal["Scenario"] = "Scenario"
     version: Literal["1.0"] = "1.0"
     title: str = Field("", description="Title for people.")
-    seed: int = quantity(1, ge=0, le=2**63 - 1, unit="1", description="Seed of everything random.")
+    seed: int = quantity(1, "1", "Seed of everything random.", (0, 2**63 - 1))
     fidelity: Literal["draft", "standard", "high"] = Field("standard", description="Point on the trade-off.")
-    geometric_tolerance: float | None = optional(
+    geometric_tolerance: float | None = quantity(
+        None,
         "m",
-        (1e-4, 1),
         "Chord error of the model; the fidelity's if not given.",
+        (1e-4, 1),
         title="Model's Tolerance",
         inherits="fidelity.tolerance",
     )
-    vegetation_detail: float | None = optional(
+    vegetation_detail: float | None = quantity(
+        None,
         "1",
-        (0, 1),
         "Share of the vegetation built; the fidelity's if not given.",
+        (0, 1),
         title="Plants Built",
         inherits="fidelity.vegetation_detail",
     )
@@ -66,7 +68,7 @@ class Scenario(ClosedModel):
         None, description="Largest errors; the cheapest settings that keep them are chosen, but for knobs given here."
     )
     time_budget: float | None = quantity(
-        None, gt=0, le=1e7, unit="s", description="Time for the whole job; the best settings that fit it are chosen."
+        None, "s", "Time for the whole job; the best settings that fit it are chosen.", gt=0, le=1e7
     )
     materials_table: str | None = Field(
         None,

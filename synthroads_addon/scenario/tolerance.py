@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import model_validator
 
 from ..base.errors import InputError, nearest_name
-from ..base.schema import ClosedModel, optional
+from ..base.schema import ClosedModel, quantity
 
 LENGTHS = {"um": 1e-6, "µm": 1e-6, "mm": 1e-3, "cm": 1e-2, "m": 1.0}
 SHARES = {"": 1.0, "%": 0.01, "‰": 0.001}
@@ -54,14 +54,14 @@ class Tolerance(ClosedModel):
     As text each can have a unit: ``"5mm"``, ``"2 %"``.
     """
 
-    height: float | None = optional("m", (0, 10), "Height of the road's surface, largest error.")
-    position: float | None = optional("m", (0, 10), "Position of the hits, error of 95 % of the pulses.")
-    relief: float | None = optional("m", (0, 10), "Micro-relief of the points, error of 95 % of them.")
-    intensity: float | None = optional("1", (0, 10), "Intensity, relative error of 95 % of the pulses.")
-    colour: float | None = optional("1", (0, 100), "Colour, CIEDE2000 of 95 % of the points.")
-    layers: float | None = optional("1", (0, 1), "Material layers, root mean square error of the worst.")
-    labels: float | None = optional("1", (0, 1), "Share of the pulses of another class.")
-    density: float | None = optional("1", (0, 1), "Share of the points that are missing or too many.")
+    height: float | None = quantity(None, "m", "Height of the road's surface, largest error.", (0, 10))
+    position: float | None = quantity(None, "m", "Position of the hits, error of 95 % of the pulses.", (0, 10))
+    relief: float | None = quantity(None, "m", "Micro-relief of the points, error of 95 % of them.", (0, 10))
+    intensity: float | None = quantity(None, "1", "Intensity, relative error of 95 % of the pulses.", (0, 10))
+    colour: float | None = quantity(None, "1", "Colour, CIEDE2000 of 95 % of the points.", (0, 100))
+    layers: float | None = quantity(None, "1", "Material layers, root mean square error of the worst.", (0, 1))
+    labels: float | None = quantity(None, "1", "Share of the pulses of another class.", (0, 1))
+    density: float | None = quantity(None, "1", "Share of the points that are missing or too many.", (0, 1))
 
     @model_validator(mode="before")
     @classmethod

@@ -29,20 +29,20 @@ class DeviceChoice(ClosedModel):
 
     device: str = Field("riegl-minivux-3uav", description="Device preset or file.")
     pulse_rate_khz: float | None = quantity(
-        None, gt=0, le=5000, unit="kHz", description="Pulse repetition rate.", inherits="device.pulse_rate_khz"
+        None, "kHz", "Pulse repetition rate.", gt=0, le=5000, inherits="device.pulse_rate_khz"
     )
     field_of_view_deg: float | None = quantity(
-        None, gt=0, le=360, unit="deg", description="Field of view.", inherits="device.field_of_view_deg"
+        None, "deg", "Field of view.", gt=0, le=360, inherits="device.field_of_view_deg"
     )
     lines_per_second: float | None = quantity(
-        None, gt=0, le=1000, unit="1/s", description="Scan lines per second.", inherits="device.lines_per_second"
+        None, "1/s", "Scan lines per second.", gt=0, le=1000, inherits="device.lines_per_second"
     )
     angle_step_deg: float | None = quantity(
         None,
+        "deg",
+        "Angle between two pulses; instead of the lines per second.",
         gt=0,
         le=90,
-        unit="deg",
-        description="Angle between two pulses; instead of the lines per second.",
         inherits="device.angle_step_deg",
     )
 
@@ -54,17 +54,17 @@ class PulseMode(Model):
     several fires at this rate, so that a scan has heads x pulse rate pulses per second.
     """
 
-    pulse_rate_khz: float = quantity(gt=0, le=5000, unit="kHz", description="Pulse repetition rate of each head.")
-    field_of_view_deg: float = quantity(gt=0, le=360, unit="deg", description="Largest field of view.")
-    maximum_range: float = quantity(gt=0, le=20_000, unit="m", description="Farthest a 20 % target is detected.")
+    pulse_rate_khz: float = quantity(..., "kHz", "Pulse repetition rate of each head.", gt=0, le=5000)
+    field_of_view_deg: float = quantity(..., "deg", "Largest field of view.", gt=0, le=360)
+    maximum_range: float = quantity(..., "m", "Farthest a 20 % target is detected.", gt=0, le=20_000)
 
 
 class Head(Model):
     """How one of several equal scanning heads sits on the device: roll (left side up), pitch (nose up), then yaw."""
 
-    roll_deg: float = quantity(0.0, ge=-180, le=180, unit="deg", description="About the forward axis.")
-    pitch_deg: float = quantity(0.0, ge=-90, le=90, unit="deg", description="Nose up.")
-    yaw_deg: float = quantity(0.0, ge=-180, le=180, unit="deg", description="Counter-clockwise from above.")
+    roll_deg: float = quantity(0.0, "deg", "About the forward axis.", (-180, 180))
+    pitch_deg: float = quantity(0.0, "deg", "Nose up.", (-90, 90))
+    yaw_deg: float = quantity(0.0, "deg", "Counter-clockwise from above.", (-180, 180))
 
 
 class Device(Model):
@@ -78,29 +78,27 @@ class Device(Model):
     heads: tuple[Head, ...] = Field(
         (Head(),), min_length=1, max_length=16, description="Scanning heads; they fire in turn."
     )
-    wavelength_nm: float = quantity(ge=300, le=2500, unit="nm", description="Wavelength.")
+    wavelength_nm: float = quantity(..., "nm", "Wavelength.", (300, 2500))
     divergence_mrad: tuple[_Divergence, _Divergence] = Field(
         description="Full angle of the beam at 1/e^2 of its peak: in the scan plane, and across it.",
         json_schema_extra={"unit": "mrad"},
     )
-    pulse_length_ns: float = quantity(gt=0, le=100, unit="ns", description="Pulse length (full width, half height).")
-    maximum_returns: int = quantity(ge=1, le=15, unit="1", description="Most returns recorded of one pulse.")
-    minimum_range: float = quantity(ge=0, unit="m", description="Nothing nearer is recorded.")
-    range_sigma: float = quantity(ge=0, le=1, unit="m", description="Precision of the range (one sigma).")
+    pulse_length_ns: float = quantity(..., "ns", "Pulse length (full width, half height).", gt=0, le=100)
+    maximum_returns: int = quantity(..., "1", "Most returns recorded of one pulse.", (1, 15))
+    minimum_range: float = quantity(..., "m", "Nothing nearer is recorded.", (0, None))
+    range_sigma: float = quantity(..., "m", "Precision of the range (one sigma).", (0, 1))
     dynamic_range_db: float = quantity(
         45.0,
+        "dB",
+        "Ratio of the optical power that saturates the receiver to the weakest detected; 45 is assumed.",
         gt=0,
         le=150,
-        unit="dB",
-        description="Ratio of the optical power that saturates the receiver to the weakest detected; 45 is assumed.",
     )
-    pulses_in_air: int = quantity(
-        1, ge=1, le=100, unit="1", description="Pulses of a beam that may be under way without being confused."
-    )
+    pulses_in_air: int = quantity(1, "1", "Pulses of a beam that may be under way without being confused.", (1, 100))
     lines_per_second: tuple[_Lines, _Lines] = Field(
         description="Slowest and fastest scan.", json_schema_extra={"unit": "1/s"}
     )
-    finest_angle_deg: float = quantity(gt=0, le=10, unit="deg", description="Smallest angle between two pulses.")
+    finest_angle_deg: float = quantity(..., "deg", "Smallest angle between two pulses.", gt=0, le=10)
     modes: tuple[PulseMode, ...] = Field(
         min_length=1, description="Pulse rates that can be chosen; the first is the default."
     )

@@ -17,7 +17,7 @@ class LinePattern(Pattern):
     """A pattern of lines across the forward direction, centred on an angle from the nadir."""
 
     centre_from_nadir_deg: float = quantity(
-        0.0, ge=-180, le=180, unit="deg", description="Middle of the field of view, to the right of the nadir."
+        0.0, "deg", "Middle of the field of view, to the right of the nadir.", (-180, 180)
     )
 
     def sweep(self, field_of_view: float) -> float:
@@ -66,7 +66,7 @@ class RotatingMirror(LinePattern):
     order: ClassVar[int] = 1
     type: Literal["rotating_mirror"] = "rotating_mirror"
     turn_per_line_deg: float = quantity(
-        360.0, gt=0, le=360, unit="deg", description="Angle by which the beam turns from one line to the next."
+        360.0, "deg", "Angle by which the beam turns from one line to the next.", gt=0, le=360
     )
 
     def sweep(self, field_of_view: float) -> float:
@@ -123,9 +123,9 @@ class Grid(LinePattern):
 
     order: ClassVar[int] = 4
     type: Literal["grid"] = "grid"
-    rows: int = quantity(ge=1, le=100_000, unit="1", description="Rows of a frame, from the rearmost to the foremost.")
+    rows: int = quantity(..., "1", "Rows of a frame, from the rearmost to the foremost.", (1, 100_000))
     along_field_deg: float = quantity(
-        ge=0, le=170, unit="deg", description="Field of view along the forward direction, centred on the nadir."
+        ..., "deg", "Field of view along the forward direction, centred on the nadir.", (0, 170)
     )
 
     @property

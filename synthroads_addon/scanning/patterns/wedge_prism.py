@@ -16,11 +16,9 @@ from .base import FULL_TURN, Numbers, Pattern, PulseRays, PulseTiming
 class Wedge(Model):
     """A rotating glass wedge: light enters through the face across the axis and leaves through the inclined one."""
 
-    angle_deg: float = quantity(gt=0, le=60, unit="deg", description="Angle between the two faces.")
-    refractive_index: float = quantity(gt=1, le=4, unit="1", description="Refractive index at the wavelength.")
-    turns: int = quantity(
-        ge=-1_000_000, le=1_000_000, unit="1", description="Turns, to the right, in the time of the other's turns."
-    )
+    angle_deg: float = quantity(..., "deg", "Angle between the two faces.", gt=0, le=60)
+    refractive_index: float = quantity(..., "1", "Refractive index at the wavelength.", gt=1, le=4)
+    turns: int = quantity(..., "1", "Turns, to the right, in the time of the other's turns.", (-1_000_000, 1_000_000))
 
     @model_validator(mode="after")
     def _turning(self) -> Wedge:

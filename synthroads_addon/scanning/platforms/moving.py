@@ -26,8 +26,8 @@ _TRACKS_KEPT = 4
 class MovingPlatform(Platform):
     """Platform that moves along a guide, in strips."""
 
-    height: float | None = quantity(None, ge=0.1, le=5000, unit="m", description="Height above the road.")
-    speed: float | None = quantity(None, ge=0.1, le=150, unit="m/s", description="Speed over ground.")
+    height: float | None = quantity(None, "m", "Height above the road.", (0.1, 5000))
+    speed: float | None = quantity(None, "m/s", "Speed over ground.", (0.1, 150))
     lateral_offsets: tuple[Finite, ...] | None = Field(
         None,
         min_length=1,
@@ -42,19 +42,10 @@ class MovingPlatform(Platform):
         json_schema_extra=notes(labels={"direct": "Along the Centreline"}),
     )
     polynomial_degree: int = quantity(
-        3,
-        ge=1,
-        le=9,
-        unit="1",
-        description="Degree of the smoothed path's polynomials.",
-        only_with={"path": ("smoothed",)},
+        3, "1", "Degree of the smoothed path's polynomials.", (1, 9), only_with={"path": ("smoothed",)}
     )
-    zigzag_amplitude: float = quantity(
-        5.0, ge=0, le=500, unit="m", description="Sway to either side.", only_with={"path": ("zigzag",)}
-    )
-    zigzag_wavelength: float = quantity(
-        100.0, ge=5, le=5000, unit="m", description="Length of a sway.", only_with={"path": ("zigzag",)}
-    )
+    zigzag_amplitude: float = quantity(5.0, "m", "Sway to either side.", (0, 500), only_with={"path": ("zigzag",)})
+    zigzag_wavelength: float = quantity(100.0, "m", "Length of a sway.", (5, 5000), only_with={"path": ("zigzag",)})
 
     def make_path(self, guide: Guide, origin: Sequence[float] | None = None) -> MovingPath:
         """Return the strips; see `Platform.make_path`."""

@@ -28,13 +28,9 @@ class Platform(ClosedModel):
     driven: ClassVar[bool] = False
 
     kind: str
-    roll_deg: float = quantity(
-        0.0, ge=-180, le=180, unit="deg", description="Mounting of the scanner: about the forward axis."
-    )
-    pitch_deg: float = quantity(0.0, ge=-90, le=90, unit="deg", description="Mounting of the scanner: nose up.")
-    yaw_deg: float = quantity(
-        0.0, ge=-180, le=180, unit="deg", description="Mounting of the scanner: counter-clockwise from above."
-    )
+    roll_deg: float = quantity(0.0, "deg", "Mounting of the scanner: about the forward axis.", (-180, 180))
+    pitch_deg: float = quantity(0.0, "deg", "Mounting of the scanner: nose up.", (-90, 90))
+    yaw_deg: float = quantity(0.0, "deg", "Mounting of the scanner: counter-clockwise from above.", (-180, 180))
 
     def make_path(self, guide: Guide, origin: Sequence[float] | None = None) -> Path:
         """Return the way of the scanner.

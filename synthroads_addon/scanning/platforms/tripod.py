@@ -30,7 +30,7 @@ class Tripod(Platform):
     usual_range: ClassVar[float | None] = _USUAL_RANGE
 
     kind: Literal["tripod"] = Field("tripod", title="Platform", description="Platform.")
-    height: float | None = quantity(None, ge=0.1, le=5000, unit="m", description="Height above the ground below.")
+    height: float | None = quantity(None, "m", "Height above the ground below.", (0.1, 5000))
     lateral_offsets: tuple[Finite, ...] | None = Field(
         None,
         min_length=1,
@@ -48,23 +48,13 @@ class Tripod(Platform):
         json_schema_extra=notes(unset="By the spacing"),
     )
     station_spacing: float = quantity(
-        80.0, ge=1, le=5000, unit="m", description="Spacing of a tripod's positions where no stations are given."
+        80.0, "m", "Spacing of a tripod's positions where no stations are given.", (1, 5000)
     )
     turn_seconds: float = quantity(
-        60.0,
-        gt=0,
-        le=3600,
-        unit="s",
-        title="Time of a Turn",
-        description="Time in which a tripod turns the scanner at each position.",
+        60.0, "s", "Time in which a tripod turns the scanner at each position.", gt=0, le=3600, title="Time of a Turn"
     )
     turn_deg: float = quantity(
-        360.0,
-        ge=0,
-        le=360,
-        unit="deg",
-        title="Angle of a Turn (°)",
-        description="Angle of that turn; 0 for a head that turns by itself.",
+        360.0, "deg", "Angle of that turn; 0 for a head that turns by itself.", (0, 360), title="Angle of a Turn (°)"
     )
 
     def make_path(self, guide: Guide, origin: Sequence[float] | None = None) -> TripodPath:

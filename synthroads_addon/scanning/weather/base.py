@@ -21,9 +21,7 @@ class Weather(ClosedModel):
     usual: ClassVar[Mapping[str, float]]
 
     condition: str
-    visibility: float | None = quantity(
-        None, ge=20, le=200_000, unit="m", description="Visibility; usual for the condition if not given."
-    )
+    visibility: float | None = quantity(None, "m", "Visibility; usual for the condition if not given.", (20, 200_000))
 
     def attenuation(self, wavelength_nm: float) -> float:
         """Return the attenuation per metre of range, 1/m: the light goes there and back, so twice the extinction."""

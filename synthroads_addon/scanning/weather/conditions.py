@@ -64,12 +64,7 @@ class Precipitation(Weather):
     """Rain or snow, by its visibility or by its rate."""
 
     rate_mm_h: float | None = quantity(
-        None,
-        gt=0,
-        le=200,
-        unit="mm/h",
-        description="Rain, or snow as water; instead of the visibility.",
-        unset="By the visibility",
+        None, "mm/h", "Rain, or snow as water; instead of the visibility.", gt=0, le=200, unset="By the visibility"
     )
 
     @model_validator(mode="after")
