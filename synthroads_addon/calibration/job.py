@@ -14,6 +14,7 @@ import numpy as np
 
 from ..base.arrays import Float
 from ..base.errors import InputError, nearest_name
+from ..base.progress import exhaust
 from ..materials.surfaces import Reflection
 from ..materials.table import Material, materials, read_material_table, write_material_table
 from ..scanning.devices.device import load_device
@@ -208,12 +209,7 @@ class Calibration:
 
 def calibrate(job: CalibrationJob) -> Calibration:
     """Compare, and fit if asked to, in one go; see `steps`."""
-    run = steps(job)
-    while True:
-        try:
-            next(run)
-        except StopIteration as end:
-            return end.value
+    return exhaust(steps(job), lambda share: None)
 
 
 def steps(job: CalibrationJob) -> Generator[float, None, Calibration]:

@@ -7,7 +7,7 @@ import json
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
@@ -81,31 +81,32 @@ class CloudWriter(ABC):
 
     def __enter__(self) -> Self:
         try:
-            self._temporary = self._scratch.enter_context(scratch_folder(self.path.parent)) / self.path.name
-            self._open()
-        except self.faults as problem:
-            self._abandon()
-            raise self._unwritable(problem) from None
+            with self._output_errors():
+                self._temporary = self._scratch.enter_context(scratch_folder(self.path.parent)) / self.path.name
+                self._open()
         except BaseException:
             self._abandon()
             raise
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        done = False
         try:
             if kind is None:
-                self._finish()
-                sync_file(self._temporary)
-                self._temporary.replace(self.path)
-                done = True
-        except self.faults as problem:
-            raise self._unwritable(problem) from None
+                with self._output_errors():
+                    self._finish()
+                    sync_file(self._temporary)
+                    self._temporary.replace(self.path)
         finally:
-            if done:
-                self._scratch.close()
-            else:
-                self._abandon()
+            self._abandon()
+
+    @contextmanager
+    def _output_errors(self) -> Iterator[None]:
+        """Raise `OutputError` in place of what the library beneath raises where it can't write."""
+        try:
+            yield
+        except self.faults as problem:
+            reason = getattr(problem, "strerror", None) or " ".join(str(problem).split())[:120]
+            raise OutputError(str(self.path), None, f"cannot be written ({reason})") from None
 
     def write(self, block: PointBlock) -> None:
         """Append a block; raise `OutputError` if a value doesn't fit or the disk is full."""
@@ -114,10 +115,8 @@ class CloudWriter(ABC):
         for column in self.columns:
             if block.array(column.array) is None:
                 raise OutputError(str(self.path), column.array, "is to be written, but the points don't have it")
-        try:
+        with self._output_errors():
             self._append(block)
-        except self.faults as problem:
-            raise self._unwritable(problem) from None
         self.count += len(block)
 
     def notes(self) -> dict[str, Any]:
@@ -156,8 +155,12 @@ class CloudWriter(ABC):
         """Return values as they are; raise `OutputError` if one is NaN or infinite."""
         if not np.isfinite(values).all():
             worst = values[~np.isfinite(values).reshape(len(values), -1).all(axis=1)][0]
-            raise self.refused(worst.tolist(), f"{name} must be finite")
+            raise OutputError(str(self.path), worst.tolist(), f"{name} must be finite")
         return values
+
+    def fitting(self, values: AnyArray, kind: str, name: str) -> AnyArray:
+        """Return values that fit into a type, see `integers` and `finite`."""
+        return self.finite(values, name) if np.dtype(kind).kind == "f" else self.integers(values, kind, name)
 
     def file_class_ids(self, block: PointBlock) -> UInt8:
         """Return the block's classes (N,) in the file's scheme."""
@@ -198,14 +201,6 @@ class CloudWriter(ABC):
         with suppress(Exception):
             self._close()
         self._scratch.close()
-
-    def refused(self, value: object, allowed: str) -> OutputError:
-        """Return the error of a value that the file can't hold."""
-        return OutputError(str(self.path), value, allowed)
-
-    def _unwritable(self, problem: Exception) -> OutputError:
-        reason = getattr(problem, "strerror", None) or " ".join(str(problem).split())[:120]
-        return OutputError(str(self.path), None, f"cannot be written ({reason})")
 
 
 BLOCK = 500_000

@@ -34,11 +34,12 @@ _CAPACITY = 65_536
 _VALID, _INVALID = 0, 2
 """Values of the field that says whether a point's coordinates mean something: all of them do, none of them does."""
 _ENDS = ("Minimum", "Maximum")
+_CHANNELS = ("colorRed", "colorGreen", "colorBlue")
 _FIXED = {
     **dict.fromkeys(("cartesianX", "cartesianY", "cartesianZ"), "i4"),
     "cartesianInvalidState": "u1",
     "intensity": "f4",
-    **dict.fromkeys(("colorRed", "colorGreen", "colorBlue"), "u1"),
+    **dict.fromkeys(_CHANNELS, "u1"),
     "timeStamp": "f8",
     **dict.fromkeys(("returnIndex", "returnCount"), "u1"),
     f"{EXTENSION}:scan_angle": "f4",
@@ -119,8 +120,7 @@ class E57Writer(CloudWriter):
             self._scan.set("cartesianBounds", self._structure(real, bounds))
             limits = {"intensityMinimum": self._dimmest, "intensityMaximum": self._brightest}
             self._scan.set("intensityLimits", self._structure(real, limits))
-        channels = ("Red", "Green", "Blue")
-        colors = {f"color{name}{end}": at for name in channels for end, at in zip(_ENDS, (0, 255), strict=True)}
+        colors = {f"{name}{end}": at for name in _CHANNELS for end, at in zip(_ENDS, (0, 255), strict=True)}
         self._scan.set("colorLimits", self._structure(whole, colors))
         for node, what in ((self._scan, "scan"), (self._file.root(), "file")):
             digits = self.content_id(what, self._low.tolist(), self._high.tolist())
@@ -138,7 +138,7 @@ class E57Writer(CloudWriter):
         local = part.xyz - self.offset
         packed = {f"cartesian{'XYZ'[i]}": self.integers(local[:, i], "int32", "xyz", SCALE) for i in range(3)}
         rgb = self.integers(part.rgb, "uint16", "rgb") >> 8
-        packed |= {f"color{name}": rgb[:, i] for i, name in enumerate(("Red", "Green", "Blue"))}
+        packed |= dict(zip(_CHANNELS, rgb.T, strict=True))
         number = self.integers(part.return_number, "uint8", "return_number")
         packed |= {
             "intensity": self.finite(part.intensity, "intensity"),
@@ -222,10 +222,6 @@ _FIELDS = {
     "strip": f"{EXTENSION}:strip",
 }
 """Names of the arrays that every block has."""
-_STANDARD = {
-    *("cartesianX", "cartesianY", "cartesianZ", "intensity", "colorRed", "colorGreen", "colorBlue", "timeStamp"),
-    *("returnIndex", "returnCount", "cartesianInvalidState", f"{EXTENSION}:scan_angle", f"{EXTENSION}:strip"),
-}
 
 
 class E57Reader(CloudReader):
@@ -260,14 +256,14 @@ class E57Reader(CloudReader):
             raise InputError(str(path), None, "has no Cartesian coordinates")
         self._counts = counts
         self.header = header_from_notes(
-            path, "E57", sum(counts), names, notes, name_of=e57_name, usual=_STANDARD, has_color="colorRed" in names
+            path, "E57", sum(counts), names, notes, name_of=e57_name, usual=set(_FIXED), has_color="colorRed" in names
         )
 
     def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
         """See `CloudReader._stored_blocks`."""
         done = 0
         for scan, fields, count in zip(self._scans, self._fields, self._counts, strict=True):
-            names = [name for name in sorted(_STANDARD | self._layer_names()) if name in fields]
+            names = [name for name in sorted(_FIXED.keys() | self._layer_names()) if name in fields]
             room = min(size, count)
             arrays = {name: np.zeros(room) for name in names}
             buffers = self._e57.VectorSourceDestBuffer()
@@ -303,7 +299,7 @@ class E57Reader(CloudReader):
         index = arrays.get("returnIndex", np.zeros(count))  # counts from 0
         stored["return_number"] = index.astype(np.uint8) + np.uint8(1)
         dark = np.zeros(count)
-        channels = [arrays.get(f"color{name}", dark).astype(np.uint16) for name in ("Red", "Green", "Blue")]
+        channels = [arrays.get(name, dark).astype(np.uint16) for name in _CHANNELS]
         stored["rgb"] = np.stack(channels, axis=1) * np.uint16(257)
         return make_points(stored, self.header.attributes, count)
 

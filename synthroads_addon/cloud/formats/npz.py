@@ -53,9 +53,7 @@ class NpzWriter(CloudWriter):
     def _append(self, block: PointBlock) -> None:
         for name, (kind, _) in self._arrays.items():
             values = self.file_class_ids(block) if name == "class_id" else block.array(name)
-            if np.dtype(kind).kind == "u":
-                values = self.integers(values, kind, name)
-            self._files[name].write(np.ascontiguousarray(self.finite(values, name), dtype=kind).data)
+            self._files[name].write(np.ascontiguousarray(self.fitting(values, kind, name), dtype=kind).data)
 
     def _finish(self) -> None:
         for file in self._files.values():

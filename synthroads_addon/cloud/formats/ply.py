@@ -34,16 +34,17 @@ _WORDS = {
 }
 PLY_TYPES = {word: kind for kind, words in _WORDS.items() for word in words}
 """Types by their names in headers, of which there are two."""
-_FIXED = (
-    *(("x", "<f8"), ("y", "<f8"), ("z", "<f8"), ("red", "u1"), ("green", "u1"), ("blue", "u1"), ("intensity", "<f4")),
-    *(("return_number", "u1"), ("number_of_returns", "u1"), ("gps_time", "<f8"), ("scan_angle", "<f4")),
-    ("strip", "<u2"),
-)
 _FIELDS = {
-    **{name: name for name in ("intensity", "return_number", "number_of_returns", "gps_time", "strip")},
-    "scan_angle_deg": "scan_angle",
+    "intensity": ("intensity", "<f4"),
+    "return_number": ("return_number", "u1"),
+    "number_of_returns": ("number_of_returns", "u1"),
+    "gps_time": ("gps_time", "<f8"),
+    "scan_angle_deg": ("scan_angle", "<f4"),
+    "strip": ("strip", "<u2"),
 }
-"""Properties of the arrays that every block has."""
+"""Arrays that every block has -> their properties and types."""
+_CHANNELS = ("red", "green", "blue")
+_FIXED = (*((axis, "<f8") for axis in "xyz"), *((name, "u1") for name in _CHANNELS), *_FIELDS.values())
 _CLASS_NAMES = ("classification", "class", "label", "scalar_Classification", "scalar_Label")
 """Where others keep classes."""
 _PIECE = 160
@@ -74,14 +75,10 @@ class PlyWriter(CloudWriter):
     def _append(self, block: PointBlock) -> None:
         record = np.zeros(len(block), dtype=self._type)
         record["x"], record["y"], record["z"] = self.finite(block.xyz, "xyz").T
-        for name, channel in zip(("red", "green", "blue"), block.rgb.T, strict=True):
+        for name, channel in zip(_CHANNELS, block.rgb.T, strict=True):
             record[name] = self.integers(channel, "uint16", name) >> 8
-        record["intensity"] = self.finite(block.intensity, "intensity")
-        record["return_number"] = self.integers(block.return_number, "uint8", "return_number")
-        record["number_of_returns"] = self.integers(block.number_of_returns, "uint8", "number_of_returns")
-        record["gps_time"] = self.finite(block.gps_time, "gps_time")
-        record["scan_angle"] = self.finite(block.scan_angle_deg, "scan_angle")
-        record["strip"] = self.integers(block.strip, "uint16", "strip")
+        for array, (name, kind) in _FIELDS.items():
+            record[name] = self.fitting(block.array(array), kind, name)
         for column in self.columns:
             if column.array == "class_id":
                 record["class_id"] = self.file_class_ids(block)
@@ -135,7 +132,7 @@ class PlyReader(CloudReader):
             self._file.close()
             raise
         usual = {name for name, _ in _FIXED} | {*_CLASS_NAMES}
-        colored = {"red", "green", "blue"} <= self._names
+        colored = set(_CHANNELS) <= self._names
         self.header = header_from_notes(
             path, "PLY", count, self._names, notes, name_of=ply_name, usual=usual, has_color=colored
         )
@@ -152,14 +149,14 @@ class PlyReader(CloudReader):
 
     def _block(self, record: AnyArray, done: int) -> PointBlock:
         stored = {c.name: record[ply_name(c)] for c in columns(self.header.attributes) if ply_name(c) in self._names}
-        stored |= {name: record[field].copy() for name, field in _FIELDS.items() if field in self._names}
+        stored |= {name: record[field].copy() for name, (field, _) in _FIELDS.items() if field in self._names}
         if not self.header.labelled:
             label = next((name for name in _CLASS_NAMES if name in self._names), None)
             stored["class_id"] = record[label] if label else np.zeros(len(record))
         xyz = np.stack([record[name].astype(np.float64) for name in "xyz"], axis=1)
         stored["xyz"] = finite_coordinates(self.header.path, done, xyz)
         dark = np.zeros(len(record), dtype=np.uint16)
-        channels = (_sixteen_bits(record[name]) if name in self._names else dark for name in ("red", "green", "blue"))
+        channels = (_sixteen_bits(record[name]) if name in self._names else dark for name in _CHANNELS)
         stored["rgb"] = np.stack(list(channels), axis=1)
         return make_points(stored, self.header.attributes, len(record))
 

@@ -158,38 +158,25 @@ def read_display(
         chosen = chosen_points(cloud.header.count, budget)
         if len(chosen) == 0:
             raise InputError(str(path), None, "has no points")
-        result = _empty(cloud.header, len(chosen), origin)
-        places, rgb = drawing_places(len(chosen)), np.empty((len(chosen), 3), dtype=np.uint16)
+        size, places = len(chosen), drawing_places(len(chosen))
+        xyz, class_id = np.empty((size, 3), np.float32), np.empty(size, np.uint8)
+        rgb, brightness, counts = np.empty((size, 3), np.uint16), np.empty(size, np.float32), np.zeros(256, np.int64)
         measure, done, kept = Brightness(), 0, 0
         for points in cloud.blocks(block):
-            if origin is None:
-                result.origin = origin = np.floor(points.xyz[0])
-            result.counts += np.bincount(points.class_id, minlength=256)
+            origin = np.floor(points.xyz[0]) if origin is None else np.asarray(origin, np.float64)
+            counts += np.bincount(points.class_id, minlength=256)
             last = int(np.searchsorted(chosen, done + len(points)))
             here, into = chosen[kept:last] - done, places[kept:last]
-            result.xyz[into] = points.xyz[here] - origin
-            result.class_id[into] = points.class_id[here]
+            xyz[into] = points.xyz[here] - origin
+            class_id[into] = points.class_id[here]
             rgb[into] = points.rgb[here]
-            result.brightness[into] = np.nan_to_num(measure.values(points)[here])
+            brightness[into] = np.nan_to_num(measure.values(points)[here])
             done, kept = done + len(points), last
             progress(done / cloud.header.count)
-        result.brightness_text = measure.text
+        assert origin is not None
         # Colours have 16 bits; some programs write 8 into them all the same.
-        result.rgb[:] = rgb if rgb.max() < 256 else rgb >> 8
-        return result
-
-
-def _empty(header: CloudHeader, size: int, origin: Float | None) -> DisplayCloud:
-    return DisplayCloud(
-        header=header,
-        origin=np.zeros(3) if origin is None else np.asarray(origin, dtype=np.float64),
-        xyz=np.empty((size, 3), dtype=np.float32),
-        class_id=np.empty(size, dtype=np.uint8),
-        rgb=np.empty((size, 3), dtype=np.uint8),
-        brightness=np.empty(size, dtype=np.float32),
-        brightness_text="",
-        counts=np.zeros(256, dtype=np.int64),
-    )
+        rgb_8 = (rgb if rgb.max() < 256 else rgb >> 8).astype(np.uint8)
+        return DisplayCloud(cloud.header, origin, xyz, class_id, rgb_8, brightness, measure.text, counts)
 
 
 def _rgb_of(scheme: ClassScheme, number: int) -> tuple[int, int, int]:
