@@ -2,21 +2,22 @@
 
 Building a road calls functions that call functions, sixty node groups deep, and all of it must happen in Blender's main
 thread or while that waits. A generator would have to be threaded through every one of them. So the work has a Python
-thread of its own, but only ever runs while its caller waits for it in `Turns.take`, or while it computes `aside`::
+thread of its own, but only ever runs while its caller waits for it in `Stepper.run_for`, or while it computes what
+needs no turn in `run_aside`::
 
     def work():
-        path = aside(lambda: heavy_numpy())     # both run meanwhile
+        path = run_aside(lambda: heavy_numpy()) # both run meanwhile
         for item in path:
             add(item)                           # the caller waits
-            pause()                             # hands back if the turn's time is over
-        rest()                                  # hands back in any case
+            yield_if_due()                      # hands back if the turn's time is over
+        yield_now()                             # hands back in any case
 
-    turns = Turns(work)
-    while turns.take(0.05):
+    stepper = Stepper(work)
+    while stepper.run_for(0.05):
         ...                                     # the work stands still, or computes aside
-    result = turns.result()
+    result = stepper.result()
 
-Outside of a `Turns` these three do nothing but their work, so the same function runs straight through as well.
+Outside of a `Stepper` these three do nothing but their work, so the same function runs straight through as well.
 """
 
 from __future__ import annotations
@@ -46,11 +47,11 @@ class _State(Enum):
     DONE = 3
 
 
-class Turns(Generic[T]):
+class Stepper(Generic[T]):
     """Work that is done in turns.
 
     Args:
-        work: what is to be done; it calls `pause`, `rest`, `aside` and `by_caller`.
+        work: what is to be done; it calls `yield_if_due`, `yield_now`, `run_aside` and `run_in_caller`.
         name: of its thread.
     """
 
@@ -67,11 +68,11 @@ class Turns(Generic[T]):
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
     @property
-    def is_aside(self) -> bool:
+    def runs_aside(self) -> bool:
         """Return whether it is computing what needs no turn."""
         return self._state is _State.ASIDE
 
-    def take(self, seconds: float) -> bool:
+    def run_for(self, seconds: float) -> bool:
         """Let the work go on for about so long; return whether there is more of it. Raises what goes wrong in it."""
         self._deadline = time.perf_counter() + seconds
         with self._change:
@@ -87,7 +88,7 @@ class Turns(Generic[T]):
         return self._state is not _State.DONE
 
     def result(self) -> T:
-        """Return what the work returned; only once `take` has said that there is no more of it."""
+        """Return what the work returned; only once `run_for` has said that there is no more of it."""
         assert self._state is _State.DONE
         return self._result  # type: ignore[return-value]
 
@@ -114,7 +115,7 @@ class Turns(Generic[T]):
     # In the work's own thread
 
     def _run(self) -> None:
-        _here.turns = self
+        _here.stepper = self
         try:
             self._result = self._work()
         except BaseException as error:
@@ -137,36 +138,36 @@ class Turns(Generic[T]):
             raise Cancelled("the work was stopped")
 
 
-def pause() -> None:
+def yield_if_due() -> None:
     """Hand back to the caller if the turn's time is over."""
-    turns: Turns[object] | None = getattr(_here, "turns", None)
-    if turns is not None and time.perf_counter() >= turns._deadline:
-        turns._wait()
+    stepper: Stepper[object] | None = getattr(_here, "stepper", None)
+    if stepper is not None and time.perf_counter() >= stepper._deadline:
+        stepper._wait()
 
 
-def rest() -> None:
+def yield_now() -> None:
     """Hand back to the caller."""
-    turns: Turns[object] | None = getattr(_here, "turns", None)
-    if turns is not None:
-        turns._wait()
+    stepper: Stepper[object] | None = getattr(_here, "stepper", None)
+    if stepper is not None:
+        stepper._wait()
 
 
-def aside(compute: Callable[[], R]) -> R:
+def run_aside(compute: Callable[[], R]) -> R:
     """Return what is computed while the caller goes on; it must touch nothing that the caller may touch."""
-    turns: Turns[object] | None = getattr(_here, "turns", None)
-    if turns is None:
+    stepper: Stepper[object] | None = getattr(_here, "stepper", None)
+    if stepper is None:
         return compute()
-    turns._hand_back(_State.ASIDE)
+    stepper._hand_back(_State.ASIDE)
     try:
         return compute()
     finally:
-        turns._wait()
+        stepper._wait()
 
 
-def by_caller(function: Callable[[], R]) -> R:
+def run_in_caller(function: Callable[[], R]) -> R:
     """Return what a function returns in the caller's thread: for what only the main thread may do."""
-    turns: Turns[object] | None = getattr(_here, "turns", None)
-    if turns is None:
+    stepper: Stepper[object] | None = getattr(_here, "stepper", None)
+    if stepper is None:
         return function()
     results: list[R] = []
     errors: list[BaseException] = []
@@ -177,8 +178,8 @@ def by_caller(function: Callable[[], R]) -> R:
         except BaseException as error:
             errors.append(error)
 
-    turns._asked = run
-    turns._wait()
+    stepper._asked = run
+    stepper._wait()
     if errors:
         raise errors[0]
     return results[0]

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import pytest
 
 from synthroads_addon.base.errors import Cancelled
-from synthroads_addon.base.stepper import Turns, aside, by_caller, pause, rest
+from synthroads_addon.base.stepper import Stepper, run_aside, run_in_caller, yield_if_due, yield_now
 
 
 def straight(work: Callable[[], object]) -> object:
@@ -17,8 +17,8 @@ def straight(work: Callable[[], object]) -> object:
 
 
 def in_turns(work: Callable[[], object]) -> object:
-    turns = Turns(work)
-    while turns.take(0.001):
+    turns = Stepper(work)
+    while turns.run_for(0.001):
         pass
     return turns.result()
 
@@ -28,10 +28,10 @@ def test_what_is_returned_is_the_same(run: Callable[[Callable[[], object]], obje
     def work() -> list[object]:
         found: list[object] = []
         for number in range(20):
-            found.append(aside(lambda number=number: number * number))
-            rest()
-            pause()
-        return [*found, by_caller(lambda: "caller")]
+            found.append(run_aside(lambda number=number: number * number))
+            yield_now()
+            yield_if_due()
+        return [*found, run_in_caller(lambda: "caller")]
 
     assert run(work) == [n * n for n in range(20)] + ["caller"]
 
@@ -42,15 +42,15 @@ def test_it_stands_still_between_turns() -> None:
     def work() -> None:
         for number in range(5):
             done.append(number)
-            rest()
+            yield_now()
 
-    turns = Turns(work)
+    turns = Stepper(work)
     assert done == []
     for expected in range(1, 6):
-        assert turns.take(1.0)
+        assert turns.run_for(1.0)
         time.sleep(0.01)
         assert len(done) == expected
-    assert not turns.take(1.0)
+    assert not turns.run_for(1.0)
 
 
 def test_a_pause_hands_back_only_when_the_time_is_over() -> None:
@@ -59,40 +59,40 @@ def test_a_pause_hands_back_only_when_the_time_is_over() -> None:
     def work() -> None:
         for number in range(100):
             counts.append(number)
-            pause()
+            yield_if_due()
 
-    turns = Turns(work)
-    assert not turns.take(60.0)
+    turns = Stepper(work)
+    assert not turns.run_for(60.0)
     assert len(counts) == 100
-    turns = Turns(work)
+    turns = Stepper(work)
     for _ in range(3):
-        turns.take(-1.0)
+        turns.run_for(-1.0)
     assert len(counts) == 103
     turns.close()
 
 
 def test_aside_the_caller_goes_on() -> None:
     gate = threading.Event()
-    turns = Turns(lambda: aside(lambda: gate.wait(30.0)))
-    assert turns.take(0.001)
-    assert turns.is_aside
-    assert turns.take(0.001)  # comes back at once: the work still computes
+    turns = Stepper(lambda: run_aside(lambda: gate.wait(30.0)))
+    assert turns.run_for(0.001)
+    assert turns.runs_aside
+    assert turns.run_for(0.001)  # comes back at once: the work still computes
     gate.set()
-    while turns.take(0.001):
+    while turns.run_for(0.001):
         pass
     assert turns.result() is True
 
 
 def test_the_caller_does_what_only_it_may_do() -> None:
     main = threading.get_ident()
-    turns = Turns(lambda: (threading.get_ident(), by_caller(threading.get_ident)))
-    while turns.take(0.001):
+    turns = Stepper(lambda: (threading.get_ident(), run_in_caller(threading.get_ident)))
+    while turns.run_for(0.001):
         pass
     own, asked = turns.result()
     assert asked == main != own
 
 
-@pytest.mark.parametrize("wrapped", [lambda f: f(), aside, by_caller])
+@pytest.mark.parametrize("wrapped", [lambda f: f(), run_aside, run_in_caller])
 def test_what_goes_wrong_reaches_the_caller(wrapped: Callable[[Callable[[], object]], object]) -> None:
     with pytest.raises(ZeroDivisionError):
         in_turns(lambda: wrapped(lambda: 1 / 0))
@@ -106,26 +106,26 @@ def test_closing_stops_it_where_it_stands_and_lets_it_clean_up(steps: int) -> No
         try:
             for number in range(5):
                 seen.append(number)
-                rest()
+                yield_now()
         except Cancelled:
             seen.append("cancelled")
             raise
         finally:
             seen.append("clean")
 
-    turns = Turns(work)
+    turns = Stepper(work)
     for _ in range(steps):
-        turns.take(1.0)
+        turns.run_for(1.0)
     turns.close()
     assert seen == ([*range(steps), "cancelled", "clean"] if steps else [])
-    assert not turns.take(1.0)
+    assert not turns.run_for(1.0)
     turns.close()  # twice does no harm
 
 
 def test_closing_waits_for_what_is_computed_aside() -> None:
     gate, ended = threading.Event(), []
-    turns = Turns(lambda: aside(lambda: (gate.wait(30.0), ended.append(True))))
-    turns.take(0.001)
+    turns = Stepper(lambda: run_aside(lambda: (gate.wait(30.0), ended.append(True))))
+    turns.run_for(0.001)
     threading.Timer(0.05, gate.set).start()
     turns.close()
     assert ended == [True]

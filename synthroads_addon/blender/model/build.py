@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.stepper import Turns
+from ...base.stepper import Stepper
 from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ..materials import vary
@@ -99,17 +99,17 @@ def build_steps(
         the share that is done, 0 to 1, or None while there is nothing to do in this thread.
     """
     work = _Build(parameters, tolerance, vegetation_detail, parts, stretch)
-    turns = Turns(work.build, "SynthRoads build")
+    stepper = Stepper(work.build, "SynthRoads build")
     try:
         more = True
         while more:
             with work.log.record():
-                more = turns.take(_TURN)
-                if not turns.is_aside:
+                more = stepper.run_for(_TURN)
+                if not stepper.runs_aside:
                     work.evaluate()
-            yield None if turns.is_aside else work.share
+            yield None if stepper.runs_aside else work.share
     except BaseException:
-        turns.close()
+        stepper.close()
         work.log.remove()
         raise
     model = work.swap()

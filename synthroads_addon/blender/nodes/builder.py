@@ -29,7 +29,7 @@ from typing import Any
 import bpy
 
 from ...base.files import PRESETS
-from ...base.stepper import pause
+from ...base.stepper import yield_if_due
 from .layout import arrange
 
 KEY = "synthroads_key"
@@ -267,7 +267,7 @@ class Tree:
             self.group.links.new(value.source(), socket)
 
     def _new(self, kind: str) -> bpy.types.Node:
-        pause()  # a large group takes a second: each node updates the whole tree
+        yield_if_due()  # a large group takes a second: each node updates the whole tree
         raw = self.group.nodes.new(kind)
         raw.parent = self._frame
         return raw

@@ -11,7 +11,7 @@ import numpy as np
 from mathutils import Vector
 
 from ...base.errors import InputError
-from ...base.stepper import by_caller
+from ...base.stepper import run_in_caller
 from ...road.terrain import surface_elevation
 from ...road.things.asset import Asset
 from ...scanning.scene.mesh_files import check_mesh_file
@@ -62,7 +62,7 @@ def _collection(path: Path, asset: LibraryAsset) -> bpy.types.Collection:
     read = {".blend": _read_blend, ".glb": _read_glb, ".obj": _read_obj}[path.suffix.lower()]
     try:
         with stderr_if_it_succeeds():
-            objects = by_caller(lambda: read(path, asset.object))  # importers need Blender's main thread
+            objects = run_in_caller(lambda: read(path, asset.object))  # importers need Blender's main thread
     except (OSError, RuntimeError) as error:
         raise InputError(str(path), None, f"cannot be read as an asset ({complaint(error)})") from None
     if not objects:

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.stepper import aside, pause, rest
+from ...base.stepper import run_aside, yield_if_due, yield_now
 from ...road.geometry import RoadGeometry
 from ...road.objects import PointObject, RoadObject
 from ...road.parameters import RoadParameters
@@ -80,7 +80,7 @@ class ModelBuilder:
 
     def lay_out(self) -> None:
         """Find the rows of the surface, and with them what stands on the stretch; comes before everything else."""
-        self.stations = aside(lambda: sample_stations(self.geometry, self.tolerance, *self._given))
+        self.stations = run_aside(lambda: sample_stations(self.geometry, self.tolerance, *self._given))
         if not self._whole:
             self.stretch = (float(self.stations[0]), float(self.stations[-1]))
             self.parameters = cut_stretch(self.parameters, *self.stretch)
@@ -200,8 +200,8 @@ class ModelBuilder:
         self._unseen += 1
         if self._unseen >= self.at_once:
             self._unseen = 0
-            rest()  # so that they are evaluated in a turn of their own
-        pause()
+            yield_now()  # so that they are evaluated in a turn of their own
+        yield_if_due()
 
 
 def group_inputs(group: bpy.types.NodeTree) -> Iterator[bpy.types.NodeTreeInterfaceSocket]:

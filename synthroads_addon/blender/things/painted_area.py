@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.classes import class_id
-from ...base.stepper import aside
+from ...base.stepper import run_aside
 from ...road.paint import arrow_outlines, hatching_outlines, pieces
 from ...road.section import Arrow, Hatching
 from ..nodes import operations as op
@@ -58,7 +58,7 @@ def painted_area_group(tree: Tree) -> None:
 
 def build_painted_areas(builder: ModelBuilder) -> None:
     """Make all painted areas as one object."""
-    outlines = aside(lambda: list(_outlines(builder)))
+    outlines = run_aside(lambda: list(_outlines(builder)))
     if not outlines:
         return
     polygons = [polygon for polygon, _ in outlines]

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.classes import class_id
-from ...base.stepper import aside
+from ...base.stepper import run_aside
 from ...road.alignment import clip_offset
 from ...road.geometry import RoadGeometry
 from ...road.surroundings import Terrain
@@ -134,7 +134,7 @@ def _ground_mesh(
     geometry: RoadGeometry, terrain: Terrain, tolerance: float, stretch: tuple[float, float], origin: Float
 ) -> bpy.types.Mesh:
     """Return the ground before the road was built: a grid of stations and offsets, wider than the terrain."""
-    vertices, faces = aside(lambda: _ground_grid(geometry, terrain, tolerance, stretch))
+    vertices, faces = run_aside(lambda: _ground_grid(geometry, terrain, tolerance, stretch))
     mesh = bpy.data.meshes.new("SR Ground")
     fill(mesh, vertices - origin, faces=faces)
     return mesh

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ....base.stepper import aside
+from ....base.stepper import run_aside
 from ....road.geometry import RoadGeometry
 from ..meshes import attribute, fill
 from ..model_builder import ModelBuilder
@@ -30,7 +30,7 @@ def build_surface(builder: ModelBuilder) -> None:
         f"{side.title()} Pavement Material": section.carriageway.pavement.kind
         for side, section in builder.geometry.sections.items()
     }
-    details = aside(lambda: detail_points(builder.geometry, station, builder.tolerance))
+    details = run_aside(lambda: detail_points(builder.geometry, station, builder.tolerance))
     for name, (share, depth) in details.items():
         mesh = bpy.data.meshes.new("SR Detail")
         fill(mesh, np.column_stack([share, depth, 0.0 * share]))
