@@ -13,6 +13,10 @@ from ...scenario.scenario import FIDELITIES
 from .wording import value_name
 
 Items = Sequence[tuple[str, str, str]]
+BY_HAND = "BY_HAND"
+"""Item of a choice that stands for a part by hand."""
+BY_HAND_ENDING = "_by_hand"
+"""Ending of the property of a part by hand, beside the choice of a standard one."""
 
 
 def _fidelities() -> Iterator[tuple[str, str, str]]:

@@ -1,31 +1,52 @@
-"""Fields of the schema as Blender properties: their limits, units, defaults and tooltips, and the way to JSON and back.
+"""Fields of the schema as Blender properties: limits, units, defaults, tooltips, the way to JSON and back, their rows.
 
 Each `Field` keeps one field of a pydantic model in one or several properties of a property group. `ui.fields.groups`
 chooses the kind by the field's type, so that a new field of the schema has its properties without more being written.
 Blender's numbers have 32 bits. What was loaded is kept beside (`base`), and given back where a property still shows it;
 a number typed in is the shortest decimal that stands for its 32 bits (0.1, not 0.10000000149).
+
+A field is drawn in a row, its name to the left; one that isn't given shows greyed what it follows meanwhile.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, get_args
+from operator import attrgetter
+from typing import Any, cast, get_args
 
 import bpy
+from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from ...base.errors import InputError
 from ...base.schema import note_of, unit_of
 from ...scenario.road import Interval
+from ...scenario.scenario import Scenario
 from .choices import ITEMS
+from .inherited import SOURCES, Value
 from .numbers import exact, fitting, is_share, list_as_text, number_property, numbers_in, push_along
-from .wording import label, value_name
+from .wording import label, value_name, written_unit
 
 AUTOMATIC = "AUTOMATIC"
 """Item of a choice that stands for "not given"."""
 Hooks = Mapping[str, Callable[[Any, Any], None]]
 """Path -> what Blender calls when that property has changed."""
+ADD_FILE, REMOVE_FILE = "synthroads.add_file", "synthroads.remove_file"
+"""Operators that lengthen and shorten a list of files."""
+_NAMES_SHARE = 0.45
+"""Share of a row's width that its name takes."""
+
+
+def value_row(layout: bpy.types.UILayout, label: str) -> bpy.types.UILayout:
+    """Draw a name, and return the place for its value: wide enough for two numbers, the name for three words."""
+    split = layout.split(factor=_NAMES_SHARE)
+    name = split.row()
+    name.alignment = "RIGHT"
+    name.label(text=label)
+    row = split.row(align=True)
+    row.use_property_split = False
+    return row
 
 
 class Field:
@@ -38,9 +59,11 @@ class Field:
         optional: whether None is allowed.
         default: value at first.
         choice: whether others can depend on it: written before them.
+        part: the part of the scenario that it stands in, see `ui.fields.groups.GroupField`; None for the whole.
     """
 
     choice = False
+    part: Any = None
 
     def __init__(self, path: str, info: FieldInfo, kind: Any, optional: bool, default: Any) -> None:
         self.path, self.info, self.kind, self.optional, self.default = path, info, kind, optional, default
@@ -79,6 +102,61 @@ class Field:
         """Yield the property groups that must be registered before the one that it stands in."""
         return iter(())
 
+    def owner(self, settings: Any) -> Any:
+        """Return the property group that has its property."""
+        head, _, _ = self.path.rpartition(".")
+        return attrgetter(head)(settings) if head else settings
+
+    def declared(self, settings: Any) -> tuple[FieldInfo | None, type[BaseModel]]:
+        """Return its declaration as the panel is set, and the model; None if the chosen kind of its part lacks it."""
+        model = self.part.model_of(settings) if self.part else Scenario
+        return model.model_fields.get(self.name), model
+
+    def has_effect(self, settings: Any) -> bool:
+        """Return whether it means something as the panel is set; the schema says it with ``only_with``."""
+        info, _ = self.declared(settings)
+        if info is None:
+            return False
+        owner, needed = self.owner(settings), (note_of(info, "only_with") or {}).items()
+        return all(getattr(owner, name) in values for name, values in needed)
+
+    def inherited(self, settings: Any) -> Value:
+        """Return the number, the numbers or the interval that it has while it isn't given; None if there is none.
+
+        The schema says where it comes from: the chosen kind of its part has ``usual`` values, others are named in the
+        note ``inherits``, a source out of `SOURCES` and what is taken of it.
+        """
+        info, model = self.declared(settings)
+        usual = getattr(model, "usual", {})
+        if info is None or self.name in usual:
+            return cast(Value, None if info is None else usual[self.name])
+        source, _, taken = (note_of(info, "inherits") or "").partition(".")
+        return SOURCES[source](settings, taken) if source else None
+
+    def inherited_text(self, settings: Any) -> str:
+        """Return in words what it has while it isn't given."""
+        info, value = self.declared(settings)[0], self.inherited(settings)
+        if info is None or value is None:
+            return str((info and note_of(info, "unset")) or "Automatic")
+        return f"{self._written(value)} {written_unit(self.unit)}".removesuffix(" 1").rstrip()
+
+    def _written(self, value: float | tuple[float, ...]) -> str:
+        return list_as_text(value) if isinstance(value, tuple) else f"{value:.4g}"
+
+    def draw(self, layout: bpy.types.UILayout, settings: Any) -> None:
+        """Draw it, unless the other settings leave it without meaning."""
+        if self.has_effect(settings):
+            self.draw_row(layout, settings, self.owner(settings))
+
+    def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
+        """Draw its name and its value, a property of the owner."""
+        value_row(layout, self.label).prop(owner, self.name, text="")
+
+    def _draw_inherited(self, row: bpy.types.UILayout, settings: Any) -> None:
+        greyed = row.row(align=True)
+        greyed.active = False
+        greyed.label(text=self.inherited_text(settings))
+
     def _common(self, hooks: Hooks, name: str | None = None) -> dict[str, Any]:
         hook = {"update": hooks[self.path]} if self.path in hooks else {}
         return {"name": name or self.label, "description": self.tooltip, **hook}
@@ -116,6 +194,46 @@ class OptionalField(Field):
         """Show a value that is given."""
         raise NotImplementedError
 
+    def checkbox(self, hooks: Hooks) -> dict[str, Any]:
+        """Return the checkbox of a field that may be left out; none for others."""
+        if not self.optional:
+            return {}
+        hook = hooks.get(checkbox_path(self.path))
+
+        def begin(group: Any, context: Any) -> None:
+            self.begin_with_inherited(group)
+            if hook:
+                hook(group, context)
+
+        text = f"{self.tooltip}. Tick to give a value of your own"
+        about = {"name": f"Own {self.label}", "description": text, "default": self.default is not None}
+        return {self.checkbox_name: bpy.props.BoolProperty(**about, update=begin)}
+
+    def begin_with_inherited(self, owner: Any) -> None:
+        """Have a field that was just ticked begin with what it had before."""
+        value = self.inherited(owner.id_data.synthroads)
+        if value is not None and getattr(owner, self.checkbox_name):
+            for name, number in zip(self.values, value if isinstance(value, tuple) else (value,), strict=True):
+                setattr(owner, name, type(getattr(owner, name))(number))
+
+    def draw_checkbox(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> bpy.types.UILayout | None:
+        """Draw the checkbox, if there is one; return the place for the value if that is given."""
+        row = value_row(layout, self.label)
+        if not self.optional:
+            return row
+        row.prop(owner, self.checkbox_name, text="")
+        if getattr(owner, self.checkbox_name):
+            return row
+        self._draw_inherited(row, settings)
+        return None
+
+    def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
+        """Draw its name and its values, or what it has while none is given."""
+        row = self.draw_checkbox(layout, settings, owner)
+        if row:
+            for name in self.values:
+                row.prop(owner, name, text="")
+
 
 class FlagField(Field):
     """Yes or no."""
@@ -127,6 +245,10 @@ class FlagField(Field):
     def read(self, owner: Any, base: Any) -> bool:
         """Return whether it is ticked."""
         return bool(getattr(owner, self.name))
+
+    def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
+        """Draw the checkbox with its name."""
+        value_row(layout, "").prop(owner, self.name, text=self.label)
 
 
 class NumberField(OptionalField):
@@ -140,7 +262,7 @@ class NumberField(OptionalField):
     def properties(self, hooks: Hooks) -> dict[str, Any]:
         """Return the number, and its checkbox."""
         number = number_property(self.info, self.kind is int, self.default, **self._common(hooks))
-        return checkbox(self, hooks) | {self.name: number}
+        return self.checkbox(hooks) | {self.name: number}
 
     def read_given(self, owner: Any, base: Any) -> float:
         """Return the number."""
@@ -149,6 +271,15 @@ class NumberField(OptionalField):
     def write_given(self, owner: Any, value: Any) -> None:
         """Show a number, as far as Blender's numbers reach."""
         setattr(owner, self.name, fitting(value) if self.kind is int else value)
+
+    def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
+        """Draw the number; a slider has its name inside."""
+        if not self.is_share or self.optional:
+            super().draw_row(layout, settings, owner)
+            return
+        row = layout.row()
+        row.use_property_split = False
+        row.prop(owner, self.name, text=self.label)
 
 
 class IntervalField(OptionalField):
@@ -165,7 +296,7 @@ class IntervalField(OptionalField):
         """Return the two numbers, of which the one pushes the other along."""
         low, high = self.ends
         default = self.default or {"minimum": 0.0, "maximum": 0.0}
-        result = checkbox(self, hooks)
+        result = self.checkbox(hooks)
         pushes = (push_along(low, high, max), push_along(high, low, min))
         for name, end, push in zip(self.ends, ("minimum", "maximum"), pushes, strict=True):
             info = Interval.model_fields[end]
@@ -185,6 +316,9 @@ class IntervalField(OptionalField):
         """Show an interval: its minimum first, which may push the maximum that is written next."""
         for name, end in zip(self.ends, ("minimum", "maximum"), strict=True):
             setattr(owner, name, value[end])
+
+    def _written(self, value: float | tuple[float, ...]) -> str:
+        return f"{value[0]:g} – {value[1]:g}" if isinstance(value, tuple) else super()._written(value)
 
 
 class ChoiceField(Field):
@@ -214,6 +348,13 @@ class ChoiceField(Field):
         """Choose a value."""
         setattr(owner, self.name, AUTOMATIC if value is None else str(value))
 
+    def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
+        """Draw the menu, and beside "Automatic" what that is."""
+        row = value_row(layout, self.label)
+        row.prop(owner, self.name, text="")
+        if self.optional and getattr(owner, self.name) == AUTOMATIC:
+            self._draw_inherited(row, settings)
+
 
 class ChoicesField(Field):
     """Any of several values; their order is the schema's, unless they were loaded in another."""
@@ -238,6 +379,12 @@ class ChoicesField(Field):
     def write(self, owner: Any, value: Any) -> None:
         """Choose values."""
         setattr(owner, self.name, set(value or ()))
+
+    def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
+        """Draw the buttons, one below the other."""
+        column = value_row(layout, self.label).column(align=True)
+        for name in self.values:
+            column.prop_enum(owner, self.name, name)
 
 
 class TextField(Field):
@@ -269,6 +416,11 @@ class TextField(Field):
     def write(self, owner: Any, value: Any) -> None:
         """Show a value as text."""
         setattr(owner, self.name, self.text(value))
+
+    def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
+        """Draw the text; greyed in it what it has while nothing is given."""
+        greyed = self.inherited_text(settings) if self.optional else ""
+        value_row(layout, self.label).prop(owner, self.name, text="", placeholder=greyed)
 
 
 class NumbersField(TextField):
@@ -340,15 +492,15 @@ class FilesField(Field):
         for text in value or ():
             items.add().file = text
 
-
-def checkbox(field: Any, hooks: Hooks) -> dict[str, Any]:
-    """Return the checkbox of a field that may be left out; none for others."""
-    if not field.optional:
-        return {}
-    hook = {"update": hooks[own_path]} if (own_path := checkbox_path(field.path)) in hooks else {}
-    text = f"{field.tooltip}. Tick to give a value of your own"
-    about = {"name": f"Own {field.label}", "description": text, "default": field.default is not None}
-    return {field.checkbox_name: bpy.props.BoolProperty(**about, **hook)}
+    def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
+        """Draw a row for each file, with buttons that add one and take it off."""
+        for number, item in enumerate(getattr(owner, self.name)):
+            row = layout.row(align=True)
+            row.use_property_split = False
+            row.prop(item, "file", text="")
+            remove = row.operator(REMOVE_FILE, text="", icon="X")
+            remove.path, remove.number = self.path, number
+        layout.operator(ADD_FILE, icon="ADD").path = self.path
 
 
 def checkbox_path(path: str) -> str:

@@ -12,9 +12,8 @@ from pydantic.fields import FieldInfo
 
 from ...scenario.road import Interval
 from . import fields as kinds
-from .choices import STANDARD_PARTS, Items
-from .declared import BY_HAND, BY_HAND_ENDING, is_constant
-from .fields import Field, FilesField, Hooks, OptionalField, checkbox
+from .choices import BY_HAND, BY_HAND_ENDING, STANDARD_PARTS, Items
+from .fields import Field, FilesField, Hooks, OptionalField
 
 
 class GroupField(OptionalField):
@@ -25,9 +24,13 @@ class GroupField(OptionalField):
         group: its class.
     """
 
+    values = ()
+
     def __init__(self, path: str, info: FieldInfo, kind: Any, optional: bool, default: Any, hooks: Hooks) -> None:
         super().__init__(path, info, kind, optional, default)
         self.fields = make_fields(kind, _defaults(kind) | (default or {}), path, hooks)
+        for field in self.fields.values():
+            field.part = self
         annotations = {name: p for field in self.fields.values() for name, p in field.properties(hooks).items()}
         name = f"SYNTHROADS_PG_{path.replace('.', '_')}"
         self.group = type(name, (bpy.types.PropertyGroup,), {"__annotations__": annotations})
@@ -35,19 +38,38 @@ class GroupField(OptionalField):
     def properties(self, hooks: Hooks) -> dict[str, Any]:
         """Return a pointer to its group, and its checkbox."""
         pointer = bpy.props.PointerProperty(type=self.group, name=self.label, description=self.tooltip)
-        return checkbox(self, hooks) | {self.name: pointer}
+        return self.checkbox(hooks) | {self.name: pointer}
 
     def read_given(self, owner: Any, base: Any) -> dict[str, Any]:
         """Return the part's data without fields that aren't given."""
-        return read_fields(self.fields_in_use(owner), getattr(owner, self.name), base)
+        return read_fields(self.fields_of(self.model_in(owner)), getattr(owner, self.name), base)
 
-    def fields_in_use(self, owner: Any) -> Mapping[str, Field]:
-        """Return the fields that have a meaning as the part is set."""
-        return self.fields
+    def model_of(self, settings: Any) -> type[BaseModel]:
+        """Return the model that declares its fields, as the panel is set."""
+        return self.model_in(self.owner(settings))
+
+    def model_in(self, owner: Any) -> type[BaseModel]:
+        """Return the same of its owner."""
+        model: type[BaseModel] = self.kind
+        return model
+
+    def fields_of(self, model: type[BaseModel]) -> dict[str, Field]:
+        """Return the fields that a model of it declares."""
+        return {name: field for name, field in self.fields.items() if name in model.model_fields}
 
     def write_given(self, owner: Any, value: Any) -> None:
         """Show the part's data."""
         write_fields(self.fields, getattr(owner, self.name), value)
+
+    def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
+        """Draw its checkbox, and its fields if it is given."""
+        if not self.optional or self.draw_checkbox(layout, settings, owner):
+            self.draw_fields(layout, settings)
+
+    def draw_fields(self, layout: bpy.types.UILayout, settings: Any) -> None:
+        """Draw those of its fields that have an effect."""
+        for field in self.fields.values():
+            field.draw(layout, settings)
 
     def classes(self) -> Iterator[type]:
         """Yield the group's class after those in it."""
@@ -81,15 +103,11 @@ class KindField(GroupField):
         fields[tag] = (Literal[tuple(self.kinds)], choice)
         super().__init__(path, info, create_model(models[0].__name__, **fields), optional, default, hooks)
 
-    def fields_in_use(self, owner: Any) -> Mapping[str, Field]:
-        """Return the fields of the kind that is chosen."""
-        return {name: field for name, field in self.fields.items() if name in self.kind_of(owner).model_fields}
-
     def write_given(self, owner: Any, value: Any) -> None:
         """Show the part's data; the fields of other kinds are as at first."""
         super().write_given(owner, _defaults(self.kind) | value)
 
-    def kind_of(self, owner: Any) -> type[BaseModel]:
+    def model_in(self, owner: Any) -> type[BaseModel]:
         """Return the model of the kind that is chosen."""
         return self.kinds[getattr(getattr(owner, self.name), self.tag)]
 
@@ -133,6 +151,12 @@ class NamedOrByHandField(Field):
         if isinstance(value, dict):
             self.by_hand.write(owner, value)
 
+    def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
+        """Draw the menu, and the fields of a part by hand."""
+        super().draw_row(layout, settings, owner)
+        if getattr(owner, self.name) == BY_HAND:
+            self.by_hand.draw_fields(layout, settings)
+
     def classes(self) -> Iterator[type]:
         """Yield the group's class."""
         return self.by_hand.classes()
@@ -164,7 +188,7 @@ def make_field(path: str, info: FieldInfo, default: Any, hooks: Hooks) -> Field 
         return kinds.JsonField(path, info, kind, optional, default)
     if kind is not Interval and _is_model(kind):
         return GroupField(path, info, kind, optional, default, hooks)
-    if is_constant(info):
+    if get_origin(kind) is Literal and len(get_args(kind)) == 1:
         return None
     return _simple(kind)(path, info, kind, optional, default)
 

@@ -6,12 +6,11 @@ from collections.abc import Callable
 from typing import Any
 
 from ...road.guidelines import SECTIONS_OF_CLASS, design_class_of
-from .declared import BY_HAND, optional_fields
+from .choices import BY_HAND
 from .fields import AUTOMATIC, checkbox_path
-from .inherited import begin_with_inherited
+from .inherited import DEVICE_SETTINGS
 
 Hook = Callable[[Any, Any], None]
-_DEVICE_SETTINGS = ("pulse_rate_khz", "field_of_view_deg", "lines_per_second", "angle_step_deg")
 
 
 def _clear(*names: str) -> Hook:
@@ -62,28 +61,18 @@ def _no_rays(scan: Any, context: Any) -> None:
         scan.rays_per_pulse = AUTOMATIC
 
 
-def _in_turn(first: Hook, second: Hook) -> Hook:
-    def both(group: Any, context: Any) -> None:
-        first(group, context)
-        second(group, context)
-
-    return both
-
-
-HOOKS: dict[str, Hook] = {checkbox_path(path): begin_with_inherited(path) for path in optional_fields()} | {
+HOOKS: dict[str, Hook] = {
     "road.cross_section": _class_for_section,
     "road.design_class": _section_for_class,
     # A pulse rate and angles are those of one device, strips and heights those of one platform.
-    "scan.device": _clear(*map(checkbox_path, _DEVICE_SETTINGS)),
+    "scan.device": _clear(*map(checkbox_path, DEVICE_SETTINGS)),
     "scan.platform.kind": _clear("own_height", "own_speed", "lateral_offsets", "stations", "file"),
     "scan.own_weather": _instead("own_weather", "own_attenuation"),
     "scan.own_attenuation": _instead("own_attenuation", "own_weather"),
     "scan.weather.own_rate_mm_h": _instead("own_rate_mm_h", "own_visibility"),
+    "scan.weather.own_visibility": _instead("own_visibility", "own_rate_mm_h"),
     "scan.beam_rings": _no_rays,
     "scan.rays_per_pulse": _no_rings,
     "colour.lighting": _no_samples,
 }
-HOOKS["scan.weather.own_visibility"] = _in_turn(
-    begin_with_inherited("scan.weather.visibility"), _instead("own_visibility", "own_rate_mm_h")
-)
 """Path of a property -> what Blender calls when it has changed."""

@@ -11,61 +11,19 @@ from ...base.schema import note_of
 from ...road.guidelines import LIMITS, STANDARD_CROSS_SECTIONS, StandardCrossSection
 from ...sampling.alignment import WIDEST_RADIUS
 from ...sampling.markings import LANE_DASH, LANE_GAP
-from ...scanning.devices.device import ScannerSetting, setting_of
+from ...scanning.devices.device import DeviceChoice, ScannerSetting, setting_of
 from ...scanning.platforms.registry import PLATFORMS
 from ...scenario.colour import USUAL_RANGE, ColourScenario
 from ...scenario.scan import ScanScenario
 from ...scenario.scenario import FIDELITIES
-from .choices import device_of
-from .declared import BY_HAND, declaration
-from .numbers import exact, list_as_text, numbers_in
-from .wording import written_unit
+from .choices import BY_HAND, device_of
+from .numbers import exact, numbers_in
 
 Value = float | tuple[float, ...] | None
-
-
-def inherited_value(settings: Any, path: str) -> Value:
-    """Return the number, the numbers or the interval that a field has while it isn't given; None if there is none.
-
-    The schema says where it comes from: the chosen kind of its part has ``usual`` values, others are named in the
-    field's note ``inherits``, a source out of `SOURCES` and what is taken of it.
-    """
-    declared = declaration(settings, path)
-    if declared is None:
-        return None
-    name, usual = path.rpartition(".")[2], getattr(declared.model, "usual", {})
-    if name in usual:
-        return cast(Value, usual[name])
-    source, _, taken = (note_of(declared.info, "inherits") or "").partition(".")
-    return SOURCES[source](settings, taken) if source else None
-
-
-def inherited_text(settings: Any, path: str, unit: str) -> str:
-    """Return in words what a field has while it isn't given."""
-    declared, value = declaration(settings, path), inherited_value(settings, path)
-    if declared is None or value is None:
-        return str((declared and note_of(declared.info, "unset")) or "Automatic")
-    suffix = "" if unit in ("", "1") else f" {written_unit(unit)}"
-    if not isinstance(value, tuple):
-        return f"{value:.4g}{suffix}"
-    return f"{value[0]:g} – {value[1]:g}{suffix}" if declared.is_interval else f"{list_as_text(value)}{suffix}"
-
-
-def begin_with_inherited(path: str) -> Callable[[Any, Any], None]:
-    """Return a hook for the checkbox of a field: once ticked, the field begins with what it had before."""
-    name = path.rpartition(".")[2]
-
-    def begin(group: Any, context: Any) -> None:
-        value = inherited_value(group.id_data.synthroads, path)
-        if value is None or not getattr(group, f"own_{name}"):
-            return
-        if not isinstance(value, tuple):
-            setattr(group, name, type(getattr(group, name))(value))
-        elif hasattr(group, f"{name}_minimum"):
-            setattr(group, f"{name}_minimum", value[0])
-            setattr(group, f"{name}_maximum", value[1])
-
-    return begin
+DEVICE_SETTINGS = tuple(
+    name for name, info in DeviceChoice.model_fields.items() if (note_of(info, "inherits") or "").startswith("device.")
+)
+"""Fields of a scan that set its device."""
 
 
 def section_of(settings: Any) -> StandardCrossSection | None:
@@ -86,8 +44,8 @@ def scanner_setting(settings: Any, without: str = "") -> ScannerSetting | None:
     device = device_of(settings.scan.device)
     if device is None:
         return None
-    scan, names = settings.scan, ("pulse_rate_khz", "field_of_view_deg", "lines_per_second", "angle_step_deg")
-    given = [name for name in names if name != without and getattr(scan, f"own_{name}")]
+    scan = settings.scan
+    given = [name for name in DEVICE_SETTINGS if name != without and getattr(scan, f"own_{name}")]
     try:
         return setting_of(device, ScanScenario.from_dict({name: exact(getattr(scan, name), None) for name in given}))
     except InputError:

@@ -17,7 +17,7 @@ from ...blender.model.store import PARAMETERS, find_road, objects_of, recall_par
 from ...blender.things.model_builder import ROLE, SUPPORT
 from ...road.parameters import RoadParameters
 from ...road.surroundings import Vegetation
-from ..fields.drawing import value_row
+from ..fields.fields import value_row
 from ..fields.wording import title_case
 from ..work.common import Sidebar, column
 

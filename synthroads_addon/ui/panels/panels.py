@@ -8,7 +8,7 @@ import bpy
 
 from ...blender.model.store import BUILT_FROM, find_road
 from ...blender.things.model_builder import ROLE
-from ..fields.drawing import draw_field, value_row
+from ..fields.fields import value_row
 from ..fields.preferences import preferences
 from ..fields.sheets import SHEETS, Sheet, fields_of
 from ..work.build import SYNTHROADS_OT_build
@@ -41,7 +41,7 @@ class SheetPanel(Sidebar):
     def draw_fields(self, layout: bpy.types.UILayout, settings: Any) -> None:
         """Show the fields, each by what belongs to its kind."""
         for field in fields_of(self.sheet):
-            draw_field(layout, settings, field)
+            field.draw(layout, settings)
 
 
 class MainPanel(SheetPanel):
@@ -87,7 +87,7 @@ class ScannerPanel(SheetPanel):
             if field.path == "scan.device":
                 layout.menu(SYNTHROADS_MT_devices.bl_idname, text=device_title(settings.scan.device), icon="PRESET")
             else:
-                draw_field(layout, settings, field)
+                field.draw(layout, settings)
 
     def draw(self, context: bpy.types.Context) -> None:
         """Show the fields, the folder and the button."""

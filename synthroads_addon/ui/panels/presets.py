@@ -14,9 +14,10 @@ from ...base.random_streams import stream
 from ...scanning.devices.device import device_names, load_device
 from ...scenario.scenario import load_scenario, scenario_names
 from ..fields.choices import device_of
-from ..fields.drawing import ADD_FILE, REMOVE_FILE, owner_of
+from ..fields.fields import ADD_FILE, REMOVE_FILE
 from ..fields.numbers import LARGEST_INTEGER
 from ..fields.preferences import preferences
+from ..fields.properties import PATHS
 from ..work.common import is_free, refusing
 from ..work.long_operator import FileChooser
 
@@ -151,7 +152,8 @@ class SYNTHROADS_OT_save_scenario(_LibraryFile, bpy.types.Operator):
 
 def _files_of(context: bpy.types.Context, path: str) -> Any:
     """Return the list of files that a field at a path of the scenario holds."""
-    return getattr(owner_of(context.scene.synthroads, path), path.rpartition(".")[2])
+    field = PATHS[path]
+    return getattr(field.owner(context.scene.synthroads), field.name)
 
 
 class SYNTHROADS_OT_add_file(JsonFileChooser, _Undoable, bpy.types.Operator):

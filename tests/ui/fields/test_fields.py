@@ -25,7 +25,6 @@ from synthroads_addon.scenario.road import Interval, interval
 from synthroads_addon.scenario.scan import ScanScenario
 from synthroads_addon.scenario.scenario import FIDELITIES, Scenario, load_scenario, scenario_names
 from synthroads_addon.ui.fields import fields as kinds
-from synthroads_addon.ui.fields.drawing import owner_of
 from synthroads_addon.ui.fields.groups import (
     BY_HAND,
     NOT_HERE,
@@ -35,7 +34,6 @@ from synthroads_addon.ui.fields.groups import (
     read_fields,
     write_fields,
 )
-from synthroads_addon.ui.fields.inherited import inherited_text, inherited_value
 from synthroads_addon.ui.fields.properties import FIELDS, PATHS
 from synthroads_addon.ui.fields.wording import BLENDERS
 
@@ -257,7 +255,7 @@ def test_there_are_numbers_to_be_tested() -> None:
 @pytest.mark.parametrize("path", NUMBERS)
 def test_numbers_are_the_schemas(panel: Any, path: str) -> None:
     schema, field = schema_of(path), PATHS[path]
-    shown = owner_of(panel, path).bl_rna.properties[field.name]
+    shown = PATHS[path].owner(panel).bl_rna.properties[field.name]
     low = schema.get("minimum", schema.get("exclusiveMinimum"))
     high = schema.get("maximum", schema.get("exclusiveMaximum"))
     assert shown.hard_min == (np.float32(low) if shown.type == "FLOAT" else low)
@@ -272,13 +270,13 @@ def test_numbers_are_the_schemas(panel: Any, path: str) -> None:
 def test_every_field_has_a_tooltip(panel: Any) -> None:
     for path, field in PATHS.items():
         for name in field.names:
-            shown = owner_of(panel, path).bl_rna.properties[name]
+            shown = PATHS[path].owner(panel).bl_rna.properties[name]
             assert path == "title" or len(shown.description) > 3, path
 
 
 def test_choices_are_the_schemas(panel: Any) -> None:
     shown = {
-        path: owner_of(panel, path).bl_rna.properties[PATHS[path].name].enum_items.keys()
+        path: PATHS[path].owner(panel).bl_rna.properties[PATHS[path].name].enum_items.keys()
         for path in ("fidelity", "scan.platform.kind", "road.design_class", "road.cross_section", "scan.rays_per_pulse")
     }
     assert shown["fidelity"] == list(FIDELITIES)
@@ -368,14 +366,14 @@ def test_another_device_takes_its_own_setting(panel: Any) -> None:
     scan = panel.scenario().scan
     own = (scan.pulse_rate_khz, scan.field_of_view_deg, scan.lines_per_second, scan.angle_step_deg)
     assert own == (None, None, None, None)
-    assert inherited_value(panel, "scan.pulse_rate_khz") == load_device("velodyne-vlp-16").modes[0].pulse_rate_khz
+    assert PATHS["scan.pulse_rate_khz"].inherited(panel) == load_device("velodyne-vlp-16").modes[0].pulse_rate_khz
 
 
 def test_another_platform_takes_its_usual_path(panel: Any) -> None:
     panel.scan.platform.kind = "vehicle"
     platform = panel.scenario().scan.platform
     assert (platform.height, platform.speed, platform.lateral_offsets) == (None, None, None)
-    assert inherited_value(panel, "scan.platform.height") == PLATFORMS["vehicle"].usual["height"]
+    assert PATHS["scan.platform.height"].inherited(panel) == PLATFORMS["vehicle"].usual["height"]
 
 
 @pytest.mark.parametrize("kind", PLATFORMS)
@@ -447,8 +445,8 @@ def test_a_value_of_ones_own_begins_with_what_was_shown(panel: Any, path: str) -
     panel.take(Scenario())
     if path == "scan.weather.visibility":
         panel.scan.own_weather = True
-    field, owner, value = PATHS[path], owner_of(panel, path), inherited_value(panel, path)
-    shown = inherited_text(panel, path, field.unit)
+    field = PATHS[path]
+    owner, value, shown = field.owner(panel), field.inherited(panel), field.inherited_text(panel)
     assert shown not in ("", "Automatic"), "says nothing of what it has while it isn't given"
     setattr(owner, field.checkbox_name, True)
     if value is not None:
@@ -462,10 +460,10 @@ def test_what_is_inherited_is_what_the_scenario_has(panel: Any) -> None:
     panel.take(Scenario(fidelity="high"))
     scenario = panel.scenario()
     numbers, colour = scenario.settings(), scenario.colour.settings("high")
-    assert inherited_value(panel, "geometric_tolerance") == numbers.tolerance
-    assert inherited_value(panel, "scan.rays_per_pulse") == numbers.rays_per_pulse
-    assert inherited_value(panel, "colour.image_spacing") == colour.image_spacing
-    assert inherited_value(panel, "colour.samples") == colour.samples
+    assert PATHS["geometric_tolerance"].inherited(panel) == numbers.tolerance
+    assert PATHS["scan.rays_per_pulse"].inherited(panel) == numbers.rays_per_pulse
+    assert PATHS["colour.image_spacing"].inherited(panel) == colour.image_spacing
+    assert PATHS["colour.samples"].inherited(panel) == colour.samples
 
 
 def test_a_seed_too_long_for_blender_is_kept_until_another_is_given(panel: Any) -> None:

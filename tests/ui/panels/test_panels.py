@@ -22,7 +22,7 @@ from synthroads_addon.scanning.weather.registry import WEATHERS
 from synthroads_addon.scenario.road import Interval
 from synthroads_addon.scenario.scenario import Scenario, load_scenario, scenario_names
 from synthroads_addon.ui.fields import preferences
-from synthroads_addon.ui.fields.declared import BY_HAND, declaration
+from synthroads_addon.ui.fields.choices import BY_HAND
 from synthroads_addon.ui.fields.inherited import SOURCES
 from synthroads_addon.ui.fields.properties import PATHS
 from synthroads_addon.ui.fields.sheets import SHEETS, fields_of, homeless
@@ -182,12 +182,11 @@ def _seen(path: str, used: set[str]) -> bool:
 
 def test_notes_of_the_schema_name_what_is_there(panel: Any) -> None:
     for _ in states(panel):
-        for path in PATHS:
-            declared = declaration(panel, path)
-            if declared is not None:
-                beside = note_of(declared.info, "only_with") or {}
-                assert set(beside) <= set(declared.model.model_fields), path
-                assert (note_of(declared.info, "inherits") or "device.").partition(".")[0] in SOURCES, path
+        for path, field in PATHS.items():
+            info, model = field.declared(panel)
+            if info is not None:
+                assert set(note_of(info, "only_with") or {}) <= set(model.model_fields), path
+                assert (note_of(info, "inherits") or "device.").partition(".")[0] in SOURCES, path
 
 
 def test_sheets_name_fields_that_are_there() -> None:
