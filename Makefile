@@ -15,7 +15,7 @@ NOX = $(RUNNER)/bin/python -m nox
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test test-slow fuzz lint judges docs extension clean distclean
+.PHONY: help demo test test-slow test-cluster fuzz lint judges docs extension clean distclean
 
 help: ## say what there is
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{ printf "%-18s %s\n", $$1, $$2 }'
@@ -32,6 +32,9 @@ test-slow: $(RUNNER)/made ## the tests that take long, and the documentation's o
 
 fuzz: $(RUNNER)/made ## tens of thousands of files made wrong by chance (SEED=N: others than usual)
 	@TEST_MARKERS=fuzz FUZZ_SEED=$(SEED) $(NOX) -s tests summary
+
+test-cluster: $(RUNNER)/made ## data sets made by a Slurm on this machine (as root; slurmctld, slurmd, munge)
+	@TEST_MARKERS=cluster PYTHON=here $(NOX) -s tests summary
 
 lint docs judges: $(RUNNER)/made
 	@$(NOX) -s $@

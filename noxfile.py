@@ -33,7 +33,7 @@ PARTS = {"blender": [*BLENDER_TESTS], "others": ["tests", *(f"--ignore={folder}"
 ONLY = {("3.13", "blender"): "smoke or not any_blender", ("3.13", "others"): "smoke"}
 """Marker expressions by Python and part, where not all of a part's tests are run on that Python."""
 
-QUICK = "not slow and not fuzz"
+QUICK = "not slow and not fuzz and not cluster"
 """Marker expression of the tests of `make test`."""
 
 nox.needs_version = ">=2026.10"

@@ -27,6 +27,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     where.add_argument(
         "--scheduler", metavar="ADDRESS", help="Dask scheduler whose workers make them (none), tcp://HOST:PORT"
     )
+    parser.add_argument(
+        "--worker-timeout", type=float, metavar="S", help="seconds that a scheduler may be without any worker (1800)"
+    )
     parser.add_argument("--resume", action="store_true", help="continue what was begun in this folder")
     parser.add_argument("--overwrite", action="store_true", help="replace the data set that is there")
     parser.add_argument(
@@ -45,6 +48,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
         return _verify(arguments.output)
     if arguments.jobs is not None and not 1 <= arguments.jobs <= 1024:
         raise InputError("--jobs", arguments.jobs, "must be 1 to 1024")
+    if arguments.worker_timeout is not None and not (arguments.scheduler and 1.0 <= arguments.worker_timeout < 1e9):
+        raise InputError("--worker-timeout", arguments.worker_timeout, "must be 1 s or more, and goes with --scheduler")
     recipe = _change_recipe(load_recipe(arguments.recipe), arguments.changes)
     detail("recipe", recipe.to_dict())
     from headless.dataset_run import DatasetRun, dask_workers, local_processes
@@ -52,7 +57,10 @@ def run(arguments: argparse.Namespace) -> Outcome:
     splits = frozenset(arguments.splits) if arguments.splits else None
     folder, progress = arguments.output.absolute(), progress_bar(arguments)
     work = DatasetRun(recipe, folder, arguments.resume, progress, splits, arguments.overwrite)
-    submit = dask_workers(arguments.scheduler) if arguments.scheduler else local_processes(arguments.jobs or 1)
+    if arguments.scheduler:
+        submit = dask_workers(arguments.scheduler, arguments.worker_timeout or 1800.0)
+    else:
+        submit = local_processes(arguments.jobs or 1)
     manifest = work.run(submit)
     failed = [scene for scene in manifest.scenes if scene.status == "failed"]
     return 3 if failed else 0, manifest.to_dict(), summary(manifest, arguments.output)

@@ -20,7 +20,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Event
-from typing import Any
+from typing import Any, Protocol, cast
 
 from headless.dataset_scene import DONE, FAILED, FILES
 from headless.messages import logger
@@ -52,15 +52,23 @@ from synthroads_addon.dataset.manifest import (
 from synthroads_addon.dataset.recipe import Recipe, SceneJob, scene_jobs
 
 WORK = ".work"
+TASK = "task.json"
 LOCK = ".lock"
 ATTEMPTS = 3
 """A scene whose process is killed (too little memory, a lost node) is tried this often."""
+MOST_WORKERS = 8
+"""Workers of a cluster that may end before a scene does, as their time is over, until it is given up."""
+_ATTEMPT = "attempt-"
 INTERRUPTED = 130
 """Exit code of a process that was told to end, as where a node is given back."""
 _ANSWER = 10.0
 """Seconds that a scheduler has for its answer."""
 _TICK = 0.1
 """Seconds between two looks at a process."""
+_LOOK = 2.0
+"""Seconds between two looks at who works on a cluster."""
+_SOON = 60.0
+"""Seconds without any worker after which it is said."""
 _MODULE = Path(__file__).with_name("dataset_scene.py")
 
 
@@ -77,38 +85,80 @@ class Outcome:
     error: str | None = None
 
 
+class Stop(Protocol):
+    """Says whether all is to stop, as `threading.Event` does."""
+
+    def is_set(self) -> bool:
+        """Return whether it is."""
+        ...
+
+    def wait(self, timeout: float) -> bool:
+        """Wait for so many seconds, or until it is; return whether it is."""
+        ...
+
+
+class WorkerClosing:
+    """Whether the Dask worker of this thread is about to close, as at the end of its wall time."""
+
+    def __init__(self) -> None:
+        from distributed import get_worker  # an optional package
+
+        self.worker = get_worker()
+
+    def is_set(self) -> bool:
+        """Return whether it is."""
+        return self.worker.status.name not in ("running", "paused")
+
+    def wait(self, timeout: float) -> bool:
+        """Wait for so many seconds; return whether it is."""
+        time.sleep(timeout)
+        return self.is_set()
+
+
 def run_on_worker(folder: str) -> Outcome:
-    """Run a task on a Dask worker, with its share of the cores."""
-    from distributed import get_worker
+    """Run a task on a Dask worker, with its share of the cores.
 
-    at_once = int(get_worker().state.nthreads)
-    return run_task(folder, max(1, available_cores() // at_once), Event())
+    Raises:
+        distributed.Reschedule: the worker closes; Dask has another one do it.
+    """
+    from distributed import Reschedule  # an optional package
+
+    closing = WorkerClosing()
+    outcome = run_task(folder, max(1, available_cores() // int(closing.worker.state.nthreads)), closing)
+    if not closing.is_set():
+        return outcome
+    if (begun := len(list(Path(folder).glob(f"{_ATTEMPT}*")))) < MOST_WORKERS:
+        raise Reschedule()
+    return Outcome(outcome.folder, f"its workers ended before it did, {begun} times: they need more time")
 
 
-def run_task(folder: str, threads: int, stopping: Event) -> Outcome:
-    """Run the process of a task that was written to a folder; it is ended when ``stopping`` is set."""
-    path = Path(folder)
-    outcome = Outcome(path, "was not tried")
+def run_task(folder: str, threads: int, stopping: Stop) -> Outcome:
+    """Run the process of a task that was written to a folder; it is ended when ``stopping`` is set.
+
+    Each attempt has a folder of its own: one on a lost node may still be writing while the next is at work.
+    """
+    outcome = Outcome(Path(folder), "was not tried")
     for _ in range(ATTEMPTS):
-        shutil.rmtree(path / FILES, ignore_errors=True)
-        code = _run_process(path, threads, stopping)
+        attempt = Path(tempfile.mkdtemp(prefix=_ATTEMPT, dir=folder))
+        shutil.copy(Path(folder) / TASK, attempt)
+        code = _run_process(attempt, threads, stopping)
         if stopping.is_set():
-            return Outcome(path, "was stopped")
-        if code == 0 and (path / DONE).is_file():
-            return Outcome(path)
-        if (path / FAILED).is_file():
-            return Outcome(path, str(json.loads((path / FAILED).read_text(encoding="utf-8"))["error"]))
-        outcome = Outcome(path, _reason(code, path / "log.txt"))
+            return Outcome(attempt, "was stopped")
+        if code == 0 and (attempt / DONE).is_file():
+            return Outcome(attempt)
+        if (attempt / FAILED).is_file():
+            return Outcome(attempt, str(json.loads((attempt / FAILED).read_text(encoding="utf-8"))["error"]))
+        outcome = Outcome(attempt, _reason(code, attempt / "log.txt"))
         if code > 0 and code != INTERRUPTED:  # a fault of its own: it would come again
             return outcome
     return outcome
 
 
-def _run_process(path: Path, threads: int, stopping: Event) -> int:
+def _run_process(path: Path, threads: int, stopping: Stop) -> int:
     """Run the process of the task in a folder to its end, or not at all if all is stopping; return its exit code."""
     if stopping.is_set():
         return 0
-    command = [sys.executable, str(_MODULE), str(path / "task.json"), str(threads)]
+    command = [sys.executable, str(_MODULE), str(path / TASK), str(threads)]
     with (
         (path / "log.txt").open("wb") as log,
         subprocess.Popen(command, stdin=subprocess.PIPE, stdout=log, stderr=log) as process,
@@ -245,7 +295,7 @@ class DatasetRun:
 
     def _published_folders(self) -> list[str]:
         """Return the folders of scenes that a run before published, or was about to, when it was killed."""
-        tasks = [json.loads(path.read_text(encoding="utf-8")) for path in (self.folder / WORK).glob(f"*/{DONE}")]
+        tasks = [json.loads(path.read_text(encoding="utf-8")) for path in (self.folder / WORK).glob(f"*/*/{DONE}")]
         return [name for task in tasks for name in task["folders"]]
 
     def _unknown(self, known: Set[str] = frozenset()) -> list[Path]:
@@ -274,12 +324,12 @@ class DatasetRun:
             "scenario": job.scenario.to_dict(),
             "recipe": self.recipe.to_dict(),
         }
-        (folder / "task.json").write_text(json.dumps(task), encoding="utf-8")
+        (folder / TASK).write_text(json.dumps(task), encoding="utf-8")
         return str(folder)
 
     def _take(self, outcome: Outcome) -> None:
         """Publish a scene that is complete, or note why there is none."""
-        task = json.loads((outcome.folder / "task.json").read_text(encoding="utf-8"))
+        task = json.loads((outcome.folder / TASK).read_text(encoding="utf-8"))
         job = self.jobs[task["number"]]
         about: dict[str, Any] = {"name": job.name, "split": job.split, "seed": job.scenario.seed}
         if outcome.error is None:
@@ -295,11 +345,14 @@ class DatasetRun:
             logger.debug("%s is done: %s points", job.name, f"{entry.points:,}")
         else:
             entry = SceneEntry.from_dict({**about, "status": "failed", "error": outcome.error}, "scene")
-            (outcome.folder / "log.txt").replace(self.folder / "logs" / f"{job.name}.txt")
+            with suppress(FileNotFoundError):  # of a lost worker there is none
+                (outcome.folder / "log.txt").replace(self.folder / "logs" / f"{job.name}.txt")
             logger.error("failed: %s: %s", job.name, outcome.error)
         append_record(self.folder, entry)
         self.entries[job.name] = entry
-        shutil.rmtree(outcome.folder, ignore_errors=True)  # until now `_published_folders` knows what is where
+        # Until now `_published_folders` knows what is where.
+        work = self.folder / WORK
+        shutil.rmtree(work / outcome.folder.relative_to(work).parts[0], ignore_errors=True)
 
     def _manifest(self) -> Manifest:
         """Return the manifest of the scenes that are done or failed so far, in the recipe's order."""
@@ -361,13 +414,18 @@ def local_processes(jobs: int) -> Submit:
     return submit
 
 
-def dask_workers(address: str) -> Submit:
+def dask_workers(address: str, patience: float = 1800.0) -> Submit:
     """Return what has the workers of a Dask cluster do it; they must see the same folder under the same name.
 
     The scheduler is called at once, before anything in the folder is touched.
 
+    Args:
+        address: the scheduler's.
+        patience: seconds without a single worker after which the work is given up; within them new ones may come.
+
     Raises:
-        InputError: nobody answers at the address, the packages are missing, or the scheduler is lost meanwhile.
+        InputError: nobody answers at the address, the packages are missing, the scheduler is lost meanwhile, or no
+            worker is there for too long.
     """
     try:
         import distributed
@@ -381,21 +439,69 @@ def dask_workers(address: str) -> Submit:
     def submit(folders: list[str]) -> Iterator[Outcome]:
         with client:
             futures = client.map(run_on_worker, folders, key=folders, retries=ATTEMPTS, pure=False)
-            yield from _results(client, futures, address)
+            for future in _ended(client, futures, Absence(address, patience)):
+                yield _outcome(future, address)
 
     return submit
 
 
-def _results(client: Any, futures: list[Any], address: str) -> Iterator[Outcome]:
-    from distributed import as_completed as completed
+def _ended(client: Any, futures: list[Any], absence: Absence) -> Iterator[Any]:
+    """Yield the futures as they end, while somebody works on them."""
+    from distributed import as_completed as completed  # an optional package
 
-    for future in completed(futures, loop=client.loop, raise_errors=False):
-        if future.status == "finished":
-            yield future.result()
-        elif future.status == "error":
-            yield Outcome(Path(future.key), f"its worker was lost ({future.exception()})")
-        else:
-            raise InputError("--scheduler", address, "was lost; --resume continues with what is done")
+    ending, looked = completed(futures, loop=client.loop, raise_errors=False), 0.0
+    while not ending.is_empty():
+        if ending.has_ready():
+            yield from ending.next_batch(block=False)
+            continue
+        time.sleep(_TICK)
+        if client.status == "running" and time.monotonic() - looked >= _LOOK:
+            looked = time.monotonic()
+            absence.look(len(client.scheduler_info(n_workers=-1)["workers"]), looked)
+
+
+def _outcome(future: Any, address: str) -> Outcome:
+    """Return how the task of a future ended."""
+    if future.status == "finished":
+        return cast(Outcome, future.result())
+    if future.status == "error":
+        return Outcome(Path(future.key), f"its worker was lost ({future.exception()})")
+    raise InputError("--scheduler", address, "was lost; --resume continues with what is done")
+
+
+class Absence:
+    """How long no worker has been there: said after a minute, and an error after too long.
+
+    Args:
+        address: the scheduler's.
+        patience: seconds after which it is an error.
+    """
+
+    def __init__(self, address: str, patience: float) -> None:
+        self._address, self._patience = address, patience
+        self._since: float | None = None
+        self._said = False
+
+    def look(self, workers: int, now: float) -> None:
+        """Take note of how many workers there are at a time (s).
+
+        Raises:
+            InputError: there has been none for too long.
+        """
+        if workers:
+            if self._said:
+                logger.warning("%s has workers again: %d", self._address, workers)
+            self._since, self._said = None, False
+            return
+        self._since = now if self._since is None else self._since
+        if now - self._since >= self._patience:
+            allowed = f"had no worker for {self._patience:g} s (--worker-timeout); --resume continues with what is done"
+            raise InputError("--scheduler", self._address, allowed)
+        if now - self._since >= min(_SOON, 0.5 * self._patience) and not self._said:
+            self._said = True
+            logger.warning(
+                "warning: %s has no worker; waiting for one, up to %g s in all", self._address, self._patience
+            )
 
 
 def _other_run(taken: TakenError, lock: Path) -> str:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import statistics
 import time
 from collections.abc import Callable, Iterator
@@ -45,7 +46,10 @@ def make(folder: Path, recipe: dict[str, Any], **options: Any) -> None:
 
 
 def small_scenes(folders: list[str]) -> Iterator[Outcome]:
-    for folder in map(Path, folders):
+    for task_folder in map(Path, folders):
+        folder = task_folder / "attempt-1"
+        folder.mkdir()
+        shutil.copy(task_folder / "task.json", folder)
         task = json.loads((folder / "task.json").read_text())
         name, files = task["name"], folder / FILES
         for path in (f"scenes/{name}/cloud.laz", f"pointcept/classes-5/train/{name}-n00e00/coord.npy"):

@@ -1,4 +1,4 @@
-"""Processes of a data set when the user interrupts at the worst moment."""
+"""Processes of a data set when the user interrupts at the worst moment, and when nobody works on it."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 
 from headless import dataset_run
-from headless.dataset_run import Outcome, local_processes
+from headless.dataset_run import TASK, Absence, Outcome, local_processes, run_task
+from synthroads_addon.base.errors import InputError
 
 
 class InterruptedPool:
@@ -52,4 +53,37 @@ def test_nothing_is_begun_that_would_be_stopped_at_once(monkeypatch: pytest.Monk
     monkeypatch.setattr(dataset_run.subprocess, "Popen", None)
     stopping = Event()
     stopping.set()
-    assert dataset_run.run_task(str(tmp_path), 1, stopping).error == "was stopped"
+    (tmp_path / TASK).write_text("{}")
+    assert run_task(str(tmp_path), 1, stopping).error == "was stopped"
+
+
+def test_each_attempt_has_a_folder_of_its_own(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A process that was given up may still be writing."""
+    seen: list[Path] = []
+
+    def killed_twice(path: Path, threads: int, stopping: Event) -> int:
+        assert (path / TASK).is_file()
+        seen.append(path)
+        return -9 if len(seen) < 3 else (path / dataset_run.DONE).write_text("{}") and 0
+
+    monkeypatch.setattr(dataset_run, "_run_process", killed_twice)
+    (tmp_path / TASK).write_text("{}")
+    assert run_task(str(tmp_path), 1, Event()) == Outcome(seen[2])
+    assert len({path for path in seen if path.parent == tmp_path}) == 3
+
+
+def test_absence_of_workers_is_said_after_a_minute_and_ended_in_the_end(caplog: pytest.LogCaptureFixture) -> None:
+    absence = Absence("tcp://here:1", 600.0)
+    for workers, now in ((1, 0.0), (0, 10.0), (0, 69.0)):
+        absence.look(workers, now)
+    assert not caplog.records
+    absence.look(0, 70.0)
+    absence.look(0, 300.0)
+    assert [record.getMessage() for record in caplog.records] == [
+        "warning: tcp://here:1 has no worker; waiting for one, up to 600 s in all"
+    ]
+    absence.look(2, 400.0)
+    assert caplog.records[-1].getMessage() == "tcp://here:1 has workers again: 2"
+    absence.look(0, 500.0)
+    with pytest.raises(InputError, match=r"had no worker for 600 s \(--worker-timeout\); --resume continues"):
+        absence.look(0, 1100.0)

@@ -40,6 +40,6 @@ def test_tests_mirror_the_tree() -> None:
     """Each folder of tests has the name of a folder of the source, but for those that are about all of it."""
     for folder in _folders("tests"):
         top, *rest = folder.split("/")[1:] or ["helpers"]
-        if top not in ("fuzz", "helpers", "judges", "packaging", "robustness"):
+        if top not in ("cluster", "fuzz", "helpers", "judges", "packaging", "robustness"):
             place = Path(top, *rest) if top in ("headless", "ml") else Path("synthroads_addon", top, *rest)
             assert (ROOT / place).is_dir(), folder
