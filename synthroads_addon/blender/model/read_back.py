@@ -15,21 +15,16 @@ from ...road.section import Carriageway, LineMarking, Pavement
 from ...road.section_geometry import CarriagewaySection
 from ...road.things.guardrail import Guardrail
 from ..compat import modifier_input
+from ..nodes.inputs import input_name
 from ..things.model_builder import named_fields
-from ..things.road.layout import input_name, strip_widths
+from ..things.road.layout import names_in_words, side_of, strip_widths, width_field
+from ..things.road.markings import LINE_FIELDS
+from .older_files import rename_inputs
 
 _ROLES = {"Terrain": "terrain"}
 """Roles of objects that are not the ids of what they show."""
 _BEAM_OF_SIDE = ("Left Beam", "Right Beam")
 _BEAMS = frozenset(_BEAM_OF_SIDE)
-_MARKING_FIELDS = {
-    "Width": "width",
-    "Dash": "dash_length",
-    "Gap": "gap_length",
-    "Start Station": "start_station",
-    "End Station": "end_station",
-    "Film Thickness": "film_thickness",
-}
 
 
 def edited_parameters(parameters: RoadParameters, objects: Mapping[str, bpy.types.Object]) -> RoadParameters:
@@ -44,6 +39,7 @@ def edited_parameters(parameters: RoadParameters, objects: Mapping[str, bpy.type
     Raises:
         InputError: a value is out of the limits of its field.
     """
+    rename_inputs(parameters, objects)
     changed: dict[str, RoadObject] = {}
     for role, item in objects.items():
         name = _ROLES.get(role, role)
@@ -70,10 +66,11 @@ def carried_inputs(parameters: RoadParameters, role: str, modifier: bpy.types.No
 def _road_inputs(parameters: RoadParameters) -> Iterator[str]:
     for carriageway in parameters.of_type(Carriageway).values():
         side = carriageway.side.title()
-        yield from (input_name(side, strip) for strip, _ in strip_widths(carriageway))
-        yield from (f"{side} Verge Slope", f"{side} Turns About Inner Edge")
-    for name in parameters.of_type(LineMarking):
-        yield from (f"{name} {label}" for label in _MARKING_FIELDS)
+        fields = [width_field(strip) for strip, _ in strip_widths(carriageway)]
+        yield from (input_name(field, side) for field in (*fields, "verge_slope", "turns_about_inner_edge"))
+    words = names_in_words(parameters)
+    for name, line in parameters.of_type(LineMarking).items():
+        yield from (input_name(field, f"{side_of(parameters, line)} {words[name]}") for field in LINE_FIELDS)
 
 
 def _number_fields(item: RoadObject, modifier: bpy.types.NodesModifier) -> dict[str, str]:
@@ -103,10 +100,11 @@ def _edited_road_objects(
         turnouts = [shape.turnout for shape in sections[carriageway.side].turnouts]
         pavement = _fit_damage(sections[carriageway.side], CarriagewaySection(edited, turnouts))
         yield name, edited.model_copy(update={"pavement": pavement})
+    words = names_in_words(parameters)
     for name, line in parameters.of_type(LineMarking).items():
+        before = f"{side_of(parameters, line)} {words[name]}"
         fields = {
-            field: _input_value(getattr(line, field), modifier, f"{name} {label}")
-            for label, field in _MARKING_FIELDS.items()
+            field: _input_value(getattr(line, field), modifier, input_name(field, before)) for field in LINE_FIELDS
         }
         yield name, line.model_copy(update=fields)
 
@@ -114,15 +112,15 @@ def _edited_road_objects(
 def _carriageway(carriageway: Carriageway, modifier: bpy.types.NodesModifier) -> Carriageway:
     side = carriageway.side.title()
     widths = {
-        strip: _scale_width(width, _input_value(nominal_width(width), modifier, input_name(side, strip)))
+        strip: _scale_width(width, _input_value(nominal_width(width), modifier, input_name(width_field(strip), side)))
         for strip, width in strip_widths(carriageway)
     }
     lanes = tuple(
         lane.model_copy(update={"width": widths[f"Lane {number}"]}) for number, lane in enumerate(carriageway.lanes, 1)
     )
     slope = carriageway.verge_slope_percent / 100.0
-    changed = _input_value(slope, modifier, f"{side} Verge Slope")
-    about_edge = modifier_input(modifier, f"{side} Turns About Inner Edge")
+    changed = _input_value(slope, modifier, input_name("verge_slope", side))
+    about_edge = modifier_input(modifier, input_name("turns_about_inner_edge", side))
     return carriageway.model_copy(
         update={
             "inner_offset": widths["Inner Offset"],

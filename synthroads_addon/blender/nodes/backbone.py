@@ -8,7 +8,8 @@ those of `things.road.layout.varying_widths`.
 from __future__ import annotations
 
 from . import operations as op
-from .builder import Operand, Value
+from .builder import Operand, Tree, Value, makes_group
+from .inputs import Inputs, socket
 
 FOLD_SHARE = 0.98
 """Share of the radius at which an offset curve is cut, as in `road.alignment.clip_offset`."""
@@ -52,21 +53,39 @@ def look_up(ribbon: Value, name: str, station: Value) -> Value:
 
 
 def height_on(road: Value, terrain: Value, place: Value) -> Value:
-    """Return the z of the surface above or below `place`: the road's, beside it the terrain's.
+    """Return the z of the surface above or below `place`, see `surface_height_group`."""
+    return place.tree.call(surface_height_group(), road=road, terrain=terrain, place=place).value
+
+
+class _Surfaces(Inputs):
+    road = socket("Geometry", "Surface of the road")
+    terrain = socket("Geometry", "Surface beside the road")
+    place = socket("Vector", "Place above or below it, which may be a field")
+
+
+@makes_group("SR Surface Height")
+def surface_height_group(tree: Tree) -> None:
+    """The z of the surface above or below a place: the road's, beside it the terrain's, the place's where is neither.
 
     On the very border of the road a vertical ray may pass by: there the nearest point of the road counts.
     """
-    tree = road.tree
-    above = place + (0.0, 0.0, 500.0)
+    surfaces = _Surfaces(tree)
+    place = surfaces.place
+    with tree.frame("Rays from above"):
+        above = place + (0.0, 0.0, 500.0)
 
-    def cast(target: Value) -> tuple[Value, Value]:
-        ray = tree.node("GeometryNodeRaycast", target_geometry=target, source_position=above, ray_length=1000.0)
-        return ray["Is Hit"], op.component(ray["Hit Position"], "Z")
+        def cast(target: Value) -> tuple[Value, Value]:
+            ray = tree.node("GeometryNodeRaycast", target_geometry=target, source_position=above, ray_length=1000.0)
+            return ray["Is Hit"], op.component(ray["Hit Position"], "Z")
 
-    on_road, road_z = cast(road)
-    on_terrain, terrain_z = cast(terrain)
-    nearest_z = op.component(op.sample_surface(road, op.position(tree), place), "Z")
-    return op.switch(on_road, op.switch(on_terrain, nearest_z, terrain_z), road_z)
+        on_road, road_z = cast(surfaces.road)
+        on_terrain, terrain_z = cast(surfaces.terrain)
+    with tree.frame("Nearest point of the road, if there is one"):
+        nearest_z = op.component(op.sample_surface(surfaces.road, op.position(tree), place), "Z")
+        nearest_z = op.switch(op.face_count(surfaces.road) > 0, op.component(place, "Z"), nearest_z)
+    with tree.frame("The first of them that there is"):
+        height = op.switch(on_road, op.switch(on_terrain, nearest_z, terrain_z), road_z)
+    tree.output("Height", height, description="z of the surface (m)")
 
 
 def first_station(backbone: Value) -> Value:

@@ -34,6 +34,10 @@ from .layout import arrange
 
 KEY = "synthroads_key"
 """Custom property of a group: hash of what it was built from."""
+MATERIALS = "synthroads_materials"
+"""Custom property of a group: entries of the material table by the names of the inputs that usually have them."""
+_TAGS = {"GEOMETRY": "GEOMETRY", "VECTOR": "VECTOR"}
+"""Colours of groups by the kind of their first output, as Blender gives them to its own nodes; else ``CONVERTER``."""
 
 
 def _calculation(operation: str, turned: bool = False) -> Callable[[Value, Operand], Value]:
@@ -151,10 +155,18 @@ class Node:
 
 
 class Tree:
-    """A node group under construction."""
+    """A node group under construction.
+
+    Attributes:
+        group: Blender's.
+        materials: the usual materials of inputs that have one, by the inputs' names.
+        makes: kind of its first output.
+    """
 
     def __init__(self, group: bpy.types.NodeTree) -> None:
         self.group = group
+        self.materials: dict[str, str] = {}
+        self.makes = ""
         self._frame: bpy.types.Node | None = None
         self._panel: Any = None
         self._inputs: dict[str, bpy.types.Node] = {}
@@ -187,21 +199,31 @@ class Tree:
         self._socket(name, f"NodeSocket{kind}", description)
         return GroupInput(self, name, kind.upper())
 
+    def material(self, name: str, usual: str = "", *, description: str) -> Value:
+        """Declare a material; `usual` is the entry of the material table that the model gives it if nothing else."""
+        if usual:
+            self.materials[name] = usual
+        return self.input(name, "Material", description=description)
+
     def output(self, name: str, value: Value, *, description: str = "") -> None:
         """Declare an output and link it."""
         kind = {"VALUE": "Float", "INT": "Int", "BOOLEAN": "Bool"}.get(value.kind, value.kind.title())
         socket = self.group.interface.new_socket(name, in_out="OUTPUT", socket_type=f"NodeSocket{kind}")
         socket.description = description
+        self.makes = self.makes or value.kind
         if self._output is None:
             self._output = self.group.nodes.new("NodeGroupOutput")
         self.group.links.new(value.source(), self._output.inputs[name])
 
     @contextmanager
     def panel(self, name: str) -> Iterator[None]:
-        """Put the inputs declared inside under one heading of the modifier."""
-        self._panel = self.group.interface.new_panel(name, default_closed=True)
+        """Put the inputs declared inside under one heading of the modifier, which may lie under another."""
+        interface, outer = self.group.interface, self._panel
+        self._panel = interface.new_panel(name, default_closed=True)
+        if outer is not None:
+            interface.move_to_parent(self._panel, outer, len(outer.interface_items))
         yield
-        self._panel = None
+        self._panel = outer
 
     def _socket(self, name: str, kind: str, description: str) -> Any:
         socket = self.group.interface.new_socket(name, in_out="INPUT", socket_type=kind, parent=self._panel)
@@ -277,6 +299,8 @@ class Tree:
             self.group.links.new(operand.source(), socket)
         elif socket.type == "VECTOR" and isinstance(operand, int | float):
             socket.default_value = (operand, operand, operand)
+        elif socket.type == "MENU" and isinstance(operand, str):  # a property of the node in older releases
+            socket.default_value = operand.replace("_", " ").title()
         else:
             socket.default_value = operand
 
@@ -319,25 +343,41 @@ def node_group(name: str, build: Callable[..., None], *arguments: object, descri
     for group in bpy.data.node_groups:
         if group.get(KEY) == key:
             return group
-    if old := bpy.data.node_groups.get(name):
+    if (old := bpy.data.node_groups.get(name)) and KEY in old:
         old.name = f"{name} (older)"
     group = bpy.data.node_groups.new(name, "GeometryNodeTree")
     group[KEY] = key
-    group.is_modifier = True
     group.description = description or (build.__doc__ or "").strip().partition("\n")[0]
-    build(Tree(group), *arguments)
+    tree = Tree(group)
+    build(tree, *arguments)
+    if tree.materials:
+        group[MATERIALS] = tree.materials
+    group.is_modifier = tree.makes == "GEOMETRY"
+    group.color_tag = _TAGS.get(tree.makes, "CONVERTER")
     arrange(group)
     return group
 
 
-def makes_group(name: str) -> Callable[[Callable[[Tree], None]], Callable[[], bpy.types.NodeTree]]:
-    """Turn a function that builds a node group into one that returns the node group `name`, see `node_group`."""
+Make = Callable[[], bpy.types.NodeTree]
+CATALOGUES: dict[str, dict[str, Make]] = {}
+"""What makes the groups that users can use by hand: by catalogue of the asset library, by name."""
 
-    def decorate(build: Callable[[Tree], None]) -> Callable[[], bpy.types.NodeTree]:
+
+def makes_group(name: str, catalogue: str = "") -> Callable[[Callable[[Tree], None]], Make]:
+    """Turn a function that builds a node group into one that returns the node group `name`, see `node_group`.
+
+    Args:
+        name: of the group.
+        catalogue: where users find it in the asset library; empty for one that only other groups use.
+    """
+
+    def decorate(build: Callable[[Tree], None]) -> Make:
         @wraps(build)
         def make() -> bpy.types.NodeTree:
             return node_group(name, build)
 
+        if catalogue:
+            CATALOGUES.setdefault(catalogue, {})[name] = make
         return make
 
     return decorate

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from . import operations as op
-from .backbone import height_on, look_up, raise_place, station_ribbon
+from .axis import AxisInputs
+from .backbone import height_on, last_station, look_up, raise_place, station_ribbon
 from .builder import Operand, Tree, Value, makes_group
 from .inputs import FAR, Inputs, backbone_socket, metres, socket
 
@@ -22,26 +23,27 @@ def foot_at(backbone: Value, surfaces: tuple[Value, Value], station: Value, offs
     return node["Foot"], node["Left"]
 
 
-class Lengthwise(Inputs):
+class Lengthwise(AxisInputs):
     """Inputs of a group that puts something along the road.
 
     Attributes:
-        backbone, road, terrain: objects that it follows and stands on.
+        road, terrain: objects that it stands on.
         start_station, end_station: where it begins and ends.
         offset: of its axis.
     """
 
-    backbone = backbone_socket("Object")
-    road = socket("Object", "Surface that it stands on")
+    road = socket("Object", "Surface that it stands on; else it is at the height of what it follows")
     terrain = socket("Object", "Surface beside the road")
     start_station = metres(0.0, (0.0, 1e6), "Beginning, terminal included")
-    end_station = metres(100.0, (0.0, 1e6), "End, terminal included")
-    offset = metres(0.0, (-100.0, 100.0), "Offset of its axis")
+    end_station = metres(0.0, (0.0, 1e6), "End, terminal included; 0 is the end of what it follows")
+    offset = metres(0.0, (-100.0, 100.0), "Offset of its axis, positive to the left")
 
     def geometry(self) -> tuple[Value, tuple[Value, Value]]:
-        """Return the geometry of the backbone, and that of road and terrain."""
-        with self.tree.frame("Geometry"):
-            axis = op.object_geometry(self.backbone)
+        """Return the geometry of the backbone, and that of road and terrain; from then on the end is given."""
+        with self.tree.frame("Geometry, and the end"):
+            axis = self.axis()
+            end = self.end_station
+            self.values["end_station"] = op.switch(end > 0.0, last_station(axis), end)
             return axis, (op.object_geometry(self.road), op.object_geometry(self.terrain))
 
 

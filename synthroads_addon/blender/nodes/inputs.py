@@ -1,11 +1,12 @@
 """Inputs of a node group as the fields of a class: each is named, limited and described in one place.
 
-A field's name is the input's: `post_spacing` is "Post Spacing" in Blender.
+A field's name is the input's: `post_spacing` is "Post Spacing" in Blender. Where a group has the same inputs several
+times, words before them tell them apart: "Left Lane Line 1 Width".
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import nullcontext
 from itertools import groupby
 from typing import Any
@@ -43,6 +44,8 @@ class Inputs:
 
     Args:
         tree: the group that they are declared for.
+        words: before the name of each.
+        heading: of those fields that have no panel of their own.
         defaults: default values in place of those of the fields.
 
     Attributes:
@@ -50,16 +53,18 @@ class Inputs:
         values: by field, as `Tree.call` takes them.
     """
 
-    def __init__(self, tree: Tree, **defaults: float) -> None:
+    def __init__(
+        self, tree: Tree, words: str = "", heading: str = "", defaults: Mapping[str, float] | None = None
+    ) -> None:
         self.tree = tree
         self.values: dict[str, Value] = {}
-        for panel, fields in groupby(self.fields(), lambda field: field.panel):
+        for panel, fields in groupby(self.fields(), lambda field: field.panel or heading):
             with tree.panel(panel) if panel else nullcontext():
                 for field in fields:
                     settings = dict(field.settings)
-                    if field.name in defaults:
+                    if defaults and field.name in defaults:
                         settings["default"] = defaults[field.name]
-                    self.values[field.name] = field.declare(tree, input_name(field.name), **settings)
+                    self.values[field.name] = field.declare(tree, input_name(field.name, words), **settings)
 
     @classmethod
     def fields(cls) -> Iterator[Input]:
@@ -68,9 +73,15 @@ class Inputs:
         yield from (item for item in fields.values() if isinstance(item, Input))
 
 
-def input_name(field: str) -> str:
-    """Return the name of the input that a field stands for."""
-    return field.rstrip("_").replace("_", " ").title()
+def inputs_class(name: str, fields: Mapping[str, Input]) -> type[Inputs]:
+    """Return a class of inputs whose fields are only known when a group is made."""
+    return type(name, (Inputs,), dict(fields))
+
+
+def input_name(field: str, words: str = "") -> str:
+    """Return the name of the input that a field stands for, after the words that tell it from others."""
+    name = field.rstrip("_").replace("_", " ").title()
+    return f"{words} {name}" if words else name
 
 
 def number(default: float, limits: tuple[float, float], description: str, *, unit: str = "", panel: str = "") -> Input:
@@ -103,9 +114,9 @@ def socket(kind: str, description: str, *, panel: str = "") -> Input:
     return Input(Tree.input, panel, kind=kind, description=description)
 
 
-def material_of(what: str, *, panel: str = "") -> Input:
-    """Return the field of a part's material."""
-    return socket("Material", f"Material of {what}", panel=panel)
+def material_of(what: str, usual: str = "", *, panel: str = "") -> Input:
+    """Return the field of a part's material, see `Tree.material`."""
+    return Input(Tree.material, panel, usual=usual, description=f"Material of {what}")
 
 
 def instance_number() -> Input:
@@ -115,4 +126,4 @@ def instance_number() -> Input:
 
 def backbone_socket(kind: str = "Geometry") -> Input:
     """Return the field of the backbone, as geometry or as an object."""
-    return socket(kind, "Polyline along the axis with its attributes")
+    return socket(kind, "Backbone of a road, or any curve")

@@ -121,6 +121,11 @@ def point_count(geometry: Value) -> Value:
     return geometry.tree.node("GeometryNodeAttributeDomainSize", geometry, component="MESH")["Point Count"]
 
 
+def face_count(geometry: Value) -> Value:
+    """Return the number of faces of a mesh."""
+    return geometry.tree.node("GeometryNodeAttributeDomainSize", geometry, component="MESH")["Face Count"]
+
+
 def sample_index(geometry: Value, value: Value, index: Operand) -> Value:
     """Return `value`, evaluated on the points of another geometry, at `index`."""
     kind = _DATA_TYPES[value.kind]

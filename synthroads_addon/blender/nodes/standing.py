@@ -20,7 +20,7 @@ class OnSurface(Inputs):
     """
 
     points = socket("Geometry", "Places; heading (rad) and elevation (m) as attributes")
-    road = socket("Object", "Surface that it stands on")
+    road = socket("Object", "Surface that it stands on; else it is at the height of the points")
     terrain = socket("Object", "Surface beside the road")
 
     def places(self) -> Value:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from . import operations as op
+from .axis import rows_along
 from .backbone import limit_offset, row
 from .builder import Tree, makes_group
 from .inputs import (
@@ -26,28 +27,34 @@ CLOSED = 1e-4
 """Where a strip is narrower than this (m) it has no faces."""
 
 
-class _Strip(Inputs):
-    backbone = backbone_socket()
-    left_offset = metres(1.0, FAR, "Offset of the left edge, positive to the left")
-    right_offset = metres(-1.0, FAR, "Offset of the right edge")
-    left_height = metres(0.0, FAR, "Left edge above the axis, per row")
-    right_height = metres(0.0, FAR, "Right edge above the axis, per row")
+class StripFaces(Inputs):
+    """Inputs of a strip that don't say where it lies."""
+
     class_ = integer(0, (0, 255), "Semantic class of the faces")
     instance = instance_number()
     material = material_of("the faces")
     detail = socket("Geometry", _DETAIL)
 
 
-@makes_group("SR Strip")
+class _Strip(Inputs):
+    backbone = backbone_socket()
+    left_offset = metres(1.0, FAR, "Offset of the left edge, positive to the left")
+    right_offset = metres(-1.0, FAR, "Offset of the right edge")
+    left_height = metres(0.0, FAR, "Left edge above the axis, per row")
+    right_height = metres(0.0, FAR, "Right edge above the axis, per row")
+
+
+@makes_group("SR Strip", catalogue="Road")
 def strip_group(tree: Tree) -> None:
     """A ribbon along a backbone between two offsets, each at its own height above the axis.
 
     Offsets and heights may be fields on the backbone's points.
     """
-    strip = _Strip(tree)
-    backbone, detail = strip.backbone, strip.detail
+    strip, faces = _Strip(tree), StripFaces(tree)
+    detail = faces.detail
 
     with tree.frame("Columns, one row per point of the backbone"):
+        backbone = rows_along(strip.backbone)
         rows, detailed = op.point_count(backbone), op.point_count(detail)
         mesh, column, number = op.grid(tree, op.switch(detailed > 0, 2, detailed // rows), rows)
         point = column * rows + number
@@ -73,7 +80,7 @@ def strip_group(tree: Tree) -> None:
         mesh = op.store(op.store(mesh, "offset", offset), "row", number)
         mesh = op.store(mesh, "strip_width", left - right)
         mesh = op.store(mesh, "station", op.sample_index(backbone, op.named_attribute(tree, "station"), number))
-        mesh = op.label(op.set_position(mesh, place), strip.class_, strip.instance, strip.material)
+        mesh = op.label(op.set_position(mesh, place), faces.class_, faces.instance, faces.material)
         # Of faces that narrow, rounding would decide which way they look.
         mesh = op.delete_faces(op.delete_degenerate(mesh), op.named_attribute(tree, "strip_width") < CLOSED)
     tree.output("Mesh", mesh, description="Ribbon whose faces look up")

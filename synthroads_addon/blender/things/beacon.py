@@ -23,7 +23,6 @@ _HEXADECAGON = 16
 
 class _BeaconInputs(OnSurface):
     points = socket("Geometry", "One point per beacon, at any height; pass_side +1 is left")
-    road = socket("Object", "Surface that the beacons stand on")
     red_material = material_of("the red stripes")
     white_material = material_of("the white stripes")
     rubber_material = material_of("the foot")

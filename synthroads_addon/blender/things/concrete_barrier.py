@@ -8,7 +8,7 @@ from ..nodes import operations as op
 from ..nodes.backbone import first_station, last_station
 from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.foot import Lengthwise, foot_at
-from ..nodes.inputs import boolean, instance_number, material_of, metres, socket
+from ..nodes.inputs import boolean, instance_number, material_of, metres
 from ..nodes.solids import loft, row_of_points
 from .model_builder import ModelBuilder
 
@@ -23,7 +23,6 @@ def _outline(profile: str) -> list[tuple[float, float, float]]:
 
 
 class _Barrier(Lengthwise):
-    road = socket("Object", "Surface that the barrier stands on")
     new_jersey = boolean(False, "New Jersey profile, else the step profile")
     height = metres(0.9, (0.4, 2.0), "Top above the surface")
     base_width = metres(0.54, (0.3, 1.2), "Width of its foot")

@@ -28,7 +28,6 @@ _UNDER, _PROUD = 0.001, 0.004
 
 class _Delineator(OnSurface):
     points = socket("Geometry", "One point per post, at any height")
-    road = socket("Object", "Surface that the posts stand on")
     white_material = material_of("this part")
     black_material = material_of("this part")
     reflector_material = material_of("this part")

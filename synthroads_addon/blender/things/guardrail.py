@@ -16,7 +16,7 @@ from ..nodes import operations as op
 from ..nodes.backbone import first_station, height_on, last_station, look_up, raise_place, station_ribbon
 from ..nodes.builder import Operand, Tree, Value, makes_group
 from ..nodes.foot import Lengthwise
-from ..nodes.inputs import boolean, instance_number, material_of, metres, socket
+from ..nodes.inputs import boolean, instance_number, material_of, metres
 from ..nodes.solids import row_of_points
 from .model_builder import ModelBuilder
 
@@ -37,7 +37,6 @@ BURIED = 0.35
 class _Rail(Lengthwise):
     """The group's inputs, and where the rail's foot and top are at any station."""
 
-    road = socket("Object", "Surface that the guardrail stands on")
     offset = metres(0.0, (-100.0, 100.0), "Offset of the posts' axis")
     left_beam = boolean(True, "A beam on the left of the posts")
     right_beam = boolean(True, "A beam on the right of the posts")

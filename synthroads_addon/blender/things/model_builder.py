@@ -18,6 +18,7 @@ from ...road.stretches import cut_stretch, frame_of
 from ...road.tessellation import sample_stations
 from ..compat import set_modifier_input
 from ..materials import material
+from ..nodes.builder import MATERIALS
 from ..nodes.inputs import input_name
 from .meshes import on_plan, points_mesh, signed_instance
 
@@ -152,7 +153,7 @@ class ModelBuilder:
             mesh: of the object; one without anything if None.
             group: of its modifier.
             inputs: the modifier's, by name; materials by their names in the table. Those that are named as objects of
-                the model (``Road``, ``Terrain``) need not be among them.
+                the model (``Road``, ``Terrain``) need not be among them, nor materials that the group usually has.
             support: only other objects need it.
         """
         mesh = mesh or bpy.data.meshes.new("SR")
@@ -172,7 +173,8 @@ class ModelBuilder:
                 for name, kind in kinds.items()
                 if kind == "NodeSocketObject" and name in self.objects
             }
-            for name, value in {**objects, **(inputs or {})}.items():
+            usual = dict(group.get(MATERIALS, {}))
+            for name, value in {**usual, **objects, **(inputs or {})}.items():
                 set_modifier_input(modifier, name, _to_input(name, kinds.get(name, ""), value))
         self._added(role, item)
 

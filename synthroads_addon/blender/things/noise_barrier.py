@@ -12,7 +12,7 @@ from ..nodes import operations as op
 from ..nodes.backbone import first_station, last_station
 from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.foot import Lengthwise, foot_at
-from ..nodes.inputs import Inputs, instance_number, integer, material_of, metres, socket
+from ..nodes.inputs import Inputs, instance_number, integer, material_of, metres
 from ..nodes.solids import box, paint_faces, prism, put_on_points, row_of_points
 from .model_builder import ModelBuilder
 
@@ -65,9 +65,8 @@ _RELIEFS = {
 
 
 class _Wall(Lengthwise):
-    road = socket("Object", "Surface that the wall stands on")
     start_station = metres(0.0, (0.0, 1e6), "First post")
-    end_station = metres(100.0, (0.0, 1e6), "Last post")
+    end_station = metres(0.0, (0.0, 1e6), "Last post; 0 is at the end of what it follows")
     offset = metres(0.0, (-100.0, 100.0), "Offset of the panels' middle")
     height = metres(4.0, (1.0, 12.0), "Top of the posts above the surface")
     panel = integer(0, (0, 3), "Kind of the panels: 0 aluminium, 1 concrete, 2 wood, 3 glass")

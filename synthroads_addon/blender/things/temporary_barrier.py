@@ -9,7 +9,7 @@ from ..nodes import operations as op
 from ..nodes.backbone import first_station, last_station
 from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.foot import Lengthwise, foot_at
-from ..nodes.inputs import boolean, instance_number, material_of, metres, socket
+from ..nodes.inputs import boolean, instance_number, material_of, metres
 from ..nodes.solids import box, loft, paint_faces, put_on_points, row_of_points
 from .model_builder import ModelBuilder
 
@@ -18,9 +18,8 @@ _REFLECTOR = (0.12, 0.02, 0.06)
 
 
 class _TemporaryBarrier(Lengthwise):
-    road = socket("Object", "Surface that the elements stand on")
     start_station = metres(0.0, (0.0, 1e6), "Beginning of the first element")
-    end_station = metres(100.0, (0.0, 1e6), "End of the last element")
+    end_station = metres(0.0, (0.0, 1e6), "End of the last element; 0 is that of what it follows")
     offset = metres(0.0, (-100.0, 100.0), "Offset of its axis at the beginning")
     end_offset = metres(0.0, (-100.0, 100.0), "Offset of its axis at the end")
     height = metres(0.55, (0.2, 1.2), "Top above the surface")

@@ -9,12 +9,15 @@ from functools import lru_cache
 from typing import Any
 
 import bpy
+from bpy.app.handlers import persistent
 
 from ...base.errors import InputError
 from ...blender.compat import shown_input
+from ...blender.model.older_files import rename_inputs
 from ...blender.model.read_back import carried_inputs
 from ...blender.model.store import PARAMETERS, find_road, objects_of, recall_parameters
 from ...blender.things.model_builder import ROLE, SUPPORT
+from ...blender.things.road.road import MARKINGS
 from ...road.parameters import RoadParameters
 from ...road.surroundings import Vegetation
 from ..fields.fields import value_row
@@ -22,7 +25,6 @@ from ..fields.wording import title_case
 from ..work.common import Sidebar, column
 
 _NOTHING = ("NOTHING", "Choose a Part", "Choose a part here, or click it in the view", "RESTRICT_SELECT_OFF", 0)
-_MARKING = "Marking "
 Section = tuple[str, list[tuple[str, str]]]
 """A part's inputs under one heading: their names as shown, and identifiers."""
 
@@ -54,8 +56,8 @@ def _parameters(text: str) -> RoadParameters | None:
         return None
 
 
-def sections(parameters: RoadParameters, item: bpy.types.Object) -> Iterator[Section]:
-    """Yield what can be edited of a part, by the headings that its node group has."""
+def sections(parameters: RoadParameters, item: bpy.types.Object, within: str = "") -> Iterator[Section]:
+    """Yield what can be edited of a part, by the headings that its node group has: all, or those `within` another."""
     modifier = _modifier(item)
     if modifier is None:
         return
@@ -64,14 +66,17 @@ def sections(parameters: RoadParameters, item: bpy.types.Object) -> Iterator[Sec
     for socket in modifier.node_group.interface.items_tree:
         if socket.item_type == "SOCKET" and socket.in_out == "INPUT" and socket.name in carried:
             heading = socket.parent.name
-            by_heading.setdefault(heading, []).append((_without_heading(socket.name, heading), socket.identifier))
+            if not within or (heading and socket.parent.parent.name == within):
+                by_heading.setdefault(heading, []).append((_without_heading(socket.name, heading), socket.identifier))
     yield from by_heading.items()
 
 
 def _without_heading(name: str, heading: str) -> str:
-    """Return an input's name without what its heading says already."""
-    of = heading.removeprefix(_MARKING) if heading.startswith(_MARKING) else heading.partition(" ")[0]
-    return name.removeprefix(f"{of} ") if of else name
+    """Return an input's name without what its heading says already: all of it, or the side."""
+    for known in (heading, heading.partition(" ")[0]):
+        if known and name.startswith(f"{known} "):
+            return name.removeprefix(f"{known} ")
+    return name
 
 
 def _modifier(item: bpy.types.Object) -> bpy.types.NodesModifier | None:
@@ -176,21 +181,21 @@ class SYNTHROADS_PT_edit(Sidebar, bpy.types.Panel):
             layout.operator(SYNTHROADS_OT_show_plants.bl_idname, text=text, icon=icon)
         parameters, item = open_parameters(context.scene), context.view_layer.objects.active
         if parameters and item and ROLE in item:
-            _draw_part(layout, item, list(sections(parameters, item)))
+            _draw_part(layout, parameters, item)
 
 
-def _draw_part(layout: bpy.types.UILayout, item: bpy.types.Object, found: list[Section]) -> None:
+def _draw_part(layout: bpy.types.UILayout, parameters: RoadParameters, item: bpy.types.Object) -> None:
     """Draw a part's inputs, each heading to be opened; the many of lines within one more."""
-    markings = [(heading, inputs) for heading, inputs in found if heading.startswith(_MARKING)]
-    for heading, inputs in found:
+    lines = list(sections(parameters, item, MARKINGS))
+    for heading, inputs in sections(parameters, item):
         if not heading:
             _draw_inputs(layout, item, inputs)
-        elif not heading.startswith(_MARKING):
+        elif (heading, inputs) not in lines:
             _draw_section(layout, item, heading, inputs)
-    if markings:
+    if lines:
         header, body = layout.panel("synthroads_edit_markings", default_closed=True)
-        header.label(text="Markings")
-        for heading, inputs in markings if body else ():
+        header.label(text=MARKINGS)
+        for heading, inputs in lines if body else ():
             _draw_section(body, item, heading, inputs)
 
 
@@ -198,7 +203,7 @@ def _draw_section(
     layout: bpy.types.UILayout, item: bpy.types.Object, heading: str, inputs: list[tuple[str, str]]
 ) -> None:
     header, body = layout.panel(f"synthroads_edit_{heading}", default_closed=True)
-    header.label(text=part_name(heading.removeprefix(_MARKING)))
+    header.label(text=heading)
     if body:
         _draw_inputs(body, item, inputs)
 
@@ -211,4 +216,14 @@ def _draw_inputs(layout: bpy.types.UILayout, item: bpy.types.Object, inputs: lis
         value_row(layout, name).prop(data, prop, text="")
 
 
+@persistent
+def _name_in_words(*_: Any) -> None:
+    """Have the inputs of roads in a file that was opened or appended named as this version names them."""
+    for scene in bpy.data.scenes:
+        road, parameters = find_road(scene), open_parameters(scene)
+        if road and parameters:
+            rename_inputs(parameters, objects_of(road))
+
+
+HANDLERS = dict.fromkeys(("load_post", "blend_import_post"), _name_in_words)
 ATTACHED = (bpy.types.WindowManager, "synthroads_edit", SYNTHROADS_PG_edit)

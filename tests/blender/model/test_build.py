@@ -19,6 +19,7 @@ from synthroads_addon.base.classes import class_id
 from synthroads_addon.blender.compat import modifier_input, set_modifier_input
 from synthroads_addon.blender.model.build import COLLECTION, RoadModel, build_road, remove_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
+from synthroads_addon.blender.things.road.layout import names_in_words, side_of
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.section import Carriageway, LineMarking
@@ -219,8 +220,9 @@ class TestMarkings:
     def test_a_changed_dash_is_exact_without_python(self) -> None:
         road = built(demo_parameters(), TOLERANCE, {"road"})
         name, line = next((n, m) for n, m in road.parameters.of_type(LineMarking).items() if m.dash_length)
-        for key, value in {"Dash": 4.3, "Gap": 7.9, "Start Station": 3.1}.items():
-            set_modifier_input(road.modifier("Road"), f"{name} {key}", value)
+        words = f"{side_of(road.parameters, line)} {names_in_words(road.parameters)[name]}"
+        for key, value in {"Dash Length": 4.3, "Gap Length": 7.9, "Start Station": 3.1}.items():
+            set_modifier_input(road.modifier("Road"), f"{words} {key}", value)
         mesh = road.mesh("Road")
         station, _ = road.located(mesh.vertices[np.unique(mesh.triangles[mesh.instance_id == line.instance])])
         changed = line.model_copy(update={"dash_length": 4.3, "gap_length": 7.9, "start_station": 3.1})

@@ -17,6 +17,7 @@ from synthroads_addon.blender.compat import modifier_input, set_modifier_input
 from synthroads_addon.blender.model.build import RoadModel, build_road
 from synthroads_addon.blender.model.read_back import edited_parameters
 from synthroads_addon.blender.scene.evaluated import scene_mesh
+from synthroads_addon.blender.things.road.layout import names_in_words, side_of
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.guidelines import SECTIONS_OF_CLASS
 from synthroads_addon.road.parameters import RoadParameters
@@ -221,8 +222,9 @@ class TestEdits:
 
     def test_a_marking_s_edit_is_exported(self) -> None:
         parameters = sample_road(everything("EKA1A", "RQ36", 600.0), 2)
-        line = next(name for name, item in parameters.of_type(LineMarking).items() if item.dash_length == 6.0)
-        _, now = self.edited("Road", f"{line} Dash", 4.5, ("road",))
+        line, item = next(pair for pair in parameters.of_type(LineMarking).items() if pair[1].dash_length == 6.0)
+        words = f"{side_of(parameters, item)} {names_in_words(parameters)[line]}"
+        _, now = self.edited("Road", f"{words} Dash Length", 4.5, ("road",))
         assert now.objects[line].dash_length == 4.5  # type: ignore[union-attr]
 
     def test_post_spacing_and_batter_slope_are_exported(self) -> None:

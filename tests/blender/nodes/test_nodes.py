@@ -21,8 +21,9 @@ from synthroads_addon.blender.nodes import operations as op
 from synthroads_addon.blender.nodes.builder import Tree, Value, node_group
 from synthroads_addon.blender.nodes.strip import strip_group
 from synthroads_addon.blender.things.guardrail import guardrail_group
-from synthroads_addon.blender.things.road.carriageway import carriageway_marking_group, height_group
+from synthroads_addon.blender.things.road.carriageway import height_group
 from synthroads_addon.blender.things.road.layout import MarkingLayout, SideLayout
+from synthroads_addon.blender.things.road.markings import carriageway_marking_group
 from synthroads_addon.blender.things.road.road import road_group
 from synthroads_addon.blender.things.vehicle.vehicle import vehicle_group
 from synthroads_addon.road.things.vehicles import CHASSIS
@@ -30,13 +31,17 @@ from tests.helpers.scenes.described_group import describe
 from tests.helpers.scenes.kept_groups import KeptGroups
 
 LAYOUT = (
-    SideLayout("Left", 3, (MarkingLayout("outer", "outer_edge", 0), MarkingLayout("dashes", "lane", 1))),
+    SideLayout("Left", 3, (MarkingLayout("Outer Edge Line", "outer_edge", 0), MarkingLayout("Lane Line", "lane", 1))),
     SideLayout(
         "Right",
         2,
-        (MarkingLayout("inner", "inner_edge", 2), MarkingLayout("gore", "gore_edge"), MarkingLayout("free", "free")),
+        (
+            MarkingLayout("Inner Edge Line", "inner_edge", 2),
+            MarkingLayout("Gore Edge Line", "gore_edge"),
+            MarkingLayout("Free Line", "free", varies=True),
+        ),
         varying=("Hard Shoulder", "Lane 1"),
-        turnouts=("exit",),
+        turnouts=("Exit",),
         detailed=("Lane 2",),
     ),
 )
@@ -231,7 +236,9 @@ class TestGroups:
     def test_groups_are_valid(self) -> None:
         for group in all_groups():
             assert all(link.is_valid for link in group.links), group.name
-            assert group.is_modifier
+            makes = next(item for item in group.interface.items_tree if item.in_out == "OUTPUT").socket_type
+            assert group.is_modifier == (makes == "NodeSocketGeometry"), group.name
+            assert group.color_tag != "NONE", group.name
 
     @pytest.mark.parametrize("make", [strip_group, height_group, carriageway_marking_group])
     def test_a_group_is_as_its_snapshot(self, make: Callable[[], bpy.types.NodeTree]) -> None:
@@ -246,9 +253,11 @@ class TestGroups:
         assert {f"Left Lane {n} Width" for n in (1, 2, 3)} | {f"Right Lane {n} Width" for n in (1, 2)} <= names
         assert "Right Lane 3 Width" not in names
         assert {
-            "outer Width",
-            "dashes Gap",
-            "inner Film Thickness",
+            "Left Outer Edge Line Width",
+            "Left Lane Line Gap Length",
+            "Right Inner Edge Line Film Thickness",
+            "Right Free Line Distance",
+            "Right Exit Start Station",
             "Median Instance",
             "Left Verge Slope",
         } <= names

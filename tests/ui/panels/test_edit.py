@@ -14,6 +14,7 @@ from synthroads_addon.blender.compat import modifier_input, set_modifier_input, 
 from synthroads_addon.blender.model.read_back import edited_parameters
 from synthroads_addon.blender.model.store import find_road, objects_of, recall_parameters
 from synthroads_addon.blender.scene.evaluated import scene_mesh
+from synthroads_addon.blender.things.road.layout import names_in_words, side_of
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.section import LineMarking
 from synthroads_addon.scanning.scene.mesh import SceneMesh
@@ -98,7 +99,7 @@ def test_every_input_that_is_shown_is_carried_back() -> None:
             for name, identifier in inputs:
                 data, prop = shown_input(edit._modifier(item), identifier)
                 before = data[prop[2:-2]] if prop.startswith("[") else getattr(data, prop)
-                if name in ("Dash", "Gap") and before == 0.0:
+                if name in ("Dash Length", "Gap Length") and before == 0.0:
                     continue  # a solid line takes both or none: `test_a_solid_line_can_be_dashed`
                 change(item, identifier, (not before) if isinstance(before, bool) else before * 1.01 + 0.001)
                 assert now() != parameters, f"{item.name}: {heading} {name}"
@@ -118,12 +119,13 @@ def change(item: bpy.types.Object, identifier: str, value: Any) -> None:
 def test_a_solid_line_can_be_dashed() -> None:
     parameters, modifier = now(), bpy.data.objects["Road"].modifiers[0]
     name = next(n for n, line in parameters.of_type(LineMarking).items() if line.dash_length == 0.0)
-    for label, value in (("Dash", 4.0), ("Gap", 8.0)):
-        set_modifier_input(modifier, f"{name} {label}", value)
+    words = f"{side_of(parameters, parameters.objects[name])} {names_in_words(parameters)[name]}"
+    for label, value in (("Dash Length", 4.0), ("Gap Length", 8.0)):
+        set_modifier_input(modifier, f"{words} {label}", value)
     line = now().objects[name]
     assert (line.dash_length, line.gap_length) == (4.0, 8.0)
-    for label in ("Dash", "Gap"):
-        set_modifier_input(modifier, f"{name} {label}", 0.0)
+    for label in ("Dash Length", "Gap Length"):
+        set_modifier_input(modifier, f"{words} {label}", 0.0)
     assert now() == parameters
 
 

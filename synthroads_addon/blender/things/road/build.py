@@ -7,18 +7,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....base.stepper import run_aside
-from ....road.geometry import RoadGeometry
+from ....road.geometry import RoadGeometry, sections_of
+from ....road.objects import nominal_width
+from ....road.parameters import RoadParameters
+from ....road.section import Carriageway, LineMarking, Median
+from ...nodes.inputs import input_name
 from ..meshes import attribute, fill
 from ..model_builder import ModelBuilder
-from .layout import detail_points, road_inputs, road_layout, varying_widths
+from .layout import detail_points, names_in_words, road_layout, side_of, strip_widths, varying_widths, width_field
+from .markings import LINE_FIELDS
 from .road import road_group
 
-_MATERIALS = {
-    "Marking Material": "paint_white",
-    "Yellow Marking Material": "paint_yellow",
-    "Verge Material": "verge",
-    "Median Material": "median",
-}
+Float = NDArray[np.float64]
 
 
 def build_surface(builder: ModelBuilder) -> None:
@@ -27,7 +27,7 @@ def build_surface(builder: ModelBuilder) -> None:
     backbone = backbone_mesh(builder.geometry, station, builder.origin, builder.zero)
     builder.add("Backbone", backbone, support=True)
     materials = {
-        f"{side.title()} Pavement Material": section.carriageway.pavement.kind
+        input_name("pavement_material", side.title()): section.carriageway.pavement.kind
         for side, section in builder.geometry.sections.items()
     }
     details = run_aside(lambda: detail_points(builder.geometry, station, builder.tolerance))
@@ -37,11 +37,49 @@ def build_surface(builder: ModelBuilder) -> None:
         attribute(mesh, "share", share)
         attribute(mesh, "depth", depth)
         builder.add(f"{name} Detail", mesh, support=True)
-    inputs = {**_MATERIALS, **materials, **road_inputs(builder.parameters, builder.zero)}
+    inputs = {**materials, **_road_inputs(builder.parameters, builder.zero)}
     builder.add("Road", None, road_group(road_layout(builder.parameters)), inputs)
 
 
-Float = NDArray[np.float64]
+def _road_inputs(parameters: RoadParameters, zero: float = 0.0) -> dict[str, float | int | bool]:
+    """Return the values of the group's inputs, without objects and materials.
+
+    Args:
+        parameters: the road, or what of it is on a stretch.
+        zero: station that the nodes count theirs from, m.
+    """
+    inputs: dict[str, float | int | bool] = {}
+    words = names_in_words(parameters)
+
+    def give(before: str, **values: float) -> None:
+        inputs.update({input_name(field, before): value for field, value in values.items()})
+
+    for carriageway in parameters.of_type(Carriageway).values():
+        side = carriageway.side.title()
+        give(side, **{width_field(strip): nominal_width(width) for strip, width in strip_widths(carriageway)})
+        give(
+            side,
+            verge_slope=carriageway.verge_slope_percent / 100.0,
+            turns_about_inner_edge=carriageway.rotation_axis == "inner_edge",
+            instance=carriageway.instance,
+        )
+    for median in parameters.of_type(Median).values():
+        if len(parameters.of_type(Carriageway)) == 2:
+            give("Median", instance=median.instance)
+    for section in sections_of(parameters).values():
+        for shape in section.turnouts:
+            name = next(key for key, item in parameters.objects.items() if item is shape.turnout)
+            low, high = shape.range()
+            place = f"{side_of(parameters, shape.turnout)} {words[name]}"
+            give(place, start_station=low - zero, end_station=high - zero, instance=shape.turnout.instance)
+    for name, line in parameters.of_type(LineMarking).items():
+        place = f"{side_of(parameters, line)} {words[name]}"
+        values = {field: getattr(line, field) for field in LINE_FIELDS}
+        stations = {"start_station": line.start_station - zero, "end_station": line.end_station - zero}
+        give(place, **values | stations, instance=line.instance)
+        if line.kind == "free":
+            give(place, distance=nominal_width(line.offset))
+    return inputs
 
 
 def backbone_mesh(geometry: RoadGeometry, station: Float, origin: Float, zero: float = 0.0) -> bpy.types.Mesh:

@@ -1,29 +1,57 @@
-"""SR Carriageway Height, SR Carriageway Marking: what lies at a distance from the axis on a carriageway."""
+"""SR Carriageway: pavement and verge of one side from their widths, and the heights of what lies on it."""
 
 from __future__ import annotations
 
+import bpy
+
+from ....base.classes import class_id
 from ...nodes import operations as op
-from ...nodes.builder import Tree, makes_group
-from ...nodes.inputs import Inputs, metres, number
-from .line import MarkingInputs, marking_group
+from ...nodes.axis import rows_along
+from ...nodes.builder import Operand, Tree, Value, makes_group, node_group
+from ...nodes.inputs import (
+    Input,
+    Inputs,
+    backbone_socket,
+    boolean,
+    inputs_class,
+    instance_number,
+    material_of,
+    metres,
+    number,
+    socket,
+)
+from ...nodes.strip import StripFaces, strip_group
+from .layout import TURNOUT_NAMES, detail_field, strips_of, width_field
+
+_FAR = (0.0, 1000.0)
+_UNPAVED = ("Verge", "Island")
+_WIDTHS = {"Inner Edge Strip": 0.5, "Outer Edge Strip": 0.5, "Hard Shoulder": 2.5, "Verge": 1.5}
+_LANE = 3.5
+_CROSSFALL = "Fall of the pavement to the right (m/m), which may be a field"
 
 
-class _Section(Inputs):
-    side = number(1.0, (-1.0, 1.0), "+1 for the left, -1 for the right carriageway")
-    distance = metres(5.0, (0.0, 1000.0), "Distance from the axis")
-    paved_edge = metres(14.0, (0.0, 1000.0), "Where the verge begins")
-    pivot = metres(8.0, (0.0, 1000.0), "Line that keeps the axis's height")
-    crossfall = number(0.025, (-0.12, 0.12), "Positive where the surface falls to the right (m/m), per row")
-    verge_slope = number(0.08, (0.0, 0.15), "Fall of the verge outwards (m/m)")
+class Section(Inputs):
+    """Inputs that are the same all over a carriageway."""
+
+    left_side = boolean(False, "On the left of the axis, else on its right")
+    paved_edge = metres(14.0, _FAR, "Distance of the axis from where the verge begins")
+    pivot = metres(8.0, _FAR, "Distance of the axis from the line that keeps its height")
+    crossfall = number(0.025, (-0.12, 0.12), _CROSSFALL)
+    verge_slope = number(0.08, (0.0, 0.15), "Fall of the verge away from the pavement (m/m)")
+
+
+class _Distance(Inputs):
+    distance = metres(5.0, _FAR, "Distance from the axis")
 
 
 @makes_group("SR Carriageway Height")
 def height_group(tree: Tree) -> None:
     """Offset and height above the axis of a line at a distance from it."""
-    section = _Section(tree)
-    side, distance, paved = section.side, section.distance, section.paved_edge
+    section, distance = Section(tree), _Distance(tree).distance
+    paved = section.paved_edge
     with tree.frame("The pavement turns about the pivot, the verge falls away"):
         # A surface that falls to the right rises with the offset, and the offset is side * distance.
+        side = op.switch(section.left_side, -1.0, 1.0)
         rise = section.crossfall * side
         beyond = op.maximum(distance - paved, 0.0)
         height = rise * (op.minimum(distance, paved) - section.pivot) - beyond * section.verge_slope
@@ -31,26 +59,138 @@ def height_group(tree: Tree) -> None:
     tree.output("Offset", distance * side, description="Offset, positive to the left (m)")
 
 
-@makes_group("SR Carriageway Marking")
-def carriageway_marking_group(tree: Tree) -> None:
-    """A line marking centred on a line at a distance from the axis."""
-    backbone = tree.input("Backbone", "Geometry", description="Polyline along the axis with its attributes")
-    section = _Section(tree)
-    width = tree.number("Width", 0.15, (0.05, 1.0), unit="m", description="Width of the line")
-    marking = MarkingInputs(tree)
-    with tree.frame("Both edges of the line"):
-        half = width * (section.side * 0.5)
-        # Left is outwards on the left carriageway and inwards on the right one.
-        left = tree.call(height_group(), **section.values | {"distance": section.distance + half})
-        right = tree.call(height_group(), **section.values | {"distance": section.distance - half})
-    with tree.frame("Line"):
+class _CarriagewayStrip(Inputs):
+    backbone = backbone_socket()
+    inner_distance = metres(5.0, _FAR, "Distance of its inner edge from the axis")
+    outer_distance = metres(9.0, _FAR, "Distance of its outer edge from the axis")
+
+
+@makes_group("SR Carriageway Strip")
+def carriageway_strip_group(tree: Tree) -> None:
+    """A strip of a carriageway between two distances from the axis, which may be fields on the backbone's points."""
+    strip, section, faces = _CarriagewayStrip(tree), Section(tree), StripFaces(tree)
+    with tree.frame("Both edges: outwards is to the left on the left side"):
+        inner, outer = strip.inner_distance, strip.outer_distance
+        left = tree.call(height_group(), **section.values, distance=op.switch(section.left_side, inner, outer))
+        right = tree.call(height_group(), **section.values, distance=op.switch(section.left_side, outer, inner))
+    with tree.frame("Strip"):
         mesh = tree.call(
-            marking_group(),
-            backbone=backbone,
+            strip_group(),
+            backbone=strip.backbone,
             left_offset=left["Offset"],
             right_offset=right["Offset"],
             left_height=left["Height"],
             right_height=right["Height"],
-            **marking.values,
+            **faces.values,
         ).value
-    tree.output("Mesh", mesh, description="Dashes whose faces look up")
+    tree.output("Mesh", mesh, description="Ribbon whose faces look up")
+
+
+def carriageway_group(lanes: int, turnouts: bool = False) -> bpy.types.NodeTree:
+    """Return the group SR Carriageway of so many lanes, with the strips that turnouts make if it has any."""
+    name = f"SR Carriageway {lanes} Lane{'s' if lanes > 1 else ''}{' and Turnouts' if turnouts else ''}"
+    description = "Pavement and verge of one side, live from their widths, which may be fields on the backbone's points"
+    return node_group(name, _build, lanes, turnouts, description=description)
+
+
+def width_fields(lanes: int, turnouts: bool = False, varying: tuple[str, ...] = ()) -> dict[str, Input]:
+    """Return the inputs that say how wide a carriageway is; of those that vary the description says so."""
+    inner = "Distance of the inner paved edge from the axis"
+    about = {"Inner Offset": inner} | {strip: f"Width of the {strip.lower()}" for strip in strips_of(lanes, turnouts)}
+    about["Lane 1"] += "; 1 is the outermost lane"
+    about |= {strip: f"{about[strip]}; the backbone says where there is less of it" for strip in varying}
+    sizes = {strip: (_WIDTHS.get(strip, _LANE), 6.0) for strip in about}
+    sizes |= {"Inner Offset": (2.0, 50.0), **dict.fromkeys(TURNOUT_NAMES, (0.0, 50.0))}
+    return {width_field(strip): metres(sizes[strip][0], (0.0, sizes[strip][1]), text) for strip, text in about.items()}
+
+
+class SideInputs(Inputs):
+    """Inputs of a carriageway beside its widths."""
+
+    verge_slope = number(0.08, (0.0, 0.15), "Fall of the verge away from the pavement (m/m)")
+    turns_about_inner_edge = boolean(
+        False, "The inner edge keeps the axis's height while the crossfall changes, else the middle of the pavement"
+    )
+    instance = instance_number()
+    pavement_material = material_of("the pavement", "asphalt")
+
+
+class _Place(Inputs):
+    backbone = backbone_socket()
+    left_side = boolean(False, "On the left of the axis, else on its right")
+    crossfall = number(0.025, (-0.12, 0.12), _CROSSFALL)
+
+
+class _Turnouts(Inputs):
+    whole_hard_shoulder_width = metres(2.5, (0.0, 6.0), "Width that the hard shoulder has where there is no turnout")
+    verge_extra_width = metres(0.0, (0.0, 50.0), "Width that the verge has in addition behind a ramp")
+    turnout_instance = instance_number()
+
+
+def _build(tree: Tree, lanes: int, turnouts: bool) -> None:
+    place = _Place(tree)
+    widths = inputs_class("Widths", width_fields(lanes, turnouts))(tree)
+    side = SideInputs(tree)
+    verge = tree.material("Verge Material", "verge", description="Material of the verge")
+    more = _Turnouts(tree) if turnouts else None
+    strips = strips_of(lanes, turnouts)
+    about = "Points that make the {} finer, see SR Strip"
+    fields = {detail_field(strip): socket("Geometry", about.format(strip.lower())) for strip in strips[:-1]}
+    with tree.panel("Detail"):
+        details = inputs_class("Details", fields)(tree)
+    with tree.frame("Boundaries: distances from the axis"):
+        backbone = rows_along(place.backbone)
+        distances, plane, pivot = _boundaries(strips, widths, side, more)
+    section: dict[str, Operand] = {"left_side": place.left_side, "crossfall": place.crossfall}
+    section |= {"paved_edge": plane, "pivot": pivot, "verge_slope": side.verge_slope}
+    with tree.frame("Pavement and verge"):
+        parts = []
+        for number_, strip in enumerate(strips):
+            paved = strip not in _UNPAVED
+            mesh = tree.call(
+                carriageway_strip_group(),
+                backbone=backbone,
+                inner_distance=distances[number_],
+                outer_distance=distances[number_ + 1],
+                **section,
+                class_=class_id("road" if paved else "roadside"),
+                instance=more.turnout_instance if more and strip in TURNOUT_NAMES else side.instance,
+                material=side.pavement_material if paved else verge,
+                **{"detail": details.values[detail_field(strip)]} if strip != "Verge" else {},
+            ).value
+            parts.append(mesh)
+        at_row = op.sample_index(backbone, distances[-1], op.named_attribute(tree, "row", "INT"))
+        beyond = op.unary("ABSOLUTE", op.named_attribute(tree, "offset")) - at_row
+        parts[-1] = op.store(parts[-1], "distance", beyond)
+        mesh = op.join(*parts)
+    with tree.frame("Inner and outer edge"):
+        edges = [tree.call(height_group(), **section, distance=distances[end]) for end in (0, -1)]
+    tree.output("Mesh", mesh, description="Pavement and verge; every face has class_id and instance_id")
+    for number_, distance in enumerate(distances):
+        text = "Distance of a boundary from the axis, per row; counted from the median (m)"
+        tree.output(f"Boundary {number_}", distance, description=text)
+    tree.output("Paved Edge", plane, description="Where the pavement's plane ends, per row (m)")
+    tree.output("Pivot", pivot, description="Line that keeps the axis's height, per row (m)")
+    for name, edge in zip(("Inner", "Outer"), edges, strict=True):
+        tree.output(f"{name} Edge Offset", edge["Offset"], description=f"{name} edge, to the left, per row (m)")
+        tree.output(f"{name} Edge Height", edge["Height"], description=f"{name} edge above the axis, per row (m)")
+
+
+def _boundaries(
+    strips: list[str], widths: Inputs, side: SideInputs, turnouts: _Turnouts | None
+) -> tuple[list[Value], Value, Value]:
+    """Return the boundaries' distances from the axis, innermost first; where the plane ends, and its pivot."""
+    inner = main = widths.values["inner_offset"]
+    distances = [inner]
+    for strip in strips:
+        width = widths.values[width_field(strip)]
+        if turnouts and strip == "Verge":
+            width = width + turnouts.verge_extra_width
+        distances.append(distances[-1] + width)
+        if turnouts and strip not in ("Verge", *TURNOUT_NAMES):
+            # Beside turnouts, too, the crossfall turns about the middle of the whole main road.
+            main = main + (turnouts.whole_hard_shoulder_width if strip == "Hard Shoulder" else width)
+    plane = distances[-2]
+    main = main if turnouts else plane
+    plane = plane + turnouts.verge_extra_width if turnouts else plane
+    return distances, plane, op.switch(side.turns_about_inner_edge, (inner + main) * 0.5, inner)

@@ -12,7 +12,7 @@ from ....road.damage import damage_columns, damage_depth, damaged_strips
 from ....road.geometry import RoadGeometry, sections_of
 from ....road.objects import AnyWidth, nominal_width, width_at
 from ....road.parameters import RoadParameters
-from ....road.section import Carriageway, LineMarking, Median, Turnout
+from ....road.section import Carriageway, LineMarking, Turnout
 from ....road.section_geometry import CarriagewaySection
 from ....road.stretches import BEYOND
 from ....road.turnout_geometry import TURNOUT_STRIPS
@@ -23,9 +23,29 @@ TURNOUT_NAMES = tuple(kind.replace("_", " ").title() for kind in TURNOUT_STRIPS)
 """Strips that turnouts make, from the hard shoulder outwards, as the inputs and attributes name them."""
 
 
+def strips_of(lanes: int, turnouts: bool) -> list[str]:
+    """Return the names of a carriageway's strips, from the median outwards."""
+    numbers = [f"Lane {number}" for number in range(lanes, 0, -1)]
+    return ["Inner Edge Strip", *numbers, "Outer Edge Strip", "Hard Shoulder", *TURNOUT_NAMES * turnouts, "Verge"]
+
+
+def width_field(strip: str) -> str:
+    """Return the field of a strip's width, or of the inner offset."""
+    return strip.lower().replace(" ", "_") + ("" if strip == "Inner Offset" else "_width")
+
+
+def detail_field(strip: str) -> str:
+    """Return the field of the points that make a strip finer."""
+    return f"{strip.lower().replace(' ', '_')}_detail"
+
+
 @dataclass(frozen=True)
 class MarkingLayout:
-    """Properties of a line marking that its nodes depend on."""
+    """Properties of a line marking that its nodes depend on.
+
+    Attributes:
+        name: what its inputs call it, without the side: ``Lane Line 1``.
+    """
 
     name: str
     kind: str
@@ -43,7 +63,7 @@ class SideLayout:
         lanes: number of lanes.
         markings: its line markings.
         varying: names of the strips (and ``Inner Offset``) whose widths change along the road.
-        turnouts: ids of its turnouts.
+        turnouts: what the inputs call its turnouts, without the side: ``Exit 1``.
         detailed: names of the strips with damage.
     """
 
@@ -55,17 +75,17 @@ class SideLayout:
     detailed: tuple[str, ...] = ()
 
     @property
-    def sign(self) -> float:
-        """Return the sign of the side's offsets."""
-        return 1.0 if self.side == "Left" else -1.0
+    def left(self) -> bool:
+        """Return whether it is the left one."""
+        return self.side == "Left"
 
 
 def road_layout(parameters: RoadParameters) -> tuple[SideLayout, ...]:
     """Return what the group's nodes depend on, left side first."""
-    sides, sections = [], sections_of(parameters)
+    sides, sections, words = [], sections_of(parameters), names_in_words(parameters)
     for name, carriageway in sorted(parameters.of_type(Carriageway).items(), key=lambda item: -item[1].sign):
         lines = [(key, line) for key, line in parameters.of_type(LineMarking).items() if line.carriageway == name]
-        turnouts = tuple(key for key, item in parameters.of_type(Turnout).items() if item.carriageway == name)
+        turnouts = tuple(words[key] for key, item in parameters.of_type(Turnout).items() if item.carriageway == name)
         section = sections[carriageway.side]
         varying = {key for key, width in strip_widths(carriageway) if isinstance(width, tuple)}
         if turnouts:
@@ -75,7 +95,7 @@ def road_layout(parameters: RoadParameters) -> tuple[SideLayout, ...]:
                 carriageway.side.title(),
                 len(carriageway.lanes),
                 tuple(
-                    MarkingLayout(key, m.kind, m.boundary, isinstance(m.offset, tuple), m.color == "yellow")
+                    MarkingLayout(words[key], m.kind, m.boundary, isinstance(m.offset, tuple), m.color == "yellow")
                     for key, m in lines
                 ),
                 tuple(sorted(varying)),
@@ -84,6 +104,41 @@ def road_layout(parameters: RoadParameters) -> tuple[SideLayout, ...]:
             )
         )
     return tuple(sides)
+
+
+_LINES = {
+    "outer_edge": "Outer Edge Line",
+    "inner_edge": "Inner Edge Line",
+    "lane": "Lane Line",
+    "block": "Block Line",
+    "turnout_edge": "Turnout Edge Line",
+    "gore_edge": "Gore Edge Line",
+    "free": "Free Line",
+}
+_TURNOUTS = {"emergency_bay": "Emergency Bay", "exit": "Exit", "entry": "Entry"}
+
+
+def names_in_words(parameters: RoadParameters) -> dict[str, str]:
+    """Return what the inputs call a road's lines and turnouts, by id: ``Lane Line 1``, after the side's name.
+
+    They are counted in their order where a side has several of a kind.
+    """
+    kinds = {key: (item.carriageway, _TURNOUTS[item.kind]) for key, item in parameters.of_type(Turnout).items()}
+    for key, line in parameters.of_type(LineMarking).items():
+        temporary = "Temporary " if line.color == "yellow" else ""
+        kinds[key] = (line.carriageway, temporary + _LINES[line.kind])
+    of_kind: dict[tuple[str, str], list[str]] = {}
+    for key, kind in kinds.items():
+        of_kind.setdefault(kind, []).append(key)
+    numbered = {key: number for keys in of_kind.values() if len(keys) > 1 for number, key in enumerate(keys, 1)}
+    return {key: f"{kind} {numbered[key]}" if key in numbered else kind for key, (_, kind) in kinds.items()}
+
+
+def side_of(parameters: RoadParameters, item: LineMarking | Turnout) -> str:
+    """Return the side that a line or a turnout lies on, as the inputs name it."""
+    carriageway = parameters.objects[item.carriageway]
+    assert isinstance(carriageway, Carriageway)
+    return carriageway.side.title()
 
 
 def strip_widths(carriageway: Carriageway) -> Iterator[tuple[str, AnyWidth]]:
@@ -97,57 +152,9 @@ def strip_widths(carriageway: Carriageway) -> Iterator[tuple[str, AnyWidth]]:
     yield "Verge", carriageway.verge_width
 
 
-def input_name(side: str, strip: str) -> str:
-    """Return the name of the input that holds a strip's width."""
-    return f"{side} Inner Offset" if strip == "Inner Offset" else f"{side} {strip} Width"
-
-
 def attribute_name(side: str, strip: str) -> str:
     """Return the name of the backbone's attribute that a strip's width changes with."""
     return f"{side}_{strip}".lower().replace(" ", "_")
-
-
-def road_inputs(parameters: RoadParameters, zero: float = 0.0) -> dict[str, float | int | bool]:
-    """Return the values of the group's inputs, without objects and materials.
-
-    Args:
-        parameters: the road, or what of it is on a stretch.
-        zero: station that the nodes count theirs from, m.
-    """
-    inputs: dict[str, float | int | bool] = {}
-    for carriageway in parameters.of_type(Carriageway).values():
-        side = carriageway.side.title()
-        inputs |= {input_name(side, strip): nominal_width(width) for strip, width in strip_widths(carriageway)}
-        inputs[f"{side} Verge Slope"] = carriageway.verge_slope_percent / 100.0
-        inputs[f"{side} Turns About Inner Edge"] = carriageway.rotation_axis == "inner_edge"
-        inputs[f"{side} Instance"] = carriageway.instance
-    for median in parameters.of_type(Median).values():
-        if len(parameters.of_type(Carriageway)) == 2:
-            inputs["Median Instance"] = median.instance
-    for section in sections_of(parameters).values():
-        for shape in section.turnouts:
-            name = next(key for key, item in parameters.objects.items() if item is shape.turnout)
-            low, high = shape.range()
-            inputs |= {f"{name} Start Station": low - zero, f"{name} End Station": high - zero}
-            inputs[f"{name} Instance"] = shape.turnout.instance
-    for name, line in parameters.of_type(LineMarking).items():
-        inputs |= _marking_inputs(name, line, zero)
-    return inputs
-
-
-def _marking_inputs(name: str, line: LineMarking, zero: float) -> dict[str, float | int | bool]:
-    inputs: dict[str, float | int | bool] = {
-        f"{name} Width": line.width,
-        f"{name} Dash": line.dash_length,
-        f"{name} Gap": line.gap_length,
-        f"{name} Start Station": line.start_station - zero,
-        f"{name} End Station": line.end_station - zero,
-        f"{name} Film Thickness": line.film_thickness,
-        f"{name} Instance": line.instance,
-    }
-    if line.kind == "free":
-        inputs[f"{name} Distance"] = nominal_width(line.offset)
-    return inputs
 
 
 def varying_widths(geometry: RoadGeometry, station: Float) -> dict[str, Float]:
@@ -157,17 +164,19 @@ def varying_widths(geometry: RoadGeometry, station: Float) -> dict[str, Float]:
     ``..._main``, the share without them. Turnouts' strips have their widths, and the verge its ``..._extra``.
     """
     values: dict[str, Float] = {}
-    for layout in road_layout(geometry.parameters):
+    road, words = geometry.parameters, names_in_words(geometry.parameters)
+    lines = {(side_of(road, line), words[key]): line for key, line in road.of_type(LineMarking).items()}
+    for layout in road_layout(road):
         section = geometry.sections["left" if layout.side == "Left" else "right"]
         for strip, width in strip_widths(section.carriageway):
             if strip in layout.varying:
                 share = width_at(width, station) / max(nominal_width(width), 1e-9)
                 values[attribute_name(layout.side, strip)] = share
         for marking in layout.markings:
-            line = geometry.parameters.objects[marking.name]
-            if marking.varies and isinstance(line, LineMarking):
+            line = lines[layout.side, marking.name]
+            if marking.varies:
                 share = width_at(line.offset, station) / max(nominal_width(line.offset), 1e-9)
-                values[attribute_name("marking", marking.name)] = share
+                values[attribute_name(layout.side, marking.name)] = share
         if layout.turnouts:
             values |= _turnout_widths(layout.side, section, station)
     return values

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from ....base.classes import class_id
 from ...nodes import operations as op
+from ...nodes.axis import rows_along
 from ...nodes.backbone import last_station, look_up, station_ribbon
 from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import FAR, Inputs, backbone_socket, instance_number, integer, material_of, metres
@@ -14,17 +16,22 @@ SNAP = 1e-3
 """End of a dash this near (m) to a row of the backbone: it is that row."""
 
 
-class MarkingInputs(Inputs):
+class Dashes(Inputs):
     """Inputs of a line that don't say where it lies across the road."""
 
+    dash_length = metres(6.0, (0.0, 100.0), "Length of a dash; 0 for a solid line")
+    gap_length = metres(12.0, (0.0, 100.0), "Length of a gap")
     start_station = metres(0.0, (0.0, 1e6), "Beginning of the first dash")
     end_station = metres(1e6, (0.0, 1e6), "End of the line")
-    dash = metres(6.0, (0.0, 100.0), "Length of a dash; 0 for a solid line")
-    gap = metres(12.0, (0.0, 100.0), "Length of a gap")
-    film_thickness = metres(0.003, (0.0, 0.01), "Height above the pavement")
-    class_ = integer(2, (0, 255), "Semantic class of the faces")
+    film_thickness = metres(0.003, (0.0005, 0.006), "Height above the pavement")
     instance = instance_number()
-    material = material_of("the faces")
+
+
+class LinePaint(Inputs):
+    """Inputs of a line that say what it is made of."""
+
+    class_ = integer(class_id("road_marking"), (0, 255), "Semantic class of the faces")
+    material = material_of("the line", "paint_white")
 
 
 class _EdgeInputs(Inputs):
@@ -35,20 +42,21 @@ class _EdgeInputs(Inputs):
     right_height = metres(0.0, FAR, "Pavement at the right edge")
 
 
-@makes_group("SR Line Marking")
+@makes_group("SR Line Marking", catalogue="Road")
 def marking_group(tree: Tree) -> None:
     """A line between two offsets, dashed or solid, raised above the pavement by its film.
 
     Offsets and heights may be fields on the backbone's points.
     """
-    edges, line = _EdgeInputs(tree), MarkingInputs(tree)
-    backbone, first, film = edges.backbone, line.start_station, line.film_thickness
+    edges, line, paint = _EdgeInputs(tree), Dashes(tree), LinePaint(tree)
+    first, film = line.start_station, line.film_thickness
 
     with tree.frame("Dashes: a solid line is one dash"):
+        backbone = rows_along(edges.backbone)
         end = op.minimum(line.end_station, last_station(backbone))
-        dashed = line.dash > 0.0
-        length = op.switch(dashed, end - first, line.dash)
-        period = op.switch(dashed, (end - first) * 2.0, line.dash + line.gap)
+        dashed = line.dash_length > 0.0
+        length = op.switch(dashed, end - first, line.dash_length)
+        period = op.switch(dashed, (end - first) * 2.0, line.dash_length + line.gap_length)
         count = op.round_up(op.maximum((end - first) / period - 1e-6, 0.0))
     with tree.frame("Edges as attributes of the rows"):
         across = (edges.left_offset, edges.right_offset, edges.left_height, edges.right_height)
@@ -63,9 +71,8 @@ def marking_group(tree: Tree) -> None:
             right_offset=op.named_attribute(tree, "edge_right"),
             left_height=op.named_attribute(tree, "edge_left_height") + film,
             right_height=op.named_attribute(tree, "edge_right_height") + film,
-            class_=line.class_,
             instance=line.instance,
-            material=line.material,
+            **paint.values,
         ).value
         station = op.named_attribute(tree, "station")
         painted = (station > first) & (station < end) & ((station - first) % period < length)

@@ -1,92 +1,124 @@
-"""SR Left Markings, SR Right Markings: the line markings of one side, each on its boundary."""
+"""SR Carriageway Marking: a line at a distance from the axis; SR Markings: all lines of one side."""
 
 from __future__ import annotations
 
 import bpy
 
-from ....base.classes import class_id
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
-from .carriageway import carriageway_marking_group
-from .layout import MarkingLayout, SideLayout, attribute_name
-from .side import declare_instance, section_inputs, strips_of
+from ...nodes.builder import Tree, Value, makes_group, node_group
+from ...nodes.inputs import Inputs, backbone_socket, inputs_class, metres
+from .carriageway import Section, height_group
+from .layout import MarkingLayout, strips_of
+from .line import Dashes, LinePaint, marking_group
 
 _OUTWARDS = {"outer_edge": 0.5, "block": 0.5, "turnout_edge": 0.5, "inner_edge": -0.5, "gore_edge": -0.5}
 """Kind of line -> share of its width by which its middle lies outside of its boundary."""
 _FAR = (0.0, 1000.0)
 
 
-def markings_group(layout: SideLayout) -> bpy.types.NodeTree:
-    """Return the group SR Left Markings or SR Right Markings for these lines."""
-    return node_group(
-        f"SR {layout.side} Markings",
-        _build,
-        layout,
-        description="Line markings of one side, each on its boundary",
-    )
+class _Width(Inputs):
+    width = metres(0.15, (0.05, 1.0), "Width of the line")
 
 
-def declare_marking(tree: Tree, marking: MarkingLayout) -> dict[str, Value]:
-    """Declare the inputs of a line, by their names."""
-    values: dict[str, Value] = {}
-
-    def metres(name: str, default: float, limits: tuple[float, float], about: str) -> None:
-        label = f"{marking.name} {name}"
-        values[label] = tree.number(label, default, limits, unit="m", description=about)
-
-    if marking.kind == "free":
-        metres("Distance", 0.0, (0.0, 50.0), "Distance of the line's middle from the axis")
-    metres("Width", 0.15, (0.05, 1.0), "Width of the line")
-    metres("Dash", 0.0, (0.0, 100.0), "Length of a dash; 0 if solid")
-    metres("Gap", 0.0, (0.0, 100.0), "Length of a gap")
-    metres("Start Station", 0.0, (0.0, 1e6), "Beginning")
-    metres("End Station", 1e6, (0.0, 1e6), "End of the line")
-    metres("Film Thickness", 0.003, (0.0005, 0.006), "Height above the pavement")
-    values[f"{marking.name} Instance"] = declare_instance(tree, f"{marking.name} Instance")
-    return values
+class LineInputs(Dashes, _Width):
+    """Inputs of a line whose middle is given."""
 
 
-def _build(tree: Tree, layout: SideLayout) -> None:
-    backbone = tree.input("Backbone", "Geometry", description="Polyline along the axis with its attributes")
+LINE_FIELDS = tuple(field.name for field in LineInputs.fields() if field.name != "instance")
+"""Those that stand for fields of `LineMarking`."""
+
+
+class Distance(Inputs):
+    """Where a line lies."""
+
+    distance = metres(5.0, _FAR, "Distance of the line's middle from the axis, which may be a field")
+
+
+class _Backbone(Inputs):
+    backbone = backbone_socket()
+
+
+@makes_group("SR Carriageway Marking", catalogue="Road")
+def carriageway_marking_group(tree: Tree) -> None:
+    """A line marking centred on a line at a distance from the axis."""
+    backbone, middle, line = _Backbone(tree).backbone, Distance(tree).distance, LineInputs(tree)
+    paint, section = LinePaint(tree), Section(tree)
+    with tree.frame("Both edges of the line"):
+        half = line.width * (op.switch(section.left_side, -1.0, 1.0) * 0.5)
+        # Left is outwards on the left carriageway and inwards on the right one.
+        left = tree.call(height_group(), **section.values, distance=middle + half)
+        right = tree.call(height_group(), **section.values, distance=middle - half)
+    with tree.frame("Line"):
+        values = {name: value for name, value in line.values.items() if name != "width"}
+        mesh = tree.call(
+            marking_group(),
+            backbone=backbone,
+            left_offset=left["Offset"],
+            right_offset=right["Offset"],
+            left_height=left["Height"],
+            right_height=right["Height"],
+            **values,
+            **paint.values,
+        ).value
+    tree.output("Mesh", mesh, description="Dashes whose faces look up")
+
+
+def markings_group(lanes: int, turnouts: bool, lines: tuple[MarkingLayout, ...]) -> bpy.types.NodeTree:
+    """Return the group SR Markings for these lines of a carriageway."""
+    description = "Line markings of one side, each on its boundary"
+    return node_group("SR Markings", _build, lanes, turnouts, lines, description=description)
+
+
+def declare_line(tree: Tree, line: MarkingLayout, words: str) -> dict[str, Value]:
+    """Declare the inputs of a line under a heading of its own; return them by field."""
+    kind = LineOnItsOwn if line.kind == "free" else LineInputs
+    return kind(tree, words, words, {"dash_length": 0.0, "gap_length": 0.0}).values
+
+
+class LineOnItsOwn(LineInputs, Distance):
+    """Inputs of a line that follows no boundary."""
+
+
+def _build(tree: Tree, lanes: int, turnouts: bool, lines: tuple[MarkingLayout, ...]) -> None:
+    backbone = _Backbone(tree).backbone
+    section = Section(tree)
     about = "Distance of a boundary from the axis, counted from the median"
-    distances = [
-        tree.number(f"Distance {i}", 0.0, _FAR, unit="m", description=about) for i in range(len(strips_of(layout)) + 1)
-    ]
-    plane = tree.number("Plane Edge", 14.0, _FAR, unit="m", description="Where the pavement's plane ends")
-    pivot = tree.number("Pivot", 8.0, _FAR, unit="m", description="Line that keeps the axis's height")
-    slope = tree.number("Verge Slope", 0.08, (0.0, 0.15), description="Fall of the verge outwards (m/m)")
-    white = tree.input("Material", "Material", description="Material of the lines")
-    yellow = tree.input("Yellow Material", "Material", description="Material of temporary lines")
-    inputs = {marking.name: declare_marking(tree, marking) for marking in layout.markings}
-    lines = []
+    strips = strips_of(lanes, turnouts)
+    boundaries = inputs_class(
+        "Boundaries", {f"boundary_{number}": metres(0.0, _FAR, about) for number in range(len(strips) + 1)}
+    )(tree)
+    white = tree.material("Material", "paint_white", description="Material of the lines")
+    yellow = tree.material("Yellow Material", "paint_yellow", description="Material of temporary lines")
+    inputs = [declare_line(tree, line, line.name) for line in lines]
+    parts = []
     with tree.frame("Lines"):
-        section = section_inputs(tree, layout, plane, pivot, slope)
-        for marking in layout.markings:
-            values = {name.removeprefix(f"{marking.name} "): value for name, value in inputs[marking.name].items()}
-            values["Distance"] = _middle(tree, layout, marking, distances, values)
-            lines.append(tree.call(
+        for line, values in zip(lines, inputs, strict=True):
+            boundary = boundaries.values.get(f"boundary_{_boundary(line, lanes, strips)}")
+            values |= {"distance": _middle(line, values, boundary)}
+            parts.append(tree.call(
                 carriageway_marking_group(),
                 backbone=backbone,
-                **section,
-                **{name.lower().replace(" ", "_"): value for name, value in values.items()},
-                class_=class_id("road_marking"),
-                material=yellow if marking.yellow else white,
+                **section.values,
+                **values,
+                material=yellow if line.yellow else white,
             ).value)  # fmt: skip
-        mesh = op.join(*lines)
+        mesh = op.join(*parts)
     tree.output("Mesh", mesh, description="Lines whose faces look up")
 
 
-def _middle(
-    tree: Tree, layout: SideLayout, marking: MarkingLayout, distances: list[Value], values: dict[str, Value]
-) -> Value:
+def _boundary(line: MarkingLayout, lanes: int, strips: list[str]) -> int:
+    """Return the number of the boundary that a line lies on, counted from the median; -1 for one that lies on none."""
+    if line.kind == "free":
+        return -1
+    if line.kind in ("turnout_edge", "gore_edge"):
+        return strips.index("Turnout Lane") + (line.kind == "turnout_edge")
+    # Boundaries of lanes count from lane 1's outer edge inwards.
+    return 1 + lanes - line.boundary
+
+
+def _middle(line: MarkingLayout, values: dict[str, Value], boundary: Value | None) -> Value:
     """Return the distance of a line's middle from the axis."""
-    if marking.kind == "free":
-        middle = values["Distance"]
-        return middle * op.named_attribute(tree, attribute_name("marking", marking.name)) if marking.varies else middle
-    if marking.kind in ("turnout_edge", "gore_edge"):
-        boundary = strips_of(layout).index("Turnout Lane") + (marking.kind == "turnout_edge")
-    else:
-        # Boundaries count from lane 1's outer edge inwards, distances from the inner paved edge outwards.
-        boundary = 1 + layout.lanes - marking.boundary
-    outwards = _OUTWARDS.get(marking.kind)
-    return distances[boundary] + values["Width"] * outwards if outwards else distances[boundary]
+    if boundary is None:
+        return values["distance"]
+    outwards = _OUTWARDS.get(line.kind)
+    return boundary + values["width"] * outwards if outwards else boundary

@@ -9,30 +9,53 @@ import bpy
 
 from ....base.classes import class_id
 from ...nodes import operations as op
+from ...nodes.axis import AxisInputs
 from ...nodes.backbone import row
 from ...nodes.builder import Node, Tree, Value, node_group
+from ...nodes.inputs import Input, Inputs, input_name, inputs_class, instance_number, material_of, metres, socket
 from ...nodes.solids import row_of_points
 from ...nodes.strip import strip_group
-from .layout import SideLayout
-from .markings import declare_marking, markings_group
-from .side import declare_instance, declare_side, side_group, strips_of
+from .carriageway import SideInputs, carriageway_group, width_fields
+from .layout import TURNOUT_NAMES, SideLayout, attribute_name, detail_field, strips_of, width_field
+from .markings import declare_line, markings_group
+
+MARKINGS = "Markings"
+"""Heading of the inputs of all lines."""
 
 
 @dataclass
-class _SideInputs:
-    """One side's inputs by name, and the node of its surface."""
+class _Side:
+    """One side: its inputs, those of its lines in order, and the node of its surface."""
 
     layout: SideLayout
-    inputs: dict[str, Value]
-    markings: dict[str, Value]
+    widths: Inputs
+    inputs: SideInputs
+    details: Inputs
+    lines: list[dict[str, Value]]
     surface: Node | None = None
 
-    def edge(self, outer: bool) -> tuple[Value, Value]:
-        """Return offset and height of the inner or outer edge, fields on the backbone."""
+    def output(self, name: str) -> Value:
+        """Return an output of the surface's node."""
         assert self.surface is not None
-        last = len(strips_of(self.layout))
-        distance = self.surface[f"Distance {last if outer else 0}"]
-        return distance * self.layout.sign, self.surface["Outer Height" if outer else "Inner Height"]
+        return self.surface[name]
+
+    def attribute(self, name: str) -> Value:
+        """Return an attribute of the backbone that is this side's."""
+        return op.named_attribute(self.inputs.tree, attribute_name(self.layout.side, name))
+
+    def width(self, strip: str) -> Value:
+        """Return a strip's width (or the inner offset), a field on the backbone where it changes along the road."""
+        if strip in TURNOUT_NAMES:
+            return self.attribute(strip)
+        width = self.widths.values[width_field(strip)]
+        return width * self.attribute(strip) if strip in self.layout.varying else width
+
+
+class _Surfaces(Inputs):
+    marking_material = material_of("the lines", "paint_white")
+    yellow_marking_material = material_of("temporary lines", "paint_yellow")
+    verge_material = material_of("the verges", "verge")
+    median_material = material_of("the median", "median")
 
 
 def road_group(layout: tuple[SideLayout, ...]) -> bpy.types.NodeTree:
@@ -46,27 +69,29 @@ def road_group(layout: tuple[SideLayout, ...]) -> bpy.types.NodeTree:
 
 
 def _build(tree: Tree, layout: tuple[SideLayout, ...]) -> None:
-    item = tree.input("Backbone", "Object", description="Polyline along the axis with its attributes")
-    sides, median = _declare(tree, layout)
+    road = AxisInputs(tree)
+    sides = [_declare_side(tree, side) for side in layout]
+    median = None
+    if len(sides) == 2:
+        with tree.panel("Median"):
+            median = inputs_class("Median", {"instance": instance_number()})(tree, "Median").values["instance"]
+    with tree.panel(MARKINGS):
+        for side in sides:
+            words = side.layout.side
+            side.lines = [declare_line(tree, line, f"{words} {line.name}") for line in side.layout.markings]
     with tree.panel("Materials"):
-        names = ("Marking", "Yellow Marking", "Verge", "Median")
-        materials = {
-            name: tree.input(f"{name} Material", "Material", description=f"Material of the {name.lower()}")
-            for name in names
-        }
+        materials = _Surfaces(tree)
     with tree.frame("Backbone"):
-        backbone = op.object_geometry(item)
+        backbone = road.axis()
     parts: list[Value] = []
     for side in sides:
         with tree.frame(f"{side.layout.side} verge and pavement"):
-            inputs = {**side.inputs, "Backbone": backbone, "Verge Material": materials["Verge"]}
-            side.surface = tree.call(side_group(side.layout), **_snake(inputs))
+            side.surface = _surface(tree, side, backbone, materials.verge_material)
     if median is not None:
         with tree.frame("Median: straight from one inner edge to the other"):
-            parts.append(_median(tree, backbone, sides, median, materials["Median"]))
+            parts.append(_median(tree, backbone, sides, median, materials.median_material))
     for side in sides:
-        assert side.surface is not None
-        parts.append(side.surface["Mesh"])
+        parts.append(side.output("Mesh"))
         if side.layout.markings:
             with tree.frame(f"{side.layout.side} markings"):
                 parts.append(_markings(tree, backbone, side, materials))
@@ -76,60 +101,113 @@ def _build(tree: Tree, layout: tuple[SideLayout, ...]) -> None:
     tree.output("Mesh", mesh, description="The road; every face has class_id and instance_id")
 
 
-def _declare(tree: Tree, layout: tuple[SideLayout, ...]) -> tuple[list[_SideInputs], Value | None]:
-    sides = []
-    for side_layout in layout:
-        with tree.panel(f"{side_layout.side} Carriageway"):
-            sides.append(_SideInputs(side_layout, declare_side(tree, side_layout), {}))
-    median = None
-    if len(sides) == 2:
-        with tree.panel("Median"):
-            median = declare_instance(tree, "Median Instance")
-    for side in sides:
-        for marking in side.layout.markings:
-            with tree.panel(f"Marking {marking.name}"):
-                side.markings |= declare_marking(tree, marking)
-    return sides, median
+def _declare_side(tree: Tree, layout: SideLayout) -> _Side:
+    words = layout.side
+    about = "Points that make this strip finer, see SR Strip"
+    further = {detail_field(strip): socket("Object", about) for strip in layout.detailed}
+    for turnout in layout.turnouts:
+        further |= turnout_fields(turnout)
+    with tree.panel(f"{words} Carriageway"):
+        return _Side(
+            layout,
+            inputs_class("Widths", width_fields(layout.lanes, varying=layout.varying))(tree, words),
+            SideInputs(tree, words),
+            inputs_class("Further", further)(tree, words),
+            [],
+        )
 
 
-def _markings(tree: Tree, backbone: Value, side: _SideInputs, materials: dict[str, Value]) -> Value:
-    assert side.surface is not None
-    across = [f"Distance {i}" for i in range(len(strips_of(side.layout)) + 1)]
-    values = {name: side.surface[name] for name in (*across, "Plane Edge", "Pivot")}
-    values |= {"Backbone": backbone, "Verge Slope": side.inputs[f"{side.layout.side} Verge Slope"]}
-    values |= {"Material": materials["Marking"], "Yellow Material": materials["Yellow Marking"]}
-    return tree.call(markings_group(side.layout), **_snake(values | side.markings)).value
+def turnout_fields(turnout: str) -> dict[str, Input]:
+    """Return the inputs of a turnout by their fields: where it begins and ends, and its instance number."""
+    field = turnout.lower().replace(" ", "_")
+    return {
+        f"{field}_start_station": metres(0.0, (-1e6, 1e6), "Beginning of the turnout"),
+        f"{field}_end_station": metres(0.0, (-1e6, 1e6), "End of the turnout"),
+        f"{field}_instance": instance_number(),
+    }
 
 
-def _median(tree: Tree, backbone: Value, sides: list[_SideInputs], instance: Value, material: Value) -> Value:
-    (left_offset, left_height), (right_offset, right_height) = (side.edge(outer=False) for side in sides)
+def _surface(tree: Tree, side: _Side, backbone: Value, verge: Value) -> Node:
+    """Add the carriageway of a side."""
+    layout = side.layout
+    turnouts = bool(layout.turnouts)
+    strips = ["Inner Offset", *strips_of(layout.lanes, turnouts)]
+    values = {width_field(strip): side.width(strip) for strip in strips}
+    for strip in layout.detailed:
+        field = detail_field(strip)
+        values[field] = op.object_geometry(side.details.values[field])
+    if turnouts:
+        whole = side.widths.values[width_field("Hard Shoulder")] * side.attribute("Hard Shoulder Main")
+        values |= {"whole_hard_shoulder_width": whole, "verge_extra_width": side.attribute("Verge Extra")}
+        values["turnout_instance"] = _turnout_instance(side)
+    return tree.call(
+        carriageway_group(layout.lanes, turnouts),
+        backbone=backbone,
+        left_side=layout.left,
+        crossfall=op.named_attribute(tree, f"crossfall_{layout.side.lower()}"),
+        **values,
+        **side.inputs.values,
+        verge_material=verge,
+    )
+
+
+def _turnout_instance(side: _Side) -> Value:
+    """Return the instance number of the turnout that a face of the strips beside the main road belongs to."""
+    station, result = op.named_attribute(side.inputs.tree, "station"), side.inputs.instance
+    for turnout in side.layout.turnouts:
+        start, end, instance = (side.details.values[field] for field in turnout_fields(turnout))
+        result = op.switch((station >= start) & (station <= end), result, instance)
+    return result
+
+
+def _markings(tree: Tree, backbone: Value, side: _Side, materials: _Surfaces) -> Value:
+    layout = side.layout
+    turnouts = bool(layout.turnouts)
+    names = [f"Boundary {number}" for number in range(len(strips_of(layout.lanes, turnouts)) + 1)]
+    values = {name: side.output(name) for name in (*names, "Paved Edge", "Pivot")}
+    for line, inputs in zip(layout.markings, side.lines, strict=True):
+        values |= {input_name(field, line.name): value for field, value in inputs.items()}
+        if line.varies:
+            name = input_name("distance", line.name)
+            values[name] = values[name] * side.attribute(line.name)
+    return tree.call(
+        markings_group(layout.lanes, turnouts, layout.markings),
+        backbone=backbone,
+        left_side=layout.left,
+        crossfall=op.named_attribute(tree, f"crossfall_{layout.side.lower()}"),
+        verge_slope=side.inputs.verge_slope,
+        material=materials.marking_material,
+        yellow_material=materials.yellow_marking_material,
+        **{name.lower().replace(" ", "_"): value for name, value in values.items()},
+    ).value
+
+
+def _median(tree: Tree, backbone: Value, sides: list[_Side], instance: Value, material: Value) -> Value:
+    left, right = sides
     return tree.call(
         strip_group(),
         backbone=backbone,
-        left_offset=left_offset,
-        left_height=left_height,
-        right_offset=right_offset,
-        right_height=right_height,
+        left_offset=left.output("Inner Edge Offset"),
+        left_height=left.output("Inner Edge Height"),
+        right_offset=right.output("Inner Edge Offset"),
+        right_height=right.output("Inner Edge Height"),
         class_=class_id("roadside"),
         instance=instance,
         material=material,
     ).value
 
 
-def _edges(tree: Tree, backbone: Value, sides: list[_SideInputs]) -> Iterator[Value]:
+def _edges(tree: Tree, backbone: Value, sides: list[_Side]) -> Iterator[Value]:
     """Return the left-most and the right-most edge as points with the attribute ``edge`` = +1 and -1."""
     for sign in (1.0, -1.0):
         side = sides[0] if sign > 0 else sides[-1]
-        offset, height = side.edge(outer=side.layout.sign == sign)
+        which = "Outer" if side.layout.left == (sign > 0) else "Inner"
         points = row_of_points(tree, op.point_count(backbone))
         number = op.index(tree)
         axis, left, _ = row(backbone, number)
-        offset, height = (op.sample_index(backbone, value, number) for value in (offset, height))
+        offset = op.sample_index(backbone, side.output(f"{which} Edge Offset"), number)
+        height = op.sample_index(backbone, side.output(f"{which} Edge Height"), number)
         place = axis + left * offset + op.vector(tree, 0.0, 0.0, height)
         points = op.store(op.set_position(points, place), "edge", sign)
         # A mesh line has edges; only its points are wanted.
         yield tree.node("GeometryNodeDeleteGeometry", points, domain="EDGE", mode="EDGE_FACE").value
-
-
-def _snake(values: dict[str, Value]) -> dict[str, Value]:
-    return {name.lower().replace(" ", "_"): value for name, value in values.items()}

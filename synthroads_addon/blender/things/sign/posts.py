@@ -19,7 +19,6 @@ _CHORD, _DIAGONAL = 0.045, 0.02
 
 class _Posts(OnSurface):
     points = socket("Geometry", "Places of the signs on the surface")
-    road = socket("Object", "Surface that the posts stand on")
     posts = integer(1, (1, MOST_POSTS), "Number of posts")
     width = metres(1.0, (0.01, 20.0), "Width of the sign")
     top = metres(2.5, (0.1, 20.0), "Top of the posts above the sign's place (m)")

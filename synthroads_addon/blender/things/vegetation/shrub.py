@@ -35,9 +35,9 @@ class _ShrubInputs(Crown):
 @makes_group("SR Shrub")
 def shrub_group(tree: Tree) -> None:
     """Shrubs of one species in a band beside the road, of three kinds, with gaps between their leaves."""
-    stand = Stand(tree, **_STAND)
+    stand = Stand(tree, defaults=_STAND)
     with tree.panel("Shape at height 1"):
-        shape = _ShrubInputs(tree, **_DEFAULTS)
+        shape = _ShrubInputs(tree, defaults=_DEFAULTS)
     with tree.panel("Materials"):
         materials = PlantMaterials(tree)
     with tree.frame("Places"):
@@ -60,7 +60,7 @@ def _kind(tree: Tree, inputs: dict[str, Value], seed: int, wider: float) -> Valu
 @makes_group("SR Shrub Shape")
 def shape_group(tree: Tree) -> None:
     """One shrub of height 1: stems and leaves."""
-    shape, plant = _ShrubInputs(tree, **_DEFAULTS), Plant(tree)
+    shape, plant = _ShrubInputs(tree, defaults=_DEFAULTS), Plant(tree)
     with tree.frame("Stems and leaves"):
         shrub = tree.call(
             crown_group(), **shape.crown(), **plant.values, branch_radius=shape.stem_radius, from_ground=True

@@ -28,7 +28,7 @@ class _TreeInputs(Crown):
 @makes_group("SR Tree")
 def tree_group(tree: Tree) -> None:
     """Trees of one species in a band beside the road, of three kinds, with gaps between their leaves."""
-    stand = Stand(tree, **_STAND)
+    stand = Stand(tree, defaults=_STAND)
     with tree.panel("Shape at height 1"):
         shape = _TreeInputs(tree)
     with tree.panel("Materials"):

@@ -1,0 +1,114 @@
+"""SR Axis from Curve: any curve as the backbone that groups follow; SR Axis: the backbone of a group's inputs."""
+
+from __future__ import annotations
+
+from . import operations as op
+from .builder import Tree, Value, makes_group
+from .inputs import Inputs, backbone_socket, integer, metres, number, socket
+
+_RESOLUTION = 32
+"""Straight pieces between two control points of a curve before it is cut into rows."""
+_CURVE = "Curve that it follows, if no backbone is given: its first spline, from its beginning on"
+
+
+class AxisInputs(Inputs):
+    """Inputs of a group that follows the backbone.
+
+    Attributes:
+        curve: what is followed where no backbone is given.
+        backbone: object with the backbone, or with a curve.
+    """
+
+    curve = socket("Geometry", _CURVE)
+    backbone = socket("Object", "Object that it follows: a curve, or the backbone of a road")
+
+    def axis(self) -> Value:
+        """Return the geometry of the backbone."""
+        given = op.object_geometry(self.backbone)
+        return self.tree.call(axis_group(), curve=self.curve, backbone=given).value
+
+
+def rows_along(curve: Value) -> Value:
+    """Return the backbone that a geometry is, or one along its curve."""
+    return curve.tree.call(axis_group(), curve=curve).value
+
+
+class _Axis(Inputs):
+    curve = socket("Geometry", _CURVE)
+    backbone = backbone_socket()
+
+
+@makes_group("SR Axis")
+def axis_group(tree: Tree) -> None:
+    """The backbone if there is one, else one along the first curve that there is."""
+    inputs = _Axis(tree)
+    with tree.frame("A mesh with rows is a backbone, a curve is yet to become one"):
+        given = op.join(inputs.backbone, inputs.curve)
+        made = tree.call(axis_from_curve_group(), curve=given).value
+        rows = op.switch(op.point_count(inputs.curve) > 0, made, inputs.curve)
+        axis = op.switch(op.point_count(inputs.backbone) > 0, rows, inputs.backbone)
+    tree.output("Axis", axis, description="Backbone")
+
+
+class _AxisFromCurve(Inputs):
+    curve = socket("Geometry", "Curve; its first spline counts")
+    step = metres(2.0, (0.05, 100.0), "Distance of the rows")
+    first_station = metres(0.0, (-1e6, 1e6), "Station of its beginning")
+    crossfall_left = number(-0.025, (-0.12, 0.12), "Fall of the left carriageway to the right (m/m)")
+    crossfall_right = number(0.025, (-0.12, 0.12), "Fall of the right carriageway to the right (m/m)")
+    smoothing = integer(4, (0, 100), "Rows over which the curvature is averaged")
+
+
+@makes_group("SR Axis from Curve", catalogue="Tools")
+def axis_from_curve_group(tree: Tree) -> None:
+    """A curve as the backbone of a road: rows with station, direction to the left, curvature and crossfalls.
+
+    Stations count along the curve in plan, as those of a road do.
+    """
+    axis = _AxisFromCurve(tree)
+    with tree.frame("Its first spline in plan, with the heights kept"):
+        spline = op.separate(axis.curve, op.index(tree).equals(0), "CURVE")
+        spline = tree.node("GeometryNodeSetSplineResolution", spline, resolution=_RESOLUTION).value
+        fine = tree.node("GeometryNodeResampleCurve", spline, mode="EVALUATED").value
+        fine = op.store(fine, "elevation", op.component(op.position(tree), "Z"))
+        flat = op.position(tree) * (1.0, 1.0, 0.0)
+        fine = op.set_position(fine, flat)
+    with tree.frame("Rows at even distances"):
+        rows = tree.node("GeometryNodeResampleCurve", fine, length=axis.step, mode="LENGTH").value
+        along = tree.node("GeometryNodeSplineParameter")["Length"]
+        rows = op.store(rows, "station", along + axis.first_station)
+        tangent = tree.node("GeometryNodeInputTangent").value
+        rows = op.store(rows, "forwards", tangent)
+    with tree.frame("Backbone at the curve's height"):
+        line = tree.node("GeometryNodeCurveToMesh", rows).value
+        height = op.named_attribute(tree, "elevation")
+        line = op.set_position(line, op.position(tree) + op.vector(tree, 0.0, 0.0, height))
+    with tree.frame("Direction to the left"):
+        forwards = op.named_attribute(tree, "forwards", "FLOAT_VECTOR")
+        left = op.vector(tree, -op.component(forwards, "Y"), op.component(forwards, "X"))
+        line = op.store(line, "left", left)
+    with tree.frame("Curvature: turn from the row before to the row behind"):
+        line = op.store(line, "curvature", _curvature(tree, line, axis.smoothing))
+    with tree.frame("Crossfalls"):
+        line = op.store(line, "crossfall_left", axis.crossfall_left)
+        line = op.store(line, "crossfall_right", axis.crossfall_right)
+        for name in ("forwards", "elevation"):
+            line = tree.node("GeometryNodeRemoveAttribute", line, name=name).value
+    tree.output("Axis", line, description="Polyline along the curve with the backbone's attributes")
+
+
+def _curvature(tree: Tree, line: Value, smoothing: Value) -> Value:
+    """Return the curvature at every row, averaged over some rows."""
+    number = op.index(tree)
+    last = op.point_count(line) - 1
+    before, behind = op.maximum(number - 1, 0), op.minimum(number + 1, last)
+
+    def at(name: str, row: Value, kind: str) -> Value:
+        return op.sample_index(line, op.named_attribute(tree, name, kind), row)
+
+    first, second = at("forwards", before, "FLOAT_VECTOR"), at("forwards", behind, "FLOAT_VECTOR")
+    across = op.component(tree.node("ShaderNodeVectorMath", first, second, operation="CROSS_PRODUCT").value, "Z")
+    turn = tree.node("ShaderNodeMath", across, op.dot(first, second), operation="ARCTAN2").value
+    length = at("station", behind, "FLOAT") - at("station", before, "FLOAT")
+    curvature = turn / op.maximum(length, 1e-6)
+    return tree.node("GeometryNodeBlurAttribute", curvature, iterations=smoothing, data_type="FLOAT").value

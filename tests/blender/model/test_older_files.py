@@ -1,0 +1,64 @@
+"""Roads that an older version has saved: its names of inputs are known, so that edits are still carried back."""
+
+from __future__ import annotations
+
+from synthroads_addon.blender.compat import modifier_input, set_modifier_input
+from synthroads_addon.blender.model.build import RoadModel, build_road
+from synthroads_addon.blender.model.older_files import rename_inputs
+from synthroads_addon.blender.model.read_back import edited_parameters
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scenario.scenario import load_scenario
+
+BEFORE = {
+    "Right Lane Line": "carriageway-right-line-1",
+    "Right Outer Edge Line": "carriageway-right-line-0",
+    "Right Inner Edge Line": "carriageway-right-line-2",
+}
+"""Names of lines, and the ids that stood in their place until October 2025."""
+FIELDS = {"Dash Length": "Dash", "Gap Length": "Gap"}
+
+
+def short_road() -> RoadParameters:
+    scenario = load_scenario("rq31-600m")
+    return sample_road(scenario.road.model_copy(update={"length": 40.0}), scenario.seed)
+
+
+def name_as_before(model: RoadModel) -> None:
+    """Give the inputs of the right side's lines the names that they had, under headings that stood by themselves."""
+    interface = model.objects["Road"].modifiers[0].node_group.interface
+    for entry in list(interface.items_tree):
+        line = next((line for line in BEFORE if entry.name.startswith(line)), None)
+        if line and entry.item_type == "PANEL":
+            entry.name = f"Marking {BEFORE[line]}"
+        elif line:
+            field = entry.name.removeprefix(f"{line} ")
+            entry.name = f"{BEFORE[line]} {FIELDS.get(field, field)}"
+
+
+def test_inputs_named_by_ids_are_read_edited_and_named_in_words() -> None:
+    parameters = short_road()
+    model = build_road(parameters, 0.02, 0.0, ("road",))
+    modifier = model.objects["Road"].modifiers[0]
+    name_as_before(model)
+    set_modifier_input(modifier, "carriageway-right-line-1 Dash", 4.5)
+
+    edited = edited_parameters(parameters, model.objects)
+
+    changed = {name for name, item in edited.objects.items() if item != parameters.objects[name]}
+    assert changed == {"carriageway-right-line-1"}
+    assert edited.objects["carriageway-right-line-1"].dash_length == 4.5  # type: ignore[union-attr]
+    assert modifier_input(modifier, "Right Lane Line Dash Length") == 4.5
+    headings = {entry.name: entry.parent.name for entry in modifier.node_group.interface.items_tree}
+    assert headings["Right Lane Line"] == "Markings"
+    assert headings["Right Lane Line Dash Length"] == "Right Lane Line"
+    assert not [name for name in headings if "carriageway-" in name]
+
+
+def test_a_road_of_this_version_stays_as_it_is() -> None:
+    parameters = short_road()
+    model = build_road(parameters, 0.02, 0.0, ("road",))
+    interface = model.objects["Road"].modifiers[0].node_group.interface
+    before = [entry.name for entry in interface.items_tree]
+    rename_inputs(parameters, model.objects)
+    assert [entry.name for entry in interface.items_tree] == before
