@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
 from pydantic import Field, model_validator
 
 from ..base.classes import ClassScheme, class_scheme
-from ..base.schema import ClosedModel, first_repeated, quantity
+from ..base.schema import ClosedModel, first_repeated, notes, quantity
 from ..cloud.layers import DEFAULT_ATTRIBUTES, LAYERS, Attribute
 from ..scanning.scene.classify import check_selectors
 
@@ -18,9 +18,16 @@ Intensity = Literal["received", "range_corrected"]
 class CloudScenario(ClosedModel):
     """The cloud's files and their content."""
 
-    formats: tuple[CloudFormat, ...] = Field(("laz",), min_length=1, description="Kinds of files.")
+    formats: tuple[CloudFormat, ...] = Field(
+        ("laz",),
+        min_length=1,
+        description="Kinds of files.",
+        json_schema_extra=notes(labels={name: name.upper() for name in get_args(CloudFormat)}),
+    )
     attributes: tuple[Attribute, ...] = Field(
-        DEFAULT_ATTRIBUTES, description="What is kept of each point beyond what every cloud holds."
+        DEFAULT_ATTRIBUTES,
+        description="What is kept of each point beyond what every cloud holds.",
+        json_schema_extra=notes(labels={name: layer.label for name, layer in LAYERS.items()}),
     )
     classes: str = Field("17", min_length=1, description="17, 5, or a JSON file of classes of one's own.")
     point_spacing: float | None = quantity(

@@ -24,7 +24,14 @@ class ColourScenario(ClosedModel):
 
     source: ColourSource = Field(
         "auto",
-        json_schema_extra=notes(labels={"material": "Material's Mean"}),
+        json_schema_extra=notes(
+            labels={
+                "auto": "Automatic",
+                "images": "Images Along the Path",
+                "returns": "A Pixel per Return",
+                "material": "Material's Mean",
+            }
+        ),
         description="Images along the path, a pixel per return (Blender 5.0 and newer), or each material's mean; "
         "auto takes a pixel per return where Blender has it.",
     )
@@ -36,19 +43,24 @@ class ColourScenario(ClosedModel):
     engine: Engine = Field(
         "cycles",
         description="Renderer of the images.",
-        json_schema_extra=notes(only_with={"source": ("auto", "images", "returns")}),
+        json_schema_extra=notes(only_with={"source": ("auto", "images", "returns")}, labels={"eevee": "EEVEE"}),
     )
     mode: ColourMode = Field(
         "lit",
         title="RGB Shows",
         description="RGB under sun and sky, of the base colour, or of the layers: roughness, metallic, specular "
         "as red, green, blue.",
-        json_schema_extra=notes(only_with={"rgb": (True,)}),
+        json_schema_extra=notes(
+            only_with={"rgb": (True,)},
+            labels={"lit": "Sun and Sky", "unlit": "Base Colour", "false_colour": "Material Layers"},
+        ),
     )
     lighting: Lighting = Field(
         "direct",
         description="Sun with shadows and an open sky, without noise; or whole light paths, which need more samples.",
-        json_schema_extra=notes(only_with={"source": ("auto", "images", "returns")}),
+        json_schema_extra=notes(
+            only_with={"source": ("auto", "images", "returns")}, labels={"path": "Whole Light Paths"}
+        ),
     )
     image_spacing: float | None = quantity(
         None,

@@ -206,7 +206,9 @@ class RoadScenario(ClosedModel):
     """Limits that the road is sampled within."""
 
     design_class: Literal["EKA1A", "EKA1B", "EKA2", "EKA3"] = Field(
-        "EKA1A", description="Design class (RAA); if not given, the first that has the cross-section."
+        "EKA1A",
+        description="Design class (RAA); if not given, the first that has the cross-section.",
+        json_schema_extra=notes(labels={"EKA1A": "EKA 1 A", "EKA1B": "EKA 1 B", "EKA2": "EKA 2", "EKA3": "EKA 3"}),
     )
     cross_section: CrossSection = Field(
         "RQ31",
@@ -239,7 +241,9 @@ class RoadScenario(ClosedModel):
         json_schema_extra=notes(unit="%", inherits="design_class.grade_percent"),
     )
     placement: Literal["rules", "random"] = Field(
-        "rules", description="Furniture by the safety rules, or at random within its limits."
+        "rules",
+        description="Furniture by the safety rules, or at random within its limits.",
+        json_schema_extra=notes(labels={"rules": "By the Rules", "random": "At Random"}),
     )
     lane_changes: LaneChangeLimits = Field(LaneChangeLimits(), description="Lane drops and gains.")
     turnouts: TurnoutLimits = Field(TurnoutLimits(), description="Exits, entries, emergency bays.")

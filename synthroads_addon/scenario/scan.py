@@ -32,7 +32,11 @@ class ScanScenario(DeviceChoice):
         (1, 8),
         inherits="fidelity.relief_octaves",
     )
-    reflection: Literal["lambert", "oren_nayar"] = Field("lambert", description="How rough surfaces reflect.")
+    reflection: Literal["lambert", "oren_nayar"] = Field(
+        "lambert",
+        description="How rough surfaces reflect.",
+        json_schema_extra=notes(labels={"oren_nayar": "Oren–Nayar"}),
+    )
     attenuation: float | None = quantity(
         None,
         "1/m",
@@ -77,7 +81,11 @@ class ScanScenario(DeviceChoice):
         title="Most Pulses",
         unset="5 thousand million",
     )
-    caster: Literal["auto", "embree", "bvhtree"] = Field("auto", description="How rays are cast.")
+    caster: Literal["auto", "embree", "bvhtree"] = Field(
+        "auto",
+        description="How rays are cast.",
+        json_schema_extra=notes(labels={"auto": "Automatic", "bvhtree": "BVH Tree"}),
+    )
     threads: int = quantity(0, "1", "Threads; 0 uses every core.", (0, 1024))
 
     @model_validator(mode="before")

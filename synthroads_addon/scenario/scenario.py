@@ -17,7 +17,7 @@ from ..cloud.layers import optional_arrays
 from ..materials.table import Material, read_material_table
 from ..road.guidelines import SECTIONS_OF_CLASS
 from ..scanning.beam import RINGS
-from ..twin.formats import IfcSettings, TwinFormat
+from ..twin.formats import FORMATS, IfcSettings, TwinFormat
 from .cloud import CloudScenario
 from .colour import ColourScenario
 from .road import RoadScenario
@@ -81,10 +81,24 @@ class Scenario(ClosedModel):
     colour: ColourScenario = Field(ColourScenario(), description="Colours and material layers.")
     cloud: CloudScenario = Field(CloudScenario(), description="The cloud's files and what they hold.")
     outputs: tuple[Output, ...] = Field(
-        OUTPUTS, title="Files", description="Files wanted; nothing is computed that none of them needs."
+        OUTPUTS,
+        title="Files",
+        description="Files wanted; nothing is computed that none of them needs.",
+        json_schema_extra=notes(
+            labels={
+                "parameters": "Parameter Set",
+                "cloud": "Point Cloud",
+                "centerline": "Centreline",
+                "scene": "Blender File",
+                "previews": "Pictures",
+            }
+        ),
     )
     twin: tuple[TwinFormat, ...] = Field(
-        (), title="Semantic Model", description="Formats of the geometric-semantic model that are wanted."
+        (),
+        title="Semantic Model",
+        description="Formats of the geometric-semantic model that are wanted.",
+        json_schema_extra=notes(labels={name: made.label for name, made in FORMATS.items()}),
     )
     ifc: IfcSettings | None = Field(
         None,

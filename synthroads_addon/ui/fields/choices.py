@@ -9,6 +9,7 @@ from pathlib import Path
 from ...base.errors import InputError
 from ...road.guidelines import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS
 from ...scanning.devices.device import Device, load_device
+from ...scenario.road import RoadScenario
 from ...scenario.scenario import FIDELITIES
 from .wording import value_name
 
@@ -35,7 +36,7 @@ def _cross_sections() -> Iterator[tuple[str, str, str]]:
 
 def _design_classes() -> Iterator[tuple[str, str, str]]:
     for name, sections in SECTIONS_OF_CLASS.items():
-        yield name, value_name("road.design_class", name), f"With {', '.join(sections)}"
+        yield name, value_name(name, RoadScenario.model_fields["design_class"]), f"With {', '.join(sections)}"
 
 
 ITEMS: dict[str, Items] = {"fidelity": tuple(_fidelities()), "road.design_class": tuple(_design_classes())}

@@ -333,7 +333,7 @@ class ChoiceField(Field):
     def properties(self, hooks: Hooks) -> dict[str, Any]:
         """Return a menu."""
         tips = note_of(self.info, "tooltips") or {}
-        plain = [(name, value_name(self.path, name, self.info), tips.get(name, "")) for name in self.values]
+        plain = [(name, value_name(name, self.info), tips.get(name, "")) for name in self.values]
         items = list(ITEMS.get(self.path, plain))
         if self.optional:
             items.insert(0, (AUTOMATIC, "Automatic", self.tooltip))
@@ -365,7 +365,7 @@ class ChoicesField(Field):
 
     def properties(self, hooks: Hooks) -> dict[str, Any]:
         """Return buttons of which several can be pressed."""
-        items = [(name, value_name(self.path, name, self.info), "") for name in self.values]
+        items = [(name, value_name(name, self.info), "") for name in self.values]
         flags = {"items": items, "default": set(self.default or ()), "options": {"ENUM_FLAG", "ANIMATABLE"}}
         return {self.name: bpy.props.EnumProperty(**self._common(hooks), **flags)}
 

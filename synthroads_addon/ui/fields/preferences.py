@@ -15,7 +15,7 @@ from .wording import value_name
 
 PACKAGE = str(__package__).removesuffix(".ui.fields")
 """The add-on's own name, under which Blender keeps its preferences."""
-_CASTERS = get_args(ScanScenario.model_fields["caster"].annotation)
+_CASTER = ScanScenario.model_fields["caster"]
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class SYNTHROADS_AP_preferences(bpy.types.AddonPreferences):
     )
     caster: bpy.props.EnumProperty(
         name="Ray Caster",
-        items=[(name, value_name("scan.caster", name), "") for name in _CASTERS],
+        items=[(name, value_name(name, _CASTER), "") for name in get_args(_CASTER.annotation)],
         default=Preferences.caster,
         description="How rays are cast, where a scenario leaves it open",
     )

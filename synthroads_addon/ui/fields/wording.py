@@ -5,41 +5,6 @@ from __future__ import annotations
 from pydantic.fields import FieldInfo
 
 from ...base.schema import note_of, unit_of
-from ...cloud.layers import LAYERS
-from ...twin.formats import FORMATS
-
-NAMES = {
-    "oren_nayar": "Oren–Nayar",
-    "bvhtree": "BVH Tree",
-    "eevee": "EEVEE",
-    "EKA1A": "EKA 1 A",
-    "EKA1B": "EKA 1 B",
-    "EKA2": "EKA 2",
-    "EKA3": "EKA 3",
-    "laz": "LAZ",
-    "las": "LAS",
-    "ply": "PLY",
-    "e57": "E57",
-    "npz": "NPZ",
-    "rules": "By the Rules",
-    "random": "At Random",
-    "auto": "Automatic",
-    "images": "Images Along the Path",
-    "returns": "A Pixel per Return",
-    "material": "Material",
-    "lit": "Sun and Sky",
-    "unlit": "Base Colour",
-    "false_colour": "Material Layers",
-    "direct": "Direct",
-    "path": "Whole Light Paths",
-    "scene": "Blender File",
-    "parameters": "Parameter Set",
-    "cloud": "Point Cloud",
-    "centerline": "Centreline",
-    "previews": "Pictures",
-    "range": "Range",
-}
-"""Values of choices that are written otherwise than with capitals."""
 
 UNITS = {
     "deg": "°",
@@ -74,16 +39,9 @@ def label(path: str, info: FieldInfo) -> str:
     return text if unit in _SILENT else f"{text} ({written_unit(unit)})"
 
 
-def value_name(path: str, value: str, info: FieldInfo | None = None) -> str:
-    """Return what the panel calls a value of a choice, by its declaration in the schema if that says it."""
-    labels = (note_of(info, "labels") or {}) if info else {}
-    if value in labels:
-        return str(labels[value])
-    if path == "cloud.attributes":
-        return LAYERS[value].label
-    if path == "twin":
-        return FORMATS[value].label
-    return NAMES.get(value) or title_case(value)
+def value_name(value: str, info: FieldInfo) -> str:
+    """Return what the panel calls a value of a choice: its label in the schema, or its name with capitals."""
+    return str((note_of(info, "labels") or {}).get(value) or title_case(value))
 
 
 def title_case(name: str) -> str:
