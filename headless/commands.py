@@ -20,7 +20,7 @@ from typing import Any
 from headless import INTERRUPTED, finish_in_peace, was_stopped
 from headless.messages import messages
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.base.scratch.folders import remove_own, temporary_files_in_scratch
+from synthroads_addon.base.scratch.folders import remove_scratch_folders, temporary_files_in_scratch
 
 
 def _missing(error: ModuleNotFoundError) -> str:
@@ -39,7 +39,7 @@ try:
     from synthroads_addon.base.schema import canonical_json
     from synthroads_addon.scenario.scan import MOST_POSSIBLE
     from synthroads_addon.scenario.scenario import apply_change
-    from synthroads_addon.scenario.tolerance import KINDS, TIMES, parse_tolerance, with_unit, written_error
+    from synthroads_addon.scenario.tolerance import KINDS, TIMES, error_text, parse_tolerance, with_unit
     from synthroads_addon.twin.formats import TWIN_FORMATS
 except ModuleNotFoundError as error:  # Blender itself has none of the packages that the extension brings
     print(_missing(error), file=sys.stderr)
@@ -192,8 +192,8 @@ def choice_summary(report: dict[str, Any]) -> list[str]:
         return []
     choice = report["choice"]
     chosen = ", ".join(f"{path}={value}" for path, value in choice["chosen"].items())
-    errors = ", ".join(f"{name} {written_error(name, value)}" for name, value in choice["expected"]["errors"].items())
-    at_most = ", ".join(f"{name} {written_error(name, value)}" for name, value in choice["expected"]["at_most"].items())
+    errors = ", ".join(f"{name} {error_text(name, value)}" for name, value in choice["expected"]["errors"].items())
+    at_most = ", ".join(f"{name} {error_text(name, value)}" for name, value in choice["expected"]["at_most"].items())
     lines = [f"chosen: {chosen or 'nothing, as all is given'} ({choice['by']})", f"  expected errors: {errors}"]
     lines += [f"  at most, with a confidence of 95 %: {at_most}"] if at_most else []
     seconds = choice["expected"]["seconds"]
@@ -357,7 +357,7 @@ def leave(action: Callable[[], int]) -> None:
             traceback.print_exc()
             code = 1
     finish_in_peace()
-    remove_own()
+    remove_scratch_folders()
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError):  # the terminal is gone
             stream.flush()

@@ -14,7 +14,7 @@ from headless.messages import detail, progress_bar
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.dataset.manifest import Manifest, faults, read_manifest
 from synthroads_addon.dataset.recipe import Recipe, load_recipe, recipe_names
-from synthroads_addon.scenario.scenario import parsed_change
+from synthroads_addon.scenario.scenario import parse_change
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -70,7 +70,7 @@ def _change_recipe(recipe: Recipe, changes: list[str]) -> Recipe:
     """Return a recipe whose scenarios are changed as well; the changes become a part of it."""
     if not changes:
         return recipe
-    values = dict(parsed_change(change) for change in changes)
+    values = dict(parse_change(change) for change in changes)
     groups = []
     for group in recipe.groups:
         update = {"set": group.set | values, "variants": tuple(each | values for each in group.variants)}

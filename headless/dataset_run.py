@@ -27,7 +27,7 @@ from headless.messages import logger
 from synthroads_addon.base.errors import InputError, OutputError
 from synthroads_addon.base.machine import available_cores
 from synthroads_addon.base.progress import Progress, silent
-from synthroads_addon.base.scratch.locks import TakenError, exclusive
+from synthroads_addon.base.scratch.locks import LockHeldError, exclusive
 from synthroads_addon.base.version import generator
 from synthroads_addon.dataset.data_card import data_card
 from synthroads_addon.dataset.layouts import layout_descriptions
@@ -42,8 +42,8 @@ from synthroads_addon.dataset.manifest import (
     faults,
     finish_removal,
     fold_records,
-    made_by,
-    manifest_of,
+    make_manifest,
+    paths_of_set,
     read_manifest,
     remove,
     write_atomically,
@@ -254,7 +254,7 @@ class DatasetRun:
             try:
                 self.folder.mkdir(parents=True, exist_ok=True)
                 stack.enter_context(exclusive(self.folder / LOCK))
-            except TakenError as taken:
+            except LockHeldError as taken:
                 raise OutputError("--output", str(self.folder), _other_run(taken, self.folder / LOCK)) from None
             yield
 
@@ -278,7 +278,7 @@ class DatasetRun:
             fold_records(self.folder)
         if self.overwrite:
             finish_removal(self.folder)
-            paths = [*made_by(self.folder, read_manifest(self.folder)), *self._published_folders()]
+            paths = [*paths_of_set(self.folder, read_manifest(self.folder)), *self._published_folders()]
             for path in self._unknown(set(paths)):
                 name = path.relative_to(self.folder).as_posix()
                 raise OutputError("--output", str(self.folder), f"holds {name}, which is no scene's; move it away")
@@ -357,7 +357,7 @@ class DatasetRun:
     def _manifest(self) -> Manifest:
         """Return the manifest of the scenes that are done or failed so far, in the recipe's order."""
         entries = [self.entries[job.name] for job in self.jobs if job.name in self.entries]
-        return manifest_of(self.recipe.title, self._generator, self._recipe_text, entries, len(self.jobs))
+        return make_manifest(self.recipe.title, self._generator, self._recipe_text, entries, len(self.jobs))
 
     def _abandon(self) -> None:
         """Leave a folder with nothing half-done in it where the work ends early; doesn't raise for a full disk."""
@@ -504,7 +504,7 @@ class Absence:
             )
 
 
-def _other_run(taken: TakenError, lock: Path) -> str:
+def _other_run(taken: LockHeldError, lock: Path) -> str:
     """Return what to say of a folder that another run holds, or may hold."""
     owner = f": process {taken.owner.pid} of {taken.owner.host}" if taken.owner else ""
     if taken.certain:

@@ -21,7 +21,7 @@ if __name__ == "__main__":
 from headless.commands import leave
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import canonical_json, read_json
-from synthroads_addon.base.scratch.folders import remove_own
+from synthroads_addon.base.scratch.folders import remove_scratch_folders
 from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.dataset.layouts import write_layouts
 from synthroads_addon.dataset.manifest import PUBLISHED, file_entries, write_atomically
@@ -94,7 +94,7 @@ def main() -> int:
 def _end_with_parent() -> None:
     """Wait until standard input is closed, which happens when the parent ends however it ends; then end at once."""
     sys.stdin.buffer.read()
-    remove_own()
+    remove_scratch_folders()
     os._exit(130)
 
 

@@ -26,7 +26,7 @@ from headless.commands import (
 )
 from headless.messages import detail, progress_bar
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.scenario.scenario import Scenario, load_scenario, parsed_change, scenario_names, with_changes
+from synthroads_addon.scenario.scenario import Scenario, load_scenario, parse_change, scenario_names, with_changes
 
 _FIELDS = {
     "device": "scan.device",
@@ -102,7 +102,7 @@ def scenario_of(arguments: argparse.Namespace) -> Scenario:
         changes.append('scan.platform.kind="tripod"')
     if arguments.scenario:
         return load_scenario(arguments.scenario, changes)
-    return Scenario.from_dict(with_changes(Scenario().to_dict(), map(parsed_change, changes)))
+    return Scenario.from_dict(with_changes(Scenario().to_dict(), map(parse_change, changes)))
 
 
 def summary(report: dict[str, Any], output: Path) -> str:

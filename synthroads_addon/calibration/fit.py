@@ -49,7 +49,7 @@ class Fit:
     above: float
 
 
-def interquartile(quantiles: Float) -> float:
+def interquartile_range(quantiles: Float) -> float:
     """Return the interquartile range of `FITTED` quantiles (4,), at least a millionth of the median."""
     return max(float(quantiles[2] - quantiles[0]), 1e-6 * abs(float(quantiles[1])), 1e-300)
 
@@ -74,7 +74,7 @@ def fit_level_and_spreads(
         beside: for a strip, the material beside it and its level.
         spread: whether the spreads are fitted as well; else they are the material's.
     """
-    width = interquartile(quantiles)
+    width = interquartile_range(quantiles)
 
     def miss(x: Float) -> Float:
         got = np.quantile(receiver.to_stored(apply_gain(expectation, material, _fit(x, material), beside)), FITTED)

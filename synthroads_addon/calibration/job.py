@@ -30,7 +30,7 @@ from .fit import (
     fitted_slope,
     fitted_wavelength,
     gain_of,
-    interquartile,
+    interquartile_range,
 )
 from .pavement import RoadClasses, road_classes
 
@@ -111,7 +111,7 @@ class CalibrationJob:
 
 
 @dataclass(frozen=True)
-class Compared:
+class ClassComparison:
     """One material beside its class.
 
     Attributes:
@@ -135,7 +135,7 @@ class Compared:
         if self.real is None:
             return None
         real = np.quantile(self.real.intensity, FITTED)
-        return np.asarray((np.quantile(self.expected, FITTED) - real) / interquartile(real))
+        return np.asarray((np.quantile(self.expected, FITTED) - real) / interquartile_range(real))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures as JSON data."""
@@ -188,7 +188,7 @@ class Calibration:
 
     job: CalibrationJob
     gain: float
-    compared: tuple[Compared, ...]
+    compared: tuple[ClassComparison, ...]
     table: Mapping[str, Material] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
@@ -406,14 +406,14 @@ def _result(
 
 def _compare_class(
     job: CalibrationJob, item: _FitInput, row: Material, gain: float, rows: list[Material], inputs: list[_FitInput]
-) -> Compared:
+) -> ClassComparison:
     """Return a class with the intensities that its final material gives."""
     pairs = zip(rows, inputs, strict=True)
     beside = next((material for material, other in pairs if other.target.real_class == "paved"), None)
     fit = Fit(gain, row.spread_below, row.spread_above)
     seen = item.expectation
     linear = apply_gain(seen, row, fit, (beside, gain) if item.strip and beside is not None else None)
-    return Compared(
+    return ClassComparison(
         item.target, item.before, row, job.receiver.to_stored(linear), seen.incidence, seen.distance, item.real
     )
 

@@ -60,7 +60,7 @@ def road_classes(cloud: RealCloud, road: RoadClasses) -> dict[str, RealClass]:
     Raises:
         InputError: the axis can't be read, or too few points lie where pavement or markings should be.
     """
-    station, offset = beside_axis(cloud.xyz[:, :2], read_axis(road.axis)[:, :2])
+    station, offset = axis_coordinates(cloud.xyz[:, :2], read_axis(road.axis)[:, :2])
     free = np.isfinite(offset)
     for line in road.lines:
         free &= ~(np.abs(offset - line) < CLEAR)
@@ -125,7 +125,7 @@ def _median_along(station: Float, intensity: Float) -> Float:
     return result
 
 
-def beside_axis(points: Float, axis: Float) -> tuple[Float, Float]:
+def axis_coordinates(points: Float, axis: Float) -> tuple[Float, Float]:
     """Return stations and offsets (N,) of points (N, 2) beside a chain of axis points (M, 2), m; NaN beside none.
 
     Each point belongs to the nearest of the segments whose ends it lies between, or to the corner of two.

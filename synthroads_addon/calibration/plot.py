@@ -16,7 +16,7 @@ from ..base.files import write_file
 from ..cloud.tools.picture import nice_step
 from ..materials.surfaces import brightness_of, surfaces_of
 from .fit import FITTED
-from .job import Calibration, Compared
+from .job import Calibration, ClassComparison
 
 Color = tuple[int, int, int]
 Box = tuple[float, float, float, float]
@@ -94,7 +94,7 @@ def _limits(result: Calibration) -> tuple[float, float]:
 
 
 def _draw_class(
-    draw: ImageDraw.ImageDraw, top: float, entry: Compared, limits: tuple[float, float], color: Color
+    draw: ImageDraw.ImageDraw, top: float, entry: ClassComparison, limits: tuple[float, float], color: Color
 ) -> None:
     edges = np.linspace(*limits, _BINS + 1)
     expected = _density(entry.expected, edges)
@@ -112,7 +112,7 @@ def _draw_class(
         _text(draw, (_MARGIN, top + 28 + 19 * number), line, 13, _SOFT if number else color)
 
 
-def _words(entry: Compared) -> list[str]:
+def _words(entry: ClassComparison) -> list[str]:
     """Return what stands beside a diagram."""
     row = entry.after
     lines = ["expected (line)", f"reflectivity {row.reflectivity:.3f}"]

@@ -167,8 +167,10 @@ def check_same_recipe(folder: Path, recipe_text: str, generator: str) -> Manifes
     return manifest
 
 
-def manifest_of(title: str, generator: str, recipe_text: str, scenes: Iterable[SceneEntry], expected: int) -> Manifest:
-    """Return the manifest of scenes, of which a number is expected."""
+def make_manifest(
+    title: str, generator: str, recipe_text: str, scenes: Iterable[SceneEntry], expected: int
+) -> Manifest:
+    """Return the manifest of some scenes; it is complete if there are as many as expected and all are done."""
     entries = tuple(scenes)
     return Manifest(
         title=title,
@@ -185,7 +187,7 @@ def write_manifest(folder: Path, manifest: Manifest) -> None:
     (folder / RECORDS).unlink(missing_ok=True)
 
 
-def made_by(folder: Path, manifest: Manifest) -> list[str]:
+def paths_of_set(folder: Path, manifest: Manifest) -> list[str]:
     """Return the paths in a data set's folder that the set made, besides its manifest and recipe.
 
     Args:

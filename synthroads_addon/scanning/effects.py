@@ -11,8 +11,8 @@ from ..base.arrays import Float, Index
 from .devices.device import ScannerSetting
 from .pulses import Pulses
 from .radiometry import received_intensity
-from .returns import UNCOUNTED, BothMarks, Marks
-from .trace import Hits, Traced
+from .returns import LEAST_REFLECTANCE, BothSignals, HitSignals
+from .trace import Hits, TracedRays
 
 
 @dataclass(frozen=True)
@@ -94,10 +94,10 @@ def apply_effect(
     setting: ScannerSetting,
     attenuation: float,
     pulses: Pulses,
-    traced: Traced,
-    marks: BothMarks,
-) -> tuple[Traced, BothMarks]:
-    """Return what the rays of a block meet, and its marks, after an effect.
+    traced: TracedRays,
+    signals: BothSignals,
+) -> tuple[TracedRays, BothSignals]:
+    """Return what the rays of a block meet, and its signals, after an effect.
 
     Echoes that are added join what lies behind permeable surfaces, with the face -1.
 
@@ -108,23 +108,23 @@ def apply_effect(
         attenuation: 1/m of range.
         pulses: the block's.
         traced: what their rays meet.
-        marks: what that adds to returns.
+        signals: what that adds to returns.
 
     Raises:
         ValueError: the effect's echoes are of no ray, or not finite numbers.
     """
-    hits = _pulse_hits(setting, attenuation, pulses, traced, marks)
+    hits = _pulse_hits(setting, attenuation, pulses, traced, signals)
     changes = effect.change_echoes(hits, random)
     _check(effect.name, changes, hits.distance.shape)
     if changes.transmission is not None:
-        traced, marks = _weaken(traced, marks, np.broadcast_to(changes.transmission, hits.distance.shape))
-    return _add_echoes(setting, attenuation, traced, marks, changes)
+        traced, signals = _weaken(traced, signals, np.broadcast_to(changes.transmission, hits.distance.shape))
+    return _add_echoes(setting, attenuation, traced, signals, changes)
 
 
 def _pulse_hits(
-    setting: ScannerSetting, attenuation: float, pulses: Pulses, traced: Traced, marks: BothMarks
+    setting: ScannerSetting, attenuation: float, pulses: Pulses, traced: TracedRays, signals: BothSignals
 ) -> PulseHits:
-    first, behind = marks
+    first, behind = signals
     ray, pulse = np.divmod(traced.ray, len(pulses.time))
     return PulseHits(
         time=pulses.time,
@@ -142,26 +142,28 @@ def _pulse_hits(
 
 
 def _add_echoes(
-    setting: ScannerSetting, attenuation: float, traced: Traced, marks: BothMarks, changes: EchoChanges
-) -> tuple[Traced, BothMarks]:
-    """Return hits and marks with those echoes of an effect that the scanner records."""
+    setting: ScannerSetting, attenuation: float, traced: TracedRays, signals: BothSignals, changes: EchoChanges
+) -> tuple[TracedRays, BothSignals]:
+    """Return hits and signals with those echoes of an effect that the scanner records."""
     distance = np.asarray(changes.distance, dtype=np.float64)
     here = np.flatnonzero((distance >= setting.minimum_range) & (distance <= setting.maximum_range))
     distance, brightness = distance[here], np.asarray(changes.brightness, dtype=np.float64)[here]
     none = np.zeros(len(here), dtype=np.intp)
     # In the air there is no face; it counts as one that lies across the beam.
     hits = Hits(none - 1, none, distance, none - 1.0, brightness)
-    added = Marks(distance, np.maximum(brightness, UNCOUNTED), received_intensity(brightness, distance, attenuation))
-    first, behind = marks
+    added = HitSignals(
+        distance, np.maximum(brightness, LEAST_REFLECTANCE), received_intensity(brightness, distance, attenuation)
+    )
+    first, behind = signals
     ray = changes.ray[here] * len(traced.rays.time) + changes.pulse[here]
     traced = replace(traced, behind=Hits.join([traced.behind, hits]), ray=np.concatenate([traced.ray, ray]))
-    return traced, (first, Marks.join([behind, added]))
+    return traced, (first, HitSignals.join([behind, added]))
 
 
-def _brightness(marks: Marks, attenuation: float) -> Float:
+def _brightness(signals: HitSignals, attenuation: float) -> Float:
     """Return what a surface sends back, from the intensity that is received of it; 0 where nothing is."""
-    white = received_intensity(1.0, marks.distance, attenuation)
-    return np.divide(marks.intensity, white, out=np.zeros_like(white), where=white > 0.0)
+    white = received_intensity(1.0, signals.distance, attenuation)
+    return np.divide(signals.intensity, white, out=np.zeros_like(white), where=white > 0.0)
 
 
 def _check(name: str, changes: EchoChanges, shape: tuple[int, ...]) -> None:
@@ -174,15 +176,15 @@ def _check(name: str, changes: EchoChanges, shape: tuple[int, ...]) -> None:
         raise ValueError(f"effect {name}: distances and brightnesses must be finite numbers")
 
 
-def _weaken(traced: Traced, marks: BothMarks, transmission: Float) -> tuple[Traced, BothMarks]:
-    """Return hits and marks with factors (K, P) on the brightness; hits that send no light back are left out."""
-    first, behind = marks
+def _weaken(traced: TracedRays, signals: BothSignals, transmission: Float) -> tuple[TracedRays, BothSignals]:
+    """Return hits and signals with factors (K, P) on the brightness; hits that send no light back are left out."""
+    first, behind = signals
     left = transmission.ravel()[traced.ray]
     seen = np.flatnonzero(left > 0.0)
-    first = Marks(
+    first = HitSignals(
         distance=np.where(transmission > 0.0, first.distance, np.inf),
         weight=np.where(transmission > 0.0, first.weight * transmission, first.weight),
         intensity=first.intensity * transmission,
     )
-    behind = Marks(behind.distance[seen], behind.weight[seen] * left[seen], behind.intensity[seen] * left[seen])
+    behind = HitSignals(behind.distance[seen], behind.weight[seen] * left[seen], behind.intensity[seen] * left[seen])
     return replace(traced, behind=traced.behind.select(seen), ray=traced.ray[seen]), (first, behind)

@@ -27,7 +27,7 @@ class Track:
     Attributes:
         begin: time of the first knot, s.
         spacing: s between two.
-        rotation: (9, K) matrices, own frame -> local, row by row.
+        rotation: (9, K) matrices from the body frame to the local one, row by row.
         position: (3, K) m.
         present: (K,) whether it is there at all.
     """
@@ -70,18 +70,18 @@ class Track:
         return rotation, position, self.present[index] & self.present[index + 1]
 
     def way_of(self, point: Float) -> Float:
-        """Return where a point (3,) of the own frame, m, is at the knots (3, K), m."""
+        """Return the local places (3, K), m, at the knots of a point (3,) that is fixed to the body, m."""
         return np.asarray(np.einsum("ijk,j->ik", self.rotation.reshape(3, 3, -1), point) + self.position)
 
     def along(self, way: Float, times: Float) -> Float:
-        """Return values (C, N) at times within the track of values (C, K) at its knots."""
+        """Interpolate values (C, K), one for each knot, at times (N,) within the track; return them (C, N)."""
         return _between(way, *_knots(self, times))
 
     def swept_box(self, centre: Float, radius: float) -> Float | None:
         """Return the smallest and largest corner (2, 3) that a sphere reaches on the way; None where it is never there.
 
         Args:
-            centre: (3,) of the sphere, own frame, m.
+            centre: (3,) of the sphere in the body frame, m.
             radius: m.
         """
         there = np.flatnonzero(self.present)

@@ -110,8 +110,8 @@ def turn_vectors(rotation: Float, vectors: Float) -> Float:
     return result
 
 
-def reaching_scene(setting: ScannerSetting, target: Target, pulses: Pulses, motions: list[Track]) -> Bool | None:
-    """Return which pulses (P,) may hit anything at all, as those into the sky don't; None if all may."""
+def may_hit_scene(setting: ScannerSetting, target: Target, pulses: Pulses, motions: list[Track]) -> Bool | None:
+    """Return which pulses (P,) may hit anything at all, and so aren't sent into the sky; None if all may."""
     boxes = [] if target.bounds is None else [target.bounds]
     boxes += target.moving_bounds(motions)
     if not boxes:

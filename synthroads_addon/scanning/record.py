@@ -15,7 +15,7 @@ from .blocks import Block
 from .colour.colour import LayerSource
 from .finish import Finish
 from .plan import ScanPlan
-from .scan import BlockResult, BlockScan, joined_results
+from .scan import BlockResult, BlockScan, join_results
 
 RETURNS_AT_ONCE = 400_000
 """Points that are rendered together: each rendering takes a tenth of a second whatever their number."""
@@ -118,10 +118,10 @@ def _join_into_batches(results: Iterator[BlockResult]) -> Iterator[BlockResult]:
     for result in results:
         batch.append(result)
         if sum(len(one.points) for one in batch) >= RETURNS_AT_ONCE:
-            yield joined_results(batch)
+            yield join_results(batch)
             batch = []
     if batch:
-        yield joined_results(batch)
+        yield join_results(batch)
 
 
 def _map_side_by_side(

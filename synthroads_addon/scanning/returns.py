@@ -8,7 +8,7 @@ import numpy as np
 
 from ..base.arrays import ArrayRows, Bool, Float, Index, UInt8
 
-UNCOUNTED = 1e-6
+LEAST_REFLECTANCE = 1e-6
 """Least reflectance that a hit has in a return's mean range, so that black surfaces have a range as well."""
 
 
@@ -33,8 +33,8 @@ class Echoes(ArrayRows):
 
 
 @dataclass(frozen=True)
-class Marks(ArrayRows):
-    """Contributions of hits to returns; all arrays have one shape.
+class HitSignals(ArrayRows):
+    """Signals that single hits send back, before they are grouped into returns; all arrays have one shape.
 
     Attributes:
         distance: m; inf where nothing is hit.
@@ -47,11 +47,11 @@ class Marks(ArrayRows):
     intensity: Float
 
 
-BothMarks = tuple[Marks, Marks]
-"""Marks of what rays meet first, and of what they meet behind it."""
+BothSignals = tuple[HitSignals, HitSignals]
+"""Signals of what rays meet first, and of what they meet behind permeable surfaces."""
 
 
-def group_returns(first: Marks, behind: Marks, pulse: Index, resolution: float) -> Echoes:
+def group_returns(first: HitSignals, behind: HitSignals, pulse: Index, resolution: float) -> Echoes:
     """Group the hits of every pulse into returns.
 
     Sorted by range, a hit that lies farther than ``resolution`` behind the one before begins a new return. A return's
@@ -77,7 +77,7 @@ def group_returns(first: Marks, behind: Marks, pulse: Index, resolution: float) 
     return _merge_echoes(one, _split_pulses(chosen, first, behind, pulse, resolution))
 
 
-def _whole_pulses(pulse: Index, nearest: Float, first: Marks) -> Echoes:
+def _whole_pulses(pulse: Index, nearest: Float, first: HitSignals) -> Echoes:
     """Return one echo for each of the pulses whose rays all hit within the resolution."""
     rays, pulses = first.distance.shape
     if rays == 1:
@@ -104,7 +104,7 @@ def _brightest_ray(energy: Float) -> Index:
     return result
 
 
-def _split_pulses(chosen: Index, first: Marks, behind: Marks, pulse: Index, resolution: float) -> Echoes:
+def _split_pulses(chosen: Index, first: HitSignals, behind: HitSignals, pulse: Index, resolution: float) -> Echoes:
     """Return the echoes of pulses that meet surfaces at several ranges, or partly nothing, or something behind."""
     rays, pulses = first.distance.shape
     near = np.take(first.distance, chosen, axis=1)
@@ -119,15 +119,15 @@ def _split_pulses(chosen: Index, first: Marks, behind: Marks, pulse: Index, reso
     begins[1:] = (owner[1:] != owner[:-1]) | (np.diff(reach) > resolution)
     starts = np.flatnonzero(begins)
     group = np.cumsum(begins) - 1
-    share = _of_both(first.weight, behind.weight, hit)
-    energy = _of_both(first.intensity, behind.intensity, hit)
+    share = _values_of_hits(first.weight, behind.weight, hit)
+    energy = _values_of_hits(first.intensity, behind.intensity, hit)
     begin, total = reach[starts], np.add.reduceat(share, starts)
     mean = begin + np.add.reduceat(share * (reach - begin[group]), starts) / total
     strongest = hit[_strongest(energy, group, starts)]
     return Echoes(owner[starts], strongest, mean, np.add.reduceat(energy, starts), total)
 
 
-def _of_both(first: Float, behind: Float, hit: Index) -> Float:
+def _values_of_hits(first: Float, behind: Float, hit: Index) -> Float:
     """Return the values of hits, see `Echoes.hit`."""
     result = np.take(first.ravel(), hit, mode="clip")
     late = np.flatnonzero(hit >= first.size)

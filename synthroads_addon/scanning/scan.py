@@ -19,16 +19,16 @@ from .noise import measured_pose, trajectory_errors
 from .plan import ScanPlan
 from .platforms.path import Strip
 from .point_layers import MeasuredPoints, fill_layers, place_points
-from .pulses import Errors, Poses, Pulses, reaching_scene, turn_vectors
+from .pulses import Errors, Poses, Pulses, may_hit_scene, turn_vectors
 from .radiometry import received_intensity, saturate
-from .returns import UNCOUNTED, BothMarks, Echoes, Marks, group_returns, number_returns
-from .trace import Hits, Rays, Traced, trace
+from .returns import LEAST_REFLECTANCE, BothSignals, HitSignals, Echoes, group_returns, number_returns
+from .trace import Hits, Rays, TracedRays, trace
 
 _MOTION_KNOTS = 0.01
 """Seconds between two poses of a moving vehicle: it turns by less than a milliradian meanwhile."""
-LENIENT = 0.25
-"""Share of the threshold that is enough for an echo whose intensity is yet to change: none is expected to become four
-times as bright as its material's mean makes it."""
+PROVISIONAL_THRESHOLD = 0.25
+"""Share of the detector's threshold that keeps an echo while its intensity is still to change: no echo is expected to
+become four times as bright as its material's mean makes it."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class BlockResult:
     blocks: int = 1
 
 
-def joined_results(results: list[BlockResult]) -> BlockResult:
+def join_results(results: list[BlockResult]) -> BlockResult:
     """Return several blocks that aren't finished yet as one, in their order."""
     seen = [result.seen for result in results if result.seen is not None]
 
@@ -99,20 +99,22 @@ class BlockScan:
         pulses = self.emit(strip, poses, errors.angle, first, count)
         number = np.arange(count)  # of each pulse within the block
         # In the air, echoes come from pulses into the sky as well.
-        towards = None if self._in_air else reaching_scene(setting, target, pulses, poses.motions)
+        towards = None if self._in_air else may_hit_scene(setting, target, pulses, poses.motions)
         if towards is not None:
             number = np.flatnonzero(towards)
             pulses = pulses.select(number)
         rays = self.rays(pulses, poses.motions)
         traced = trace(target, plan.surfaces, rays, poses.motions, setting.minimum_range, setting.maximum_range)
-        marks = self.marks(traced)
+        signals = self.signals(traced)
         for effect in plan.effects if self._in_air else ():
             random = stream(plan.seed, f"effect {effect.name}", strip.index, key)
-            traced, marks = apply_effect(effect, random, setting, plan.attenuation, pulses, traced, marks)
-        echoes = group_returns(*marks, traced.pulse, setting.range_resolution)
+            traced, signals = apply_effect(effect, random, setting, plan.attenuation, pulses, traced, signals)
+        echoes = group_returns(*signals, traced.pulse, setting.range_resolution)
         if plan.surfaces.varying:
             echoes = self.vary_brightness(traced, echoes, poses.motions)
-        strong = np.flatnonzero(echoes.intensity >= setting.threshold * (LENIENT if plan.detects_later else 1.0))
+        strong = np.flatnonzero(
+            echoes.intensity >= setting.threshold * (PROVISIONAL_THRESHOLD if plan.detects_later else 1.0)
+        )
         weak = len(echoes.pulse) - len(strong)
         if weak:
             echoes = echoes.select(strong)
@@ -204,20 +206,20 @@ class BlockScan:
         direction = np.repeat(pulses.direction[:, None, :], len(pattern), axis=1)
         return Rays(origin + offsets, direction, share, pulses.time)
 
-    def marks(self, traced: Traced) -> BothMarks:
-        """Return what the hits of traced rays add to returns: what each ray meets first, and what lies behind."""
-        return self._marks(traced.first), self._marks(traced.behind)
+    def signals(self, traced: TracedRays) -> BothSignals:
+        """Return the signals of traced rays' hits: of what each ray meets first, and of what lies behind it."""
+        return self._signals(traced.first), self._signals(traced.behind)
 
-    def _marks(self, hits: Hits) -> Marks:
-        """Return what hits add to returns."""
+    def _signals(self, hits: Hits) -> HitSignals:
+        """Return the signals that hits send back."""
         surfaces, material = self.plan.surfaces, hits.material.ravel()
         brightness = brightness_of(surfaces, material, np.abs(hits.along.ravel())).reshape(hits.face.shape)
         brightness *= hits.share
-        weight = np.maximum(np.take(surfaces.reflectivity, material), UNCOUNTED).reshape(hits.face.shape)
+        weight = np.maximum(np.take(surfaces.reflectivity, material), LEAST_REFLECTANCE).reshape(hits.face.shape)
         weight *= hits.share
-        return Marks(hits.distance, weight, received_intensity(brightness, hits.distance, self.plan.attenuation))
+        return HitSignals(hits.distance, weight, received_intensity(brightness, hits.distance, self.plan.attenuation))
 
-    def vary_brightness(self, traced: Traced, echoes: Echoes, motions: list[Track]) -> Echoes:
+    def vary_brightness(self, traced: TracedRays, echoes: Echoes, motions: list[Track]) -> Echoes:
         """Return the echoes as bright as the places are that gave most of them, see `materials.surfaces`."""
         surfaces, target = self.plan.surfaces, self.plan.target
         material = traced.pick("material", echoes.hit)
@@ -230,7 +232,7 @@ class BlockScan:
         ray, reach, face = traced.ray_of(hit), traced.pick("distance", hit), traced.pick("face", hit)
         position, _ = _ray_ends(traced.rays, ray, reach)
         if target.moving:
-            (position,) = target.at_start(face, position, traced.rays.time[ray % len(traced.rays.time)], motions)
+            (position,) = target.at_time_zero(face, position, traced.rays.time[ray % len(traced.rays.time)], motions)
         intensity = echoes.intensity.copy()
         place = position.T + self.plan.frame
         intensity[uneven] *= spread_factors(surfaces, material[uneven], place, self.plan.seed)
@@ -240,7 +242,7 @@ class BlockScan:
         self,
         strip: Strip,
         pulses: Pulses,
-        traced: Traced,
+        traced: TracedRays,
         echoes: Echoes,
         errors: Errors,
         number_in_block: Index,
@@ -296,7 +298,7 @@ class BlockScan:
         target, time = self.plan.target, rays.time[ray % len(rays.time)]
         position, scanner = _ray_ends(rays, ray, reach)
         if target.moving:
-            begin, offset, normal = target.at_start(face, position, time, motions, (scanner - position, normal))
+            begin, offset, normal = target.at_time_zero(face, position, time, motions, (scanner - position, normal))
             position, scanner = begin, begin + offset
         return SeenPoints(
             position=np.ascontiguousarray(position.T),

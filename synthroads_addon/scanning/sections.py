@@ -92,7 +92,7 @@ def reach(cut: Blocks, geometry: RoadGeometry, blocks: list[Block]) -> tuple[flo
         chosen = np.unique(np.linspace(0, len(numbers) - 1, _PLACES).astype(int))
         rays = [_rays(cut, strip, numbers[i]) for i in chosen]
         origin, direction = (np.concatenate(parts) for parts in zip(*rays, strict=True))
-        stations.append(_reached_stations(cut, geometry, origin, direction))
+        stations.append(_stations_of_rays(cut, geometry, origin, direction))
     return min(low for low, _ in stations), max(high for _, high in stations)
 
 
@@ -164,7 +164,7 @@ def _rays(cut: Blocks, strip: Strip, block: int) -> tuple[Float, Float]:
     return np.concatenate(origins), np.concatenate(directions)
 
 
-def _reached_stations(cut: Blocks, geometry: RoadGeometry, origin: Float, direction: Float) -> tuple[float, float]:
+def _stations_of_rays(cut: Blocks, geometry: RoadGeometry, origin: Float, direction: Float) -> tuple[float, float]:
     """Return the smallest and the largest station that rays come to where there can be anything."""
     farthest = cut.setting.maximum_range
     begin, _ = geometry.alignment.project(origin[:, :2])

@@ -59,7 +59,7 @@ class Hits(ArrayRows):
 
 
 @dataclass(frozen=True)
-class Traced:
+class TracedRays:
     """All that the rays of a block meet.
 
     Attributes:
@@ -99,7 +99,7 @@ class Traced:
 
 def trace(
     target: Target, surfaces: Surfaces, rays: Rays, motions: list[Track], nearest: float, farthest: float
-) -> Traced:
+) -> TracedRays:
     """Follow rays to what they meet between two ranges (m).
 
     The shares taken along one ray never add up to more than its own.
@@ -140,14 +140,14 @@ def trace(
     return _gather_hits(rays, first, layers, rays_on)
 
 
-def _gather_hits(rays: Rays, first: Hits, layers: list[Hits], on: list[Index]) -> Traced:
+def _gather_hits(rays: Rays, first: Hits, layers: list[Hits], on: list[Index]) -> TracedRays:
     """Return all hits; behind permeable surfaces only those within reach."""
     if not layers:
         none, nothing = np.empty(0, dtype=np.intp), np.empty(0)
-        return Traced(rays, first, Hits(none, none, nothing, nothing, nothing), none)
+        return TracedRays(rays, first, Hits(none, none, nothing, nothing, nothing), none)
     behind = Hits.join(layers)
     inside = np.flatnonzero(behind.distance < np.inf)
-    return Traced(rays, first, behind.select(inside), np.concatenate(on)[inside])
+    return TracedRays(rays, first, behind.select(inside), np.concatenate(on)[inside])
 
 
 def _within(distance: Float, nearest: float, farthest: float) -> Float:

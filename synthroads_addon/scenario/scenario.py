@@ -212,24 +212,24 @@ def load_scenario(name_or_file: str, changes: list[str] | None = None) -> Scenar
     scenario = Scenario.from_dict(read_json(path), source=str(name_or_file))
     if not changes:
         return scenario
-    return Scenario.from_dict(with_changes(scenario.to_dict(), map(parsed_change, changes)))
+    return Scenario.from_dict(with_changes(scenario.to_dict(), map(parse_change, changes)))
 
 
 def with_changes(data: Any, changes: Iterable[tuple[str, Any]]) -> Any:
     """Return a scenario's JSON data with values set by their dotted paths, one after another.
 
-    What the scenario said itself and doesn't fit them any more gives way, see `without_what_gives_way`.
+    What the scenario said itself and doesn't fit them any more gives way, see `drop_misfits`.
     """
     before, named = data, set()
     for path, value in changes:
         data = apply_values(data, {path: value})
         named.add(path)
-    return without_what_gives_way(data, before, named)
+    return drop_misfits(data, before, named)
 
 
 def apply_change(data: Any, change: str, model: type[Model] = Scenario) -> Any:
     """Return JSON data with one ``path=value`` applied, the value being of the type of the model's field."""
-    path, value = parsed_change(change, model)
+    path, value = parse_change(change, model)
     return _with_value(data, path, value)
 
 
@@ -242,7 +242,7 @@ def apply_values(data: Any, values: Mapping[str, Any]) -> Any:
     return data
 
 
-def parsed_change(change: str, model: type[Model] = Scenario) -> tuple[str, Any]:
+def parse_change(change: str, model: type[Model] = Scenario) -> tuple[str, Any]:
     """Return path and value of ``path=value``, see `typed_value`; raise `InputError` if it has another form."""
     path, equals, text = change.partition("=")
     if not equals or not _is_path(path):
@@ -262,7 +262,7 @@ def _with_value(data: Any, path: str, value: Any, above: str = "") -> Any:
     return {**data, head: _with_value(data.get(head, {}), rest, value, here) if dot else value}
 
 
-def without_what_gives_way(data: dict[str, Any], before: Mapping[str, Any], named: AbstractSet[str]) -> dict[str, Any]:
+def drop_misfits(data: dict[str, Any], before: Mapping[str, Any], named: AbstractSet[str]) -> dict[str, Any]:
     """Return a changed scenario's JSON data without what it said itself and doesn't fit the changes any more.
 
     Of a design class and a standard cross-section that don't fit each other, the one that no change names is left out;

@@ -128,7 +128,7 @@ def parse_tolerance(text: str, field: str = "--tolerance") -> dict[str, float]:
     return data
 
 
-def written_error(name: str, value: float) -> str:
+def error_text(name: str, value: float) -> str:
     """Return an error of a kind in the unit that its tolerance is usually given in: ``5 mm``, ``2 %``."""
     kind = KINDS[name]
     return f"{value / kind.factor:.3g}{kind.suffix}"

@@ -23,7 +23,7 @@ from synthroads_addon.calibration.fit import (
     gain_of,
 )
 from synthroads_addon.calibration.job import Calibration, CalibrationJob, MaterialTarget, calibrate, save_fitted, steps
-from synthroads_addon.calibration.pavement import RoadClasses, beside_axis, road_classes
+from synthroads_addon.calibration.pavement import RoadClasses, axis_coordinates, road_classes
 from synthroads_addon.calibration.plot import save_plot
 from synthroads_addon.materials.reflectance import facet_terms
 from synthroads_addon.materials.table import Material, materials, read_material_table, write_material_table
@@ -215,7 +215,7 @@ def test_lines_are_found_where_they_are_and_not_by_each_points_own_brightness(tm
 def test_stations_and_offsets_beside_a_bent_axis_with_a_gap() -> None:
     axis = np.array([[0.0, 0.0], [4.0, 0.0], [8.0, 0.0], [8.0, 4.0], [8.0, 40.0], [8.0, 44.0]])
     points = np.array([[2.0, 1.0], [9.0, 2.0], [8.2, -0.2], [5.0, 20.0], [7.0, 42.0], [-3.0, 0.0], [2.0, 90.0]])
-    station, offset = beside_axis(points, axis)
+    station, offset = axis_coordinates(points, axis)
     assert station[[0, 1]] == pytest.approx([2.0, 10.0])
     assert offset[[0, 1]] == pytest.approx([1.0, -1.0])
     assert np.isfinite(offset[[2, 4]]).all()

@@ -23,7 +23,7 @@ from synthroads_addon.dataset.manifest import (
     check_same_recipe,
     faults,
     file_entries,
-    manifest_of,
+    make_manifest,
     write_manifest,
 )
 from synthroads_addon.dataset.recipe import Recipe, load_recipe, recipe_names, scene_jobs
@@ -172,7 +172,7 @@ def test_faults_are_found(tmp_path: Path) -> None:
 
 
 def test_another_recipe_or_version_is_not_continued(tmp_path: Path) -> None:
-    write_manifest(tmp_path, manifest_of("T", "SynthRoads 1", "recipe", [], 1))
+    write_manifest(tmp_path, make_manifest("T", "SynthRoads 1", "recipe", [], 1))
     assert not check_same_recipe(tmp_path, "recipe", "SynthRoads 1").complete
     with pytest.raises(InputError, match="begun with another recipe"):
         check_same_recipe(tmp_path, "other recipe", "SynthRoads 1")

@@ -35,7 +35,7 @@ from synthroads_addon.scanning.platforms.polyline import PolylineGuide
 from synthroads_addon.scanning.platforms.registry import make_platform
 from synthroads_addon.scenario.assets import LIBRARIES, read_asset_library
 from synthroads_addon.scenario.road import RoadScenario
-from synthroads_addon.scenario.scenario import Scenario, apply_change, load_scenario, parsed_change
+from synthroads_addon.scenario.scenario import Scenario, apply_change, load_scenario, parse_change
 from tests.helpers.files.mutations import accepted, damaged, for_all, fuzz, json_files, wrong_values, yaml_files
 from tests.helpers.roads.checker_full_road import full
 
@@ -238,7 +238,7 @@ def test_changes_on_the_command_line(count: int) -> None:
         text = content.decode("utf-8", errors="surrogateescape")
         data = Scenario().to_dict()
         accepted(lambda: Scenario.from_dict(apply_change(data, text)))
-        accepted(lambda: parsed_change(text))
+        accepted(lambda: parse_change(text))
 
     for_all(damaged(texts), count, body)
 
@@ -366,4 +366,4 @@ def test_dashes_shorter_than_any_paint_are_refused() -> None:
 
 def test_changes_nested_beyond_reason() -> None:
     refused(lambda: apply_change({}, "a." * 5000 + "b=1"), "--set is 'a.a.*must be path=value")
-    assert parsed_change("a=" + "[" * 100_000)[1] == "[" * 100_000
+    assert parse_change("a=" + "[" * 100_000)[1] == "[" * 100_000

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from synthroads_addon.scanning.returns import Marks, group_returns, number_returns
+from synthroads_addon.scanning.returns import HitSignals, group_returns, number_returns
 
 INF = np.inf
 
@@ -17,7 +17,7 @@ def group(ranges, resolution=0.6, behind=()):
     energy = np.where(np.isfinite(ranges.T), share, 0.0)
     pulse, late = np.array([p for p, _ in behind], dtype=np.intp), np.array([r for _, r in behind], dtype=float)
     same = np.full(len(late), 1.0 / ranges.shape[1])
-    return group_returns(Marks(ranges.T, share, energy), Marks(late, same, same), pulse, resolution)
+    return group_returns(HitSignals(ranges.T, share, energy), HitSignals(late, same, same), pulse, resolution)
 
 
 def test_one_surface_is_one_return() -> None:
@@ -53,8 +53,8 @@ def test_nothing_hit_and_no_pulse_at_all() -> None:
 def test_label_is_of_the_strongest_ray() -> None:
     distance = np.array([[10.0, 10.1, 10.2], [10.0, 20.0, 20.1]]).T
     energy = np.array([[0.1, 0.7, 0.2], [0.2, 0.1, 0.4]]).T
-    none = Marks(np.empty(0), np.empty(0), np.empty(0))
-    echoes = group_returns(Marks(distance, np.full((3, 2), 1 / 3), energy), none, np.empty(0, dtype=np.intp), 0.6)
+    none = HitSignals(np.empty(0), np.empty(0), np.empty(0))
+    echoes = group_returns(HitSignals(distance, np.full((3, 2), 1 / 3), energy), none, np.empty(0, dtype=np.intp), 0.6)
     assert echoes.hit.tolist() == [2, 1, 5]  # ray 1 of pulse 0, rays 0 and 2 of pulse 1
 
 

@@ -6,7 +6,7 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.road.guidelines import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS
 from synthroads_addon.scanning.devices.device import device_names
 from synthroads_addon.scenario.scan import scanner_setting
-from synthroads_addon.scenario.scenario import Scenario, apply_change, load_scenario, parsed_change, scenario_names
+from synthroads_addon.scenario.scenario import Scenario, apply_change, load_scenario, parse_change, scenario_names
 
 
 def test_changes_are_applied_and_unknown_keys_named() -> None:
@@ -74,7 +74,7 @@ TYPED = {
 
 @pytest.mark.parametrize("change", TYPED)
 def test_values_are_of_the_type_of_their_field(change: str) -> None:
-    path, value = parsed_change(change)
+    path, value = parse_change(change)
     assert path == change.partition("=")[0]
     assert value == TYPED[change]
     assert type(value) is type(TYPED[change])

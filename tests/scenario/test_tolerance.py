@@ -13,7 +13,7 @@ from headless.commands import choice_changes
 from headless.tradeoff_table import ROW_TITLES
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.scenario.scenario import load_scenario
-from synthroads_addon.scenario.tolerance import KINDS, TIMES, Tolerance, parse_tolerance, with_unit, written_error
+from synthroads_addon.scenario.tolerance import KINDS, TIMES, Tolerance, error_text, parse_tolerance, with_unit
 
 
 def test_every_kind_is_a_field_and_a_column() -> None:
@@ -107,7 +107,7 @@ def test_the_command_line_says_the_same() -> None:
 
 
 def test_errors_are_shown_in_their_units() -> None:
-    assert written_error("height", 0.005) == "5 mm"
-    assert written_error("intensity", 0.0512) == "5.12 %"
-    assert written_error("colour", 2.0) == "2"
-    assert not math.isnan(float(written_error("layers", 0.01)))
+    assert error_text("height", 0.005) == "5 mm"
+    assert error_text("intensity", 0.0512) == "5.12 %"
+    assert error_text("colour", 2.0) == "2"
+    assert not math.isnan(float(error_text("layers", 0.01)))

@@ -79,7 +79,7 @@ def _use_for_temporary_files(variables: dict[str, str | None], folder: str | Non
     tempfile.tempdir = folder
 
 
-def unwritable_temporary(folder: Path, error: Exception) -> OutputError:
+def temporary_folder_error(folder: Path, error: Exception) -> OutputError:
     """Return the error of a temporary folder to which something couldn't be written."""
     reason, place = getattr(error, "strerror", None) or "is the disk full?", folder
     while _NAME.fullmatch(place.name):
@@ -96,7 +96,7 @@ def remove_leftovers(parent: Path) -> None:
                     _remove_leftover(folder)
 
 
-def remove_own() -> None:
+def remove_scratch_folders() -> None:
     """Remove the scratch folders of this process that still stand, before it ends without unwinding its stack."""
     for folder in filter(_is_ours, list(_mine)):
         _remove(folder)
@@ -143,7 +143,7 @@ def _remove(folder: Path) -> None:
         with suppress(OSError):
             os.close(lock)
     shutil.rmtree(folder, ignore_errors=True)
-    _mine.pop(folder, None)  # not before: where this is cut off `remove_own` goes on with it
+    _mine.pop(folder, None)  # not before: where this is cut off `remove_scratch_folders` goes on with it
 
 
 def names_to_move(folder: Path) -> list[str]:

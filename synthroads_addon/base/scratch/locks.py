@@ -129,7 +129,7 @@ def _start_of(pid: int) -> int | None:
     return 0
 
 
-class TakenError(Exception):
+class LockHeldError(Exception):
     """A lock file is another process's.
 
     Attributes:
@@ -147,7 +147,7 @@ def exclusive(path: Path) -> Iterator[None]:
     """Hold a lock file; it goes with the process however that ends. The file itself stays, empty.
 
     Raises:
-        TakenError: another process holds it, or may do so.
+        LockHeldError: another process holds it, or may do so.
         OSError: it can't be written.
     """
     with path.open("a+", encoding="utf-8") as file:
@@ -157,7 +157,7 @@ def exclusive(path: Path) -> Iterator[None]:
             owner = read_owner(file.read())
         if lock is False or (lock is None and owner is not None and not is_dead(owner, None)):
             certain = lock is False or (owner is not None and owner.host == this_process().host)
-            raise TakenError(owner, certain)
+            raise LockHeldError(owner, certain)
         file.truncate(0)
         file.write(this_process(lock is True).to_json())
         file.flush()

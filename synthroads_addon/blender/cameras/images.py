@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...base.scratch.folders import scratch_folder, unwritable_temporary
+from ...base.scratch.folders import scratch_folder, temporary_folder_error
 from ...scanning.colour.colour import MaterialLayers
 from ...scanning.colour.images import ImageLayers
 from ...scanning.colour.views import RenderedImage, View
@@ -70,7 +70,7 @@ class RenderedLayers(ImageLayers):
         try:
             np.save(path, array)
         except OSError as error:
-            raise unwritable_temporary(self._folder, error) from None
+            raise temporary_folder_error(self._folder, error) from None
         # An empty array can't be mapped.
         return np.load(path, mmap_mode="r" if array.size else None)
 

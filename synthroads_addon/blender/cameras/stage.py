@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.scratch.folders import scratch_folder, unwritable_temporary
+from ...base.scratch.folders import scratch_folder, temporary_folder_error
 from ...scanning.colour.colour import MATERIAL_LAYERS
 from ..files import stderr_if_it_succeeds
 from .exr import read_layers
@@ -111,7 +111,7 @@ class RenderStage:
                     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
             return self._read(read_layers(path))
         except (OSError, LookupError, StopIteration, RuntimeError) as error:
-            raise unwritable_temporary(self.folder, error) from None
+            raise temporary_folder_error(self.folder, error) from None
 
     def forget(self) -> None:
         """Have the renderer drop what it keeps from image to image."""

@@ -131,7 +131,7 @@ class CloudWriter(ABC):
         """Return `notes` with offset and coordinate system, for formats that have no fields for these."""
         return {**self.notes(), "offset": self.offset.tolist(), "crs": self.crs_text}
 
-    def integers(self, values: AnyArray, kind: str, name: str, scale: float | None = None) -> AnyArray:
+    def to_integers(self, values: AnyArray, kind: str, name: str, scale: float | None = None) -> AnyArray:
         """Return values (N,) as whole steps, rounded, in the integer type ``kind``.
 
         Raises:
@@ -151,29 +151,29 @@ class CloudWriter(ABC):
             raise OutputError(str(self.path), float(worst * step), allowed)
         return steps.astype(kind)
 
-    def finite(self, values: AnyArray, name: str) -> AnyArray:
+    def check_finite(self, values: AnyArray, name: str) -> AnyArray:
         """Return values as they are; raise `OutputError` if one is NaN or infinite."""
         if not np.isfinite(values).all():
             worst = values[~np.isfinite(values).reshape(len(values), -1).all(axis=1)][0]
             raise OutputError(str(self.path), worst.tolist(), f"{name} must be finite")
         return values
 
-    def fitting(self, values: AnyArray, kind: str, name: str) -> AnyArray:
-        """Return values that fit into a type, see `integers` and `finite`."""
-        return self.finite(values, name) if np.dtype(kind).kind == "f" else self.integers(values, kind, name)
+    def fit_values(self, values: AnyArray, kind: str, name: str) -> AnyArray:
+        """Return values that fit into a type, see `to_integers` and `check_finite`."""
+        return self.check_finite(values, name) if np.dtype(kind).kind == "f" else self.to_integers(values, kind, name)
 
     def file_class_ids(self, block: PointBlock) -> UInt8:
         """Return the block's classes (N,) in the file's scheme."""
-        return np.take(self.scheme.ids, self.integers(block.class_id, "uint8", "class_id"))
+        return np.take(self.scheme.ids, self.to_integers(block.class_id, "uint8", "class_id"))
 
-    def stored(self, column: Column, block: PointBlock) -> AnyArray:
-        """Return a column (N,) of a block as the integers that LAS and E57 store."""
+    def stored_integers(self, column: Column, block: PointBlock) -> AnyArray:
+        """Return the integers (N,) that LAS and E57 store for a column of a block."""
         if column.array == "class_id":
             return self.file_class_ids(block)
         values = column.values(block)
         if column.local and column.component is not None:
             values = values - self.offset[column.component]
-        return self.integers(values, column.dtype, column.name, column.scale)
+        return self.to_integers(values, column.dtype, column.name, column.scale)
 
     def content_id(self, *more: object) -> str:
         """Return 32 hexadecimal digits that depend on the file's description alone: no wall clock, no chance."""
@@ -270,7 +270,7 @@ class CloudReader(ABC):
         """
         done = 0
         for block in self._stored_blocks(size):
-            yield _checked(self.header.path, done, block)
+            yield _check_block(self.header.path, done, block)
             done += len(block)
 
     @abstractmethod
@@ -350,7 +350,7 @@ def intensity_scale(path: Path, notes: dict[str, Any]) -> float:
     return float(scale)
 
 
-def finite_coordinates(path: Path, done: int, xyz: Float) -> Float:
+def check_coordinates(path: Path, done: int, xyz: Float) -> Float:
     """Return the coordinates (N, 3) of a block as they are.
 
     Args:
@@ -367,11 +367,11 @@ def finite_coordinates(path: Path, done: int, xyz: Float) -> Float:
     return xyz
 
 
-def _checked(path: Path, done: int, block: PointBlock) -> PointBlock:
+def _check_block(path: Path, done: int, block: PointBlock) -> PointBlock:
     """Return a block as it is; raise `InputError` if a coordinate or intensity can't be one."""
     if not len(block):
         return block
-    xyz = finite_coordinates(path, done, block.xyz)
+    xyz = check_coordinates(path, done, block.xyz)
     if max(xyz.max(), -xyz.min()) > FARTHEST:
         point, axis = divmod(int(np.abs(xyz).argmax()), 3)
         allowed = f"must be a map coordinate, at most {FARTHEST:g} m"

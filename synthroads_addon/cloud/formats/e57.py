@@ -19,7 +19,7 @@ from ...base.errors import InputError
 from ...base.rotations import matrices
 from ..layers import Column, columns, make_points
 from ..points import PointBlock
-from .base import CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
+from .base import CloudReader, CloudWriter, check_coordinates, damage_error, header_from_notes
 
 SCALE = 1e-4
 """Size of a coordinate's step, m."""
@@ -92,7 +92,7 @@ class E57Writer(CloudWriter):
         first = 0
         while first < len(block):
             part = block.select(slice(first, first + _CAPACITY - self._held))
-            for name, values in self._packed(part).items():
+            for name, values in self._pack_columns(part).items():
                 self._arrays[name][self._held : self._held + len(part)] = values
             self._held += len(part)
             first += len(part)
@@ -133,24 +133,24 @@ class E57Writer(CloudWriter):
             self._points.close()
         self._file.close()
 
-    def _packed(self, part: PointBlock) -> dict[str, AnyArray]:
+    def _pack_columns(self, part: PointBlock) -> dict[str, AnyArray]:
         """Return what is stored of at most `_CAPACITY` points, by name."""
         local = part.xyz - self.offset
-        packed = {f"cartesian{'XYZ'[i]}": self.integers(local[:, i], "int32", "xyz", SCALE) for i in range(3)}
-        rgb = self.integers(part.rgb, "uint16", "rgb") >> 8
+        packed = {f"cartesian{'XYZ'[i]}": self.to_integers(local[:, i], "int32", "xyz", SCALE) for i in range(3)}
+        rgb = self.to_integers(part.rgb, "uint16", "rgb") >> 8
         packed |= dict(zip(_CHANNELS, rgb.T, strict=True))
-        number = self.integers(part.return_number, "uint8", "return_number")
+        number = self.to_integers(part.return_number, "uint8", "return_number")
         packed |= {
-            "intensity": self.finite(part.intensity, "intensity"),
-            "timeStamp": self.finite(part.gps_time, "gps_time"),
+            "intensity": self.check_finite(part.intensity, "intensity"),
+            "timeStamp": self.check_finite(part.gps_time, "gps_time"),
             "returnIndex": np.maximum(number, 1) - 1,  # counts from 0
-            "returnCount": self.integers(part.number_of_returns, "uint8", "number_of_returns"),
-            f"{EXTENSION}:scan_angle": self.finite(part.scan_angle_deg, "scan_angle"),
-            f"{EXTENSION}:strip": self.integers(part.strip, "uint16", "strip"),
+            "returnCount": self.to_integers(part.number_of_returns, "uint8", "number_of_returns"),
+            f"{EXTENSION}:scan_angle": self.check_finite(part.scan_angle_deg, "scan_angle"),
+            f"{EXTENSION}:strip": self.to_integers(part.strip, "uint16", "strip"),
             # Readers such as pye57's `read_scan` insist on it.
             "cartesianInvalidState": np.full(len(part), _VALID, dtype=np.uint8),
         }
-        return packed | {e57_name(column): self.stored(column, part) for column in self.columns}
+        return packed | {e57_name(column): self.stored_integers(column, part) for column in self.columns}
 
     def _begin_root(self) -> None:
         """Write what a file and its one scan are described by."""
@@ -239,7 +239,7 @@ class E57Reader(CloudReader):
         try:
             self._file = e57.ImageFile(str(path), "r")
         except Exception as problem:
-            raise InputError(str(path), None, f"is not an E57 file that can be read ({_short(problem)})") from None
+            raise InputError(str(path), None, f"is not an E57 file that can be read ({_error_text(problem)})") from None
         try:
             root = self._file.root()
             self._scans = [root["data3D"][i] for i in range(len(root["data3D"]))]
@@ -249,7 +249,7 @@ class E57Reader(CloudReader):
             notes = json.loads(root[f"{EXTENSION}:notes"].value()) if noted else None
         except Exception as problem:
             self.close()
-            raise InputError(str(path), None, f"is an E57 file that is damaged ({_short(problem)})") from None
+            raise InputError(str(path), None, f"is an E57 file that is damaged ({_error_text(problem)})") from None
         names: set[str] = set().union(*self._fields)
         if sum(counts) and not all({"cartesianX", "cartesianY", "cartesianZ"} <= fields for fields in self._fields):
             self.close()
@@ -281,7 +281,7 @@ class E57Reader(CloudReader):
                 block = self._block({name: array[:got] for name, array in arrays.items()}, got, _pose(scan))
                 invalid = arrays["cartesianInvalidState"][:got] if "cartesianInvalidState" in arrays else None
                 block = block if invalid is None else block.select(invalid == 0)
-                finite_coordinates(self.header.path, done, block.xyz)
+                check_coordinates(self.header.path, done, block.xyz)
                 yield block
                 done, left = done + got, left - got
             if reader:
@@ -321,5 +321,5 @@ def _pose(scan: Any) -> tuple[AnyArray, AnyArray]:
     return rotation, translation
 
 
-def _short(problem: Exception) -> str:
+def _error_text(problem: Exception) -> str:
     return " ".join(str(problem).split())[:80]

@@ -99,15 +99,15 @@ class LasWriter(CloudWriter):
             self.clipped += int(np.count_nonzero(brightness > 65535))
             np.minimum(brightness, 65535, out=brightness)
         record["intensity"] = brightness
-        rgb = self.integers(block.rgb, "uint16", "rgb")
+        rgb = self.to_integers(block.rgb, "uint16", "rgb")
         record["red"], record["green"], record["blue"] = rgb[:, 0], rgb[:, 1], rgb[:, 2]
         self._pack_returns(block, record)
-        record["gps_time"] = self.finite(block.gps_time, "gps_time")
+        record["gps_time"] = self.check_finite(block.gps_time, "gps_time")
         record["scan_angle"] = self._scan_angle(block)
-        record["point_source_id"] = self.integers(block.strip, "uint16", "strip") + np.uint16(1)
+        record["point_source_id"] = self.to_integers(block.strip, "uint16", "strip") + np.uint16(1)
         for column in self.columns:
-            record[column.name] = self.stored(column, block)
-        record["classification"] = np.take(self._codes, self.integers(block.class_id, "uint8", "class_id"))
+            record[column.name] = self.stored_integers(column, block)
+        record["classification"] = np.take(self._codes, self.to_integers(block.class_id, "uint8", "class_id"))
 
     def _pack_coordinates(self, xyz: Float, record: AnyArray) -> None:
         steps = np.empty((3, len(xyz)))  # a row per axis: its extremes are found ten times as fast
@@ -123,8 +123,8 @@ class LasWriter(CloudWriter):
 
     def _pack_returns(self, block: PointBlock, record: AnyArray) -> None:
         """Pack return number and number of returns, four bits each."""
-        number = self.integers(block.return_number, "uint8", "return_number")
-        of = self.integers(block.number_of_returns, "uint8", "number_of_returns")
+        number = self.to_integers(block.return_number, "uint8", "return_number")
+        of = self.to_integers(block.number_of_returns, "uint8", "number_of_returns")
         most = max(number.max(), of.max())
         if most > 15:
             raise OutputError(str(self.path), int(most), "returns of a pulse must be at most 15")
@@ -132,7 +132,7 @@ class LasWriter(CloudWriter):
         self._by_return += [np.count_nonzero(number == k) for k in range(16)]  # faster than to sort them into bins
 
     def _scan_angle(self, block: PointBlock) -> NDArray[np.int16]:
-        steps = self.integers(block.scan_angle_deg, "int16", "scan_angle", SCAN_ANGLE_STEP)
+        steps = self.to_integers(block.scan_angle_deg, "int16", "scan_angle", SCAN_ANGLE_STEP)
         if max(-int(steps.min()), int(steps.max())) > 30_000:
             raise OutputError(str(self.path), float(np.abs(block.scan_angle_deg).max()), "scan_angle is at most 180")
         return steps

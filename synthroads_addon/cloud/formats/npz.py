@@ -25,7 +25,7 @@ from ...base.arrays import AnyArray
 from ...base.errors import InputError
 from ..layers import columns, layer_arrays, make_points
 from ..points import POINT_TYPES, PointBlock
-from .base import CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
+from .base import CloudReader, CloudWriter, check_coordinates, damage_error, header_from_notes
 
 _ON_REQUEST = {name: (np.dtype(kind).str, width) for name, (kind, width) in layer_arrays().items()}
 ARCHIVE_FAULTS = (
@@ -53,7 +53,7 @@ class NpzWriter(CloudWriter):
     def _append(self, block: PointBlock) -> None:
         for name, (kind, _) in self._arrays.items():
             values = self.file_class_ids(block) if name == "class_id" else block.array(name)
-            self._files[name].write(np.ascontiguousarray(self.fitting(values, kind, name), dtype=kind).data)
+            self._files[name].write(np.ascontiguousarray(self.fit_values(values, kind, name), dtype=kind).data)
 
     def _finish(self) -> None:
         for file in self._files.values():
@@ -124,7 +124,7 @@ class NpzReader(CloudReader):
                     arrays = {name: self._rows(members[name], name, rows) for name in members}
                 except ARCHIVE_FAULTS:
                     raise damage_error(self.header.path, done, self.header.count) from None
-                finite_coordinates(self.header.path, done, arrays["xyz"])
+                check_coordinates(self.header.path, done, arrays["xyz"])
                 yield self._block(arrays, rows)
         finally:
             for member in members.values():

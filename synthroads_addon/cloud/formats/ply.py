@@ -18,7 +18,7 @@ from ...base.arrays import AnyArray, UInt16
 from ...base.errors import InputError
 from ..layers import Column, columns, make_points
 from ..points import PointBlock
-from .base import CloudReader, CloudWriter, damage_error, finite_coordinates, header_from_notes
+from .base import CloudReader, CloudWriter, check_coordinates, damage_error, header_from_notes
 
 _NAMES = {"NormalX": "nx", "NormalY": "ny", "NormalZ": "nz"}
 """Columns that PLY has names of its own for."""
@@ -74,17 +74,19 @@ class PlyWriter(CloudWriter):
 
     def _append(self, block: PointBlock) -> None:
         record = np.zeros(len(block), dtype=self._type)
-        record["x"], record["y"], record["z"] = self.finite(block.xyz, "xyz").T
+        record["x"], record["y"], record["z"] = self.check_finite(block.xyz, "xyz").T
         for name, channel in zip(_CHANNELS, block.rgb.T, strict=True):
-            record[name] = self.integers(channel, "uint16", name) >> 8
+            record[name] = self.to_integers(channel, "uint16", name) >> 8
         for array, (name, kind) in _FIELDS.items():
-            record[name] = self.fitting(block.array(array), kind, name)
+            record[name] = self.fit_values(block.array(array), kind, name)
         for column in self.columns:
             if column.array == "class_id":
                 record["class_id"] = self.file_class_ids(block)
             else:
-                values = self.finite(column.values(block), column.name)
-                record[ply_name(column)] = self.integers(values, column.dtype, column.name) if column.whole else values
+                values = self.check_finite(column.values(block), column.name)
+                record[ply_name(column)] = (
+                    self.to_integers(values, column.dtype, column.name) if column.whole else values
+                )
         self._file.write(record)
 
     def _finish(self) -> None:
@@ -154,7 +156,7 @@ class PlyReader(CloudReader):
             label = next((name for name in _CLASS_NAMES if name in self._names), None)
             stored["class_id"] = record[label] if label else np.zeros(len(record))
         xyz = np.stack([record[name].astype(np.float64) for name in "xyz"], axis=1)
-        stored["xyz"] = finite_coordinates(self.header.path, done, xyz)
+        stored["xyz"] = check_coordinates(self.header.path, done, xyz)
         dark = np.zeros(len(record), dtype=np.uint16)
         channels = (_sixteen_bits(record[name]) if name in self._names else dark for name in _CHANNELS)
         stored["rgb"] = np.stack(list(channels), axis=1)

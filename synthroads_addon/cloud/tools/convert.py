@@ -51,7 +51,7 @@ def convert(
         with _writer_like(cloud, output, scheme) as writer:
             for points in _pass_with_progress(cloud.blocks(block), cloud.header.count, progress, "convert"):
                 writer.write(points)
-        return _done(cloud, writer)
+        return _summary(cloud, writer)
 
 
 def subsample(
@@ -72,7 +72,7 @@ def subsample(
         with _writer_like(cloud, output, scheme) as writer:
             for points in grid.blocks():
                 writer.write(points)
-        return _done(cloud, writer) | {"grid": cell, "points_read": grid.points_read}
+        return _summary(cloud, writer) | {"grid": cell, "points_read": grid.points_read}
 
 
 def map_intensity(
@@ -91,7 +91,7 @@ def map_intensity(
         with _writer_like(cloud, output, _scheme_of(cloud, None), mapping.scale) as writer:
             for block in _pass_with_progress(mapping.blocks(cloud), cloud.header.count, progress, "map"):
                 writer.write(block)
-        result = _done(cloud, writer) | {
+        result = _summary(cloud, writer) | {
             "target": other.header.path.name,
             "distance_before": mapping.distance_before(),
             "distance_after": mapping.distance_after(),
@@ -288,7 +288,7 @@ def _writer_like(
     return open_writer(output, crs, offset, scale, header.attributes, scheme, header.crs_text)
 
 
-def _done(cloud: CloudReader, writer: CloudWriter) -> dict[str, Any]:
+def _summary(cloud: CloudReader, writer: CloudWriter) -> dict[str, Any]:
     return {
         "file": cloud.header.path.name,
         "output": str(writer.path),

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...base.errors import InputError
-from ...scenario.tolerance import written_error
+from ...scenario.tolerance import error_text
 from ..measure.errors import Errors
 
 _LEAST = 1e-9
@@ -72,11 +72,11 @@ def _impossible(options: Sequence[Option], limits: Mapping[str, float]) -> Input
     for kind, limit in limits.items():
         best = min(option.bound(kind) for option in options)
         if best > limit:
-            text = f"can't be kept here: the best to be had is {written_error(kind, best)}"
+            text = f"can't be kept here: the best to be had is {error_text(kind, best)}"
             return InputError(f"tolerance.{kind}", limit, text)
     kinds = [kind for kind in limits if any(kind in option.found for option in options)]
     nearest = min(options, key=lambda option: max(option.bound(kind) / max(limits[kind], _LEAST) for kind in kinds))
-    said = ", ".join(f"{kind}={written_error(kind, nearest.bound(kind))}" for kind in kinds)
+    said = ", ".join(f"{kind}={error_text(kind, nearest.bound(kind))}" for kind in kinds)
     return InputError("tolerance", None, f"{' and '.join(kinds)} can't be kept together: the nearest is {said}")
 
 

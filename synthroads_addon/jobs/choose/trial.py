@@ -25,7 +25,7 @@ from ...scanning.noise import Noise
 from ...scanning.plan import ScanPlan
 from ...scanning.platforms.stretches import scatter_stretches
 from ...scanning.record import record_as_measured
-from ...scanning.scan import BlockResult, joined_results
+from ...scanning.scan import BlockResult, join_results
 from ...scanning.scene.motion import ScannedScene
 from ..measure.errors import (
     CONVERGED,
@@ -88,7 +88,7 @@ class Trial:
         path = scatter_stretches(self.plan.path, lines or self.lines, PULSES / self.plan.setting.shot_rate, self.phase)
         plan = replace(self.plan, path=path, rings=rings)
         results = iter(record_as_measured(plan))
-        return [joined_results([next(results) for _ in plan.cut.block_numbers(strip)]) for strip in path.strips]
+        return [join_results([next(results) for _ in plan.cut.block_numbers(strip)]) for strip in path.strips]
 
     def points(self, rings: tuple[int, ...] = RINGS[CONVERGED]) -> list[PointBlock]:
         """Return the points of the stretches with a beam: the converged one, which is the truth, if none is given."""

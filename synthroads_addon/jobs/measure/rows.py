@@ -25,7 +25,7 @@ from ...scanning.plan import ScanPlan
 from ...scanning.platforms.stretches import middle_stretches, spread_stretches
 from ...scanning.record import RETURNS_AT_ONCE, record_as_measured, scan_blocks
 from ...scanning.relief import micro_relief
-from ...scanning.scan import BlockResult, joined_results
+from ...scanning.scan import BlockResult, join_results
 from ...scanning.scene.height_errors import mesh_height_errors
 from ...scenario.scenario import load_scenario
 from ..open_scene import RoadScene
@@ -135,7 +135,7 @@ def _measure_stretches(site: Site, knob: Knob, plan: ScanPlan) -> tuple[dict[str
         request = replace(request, wanted=LAYERS)
     path = spread_stretches(plan.path, _STRETCHES, _SECONDS)
     part = replace(plan, path=path)
-    result = joined_results(record_as_measured(part))
+    result = join_results(record_as_measured(part))
     start = time.process_time()
     with layer_source(request) as source, tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
         if coloured and result.seen is not None:
@@ -187,7 +187,7 @@ def _true_plan(shown: RoadScene, part: ScanPlan, plants: float) -> ScanPlan | No
 def _beam_errors(sample: Sample, plan: ScanPlan | None) -> dict[str, float]:
     """Compare first returns with those of the converged footprint's plan; points with those in the file."""
     mine = sample.result.points
-    truth = mine if plan is None else joined_results(record_as_measured(plan)).points
+    truth = mine if plan is None else join_results(record_as_measured(plan)).points
     found = beam_errors([mine], [truth])
     return {
         "position_mm": 1e3 * found["position"][0],

@@ -14,7 +14,7 @@ from ...base.errors import InputError
 from ...base.rotations import rotation_matrix
 from ...base.schema import Finite, notes, quantity
 from .guides import Guide, SmoothedGuide
-from .path import KNOT_RANGE, Strip, knots_for, strips_of
+from .path import KNOT_RANGE, Strip, knot_spacing_for, make_strips
 from .platform import Platform
 from .strip_line import EasedFunction, StripTrack, Sway
 
@@ -110,7 +110,7 @@ class MovingPath:
     """
 
     def __init__(self, platform: MovingPlatform, guide: Guide) -> None:
-        self._guide, self._sway = _form(platform, guide)
+        self._guide, self._sway = _guide_and_sway(platform, guide)
         self._offsets: tuple[float, ...] = platform.value("lateral_offsets") or self._guide.driving_offsets()
         self._forward = [platform.runs_forward(strip, offset) for strip, offset in enumerate(self._offsets)]
         self.height, self._speed = float(platform.value("height")), float(platform.value("speed"))
@@ -122,7 +122,7 @@ class MovingPath:
         for index in range(len(self._offsets)):
             lengths.append(self._strip_track(index).length)
             spacings.append(self._knots(index))
-        self.strips = strips_of([length / self._speed for length in lengths])
+        self.strips = make_strips([length / self._speed for length in lengths])
         self.knot_spacing = min(spacings)
 
     def pose(self, strip: Strip, time: Float) -> tuple[Float, Float]:
@@ -176,10 +176,10 @@ class MovingPath:
         # A rotation's second derivative is at most the angular velocity squared plus the angular acceleration.
         swing = float(rate.sum() ** 2 + turn.sum())
         bend = np.hypot(curvature, float(height.bends()[1][0])) + KNOT_RANGE * swing
-        return knots_for(bend * self._speed**2, jump * self._speed)
+        return knot_spacing_for(bend * self._speed**2, jump * self._speed)
 
 
-def _form(platform: MovingPlatform, guide: Guide) -> tuple[Guide, Sway | None]:
+def _guide_and_sway(platform: MovingPlatform, guide: Guide) -> tuple[Guide, Sway | None]:
     """Return the guide that the strips lie beside, and their sway."""
     if platform.path == "smoothed":
         return SmoothedGuide(guide, platform.polynomial_degree), None

@@ -77,7 +77,7 @@ class Path(Protocol):
         ...
 
 
-def strips_of(durations: list[float]) -> tuple[Strip, ...]:
+def make_strips(durations: list[float]) -> tuple[Strip, ...]:
     """Return strips of these durations (s), `TURNAROUND` apart.
 
     Raises:
@@ -89,7 +89,7 @@ def strips_of(durations: list[float]) -> tuple[Strip, ...]:
     return tuple(Strip(i, float(starts[i]), float(duration)) for i, duration in enumerate(durations))
 
 
-def knots_for(bend: float, jump: float = 0.0) -> float:
+def knot_spacing_for(bend: float, jump: float = 0.0) -> float:
     """Return the knots' spacing, s, that keeps `KNOT_ERROR`.
 
     Args:

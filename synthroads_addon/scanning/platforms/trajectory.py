@@ -17,7 +17,7 @@ from ...base.files import read_text
 from ...base.rotations import angle_between, matrices, quaternions, rotation_matrix, slerp
 from ...road.centerline import FARTHEST, fields_of
 from .guides import Guide
-from .path import KNOT_RANGE, Strip, knots_for
+from .path import KNOT_RANGE, Strip, knot_spacing_for
 from .platform import Platform
 
 COLUMNS = ("time", "x", "y", "z", "roll", "pitch", "heading")
@@ -99,7 +99,7 @@ class TrajectoryPath:
         interval = np.diff(self._time)
         turning = angle_between(self._attitude[:-1], self._attitude[1:]) / interval
         # Between rows positions are linear, so only the turning bends; it does so evenly.
-        within = knots_for(KNOT_RANGE * float(turning.max()) ** 2)
+        within = knot_spacing_for(KNOT_RANGE * float(turning.max()) ** 2)
         for parts in range(1, _SUBDIVISIONS + 1):
             grid = float(interval.min()) / parts
             grid = float(self._time[-1]) / max(round(float(self._time[-1]) / grid), 1)
@@ -107,7 +107,7 @@ class TrajectoryPath:
                 return grid / np.ceil(grid / within)
         velocity = np.diff(self._position, axis=0) / interval[:, None]
         corner = np.linalg.norm(np.diff(velocity, axis=0), axis=1) + KNOT_RANGE * (turning[1:] + turning[:-1])
-        return knots_for(KNOT_RANGE * float(turning.max()) ** 2, float(corner.max(initial=0.0)))
+        return knot_spacing_for(KNOT_RANGE * float(turning.max()) ** 2, float(corner.max(initial=0.0)))
 
 
 def _refuse_wide_turns(file: str, rows: Trajectory, attitude: Float) -> None:

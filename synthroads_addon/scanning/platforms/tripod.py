@@ -15,7 +15,7 @@ from ...base.errors import InputError
 from ...base.rotations import rotation_matrix
 from ...base.schema import Finite, notes, quantity
 from .guides import Guide
-from .path import KNOT_RANGE, Strip, knots_for, strips_of
+from .path import KNOT_RANGE, Strip, knot_spacing_for, make_strips
 from .platform import Platform
 
 _USUAL_RANGE = 15.0
@@ -98,8 +98,8 @@ class TripodPath:
         self._headings = np.zeros(len(self.positions)) if headings is None else headings
         self._turning = math.radians(platform.turn_deg) / platform.turn_seconds  # counter-clockwise
         self._mounting = platform.mounting()
-        self.strips = strips_of([platform.turn_seconds] * len(self.positions))
-        self.knot_spacing = knots_for(KNOT_RANGE * self._turning**2)
+        self.strips = make_strips([platform.turn_seconds] * len(self.positions))
+        self.knot_spacing = knot_spacing_for(KNOT_RANGE * self._turning**2)
         self.typical_range = _USUAL_RANGE
 
     def pose(self, strip: Strip, time: Float) -> tuple[Float, Float]:

@@ -60,7 +60,7 @@ class Bundles:
 
         Args:
             track: of the body.
-            centre: (3,) of the ball, own frame, m.
+            centre: (3,) of the ball in the body frame, m.
             radius: m.
         """
         way = track.way_of(centre)
@@ -74,7 +74,7 @@ class Bundles:
         return rays[np.einsum("in,in->n", towards, towards) <= radius**2]
 
     def _bundles_near(self, track: Track, way: Float, radius: float) -> Index:
-        """Return the bundles whose cone touches the ball, whose middle has a way (3, K), while they are cast."""
+        """Return the bundles whose cone touches the ball, whose centre at the knots is ``way`` (3, K)."""
         towards = track.along(way, self.time) - self.apex
         fastest = float(np.sqrt(np.square(np.diff(way, axis=1)).sum(axis=0).max())) / track.spacing
         away = np.sqrt(np.einsum("ib,ib->b", towards, towards))

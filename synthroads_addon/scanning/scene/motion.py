@@ -30,7 +30,7 @@ class Motion(Protocol):
     def pose(self, time: Float) -> Pose:
         """Return rotation (K, 3, 3), translation (K, 3) and whether (K,) the body is there, at times (K,), s.
 
-        Both take the body's own frame to the local one: ``local = rotation @ own + translation``. Exact at any time,
+        Both map the body frame to the local one: ``local = rotation @ body + translation``. Exact at any time,
         finite even where the body isn't there; the same from any thread.
         """
 
@@ -40,8 +40,8 @@ class MovingMesh:
     """A body that moves.
 
     Attributes:
-        mesh: its triangles in its own frame; ``origin`` has no meaning there and is 0.
-        motion: of the own frame.
+        mesh: its triangles in the body frame; ``origin`` has no meaning there and is 0.
+        motion: of the body frame.
     """
 
     mesh: SceneMesh
@@ -64,11 +64,11 @@ class ScannedScene:
 
 
 class LinearMotion:
-    """Straight on without turning. The own frame is parallel to the local one.
+    """Constant-velocity motion without rotation; the body frame keeps parallel to the local frame.
 
     Args:
         velocity: (3,) m/s.
-        place: (3,) local place of the own frame's origin at the time 0, m.
+        place: (3,) local place of the body frame's origin at the time 0, m.
     """
 
     def __init__(self, velocity: ArrayLike, place: ArrayLike = (0.0, 0.0, 0.0)) -> None:
@@ -109,7 +109,7 @@ class LaneMotion:
     lane becomes too narrow to drive on, it leaves and comes in again where the lane begins: see `lane_passes`. While a
     part of it would stick out there it is not there at all.
 
-    The own frame has its origin on the road below the vehicle's middle, x forward, y left, z up.
+    The body frame has its origin on the road below the vehicle's middle, x forward, y left, z up.
 
     Args:
         geometry: the road.
@@ -153,7 +153,7 @@ class LaneMotion:
     def pose(self, time: Float) -> Pose:
         """Return the poses at times (K,), see `Motion`."""
         station, present = self._place(np.asarray(time, dtype=np.float64))
-        rotation, translation = self._standing(station)
+        rotation, translation = self._wheel_pose(station)
         return rotation, translation, present
 
     def from_elsewhere(self, place: Float) -> LaneMotion:
@@ -175,7 +175,7 @@ class LaneMotion:
         # The way there and back through distances leaves a nanometre: at the time 0 it is where it was put.
         return np.where(time == 0.0, self.vehicle.station, station), present
 
-    def _standing(self, station: Float) -> tuple[Float, Float]:
+    def _wheel_pose(self, station: Float) -> tuple[Float, Float]:
         """Return rotations (K, 3, 3) and places (K, 3) of the vehicle with its middle at stations (K,)."""
         position, axis, bend = self._alignment.frame(station)
         offset = self.line.offset(station)

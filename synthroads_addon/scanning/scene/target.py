@@ -29,7 +29,7 @@ class _TargetPart:
 
     Attributes:
         first: number of its first face among all.
-        half: (3,) half the size of the box around ``centre`` (own frame) that holds it, m.
+        half: (3,) half the size of the box around ``centre`` (body frame) that holds it, m.
         radius: of the sphere that holds it, m.
     """
 
@@ -145,7 +145,7 @@ class Target:
         to = shape[1:]
         return FirstHits(nearest.face.reshape(to), nearest.distance.reshape(to), nearest.along.reshape(to))
 
-    def at_start(
+    def at_time_zero(
         self, faces: Index, places: Float, times: Float, motions: list[Track], vectors: tuple[Float, ...] = ()
     ) -> tuple[Float, ...]:
         """Return places on faces, and directions there, as they are in the scene at the time 0.
@@ -206,7 +206,7 @@ def _clear_scanner(track: Track, part: _TargetPart, scanner: Float) -> Track:
 
 
 def _cast(part: _TargetPart, origins: Float, directions: Float, maximum_range: float) -> FirstHits:
-    """Cast rays at one part in its own frame; face numbers are those of all parts."""
+    """Cast rays at one part in its body frame; face numbers are those of all parts."""
     shape = directions.shape[1:]
     begin, towards = (np.broadcast_to(_rows(array), (*shape, 3)).reshape(-1, 3) for array in (origins, directions))
     found = part.caster.cast(begin, towards, maximum_range)

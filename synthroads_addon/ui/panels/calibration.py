@@ -13,7 +13,7 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.progress import exhaust
 from ...calibration.fit import FITTED
-from ...calibration.job import Calibration, CalibrationJob, Compared, save_fitted, steps
+from ...calibration.job import Calibration, CalibrationJob, ClassComparison, save_fitted, steps
 from ...calibration.plot import calibration_picture
 from ..work.common import Sidebar, column, large_button, refusing
 from ..work.job import PanelJob
@@ -247,7 +247,7 @@ def _draw_result(layout: bpy.types.UILayout, result: Calibration) -> None:
         row.operator(SYNTHROADS_OT_save_materials.bl_idname, icon="FILE_TICK")
 
 
-def lines_of(entry: Compared) -> list[str]:
+def lines_of(entry: ClassComparison) -> list[str]:
     """Return the figures of a material as the panel shows them."""
     before, after = entry.before.reflectivity, entry.after.reflectivity
     changed = f"{before:.3f} → {after:.3f}" if before != after else f"{after:.3f}"

@@ -14,7 +14,12 @@ from pathlib import Path
 import pytest
 
 from synthroads_addon.base.scratch import folders, locks
-from synthroads_addon.base.scratch.folders import LOCK, remove_own, scratch_folder, temporary_files_in_scratch
+from synthroads_addon.base.scratch.folders import (
+    LOCK,
+    remove_scratch_folders,
+    scratch_folder,
+    temporary_files_in_scratch,
+)
 from synthroads_addon.base.scratch.locks import Owner, is_dead, read_owner, this_process, try_lock
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
@@ -159,7 +164,7 @@ def test_a_full_disk_leaves_no_folder(tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_before_the_process_ends_at_once_its_folders_go(tmp_path: Path) -> None:
     with scratch_folder(tmp_path) as folder:
-        remove_own()
+        remove_scratch_folders()
         assert not folder.exists()
 
 
@@ -168,7 +173,7 @@ def test_a_forked_process_leaves_the_folders_of_its_parent(tmp_path: Path) -> No
     with scratch_folder(tmp_path) as folder:
         child = os.fork()
         if child == 0:
-            remove_own()
+            remove_scratch_folders()
             os._exit(0)
         os.waitpid(child, 0)
         assert folder.exists()
@@ -216,5 +221,5 @@ def test_a_removal_that_is_cut_off_is_ended_before_the_process_does(
     monkeypatch.setattr(folders.shutil, "rmtree", cut)
     with pytest.raises(KeyboardInterrupt), scratch_folder(tmp_path):
         pass
-    remove_own()
+    remove_scratch_folders()
     assert list(tmp_path.iterdir()) == []

@@ -128,5 +128,5 @@ def echoes_and_pulses(scan: ScanPlan, first: int, count: int) -> tuple[Echoes, P
     strip = scan.path.strips[0]
     pulses = emit_pulses(scan, strip, 0.0, 80.0, first, count)
     traced = trace(scan.target, scan.surfaces, beam_rays(scan, pulses), [], 0.0, scan.setting.maximum_range)
-    marks = BlockScan(scan).marks(traced)
-    return group_returns(*marks, traced.pulse, scan.setting.range_resolution), pulses
+    signals = BlockScan(scan).signals(traced)
+    return group_returns(*signals, traced.pulse, scan.setting.range_resolution), pulses
