@@ -21,7 +21,7 @@ from .platforms.path import Strip
 from .point_layers import MeasuredPoints, fill_layers, place_points
 from .pulses import Errors, Poses, Pulses, may_hit_scene, turn_vectors
 from .radiometry import received_intensity, saturate
-from .returns import LEAST_REFLECTANCE, BothSignals, HitSignals, Echoes, group_returns, number_returns
+from .returns import LEAST_REFLECTANCE, BothSignals, Echoes, HitSignals, group_returns, number_returns
 from .trace import Hits, Rays, TracedRays, trace
 
 _MOTION_KNOTS = 0.01
