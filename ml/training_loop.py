@@ -108,6 +108,14 @@ def fit(
         run.save({"model": model.state_dict(), "optimizer": optimizer.state_dict(), "epoch": epoch + 1})
 
 
+def moved_to(model: nn.Module, batch: Any) -> Any:
+    """Return a tensor, or those of a batch by name, on the device of a model."""
+    device = next(model.parameters()).device
+    if isinstance(batch, Tensor):
+        return batch.to(device)
+    return {name: value.to(device, non_blocking=True) for name, value in batch.items()}
+
+
 def learning_rate(schedule: Schedule, step: int, steps: int) -> float:
     """Return the rate of a step counted from 0: linear up to ``learning_rate``, then a cosine to the final one."""
     rising = schedule.warmup * steps
@@ -139,7 +147,7 @@ def train_step(
     optimizer.zero_grad(set_to_none=True)
     half = configuration.precision == "bfloat16"
     with torch.autocast(next(model.parameters()).device.type, torch.bfloat16, enabled=half):
-        value, figures = loss(model, batch)
+        value, figures = loss(model, moved_to(model, batch))
     mean = value.detach().clone()
     average([mean])  # not finite in one process, it is in none: all end
     if not torch.isfinite(mean):

@@ -31,7 +31,6 @@ from ml.scores.metrics import Spread, defined  # noqa: E402
 from ml.scores.pictures import comparison  # noqa: E402
 from ml.segmentation.experiment import RESULTS  # noqa: E402
 from ml.segmentation.scoring import score, trained_model  # noqa: E402
-from ml.training_loop import chosen_device  # noqa: E402
 from synthroads_addon.base.errors import InputError, SynthRoadsError  # noqa: E402
 from synthroads_addon.base.files import write_file  # noqa: E402
 from synthroads_addon.base.schema import read_json  # noqa: E402
@@ -76,11 +75,10 @@ def real(runs: Sequence[Path], folder: Path, pictures: Path) -> dict[str, str]:
     found: dict[str, list[dict[str, Any]]] = {name: [] for name in REAL_CLOUDS}
     for place, path in enumerate(runs):
         run = Run.open(path)
-        device = chosen_device(run.configuration)
-        model = trained_model(run, device)
+        model = trained_model(run)
         for name, file in REAL_CLOUDS.items():
             source = Source(path=str(folder / file), mapping=name, tile=_WHOLE)
-            confusion, shown = score(model, run.configuration, [source], device)
+            confusion, shown = score(model, run.configuration, [source])
             found[name].append(confusion.to_dict())
             if place == 0 and shown is not None:
                 picture = comparison(*shown, source.targets(run.configuration.scheme()))

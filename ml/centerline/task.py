@@ -29,7 +29,7 @@ from ..runs import CALIBRATION, Run, plain, stream_seed
 from ..scores.calibration import DEVIATIONS, IntervalCalibration
 from ..scores.evaluation import Cropping, case
 from ..tasks import Evaluation, Prediction
-from ..training_loop import chosen_device, fit
+from ..training_loop import chosen_device, fit, moved_to
 from .find_road import corridor_json, find_road, geojson
 from .measuring import measure_run
 from .predictor import CenterlinePredictor, UseOptions
@@ -91,14 +91,13 @@ def train_network(run: Run[CenterlineConfiguration], progress: Progress = silent
         configuration.seed,
         configuration.data.measured_share,
     )
-    on_device = centerline_loss(configuration.loss, configuration.slices.half_width)
     fit(
         model,
         run,
         batches,
         configuration.batches.steps,
-        lambda net, batch: on_device(net, _move_to_device(batch, device)),
-        validate=_validation(configuration, roads, device),
+        centerline_loss(configuration.loss, configuration.slices.half_width),
+        validate=_validation(configuration, roads),
         progress=progress,
     )
     return model, roads
@@ -188,11 +187,7 @@ def _first_model(configuration: CenterlineConfiguration) -> CenterlineModel:
     return model
 
 
-def _move_to_device(batch: Batch, device: torch.device) -> Batch:
-    return {name: values.to(device) for name, values in batch.items()}
-
-
-def _validation(configuration: CenterlineConfiguration, roads: Roads, device: torch.device) -> Any:
+def _validation(configuration: CenterlineConfiguration, roads: Roads) -> Any:
     """Return what `fit` calls after each epoch: errors and coverage on sequences that stay the same."""
     crop = quiet(configuration.effects.crop)
     count = configuration.batches.validation
@@ -200,7 +195,7 @@ def _validation(configuration: CenterlineConfiguration, roads: Roads, device: to
     batches = fixed_batches(known, configuration.slices, crop, count, configuration.seed)
 
     def validate(model: nn.Module, epoch: int) -> dict[str, float]:
-        error, std = _residuals(model, batches, device)
+        error, std = _residuals(model, batches)
         known = np.isfinite(error[:, 0])
         ratio = np.abs(error[known, 0]) / std[known, 0]
         return {
@@ -241,16 +236,16 @@ def calibrate(run: Run[CenterlineConfiguration], model: CenterlineModel, roads: 
     }
 
 
-def _residuals(model: nn.Module, batches: Sequence[Batch], device: torch.device) -> tuple[Any, Any]:
+def _residuals(model: nn.Module, batches: Sequence[Batch]) -> tuple[Any, Any]:
     """Return errors and deviations (N, T) of all slices of some batches; errors are NaN where the truth is."""
     model.eval()
-    pairs = list(_pairs(model, batches, device))
+    pairs = list(_pairs(model, batches))
     return tuple(np.concatenate([pair[side] for pair in pairs]).astype(np.float64) for side in (0, 1))
 
 
-def _pairs(model: nn.Module, batches: Sequence[Batch], device: torch.device) -> Iterator[tuple[Any, Any]]:
+def _pairs(model: nn.Module, batches: Sequence[Batch]) -> Iterator[tuple[Any, Any]]:
     for batch in batches:
-        moved = _move_to_device(batch, device)
+        moved = moved_to(model, batch)
         with torch.no_grad():
             output = model(moved)
         value = torch.cat([output["center"][..., None], output["corridor"]], dim=-1)

@@ -23,7 +23,6 @@ from ..configuration import EXPERIMENTS, load_configuration, shipped_file
 from ..data.sources import Source
 from ..runs import CHECKPOINT, CONFIGURATION, HISTORY, METRICS, PRETRAINING, Run, lasting
 from ..scores.confusion import by_test
-from ..training_loop import chosen_device
 from .recipes import Data, SegmentationConfiguration
 from .scoring import score_all, trained_model
 from .task import train
@@ -180,10 +179,7 @@ def _test_variant(
     if file.is_file() and (kept := read_json(file)).get("made_from") == made_from:
         tests = kept["tests"]
         return tests
-    run = Run.open(folder)
-    device = chosen_device(configuration)
-    model = trained_model(run, device)
-    tests = score_all(model, configuration, device, progress)
+    tests = score_all(trained_model(Run(folder, configuration)), configuration, progress)
     write_file(file, canonical_json({"made_from": made_from, "tests": tests}).encode(), overwrite=True)
     return tests
 

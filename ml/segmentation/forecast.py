@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from itertools import chain, count
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -18,12 +18,10 @@ import torch
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.progress import peak_memory_mb
 
-from ..data.classes import class_names
-from ..data.crops import Item, Seeds
 from ..data.sources import Source, pointcept_folders, pointcept_root
-from ..data.tiles import CloudTile, scalings
+from ..data.tiles import CloudTile
 from ..training_loop import chosen_device, optimizer_of, train_step
-from .loading import epoch_batches, thin_tiles
+from .loading import CropBatches, thin_tiles
 from .network import build
 from .recipes import SegmentationConfiguration
 from .task import objective
@@ -95,7 +93,8 @@ def timed_steps(
     optimizer = optimizer_of(model, configuration.schedule)
     loss = objective(configuration, tiles, device)
     wall, cpu = [], []
-    batches = _endless(configuration, tiles, device)
+    enough = CropBatches(configuration.model_copy(update={"crops_per_tile": configuration.batch}), [tiles])
+    batches = chain.from_iterable(map(enough, count()))  # epoch after epoch
     for _ in range(steps + 1):
         begin = time.perf_counter(), time.process_time()
         batch = next(batches)
@@ -103,14 +102,3 @@ def timed_steps(
         wall.append(time.perf_counter() - begin[0])
         cpu.append(time.process_time() - begin[1])
     return median(wall[1:]), median(cpu[1:])
-
-
-def _endless(configuration: SegmentationConfiguration, tiles: list[CloudTile], device: torch.device) -> Iterator[Item]:
-    """Yield whole batches, epoch after epoch."""
-    enough = configuration.model_copy(update={"crops_per_tile": configuration.batch})
-    seeds = Seeds(tiles, len(class_names(configuration.scheme())), configuration.balanced)
-    scaling = scalings(tiles, configuration.intensity)
-    epoch = 0
-    while True:
-        yield from epoch_batches(enough, tiles, [len(tiles)], scaling, seeds, device, epoch)
-        epoch += 1

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import sys
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from types import TracebackType
@@ -17,10 +18,11 @@ from torch.utils.data import DataLoader
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.random_streams import stream
 
+from ..data.classes import class_names
 from ..data.crops import CropDataset, Draw, Item, Seeds, collate
 from ..data.sources import Source, read_tiles
-from ..data.tiles import CloudTile, Scaling, scalings
-from .network import laid_over, on_device
+from ..data.tiles import CloudTile, scalings
+from .network import laid_over
 from .recipes import SegmentationConfiguration, mapped_intensities, plan
 
 SMALLEST_SHARE = 0.25
@@ -57,29 +59,39 @@ def thin_tiles(sources: Sequence[Source], configuration: SegmentationConfigurati
             yield replace(tile, scene=f"{title}/{place}/{tile.scene}")
 
 
-def epoch_batches(
-    configuration: SegmentationConfiguration,
-    tiles: Sequence[CloudTile],
-    domains: Sequence[int],
-    scaling: dict[str, Scaling],
-    seeds: Seeds,
-    device: torch.device,
-    epoch: int,
-    share: slice = slice(None),
-) -> Iterator[Item]:
-    """Yield those batches of an epoch whose numbers a slice names; they depend on seed and epoch alone."""
-    draws = plan(domains, configuration.crops_per_tile, configuration.synthetic_share, configuration.seed, epoch)
-    dataset = CropDataset(
-        tiles,
-        scaling,
-        configuration.crop_settings(),
-        draws,
-        seeds,
-        effects=configuration.effects,
-        seed=configuration.seed,
-        epoch=epoch,
-    )
-    yield from _load_crops(dataset, configuration, device, epoch, configuration.adaptation.mix3d, share)
+class CropBatches:
+    """The batches of an epoch: called with its number, gives those that a slice names. They hang on both and the seed.
+
+    Args:
+        configuration: of the training.
+        domains: the tiles of each; the synthetic ones first where there are two.
+    """
+
+    def __init__(self, configuration: SegmentationConfiguration, domains: Iterable[Sequence[CloudTile]]) -> None:
+        self.configuration = configuration
+        self.domains = list(domains)
+        self.tiles = [tile for tiles in self.domains for tile in tiles]
+        self.scaling = scalings(self.tiles, configuration.intensity)
+        self.seeds = Seeds(self.tiles, len(class_names(configuration.scheme())), configuration.balanced)
+
+    def __len__(self) -> int:
+        return math.ceil(self.configuration.crops_per_tile * len(self.tiles) / self.configuration.batch)
+
+    def __call__(self, epoch: int, share: slice = slice(None)) -> Iterator[Item]:
+        """Yield those batches of an epoch whose numbers a slice names."""
+        given, sizes = self.configuration, [len(tiles) for tiles in self.domains]
+        draws = plan(sizes, given.crops_per_tile, given.synthetic_share, given.seed, epoch)
+        crops = CropDataset(
+            self.tiles,
+            self.scaling,
+            given.crop_settings(),
+            draws,
+            self.seeds,
+            effects=given.effects,
+            seed=given.seed,
+            epoch=epoch,
+        )
+        yield from _load_crops(crops, given, epoch, given.adaptation.mix3d, share)
 
 
 @contextmanager
@@ -100,12 +112,7 @@ def watched_workers(configuration: SegmentationConfiguration) -> Iterator[None]:
 
 
 def _load_crops(
-    dataset: CropDataset,
-    configuration: SegmentationConfiguration,
-    device: torch.device,
-    epoch: int,
-    mix3d: float,
-    share: slice,
+    dataset: CropDataset, configuration: SegmentationConfiguration, epoch: int, mix3d: float, share: slice
 ) -> Iterator[Item]:
     numbers, size = range(len(dataset)), configuration.batch
     loader: DataLoader[Item] = DataLoader(
@@ -113,13 +120,12 @@ def _load_crops(
         batch_sampler=[[*numbers[first : first + size]] for first in numbers[::size][share]],
         num_workers=configuration.workers,
         collate_fn=Collate(configuration, epoch, mix3d),
-        pin_memory=device.type == "cuda",
+        pin_memory=configuration.device != "cpu" and torch.cuda.is_available(),
         worker_init_fn=leave_quietly,
     )
     with defer_interrupt():
         batches = iter(loader)
-    for batch in batches:
-        yield on_device(batch, device)
+    yield from batches
 
 
 def leave_quietly(_worker: int) -> None:
@@ -189,4 +195,4 @@ def adaptation_batches(tiles: list[CloudTile], configuration: SegmentationConfig
         Seeds(tiles, 0, balanced=False),
         seed=configuration.seed,
     )
-    yield from _load_crops(dataset, configuration, torch.device("cpu"), 0, 0.0, slice(None))
+    yield from _load_crops(dataset, configuration, 0, 0.0, slice(None))

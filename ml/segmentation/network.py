@@ -14,6 +14,7 @@ from synthroads_addon.base.errors import InputError
 
 from ..data.classes import class_names
 from ..data.crops import Item
+from ..training_loop import moved_to
 from .recipes import SegmentationConfiguration
 
 
@@ -28,19 +29,14 @@ def scores_of(model: nn.Module, batch: Item) -> Tensor:
     return scores
 
 
-def on_device(batch: Item, device: torch.device) -> Item:
-    """Return a batch's tensors on a device."""
-    return {name: value.to(device, non_blocking=True) for name, value in batch.items()}
-
-
-def adapt_network(model: nn.Module, batches: Iterable[Item], device: torch.device) -> nn.Module:
+def adapt_network(model: nn.Module, batches: Iterable[Item]) -> nn.Module:
     """Return a copy of a network whose norms have the statistics of other points (AdaBN).
 
     Raises:
         InputError: there are no points.
     """
     other = deepcopy(model)
-    adapt_norms(other, batches, lambda batch: scores_of(other, on_device(batch, device)))
+    adapt_norms(other, batches, lambda batch: scores_of(other, moved_to(other, batch)))
     return other
 
 

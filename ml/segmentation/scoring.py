@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any, Protocol
+from itertools import groupby
+from typing import Any
 
 import numpy as np
 import torch
@@ -25,8 +26,9 @@ from ..data.sources import Source, read_tiles
 from ..data.tiles import CloudTile, Scaling, scalings
 from ..runs import Run
 from ..scores.confusion import Confusion
+from ..training_loop import chosen_device, moved_to
 from .loading import adaptation_batches, thin_tiles, watched_workers
-from .network import adapt_network, build, on_device, scores_of
+from .network import adapt_network, build, scores_of
 from .recipes import SegmentationConfiguration
 
 EDGE = 24.0
@@ -38,10 +40,8 @@ LARGEST = 100_000
 _SMALLEST_EDGE = 1.5
 
 
-class Classifier(Protocol):
-    """Function that turns a batch of one item into the scores of its points."""
-
-    def __call__(self, batch: Item) -> torch.Tensor: ...
+Classifier = Callable[[Item], torch.Tensor]
+"""Turns a batch of one item into the scores of its points."""
 
 
 def pieces(
@@ -137,12 +137,13 @@ def carry(known: Float32, labels: NDArray[np.int16], points: Float32) -> NDArray
     return labels[nearest]
 
 
-def trained_model(run: Run[SegmentationConfiguration], device: torch.device) -> nn.Module:
+def trained_model(run: Run[SegmentationConfiguration]) -> nn.Module:
     """Return the network of a trained run.
 
     Raises:
         InputError: the checkpoint is damaged or of another network.
     """
+    device = chosen_device(run.configuration)
     state = run.saved(device)
     if state is None:
         raise InputError(str(run.folder), None, "holds no checkpoint")
@@ -154,13 +155,13 @@ def trained_model(run: Run[SegmentationConfiguration], device: torch.device) -> 
     return model.eval()
 
 
-def classifier(model: nn.Module, configuration: SegmentationConfiguration, device: torch.device) -> Classifier:
+def classifier(model: nn.Module, configuration: SegmentationConfiguration) -> Classifier:
     """Return what scores the points of an item."""
 
     def scores(batch: Item) -> Tensor:
         model.eval()
         with torch.inference_mode():
-            return scores_of(model, on_device(configuration.network.prepare(batch), device))
+            return scores_of(model, moved_to(model, configuration.network.prepare(batch)))
 
     return scores
 
@@ -182,11 +183,11 @@ def check_tests(configuration: SegmentationConfiguration) -> None:
 
 
 def score_all(
-    model: nn.Module, configuration: SegmentationConfiguration, device: torch.device, progress: Progress = silent
+    model: nn.Module, configuration: SegmentationConfiguration, progress: Progress = silent
 ) -> dict[str, Any]:
     """Return the scores of a configuration's tests by name, see `Confusion.to_dict`."""
     return {
-        name: score(model, configuration, sources, device, progress)[0].to_dict()
+        name: score(model, configuration, sources, progress)[0].to_dict()
         for name, sources in configuration.data.tests.items()
     }
 
@@ -195,7 +196,6 @@ def score(
     model: nn.Module,
     configuration: SegmentationConfiguration,
     sources: Sequence[Source],
-    device: torch.device,
     progress: Progress = silent,
 ) -> tuple[Confusion, tuple[CloudTile, Any] | None]:
     """Return the confusion over all points of some sources, and the largest tile with its classes, to be drawn.
@@ -208,12 +208,13 @@ def score(
     if configuration.adaptation.adabn:
         tiles = list(thin_tiles(sources, configuration, "test"))
         with watched_workers(configuration):
-            model = adapt_network(model, adaptation_batches(tiles, configuration), device)
-    scores = classifier(model, configuration, device)
+            model = adapt_network(model, adaptation_batches(tiles, configuration))
+    scores = classifier(model, configuration)
     shown = None
     for source in sources:
         groups = _groups(source, scheme)
-        for scene in _scenes(read_tiles(source, scheme, None)):
+        for _, together in groupby(read_tiles(source, scheme, None), key=lambda tile: tile.scene):
+            scene = list(together)
             scaling = scalings(scene, configuration.intensity, configuration.voxel)
             for tile in scene:
                 labels = label_tile(tile, scaling[tile.scene], scores, configuration.crop_settings())
@@ -238,15 +239,3 @@ def _groups(source: Source, scheme: ClassScheme) -> NDArray[np.int16]:
     if (groups == IGNORED).any():
         raise InputError("groups", mapping and mapping.title, "must have a place for every class of the scheme")
     return groups
-
-
-def _scenes(tiles: Iterator[CloudTile]) -> Iterator[list[CloudTile]]:
-    """Yield the tiles of one scene after another, which stand together."""
-    scene: list[CloudTile] = []
-    for tile in tiles:
-        if scene and scene[0].scene != tile.scene:
-            yield scene
-            scene = []
-        scene.append(tile)
-    if scene:
-        yield scene

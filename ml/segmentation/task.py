@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +19,7 @@ from synthroads_addon.base.progress import Progress, peak_memory_mb, silent
 from synthroads_addon.cloud.formats.registry import ENDINGS, open_cloud
 
 from ..data.classes import IGNORED, class_names
-from ..data.crops import Item, Seeds
+from ..data.crops import Item
 from ..data.sources import Source
 from ..data.tiles import CloudTile, scalings
 from ..processes import helpers
@@ -30,7 +28,7 @@ from ..scores.confusion import Confusion, score_table
 from ..scores.pictures import comparison
 from ..tasks import Evaluation, Prediction
 from ..training_loop import Figures, chosen_device, fit
-from .loading import epoch_batches, read_domains, thin_tiles, watched_workers
+from .loading import CropBatches, read_domains, thin_tiles, watched_workers
 from .network import build, scores_of
 from .prediction import Labelling, predict_file
 from .recipes import SegmentationConfiguration, class_shares, class_weights
@@ -55,7 +53,7 @@ def train(run: SegmentationRun, progress: Progress = silent) -> dict[str, Any]:
     device = chosen_device(configuration)
     with helpers(run, train_network, device):
         model, domains = train_network(run, progress)
-    tests = score_all(model, configuration, device, progress)
+    tests = score_all(model, configuration, progress)
     metrics = {
         **{f"{name}_mean_iou": result["mean_iou"] for name, result in tests.items()},
         "parameters": sum(weight.numel() for weight in model.parameters()),
@@ -77,14 +75,13 @@ def evaluate(run: SegmentationRun, evaluation: Evaluation, progress: Progress = 
         OutputError: the folder can't be written.
     """
     configuration = run.configuration
-    device = chosen_device(configuration)
-    model = trained_model(run, device)
+    model = trained_model(run)
     results: dict[str, Any] = {}
     tables: dict[str, str] = {}
     files: list[str] = []
     for path, name in zip(evaluation.data, _names(evaluation), strict=True):
         source = _test_source(path, evaluation)
-        confusion, shown = score(model, configuration, [source], device, progress)
+        confusion, shown = score(model, configuration, [source], progress)
         results[name] = confusion.to_dict()
         tables[name] = score_table(results[name]) + "\n"
         files.append(f"{name}.txt")
@@ -132,9 +129,8 @@ def _test_source(path: Path, evaluation: Evaluation) -> Source:
 def predict(run: SegmentationRun, prediction: Prediction, progress: Progress = silent) -> dict[str, Any]:
     """Label the points of a LAS or LAZ file; see `prediction.predict_file`."""
     configuration = run.configuration
-    device = chosen_device(configuration)
     labelling = Labelling(
-        classifier(trained_model(run, device), configuration, device),
+        classifier(trained_model(run), configuration),
         configuration.crop_settings(),
         configuration.scheme(),
         configuration.intensity,
@@ -189,28 +185,11 @@ def _fit(
 ) -> None:
     """Train on given domains by the run's schedule; afterwards the model has the run's last weights."""
     configuration = run.configuration
-    tiles = [tile for found in domains.values() for tile in found]
-    device = next(model.parameters()).device
-    classes = len(class_names(configuration.scheme()))
-    batches = partial(
-        epoch_batches,
-        configuration,
-        tiles,
-        [len(found) for found in domains.values()],
-        scalings(tiles, configuration.intensity),
-        Seeds(tiles, classes, configuration.balanced),
-        device,
-    )
+    batches, device = CropBatches(configuration, domains.values()), next(model.parameters()).device
+    loss = objective(configuration, batches.tiles, device)
+    validate = _validation(configuration, validation) if validation else None
     with watched_workers(configuration):
-        fit(
-            model,
-            run,
-            batches,
-            math.ceil(configuration.crops_per_tile * len(tiles) / configuration.batch),
-            objective(configuration, tiles, device),
-            validate=_validation(configuration, validation, device) if validation else None,
-            progress=progress,
-        )
+        fit(model, run, batches, len(batches), loss, validate=validate, progress=progress)
 
 
 def smoothed_loss(scores: Tensor, truth: Tensor, weights: Tensor, smoothing: float) -> Tensor:
@@ -254,13 +233,13 @@ def objective(
 
 
 def _validation(
-    configuration: SegmentationConfiguration, tiles: list[CloudTile], device: torch.device
+    configuration: SegmentationConfiguration, tiles: list[CloudTile]
 ) -> Callable[[nn.Module, int], Figures]:
     scaling = scalings(tiles, configuration.intensity)
 
     def validate(model: nn.Module, epoch: int) -> Figures:
         confusion = Confusion(class_names(configuration.scheme()))
-        scores = classifier(model, configuration, device)
+        scores = classifier(model, configuration)
         for tile in tiles:
             labels = label_tile(tile, scaling[tile.scene], scores, configuration.crop_settings())
             confusion.add(tile.segment, labels)

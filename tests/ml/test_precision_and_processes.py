@@ -10,12 +10,10 @@ import pytest
 import torch
 
 from ml.configuration import from_data
-from ml.data.crops import Seeds
-from ml.data.tiles import scalings
 from ml.networks.base import full_precision
 from ml.networks.centerline.losses import centerline_loss
 from ml.runs import Run
-from ml.segmentation.loading import epoch_batches, read_domains
+from ml.segmentation.loading import CropBatches, read_domains
 from ml.tasks import task
 from ml.training_loop import optimizer_of, train_step
 from synthroads_addon.base.errors import InputError
@@ -124,12 +122,10 @@ def test_two_processes_fine_tune_and_go_on_where_they_were(data: Path, tmp_path:
 
 def test_shares_of_an_epoch_are_all_of_its_batches(data: Path) -> None:
     configuration = segmentation(data, effects={"jitter": 0.01})
-    tiles = read_domains(configuration)["real"]
-    scaling, seeds = scalings(tiles, "share"), Seeds(tiles, 5, balanced=False)
+    batches = CropBatches(configuration, read_domains(configuration).values())
 
     def drawn(share: slice) -> list[torch.Tensor]:
-        given = configuration, tiles, [len(tiles)], scaling, seeds, torch.device("cpu"), 3, share
-        return [one["coord"] for one in epoch_batches(*given)]
+        return [one["coord"] for one in batches(3, share)]
 
     whole = drawn(slice(None))
     parts = [drawn(slice(number, None, 2)) for number in range(2)]

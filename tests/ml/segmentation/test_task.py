@@ -20,13 +20,12 @@ from headless import predict as predict_command
 from headless import train as train_command
 from ml.configuration import EXPERIMENTS, load_configuration
 from ml.data.classes import IGNORED
-from ml.data.crops import Item, Seeds
 from ml.data.sources import Source, read_tiles
 from ml.data.tiles import scalings
 from ml.runs import CHECKPOINT, PRETRAINING, Run
 from ml.segmentation import experiment, task
 from ml.segmentation.experiment import configurations, load_experiment, table
-from ml.segmentation.loading import adaptation_batches, epoch_batches, read_domains
+from ml.segmentation.loading import CropBatches, adaptation_batches, read_domains
 from ml.segmentation.network import build
 from ml.segmentation.recipes import Data, SegmentationConfiguration
 from ml.segmentation.task import smoothed_loss
@@ -249,13 +248,7 @@ def test_a_variant_is_tested_anew_when_its_network_or_its_settings_have_changed(
 def test_clouds_are_laid_over_as_often_as_asked(data: Path) -> None:
     for share, wanted in ((0.0, [4]), (1.0, [2]), (0.5, [2, 4])):
         configuration = toy(data, adaptation={"mix3d": share}, crops_per_tile=12, crop_points=64)
-        tiles = read_domains(configuration)["real"]
-        seeds, scaling = Seeds(tiles, 5, False), scalings(tiles, "share")
-
-        def batches(epoch: int) -> list[Item]:
-            run = (configuration, tiles, [len(tiles)], scaling, seeds, torch.device("cpu"), epoch)  # noqa: B023
-            return list(epoch_batches(*run))
-
+        batches = CropBatches(configuration, read_domains(configuration).values())
         sizes = [len(batch["offset"]) for batch in batches(1)]
         assert sorted(set(sizes)) == wanted
         assert sizes == [len(batch["offset"]) for batch in batches(1)]
@@ -306,7 +299,7 @@ def test_a_checkpoint_of_another_network_is_refused(data: Path, tmp_path: Path) 
     other = build(toy(data, features=["x", "y", "z"]))
     run.save({"model": other.state_dict(), "epoch": 1})
     with pytest.raises(InputError, match="another network"):
-        task.trained_model(run, torch.device("cpu"))
+        task.trained_model(run)
 
 
 def test_evaluation_with_a_mapping_scores_groups(trained: Trained, tmp_path: Path) -> None:
