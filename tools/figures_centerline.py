@@ -13,41 +13,49 @@ Markdown, and all settings that the baseline's grid search tried, are written to
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib import import_module
+from itertools import product
 from pathlib import Path
 from typing import Any, TypeVar
+
+import numpy as np
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from headless.marked_documents import fill  # noqa: E402
+from ml.centerline.predictor import CenterlinePredictor  # noqa: E402
 from ml.configuration import Part  # noqa: E402
 from ml.data.batches import DataOptions  # noqa: E402
 from ml.data.corridor import TRUTH_KINDS, TruthKind  # noqa: E402
+from ml.data.frames import Frames  # noqa: E402
 from ml.data.roads import LearningRoad, read_measured, read_scene, scene_folders  # noqa: E402
 from ml.data.slices import SliceSettings  # noqa: E402
 from ml.runs import Run  # noqa: E402
 from ml.scores import pictures, tables  # noqa: E402
-from ml.scores.baselines import SkeletonSettings  # noqa: E402
+from ml.scores.baselines import SkeletonSettings, centers_on, skeletons  # noqa: E402
+from ml.scores.distances import over_roads  # noqa: E402
 from ml.scores.evaluation import (  # noqa: E402
     HALF_WIDTH,
     Case,
     Cropping,
-    GridSearch,
     Predictor,
     case,
-    grid_search,
+    evaluate,
+    mask_points,
     measure,
     skeleton_predictor,
     trivial_predictors,
-    truth_of,
 )
 from ml.scores.metrics import Spread, over_seeds  # noqa: E402
 from ml.scores.paint import with_painted_line  # noqa: E402
+from synthroads_addon.base.arrays import Float  # noqa: E402
 from synthroads_addon.base.errors import SynthRoadsError  # noqa: E402
 from synthroads_addon.base.files import write_file  # noqa: E402
 
@@ -91,13 +99,79 @@ class Model:
     half_width: float = HALF_WIDTH
 
 
+@dataclass(frozen=True)
+class GridSearch:
+    """Variants tried for the baseline, and the best.
+
+    Attributes:
+        best: of the settings that find at least `FOUND` of the slices, the one with the smallest mean distance.
+        rows: settings with their figures.
+    """
+
+    best: SkeletonSettings
+    rows: list[tuple[SkeletonSettings, dict[str, float]]]
+
+
+FOUND = 0.8
+RASTERS = (0.25, 0.5, 1.0, 2.0)
+BRANCHES = (5.0, 10.0, 15.0, 30.0)
+BINS = (1.0, 5.0, 10.0)
+"""m."""
+
+
+def grid_search(shown: Sequence[Case], masks: Sequence[str]) -> GridSearch:
+    """Return the baseline's best settings on the cases of one road, to be frozen for all others."""
+    rows: list[tuple[SkeletonSettings, dict[str, float]]] = []
+    for mask, raster, branch in product(masks, RASTERS, BRANCHES):
+        tried = [SkeletonSettings(raster, branch, mask, width) for width in BINS]
+        found: list[list[dict[str, float]]] = [[] for _ in tried]
+        for one in shown:
+            frames = one.frames
+            # Thinning takes the time, and doesn't depend on the bins.
+            lines = skeletons(*mask_points(one.road, mask), frames.position, tried[0])
+            for settings, some in zip(tried, found, strict=True):
+                y = centers_on(lines, frames.position, frames.direction, settings.bin)
+                some.append(evaluate(partial(_as_column, y), one))
+        rows.extend((settings, over_roads(some)) for settings, some in zip(tried, found, strict=True))
+    enough = [row for row in rows if row[1]["found"] >= FOUND] or rows
+    best = min(enough, key=lambda row: row[1]["mae"] if np.isfinite(row[1]["mae"]) else np.inf)
+    return GridSearch(best[0], rows)
+
+
+def _as_column(y: Float, road: LearningRoad, frames: Frames) -> Float:
+    return y[:, None]
+
+
+class RememberingPredictor(CenterlinePredictor):
+    """A predictor that doesn't find twice what it found on the same points in the same frames.
+
+    Those that `calibrated_on` makes of it share its memory.
+    """
+
+    memory: dict[str, tuple[Float, Float]]
+
+    def _regress(self, road: LearningRoad, frames: Frames) -> tuple[Float, Float]:
+        parts = (road.xyz, road.intensity, frames.position, frames.direction)
+        key = hashlib.sha256(b"".join(np.ascontiguousarray(part).tobytes() for part in parts)).hexdigest()
+        if key not in self.memory:
+            self.memory[key] = super()._regress(road, frames)
+        return self.memory[key]
+
+
+def remembering(plain: CenterlinePredictor) -> RememberingPredictor:
+    """Return a predictor that has a memory."""
+    other = RememberingPredictor(plain.model, plain.settings, plain.use, plain.calibration)
+    other.memory = {}
+    return other
+
+
 def models(runs: Sequence[str]) -> dict[str, list[Model]]:
     """Return the trained models by name, given as NAME=FOLDER; those of one name, truth and real roads are one."""
     found: dict[str, dict[tuple[TruthKind, frozenset[str], float], list[Predictor]]] = {}
     for text in runs:
         name, _, folder = text.partition("=")
         run = Run.open(Path(folder))
-        predictor = import_module("ml.centerline.task").predictor(run).remembering()
+        predictor = remembering(import_module("ml.centerline.task").predictor(run))
         alike = (kind_of(run), learned_by(run), _part(run, SliceSettings).half_width)
         found.setdefault(name, {}).setdefault(alike, []).append(predictor)
     return {
@@ -331,7 +405,7 @@ def measure_painted(
 
 def axis_predictor(known: LearningRoad) -> Predictor:
     """Return what predicts a road's measured axis."""
-    return lambda road, frames: truth_of(known).axis.crossing(frames.position, frames.direction)[0][:, None]
+    return lambda road, frames: known.known_truth.axis.crossing(frames.position, frames.direction)[0][:, None]
 
 
 def measure_real(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,18 +12,18 @@ from synthroads_addon.base.arrays import Float
 from synthroads_addon.base.progress import Progress, silent
 
 from ..data.corridor import CORRIDOR
-from ..data.frames import Frames, along, read_path
+from ..data.frames import along, read_path
 from ..data.strips import find_ground, path_through, strips
 from ..networks.centerline.models import TARGETS
-from .predictor import CenterlinePredictor
+from .predictor import CenterlinePredictor, Regression
 
 _HEIGHT = TARGETS.index("height")
 
 
 def find_road(
     predictor: CenterlinePredictor, cloud: Path, path: Path | None = None, progress: Progress = silent
-) -> Found:
-    """Find centreline and corridor along a cloud's road, in bounded memory however long it is.
+) -> Regression:
+    """Find centreline and corridor along a cloud's road, in map coordinates and bounded memory however long it is.
 
     Args:
         predictor: a trained model.
@@ -41,17 +40,18 @@ def find_road(
     line = line or path_through(ground)
     frames = along(line, predictor.settings.frame_spacing)
     shape = (len(frames), len(TARGETS))
-    value, std, widths = np.full(shape, np.nan), np.full(shape, np.nan), np.full((*shape, 2), np.nan)
+    value, raw, std = (np.full(shape, np.nan) for _ in range(3))
+    widths = np.full((*shape, 2), np.nan)
     for road, local, own in strips(cloud, ground, line, frames, progress):
         found = predictor.regress(road, local)
         # Frames keep their stations, which rise strictly, from strip to strip.
         number = np.searchsorted(frames.station, found.frames.station[own])
         value[number] = found.value[own]
         value[number, _HEIGHT] += road.origin[2]
-        std[number], widths[number] = found.std[own], predictor.widths(found)[own]
+        raw[number], std[number], widths[number] = found.raw_std[own], found.std[own], found.widths[own]
         progress("finding the road", float(number[-1] + 1) / len(frames) if len(number) else 0.0)
     kept = _span(value[:, 0])
-    return Found(frames.select(kept), value[kept], std[kept], widths[kept], ground.header.epsg)
+    return Regression(frames.select(kept), value[kept], raw[kept], std[kept], widths[kept], ground.header.epsg)
 
 
 def _span(center: Float) -> slice:
@@ -66,33 +66,7 @@ UNITS = {"lanes": "1", "heading": "rad"}
 """All other numbers are in metres."""
 
 
-@dataclass(frozen=True)
-class Found:
-    """Predictions in M frames of a whole road, map coordinates; T are the `TARGETS`.
-
-    Attributes:
-        frames: where.
-        value: (M, T), the centre and the edges as y in their frame, the height as elevation; NaN: nothing.
-        std: (M, T) calibrated standard deviations.
-        widths: (M, T, 2) half-widths of the intervals for 68 % and 95 %.
-        epsg: code of the coordinate system, None if it isn't known.
-    """
-
-    frames: Frames
-    value: Float
-    std: Float
-    widths: Float
-    epsg: int | None
-
-    def points(self, name: str) -> Float:
-        """Return the points (M, 3) of one of the lines; z is the centre's elevation."""
-        return np.column_stack([self.frames.at(self._column(name)), self._column("height")])
-
-    def _column(self, name: str) -> Float:
-        return self.value[:, TARGETS.index(name)]
-
-
-def geojson(found: Found, name: str, spacing: float) -> dict[str, Any]:
+def geojson(found: Regression, name: str, spacing: float) -> dict[str, Any]:
     """Return a FeatureCollection with centreline and edges, one feature per stretch without a gap.
 
     Each has, per vertex, its station along the path, its standard deviation across the road and the half-widths of the
@@ -129,7 +103,7 @@ def geojson(found: Found, name: str, spacing: float) -> dict[str, Any]:
     return collection | {"features": features}
 
 
-def corridor_json(found: Found, calibration: Mapping[str, Any]) -> dict[str, Any]:
+def corridor_json(found: Regression, calibration: Mapping[str, Any]) -> dict[str, Any]:
     """Return the corridor as JSON data: a list of M numbers per column, null where nothing was found.
 
     Args:

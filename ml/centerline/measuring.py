@@ -28,7 +28,6 @@ from ..scores.evaluation import (
     measure,
     skeleton_predictor,
     trivial_predictors,
-    truth_of,
 )
 from ..scores.metrics import figures, or_none
 from ..scores.pictures import PictureView, corridor_picture, lines_picture
@@ -113,9 +112,9 @@ def corridor_figures(predictor: CenterlinePredictor, shown: Sequence[Case]) -> d
     error, std, wide = [], [], []
     for one in shown:
         found = predictor.regress(one.road, one.frames)
-        error.append(errors(found, truth_of(one.road)))
+        error.append(errors(found, one.road.known_truth))
         std.append(found.std)
-        wide.append(predictor.widths(found))
+        wide.append(found.widths)
     every, deviation, widths = np.concatenate(error), np.concatenate(std), np.concatenate(wide)
     rows = {}
     for index, name in enumerate(TARGETS):
@@ -139,7 +138,7 @@ def _measure_case(cloud: Path, truth: TruthKind) -> LearningRoad:
 
 def _draw(folder: Path, one: Case, predictor: CenterlinePredictor, name: str) -> list[str]:
     """Draw a road; return the names of the pictures."""
-    length = truth_of(one.road).axis.length
+    length = one.road.known_truth.axis.length
     view = PictureView(max(0.0, 0.5 * (length - _VIEW)), min(length, 0.5 * (length + _VIEW)))
     prediction = predictor(one.road, one.frames)
     lines: Mapping[str, Float] = {

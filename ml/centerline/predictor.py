@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Iterator, Mapping
 from copy import copy
 from dataclasses import dataclass
@@ -13,7 +12,6 @@ from pydantic import Field
 from torch import Tensor
 
 from synthroads_addon.base.arrays import Bool, Float, Index
-from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import quantity
 
 from ..configuration import Part
@@ -47,12 +45,21 @@ class Regression:
             local coordinates. NaN: nothing found.
         raw_std: (M, T) the model's own standard deviations.
         std: (M, T) the same, calibrated.
+        widths: (M, T, 2) half-widths of the intervals that cover 68 % and 95 % on roads like the validation's.
+        epsg: code of the coordinate system, None if it isn't known.
     """
 
     frames: Frames
     value: Float
     raw_std: Float
     std: Float
+    widths: Float
+    epsg: int | None = None
+
+    def points(self, name: str) -> Float:
+        """Return the points (M, 3) of one of the lines; z is the centre's elevation."""
+        y, height = (self.value[:, TARGETS.index(each)] for each in (name, "height"))
+        return np.column_stack([self.frames.at(y), height])
 
     @property
     def center(self) -> Float:
@@ -82,22 +89,12 @@ class CenterlinePredictor:
         self.use = use
         found = calibration or {}
         self.calibration = {name: found.get(name, IntervalCalibration()) for name in TARGETS}
-        self._memory: dict[str, tuple[Float, Float]] | None = None
-
-    def remembering(self) -> CenterlinePredictor:
-        """Return the same, but what it found on the same points in the same frames isn't found twice.
-
-        Those that `calibrated_on` makes of it share its memory.
-        """
-        other = copy(self)
-        other._memory = {}
-        return other
 
     def __call__(self, road: LearningRoad, frames: Frames) -> Float:
         """Return (M, 4 + 2 K), `evaluation.CORRIDOR_COLUMNS`; the height is an elevation."""
         found = self.regress(road, frames)
         center, corridor = (found.value[:, :1], found.std[:, :1]), (found.value[:, 1:], found.std[:, 1:])
-        return np.column_stack([*center, *corridor, self.widths(found)[:, 0]])
+        return np.column_stack([*center, *corridor, found.widths[:, 0]])
 
     def regress(self, road: LearningRoad, frames: Frames) -> Regression:
         """Return what the model finds.
@@ -106,19 +103,10 @@ class CenterlinePredictor:
         their mean as well, since errors of the same points don't average out. Where sequences are interleaved, lines
         are `join_line`.
         """
-        mean, raw = self._found(road, frames)
-        factors = np.array([self.calibration[name].factor for name in TARGETS])
-        return Regression(frames, mean, raw, raw * factors)
-
-    def _found(self, road: LearningRoad, frames: Frames) -> tuple[Float, Float]:
-        """Return values and the model's own deviations (M, T), from memory if there is one that has them."""
-        if self._memory is None:
-            return self._regress(road, frames)
-        parts = (road.xyz, road.intensity, frames.position, frames.direction)
-        key = hashlib.sha256(b"".join(np.ascontiguousarray(part).tobytes() for part in parts)).hexdigest()
-        if key not in self._memory:
-            self._memory[key] = self._regress(road, frames)
-        return self._memory[key]
+        mean, raw = self._regress(road, frames)
+        calibration = [self.calibration[name] for name in TARGETS]
+        factors, widths = np.array([one.factor for one in calibration]), np.array([one.widths for one in calibration])
+        return Regression(frames, mean, raw, raw * factors, raw[:, :, None] * widths)
 
     def _regress(self, road: LearningRoad, frames: Frames) -> tuple[Float, Float]:
         shape = (len(frames), len(TARGETS))
@@ -156,20 +144,13 @@ class CenterlinePredictor:
         """
         error, raw = [], []
         for road, frames in shown:
-            if road.truth is None:
-                raise InputError("road", road.name, "must have a known centreline for deviations to be found")
             found = self.regress(road, frames)
-            error.append(errors(found, road.truth))
+            error.append(errors(found, road.known_truth))
             raw.append(found.raw_std)
         every = np.concatenate(error)
         other = copy(self)
         other.calibration = all_calibrated(TARGETS, every, np.concatenate(raw))
         return other, every
-
-    def widths(self, found: Regression) -> Float:
-        """Return half-widths (M, T, 2) of the intervals that cover 68 % and 95 % on roads like the validation's."""
-        factors = np.array([self.calibration[name].widths for name in TARGETS])
-        return found.raw_std[:, :, None] * factors
 
     def _sequences(self, road: LearningRoad, frames: Frames) -> Iterator[tuple[Index, Float, Bool, Float, Float]]:
         """Yield of all slices of some sequences: frame, z origin, whether there are points, values and deviations."""

@@ -10,23 +10,24 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from synthroads_addon.base.arrays import Float
 from synthroads_addon.base.classes import ClassScheme
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.random_streams import stream
-from synthroads_addon.base.schema import read_json
 from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.cloud.points import PointBlock, concatenate
 from synthroads_addon.cloud.tools.quantile_mapping import steps_per_unit
 from synthroads_addon.cloud.tools.subsample import GridSubsampler
 from synthroads_addon.dataset.manifest import MANIFEST, SceneEntry, read_manifest
 
+from .axis import MeasuredAxis
 from .packed import Packed, pack_tile
 from .sources import Source, labelled_blocks, read_tiles, tile_of
 from .tiles import CloudTile
 
 CROP = 24_000
 """Points of a crop, in which the size of a packed set is told."""
+_SPACING = 0.5
+"""Distance of the points of a centreline, m."""
 _SMALLEST = 2_000
 """Tiles of fewer points, at a road's ends, are left out."""
 
@@ -47,8 +48,8 @@ def corridor_tiles(
         length: of a tile along the road, m.
     """
     home = folder / "scenes" / scene
-    line = densify_polyline(_line(home / "centerline.geojson"), 0.5)
-    tree = cKDTree(line)
+    line = MeasuredAxis.read(home / "centerline.geojson")
+    tree = cKDTree(line.position(line.stations(_SPACING)))
     clouds = sorted(home.glob("cloud.*"))
     if not clouds:
         raise InputError(str(home), None, "holds no cloud")
@@ -62,7 +63,7 @@ def corridor_tiles(
         return
     points = concatenate(blocks)
     _, nearest = tree.query(points.xyz[:, :2])
-    station = nearest * 0.5 // length
+    station = nearest * _SPACING // length
     for number in np.unique(station):
         part = points.select(station == number)
         if len(part) >= _SMALLEST:
@@ -73,23 +74,6 @@ def _lean(block: PointBlock) -> PointBlock:
     """Return a block without what isn't packed."""
     block = replace(block, normal=None, material=None, scanner=None, true_range=None, true_xyz=None)
     return replace(block, roughness=None, metallic=None, specular=None, color_source=None)
-
-
-def _line(path: Path) -> Float:
-    """Return the vertices (M, 2) of a centreline in GeoJSON."""
-    data = read_json(path)
-    try:
-        line = np.array(data["features"][0]["geometry"]["coordinates"], dtype=np.float64)[:, :2]
-    except (KeyError, IndexError, TypeError, ValueError):
-        raise InputError(str(path), None, "holds no line") from None
-    return line
-
-
-def densify_polyline(line: Float, spacing: float) -> Float:
-    """Return points (K, 2) every ``spacing`` along a polyline (M, 2), m."""
-    along = np.r_[0.0, np.cumsum(np.hypot(*np.diff(line, axis=0).T))]
-    at = np.arange(int(along[-1] / spacing) + 1) * spacing
-    return np.stack([np.interp(at, along, line[:, axis]) for axis in range(2)], axis=1)
 
 
 def packed_tiles(

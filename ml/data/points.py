@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,29 +41,29 @@ class Points:
     """
 
     origin: Float
-    xyz: Float
+    xyz: AnyArray
     intensity: Float32
-    rgb: Float32
+    rgb: AnyArray
     class_id: UInt8
     class_names: Mapping[int, str] = field(default_factory=dict)
     has_color: bool = False
     epsg: int | None = None
+    per_point: ClassVar[tuple[str, ...]] = ("xyz", "intensity", "rgb", "class_id")
 
     def __len__(self) -> int:
         return len(self.xyz)
 
-    def select(self, keep: Bool | Index | slice) -> Points:
+    def select(self, keep: Bool | Index | slice) -> Self:
         """Return the points chosen by a mask, indices or a slice."""
-        return replace(
-            self, xyz=self.xyz[keep], intensity=self.intensity[keep], rgb=self.rgb[keep], class_id=self.class_id[keep]
-        )
+        return replace(self, **{name: getattr(self, name)[keep] for name in self.per_point})
+
+    def class_table(self, names: Collection[str]) -> Bool:
+        """Return for each id (256,) whether its class has one of the names."""
+        return np.array([self.class_names.get(number) in names for number in range(256)])
 
     def of_class(self, names: Collection[str]) -> Bool:
         """Return a mask (N,) of the points whose class has one of the names."""
-        wanted = np.zeros(256, dtype=bool)
-        for number, name in self.class_names.items():
-            wanted[number] = name in names
-        return wanted[self.class_id]
+        return np.asarray(self.class_table(names)[self.class_id])
 
 
 def read_points(path: Path, classes: Collection[str] | None = None) -> Points:

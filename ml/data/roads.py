@@ -5,15 +5,15 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
-from synthroads_addon.base.arrays import Bool, Float, Float32, Index, UInt8
+from synthroads_addon.base.arrays import Bool, Float, Float32, Index
 from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
 from synthroads_addon.base.random_streams import stream
 from synthroads_addon.base.scratch.folders import scratch_folder
@@ -42,38 +42,35 @@ _CACHED = {
 _CACHE_VERSION = 1
 
 
-@dataclass(frozen=True)
-class LearningRoad:
+@dataclass(frozen=True, kw_only=True)
+class LearningRoad(Points):
     """N points of the road and the ground beside it. Arrays may be mapped from files.
+
+    Coordinates are float32 here (0.25 mm at 4 km), colours 8 bits of sRGB.
 
     Attributes:
         name: of the road.
-        origin: (3,) map coordinates that were subtracted, whole metres.
-        xyz: (N, 3) float32 local coordinates, m: 0.25 mm at 4 km.
-        intensity: (N,) float32 share of 16 bits.
-        rgb: (N, 3) uint8 sRGB.
-        class_id: (N,) uint8 in the file's scheme.
-        class_names: name of each class by its id.
-        has_color: whether the points have colours.
         station: (N,) float32 along ``reference``, m, ascending.
         reference: the line that the points are sorted along.
         truth: the centreline, None if it isn't known.
     """
 
     name: str
-    origin: Float
-    xyz: Float32
-    intensity: Float32
-    rgb: UInt8
-    class_id: UInt8
-    class_names: dict[int, str]
-    has_color: bool
     station: Float32
     reference: MeasuredAxis
     truth: Truth | None = None
+    per_point: ClassVar[tuple[str, ...]] = (*Points.per_point, "station")
 
-    def __len__(self) -> int:
-        return len(self.station)
+    @property
+    def known_truth(self) -> Truth:
+        """Return the truth.
+
+        Raises:
+            InputError: it isn't known.
+        """
+        if self.truth is None:
+            raise InputError("road", self.name, "must have a known centreline to be measured on")
+        return self.truth
 
     @classmethod
     def of_points(
@@ -97,10 +94,6 @@ class LearningRoad:
             truth=truth,
         )
 
-    def select(self, keep: Bool) -> LearningRoad:
-        """Return the road with the points (N,) of a mask only."""
-        return replace(self, **{name: getattr(self, name)[keep] for name in _CACHED})
-
     @cached_property
     def belonging(self) -> Bool:
         """Which points (N,) belong to the road: of a carriageway those up to the middle of the median."""
@@ -110,10 +103,6 @@ class LearningRoad:
         nearest = np.clip(np.searchsorted(self.truth.axis.station, station), 0, len(self.truth.room) - 1)
         room = self.truth.room[nearest]
         return np.asarray((offset <= room[:, 0]) & (-offset <= room[:, 1]))
-
-    def ids_of(self, names: Sequence[str]) -> list[int]:
-        """Return the ids of the classes that have one of the names."""
-        return [number for number, name in self.class_names.items() if name in names]
 
     def slices(self, frames: Frames, half_width: float, thickness: float = 1.0) -> Slices:
         """Return the points in the slice of each of M frames.

@@ -15,7 +15,6 @@ A sample is a dictionary of tensors; S is the number of slices of a sequence, N 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -67,15 +66,6 @@ class SliceSettings(Part):
     def frame_spacing(self) -> float:
         """Distance of the frames along a path in use, m: sequences of slices farther apart are interleaved."""
         return min(SPACING, self.spacing)
-
-
-@dataclass(frozen=True)
-class _Start:
-    """A stretch of a road in which sequences can begin: their first station is uniform in low to high."""
-
-    road: int
-    low: float
-    high: float
 
 
 class SliceDataset(Dataset[Sample]):
@@ -132,13 +122,12 @@ class SliceDataset(Dataset[Sample]):
         """Return the sample of some numbers, any of them."""
         rng = stream(self.seed, self.purpose, *key)
         starts = self._starts[rng.integers(len(self._starts))]
-        lengths = np.array([start.high - start.low + 1e-3 for start in starts])
-        start = starts[rng.choice(len(starts), p=lengths / lengths.sum())]
+        lengths = np.array([high - low + 1e-3 for _, low, high in starts])
+        number, low, high = starts[rng.choice(len(starts), p=lengths / lengths.sum())]
         settings = self.settings
-        road = cut_beside_median(self.roads[start.road], settings.median_error, rng)
-        assert road.truth is not None
-        station = rng.uniform(start.low, start.high) + settings.spacing * np.arange(settings.slices)
-        axis = road.truth.axis
+        road = cut_beside_median(self.roads[number], settings.median_error, rng)
+        station = rng.uniform(low, high) + settings.spacing * np.arange(settings.slices)
+        axis = road.known_truth.axis
         exact = Frames(axis.position(station), axis.direction(station), station)
         path = displace_frames(exact, rng, settings.window, settings.direction_deg, settings.wander_length)
         cut = stretch(road, path, settings)
@@ -146,7 +135,7 @@ class SliceDataset(Dataset[Sample]):
             apply_effects("centerline", cut, self.effects, rng, before_thinning=True)
             thin(cut, settings.points_per_slice, rng)
             apply_effects("centerline", cut, self.effects, rng)
-        return sample(cut, settings, rng, start.road, np.arange(settings.slices))
+        return sample(cut, settings, rng, number, np.arange(settings.slices))
 
 
 class IterableSlices(IterableDataset[Sample]):
@@ -202,8 +191,6 @@ def stretch(road: LearningRoad, frames: Frames, settings: SliceSettings) -> Stre
     """
     found = road.slices(frames, settings.half_width, settings.thickness)
     labels = road.class_id[found.index]
-    paved = np.isin(labels, road.ids_of(ROAD_CLASSES))
-    marked = np.isin(labels, road.ids_of(("road_marking",)))
     if road.truth is None:
         unknown = np.full((len(frames), len(CORRIDOR)), np.nan)
         center, corridor, lines, room = unknown[:, 0], unknown, unknown[:, :2], unknown[:, :2]
@@ -215,8 +202,8 @@ def stretch(road: LearningRoad, frames: Frames, settings: SliceSettings) -> Stre
         strength=road.intensity[found.index].astype(np.float64),
         color=road.rgb[found.index] / 255.0 if road.has_color else None,
         number=found.number,
-        paved=paved,
-        marked=marked,
+        paved=road.class_table(ROAD_CLASSES)[labels],
+        marked=road.class_table(("road_marking",))[labels],
         frames=frames,
         center=center,
         corridor=corridor,
@@ -276,12 +263,13 @@ def collate(samples: Sequence[Mapping[str, Tensor]]) -> Batch:
     return batch
 
 
-def _starts(road: LearningRoad, number: int, settings: SliceSettings) -> list[_Start]:
+def _starts(road: LearningRoad, number: int, settings: SliceSettings) -> list[tuple[int, float, float]]:
+    """Return where sequences can begin: the road's number, and from which to which station, on each of its parts."""
     if road.truth is None:
         return []
     length = settings.spacing * (settings.slices - 1)
     parts = road.truth.axis.parts
-    return [_Start(number, low, high - length) for low, high in parts.tolist() if high - low >= length]
+    return [(number, low, high - length) for low, high in parts.tolist() if high - low >= length]
 
 
 def thin(cut: Stretch, most: int, rng: np.random.Generator) -> None:

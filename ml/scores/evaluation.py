@@ -20,8 +20,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
-from itertools import product
 
 import numpy as np
 
@@ -29,7 +27,7 @@ from synthroads_addon.base.arrays import Float
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.random_streams import stream
 
-from ..data.corridor import CORRIDOR, Truth
+from ..data.corridor import CORRIDOR
 from ..data.frames import Frames, along, displace_frames, estimated_path, stretches
 from ..data.points import ROAD_CLASSES
 from ..data.roads import LearningRoad, Slices, crop_road, cut_beside_median
@@ -87,28 +85,17 @@ def case(
     settings = settings or SliceSettings()
     seen = road if cropping is None else crop_road(road, cropping.share, seed, cropping.length)
     seen = cut_beside_median(seen, settings.median_error, stream(seed, "median", road.name))
-    path = estimated_path(seen.xyz.astype(np.float64)) if estimated else truth_of(road).axis
+    path = estimated_path(seen.xyz.astype(np.float64)) if estimated else road.known_truth.axis
     rng = stream(seed, "frames", road.name)
     strayed = displace_frames(along(path), rng, settings.window, settings.direction_deg, settings.wander_length)
     return Case(seen, strayed)
-
-
-def truth_of(road: LearningRoad) -> Truth:
-    """Return a road's truth.
-
-    Raises:
-        InputError: it isn't known.
-    """
-    if road.truth is None:
-        raise InputError("road", road.name, "must have a known centreline to be measured on")
-    return road.truth
 
 
 def evaluate(predictor: Predictor, shown: Case) -> dict[str, float]:
     """Return the figures of one predictor on one road, see `distances.METRICS`."""
     frames = shown.frames
     predicted = predictor(shown.road, frames)
-    true, _ = truth_of(shown.road).axis.crossing(frames.position, frames.direction)
+    true, _ = shown.road.known_truth.axis.crossing(frames.position, frames.direction)
     std = predicted[:, 1] if predicted.shape[1] > 1 else None
     intervals = predicted[:, -2:] if predicted.shape[1] == len(CORRIDOR_COLUMNS) else None
     compared = Comparison(frames.at(predicted[:, 0]), frames.at(true), frames.station, std, intervals)
@@ -186,15 +173,15 @@ def skeleton_predictor(settings: baselines.SkeletonSettings) -> Predictor:
     """Return the skeleton baseline; the mask ``classes`` takes the points of the road's classes where there are any."""
 
     def predict(road: LearningRoad, frames: Frames) -> Float:
-        xy, intensity = _mask_points(road, settings.mask)
+        xy, intensity = mask_points(road, settings.mask)
         return baselines.skeleton_centers(xy, intensity, frames.position, frames.direction, settings)[:, None]
 
     return predict
 
 
-def _mask_points(road: LearningRoad, mask: str) -> tuple[Float, Float]:
+def mask_points(road: LearningRoad, mask: str) -> tuple[Float, Float]:
     """Return places (N, 2) and intensities (N,) of the points that the skeleton's mask is made of."""
-    paved = np.isin(road.class_id, road.ids_of(ROAD_CLASSES))
+    paved = road.of_class(ROAD_CLASSES)
     own = road.belonging & paved if mask == "classes" and paved.any() else road.belonging
     return road.xyz[own, :2].astype(np.float64), road.intensity[own].astype(np.float64)
 
@@ -232,46 +219,3 @@ def along_parabolas(predictor: Predictor, length: float) -> Predictor:
         return result[:, None]
 
     return predict
-
-
-@dataclass(frozen=True)
-class GridSearch:
-    """Variants tried for the baseline, and the best.
-
-    Attributes:
-        best: of the settings that find at least `FOUND` of the slices, the one with the smallest mean distance.
-        rows: settings with their figures.
-    """
-
-    best: baselines.SkeletonSettings
-    rows: list[tuple[baselines.SkeletonSettings, dict[str, float]]]
-
-
-FOUND = 0.8
-RASTERS = (0.25, 0.5, 1.0, 2.0)
-BRANCHES = (5.0, 10.0, 15.0, 30.0)
-BINS = (1.0, 5.0, 10.0)
-"""m."""
-
-
-def grid_search(shown: Sequence[Case], masks: Sequence[str]) -> GridSearch:
-    """Return the baseline's best settings on the cases of one road, to be frozen for all others."""
-    rows: list[tuple[baselines.SkeletonSettings, dict[str, float]]] = []
-    for mask, raster, branch in product(masks, RASTERS, BRANCHES):
-        tried = [baselines.SkeletonSettings(raster, branch, mask, width) for width in BINS]
-        found: list[list[dict[str, float]]] = [[] for _ in tried]
-        for one in shown:
-            frames = one.frames
-            # Thinning takes the time, and doesn't depend on the bins.
-            lines = baselines.skeletons(*_mask_points(one.road, mask), frames.position, tried[0])
-            for settings, some in zip(tried, found, strict=True):
-                y = baselines.centers_on(lines, frames.position, frames.direction, settings.bin)
-                some.append(evaluate(partial(_as_column, y), one))
-        rows.extend((settings, over_roads(some)) for settings, some in zip(tried, found, strict=True))
-    enough = [row for row in rows if row[1]["found"] >= FOUND] or rows
-    best = min(enough, key=lambda row: row[1]["mae"] if np.isfinite(row[1]["mae"]) else np.inf)
-    return GridSearch(best[0], rows)
-
-
-def _as_column(y: Float, road: LearningRoad, frames: Frames) -> Float:
-    return y[:, None]

@@ -18,7 +18,6 @@ from ..data.axis import MeasuredAxis
 from ..data.corridor import Truth
 from ..data.intensity import logarithms
 from ..data.roads import LearningRoad
-from .evaluation import truth_of
 
 REACH = 1.2
 """A line is looked for up to so far from the axis, m."""
@@ -42,7 +41,7 @@ def with_painted_line(road: LearningRoad) -> LearningRoad:
     Raises:
         InputError: the road has no truth, or no two neighbouring places with a line.
     """
-    truth = truth_of(road)
+    truth = road.known_truth
     axis = truth.axis
     station, offset = axis.project(road.xyz)
     near = np.abs(offset) <= REACH + LINE

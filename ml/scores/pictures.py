@@ -20,7 +20,7 @@ from ..data.corridor import CORRIDOR
 from ..data.frames import Frames
 from ..data.tiles import CloudTile
 from .calibration import DEVIATIONS, LEVELS
-from .evaluation import CORRIDOR_COLUMNS, Case, truth_of
+from .evaluation import CORRIDOR_COLUMNS, Case
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -135,14 +135,14 @@ def _cloud(axes: Axes, shown: Case, view: PictureView, height: float) -> None:
     Where only an axis is known, as of real scans that may not be passed on, means of cells are drawn and no points.
     """
     own = np.flatnonzero(shown.road.belonging)
-    station, offset = truth_of(shown.road).axis.project(shown.road.xyz[own])
+    station, offset = shown.road.known_truth.axis.project(shown.road.xyz[own])
     near = np.flatnonzero((station >= view.first) & (station <= view.last) & (np.abs(offset) <= height))
     intensity = shown.road.intensity[own[near]]
     # By their ranks: a scanner beside the road sees its near side a hundred times as bright as the far one.
     intensity = rankdata(intensity) / max(1, len(near))
     look: dict[str, Any] = {"cmap": "gray", "vmin": -0.5, "vmax": 1.0, "rasterized": True}
     axes.set_facecolor("#101418")
-    if truth_of(shown.road).left is None:
+    if shown.road.known_truth.left is None:
         along, aside = np.arange(view.first, view.last + 0.5), np.arange(-height, height + 0.125, 0.25)
         places = np.column_stack([station[near], offset[near]])
         count, _ = np.histogramdd(places, bins=[along, aside])
@@ -155,7 +155,7 @@ def _cloud(axes: Axes, shown: Case, view: PictureView, height: float) -> None:
 
 
 def _true(axes: Axes, shown: Case, view: PictureView, edges: bool = False) -> None:
-    truth = truth_of(shown.road)
+    truth = shown.road.known_truth
     station = np.arange(view.first, view.last, 0.5)
     axes.plot(station, np.where(truth.axis.inside(station), 0.0, np.nan), color=TRUE, lw=2.5, label="true axis")
     if edges:
@@ -168,7 +168,7 @@ def _true(axes: Axes, shown: Case, view: PictureView, edges: bool = False) -> No
 
 def _beside(shown: Case, points: Float, view: PictureView) -> tuple[Float, Float]:
     """Return station and offset of those points (M, 2) that lie in the view, by station; NaN between stretches."""
-    truth = truth_of(shown.road)
+    truth = shown.road.known_truth
     there = np.isfinite(points).all(axis=1)
     station, offset = truth.axis.project(points[there])
     inside = (station >= view.first) & (station <= view.last) & truth.axis.inside(station)
@@ -199,7 +199,7 @@ def _band(axes: Axes, shown: Case, view: PictureView, y: Float, width: Float, co
 
 def _across(shown: Case, frames: Frames, y: Float, view: PictureView) -> tuple[Float, Float]:
     """Return the frames' stations on the true axis (K,) and the offsets of their points, in the frames' order."""
-    truth = truth_of(shown.road)
+    truth = shown.road.known_truth
     _, station = truth.axis.crossing(frames.position, frames.direction)
     inside = (station >= view.first) & (station <= view.last) & np.isfinite(y)
     _, offset = truth.axis.project(frames.at(y)[inside])
@@ -225,7 +225,7 @@ def _center_error(axes: Axes, shown: Case, view: PictureView, column: Mapping[st
 
 
 def _lanes(axes: Axes, shown: Case, view: PictureView, column: Mapping[str, Float]) -> None:
-    there = truth_of(shown.road).at(shown.frames.position, shown.frames.direction, np.zeros(len(shown.frames)))
+    there = shown.road.known_truth.at(shown.frames.position, shown.frames.direction, np.zeros(len(shown.frames)))
     inside = np.flatnonzero((there.station >= view.first) & (there.station <= view.last))
     inside = inside[np.argsort(there.station[inside])]
     station = there.station[inside]

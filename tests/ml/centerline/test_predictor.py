@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ml.centerline.find_road import Found, corridor_json, find_road, geojson
+from ml.centerline.find_road import corridor_json, find_road, geojson
 from ml.centerline.predictor import CenterlinePredictor, Regression, UseOptions, errors, join_line
 from ml.data import strips
 from ml.data.axis import MeasuredAxis
@@ -132,7 +132,7 @@ def test_calibration_scales_deviations_and_widths():
     found = ready.regress(road(), frames())
     np.testing.assert_allclose(found.std[:, 0], 3.0 * plain.std[:, 0])
     np.testing.assert_allclose(found.std[:, 1:], plain.std[:, 1:])
-    np.testing.assert_allclose(ready.widths(found)[:, 0], plain.std[:, :1] * [4.0, 5.0])
+    np.testing.assert_allclose(found.widths[:, 0], plain.std[:, :1] * [4.0, 5.0])
 
 
 def test_errors_of_the_truth_itself_are_none():
@@ -141,7 +141,7 @@ def test_errors_of_the_truth_itself_are_none():
     places = frames()
     there = known.at(places.position, places.direction, np.zeros(len(places)))
     value = np.column_stack([there.center, there.corridor])
-    found = Regression(places, value, np.ones_like(value), np.ones_like(value))
+    found = Regression(places, value, *(np.ones_like(value) for _ in range(2)), np.ones((*value.shape, 2)))
     np.testing.assert_allclose(errors(found, known), 0.0, atol=1e-12)
     found.value[:, TARGETS.index("height")] += 0.25
     np.testing.assert_allclose(errors(found, known)[:, TARGETS.index("height")], 0.25)
@@ -202,7 +202,7 @@ def test_clouds_without_ground_are_refused(tmp_path: Path):
         find_road(predictor(), tmp_path / "none.laz")
 
 
-def _found(gap: bool = True) -> Found:
+def _found(gap: bool = True) -> Regression:
     count = 6
     station = np.arange(count, dtype=np.float64)
     value = np.zeros((count, len(TARGETS)))
@@ -211,7 +211,7 @@ def _found(gap: bool = True) -> Found:
         value[2] = np.nan
     std = np.full_like(value, 0.1)
     places = Frames(np.column_stack([500_000.0 + station, 0.0 * station]), 0.0 * station, station)
-    return Found(places, value, std, std[:, :, None] * np.array([1.0, 2.0]), 25832)
+    return Regression(places, value, std, std, std[:, :, None] * np.array([1.0, 2.0]), 25832)
 
 
 def test_geojson_has_lines_in_map_coordinates():
@@ -274,30 +274,3 @@ def test_lines_of_interleaved_sequences_are_joined():
     other = jagged.copy()
     other[60:] += 5.0
     np.testing.assert_array_equal(join_line(places, other, std, 4)[:60], again[:60])
-
-
-def test_what_was_found_is_remembered_by_points_and_frames(monkeypatch: pytest.MonkeyPatch):
-    seen: list[int] = []
-    sequences = CenterlinePredictor._sequences
-
-    def counted(self: CenterlinePredictor, road: LearningRoad, frames: Frames):
-        seen.append(len(frames))
-        return sequences(self, road, frames)
-
-    monkeypatch.setattr(CenterlinePredictor, "_sequences", counted)
-    plain, places = predictor(), frames(20.0, 43.0)
-    wanted = plain.regress(road(), places)
-    remembering = plain.remembering()
-    for _ in range(2):
-        found = remembering.regress(road(), places)
-        np.testing.assert_array_equal(found.value, wanted.value)
-        np.testing.assert_array_equal(found.std, wanted.std)
-    again, _ = remembering.calibrated_on([(road(), places)])
-    factors = np.array([again.calibration[name].factor for name in TARGETS])
-    np.testing.assert_allclose(again.regress(road(), places).std, wanted.raw_std * factors)
-    assert len(seen) == 2
-    fewer = np.arange(len(road())) % 2 == 0
-    other = remembering.regress(road().select(fewer), places)
-    assert not np.array_equal(other.value, wanted.value)
-    remembering.regress(road(), places.select(np.arange(len(places)) > 3))
-    assert len(seen) == 4

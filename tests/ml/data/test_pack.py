@@ -49,7 +49,7 @@ def test_corridor_of_a_scene_is_cut_along_its_road(tmp_path: Path) -> None:
     block = road_block(60_000, 3, length=150.0)
     write_cloud(home / "cloud.laz", block)
     line = [[4e5 - 5.0, 5.6e6 + 20.0, 100.0], [4e5 + 155.0, 5.6e6 + 20.0, 100.0]]
-    data = {"features": [{"geometry": {"type": "LineString", "coordinates": line}}]}
+    data = {"type": "LineString", "coordinates": line}
     (home / "centerline.geojson").write_text(json.dumps(data))
     tiles = list(pack.corridor_tiles(tmp_path, "one", class_scheme("5"), 0.2, 8.0))
     assert len(tiles) == 3

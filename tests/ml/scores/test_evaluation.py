@@ -23,12 +23,10 @@ from ml.scores.evaluation import (
     along_parabolas,
     case,
     evaluate,
-    grid_search,
     measure,
     skeleton_predictor,
     trivial_predictor,
     trivial_predictors,
-    truth_of,
 )
 from ml.scores.metrics import Spread
 from ml.scores.pictures import PictureView, corridor_picture, lines_picture
@@ -45,7 +43,7 @@ def told(offset: float, std: float = 0.1):
     """Return a predictor that looks the truth up and strays from it by an offset."""
 
     def predict(road: LearningRoad, frames: Frames) -> Float:
-        y, _ = truth_of(road).axis.crossing(frames.position, frames.direction)
+        y, _ = road.known_truth.axis.crossing(frames.position, frames.direction)
         return np.column_stack([y + offset, np.full(len(y), std)])
 
     return predict
@@ -73,14 +71,14 @@ def test_frames_stray_from_the_axis_by_the_seed(road: LearningRoad) -> None:
     first, second, again = (case(road, seed, cropping=None, estimated=False).frames for seed in (1, 2, 1))
     assert np.array_equal(first.position, again.position)
     assert not np.allclose(first.position, second.position)
-    y, _ = truth_of(road).axis.crossing(first.position, first.direction)
+    y, _ = road.known_truth.axis.crossing(first.position, first.direction)
     assert 0.5 < np.nanmax(np.abs(y)) <= 6.2
-    assert np.abs(first.direction - truth_of(road).axis.direction(first.station)).max() > 0.01
+    assert np.abs(first.direction - road.known_truth.axis.direction(first.station)).max() > 0.01
 
 
 def test_the_estimated_path_does_not_know_the_axis(road: LearningRoad) -> None:
     """The truth may be anything: frames in use come from the points alone."""
-    other = replace(road, truth=replace(truth_of(road), axis=truth_of(road).axis.moved((3.0, 4.0, 0.0))))
+    other = replace(road, truth=replace(road.known_truth, axis=road.known_truth.axis.moved((3.0, 4.0, 0.0))))
     frames = [case(one, 1, cropping=None, estimated=True).frames for one in (road, other)]
     assert np.array_equal(frames[0].position, frames[1].position)
 
@@ -110,10 +108,10 @@ def test_cuts_of_single_slices_average_out_and_longer_ones_do_not(road: Learning
 
 
 def test_gaps_of_the_axis_are_left_out(road: LearningRoad) -> None:
-    axis = truth_of(road).axis
+    axis = road.known_truth.axis
     joined = axis.joined.copy()
     joined[80:120] = False
-    gap = replace(road, truth=replace(truth_of(road), axis=MeasuredAxis(axis.points, joined)))
+    gap = replace(road, truth=replace(road.known_truth, axis=MeasuredAxis(axis.points, joined)))
     whole, holed = (evaluate(told(0.0), case(one, 1, cropping=None, estimated=True)) for one in (road, gap))
     assert whole["slices"] - holed["slices"] == pytest.approx(40, abs=2)
 
@@ -137,10 +135,10 @@ def test_without_classes_the_skeleton_takes_the_ground() -> None:
 def test_only_one_carriageways_points_belong_to_it(road: LearningRoad) -> None:
     assert road.belonging.all()
     room = np.column_stack(
-        [np.full(len(truth_of(road).axis.points), np.inf), np.full(len(truth_of(road).axis.points), 2.0)]
+        [np.full(len(road.known_truth.axis.points), np.inf), np.full(len(road.known_truth.axis.points), 2.0)]
     )
-    half = replace(road, truth=replace(truth_of(road), room=room))
-    _, offset = truth_of(road).axis.project(road.xyz)
+    half = replace(road, truth=replace(road.known_truth, room=room))
+    _, offset = road.known_truth.axis.project(road.xyz)
     assert offset[half.belonging].min() == pytest.approx(-2.0, abs=0.05)
     shown = Case(half, case(road, 1, cropping=None, estimated=False).frames)
     assert evaluate(trivial_predictor(MIDDLE), shown)["bias"] == pytest.approx(2.5, abs=0.1)
@@ -152,18 +150,6 @@ def test_only_one_carriageways_points_belong_to_it(road: LearningRoad) -> None:
 def test_a_road_without_truth_is_refused(road: LearningRoad) -> None:
     with pytest.raises(InputError, match=r"strip.*known centreline"):
         case(replace(road, truth=None), 1, cropping=None, estimated=False)
-
-
-def test_the_grid_search_takes_the_best_that_finds_enough() -> None:
-    road = strip_road("short", length=80.0)
-    search = grid_search([case(road, 1, cropping=None, estimated=True)], ["ground"])
-    assert len(search.rows) == 48
-    one, row = search.rows[7]
-    assert evaluate(skeleton_predictor(one), case(road, 1, cropping=None, estimated=True)) == row
-    figures = dict(search.rows)
-    enough = [row["mae"] for row in figures.values() if row["found"] >= 0.8]
-    assert figures[search.best]["mae"] == min(enough)
-    assert figures[search.best]["found"] >= 0.8
 
 
 def test_seeds_and_trained_versions_are_averaged(road: LearningRoad) -> None:
@@ -257,7 +243,7 @@ def test_parabolas_average_cuts_out_and_follow_a_bend() -> None:
     road = strip_road("bend", radius=300.0)
     shown = case(road, 2, cropping=None, estimated=False)
     known = along_parabolas(
-        lambda _, frames: truth_of(road).axis.crossing(frames.position, frames.direction)[0][:, None], 37.0
+        lambda _, frames: road.known_truth.axis.crossing(frames.position, frames.direction)[0][:, None], 37.0
     )
     assert evaluate(known, shown)["distance_95"] < 0.01
     cut = case(road, 2, cropping=Cropping(), estimated=False)

@@ -11,7 +11,6 @@ from ml.data.axis import MeasuredAxis
 from ml.data.corridor import Truth
 from ml.data.points import Points
 from ml.data.roads import LearningRoad
-from ml.scores.evaluation import truth_of
 from ml.scores.paint import REACH, with_painted_line
 from synthroads_addon.base.errors import InputError
 
@@ -38,7 +37,7 @@ def swaying_road(paint: float = 1.5, sway: float = 0.4, bare: tuple[float, float
 
 
 def test_the_line_is_found_where_the_axis_is_not() -> None:
-    found = truth_of(with_painted_line(swaying_road())).axis
+    found = with_painted_line(swaying_road()).known_truth.axis
     assert found.length > 190.0
     assert len(found.parts) == 1
     # Over 10 m the axis turns by a quarter of its sway; the line is straight.
@@ -49,7 +48,7 @@ def test_the_line_is_found_where_the_axis_is_not() -> None:
 def test_no_line_is_found_where_none_is_painted() -> None:
     with pytest.raises(InputError, match="painted line"):
         with_painted_line(swaying_road(paint=0.0))
-    found = truth_of(with_painted_line(swaying_road(bare=(80.0, 120.0)))).axis
+    found = with_painted_line(swaying_road(bare=(80.0, 120.0))).known_truth.axis
     assert not found.inside([100.0])[0]
     assert found.inside(np.array([40.0, 160.0])).all()
 

@@ -1,0 +1,60 @@
+"""What only the tables of the documentation need: the baseline's best settings, and predictors with a memory."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ml.centerline.predictor import CenterlinePredictor, UseOptions
+from ml.data.frames import Frames, along
+from ml.data.roads import LearningRoad
+from ml.networks.centerline.models import TARGETS
+from ml.scores.evaluation import case, evaluate, skeleton_predictor
+from tests.helpers.clouds.centerline_batches import SETTINGS, small
+from tests.helpers.clouds.centerline_roads import strip_road
+from tests.helpers.roads.analytic_roads import roads
+from tools import figures_centerline
+from tools.figures_centerline import grid_search
+
+
+def test_the_grid_search_takes_the_best_that_finds_enough() -> None:
+    road = strip_road("short", length=80.0)
+    search = grid_search([case(road, 1, cropping=None, estimated=True)], ["ground"])
+    assert len(search.rows) == 48
+    one, row = search.rows[7]
+    assert evaluate(skeleton_predictor(one), case(road, 1, cropping=None, estimated=True)) == row
+    figures = dict(search.rows)
+    enough = [row["mae"] for row in figures.values() if row["found"] >= 0.8]
+    assert figures[search.best]["mae"] == min(enough)
+    assert figures[search.best]["found"] >= 0.8
+
+
+def test_what_was_found_is_remembered_by_points_and_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[int] = []
+    sequences = CenterlinePredictor._sequences
+
+    def counted(self: CenterlinePredictor, road: LearningRoad, frames: Frames) -> Any:
+        seen.append(len(frames))
+        return sequences(self, road, frames)
+
+    monkeypatch.setattr(CenterlinePredictor, "_sequences", counted)
+    known = roads()[0]
+    places = along(known.known_truth.axis).select(slice(20, 43))
+    plain = CenterlinePredictor(small("single").eval(), SETTINGS, UseOptions(step=10))
+    wanted = plain.regress(known, places)
+    remembering = figures_centerline.remembering(plain)
+    for _ in range(2):
+        found = remembering.regress(known, places)
+        np.testing.assert_array_equal(found.value, wanted.value)
+        np.testing.assert_array_equal(found.std, wanted.std)
+    again, _ = remembering.calibrated_on([(known, places)])
+    factors = np.array([again.calibration[name].factor for name in TARGETS])
+    np.testing.assert_allclose(again.regress(known, places).std, wanted.raw_std * factors)
+    assert len(seen) == 2
+    fewer = np.arange(len(known)) % 2 == 0
+    other = remembering.regress(known.select(fewer), places)
+    assert not np.array_equal(other.value, wanted.value)
+    remembering.regress(known, places.select(np.arange(len(places)) > 3))
+    assert len(seen) == 4
