@@ -25,10 +25,11 @@ from ml.data.tiles import Scaling
 from ml.networks.base import SegmentationNetwork
 from ml.registry import FOLDERS, Change, apply_effects, effect, effect_options, network, networks
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.base.schema import quantity, read_yaml
+from synthroads_addon.base.schema import read_yaml
 from tests.helpers.clouds.centerline_batches import SETTINGS
 from tests.helpers.clouds.centerline_batches import batch as slices
 from tests.helpers.clouds.segmentation_data import road_tile, toy, write_pointcept
+from tests.helpers.page_modules import module_of_page
 from tests.helpers.roads.analytic_roads import roads
 
 ROOT = Path(__file__).parents[2]
@@ -96,29 +97,23 @@ def code_of_page(file: str) -> str:
 
 
 @pytest.fixture
-def fading(monkeypatch: pytest.MonkeyPatch) -> Change:
-    """An effect on the samples of both tasks, as a file of the folder would register it; gone after the test."""
+def window(monkeypatch: pytest.MonkeyPatch) -> Change:
+    """The effect of the documentation's page, as if its file stood in the folder; gone after the test."""
     monkeypatch.setattr(registry, "_EFFECTS", {task: dict(known) for task, known in registry._EFFECTS.items()})
-    strength = quantity(0.0, ge=0, le=1, unit="1", description="Share of the intensities that is lost.")
-
-    @effect("segmentation", "centerline", fade=strength)
-    def fading(sample: Sample, effects: Any, random: np.random.Generator) -> None:
-        if sample.strength is not None and effects.fade:
-            sample.strength = sample.strength * (1.0 - effects.fade * random.random())
-
-    return fading
+    found: Change = module_of_page("extend/effect.md", "ml/data/effects/window.py", monkeypatch).dirty_window
+    return found
 
 
-def test_an_effect_is_one_function_for_both_tasks(fading: Change) -> None:
+def test_an_effect_is_one_function_for_both_tasks(window: Change) -> None:
     for task, base in (("segmentation", CropEffects), ("centerline", SequenceEffects)):
         options = effect_options(task, base)
-        assert options.from_dict({"fade": 0.5}).to_dict() == {**base().to_dict(), "fade": 0.5}
-        with pytest.raises(InputError, match="fade is 2"):
-            options.from_dict({"fade": 2})
+        assert options.from_dict({"window": 0.5}).to_dict() == {**base().to_dict(), "window": 0.5}
+        with pytest.raises(InputError, match="window is 2"):
+            options.from_dict({"window": 2})
         samples = []
-        for fade in (0.0, 0.5):
+        for loss in (0.0, 0.5):
             one: Sample = crop_of(road_tile(50), Scaling()) if task == "segmentation" else cut()
-            apply_effects(task, one, options.from_dict({"fade": fade}), np.random.default_rng(1))
+            apply_effects(task, one, options.from_dict({"window": loss}), np.random.default_rng(1))
             samples.append(one)
         plain, faded = samples
         assert plain.strength is not None
@@ -129,11 +124,11 @@ def test_an_effect_is_one_function_for_both_tasks(fading: Change) -> None:
         assert 0.5 < ratio.min() < 1.0
 
 
-def test_two_effects_of_one_name_are_refused(fading: Change) -> None:
+def test_two_effects_of_one_name_are_refused(window: Change) -> None:
     def other(sample: Sample, effects: Any, random: np.random.Generator) -> None: ...
 
-    other.__name__ = "fading"
-    with pytest.raises(ValueError, match=r"test_registry and .*test_registry both have the effect 'fading'"):
+    other.__name__ = "dirty_window"
+    with pytest.raises(ValueError, match=r"effects\.window and .*test_registry both have the effect 'dirty_window'"):
         effect("centerline")(other)
 
 

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from ml.data.classes import IGNORED
+from ml.scores import confusion as confusion_module
 from ml.scores.confusion import METRICS, Confusion, by_class, by_test, score_table
-from ml.scores.metrics import Metric, Spread, defined
+from ml.scores.metrics import Spread, defined
 from synthroads_addon.base.errors import InputError
+from tests.helpers.page_modules import block_of_page
 from tests.judges import require
 from tests.judges.learning import scores_that_differ
 
@@ -137,8 +139,8 @@ def test_further_rows_end_the_first_tests_table() -> None:
 
 
 def test_a_metric_is_one_entry_that_data_and_tables_have(monkeypatch: pytest.MonkeyPatch) -> None:
-    f1 = Metric(lambda of: 2.0 * of.right / (of.found + of.support), "F1", 100.0, 1)
-    monkeypatch.setitem(METRICS, "f1", f1)
+    entry = eval(f"{{{block_of_page('extend/effect.md', 'text', 1)}}}", vars(confusion_module))
+    monkeypatch.setitem(METRICS, "f1", entry["f1"])
     confusion = Confusion(("a", "b"))
     confusion.add(np.array([0, 0, 0, 1]), np.array([0, 0, 1, 1]))
     scores = confusion.to_dict()
