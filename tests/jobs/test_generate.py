@@ -54,7 +54,8 @@ def test_a_road_that_no_pulse_comes_back_from_is_told(tmp_path: Path) -> None:
     assert summary(report, tmp_path).startswith("warning: not one pulse came back")
 
 
-def test_every_file_is_written_and_agrees(tmp_path: Path) -> None:
+def test_every_file_is_written_and_agrees(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("synthroads_addon.cloud.tools.previews.WIDTH", 300)
     seen = []
     report = generate(job(tmp_path), lambda stage, share: seen.append((stage, share)))
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted(
@@ -127,10 +128,10 @@ def test_labels_of_the_pavement_agree_with_the_parameters(demo, sigma: float, ra
     scenario, geometry, scene = demo
     changed = scenario.scan.model_copy(update={"noise": scenario.scan.noise.model_copy(update={"range_sigma": sigma})})
     scan = scan_of(scenario.model_copy(update={"scan": changed}), geometry, scene)
-    points = concatenate([scan_block(scan, *task).points for task in list(scan.blocks())[::5]])
+    points = concatenate([scan_block(scan, *task).points for task in list(scan.blocks())[::10]])
     wrong = misplaced_points(points, geometry, 0.02 + 3 * sigma)
     print(f"{wrong.mean():.4%} of {len(wrong)} points of the pavement lie outside the strips of their class")
-    assert len(wrong) > 100_000
+    assert len(wrong) > 50_000
     assert wrong.mean() < 0.001
     swapped = replace(points, class_id=np.where(points.class_id == 1, 2, points.class_id).astype(np.uint8))
     assert misplaced_points(swapped, geometry, 0.02 + 3 * sigma).mean() > 0.5  # the check can fail
@@ -140,20 +141,20 @@ def test_labels_of_the_pavement_agree_with_the_parameters(demo, sigma: float, ra
 def test_points_of_the_road_lie_on_the_analytic_surface(demo) -> None:
     scenario, geometry, scene = demo
     scan = scan_of(scenario, geometry, scene)
-    points = concatenate([scan_block(scan, *task).points for task in list(scan.blocks())[::3]])
+    points = concatenate([scan_block(scan, *task).points for task in list(scan.blocks())[::9]])
     road = points.select(points.class_id == 1)
     local = road.xyz - scene.static.origin
     station, offset = geometry.alignment.project(local[:, :2])
     error = local[:, 2] - geometry.elevation(station, offset)
     error = error[np.isfinite(error)]
     print(f"largest height error {1e3 * np.abs(error).max():.2f} mm over {len(error)} points")
-    assert len(error) > 100_000
+    assert len(error) > 50_000
     assert np.abs(error).max() <= scenario.settings().tolerance
 
 
 @pytest.mark.keep_scene
 def test_casters_agree(demo) -> None:
-    """Same face for 99.99 % of 40,000 rays with ranges within 0.1 mm; every other ray passes an edge that closely."""
+    """Same face for 99.99 % of 10,000 rays with ranges within 0.1 mm; every other ray passes an edge that closely."""
     from synthroads_addon.blender.casters import make_caster
     from synthroads_addon.scanning.scene.caster import FacePlanes
 
@@ -164,7 +165,7 @@ def test_casters_agree(demo) -> None:
     per_second = scan.setting.pulses_per_line * scan.setting.lines_per_second
     for strip in scan.path.strips:
         begin, end = strip.start_time, strip.start_time + strip.duration
-        firsts = rng.integers(0, int(strip.duration * per_second) - 1000, 20)
+        firsts = rng.integers(0, int(strip.duration * per_second) - 1000, 5)
         rays += [emit_pulses(scan, strip, begin, end, int(first), 1000) for first in firsts]
     origins = np.concatenate([p.origin.T for p in rays])
     directions = np.concatenate([p.direction.T for p in rays])
@@ -174,7 +175,7 @@ def test_casters_agree(demo) -> None:
         assert caster.name == name
         hits[name] = caster.cast(origins.astype(np.float32), directions.astype(np.float32), 500.0)
     a, b = hits["bvhtree"], hits["embree"]
-    assert len(a) == 40_000
+    assert len(a) == 10_000
     assert (a >= 0).mean() > 0.5
     same = a == b
     other = np.flatnonzero(~same)
@@ -207,12 +208,12 @@ def edge_distance(mesh, face: int, origin: np.ndarray, direction: np.ndarray) ->
 
 @pytest.mark.skipif(not REAL_AXIS.exists(), reason="needs the real axis beside the checkout")
 def test_a_real_axis_is_met_and_scanned(tmp_path: Path) -> None:
-    fast = ("vegetation_detail=0", "scan.platform.speed=40", 'outputs=["parameters","cloud","centerline"]')
-    report = generate(job(tmp_path, *fast, axis=REAL_AXIS))
+    fast = ("vegetation_detail=0", "scan.platform.speed=40", "scan.lines_per_second=20")
+    report = generate(job(tmp_path, *fast, 'outputs=["parameters","cloud","centerline"]', axis=REAL_AXIS))
     fit = report["axis"]["horizontal"]
     assert fit["rms"] <= 0.05
     assert fit["p95"] <= 0.10
-    assert report["counts"]["points"] > 100_000
+    assert report["counts"]["points"] > 40_000
     parameters = read_parameters(tmp_path / "parameters.json")
     given = np.genfromtxt(REAL_AXIS, delimiter=",", names=True)
     geometry = RoadGeometry(parameters)

@@ -144,8 +144,12 @@ def test_what_points_up_can_be_said(up: str | None, flat: bool, tmp_path: Path) 
     assert (np.ptp(scene_mesh().vertices[:, 2]) < 1e-5) == flat
 
 
-def test_pictures_come_with_the_cloud_and_colours_are_rendered(scene: Callable[[str], Path], tmp_path: Path) -> None:
-    usual = ("--set", 'outputs=["cloud","previews"]', "--set", "colour.source=images")
+def test_pictures_come_with_the_cloud_and_colours_are_rendered(
+    scene: Callable[[str], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("synthroads_addon.cloud.tools.previews.WIDTH", 300)
+    coarse = ("--set", "colour.image_spacing=60", "--set", "colour.ground_sampling_distance=0.5")
+    usual = ("--set", 'outputs=["cloud","previews"]', "--set", "colour.source=images", *coarse)
     las = scan(scene(".blend"), tmp_path / "out", "--height", "30", *usual)
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
         "cloud.laz", "preview_class.png", "preview_intensity.png", "preview_rgb.png", "report.json"

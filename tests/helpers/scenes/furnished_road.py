@@ -150,7 +150,8 @@ def pieces(mesh: SceneMesh, chosen: NDArray[np.bool_] | slice = slice(None)) -> 
     edges = np.concatenate([index[:, :2], index[:, 1:]])
     graph = coo_matrix((np.ones(len(edges)), edges.T), shape=(index.max() + 1,) * 2)
     label = connected_components(graph, directed=False)[1][index[:, 0]]
-    return [triangles[label == number] for number in np.unique(label)]
+    ends = np.cumsum(np.unique(label, return_counts=True)[1])
+    return np.split(triangles[np.argsort(label, kind="stable")], ends[:-1])
 
 
 def volume(triangles: Float) -> float:

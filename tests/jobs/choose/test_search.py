@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from headless.commands import command
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.files import empty_file
 from synthroads_addon.blender.model.build import build_road
@@ -84,21 +85,21 @@ def test_a_tolerance_takes_what_keeps_it_and_leaves_what_is_given(tmp_path: Path
 @pytest.mark.usefixtures("few_lines")
 def test_what_cannot_be_kept_is_refused_with_the_best(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"tolerance.intensity is 0.01: can't be kept here: the best to be had is"):
-        report_of(tmp_path / "out", "tolerance=intensity=1%", "scan.rays_per_pulse=7")
+        report_of(tmp_path / "out", "road.length=40", "tolerance=intensity=1%", "scan.rays_per_pulse=7")
     with pytest.raises(InputError, match=r"tolerance.height is 0.001: .* 20 mm"):
-        report_of(tmp_path / "out", "tolerance=height=1mm", "geometric_tolerance=0.02")
+        report_of(tmp_path / "out", "road.length=40", "tolerance=height=1mm", "geometric_tolerance=0.02")
     with pytest.raises(InputError, match="time_budget: too short: 0 s"):
-        report_of(tmp_path / "out", "time_budget=0.5s")
+        report_of(tmp_path / "out", "road.length=40", "time_budget=0.5s")
     with pytest.raises(InputError, match=r"tolerance.relief is 0.001: .* relief of another strength"):
-        report_of(tmp_path / "out", "tolerance=relief=1mm", "scan.relief=0")
+        report_of(tmp_path / "out", "road.length=40", "tolerance=relief=1mm", "scan.relief=0")
     with pytest.raises(InputError, match=r"tolerance.colour is 1.0: .* points get no colours: colour.rgb is false"):
-        report_of(tmp_path / "out", "tolerance=colour=1", "colour.rgb=false")
+        report_of(tmp_path / "out", "road.length=40", "tolerance=colour=1", "colour.rgb=false")
     with pytest.raises(InputError, match=r"tolerance.layers is 0.1: .* points get no layers"):
-        report_of(tmp_path / "out", "tolerance=layers=0.1")
+        report_of(tmp_path / "out", "road.length=40", "tolerance=layers=0.1")
     with pytest.raises(InputError, match=r"tolerance.colour is 0.1: can't be kept here: the best to be had is \d"):
-        report_of(tmp_path / "out", "tolerance=colour=0.1", "colour.source=material")
+        report_of(tmp_path / "out", "road.length=40", "tolerance=colour=0.1", "colour.source=material")
     with pytest.raises(InputError, match="outputs"):
-        report_of(tmp_path / "out", "time_budget=60s", 'outputs=["parameters"]')
+        report_of(tmp_path / "out", "road.length=40", "time_budget=60s", 'outputs=["parameters"]')
     assert not (tmp_path / "out").exists()
 
 
@@ -116,23 +117,17 @@ def test_much_time_takes_the_best_by_trials_for_a_tolerance_and_else_by_the_ship
     assert by_table["expected"]["errors"]["relief"] == table_of("uav").relief["6"]
 
 
-def test_the_command_says_what_it_chose(tmp_path: Path) -> None:
-    line = [sys.executable, "-m", "headless.generate", "--tolerance", "height=5mm", "--output", str(tmp_path)]
+@pytest.mark.usefixtures("few_lines")
+def test_the_command_says_what_it_chose(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["--tolerance", "height=5mm", "--output", str(tmp_path / "out")]
     changes = [word for change in SMALL for word in ("--set", change)]
-    done = subprocess.run([*line, *changes], cwd=ROOT, capture_output=True, text=True, timeout=900, check=False)
-    assert done.returncode == 0, done.stderr
-    assert "chosen: geometric_tolerance=0.005" in done.stdout
-    assert "expected errors: " in done.stdout
-    assert "at most, with a confidence of 95 %: height 5 mm" in done.stdout
-    wrong = subprocess.run(
-        [*line[:-2], "--output", str(tmp_path / "b"), "--fidelity", "high"],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        timeout=900,
-        check=False,
-    )
-    assert (wrong.returncode, "--fidelity is 'high'" in wrong.stderr) == (2, True)
+    assert command("generate", [*words, *changes]) == 0
+    said = capsys.readouterr().out
+    assert "chosen: geometric_tolerance=0.005" in said
+    assert "expected errors: " in said
+    assert "at most, with a confidence of 95 %: height 5 mm" in said
+    assert command("generate", [*words, "--fidelity", "high"]) == 2
+    assert "--fidelity is 'high'" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("few_lines")
@@ -146,7 +141,8 @@ def test_a_scene_that_is_there_is_scanned_within_a_tolerance(tmp_path: Path) -> 
 
     def scanned(folder: str, *changes: str) -> dict[str, Any]:
         data: Any = Scenario().to_dict()
-        for change in ("scan.platform.height=40", "scan.relief=0", "colour.rgb=false", 'outputs=["cloud"]', *changes):
+        flown = ("scan.platform.height=40", "scan.platform.speed=60", "scan.relief=0")
+        for change in (*flown, "colour.rgb=false", 'outputs=["cloud"]', *changes):
             data = apply_change(data, change)
         return scan_scene(SceneScan(Scenario.from_dict(data), tmp_path / folder, scene, up="z"))
 

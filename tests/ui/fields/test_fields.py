@@ -132,7 +132,7 @@ def of_type(kind: Any, notes: list[Any]) -> st.SearchStrategy[Any]:
 
 @given(data=of_model(Scenario))
 @example(data={"scan": {"platform": {"file": "0", "height": 1.0, "lateral_offsets": [-0.0]}}})
-@settings(max_examples=200, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow])
+@settings(max_examples=70, suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow])
 def test_any_scenario_comes_back_to_the_last_digit(data: dict[str, Any]) -> None:
     try:
         scenario = Scenario.from_dict({key: value for key, value in data.items() if key not in NOT_HERE})

@@ -37,14 +37,14 @@ def labels(settings: Any, cloud: Path) -> None:
 def test_buttons_fit_and_save_what_the_library_does(settings: Any, tmp_path: Path) -> None:
     cloud = labelled(tmp_path / "real.laz", 30.0, 40.0)
     labels(settings, cloud)
-    settings.table = str(tmp_path / "panel.json")
+    settings.table, settings.angles = str(tmp_path / "panel.json"), "0 40"
     assert bpy.ops.synthroads.fit_materials() == {"FINISHED"}
     assert bpy.ops.synthroads.save_materials() == {"FINISHED"}
     job = CalibrationJob(
         (MaterialTarget("asphalt", "40"), MaterialTarget("paint_white", "60")),
         real=cloud,
         class_field="label",
-        incidence_deg=(0.0, 20.0, 40.0, 60.0),
+        incidence_deg=(0.0, 40.0),
         range_corrected=True,
         decibels=30.0,
     )

@@ -15,9 +15,9 @@ from synthroads_addon.road.parameters import RoadParameters, read_parameters
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import Scenario, load_scenario
 from synthroads_addon.ui.panels.road_files import source_of
-from tests.helpers.scenes.panel_road import SAME, cheap, settings, small_pictures
+from tests.helpers.scenes.panel_road import SAME, cheap, road, road_file, settings, small_pictures
 
-__all__ = ["cheap", "settings", "small_pictures"]
+__all__ = ["cheap", "road", "road_file", "settings", "small_pictures"]
 
 pytestmark = pytest.mark.usefixtures("small_pictures")
 
@@ -143,10 +143,12 @@ BAD_AXES = {
     [("load_road", *case) for case in BAD.values()] + [("load_axis", *case) for case in BAD_AXES.values()],
 )
 def test_a_bad_file_is_a_message_and_the_road_stays(
-    cheap: Any, tmp_path: Path, operator: str, content: str | bytes | None, message: str
+    road: Any,
+    tmp_path: Path,
+    operator: str,
+    content: str | bytes | None,
+    message: str,
 ) -> None:
-    cheap.road.length = 60.0
-    bpy.ops.synthroads.build()
     before, path = built(), tmp_path / "bad.json"
     if content is not None:
         path.write_bytes(content if isinstance(content, bytes) else content.encode())

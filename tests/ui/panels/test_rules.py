@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -21,13 +22,24 @@ from synthroads_addon.ui.panels import rules
 from tests.helpers.scenes.fake_layout import drawn
 
 
-@pytest.fixture(autouse=True)
-def found() -> Iterator[Any]:
-    """Register the add-on with a small road for one test; return the list."""
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file with a small road."""
+    path = tmp_path_factory.mktemp("road") / "road.blend"
     synthroads_addon.register()
     settings = bpy.context.scene.synthroads
     settings.road.length, settings.road.half_width, settings.seed = 150.0, 20.0, 3
     bpy.ops.synthroads.build()
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    synthroads_addon.unregister()
+    return path
+
+
+@pytest.fixture
+def found(file: Path) -> Iterator[Any]:
+    """Register the add-on and open the small road for one test; return the list."""
+    synthroads_addon.register()
+    bpy.ops.wm.open_mainfile(filepath=str(file))
     yield bpy.context.window_manager.synthroads_rules
     synthroads_addon.unregister()
 
