@@ -134,8 +134,8 @@ def test_at_map_coordinates_the_same_elements_are_found() -> None:
 
 
 def test_turned_and_mirrored_points_give_the_turned_and_mirrored_fit() -> None:
-    points = sampled(road(S_CURVE), noise=0.02)
-    plain, mirrored = fitted("s-curve", 0.02), fit_axis(points * [1.0, -1.0])
+    points = sampled(road(BEND), noise=0.02)
+    plain, mirrored = fitted("bend", 0.02), fit_axis(points * [1.0, -1.0])
     c, s = np.cos(2.0), np.sin(2.0)
     turned = fit_axis(points @ np.array([[c, s], [-s, c]]))
     for other, sign in ((turned, 1.0), (mirrored, -1.0)):
@@ -209,7 +209,7 @@ def test_noise_beyond_the_tolerance_is_reported_and_not_followed() -> None:
 
 
 def test_a_wider_tolerance_needs_no_more_elements() -> None:
-    s = np.arange(0.0, 900.0, 2.0)
+    s = np.arange(0.0, 600.0, 2.0)
     points = np.column_stack((s, 20.0 * np.sin(s / 150.0) + np.random.default_rng(1).normal(0.0, 0.01, s.size)))
     counts = []
     for tolerance in (0.02, 0.1, 0.5, 50.0):
