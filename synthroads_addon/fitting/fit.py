@@ -215,9 +215,7 @@ def _fit_plan(points: Float, weights: Float, tolerance: float) -> tuple[Alignmen
     return _trim_ends(chain, float(station[0]), float(station[-1])), station - station[0]
 
 
-def _fit_heights(
-    station: Float, heights: Float, weights: Float, length: float, tolerance: float
-) -> Profile:
+def _fit_heights(station: Float, heights: Float, weights: Float, length: float, tolerance: float) -> Profile:
     order = np.argsort(station, kind="stable")
     station = np.clip(station[order], 0.0, length)
     return _profile(_fit_windows(Heights(heights[order], weights[order], station), station, tolerance)[0])

@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Bool, Float, Index
-from ..road.things.guardrail import GUARDRAIL_BEAM, GUARDRAIL_POST, GUARDRAIL_SPACER
+from ..road.things import guardrail as sizes
 from .cloud import STANDING, PointKind, RoadCloud
 from .path import SPACING, CloudPath
 from .profiles import ACROSS, STRETCH, Profiles
@@ -44,7 +44,7 @@ USUAL_POST = 1.0
 _BARRIER_HEIGHTS = (0.25, 1.6)
 _NOISE_FROM = 1.6  # m: higher walls are noise barriers, where the class doesn't tell
 _ALONE = 0.8  # m around a post of unknown class in which nothing else may stand
-_BEAM = GUARDRAIL_POST[0] / 2.0 + 0.5 * max(point[0] for point in GUARDRAIL_BEAM)
+_BEAM = sizes.POST[0] / 2.0 + 0.5 * max(point[0] for point in sizes.BEAM)
 USUAL_VERGE = 1.5
 """Width of the verge where classes don't tell, m."""
 _FARTHEST, _FARTHEST_UNKNOWN = 12.0, 4.0  # m outside of the pavement, of what has a class and what hasn't
@@ -184,7 +184,7 @@ def facing(barrier: FoundBarrier, side: Literal["left", "right", "both"]) -> Fou
     if barrier.kind != "guardrail" or side == "both":
         return barrier
     behind = -1.0 if side == "left" else 1.0
-    return replace(barrier, offset=barrier.offset + behind * (_BEAM + GUARDRAIL_SPACER[side]), faces=side)
+    return replace(barrier, offset=barrier.offset + behind * (_BEAM + sizes.SPACER[side]), faces=side)
 
 
 def find_posts(standing: StandingObject, barrier_points: Bool) -> list[FoundPost]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..road.objects import LineObject, PointObject, RoadObject
-from ..road.section import Marking
+from ..road.objects import RoadObject
+from ..road.things.thing import Thing
 
 
 def attributes_of(item: RoadObject) -> dict[str, Any]:
@@ -15,6 +15,7 @@ def attributes_of(item: RoadObject) -> dict[str, Any]:
     """
     data = item.model_dump(mode="json", by_alias=True, exclude_none=True)
     attributes = {"instance": data.pop("instance"), "object_type": data.pop("type")}
-    if isinstance(item, LineObject | PointObject) and not isinstance(item, Marking):
-        attributes["class"] = data.pop("class_name", item.points_class)
+    if isinstance(item, Thing):
+        attributes["class"] = item.semantic_class
+        data.pop("class_name", None)
     return attributes | data

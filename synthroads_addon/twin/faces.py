@@ -117,6 +117,25 @@ def turn_polygons(faces: Faces) -> Faces:
     return Faces(faces.points, faces.corners[::-1], faces.sizes[::-1])
 
 
+def strip_triangles(faces: Faces) -> Int:
+    """Return the corners (T, 3) of triangles that polygons are cut into: strips between their first and last corners.
+
+    So a polygon needs not be convex if its corner i faces the last one but i.
+    """
+    found = []
+    starts = np.cumsum(faces.sizes) - faces.sizes
+    for size in np.unique(faces.sizes).tolist():
+        rings = faces.corners[starts[faces.sizes == size][:, None] + np.arange(size)]
+        order, low, high = [], 0, size - 1
+        while high - low > 1:
+            order.append((low, low + 1, high))
+            if high - low > 2:
+                order.append((low + 1, high - 1, high))
+            low, high = low + 1, high - 1
+        found.append(rings[:, order].reshape(-1, 3))
+    return np.concatenate(found) if found else np.empty((0, 3), np.int64)
+
+
 def volume(faces: Faces) -> float:
     """Return the volume (m3) that closed polygons enclose; negative where they look inwards."""
     if not len(faces):

@@ -145,32 +145,15 @@ def pothole_surface(geometry: RoadGeometry, pothole: Pothole, tolerance: float) 
 
 # --- along the road ---------------------------------------------------------------------------------------------
 
-_SHORTEST_RAMP = 1e-3  # m
 
-
-def line_stations(geometry: RoadGeometry, item: LineObject, step: float = 1.0) -> Float:
-    """Return the (N,) stations, closely spaced, of what runs along the road, clipped to the road; at least two."""
-    start, end = item.start_station, min(item.end_station, geometry.length)
+def close_stations(start: float, end: float, step: float = 1.0) -> Float:
+    """Return stations (N,), closely spaced (m), from a start to an end; at least two."""
     return np.linspace(start, max(end, start + 1e-3), max(2, int(np.ceil((end - start) / step)) + 1))
-
-
-def ramp_length(item: LineObject, end: float) -> float:
-    """Return over which length (m) a barrier that ends at a station (m) is ramped at either end; 0 if it isn't."""
-    ramp = min(float(getattr(item, "terminal_length", 0.0)), (end - item.start_station) / 2.0)
-    return ramp if ramp > _SHORTEST_RAMP else 0.0
-
-
-def height_share(item: LineObject, end: float, station: Float) -> Float:
-    """Return the share (N,) of its height that a barrier that ends at a station (m) has at others (N,)."""
-    ramp = ramp_length(item, end)
-    if not ramp:
-        return np.ones(station.shape)
-    return np.clip(np.minimum(station - item.start_station, end - station) / ramp, 0.0, 1.0)
 
 
 def line_points(geometry: RoadGeometry, item: LineObject, tolerance: float) -> Float:
     """Return points (N, 3) of the surface below a line object's axis, so many that chords keep the tolerance (m)."""
-    station = line_stations(geometry, item)
+    station = close_stations(item.start_station, min(item.end_station, geometry.length))
     points = on_ground(geometry, station, item.offset_at(station))
     return points[needed_rows(points, tolerance)]
 

@@ -6,8 +6,8 @@ from ...base.classes import class_id
 from . import operations as op
 from .builder import Operand, Value
 
-SPACING = 0.05
-"""Distance (m) of the points across the road at which the pavement's height is looked up: 3.5 mm at 7 % crossfall."""
+SPACING = 0.0125
+"""Distance (m) of the points across the road at which the pavement's height is looked up: 0.9 mm at 7 % crossfall."""
 _ROWS = 7
 _NOTHING = -1e5
 

@@ -7,9 +7,6 @@ from .backbone import height_on, raise_place
 from .builder import Operand, Value
 from .inputs import Inputs, instance_number, socket
 
-BURIED = 0.3
-"""Depth to which posts and foundations are modelled below the surface, m."""
-
 
 class OnSurface(Inputs):
     """Inputs of a group that puts something on points.

@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from ...base.classes import class_id
-from ...road.things.beacon import BEACON_BLADE, BEACON_BLADE_BOTTOM, BEACON_FOOT, ConstructionBeacon
+from ...road.things import beacon as sizes
+from ...road.things.beacon import ConstructionBeacon
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.inputs import material_of, socket
@@ -17,8 +18,6 @@ from .model_builder import ModelBuilder
 
 CELLS = (2, 8)
 """Cells across and up a blade, each cut by the border of a stripe: of 0.25 m x 1 m they are squares."""
-_LENS = (0.095, 0.075)
-_HEXADECAGON = 16
 
 
 class _BeaconInputs(OnSurface):
@@ -36,7 +35,10 @@ def beacon_group(tree: Tree) -> None:
     beacon = _BeaconInputs(tree)
 
     with tree.frame("Foot and its tenon"):
-        foot = paint_faces(op.join(_foot(tree), box(tree, (0.07, 0.05, 0.1), (0.0, 0.0, 0.12))), beacon.rubber_material)
+        foot = paint_faces(
+            op.join(_foot(tree), box(tree, sizes.TENON, (0.0, 0.0, sizes.TENON_MIDDLE))),
+            beacon.rubber_material,
+        )
     with tree.frame("Blades of size 1: stripes fall to the left or to the right"):
         blades = [_blade(tree, beacon.red_material, beacon.white_material, side) for side in (1, -1)]
     with tree.frame("Lamp"):
@@ -46,7 +48,7 @@ def beacon_group(tree: Tree) -> None:
     with tree.frame("Beacons"):
         turned = op.turn(tree, z=op.named_attribute(tree, "heading"))
         place, tall = op.position(tree), op.named_attribute(tree, "height")
-        bottom = place + (0.0, 0.0, BEACON_BLADE_BOTTOM)
+        bottom = place + (0.0, 0.0, sizes.BLADE_BOTTOM)
         parts = [put_on_points(points, foot, place, 1.0, turned)]
         for side, blade in zip((1, -1), blades, strict=True):
             chosen = op.separate(points, op.named_attribute(tree, "pass_side", "INT").equals(side))
@@ -61,20 +63,17 @@ def beacon_group(tree: Tree) -> None:
         beacons = op.realize(
             op.store(beacons, "beacon_instance", op.named_attribute(tree, "instance", "INT"), "INSTANCE")
         )
-        beacons = op.store(beacons, "class_id", class_id("construction_barrier"), "FACE")
+        beacons = op.store(beacons, "class_id", class_id(ConstructionBeacon.points_class), "FACE")
         beacons = op.store(beacons, "instance_id", op.named_attribute(tree, "beacon_instance", "INT"), "FACE")
     tree.output("Mesh", beacons, description="Beacons; each face has its own beacon's instance number")
 
 
 def _foot(tree: Tree) -> Value:
     """Return the foot: a slab with chamfered corners and edges, a little sunk."""
-    x, y, _ = BEACON_FOOT
-    corner = 0.06
-    outline = [(x / 2, -y / 2 + corner), (x / 2, y / 2 - corner), (x / 2 - corner, y / 2), (corner - x / 2, y / 2)]
-    outline += [(-a, -b) for a, b in outline]
-    slab = prism(tree, outline, (1.0, 1.0, BEACON_FOOT[2] * 0.7 + 0.01))
-    upper = prism(tree, outline, (0.86, 0.92, BEACON_FOOT[2]))
-    return op.join(move_geometry(slab, (0.0, 0.0, -0.01)), upper)
+    outline, (share, smaller) = [(x, y) for x, y in sizes.foot_outline().tolist()], sizes.LEVELS
+    slab = prism(tree, outline, (1.0, 1.0, sizes.FOOT[2] * share + sizes.SUNK))
+    upper = prism(tree, outline, (*smaller, sizes.FOOT[2]))
+    return op.join(move_geometry(slab, (0.0, 0.0, -sizes.SUNK)), upper)
 
 
 def _blade(tree: Tree, red: Value, white: Value, side: int) -> Value:
@@ -83,14 +82,14 @@ def _blade(tree: Tree, red: Value, white: Value, side: int) -> Value:
     faces = []
     for front in (True, False):
         # Seen from the front they rise to the right. A mirror turns the faces round.
-        y = -BEACON_BLADE / 2 - 0.002
+        y = -sizes.BLADE / 2 - sizes.SHEETING
         scale = (float(side), 1.0, 1.0)
         face = op.transform(stripes, translation=(0.0, y if front else -y, 0.0), scale=scale)
         faces.append(face if (side > 0) == front else flip_faces(face))
     mesh = paint_faces(op.join(*faces), white)
     first = (op.named_attribute(tree, "stripe", "INT") % 2).equals(0)
     mesh = paint_faces(mesh, red, first)
-    plate = box(tree, (1.0, BEACON_BLADE, 1.0), (0.0, 0.0, 0.5))
+    plate = box(tree, (1.0, sizes.BLADE, 1.0), (0.0, 0.0, 0.5))
     return op.join(paint_faces(plate, white), mesh)
 
 
@@ -114,11 +113,13 @@ def _blade_face(tree: Tree) -> Value:
 
 def _lamp(tree: Tree, housing: Value, lens: Value) -> Value:
     """Return a warning lamp that shines both ways."""
-    radius, deep = _LENS
-    body = paint_faces(box(tree, (0.11, 0.07, 0.12), (0.0, 0.0, 0.05)), housing)
-    middle = (0.0, 0.0, 0.17)
-    drum = tree.node("GeometryNodeMeshCylinder", vertices=_HEXADECAGON, radius=radius, depth=deep).value
-    glass = tree.node("GeometryNodeMeshCylinder", vertices=_HEXADECAGON, radius=radius * 0.85, depth=deep + 0.03).value
+    radius, deep = sizes.LENS
+    body = paint_faces(box(tree, sizes.HOUSING, (0.0, 0.0, sizes.HOUSING_MIDDLE)), housing)
+    middle = (0.0, 0.0, sizes.LENS_MIDDLE)
+    drum = tree.node("GeometryNodeMeshCylinder", vertices=sizes.LENS_SIDES, radius=radius, depth=deep).value
+    glass = tree.node(
+        "GeometryNodeMeshCylinder", vertices=sizes.LENS_SIDES, radius=radius * 0.85, depth=deep + sizes.LENS_PROUD
+    ).value
     lying = op.turn(tree, x=1.5707963)
     parts = [op.transform(mesh, translation=middle, rotation=lying) for mesh in (drum, glass)]
     return op.join(body, paint_faces(parts[0], housing), paint_faces(parts[1], lens))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ...base.classes import class_id
+from ...road.things import cabinet as sizes
 from ...road.things.cabinet import Cabinet
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, makes_group
@@ -12,12 +13,8 @@ from ..nodes.standing import Standing
 from .emergency_phone import emergency_phone_group
 from .model_builder import ModelBuilder
 
-BURIED = 0.5
-"""Depth of the plinth below the surface, m: the ground may fall beside its middle."""
-_PLINTH, _LID = 0.12, 0.03
-"""Height of the plinth above the surface, and of the lid, m."""
-_OVERHANG, _DOOR, _GAP = 0.02, 0.012, 0.006
-"""Overhang of the lid beyond the body, depth by which doors stand out, and the joint around them, m."""
+_GAP = 0.006
+"""The joint around doors, m."""
 _SLOTS = 5
 _WIDE = 0.7
 """Width from which a cabinet has two doors, m."""
@@ -53,35 +50,35 @@ def cabinet_group(tree: Tree) -> None:
     body, fitting = cabinet.body_material, cabinet.fitting_material
 
     with tree.frame("Plinth, body and lid"):
-        foot = _block(tree, cabinet, 2.0 * _OVERHANG, -BURIED, _PLINTH)
-        walls = _block(tree, cabinet, _OVERHANG, _PLINTH, cabinet.height - _LID)
-        lid = _block(tree, cabinet, 0.0, cabinet.height - _LID, cabinet.height)
+        foot = _block(tree, cabinet, 2.0 * sizes.OVERHANG, -sizes.PLINTH_BURIED, sizes.PLINTH)
+        walls = _block(tree, cabinet, sizes.OVERHANG, sizes.PLINTH, cabinet.height - sizes.LID)
+        lid = _block(tree, cabinet, 0.0, cabinet.height - sizes.LID, cabinet.height)
         parts = [paint_faces(foot, cabinet.plinth_material), paint_faces(op.join(walls, lid), body)]
     with tree.frame("Doors"):
         count = op.switch(cabinet.width >= _WIDE, 1, 2)
-        pitch = (cabinet.width - 2.0 * _OVERHANG) / count
-        tall = cabinet.height - (_PLINTH + _LID + 2.0 * _GAP)
-        middle = (cabinet.height + (_PLINTH - _LID)) * 0.5
-        front = cabinet.depth * -0.5 + (_OVERHANG - _DOOR * 0.5)
+        pitch = (cabinet.width - 2.0 * sizes.OVERHANG) / count
+        tall = cabinet.height - (sizes.PLINTH + sizes.LID + 2.0 * _GAP)
+        middle = (cabinet.height + (sizes.PLINTH - sizes.LID)) * 0.5
+        front = cabinet.depth * -0.5 + (sizes.OVERHANG - sizes.DOOR * 0.5)
         beside = (op.index(tree) - (count - 1.0) * 0.5) * pitch
-        door = box(tree, op.vector(tree, pitch - 2.0 * _GAP, _DOOR, tall))
+        door = box(tree, op.vector(tree, pitch - 2.0 * _GAP, sizes.DOOR, tall))
         parts.append(
             paint_faces(put_on_points(row_of_points(tree, count), door, op.vector(tree, beside, front, middle)), body)
         )
     with tree.frame("Handles"):
-        handle = op.vector(tree, beside + pitch * 0.36, front - _DOOR * 0.5, middle)
+        handle = op.vector(tree, beside + pitch * 0.36, front - sizes.DOOR * 0.5, middle)
         parts.append(
             paint_faces(put_on_points(row_of_points(tree, count), box(tree, (0.025, 0.01, 0.12)), handle), fitting)
         )
     with tree.frame("Slots for air, some at the top of each door"):
         number = op.index(tree)
         beside = ((number // _SLOTS) - (count - 1.0) * 0.5) * pitch
-        level = cabinet.height - (_LID + 0.08) - (number % _SLOTS) * 0.022
+        level = cabinet.height - (sizes.LID + 0.08) - (number % _SLOTS) * 0.022
         slot = box(tree, op.vector(tree, pitch * 0.6, 0.002, 0.007))
-        place = op.vector(tree, beside, front - _DOOR * 0.5, level)
+        place = op.vector(tree, beside, front - sizes.DOOR * 0.5, level)
         parts.append(paint_faces(put_on_points(row_of_points(tree, count * _SLOTS), slot, place), fitting))
     with tree.frame("Put onto the points"):
-        mesh = cabinet.put_labelled(parts, class_id("utility"))
+        mesh = cabinet.put_labelled(parts, class_id(Cabinet.points_class))
     tree.output("Mesh", mesh, description="Cabinet")
 
 

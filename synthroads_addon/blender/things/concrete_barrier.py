@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ...base.classes import class_id
-from ...road.things.concrete_barrier import CONCRETE_FLANKS, CONCRETE_TIP, ConcreteBarrier
+from ...road.things import concrete_barrier as sizes
+from ...road.things.concrete_barrier import ConcreteBarrier
 from ..nodes import operations as op
 from ..nodes.backbone import first_station, last_station
 from ..nodes.builder import Tree, Value, makes_group
@@ -12,13 +13,10 @@ from ..nodes.inputs import boolean, instance_number, material_of, metres
 from ..nodes.solids import loft, row_of_points
 from .model_builder import ModelBuilder
 
-BURIED = 0.1
-"""Depth of the foot below the surface, m."""
-
 
 def _outline(profile: str) -> list[tuple[float, float, float]]:
     """Return a profile, clockwise as seen along the road: x to the left, y 0, z; the two buried points have z = -1."""
-    left = [(1.0, -1.0), *CONCRETE_FLANKS[profile]]
+    left = [(1.0, -1.0), *sizes.FLANKS[profile]]
     return [(x, 0.0, z) for x, z in left] + [(-x, 0.0, z) for x, z in reversed(left)]
 
 
@@ -48,11 +46,11 @@ def concrete_barrier_group(tree: Tree) -> None:
         line = op.store(op.store(line, "left", left), "foot", foot)
         inside = op.minimum(station - barrier.start_station, barrier.end_station - station)
         share = op.switch(ramp > 1e-3, 1.0, op.minimum(inside / op.maximum(ramp, 1e-3), 1.0))
-        line = op.store(line, "tall", op.maximum(barrier.height * share, CONCRETE_TIP))
+        line = op.store(line, "tall", op.maximum(barrier.height * share, sizes.TIP))
     with tree.frame("Profile swept along the rows"):
         mesh = op.delete_degenerate(_sweep_profile(tree, line, barrier))
     with tree.frame("Labels"):
-        mesh = op.label(mesh, class_id("barrier"), barrier.instance, barrier.material)
+        mesh = op.label(mesh, class_id(ConcreteBarrier.points_class), barrier.instance, barrier.material)
     tree.output("Mesh", op.only_if(end - begin > 0.01, mesh), description="Barrier; its points carry their station")
 
 
@@ -82,7 +80,7 @@ def _sweep_profile(tree: Tree, line: Value, barrier: _Barrier) -> Value:
         left = op.sample_index(line, op.named_attribute(tree, "left", "FLOAT_VECTOR"), row)
         tall = op.sample_index(line, op.named_attribute(tree, "tall"), row)
         share = op.component(point, "Z")
-        z = op.switch(share < 0.0, tall * share, -BURIED)
+        z = op.switch(share < 0.0, tall * share, -sizes.BURIED)
         return foot + left * (op.component(point, "X") * barrier.base_width * 0.5) + op.vector(tree, 0.0, 0.0, z)
 
     def station(row: Value) -> Value:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ...base.classes import class_id
-from ...road.things.delineator import DELINEATOR, Delineator
+from ...road.things import delineator as sizes
+from ...road.things.body import BURIED
+from ...road.things.delineator import Delineator
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.inputs import material_of, socket
@@ -13,15 +15,10 @@ from ..nodes.solids import paint_faces
 from ..nodes.standing import OnSurface, put_on
 from .model_builder import ModelBuilder
 
-_SLANT = 0.6
-"""Rise of the top and of the black band away from the road, m/m."""
 # Rows of the body from below: z on the axis; the slant applies above the surface only.
-_LEVELS = (-0.3, 0.0, 0.64, 0.89, 0.964)
+_LEVELS = (-BURIED, 0.0, 0.64, 0.89, sizes.TOP)
 _BAND = 2
-REFLECTOR = (0.04, 0.18)
-"""Width and height of the upright reflector, m."""
-_MIDDLE = 0.765
-"""Height of the reflectors' middle on a post of 1 m, m."""
+_WIDE, _HIGH, _MIDDLE = sizes.REFLECTOR
 _UNDER, _PROUD = 0.001, 0.004
 """How far reflectors reach into the post, and out of it, m."""
 
@@ -48,31 +45,31 @@ def delineator_group(tree: Tree) -> None:
         tall = op.vector(tree, 1.0, 1.0, op.named_attribute(tree, "height"))
         posts = put_on(places, body, tall)
     with tree.frame("Labels"):
-        posts = op.store(posts, "class_id", class_id("warning_post"), "FACE")
+        posts = op.store(posts, "class_id", class_id(Delineator.points_class), "FACE")
         posts = op.store(posts, "instance_id", op.named_attribute(tree, "instance", "INT"), "FACE")
     tree.output("Mesh", posts, description="Posts; each face has its own post's instance number")
 
 
 def _body(tree: Tree, white: Value, black: Value) -> Value:
     rows = len(_LEVELS)
-    mesh, column, row = op.grid(tree, len(DELINEATOR) + 1, rows)
-    section = op.choose(column, [(x, y, 0.0) for x, y in (*DELINEATOR, DELINEATOR[0])])
+    mesh, column, row = op.grid(tree, len(sizes.OUTLINE) + 1, rows)
+    section = op.choose(column, [(x, y, 0.0) for x, y in (*sizes.OUTLINE, sizes.OUTLINE[0])])
     level = op.component(op.choose(row, [(0.0, 0.0, z) for z in _LEVELS]), "Z")
-    slant = op.switch(row > 1, 0.0, op.component(section, "X") * _SLANT)
+    slant = op.switch(row > 1, 0.0, op.component(section, "X") * sizes.SLANT)
     mesh = op.set_position(mesh, section + op.vector(tree, 0.0, 0.0, level + slant))
     # Faces of a grid run column by column, rows - 1 of them each.
     banded = (op.index(tree) % (rows - 1)).equals(_BAND)
     mesh = paint_faces(paint_faces(mesh, white), black, banded)
-    lid = tree.node("GeometryNodeMeshCircle", vertices=len(DELINEATOR), fill_type="NGON").value
-    outline = op.choose(op.index(tree), [(x, y, _LEVELS[-1] + _SLANT * x) for x, y in DELINEATOR])
+    lid = tree.node("GeometryNodeMeshCircle", vertices=len(sizes.OUTLINE), fill_type="NGON").value
+    outline = op.choose(op.index(tree), [(x, y, _LEVELS[-1] + sizes.SLANT * x) for x, y in sizes.OUTLINE])
     return op.join(mesh, paint_faces(op.set_position(lid, outline), white))
 
 
 def _front(tree: Tree, glass: Value) -> Value:
     """Return the reflector on the face that approaching drivers see (-y)."""
     mesh, column, row = op.grid(tree, 2, 2)
-    x = column * REFLECTOR[0] - REFLECTOR[0] / 2
-    place = op.vector(tree, x, -_flank(x), row * REFLECTOR[1] - REFLECTOR[1] / 2 + _MIDDLE)
+    x = column * _WIDE - _WIDE / 2
+    place = op.vector(tree, x, -_flank(x), row * _HIGH - _HIGH / 2 + _MIDDLE)
     return _reflector_body(op.set_position(mesh, place), glass)
 
 

@@ -5,21 +5,15 @@ from __future__ import annotations
 import math
 
 from ...base.classes import class_id
+from ...road.things import cabinet as sizes
+from ...road.things.cabinet import Cabinet
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.inputs import material_of, metres
-from ..nodes.solids import Point, box, loft, move_geometry, paint_faces, tube
-from ..nodes.standing import BURIED, Standing
+from ..nodes.solids import box, loft, move_geometry, paint_faces, tube
+from ..nodes.standing import Standing
 from .sign.writing import sign_writing_group
 
-_CORNER = 0.16
-"""Radius of the pillar's edges as a share of half its width."""
-_CORNER_STEPS = 4
-# Solids from below: the heights (a share; below the surface m) and widths (a share) that they go through.
-_PLINTH = [(-BURIED, 0.97), (0.05, 0.97)]
-_BODY_WIDTH = 0.92
-_BODY = [(0.05, _BODY_WIDTH), (0.93, _BODY_WIDTH), (0.97, 0.8), (1.0, 0.4)]
-_BAND = [(0.46, 1.0), (0.52, 1.0)]
 _LETTERS = (0.77, 0.92)
 """Lower and upper border of the writing as shares of the height."""
 
@@ -41,10 +35,14 @@ def emergency_phone_group(tree: Tree) -> None:
     phone = _Phone(tree)
 
     with tree.frame("Plinth, body with its roof, and reflective band"):
-        solids = ((_PLINTH, phone.plinth_material), (_BODY, phone.body_material), (_BAND, phone.band_material))
+        solids = (
+            (sizes.PHONE_PLINTH, phone.plinth_material),
+            (sizes.PHONE_BODY, phone.body_material),
+            (sizes.PHONE_BAND, phone.band_material),
+        )
         parts = [paint_faces(_pillar(tree, phone, rows), material) for rows, material in solids]
     with tree.frame("Speech panel with its button"):
-        front = phone.depth * (-0.5 * _BODY_WIDTH)
+        front = phone.depth * (-0.5 * sizes.PHONE_WIDTH)
         size = op.vector(tree, phone.width * 0.6, 0.012, phone.height * 0.15)
         parts.append(
             paint_faces(box(tree, size, op.vector(tree, 0.0, front, phone.height * 0.68)), phone.panel_material)
@@ -56,22 +54,11 @@ def emergency_phone_group(tree: Tree) -> None:
     with tree.frame("SOS on all four sides"):
         parts.append(paint_faces(_writing(tree, phone), phone.writing_material))
     with tree.frame("Put onto the points"):
-        mesh = phone.put_labelled(parts, class_id("utility"))
+        mesh = phone.put_labelled(parts, class_id(Cabinet.points_class))
     tree.output("Mesh", mesh, description="Emergency telephone")
 
 
-def _outline() -> list[Point]:
-    """Return a square of side 1 with rounded corners, anticlockwise from above."""
-    inner, radius = (1.0 - _CORNER) / 2.0, _CORNER / 2.0
-    points = []
-    for x, y, start in ((1, -1, -90.0), (1, 1, 0.0), (-1, 1, 90.0), (-1, -1, 180.0)):
-        for step in range(_CORNER_STEPS):
-            turn = math.radians(start + 90.0 * step / (_CORNER_STEPS - 1))
-            points.append((x * inner + radius * math.cos(turn), y * inner + radius * math.sin(turn), 0.0))
-    return points
-
-
-def _pillar(tree: Tree, phone: _Phone, rows: list[tuple[float, float]]) -> Value:
+def _pillar(tree: Tree, phone: _Phone, rows: tuple[tuple[float, float], ...]) -> Value:
     """Return a solid through rows of height (a share, or m below the surface) and width (a share)."""
 
     def place(point: Value, row: Value) -> Value:
@@ -80,7 +67,7 @@ def _pillar(tree: Tree, phone: _Phone, rows: list[tuple[float, float]]) -> Value
         z = op.switch(z < 0.0, z * phone.height, z)
         return point * op.vector(tree, phone.width, phone.depth) * share + op.vector(tree, 0.0, 0.0, z)
 
-    points = _outline()
+    points = [(x, y, 0.0) for x, y in sizes.phone_outline().tolist()]
     return loft(tree, lambda number: op.choose(number, points), len(points), len(rows), place)
 
 
@@ -95,6 +82,6 @@ def _writing(tree: Tree, phone: _Phone) -> Value:
         )
         letters = tree.call(sign_writing_group(), line_1="SOS", low_corner=low, high_corner=high).value
         upright = op.transform(letters, rotation=(math.pi / 2, 0.0, 0.0))
-        upright = move_geometry(upright, op.vector(tree, 0.0, deep * (-0.5 * _BODY_WIDTH) - 0.001))
+        upright = move_geometry(upright, op.vector(tree, 0.0, deep * (-0.5 * sizes.PHONE_WIDTH) - 0.001))
         sides.append(op.transform(upright, rotation=(0.0, 0.0, turns * math.pi / 2)))
     return op.join(*sides)

@@ -3,15 +3,8 @@
 from __future__ import annotations
 
 from ...base.classes import class_id
-from ...road.things.guardrail import (
-    GUARDRAIL_BEAM,
-    GUARDRAIL_LOWEST_POST,
-    GUARDRAIL_POST,
-    GUARDRAIL_POST_TOP,
-    GUARDRAIL_SPACER,
-    GUARDRAIL_TIP,
-    Guardrail,
-)
+from ...road.things import guardrail as sizes
+from ...road.things.guardrail import Guardrail
 from ..nodes import operations as op
 from ..nodes.backbone import first_station, height_on, last_station, look_up, raise_place, station_ribbon
 from ..nodes.builder import Operand, Tree, Value, makes_group
@@ -20,18 +13,15 @@ from ..nodes.inputs import boolean, instance_number, material_of, metres
 from ..nodes.solids import row_of_points
 from .model_builder import ModelBuilder
 
-_THICKNESS = 0.003
-BEAM_PROFILE = [(x, 0.0, z) for x, z in GUARDRAIL_BEAM]
-BEAM_PROFILE += [(x - _THICKNESS, 0.0, z) for x, z in reversed(GUARDRAIL_BEAM)]
+BEAM_PROFILE = [(x, 0.0, z) for x, z in sizes.BEAM]
+BEAM_PROFILE += [(x - sizes.SHEET, 0.0, z) for x, z in reversed(sizes.BEAM)]
 BEAM_PROFILE.append(BEAM_PROFILE[0])
 
 # Across the road, along it; open at its back.
-_HALF, _SIDE = GUARDRAIL_POST[0] / 2, GUARDRAIL_POST[1] / 2
+_HALF, _SIDE = sizes.POST[0] / 2, sizes.POST[1] / 2
 _POST = [(_HALF, -0.010), (_HALF, _SIDE), (-_HALF, _SIDE), (-_HALF, -_SIDE), (_HALF, -_SIDE)]
 POST_DEPTH = _HALF
 """From a post's axis to the back of a beam that is bolted to it, m."""
-BURIED = 0.35
-"""Depth to which posts are modelled below the surface, m."""
 
 
 class _Rail(Lengthwise):
@@ -60,7 +50,7 @@ class _Rail(Lengthwise):
         """Return the height of the beam's top edge above the surface."""
         inside = op.minimum(station - self.start_station, self.end_station - station) / op.maximum(ramp, 1e-3)
         share = op.switch(ramp > 1e-3, 1.0, op.minimum(inside, 1.0))
-        return self.height * share + GUARDRAIL_TIP * (1.0 - share)
+        return self.height * share + sizes.TIP * (1.0 - share)
 
     def foot_at(self, station: Value, ribbon: Value, surfaces: tuple[Value, Value]) -> tuple[Value, Value]:
         """Return the point on the surface under the posts' axis, and the vector to the left."""
@@ -98,10 +88,10 @@ def guardrail_group(tree: Tree) -> None:
         posts = op.delete_points(posts, beyond | (station < begin))
         foot, left = rail.foot_at(station, ribbon, surfaces)
         posts = op.set_position(op.store(posts, "left", left), foot)
-        posts = op.delete_points(posts, op.named_attribute(tree, "tall") < GUARDRAIL_LOWEST_POST)
+        posts = op.delete_points(posts, op.named_attribute(tree, "tall") < sizes.LOWEST_POST)
         parts += _instances(tree, posts, rail)
     with tree.frame("Labels"):
-        mesh = op.label(op.realize(op.join(*parts)), class_id("guardrail"), rail.instance, rail.material)
+        mesh = op.label(op.realize(op.join(*parts)), class_id(Guardrail.points_class), rail.instance, rail.material)
     tree.output("Mesh", mesh, description="Beams, posts and spacers")
 
 
@@ -157,11 +147,17 @@ def _instances(tree: Tree, posts: Value, rail: _Rail) -> list[Value]:
         points = tree.node("GeometryNodeSetPosition", posts, offset=op.vector(tree, 0.0, 0.0, height)).value
         return tree.node("GeometryNodeInstanceOnPoints", points, instance=body, rotation=upright, scale=scale).value
 
-    parts = [on_posts(_post(tree), -BURIED, op.vector(tree, 1.0, 1.0, tall + (BURIED - GUARDRAIL_POST_TOP)))]
+    parts = [
+        on_posts(
+            _post(tree),
+            -sizes.BURIED,
+            op.vector(tree, 1.0, 1.0, tall + (sizes.BURIED - sizes.POST_TOP)),
+        )
+    ]
     for side, present in rail.beams():
-        # A little shorter than the gap: faces that coincide with the post's or the beam's have no first hit.
-        box = tree.node("GeometryNodeMeshCube", size=(0.96, 0.1, 0.22)).value
-        middle = op.vector(tree, (rail.spacer * 0.5 + POST_DEPTH) * side, 0.0, -0.155)
+        share, long, high, below = sizes.BLOCK
+        box = tree.node("GeometryNodeMeshCube", size=(share, long, high)).value
+        middle = op.vector(tree, (rail.spacer * 0.5 + POST_DEPTH) * side, 0.0, -below)
         body = op.transform(box, translation=middle, scale=op.vector(tree, rail.spacer, 1.0, 1.0))
         parts.append(op.only_if(present & (rail.spacer > 1e-3), on_posts(body, tall, 1.0)))
     return parts
@@ -184,7 +180,7 @@ def build_guardrails(builder: ModelBuilder) -> None:
             end_station=builder.along(min(rail.end_station, builder.geometry.length)),
             left_beam=rail.faces in ("left", "both"),
             right_beam=rail.faces in ("right", "both"),
-            spacer=GUARDRAIL_SPACER[rail.faces],
+            spacer=sizes.SPACER[rail.faces],
             beam_step=builder.step,
             material="galvanised_steel",
         )

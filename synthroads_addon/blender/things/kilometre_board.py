@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from ...base.classes import class_id
-from ...road.things.kilometre_board import KILOMETRE_POST, KilometreBoard
+from ...road.things import kilometre_board as sizes
+from ...road.things.kilometre_board import KilometreBoard
 from ..nodes import operations as op
 from ..nodes.builder import Tree, makes_group
 from ..nodes.inputs import Inputs, material_of, metres
@@ -17,8 +18,6 @@ from .sign.looks import FaceStyle, face_inputs
 from .sign.posts import sign_posts_group
 
 _STYLE = FaceStyle("blue", "white", "white")
-_THICKNESS = 0.024
-"""Thickness of either half of a board, m."""
 
 
 class _Board(Inputs):
@@ -47,11 +46,11 @@ def kilometre_board_group(tree: Tree) -> None:
             road=standing.road,
             terrain=standing.terrain,
             top=middle,
-            post_diameter=KILOMETRE_POST,
+            post_diameter=sizes.POST,
             material=board.post_material,
         ).value
     with tree.frame("Labels"):
-        mesh = standing.label(op.join(mesh, post), class_id("road_sign"))
+        mesh = standing.label(op.join(mesh, post), class_id(KilometreBoard.points_class))
     tree.output("Mesh", mesh, description="Board with its post")
 
 
@@ -60,4 +59,4 @@ def build_kilometre_boards(builder: ModelBuilder) -> None:
     for name, board in builder.parameters.of_type(KilometreBoard).items():
         face = face_inputs(_STYLE, "rectangle", board.width, board.height, (board.text,))
         group = kilometre_board_group()
-        builder.add_thing(name, board, group, **face | {"thickness": _THICKNESS}, post_material="galvanised_steel")
+        builder.add_thing(name, board, group, **face | {"thickness": sizes.BOARD}, post_material="galvanised_steel")

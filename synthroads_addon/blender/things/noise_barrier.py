@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from ...base.classes import class_id
+from ...road.things import noise_barrier as sizes
 from ...road.things.noise_barrier import NoiseBarrier
 from ...road.things.thing import SHORTEST_ELEMENT
 from ..nodes import operations as op
@@ -16,24 +17,8 @@ from ..nodes.inputs import Inputs, instance_number, integer, material_of, metres
 from ..nodes.solids import box, paint_faces, prism, put_on_points, row_of_points
 from .model_builder import ModelBuilder
 
-# Section of an HEA profile of width 1 (HEA 160: 152 mm across the wall, 160 mm along it).
-_FLANGE, _INSIDE, _WEB = 0.475, 0.42, 0.02
-BURIED = 0.4
-"""Depth of posts and plinths below the surface, m."""
-_PLINTH_SHARE, _HIGHEST_PLINTH = 0.25, 0.5
-_PLAY = 0.005  # m, between a panel and a post
 _KINDS = ("aluminium", "concrete", "wood", "glass")
-_CAP = 0.04  # m, height of the strip on top
 _SUNK = 0.003  # m: faces that coincide have no first hit
-_PANE = 0.02  # m
-_RAIL = 0.07  # m, width of a glass panel's frame
-_MATERIALS = {
-    "aluminium": ("noise_aluminium", "noise_aluminium"),
-    "concrete": ("noise_concrete", "noise_concrete"),
-    "wood": ("noise_wood", "noise_wood"),
-    "glass": ("acrylic_glass", "galvanised_steel"),
-}
-"""Materials of a panel, and of its frame or cap."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +30,6 @@ class _Relief:
         pitch: distance between them, m.
         share: their width as a share of the pitch.
         bevel: what either flank takes of the width, as a share.
-        depth: how far they stand out, m.
         cap: whether a strip closes the panel's top.
     """
 
@@ -53,14 +37,13 @@ class _Relief:
     pitch: float
     share: float
     bevel: float
-    depth: float
     cap: bool
 
 
 _RELIEFS = {
-    "aluminium": _Relief(lying=True, pitch=0.25, share=0.9, bevel=0.15, depth=0.025, cap=True),
-    "concrete": _Relief(lying=False, pitch=0.2, share=0.7, bevel=0.2, depth=0.045, cap=False),
-    "wood": _Relief(lying=False, pitch=0.14, share=0.82, bevel=0.02, depth=0.024, cap=True),
+    "aluminium": _Relief(lying=True, pitch=0.25, share=0.9, bevel=0.15, cap=True),
+    "concrete": _Relief(lying=False, pitch=0.2, share=0.7, bevel=0.2, cap=False),
+    "wood": _Relief(lying=False, pitch=0.14, share=0.82, bevel=0.02, cap=True),
 }
 
 
@@ -95,9 +78,9 @@ def noise_barrier_group(tree: Tree) -> None:
     with tree.frame("Bays: both ends' feet"):
         bays = _bays(tree, wall, count, axis, surfaces)
     with tree.frame("Plinths and panels"):
-        plinth = op.minimum(wall.height * _PLINTH_SHARE, _HIGHEST_PLINTH)
-        fits = wall.thickness < wall.post_width * (2.0 * _INSIDE)
-        gap = op.switch(fits, wall.post_width * 0.5, wall.post_width * _WEB) + _PLAY
+        plinth = op.minimum(wall.height * sizes.PLINTH_SHARE, sizes.HIGHEST_PLINTH)
+        fits = wall.thickness < wall.post_width * (2.0 * sizes.INSIDE)
+        gap = op.switch(fits, wall.post_width * 0.5, wall.post_width * sizes.WEB) + sizes.PLAY
         panel = tree.call(
             _panel_group(),
             panel=wall.panel,
@@ -109,7 +92,7 @@ def noise_barrier_group(tree: Tree) -> None:
         ).value
         walls = _fill_bays(tree, wall, bays, (gap, plinth), (panel, paint_faces(box(tree, 1.0), wall.plinth_material)))
     with tree.frame("Labels"):
-        mesh = op.label(op.join(posts, walls), class_id("noise_barrier"), wall.instance)
+        mesh = op.label(op.join(posts, walls), class_id(NoiseBarrier.points_class), wall.instance)
     tree.output("Mesh", mesh, description="Posts, plinths and panels; a panel's points carry the number of its bay")
 
 
@@ -124,16 +107,16 @@ def _posts(tree: Tree, wall: _Wall, count: Value, axis: Value, surfaces: tuple[V
     passed = (station > end - 1e-3) & (wall.end_station > end + 1e-3)
     posts = op.delete_points(posts, passed | (station < first_station(axis)))
     foot, left = foot_at(axis, surfaces, station, wall.offset)
-    size = op.vector(tree, wall.post_width, wall.post_width, wall.height + BURIED)
+    size = op.vector(tree, wall.post_width, wall.post_width, wall.height + sizes.BURIED)
     upright = op.upright(left)
-    return put_on_points(posts, _post(tree), foot + (0.0, 0.0, -BURIED), size, upright)
+    return put_on_points(posts, _post(tree), foot + (0.0, 0.0, -sizes.BURIED), size, upright)
 
 
 def _post(tree: Tree) -> Value:
     """Return an HEA profile of width and height 1 on z = 0: x is across the wall, y along it."""
-    flange = (_FLANGE - _INSIDE, 1.0, 1.0)
-    beside = (_FLANGE + _INSIDE) / 2
-    web = box(tree, (2.0 * _INSIDE + 0.01, 2.0 * _WEB, 1.0), (0.0, 0.0, 0.5))
+    flange = (sizes.FLANGE - sizes.INSIDE, 1.0, 1.0)
+    beside = (sizes.FLANGE + sizes.INSIDE) / 2
+    web = box(tree, (2.0 * sizes.INSIDE + 0.01, 2.0 * sizes.WEB, 1.0), (0.0, 0.0, 0.5))
     return op.join(web, *(box(tree, flange, (beside * side, 0.0, 0.5)) for side in (1.0, -1.0)))
 
 
@@ -154,9 +137,9 @@ def _bays(tree: Tree, wall: _Wall, count: Value, axis: Value, surfaces: tuple[Va
     return bays
 
 
-def _fill_bays(tree: Tree, wall: _Wall, bays: Value, sizes: tuple[Value, Value], bodies: tuple[Value, Value]) -> Value:
+def _fill_bays(tree: Tree, wall: _Wall, bays: Value, gaps: tuple[Value, Value], bodies: tuple[Value, Value]) -> Value:
     """Put a panel, and a plinth below it, into every bay, level at the lower one of its posts."""
-    (gap, plinth), (panel, block) = sizes, bodies
+    (gap, plinth), (panel, block) = gaps, bodies
     start, end = (op.named_attribute(tree, name, "FLOAT_VECTOR") for name in ("start", "end"))
     low = op.minimum(op.component(start, "Z"), op.component(end, "Z"))
     along = (end - start) * (1.0, 1.0, 0.0)
@@ -174,7 +157,7 @@ def _fill_bays(tree: Tree, wall: _Wall, bays: Value, sizes: tuple[Value, Value],
     panels = put_on_points(
         bays, panel, level, op.vector(tree, length / (wall.post_spacing - gap * 2.0), 1.0, 1.0), facing
     )
-    deep = plinth + BURIED
+    deep = plinth + sizes.BURIED
     below = level - op.vector(tree, 0.0, 0.0, deep * 0.5)
     return op.realize(
         op.join(panels, put_on_points(bays, block, below, op.vector(tree, length, wall.thickness, deep), turned))
@@ -197,15 +180,16 @@ def _panel_group(tree: Tree) -> None:
     parts = []
     for number, name in enumerate(_KINDS):
         with tree.frame(f"{name.capitalize()} panel"):
-            made = _slatted_wall(tree, panel, _RELIEFS[name]) if name in _RELIEFS else _glass_pane(tree, panel)
+            made = _slatted_wall(tree, panel, name) if name in _RELIEFS else _glass_pane(tree, panel)
             parts.append(op.only_if(panel.panel.equals(number), made))
     tree.output("Mesh", op.realize(op.join(*parts)), description="The panel")
 
 
-def _slatted_wall(tree: Tree, panel: _Panel, relief: _Relief) -> Value:
+def _slatted_wall(tree: Tree, panel: _Panel, kind: str) -> Value:
     """Return a wall with slats on its face."""
-    out = op.minimum(panel.thickness * 0.3, relief.depth)
-    tall = panel.height - (_CAP if relief.cap else 0.0)
+    relief = _RELIEFS[kind]
+    out = op.minimum(panel.thickness * sizes.RELIEF_SHARE, sizes.RELIEFS[kind])
+    tall = panel.height - (sizes.CAP if relief.cap else 0.0)
     core = box(
         tree,
         op.vector(tree, panel.length, panel.thickness - out, tall),
@@ -226,27 +210,34 @@ def _slatted_wall(tree: Tree, panel: _Panel, relief: _Relief) -> Value:
         slats = put_on_points(row_of_points(tree, count), slat, start, size)
     parts = [paint_faces(core, panel.panel_material), paint_faces(op.realize(slats), panel.panel_material)]
     if relief.cap:
-        strip = op.vector(tree, panel.length, panel.thickness, _CAP)
-        parts.append(paint_faces(box(tree, strip, op.vector(tree, 0.0, 0.0, tall + _CAP / 2)), panel.frame_material))
+        strip = op.vector(tree, panel.length, panel.thickness, sizes.CAP)
+        parts.append(
+            paint_faces(box(tree, strip, op.vector(tree, 0.0, 0.0, tall + sizes.CAP / 2)), panel.frame_material)
+        )
     return op.join(*parts)
 
 
 def _glass_pane(tree: Tree, panel: _Panel) -> Value:
     """Return a pane in a frame."""
     deep, tall = panel.thickness, panel.height
-    level = box(tree, op.vector(tree, panel.length, deep, _RAIL))
-    upright = box(tree, op.vector(tree, _RAIL, deep, tall - 2.0 * _RAIL))
-    side = panel.length * 0.5 - _RAIL / 2
+    level = box(tree, op.vector(tree, panel.length, deep, sizes.FRAME))
+    upright = box(tree, op.vector(tree, sizes.FRAME, deep, tall - 2.0 * sizes.FRAME))
+    side = panel.length * 0.5 - sizes.FRAME / 2
     frame = [
         op.transform(part, translation=op.vector(tree, x, 0.0, z))
         for part, x, z in (
-            (level, 0.0, _RAIL / 2),
-            (level, 0.0, tall - _RAIL / 2),
+            (level, 0.0, sizes.FRAME / 2),
+            (level, 0.0, tall - sizes.FRAME / 2),
             (upright, side, tall * 0.5),
             (upright, -side, tall * 0.5),
         )
     ]
-    inside = op.vector(tree, panel.length - 1.9 * _RAIL, op.minimum(deep * 0.6, _PANE), tall - 1.9 * _RAIL)
+    inside = op.vector(
+        tree,
+        panel.length - 1.9 * sizes.FRAME,
+        op.minimum(deep * 0.6, sizes.PANE),
+        tall - 1.9 * sizes.FRAME,
+    )
     pane = box(tree, inside, op.vector(tree, 0.0, 0.0, tall * 0.5))
     return op.join(paint_faces(op.join(*frame), panel.frame_material), paint_faces(pane, panel.panel_material))
 
@@ -254,7 +245,7 @@ def _glass_pane(tree: Tree, panel: _Panel) -> Value:
 def build_noise_barriers(builder: ModelBuilder) -> None:
     """Make one object per noise barrier."""
     for name, wall in builder.parameters.of_type(NoiseBarrier).items():
-        face, frame = _MATERIALS[wall.panel]
+        face, frame = sizes.MATERIALS[wall.panel]
         builder.add_thing(
             name,
             wall,

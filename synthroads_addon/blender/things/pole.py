@@ -5,28 +5,18 @@ from __future__ import annotations
 import math
 
 from ...base.classes import class_id
+from ...road.things import pole as sizes
+from ...road.things.body import BURIED
 from ...road.things.pole import Pole
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.inputs import boolean, material_of, metres
 from ..nodes.solids import box, cone, move_geometry, paint_faces, prism, row_of_points, tube
-from ..nodes.standing import BURIED, Standing, put_on
+from ..nodes.standing import Standing, put_on
 from .model_builder import ModelBuilder
 
-_TAPER = 0.45
-"""Diameter at the top as a share of that at the foot."""
-_TUBE, _SHORTEST_ARM = 0.03, 0.05
-"""Radius of the arm, and length from which there is one, m."""
-# Luminaire seen from above, and the glass under it: x from its mount on, y, m.
-_LUMINAIRE = [
-    (0.06, -0.04), (0.06, 0.04), (-0.12, 0.13), (-0.58, 0.13), (-0.66, 0.08), (-0.66, -0.08), (-0.58, -0.13),
-    (-0.12, -0.13),
-]  # fmt: skip
 _GLASS = [(-0.16, -0.1), (-0.16, 0.1), (-0.56, 0.1), (-0.56, -0.1)]
-_THICK = 0.09  # m
-_ARM_RISE = 0.12  # m per m of the arm
-_CAMERA = (0.13, 0.4, 0.12)  # m: across, along, high
-_DOME = 0.09  # radius, m
+"""Glass under a luminaire: x from its mount on, y, m."""
 
 
 class _Pole(Standing):
@@ -40,7 +30,7 @@ class _Pole(Standing):
 
     def rise(self) -> Value:
         """Return how much higher the arm ends than it begins."""
-        return self.arm_length * _ARM_RISE
+        return self.arm_length * sizes.ARM_RISE
 
 
 @makes_group("SR Pole")
@@ -49,74 +39,77 @@ def pole_group(tree: Tree) -> None:
     pole = _Pole(tree)
 
     with tree.frame("Street light"):
-        mount = pole.height - _THICK * 0.5
+        mount = pole.height - sizes.LUMINAIRE_DEPTH * 0.5
         light = op.join(_mast(tree, pole, mount - pole.rise()), _arm(tree, pole, mount), _luminaire(tree, pole))
     with tree.frame("Surveillance"):
-        mount = pole.height - 0.35
+        mount = pole.height - sizes.CAMERA_MOUNT
         watch = op.join(_mast(tree, pole, pole.height), _arm(tree, pole, mount), _cameras(tree, pole, mount))
     with tree.frame("Put onto the points"):
         body = op.switch(pole.surveillance, light, watch)
-        mesh = pole.label(put_on(pole.places(), body), class_id("pole"))
+        mesh = pole.label(put_on(pole.places(), body), class_id(Pole.points_class))
     tree.output("Mesh", mesh, description="Pole with what it carries")
 
 
 def _mast(tree: Tree, pole: _Pole, top: Value) -> Value:
     """Return the mast with its foot below the surface and a door for the cables."""
     radius = pole.diameter * 0.5
-    mast = cone(tree, radius, radius * _TAPER, top)
-    foot = move_geometry(tube(tree, radius, BURIED, 16), (0.0, 0.0, -BURIED))
+    mast = cone(tree, radius, radius * sizes.MAST_TAPER, top, sizes.MAST_SIDES)
+    foot = move_geometry(tube(tree, radius, BURIED, sizes.MAST_SIDES), (0.0, 0.0, -BURIED))
     door = box(tree, op.vector(tree, radius * 0.9, 0.02, 0.35), op.vector(tree, 0.0, radius * -0.93, 0.8))
     return paint_faces(op.join(mast, foot, door), pole.steel_material)
 
 
 def _arm(tree: Tree, pole: _Pole, end: Value) -> Value:
     """Return a quarter of an ellipse from the mast's axis to the left and up to its end's height."""
-    line = row_of_points(tree, 9)
-    turn = op.index(tree) * (math.pi / 16.0)
+    line = row_of_points(tree, sizes.ARM_POINTS)
+    turn = op.index(tree) * (math.pi / 2.0 / (sizes.ARM_POINTS - 1))
     across = (op.unary("COSINE", turn) - 1.0) * pole.arm_length
     above = end - pole.rise() * (1.0 - op.unary("SINE", turn))
     line = op.set_position(line, op.vector(tree, across, 0.0, above))
-    profile = tree.node("GeometryNodeCurvePrimitiveCircle", resolution=8, radius=_TUBE).value
+    profile = tree.node("GeometryNodeCurvePrimitiveCircle", resolution=sizes.ARM_SIDES, radius=sizes.ARM_RADIUS).value
     curve = tree.node("GeometryNodeMeshToCurve", line).value
     pipe = tree.node("GeometryNodeCurveToMesh", curve, profile_curve=profile, fill_caps=True).value
     pipe = tree.node("GeometryNodeSetShadeSmooth", pipe).value
-    return op.only_if(pole.arm_length > _SHORTEST_ARM, paint_faces(pipe, pole.steel_material))
+    return op.only_if(pole.arm_length > sizes.SHORTEST_ARM, paint_faces(pipe, pole.steel_material))
 
 
 def _luminaire(tree: Tree, pole: _Pole) -> Value:
     """Return the street light at the end of the arm; its top is the pole's."""
-    body = paint_faces(prism(tree, _LUMINAIRE, (1.0, 1.0, _THICK)), pole.housing_material)
+    body = paint_faces(prism(tree, list(sizes.LUMINAIRE), (1.0, 1.0, sizes.LUMINAIRE_DEPTH)), pole.housing_material)
     glass = paint_faces(prism(tree, _GLASS, (1.0, 1.0, 0.01)), pole.glass_material)
     parts = op.join(body, move_geometry(glass, (0.0, 0.0, -0.01)))
-    return move_geometry(parts, op.vector(tree, -pole.arm_length, 0.0, pole.height - _THICK))
+    return move_geometry(parts, op.vector(tree, -pole.arm_length, 0.0, pole.height - sizes.LUMINAIRE_DEPTH))
 
 
 def _cameras(tree: Tree, pole: _Pole, mount: Value) -> Value:
     """Return a camera along the road either way, a dome camera at the end of the arm, and a cabinet on the mast."""
-    front = move_geometry(_camera(tree, pole), op.vector(tree, 0.0, (pole.diameter + _CAMERA[1]) * -0.5))
+    front = move_geometry(_camera(tree, pole), op.vector(tree, 0.0, (pole.diameter + sizes.CAMERA[1]) * -0.5))
     behind = op.transform(front, rotation=(0.0, 0.0, math.pi))
-    pair = move_geometry(op.join(front, behind), op.vector(tree, 0.0, 0.0, mount - 0.3))
-    cap = paint_faces(move_geometry(tube(tree, _DOME, 0.14), (0.0, 0.0, -0.17)), pole.housing_material)
-    ball = tree.node("GeometryNodeMeshUVSphere", segments=12, rings=6, radius=_DOME * 0.9).value
+    pair = move_geometry(op.join(front, behind), op.vector(tree, 0.0, 0.0, mount - sizes.CAMERA_BELOW))
+    radius, high, low, middle = sizes.CAMERA_DOME
+    cap = paint_faces(move_geometry(tube(tree, radius, high), (0.0, 0.0, -low)), pole.housing_material)
+    ball = tree.node("GeometryNodeMeshUVSphere", segments=12, rings=6, radius=radius * 0.9).value
     ball = tree.node("GeometryNodeSetShadeSmooth", ball).value
-    dome = op.join(cap, paint_faces(move_geometry(ball, (0.0, 0.0, -0.18)), pole.glass_material))
+    dome = op.join(cap, paint_faces(move_geometry(ball, (0.0, 0.0, -middle)), pole.glass_material))
     dome = op.only_if(
-        pole.arm_length > _SHORTEST_ARM, move_geometry(dome, op.vector(tree, -pole.arm_length, 0.0, mount))
+        pole.arm_length > sizes.SHORTEST_ARM, move_geometry(dome, op.vector(tree, -pole.arm_length, 0.0, mount))
     )
-    cabinet = box(tree, (0.3, 0.22, 0.45), op.vector(tree, 0.0, pole.diameter * 0.5 + 0.1, 2.2))
+    *size, level = sizes.POLE_CABINET
+    cabinet = box(tree, tuple(size), op.vector(tree, 0.0, pole.diameter * 0.5 + 0.1, level))
     return op.join(pair, dome, paint_faces(cabinet, pole.housing_material))
 
 
 def _camera(tree: Tree, pole: _Pole) -> Value:
     """Return a camera under its sunshield around the origin, looking along -y and down."""
-    across, along, high = _CAMERA
-    shield = box(tree, (across + 0.03, along + 0.08, 0.008), (0.0, -0.03, high / 2 + 0.012))
+    (across, along, high), (wider, longer, thick) = sizes.CAMERA, sizes.CAMERA_SHIELD
+    shield = box(tree, (across + wider, along + longer, thick), (0.0, -0.03, high / 2 + 0.012))
     lens = tube(tree, 0.045, 0.02)
     lens = op.transform(lens, translation=(0.0, 0.01 - along / 2, 0.0), rotation=(math.pi / 2, 0.0, 0.0))
     camera = op.join(
-        paint_faces(op.join(box(tree, _CAMERA), shield), pole.housing_material), paint_faces(lens, pole.glass_material)
+        paint_faces(op.join(box(tree, sizes.CAMERA), shield), pole.housing_material),
+        paint_faces(lens, pole.glass_material),
     )
-    return op.transform(camera, rotation=(math.radians(8.0), 0.0, 0.0))
+    return op.transform(camera, rotation=(math.radians(sizes.CAMERA_TILT), 0.0, 0.0))
 
 
 def build_poles(builder: ModelBuilder) -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ...base.classes import class_id
-from ...road.things.temporary_barrier import LONGEST_PLASTIC, TEMPORARY_FLANKS, TEMPORARY_GAP, TemporaryBarrier
+from ...road.things import temporary_barrier as sizes
+from ...road.things.temporary_barrier import TemporaryBarrier
 from ...road.things.thing import SHORTEST_ELEMENT
 from ..nodes import operations as op
 from ..nodes.backbone import first_station, last_station
@@ -13,8 +14,7 @@ from ..nodes.inputs import boolean, instance_number, material_of, metres
 from ..nodes.solids import box, loft, paint_faces, put_on_points, row_of_points
 from .model_builder import ModelBuilder
 
-_STEEL, _PLASTIC = TEMPORARY_FLANKS["steel"], TEMPORARY_FLANKS["plastic"]
-_REFLECTOR = (0.12, 0.02, 0.06)
+_STEEL, _PLASTIC = sizes.FLANKS["steel"], sizes.FLANKS["plastic"]
 
 
 class _TemporaryBarrier(Lengthwise):
@@ -54,7 +54,7 @@ def temporary_barrier_group(tree: Tree) -> None:
             parts.append(_put_on_elements(tree, chosen, paint_faces(body, finish), True))
             parts.append(_put_on_elements(tree, chosen, marks, False))
     with tree.frame("Labels"):
-        mesh = op.label(op.realize(op.join(*parts)), class_id("construction_barrier"), barrier.instance)
+        mesh = op.label(op.realize(op.join(*parts)), class_id(TemporaryBarrier.points_class), barrier.instance)
     tree.output("Mesh", mesh, description="Elements")
 
 
@@ -65,7 +65,7 @@ def _elements(tree: Tree, barrier: _TemporaryBarrier, begin: Value, end: Value) 
     points = op.store(row_of_points(tree, count), "number", op.index(tree))
     start = barrier.start_station + op.index(tree) * barrier.segment_length
     stop = op.switch(op.index(tree) < count - 1, barrier.end_station, start + barrier.segment_length)
-    for name, station in {"from": start + TEMPORARY_GAP / 2, "to": stop - TEMPORARY_GAP / 2}.items():
+    for name, station in {"from": start + sizes.GAP / 2, "to": stop - sizes.GAP / 2}.items():
         points = op.store(points, name, op.minimum(op.maximum(station, begin), end))
     return op.delete_points(points, op.named_attribute(tree, "to") - op.named_attribute(tree, "from") < 0.05)
 
@@ -95,9 +95,9 @@ def _body(tree: Tree, barrier: _TemporaryBarrier) -> Value:
 
 def _reflectors(tree: Tree, barrier: _TemporaryBarrier) -> Value:
     """Return a reflector on either flank, around x = 0."""
-    beside = barrier.base_width * (0.5 * _STEEL[5][0]) + _REFLECTOR[1] * 0.25
+    beside = barrier.base_width * (0.5 * _STEEL[5][0]) + sizes.REFLECTOR[1] * 0.25
     up = barrier.height * 0.82
-    sides = [box(tree, _REFLECTOR, op.vector(tree, 0.0, beside * side, up)) for side in (1.0, -1.0)]
+    sides = [box(tree, sizes.REFLECTOR, op.vector(tree, 0.0, beside * side, up)) for side in (1.0, -1.0)]
     return op.join(*sides)
 
 
@@ -114,7 +114,7 @@ def _put_on_elements(tree: Tree, points: Value, body: Value, whole: bool) -> Val
 def build_temporary_barriers(builder: ModelBuilder) -> None:
     """Make one object per movable barrier."""
     for name, barrier in builder.parameters.of_type(TemporaryBarrier).items():
-        plastic = barrier.segment_length <= LONGEST_PLASTIC
+        plastic = barrier.plastic
         builder.add_thing(
             name,
             barrier,

@@ -5,21 +5,16 @@ from __future__ import annotations
 import math
 
 from ...base.classes import class_id
-from ...road.things.traffic_light import TRAFFIC_LIGHT_POST, TrafficLight
+from ...road.things import traffic_light as sizes
+from ...road.things.body import BURIED
+from ...road.things.traffic_light import TrafficLight
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.inputs import integer, material_of, metres
 from ..nodes.solids import box, cone, loft, move_geometry, paint_faces, put_on_points, row_of_points, tube
-from ..nodes.standing import BURIED, Standing
+from ..nodes.standing import Standing
 from .model_builder import ModelBuilder
 
-# In diameters of a light: a chamber of the housing, and the board behind it.
-_CHAMBER = (1.3, 0.7, 1.25)
-_BOARD_WIDTH = 1.9
-_MARGIN = 0.05  # m of the board above and below the housing
-_RIM = 0.018  # m of white around the board
-_VISOR_STEPS = 9
-_VISOR_THICKNESS = 0.004  # m
 _MATERIALS = {
     "post_material": "galvanised_steel",
     "housing_material": "plastic_black",
@@ -43,7 +38,7 @@ class _Light(Standing):
 
     def level(self, number: Value) -> Value:
         """Return the height of a light's middle above the surface, 0 being the uppermost."""
-        return self.height - _MARGIN - (number + 0.5) * self.light_diameter * _CHAMBER[2]
+        return self.height - sizes.MARGIN - (number + 0.5) * self.light_diameter * sizes.CHAMBER[2]
 
 
 @makes_group("SR Traffic Light")
@@ -55,7 +50,8 @@ def traffic_light_group(tree: Tree) -> None:
         tall = light.height + (BURIED - 0.03)
         parts = [
             paint_faces(
-                move_geometry(tube(tree, TRAFFIC_LIGHT_POST / 2, tall), (0.0, 0.0, -BURIED)), light.post_material
+                move_geometry(tube(tree, sizes.POST / 2, tall), (0.0, 0.0, -BURIED)),
+                light.post_material,
             )
         ]
     with tree.frame("Board with its rim, and housing"):
@@ -68,24 +64,34 @@ def traffic_light_group(tree: Tree) -> None:
         visors = put_on_points(row_of_points(tree, light.lights), _visor(tree, light.light_diameter), place)
         parts.append(paint_faces(visors, light.housing_material))
     with tree.frame("Put onto the points"):
-        mesh = light.put_labelled(parts, class_id("traffic_light"))
+        mesh = light.put_labelled(parts, class_id(TrafficLight.points_class))
     tree.output("Mesh", mesh, description="Traffic light with its post")
 
 
 def _front(light: _Light) -> Value:
     """Return the y of the housing's front."""
-    return light.light_diameter * -_CHAMBER[1] - (TRAFFIC_LIGHT_POST / 2 + 0.01)
+    return light.light_diameter * -sizes.CHAMBER[1] - (sizes.POST / 2 + 0.01)
 
 
 def _housing(tree: Tree, light: _Light) -> list[Value]:
-    tall = light.light_diameter * _CHAMBER[2] * light.lights
-    middle = light.height - _MARGIN - tall * 0.5
-    wide, back = light.light_diameter * _BOARD_WIDTH, -TRAFFIC_LIGHT_POST / 2 - 0.005
-    rim = box(tree, op.vector(tree, wide, 0.004, tall + 2 * _MARGIN), op.vector(tree, 0.0, back, middle))
-    size = op.vector(tree, wide - 2 * _RIM, 0.008, tall + 2 * (_MARGIN - _RIM))
-    board = box(tree, size, op.vector(tree, 0.0, back - 0.001, middle))
-    depth = light.light_diameter * _CHAMBER[1]
-    chamber = op.vector(tree, light.light_diameter * _CHAMBER[0], depth, light.light_diameter * (_CHAMBER[2] - 0.02))
+    tall = light.light_diameter * sizes.CHAMBER[2] * light.lights
+    middle = light.height - sizes.MARGIN - tall * 0.5
+    wide, back = light.light_diameter * sizes.BOARD, -sizes.POST / 2 - sizes.BEHIND
+    deep, before = sizes.PANEL
+    rim = box(
+        tree,
+        op.vector(tree, wide, sizes.RIM, tall + 2 * sizes.MARGIN),
+        op.vector(tree, 0.0, back, middle),
+    )
+    size = op.vector(tree, wide - 2 * sizes.EDGE, deep, tall + 2 * (sizes.MARGIN - sizes.EDGE))
+    board = box(tree, size, op.vector(tree, 0.0, back - before, middle))
+    depth = light.light_diameter * sizes.CHAMBER[1]
+    chamber = op.vector(
+        tree,
+        light.light_diameter * sizes.CHAMBER[0],
+        depth,
+        light.light_diameter * (sizes.CHAMBER[2] - sizes.JOINT),
+    )
     level = light.level(op.index(tree))
     chambers = put_on_points(
         row_of_points(tree, light.lights), box(tree, chamber), op.vector(tree, 0.0, depth * -0.5 - 0.055, level)
@@ -114,23 +120,23 @@ def _lamps(tree: Tree, light: _Light) -> Value:
 
 def _visor(tree: Tree, diameter: Value) -> Value:
     """Return a sheet bent over a light, open below, that reaches forward; the light's middle is the origin."""
-    turns = [math.radians(-35.0 + 250.0 * i / (_VISOR_STEPS - 1)) for i in range(_VISOR_STEPS)]
+    share, thick, ahead, more = sizes.VISOR
     # Clockwise as seen along -y, from outside over the top and back inside.
-    outer = [(math.cos(t), 0.0, math.sin(t)) for t in turns]
-    inner = [(math.cos(t), 1.0, math.sin(t)) for t in reversed(turns)]
+    outer = [(math.cos(t), 0.0, math.sin(t)) for t in sizes.VISOR_TURNS]
+    inner = [(math.cos(t), 1.0, math.sin(t)) for t in reversed(sizes.VISOR_TURNS)]
 
     def outline(number: Value) -> Value:
         point = op.choose(number, outer + inner)
-        radius = diameter * 0.56 - op.component(point, "Y") * _VISOR_THICKNESS
+        radius = diameter * share - op.component(point, "Y") * thick
         flat = point * (1.0, 0.0, 1.0)
         return flat * radius
 
     def place(point: Value, row: Value) -> Value:
         # The upper part reaches farther forward than the ends.
-        reach = diameter * 0.55 + op.maximum(op.component(point, "Z"), 0.0) * 0.5
+        reach = diameter * ahead + op.maximum(op.component(point, "Z"), 0.0) * more
         return point - op.vector(tree, 0.0, reach * row)
 
-    return loft(tree, outline, 2 * _VISOR_STEPS, 2, place)
+    return loft(tree, outline, 2 * len(sizes.VISOR_TURNS), 2, place)
 
 
 def build_traffic_lights(builder: ModelBuilder) -> None:

@@ -11,9 +11,10 @@ from ...road.guidelines import DELINEATOR_SPACING, EMERGENCY_PHONE_SPACING, KILO
 from ...road.objects import LineObject, PointObject
 from ...road.section import LineMarking
 from ...road.surroundings import Vegetation, Vehicle
+from ...road.things import delineator as sizes
 from ...road.things.beacon import ConstructionBeacon
 from ...road.things.cabinet import Cabinet
-from ...road.things.delineator import DELINEATOR_REACH, Delineator
+from ...road.things.delineator import Delineator
 from ...road.things.kilometre_board import KilometreBoard
 from .edges import Edges, Float
 from .obstacles import Bodies, Bool
@@ -76,7 +77,7 @@ def _delineator_spacing(road: Road) -> Iterator[Finding]:
 def _delineator_distance(road: Road) -> Iterator[Finding]:
     posts, clearance = road.of(Delineator), road.around.nearest
     for i in np.flatnonzero((clearance >= 0.0) & (clearance < DELINEATOR_DISTANCE)).tolist():
-        name, distance = road.bodies.names[i], float(clearance[i]) + DELINEATOR_REACH
+        name, distance = road.bodies.names[i], float(clearance[i]) + sizes.REACH
         if name in posts and below(distance, DELINEATOR_DISTANCE):
             text = (
                 f"The delineator stands {distance:.2f} m from the paved edge; {DELINEATOR_DISTANCE} m are needed (HLB)."

@@ -8,7 +8,8 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from ...base.schema import quantity
-from .thing import Block, StandingThing
+from .body import Body, Place
+from .thing import Block, StandingThing, TwinTypes
 
 
 class Asset(StandingThing):
@@ -20,6 +21,19 @@ class Asset(StandingThing):
     name: str = Field(description="Name of the asset in its library.")
     class_name: str = Field(description="Semantic class of its faces.")
     scale: float = quantity(1.0, gt=0, le=100, unit="1", description="Scale of the asset.")
+
+    @property
+    def semantic_class(self) -> str:
+        """Return the class of its points, which its library chooses."""
+        return self.class_name
+
+    def twin(self) -> TwinTypes:
+        """Return its types: nothing known."""
+        return TwinTypes(opendrive=f"none.{self.name}", kind=self.name)
+
+    def bodies(self, place: Place) -> list[Body]:
+        """Return nothing: its shape is its library's."""
+        return []
 
     def footprint(self) -> Iterator[Block]:
         """Yield its place: its size is its library's."""

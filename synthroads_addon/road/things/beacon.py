@@ -5,18 +5,44 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import ClassVar, Literal
 
+import numpy as np
 from pydantic import Field
 
+from ...base.arrays import Float
 from ...base.schema import quantity
 from ..objects import Side
-from .thing import Block, StandingThing
+from .body import Body, Place, box, circle, moved, plate, prism
+from .thing import Block, StandingThing, TwinTypes
 
-BEACON_FOOT = (0.40, 0.80, 0.11)
+FOOT = (0.40, 0.80, 0.11)
 """A beacon's rubber foot: across the blade, along the road, height (m)."""
-BEACON_BLADE_BOTTOM = 0.16
+BLADE_BOTTOM = 0.16
 """Lower edge of a beacon's blade above the surface, m."""
-BEACON_BLADE = 0.045
+BLADE = 0.045
 """Thickness of a beacon's blade, m."""
+SHEETING = 0.002
+"""Distance of the stripes from the blade, m."""
+CORNER, SUNK = 0.06, 0.01
+"""What is cut off a foot's corners, and how far it is sunk, m."""
+LEVELS = (0.7, (0.86, 0.92))
+"""Height of a foot's lower part as a share, and the size of its upper one as shares of the lower's."""
+TENON, TENON_MIDDLE = (0.07, 0.05, 0.1), 0.12
+"""The tenon between foot and blade, and the height of its middle, m."""
+HOUSING, HOUSING_MIDDLE = (0.11, 0.07, 0.12), 0.05
+"""The lamp's housing, and the height of its middle above the blade, m."""
+LENS, LENS_MIDDLE, LENS_SIDES = (0.095, 0.075), 0.17, 16
+"""Radius and depth of the lamp's drum, the height of its middle above the blade (m), and its corners."""
+LENS_PROUD = 0.03
+"""How much deeper than the drum its glass is, m."""
+
+
+def foot_outline() -> Float:
+    """Return the outline (8, 2) of a foot, anticlockwise from above."""
+    x, y, cut = FOOT[0] / 2.0, FOOT[1] / 2.0, CORNER
+    half = np.array([(x, cut - y), (x, y - cut), (x - cut, y), (cut - x, y)])
+    return np.concatenate([half, -half])
+
+
 _REACH = 0.1
 """Half of the room along the road, m."""
 
@@ -30,6 +56,35 @@ class ConstructionBeacon(StandingThing):
     pass_side: Side = Field(description="Side, seen along the stations, on which traffic passes it.")
     width: float = quantity(0.25, ge=0.1, le=0.6, unit="m", description="Width of its blade.")
     height: float = quantity(1.0, ge=0.5, le=2, unit="m", description="Height of its blade.")
+
+    def twin(self) -> TwinTypes:
+        """Return its types: a marker."""
+        return TwinTypes("IfcSign.MARKER", "obstacle.constructionBeacon")
+
+    def bodies(self, place: Place) -> list[Body]:
+        """Return blade, foot and lamp."""
+        top = BLADE_BOTTOM + self.height
+        thick = BLADE + 2.0 * SHEETING
+        blade = box((self.width, thick, self.height), (0.0, 0.0, (BLADE_BOTTOM + top) / 2.0))
+        outline, (share, smaller) = foot_outline(), LEVELS
+        feet = [
+            prism(outline, -SUNK, FOOT[2] * share),
+            prism(outline * smaller, 0.0, FOOT[2]),
+            box(TENON, (0.0, 0.0, TENON_MIDDLE)),
+        ]
+        radius, deep = LENS
+        drum = plate(circle(2.0 * radius, LENS_SIDES), -deep / 2.0, deep / 2.0)
+        lamp = [
+            box(HOUSING, (0.0, 0.0, top + HOUSING_MIDDLE)),
+            moved(drum, (0.0, 0.0, top + LENS_MIDDLE)),
+        ]
+        glass = box((2.0 * radius, deep + LENS_PROUD, 2.0 * radius), (0.0, 0.0, top + LENS_MIDDLE))
+        return [
+            Body(blade, "sheeting_red"),
+            *(Body(shape, "rubber") for shape in feet),
+            *(Body(shape, "plastic_black") for shape in lamp),
+            Body(glass, "lamp_yellow", "lens", detail=LENS_PROUD),
+        ]
 
     def footprint(self) -> Iterator[Block]:
         """Yield the blade's box."""

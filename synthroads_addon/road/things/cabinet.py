@@ -5,10 +5,36 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import ClassVar, Literal
 
+import numpy as np
 from pydantic import Field
 
+from ...base.arrays import Float
 from ...base.schema import quantity
-from .thing import Block, StandingThing
+from .body import BURIED, Body, Place, box
+from .thing import Block, StandingThing, TwinTypes
+
+PLINTH_BURIED = 0.5
+"""Depth of a cabinet's plinth below the surface, m: the ground may fall beside its middle."""
+PLINTH, LID = 0.12, 0.03
+"""Height of a cabinet's plinth above the surface, and of its lid, m."""
+OVERHANG, DOOR = 0.02, 0.012
+"""Overhang of the lid beyond the body, and depth by which doors stand out, m."""
+PHONE_CORNER, PHONE_STEPS = 0.16, 4
+"""Radius of a phone's edges as a share of half its width, and the points of each."""
+PHONE_PLINTH = ((-BURIED, 0.97), (0.05, 0.97))
+PHONE_WIDTH = 0.92
+PHONE_BODY = ((0.05, PHONE_WIDTH), (0.93, PHONE_WIDTH), (0.97, 0.8), (1.0, 0.4))
+PHONE_BAND = ((0.46, 1.0), (0.52, 1.0))
+"""Heights (a share; below the surface m) and widths (a share) that a phone's solids go through."""
+
+
+def phone_outline() -> Float:
+    """Return a square of side 1 (16, 2) with rounded corners, anticlockwise from above."""
+    inner, radius = (1.0 - PHONE_CORNER) / 2.0, PHONE_CORNER / 2.0
+    start = np.deg2rad([-90.0, 0.0, 90.0, 180.0])
+    turn = start[:, None] + np.pi / 2.0 * np.arange(PHONE_STEPS) / (PHONE_STEPS - 1.0)
+    corners = np.array([(1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0)]) * inner
+    return (corners[:, None] + radius * np.stack([np.cos(turn), np.sin(turn)], axis=2)).reshape(-1, 2)
 
 
 class Cabinet(StandingThing):
@@ -21,6 +47,51 @@ class Cabinet(StandingThing):
     width: float = quantity(0.3, ge=0.1, le=3, unit="m", description="Width, seen by the traffic beside it.")
     depth: float = quantity(0.3, ge=0.1, le=3, unit="m", description="Depth.")
     height: float = quantity(1.6, ge=0.4, le=3, unit="m", description="Top above the surface.")
+
+    def twin(self) -> TwinTypes:
+        """Return its types, by what it is."""
+        phone = self.kind == "emergency_phone"
+        entity = "IfcCommunicationsAppliance.USERDEFINED" if phone else "IfcDistributionBoard.DISTRIBUTIONBOARD"
+        return TwinTypes(entity, f"obstacle.{self.kind}", kind=self.kind)
+
+    def bodies(self, place: Place) -> list[Body]:
+        """Return body, plinth and lid or band; doors, panel and letters are left out."""
+        return self._phone() if self.kind == "emergency_phone" else self._cabinet()
+
+    def _cabinet(self) -> list[Body]:
+        body = self.height - LID
+        walls = self._block(OVERHANG, PLINTH, body)
+        lid, plinth = (
+            self._block(0.0, body, self.height),
+            self._block(2.0 * OVERHANG, -PLINTH_BURIED, PLINTH),
+        )
+        doors = box((self.width, OVERHANG, body), (0.0, (OVERHANG - self.depth) / 2.0, body / 2.0))
+        return [
+            Body(walls, "cabinet_grey"),
+            Body(lid, "cabinet_grey"),
+            Body(plinth, "concrete"),
+            Body(doors, "cabinet_grey", "doors", detail=OVERHANG),
+        ]
+
+    def _block(self, inset: float, low: float, high: float) -> Float:
+        """Return a box between two heights, so much smaller than the cabinet all around."""
+        size = (self.width - 2.0 * inset, self.depth - 2.0 * inset, high - low)
+        return box(size, (0.0, 0.0, (high + low) / 2.0))
+
+    def _phone(self) -> list[Body]:
+        solids = ((PHONE_BODY, "plastic_orange"), (PHONE_PLINTH, "concrete"), (PHONE_BAND, "sheeting_white"))
+        panel = box((self.width, self.depth, self.height * 0.4), (0.0, 0.0, self.height * 0.74))
+        made = [Body(self._pillar(rows), material) for rows, material in solids]
+        return [*made, Body(panel, "plastic_black", "panel", detail=0.01)]
+
+    def _pillar(self, rows: tuple[tuple[float, float], ...]) -> Float:
+        flat = phone_outline() * (self.width, self.depth)
+        return np.stack(
+            [
+                np.column_stack([flat * share, np.full(len(flat), z if z < 0.0 else z * self.height)])
+                for z, share in rows
+            ]
+        )
 
     def footprint(self) -> Iterator[Block]:
         """Yield a box that holds it, however it is turned."""

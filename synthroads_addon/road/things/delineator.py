@@ -5,14 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import ClassVar, Literal
 
-from ...base.schema import quantity
-from .thing import Block, StandingThing
+import numpy as np
 
-DELINEATOR = (
+from ...base.schema import quantity
+from .body import BURIED, Body, Place, box
+from .thing import Block, StandingThing, TwinTypes
+
+OUTLINE = (
     (-0.06, -0.050), (-0.045, -0.055), (0.05, -0.014), (0.06, 0.0), (0.05, 0.014), (-0.045, 0.055), (-0.06, 0.05),
 )  # fmt: skip
 """A delineator's cross-section from above, x away from the road, y along the driver's way: a triangle 0.12 m wide."""
-DELINEATOR_REACH = 0.06
+TOP, SLANT = 0.964, 0.6
+"""Top of a delineator of 1 m on its axis (m), and the rise of its top and its band away from the road (m/m)."""
+REFLECTOR = (0.04, 0.18, 0.765)
+"""Width and height of the upright reflector, and the height of the reflectors' middle on a post of 1 m, m."""
+REACH = 0.06
 """Half the width of a delineator, m."""
 
 
@@ -24,6 +31,19 @@ class Delineator(StandingThing):
     type: Literal["Delineator"] = "Delineator"
     height: float = quantity(1.0, ge=0.3, le=1.5, unit="m", description="Top above the surface.")
 
+    def twin(self) -> TwinTypes:
+        """Return its types: a marker."""
+        return TwinTypes("IfcSign.MARKER", "pole.delineator")
+
+    def bodies(self, place: Place) -> list[Body]:
+        """Return the post with its slanted top, and the reflectors on it."""
+        outline = np.array(OUTLINE)
+        top = TOP + SLANT * outline[:, 0]
+        ends = [np.column_stack([outline, z * self.height]) for z in (np.full(len(outline), -BURIED), top)]
+        wide, high, middle = REFLECTOR
+        glass = box((wide + 0.03, 0.104, (high + 0.02) * self.height), (0.0, 0.0, middle * self.height))
+        return [Body(np.stack(ends), "plastic_white"), Body(glass, "reflector", detail=wide)]
+
     def footprint(self) -> Iterator[Block]:
         """Yield the post's box."""
-        yield self.upright(DELINEATOR_REACH, self.height)
+        yield self.upright(REACH, self.height)

@@ -5,17 +5,60 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import ClassVar, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
+from ...base.arrays import Float
 from ...base.schema import Model, quantity
 from ..objects import Side
-from .thing import Block, StandingThing
+from .body import Body, Place, bar, box, circle, moved
+from .thing import Block, Signal, StandingThing, TwinTypes
 
-GANTRY_HANGER = 0.18
+HANGER = 0.18
 """Distance between a gantry's beam and its boards, m."""
-GANTRY_BOARD, GANTRY_DISPLAY = 0.05, 0.28
+BOARD, DISPLAY = 0.05, 0.28
 """Depth of a painted board and of a display, m."""
-GANTRY_OVERHANG = 0.3
+HUNG = (0.32, 0.1, 0.01)
+"""Where a board's hangers are as a share of its width, how wide they are, and how much longer than the gap, m."""
+FACE = 0.006
+"""How far a board's face stands before it, m."""
+BEAMS = ("box", "truss", "tube")
+TUBE_SIDES = 20
+JOINT = 0.08
+"""What a beam's joints are deeper than it, m."""
+TRUSS_CHORD = (0.1, 0.06, 0.16)
+"""Width of a truss's chords as a share of its height, and its limits, m."""
+TRUSS_BAR, TRUSS_BAY = 0.65, (0.5, 1.2)
+"""Width of a truss's other bars as a share of the chords'; a bay's length per height of 0.5 m at least."""
+TRUSS_BARS = (
+    ((0.0, -1.0, 0.0), (0.0, -1.0, 1.0)), ((0.0, 1.0, 0.0), (0.0, 1.0, 1.0)),
+    ((0.0, -1.0, 0.0), (0.0, 1.0, 0.0)), ((0.0, -1.0, 1.0), (0.0, 1.0, 1.0)),
+    ((0.0, -1.0, 0.0), (1.0, -1.0, 1.0)), ((0.0, 1.0, 0.0), (1.0, 1.0, 1.0)),
+    ((0.0, -1.0, 0.0), (1.0, 1.0, 0.0)), ((0.0, -1.0, 1.0), (1.0, 1.0, 1.0)),
+)  # fmt: skip
+"""Bars of one bay of a truss from x = 0 to 1, y = -1 to 1, z = 0 to 1; the first four are its frame."""
+TRUSS_FRAME = 4
+POST_ENCLOSES, POST_ENTERS, POST_SHARE = 0.02, 0.05, 0.9
+"""How far posts enclose the beam's ends, and the middle one reaches into it (m); its depth as a share of the beam's."""
+PLINTH, BURIED, PLINTH_MARGIN = 0.3, 0.6, 0.2
+"""Top of a post's plinth above the surface, its depth below it, and what it is wider than the post all around, m."""
+BASE_PLATE, PLATE_MARGIN, PLATE_SUNK = 0.04, 0.12, 0.01
+"""A base plate's thickness above its plinth and its margin; how far it and the post reach into what is below, m."""
+BOLT = 0.06
+"""Height of a base plate's bolts, m."""
+CATWALK_CLEAR, NARROWEST_CATWALK = 0.05, 0.7
+"""From a post to a catwalk, and its least width, m."""
+CATWALK_SUPPORT, CATWALK_GRATING, CATWALK_RAIL, CATWALK_BAR = 0.06, 0.04, 1.1, 0.045
+"""Heights of a catwalk's supports, grating and handrail above it, and the thickness of its rails, m."""
+CATWALK_TOE = (0.01, 0.12, 0.1)
+"""Thickness and height of the toe boards, and the height of their middle above the supports, m."""
+CATWALK_POST, CATWALK_SPACING = 0.8, 2.0
+"""Thickness of a railing's posts as a share of its rails', and their spacing at most, m."""
+LADDER_FOOT, LADDER_RAIL, LADDER_HALF, LADDER_AWAY = 2.3, 0.05, 0.2, 0.2
+"""Foot of a ladder above the surface, thickness of its rails, half their distance, and from the beam to it, m."""
+LADDER_RUNG = (0.4, 0.03, 0.3)
+"""Width and thickness of a rung, and their spacing, m."""
+OVERHANG = 0.3
 """Share of what a board is higher than a gantry's beam that hangs below it."""
 
 
@@ -31,7 +74,7 @@ class GantrySign(Model):
     @property
     def depth(self) -> float:
         """Return the depth of its body along the road, m."""
-        return GANTRY_DISPLAY if self.kind == "display" else GANTRY_BOARD
+        return DISPLAY if self.kind == "display" else BOARD
 
     @property
     def facing(self) -> float:
@@ -75,13 +118,13 @@ class Gantry(StandingThing):
 
     def reach(self, facing: float) -> float:
         """Return how far the beam, and the signs on one side of it (1 or -1), reach along the road from its middle."""
-        signs = [GANTRY_HANGER + sign.depth for sign in self.signs if sign.facing == facing]
+        signs = [HANGER + sign.depth for sign in self.signs if sign.facing == facing]
         return self.beam_depth / 2.0 + max(signs, default=0.0)
 
     def beam_bottom(self, low: float) -> float:
         """Return the height (m) of the beam's lower edge, from that of the lowest part: taller signs hang below it."""
         tallest = max((sign.height for sign in self.signs), default=0.0)
-        return low + max(tallest - self.beam_height, 0.0) * GANTRY_OVERHANG
+        return low + max(tallest - self.beam_height, 0.0) * OVERHANG
 
     def ends_in_beam(self, sign: GantrySign, low: float) -> bool:
         """Return whether a sign whose lower edge is at the lowest part (m) would end below the beam's top."""
@@ -92,6 +135,161 @@ class Gantry(StandingThing):
         if self.kind == "cantilever":
             return [self.left_offset if self.post_side == "left" else self.right_offset]
         return [self.left_offset, self.right_offset, *([0.0] if self.kind == "two_sided" else [])]
+
+    @property
+    def foot_offset(self) -> float:
+        """Return the offset of the end that it is counted to stand at, m."""
+        return self.left_offset if self.post_side == "left" else self.right_offset
+
+    @property
+    def catwalk(self) -> bool:
+        """Return whether it has a catwalk: displays are looked after from above; boards are not."""
+        return any(sign.kind == "display" for sign in self.signs)
+
+    def twin(self) -> TwinTypes:
+        """Return its types: what signs hang on."""
+        return TwinTypes("IfcElementAssembly.SIGNALASSEMBLY.SITE", f"gantry.{self.kind}", kind=f"Gantry {self.kind}")
+
+    def signals(self) -> dict[str, Signal]:
+        """Return what its boards and displays tell."""
+        return {
+            f"sign-{number}": Signal(
+                sign.kind, text="\n".join(sign.text), dynamic=sign.kind == "display", facing=sign.facing
+            )
+            for number, sign in enumerate(self.signs, 1)
+        }
+
+    def bodies(self, place: Place) -> list[Body]:
+        """Return beam, posts, boards with what they hang on, and the catwalk with its ladder."""
+        left, right = self.offset - self.left_offset, self.offset - self.right_offset
+        low = place.pavement((left, right), (-self.reach(1.0), self.reach(-1.0)), 0.0) + self.clearance
+        bottom = self.beam_bottom(low)
+        shapes = [moved(shape, (left, 0.0, bottom)) for shape in self._beam(right - left)]
+        made = [Body(shape, "gantry_steel", "beam", "IfcBeam.BEAM") for shape in shapes]
+        size = (right - left, self.beam_depth + JOINT, self.beam_height)
+        joints = box(size, ((left + right) / 2.0, 0.0, bottom + self.beam_height / 2.0))
+        made.append(Body(joints, "gantry_steel", "joints", detail=JOINT / 2.0))
+        for number, offset in enumerate(self.post_offsets(), 1):
+            made += self._post(place, f"post-{number}", offset, bottom)
+        for number, sign in enumerate(self.signs, 1):
+            made += self._board(f"sign-{number}", sign, (low, bottom))
+        return [*made, *self._catwalk(place, (left, right), bottom + self.beam_height)] if self.catwalk else made
+
+    def _beam(self, length: float) -> list[Float]:
+        """Return the beam from x = 0 on, its lower edge on z = 0."""
+        depth, height = self.beam_depth, self.beam_height
+        middle = (length / 2.0, 0.0, height / 2.0)
+        if self.beam == "box":
+            return [box((length, depth, height), middle)]
+        if self.beam == "tube":
+            ring = circle(1.0, TUBE_SIDES)[:, ::-1] * (depth, height) + (0.0, height / 2.0)
+            return [np.stack([np.column_stack([np.full(TUBE_SIDES, x), ring]) for x in (0.0, length)])]
+        share, least, most = TRUSS_CHORD
+        wide = min(max(height * share, least), most)
+        beside, above = (depth - wide) / 2.0, (height - wide) / 2.0
+        chords = [
+            box((length, wide, wide), (length / 2.0, y * beside, height / 2.0 + z * above))
+            for y in (-1.0, 1.0)
+            for z in (-1.0, 1.0)
+        ]
+        bays = int(np.ceil(length / (max(height, TRUSS_BAY[0]) * TRUSS_BAY[1])))
+        start, middle = np.array([wide / 2.0, 0.0, height / 2.0]), np.array([0.0, 0.0, 0.5])
+        for number in range(bays * len(TRUSS_BARS) + TRUSS_FRAME):
+            bay, kind = divmod(number, len(TRUSS_BARS))
+            turned = 1.0 - 2.0 * (bay % 2)
+            size = ((length - wide) / bays, beside * turned, 2.0 * above * turned)
+            ends = start + (np.array(TRUSS_BARS[kind]) + (bay, 0.0, 0.0) - middle) * size
+            chords.append(bar(*ends, wide * TRUSS_BAR))
+        return chords
+
+    def _post(self, place: Place, name: str, offset: float, bottom: float) -> list[Body]:
+        """Return a post: one at an end encloses the beam's end, the middle one ends in it."""
+        x, outer = self.offset - offset, offset in (self.left_offset, self.right_offset)
+        foot = float(place.ground([x], [0.0])[0]) + self.elevation
+        top = bottom + (self.beam_height + POST_ENCLOSES if outer else POST_ENTERS)
+        depth = self.beam_depth + 2.0 * POST_ENCLOSES if outer else self.beam_depth * POST_SHARE
+
+        def block(margin: float, low: float, high: float) -> Float:
+            size = (self.post_width + 2.0 * margin, depth + 2.0 * margin, high - low)
+            return box(size, (x, 0.0, (low + high) / 2.0))
+
+        plate_top = foot + PLINTH + BASE_PLATE
+        parts = (
+            (block(0.0, plate_top - PLATE_SUNK, top), "gantry_steel", 0.0),
+            (block(PLINTH_MARGIN, foot - BURIED, foot + PLINTH), "bridge_concrete", 0.0),
+            (block(PLATE_MARGIN, foot + PLINTH - PLATE_SUNK, plate_top), "gantry_steel", 0.0),
+            (block(PLATE_MARGIN, plate_top, plate_top + BOLT), "gantry_steel", BOLT),
+        )
+        return [Body(shape, material, name, "IfcColumn.COLUMN", detail) for shape, material, detail in parts]
+
+    def _board(self, name: str, sign: GantrySign, levels: tuple[float, float]) -> list[Body]:
+        """Return a board's body, in front of the beam as the traffic below it sees it, and what it hangs on."""
+        low, bottom = levels
+        beam = bottom + self.beam_height / 2.0
+        z = beam if self.ends_in_beam(sign, low) else low + sign.height / 2.0
+        x, behind = self.offset - sign.offset, self.beam_depth / 2.0
+        share, wide, longer = HUNG
+
+        def block(size: tuple[float, float, float], before: float, beside: float = 0.0, level: float = z) -> Float:
+            """Return a box whose middle is so far (m) before the beam's axis as its traffic sees it."""
+            return box(size, (x + beside, -sign.facing * before, level))
+
+        board = block((sign.width, sign.depth, sign.height), behind + HANGER + sign.depth / 2.0)
+        face = block((sign.width, FACE, sign.height), behind + HANGER + sign.depth + FACE / 2.0)
+        kind, material = (
+            ("IfcSignal.VISUAL", "display") if sign.kind == "display" else ("IfcSign.PICTORAL", "board_back")
+        )
+        made = [Body(board, material, name, kind), Body(face, material, name, detail=FACE)]
+        tall, within = max(sign.height - 0.2, sign.height / 2.0), behind - self.beam_depth * 0.1
+        for beside in (-share * sign.width, share * sign.width):
+            hanger = block((wide, HANGER + longer, tall), behind + HANGER / 2.0, beside)
+            clamp = block((0.16, self.beam_depth * 0.3 + 0.05, self.beam_height * 0.3), within, beside, beam)
+            made += [Body(shape, "gantry_steel", "beam", "IfcBeam.BEAM") for shape in (hanger, clamp)]
+        return made
+
+    def _catwalk(self, place: Place, ends: tuple[float, float], level: float) -> list[Body]:
+        """Return the catwalk on the beam, and the ladder at the right post, or at the left one if there is no right."""
+        clear = self.post_width / 2.0 + CATWALK_CLEAR
+        length, width = max(ends[1] - ends[0] - 2.0 * clear, 1.0), max(self.beam_depth, NARROWEST_CATWALK)
+        start, middle, edge = ends[0] + clear, ends[0] + clear + length / 2.0, (width - CATWALK_BAR) / 2.0
+        thin, tall, toe = CATWALK_TOE
+        floor = CATWALK_SUPPORT + CATWALK_GRATING
+        top = floor + CATWALK_RAIL
+        shapes = [box((length, width, CATWALK_GRATING), (middle, 0.0, floor - CATWALK_GRATING / 2.0))]
+        bays = int(np.ceil(length / CATWALK_SPACING))
+        along = start + CATWALK_BAR / 2.0 + np.arange(bays + 1) * (length - CATWALK_BAR) / bays
+        upright = top - CATWALK_BAR - CATWALK_SUPPORT
+        for y in (-edge, edge):
+            shapes.append(box((length, thin, tall), (middle, y, CATWALK_SUPPORT + toe)))
+            shapes += [
+                box((length, CATWALK_BAR, CATWALK_BAR), (middle, y, z))
+                for z in (top - CATWALK_BAR / 2.0, top - CATWALK_RAIL / 2.0)
+            ]
+            size = (CATWALK_BAR * CATWALK_POST, CATWALK_BAR * CATWALK_POST, upright)
+            shapes += [box(size, (x, y, CATWALK_SUPPORT + upright / 2.0)) for x in along.tolist()]
+        size = (length + CATWALK_SUPPORT - CATWALK_BAR, width * 0.96, CATWALK_SUPPORT + 0.02)
+        supports = box(size, (middle, 0.0, CATWALK_SUPPORT / 2.0))
+        walk = [moved(shape, (0.0, 0.0, level)) for shape in shapes]
+        ladder, rungs = self._ladder(place, ends, level)
+        return [
+            *(Body(shape, "gantry_steel", "catwalk", "IfcPlate.USERDEFINED") for shape in (*walk, *ladder)),
+            Body(moved(supports, (0.0, 0.0, level)), "gantry_steel", "catwalk", detail=CATWALK_SUPPORT),
+            Body(rungs, "gantry_steel", "rungs", detail=LADDER_RUNG[1]),
+        ]
+
+    def _ladder(self, place: Place, ends: tuple[float, float], level: float) -> tuple[list[Float], Float]:
+        """Return a ladder's rails, and the box around its rungs."""
+        right = self.kind != "cantilever" or self.post_side == "right"
+        # Behind the boards of the carriageway that the post stands beside.
+        x, y = ends[right], (self.beam_depth / 2.0 + LADDER_AWAY) * (1.0 if right else -1.0)
+        foot = float(place.ground([x], [0.0])[0]) + self.elevation + LADDER_FOOT
+        top = level + CATWALK_RAIL
+        rails = [
+            box((LADDER_RAIL, LADDER_RAIL, top - foot), (x + side, y, (top + foot) / 2.0))
+            for side in (-LADDER_HALF, LADDER_HALF)
+        ]
+        wide, thick, _ = LADDER_RUNG
+        return rails, box((wide, thick, top - foot), (x, y, (top + foot) / 2.0))
 
     def footprint(self) -> Iterator[Block]:
         """Yield the boxes of its posts, then that of its beam."""

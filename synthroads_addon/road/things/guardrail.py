@@ -5,27 +5,37 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import ClassVar, Literal
 
+import numpy as np
 from pydantic import Field
 
+from ...base.arrays import Float
 from ...base.schema import quantity
-from .thing import Block, LengthwiseThing
+from .body import Body, Course, boxes, swept
+from .thing import Block, LengthwiseThing, TwinTypes
 
-GUARDRAIL_BEAM = (
+BEAM = (
     (0.010, 0.000), (0.040, -0.006), (0.074, -0.030), (0.081, -0.052), (0.074, -0.080), (0.012, -0.124),
     (0.003, -0.140), (0.003, -0.170), (0.012, -0.186), (0.074, -0.230), (0.081, -0.258), (0.074, -0.280),
     (0.040, -0.304), (0.010, -0.310),
 )  # fmt: skip
 """A guardrail's beam, the A profile of 0.31 m: depth towards traffic, height under its top edge (m)."""
-GUARDRAIL_POST = (0.10, 0.055)
+POST = (0.10, 0.055)
 """A guardrail's post: across the road, along it (m)."""
-GUARDRAIL_POST_TOP = 0.03
+BURIED = 0.35
+"""Depth to which a guardrail's posts are modelled below the surface, m."""
+POST_TOP = 0.03
 """A guardrail's posts end so far (m) below the top of its beam."""
-GUARDRAIL_LOWEST_POST = 0.15
+LOWEST_POST = 0.15
 """Where the beam's top is lower than this (m), a terminal has no posts."""
-GUARDRAIL_TIP = -0.02
+TIP = -0.02
 """Top of a guardrail's beam at its very ends above the surface, m."""
-GUARDRAIL_SPACER = {"left": 0.07, "right": 0.07, "both": 0.20}
+SPACER = {"left": 0.07, "right": 0.07, "both": 0.20}
 """Distance between posts and beam, m: a single rail's face stands 0.2 m from the posts' axis."""
+SHEET = 0.003
+"""Thickness of a guardrail's beam, m."""
+BLOCK = (0.96, 0.10, 0.22, 0.155)
+"""A spacer: its share of the gap, as faces that coincide have no first hit; length and height; how far its middle is
+below the beam's top (m)."""
 _FACE, _REAR = 0.2, 0.05
 """From the axis to the face of the beam, and to the rear of the posts, m."""
 
@@ -42,6 +52,54 @@ class Guardrail(LengthwiseThing):
     terminal_length: float = quantity(
         12.0, ge=0, le=50, unit="m", description="Length over which either end is ramped into the ground."
     )
+
+    def twin(self) -> TwinTypes:
+        """Return its types: a guardrail."""
+        return TwinTypes("IfcRailing.GUARDRAIL", "barrier.guardRail")
+
+    def reach(self) -> tuple[float, float]:
+        """Return how far its beams and posts reach to the right and to the left, m."""
+        rear = POST[0] / 2.0
+        face = rear + SPACER[self.faces] + max(depth for depth, _ in BEAM)
+        return rear if self.faces == "left" else face, rear if self.faces == "right" else face
+
+    def bodies(self, course: Course) -> list[Body]:
+        """Return beams, posts, and the spacers between them."""
+        end = self.end_on(course.length)
+        if end is None:
+            return []
+        sides = {"left": (1.0,), "right": (-1.0,), "both": (1.0, -1.0)}[self.faces]
+        shapes = [*self._beams(course, end, sides), *self._posts(course, end, sides)]
+        return [Body(shape, "galvanised_steel") for shape in shapes]
+
+    def _beams(self, course: Course, end: float, sides: tuple[float, ...]) -> Iterator[Float]:
+        ramp = self.ramp_length(end)
+        station = course.rows(self.offset_at, self.start_station, end, (self.start_station + ramp, end - ramp))
+        feet, left = course.feet(station, self.offset_at(station)), course.left(station)
+        profile = np.array([*BEAM, *((x - SHEET, z) for x, z in reversed(BEAM))])
+        across = profile[:, 0] + POST[0] / 2.0 + SPACER[self.faces]
+        height = self._top(end, station)[:, None] + profile[:, 1]
+        return (swept(feet, left, side * across, height) for side in sides)
+
+    def _posts(self, course: Course, end: float, sides: tuple[float, ...]) -> list[Float]:
+        """Return posts wherever the beam is high enough, and their spacers."""
+        count = int((end - self.start_station) / self.post_spacing + 1e-4) + 1
+        station = self.start_station + np.arange(count) * self.post_spacing
+        station = station[(self._top(end, station) >= LOWEST_POST) & (station <= end + 1e-9)]
+        feet, left = course.feet(station, self.offset_at(station)), course.left(station)
+        top = self._top(end, station)
+        size = (*POST, top - POST_TOP + BURIED)
+        shapes = boxes(feet, left, size, -BURIED)
+        spacer, (share, long, high, below) = SPACER[self.faces], BLOCK
+        for side in sides:
+            beside = side * (POST[0] + spacer) / 2.0
+            shapes += boxes(feet, left, (spacer * share, long, high), top - below - high / 2.0, beside)
+        return shapes
+
+    def _top(self, end: float, station: Float) -> Float:
+        """Return the height (N,) of the beam's top above the surface, m."""
+        share = self.height_share(end, station)
+        return self.height * share + TIP * (1.0 - share)
 
     def footprint(self) -> Iterator[Block]:
         """Yield the rail's box, to the face of its beam."""

@@ -8,10 +8,14 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from ...base.schema import quantity
-from .thing import Block, StandingThing
+from .body import BURIED, Body, Place, plate, post
+from .sign_outline import face_outline
+from .thing import Block, Signal, StandingThing, TwinTypes
 
-KILOMETRE_POST = 0.042
+POST = 0.042
 """Diameter of a kilometre board's post, m."""
+BOARD = 0.024
+"""Thickness of either half of a board, m."""
 _POST_REACH = 0.03
 """Half of what a post is given room for, m."""
 
@@ -26,6 +30,23 @@ class KilometreBoard(StandingThing):
     width: float = quantity(0.55, ge=0.1, le=2, unit="m", description="Width of the board.")
     height: float = quantity(0.26, ge=0.1, le=2, unit="m", description="Height of the board.")
     lower_edge: float = quantity(1.2, ge=0.2, le=4, unit="m", description="Lower edge above the surface.")
+
+    def twin(self) -> TwinTypes:
+        """Return its types: a marker."""
+        return TwinTypes("IfcSign.MARKER", "pole.signalPost", reference=self.text)
+
+    def signals(self) -> dict[str, Signal]:
+        """Return its kilometre."""
+        return {"face": Signal("kilometreBoard", text=self.text)}
+
+    def bodies(self, place: Place) -> list[Body]:
+        """Return the board, and its post up into it."""
+        middle = self.lower_edge + self.height / 2.0
+        outline = face_outline("rectangle", self.width, self.height) + (0.0, middle)
+        return [
+            Body(plate(outline, -BOARD, BOARD), "sheeting_blue", "face"),
+            Body(post(POST, -BURIED, middle), "galvanised_steel"),
+        ]
 
     def footprint(self) -> Iterator[Block]:
         """Yield the boxes of its post and of the board."""

@@ -3,24 +3,49 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Annotated, ClassVar, Literal
 
+import numpy as np
 from pydantic import Field
 
+from ...base.arrays import Float
 from ...base.schema import quantity
-from .thing import Block, StandingThing
+from .body import Body, Place, Point2, Point3, box, moved, prism
+from .thing import Block, StandingThing, TwinTypes
 
-BRIDGE_DECK = ((0.18, 0.6), (0.24, 0.0), (0.52, 0.0), (0.6, 0.62), (0.985, 0.78), (0.985, 1.0))
+DECK = ((0.18, 0.6), (0.24, 0.0), (0.52, 0.0), (0.6, 0.62), (0.985, 0.78), (0.985, 1.0))
 """Half of a deck's section, from the middle of the lower side to the top: shares of half its width, of its height."""
-BRIDGE_SEAT = 0.9
+WEB = (DECK[1][0], DECK[2][0])
+"""Where the webs begin and end beside the middle, as shares of half the deck's width."""
+PAVEMENT = 0.05
+"""Thickness of the asphalt on a bridge, m; the deck reaches into it by half of it."""
+EDGE, CURB, NOSE, HANG = 0.1, 0.15, 0.3, (0.6, 0.45)
+"""Edge beams: width as a share of the deck's; height above the pavement and thickness of the outer face (m); how far
+this hangs below the pavement, as a share of the deck's height and at most (m)."""
+LOWEST_PARAPET = 0.5
+"""Bridges with lower parapets have no railings, m."""
+RAILING_INSIDE, RAILING_SPACING = 0.2, 2.0
+"""From a railing's axis to the deck's edge, and between its posts at most, m."""
+RAILING_POST, RAILING_BAR, RAILING_RAIL, RAILING_HAND, RAILING_LOWER = 0.06, 0.016, 0.04, (0.09, 0.06), 0.1
+"""Thickness of a railing's posts, bars and rails, its handrail's width and height, its lower rail's height, m."""
+WALL, WALL_INSIDE = 0.5, 0.06
+"""Thickness of wing walls, and from the deck's edge to them, m."""
+WINGS = (3.0, 12.0)
+"""Shortest and longest wing walls, m."""
+BACK_WALL = (0.04, 0.01)
+"""From the seat to the back wall, and from this to the abutment's back, m."""
+PIER_ROUND = 8
+"""Points of a pier's rounded end."""
+SEAT = 0.9
 """Depth of an abutment's bearing seat, m."""
-BRIDGE_ABUTMENT = 1.5
+ABUTMENT = 1.5
 """Depth of an abutment, m."""
-BRIDGE_BEARING = 0.1
+BEARING = 0.1
 """Height of a bridge's bearings, m."""
-BRIDGE_PIER_LENGTH = 0.5
+PIER_LENGTH = 0.5
 """Length of a pier as a share of the deck's width."""
-BRIDGE_BURIED = 0.8
+BURIED = 0.8
 """Depth of a bridge's walls and piers below the ground, m."""
 _FAR = 1000.0
 """How far abutments reach, m: their embankments go on to the ground."""
@@ -50,6 +75,111 @@ class Overpass(StandingThing):
     )
     pier_width: float = quantity(1.0, ge=0.2, le=4, unit="m", description="Width of a pier across the road.")
 
+    @property
+    def turn(self) -> float:
+        """Return 0: a skewed bridge is sheared."""
+        return 0.0
+
+    def twin(self) -> TwinTypes:
+        """Return its types: a bridge."""
+        return TwinTypes("IfcBridge.NOTDEFINED", "building.overpass", "Bridge", "BridgeConstructiveElement")
+
+    def bodies(self, place: Place) -> list[Body]:
+        """Return deck, edge beams, railings, piers and abutments; its embankments are ground.
+
+        The deck is level, its underside `clearance` above the pavement's highest point below it. A skewed bridge is
+        sheared: its faces stay parallel to the road, as its piers do.
+        """
+        shear, half = float(np.tan(np.deg2rad(self.rotation_deg))), self.width / 2.0
+        faces = self.offset - self.left_abutment, self.offset - self.right_abutment
+        low = place.pavement(faces, (-half, half), shear) + self.clearance
+        made, ends = [], []
+        for number, (side, x) in enumerate(zip((-1.0, 1.0), faces, strict=True), 1):
+            ground = float(np.min(place.ground([x, x], np.array([half, -half]) + x * shear))) - low
+            wing = float(np.clip((self.deck_thickness - ground) * place.slope, *WINGS))
+            ends.append(x + side * wing)
+            for body in self._abutment(f"abutment-{number}", ground - BURIED, wing):
+                made.append(replace(body, sections=moved(body.sections, (x, 0.0, 0.0), (side, 1.0, 1.0))))
+        made += self._deck((faces[0] - SEAT, faces[1] + SEAT), (ends[0], ends[1]))
+        skewed = [replace(body, sections=_skewed(body.sections, shear, low)) for body in made]
+        for number, offset in enumerate(self.pier_offsets, 1):
+            x = self.offset - offset
+            foot = float(place.ground([x], [x * shear])[0]) - BURIED - low
+            for body in self._pier(f"pier-{number}", foot):
+                skewed.append(replace(body, sections=moved(body.sections, (x, x * shear, low))))
+        return skewed
+
+    def _deck(self, ends: Point2, reach: Point2) -> list[Body]:
+        """Return the deck between two x, and the pavement, edge beams and railings on it between two others."""
+        width, height, (start, end) = self.width, self.deck_thickness, reach
+        half = np.array(DECK) * (width / 2.0, height - PAVEMENT / 2.0)
+        shapes = [_across(np.concatenate([half, half[::-1] * (-1.0, 1.0)]), ends)]
+        size = (end - start, width * (1.0 - 1.96 * EDGE), PAVEMENT)
+        shapes.append(box(size, ((start + end) / 2.0, 0.0, height - PAVEMENT / 2.0)))
+        materials = ("bridge_concrete", "asphalt")
+        made = [Body(shape, m, "deck", "IfcSlab.USERDEFINED") for shape, m in zip(shapes, materials, strict=True)]
+        inner, nose = width / 2.0 - width * EDGE, width / 2.0 - NOSE
+        top, seat, hang = height + CURB, height - PAVEMENT, min(height * HANG[0], HANG[1])
+        below = height - hang
+        beam = [(width / 2.0, below), (width / 2.0, top), (inner, top), (inner, seat), (nose, seat), (nose, below)]
+        for number, side in enumerate((-1.0, 1.0), 1):
+            outline = np.array(beam) * (side, 1.0)
+            made.append(Body(_across(outline, reach), "barrier_concrete", f"edge-beam-{number}", "IfcBeam.EDGEBEAM"))
+            if self.parapet_height > LOWEST_PARAPET:
+                place = (start, side * (width / 2.0 - RAILING_INSIDE), top)
+                made += self._railing(f"parapet-{number}", place, end - start)
+        return made
+
+    def _railing(self, name: str, place: Point3, length: float) -> list[Body]:
+        """Return a railing along x from a place on."""
+        height, middle, (wide, high) = self.parapet_height - CURB, length / 2.0, RAILING_HAND
+        upper, rail = height - high - RAILING_LOWER, (length, RAILING_RAIL, RAILING_RAIL)
+        shapes = [
+            box((length, wide, high), (middle, 0.0, height - high / 2.0)),
+            box(rail, (middle, 0.0, RAILING_LOWER)),
+            box(rail, (middle, 0.0, upper)),
+        ]
+        bays, tall = int(np.ceil(length / RAILING_SPACING)), height - high / 2.0
+        along = RAILING_POST / 2.0 + np.arange(bays + 1) * (length - RAILING_POST) / bays
+        shapes += [box((RAILING_POST, RAILING_POST, tall), (x, 0.0, tall / 2.0)) for x in along.tolist()]
+        bars = box((length, 1.4 * RAILING_BAR, upper - RAILING_LOWER), (middle, 0.0, (upper + RAILING_LOWER) / 2.0))
+        steel = [Body(moved(shape, place), "galvanised_steel", name, "IfcRailing.BALUSTRADE") for shape in shapes]
+        return [*steel, Body(moved(bars, place), "galvanised_steel", name, detail=RAILING_BAR)]
+
+    def _abutment(self, name: str, foot: float, wing: float) -> list[Body]:
+        """Return an abutment whose face looks to -x and stands on x = 0; the deck's underside is z = 0."""
+        wide, height, (behind, before) = self.width - 2.0 * WALL_INSIDE, self.deck_thickness, BACK_WALL
+        end = ABUTMENT - before
+
+        def wall(along: Point2, top: float, thick: float, y: float = 0.0) -> Float:
+            size = (along[1] - along[0], thick, top - foot)
+            return box(size, (sum(along) / 2.0, y, (top + foot) / 2.0))
+
+        shapes = [wall((0.0, ABUTMENT), -BEARING, wide)]
+        shapes.append(wall((SEAT + behind, end), height - PAVEMENT * 0.5, wide - 0.02))
+        for side in (1.0, -1.0):
+            y = (wide - WALL) / 2.0 * side
+            shapes.append(wall((ABUTMENT - 0.02, wing), height - PAVEMENT * 0.6, WALL, y))
+        web = self.width * sum(WEB) / 4.0
+        pads = box((0.5, 2.0 * web + 0.6, BEARING + 0.02), (SEAT / 2.0, 0.0, -BEARING / 2.0))
+        made = [Body(shape, "bridge_concrete", name, "IfcWall.RETAININGWALL") for shape in shapes]
+        return [*made, Body(pads, "galvanised_steel", name, detail=BEARING)]
+
+    def _pier(self, name: str, foot: float) -> list[Body]:
+        """Return a pier along y with rounded ends; the deck's underside is z = 0."""
+        wide = self.pier_width
+        straight = max((self.width * PIER_LENGTH - wide) / 2.0, 0.01 * wide)
+        turn = np.pi * np.arange(PIER_ROUND) / (PIER_ROUND - 1.0)
+        end = wide / 2.0 * np.column_stack([np.cos(turn), np.sin(turn)]) + (0.0, straight)
+        body = prism(np.concatenate([end, -end]), foot, -BEARING)
+        beside = min(self.width * sum(WEB) / 4.0, straight)
+        size = (min(wide * 0.8, 0.6), 2.0 * beside + 0.5, BEARING + 0.02)
+        pads = box(size, (0.0, 0.0, -BEARING / 2.0))
+        return [
+            Body(body, "bridge_concrete", name, "IfcColumn.PIERSTEM"),
+            Body(pads, "galvanised_steel", name, detail=BEARING),
+        ]
+
     def footprint(self) -> Iterator[Block]:
         """Yield the boxes of its piers, its deck, and what lies behind its abutments."""
         start, end, half = self.station - self.width / 2.0, self.station + self.width / 2.0, self.pier_width / 2.0
@@ -59,3 +189,13 @@ class Overpass(StandingThing):
         yield Block("beam", start, end, right, left, self.clearance, top)
         yield Block("wall", start, end, left, _FAR, 0.0, top)
         yield Block("wall", start, end, -_FAR, right, 0.0, top)
+
+
+def _across(outline: Float, ends: Point2) -> Float:
+    """Return the body over an outline (y, z) between two x."""
+    return np.stack([np.column_stack([np.full(len(outline), x), outline]) for x in ends])
+
+
+def _skewed(sections: Float, shear: float, low: float) -> Float:
+    """Return sections moved along y by their x times a shear, and up by a height (m)."""
+    return sections + sections[..., :1] * np.array([0.0, shear, 0.0]) + (0.0, 0.0, low)

@@ -5,10 +5,37 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import ClassVar, Literal
 
+import numpy as np
 from pydantic import Field
 
+from ...base.arrays import Float
 from ...base.schema import quantity
-from .thing import Block, StandingThing
+from .body import BURIED, Body, Place, box, circle, moved, post, prism, tilted
+from .thing import Block, StandingThing, TwinTypes
+
+MAST_TAPER, MAST_SIDES = 0.45, 16
+"""Diameter of a mast at the top as a share of that at the foot, and its corners."""
+ARM_RADIUS, SHORTEST_ARM = 0.03, 0.05
+"""Radius of an arm, and length from which there is one, m."""
+ARM_RISE, ARM_POINTS, ARM_SIDES = 0.12, 9, 8
+"""Rise of an arm (m per m), the points of its quarter of an ellipse, and its corners."""
+LUMINAIRE = (
+    (0.06, -0.04), (0.06, 0.04), (-0.12, 0.13), (-0.58, 0.13), (-0.66, 0.08), (-0.66, -0.08), (-0.58, -0.13),
+    (-0.12, -0.13),
+)  # fmt: skip
+"""A luminaire from above: x from its mount on, y, m."""
+LUMINAIRE_DEPTH = 0.09
+"""Thickness of a luminaire, m."""
+CAMERA, CAMERA_TILT = (0.13, 0.4, 0.12), 8.0
+"""A camera: across, along, height (m); it looks down by so many degrees."""
+CAMERA_MOUNT, CAMERA_BELOW = 0.35, 0.3
+"""How far an arm that carries cameras is below the top, and the pair of cameras below the arm, m."""
+CAMERA_SHIELD = (0.03, 0.08, 0.008)
+"""A sunshield: wider and longer than the camera, thickness, m."""
+CAMERA_DOME = (0.09, 0.14, 0.17, 0.18)
+"""A dome camera: radius; its cap's height; how far the cap's lower edge and the ball's middle are below the arm, m."""
+POLE_CABINET = (0.3, 0.22, 0.45, 2.2)
+"""A cabinet on a mast: width, depth, height, the height of its middle, m."""
 
 
 class Pole(StandingThing):
@@ -23,6 +50,67 @@ class Pole(StandingThing):
     diameter: float = quantity(0.2, ge=0.05, le=0.6, unit="m", description="Diameter at its foot.")
     arm_length: float = quantity(1.5, ge=0, le=6, unit="m", description="Length of its arm; 0 for none.")
 
+    def twin(self) -> TwinTypes:
+        """Return its types: a mast and what it carries."""
+        return TwinTypes("IfcElementAssembly.MAST.FACTORY", f"pole.{self.kind}", kind=self.kind)
+
+    def bodies(self, place: Place) -> list[Body]:
+        """Return the mast, its arm, and a street light or cameras."""
+        lighting = self.kind == "lighting"
+        mount = self.height - (LUMINAIRE_DEPTH / 2.0 if lighting else CAMERA_MOUNT)
+        rise = self.arm_length * ARM_RISE
+        top = mount - rise if lighting else self.height
+        circles = circle(self.diameter, MAST_SIDES), circle(self.diameter * MAST_TAPER, MAST_SIDES)
+        rings = ((circles[0], -BURIED), (circles[0], 0.0), (circles[1], top))
+        shapes = [np.stack([np.column_stack([ring, np.full(MAST_SIDES, z)]) for ring, z in rings])]
+        if self.arm_length > SHORTEST_ARM:
+            shapes.append(_arm(self.arm_length, mount, rise))
+        door = box((self.diameter * 0.45, 0.02, 0.35), (0.0, self.diameter * -0.465, 0.8))
+        mast = [Body(shape, "galvanised_steel", "column", "IfcColumn.COLUMN") for shape in shapes]
+        door_body = Body(door, "galvanised_steel", "door", detail=0.02)
+        return [*mast, door_body, *(self._luminaire() if lighting else self._cameras(mount))]
+
+    def _luminaire(self) -> list[Body]:
+        low, high = self.height - LUMINAIRE_DEPTH, self.height
+        outline = np.array(LUMINAIRE) - (self.arm_length, 0.0)
+        glass = box((0.4, 0.2, 0.02), (-self.arm_length - 0.36, 0.0, low))
+        return [
+            Body(prism(outline, low, high), "cabinet_grey", "light", "IfcLightFixture.POINTSOURCE"),
+            Body(glass, "lamp_glass", "glass", detail=0.01),
+        ]
+
+    def _cameras(self, mount: float) -> list[Body]:
+        """Return a camera along the road either way, a dome camera at the end of the arm, and the mast's cabinet."""
+        across, along, high = CAMERA
+        wider, longer, thick = CAMERA_SHIELD
+        away, level = (self.diameter + along) / 2.0, mount - CAMERA_BELOW
+        wide, deep, tall, middle = POLE_CABINET
+        shapes, small = [box((wide, deep, tall), (0.0, self.diameter / 2.0 + 0.1, middle))], []
+        for side in (1.0, -1.0):
+            place, facing = (0.0, -side * away, level), (side, side, 1.0)
+            shapes.append(moved(tilted(box(CAMERA), np.deg2rad(CAMERA_TILT)), place, facing))
+            shield = box((across + wider, along + longer, thick), (0.0, -0.03, high / 2.0 + 0.012))
+            lens = box((0.09, 0.02, 0.09), (0.0, -along / 2.0, 0.0))
+            small += [moved(tilted(shape, np.deg2rad(CAMERA_TILT)), place, facing) for shape in (shield, lens)]
+        if self.arm_length > SHORTEST_ARM:
+            radius, cap, low, ball = CAMERA_DOME
+            shapes.append(post(2.0 * radius, mount - low, mount - low + cap, -self.arm_length))
+            small.append(box((1.8 * radius, 1.8 * radius, 1.8 * radius), (-self.arm_length, 0.0, mount - ball)))
+        head = [Body(shape, "cabinet_grey", "camera", "IfcAudioVisualAppliance.CAMERA") for shape in shapes]
+        return [*head, *(Body(shape, "cabinet_grey", "fittings", detail=0.09) for shape in small)]
+
     def footprint(self) -> Iterator[Block]:
         """Yield the box of its mast."""
         yield self.upright(self.diameter / 2.0, self.height)
+
+
+def _arm(length: float, mount: float, rise: float) -> Float:
+    """Return a quarter of an ellipse from the mast's axis to the left, and up to the height of its end."""
+    turn = np.pi / 2.0 * np.arange(ARM_POINTS) / (ARM_POINTS - 1.0)
+    line = np.column_stack([length * (np.cos(turn) - 1.0), np.zeros(ARM_POINTS), mount - rise * (1.0 - np.sin(turn))])
+    steps = np.diff(line, axis=0) / np.linalg.norm(np.diff(line, axis=0), axis=1)[:, None]
+    tangent = np.concatenate([steps[:1], steps[:-1] + steps[1:], steps[-1:]])
+    tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+    up = np.column_stack([-tangent[:, 2], tangent[:, 1], tangent[:, 0]])
+    ring = circle(2.0 * ARM_RADIUS, ARM_SIDES)
+    return line[:, None] + ring[None, :, :1] * up[:, None] + ring[None, :, 1:] * np.array([0.0, 1.0, 0.0])

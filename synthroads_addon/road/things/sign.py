@@ -5,24 +5,33 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import ClassVar, Literal
 
+import numpy as np
 from pydantic import Field
 
 from ...base.schema import quantity
-from .thing import Block, StandingThing
+from .body import BURIED, Body, Place, box, plate, post, prism
+from .sign_outline import face_outline
+from .thing import Block, Signal, StandingThing, TwinTypes
 
-_OCTAGON = 0.20710678118654752
-SIGN_OUTLINES = {
-    "rectangle": ((0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5)),
-    "triangle": ((0.0, 0.5), (-0.5, -0.5), (0.5, -0.5)),
-    "octagon": (
-        (0.5, _OCTAGON), (_OCTAGON, 0.5), (-_OCTAGON, 0.5), (-0.5, _OCTAGON),
-        (-0.5, -_OCTAGON), (-_OCTAGON, -0.5), (_OCTAGON, -0.5), (0.5, -_OCTAGON),
-    ),
-    "arrow": ((0.5, 0.0), (0.3, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.3, -0.5)),
-}  # fmt: skip
-"""Corners of a sign's face, anticlockwise, in shares of its width and height around the middle; others are round."""
-SIGN_RAIL = 0.04
-"""Depth of the rails between a sign's face and its posts, m."""
+PLATE, RAIL = 0.003, 0.04
+"""Thickness of a sign's face, and depth of the rails between it and its posts, m."""
+BEHIND = {
+    "round": (0.9, 1.0, 0.5),
+    "triangle": (0.6, 0.7, 0.4),
+    "rectangle": (0.97, 1.0, 0.94),
+    "octagon": (0.93, 1.0, 0.6),
+    "arrow": (0.9, 1.0, 0.7),
+}
+"""What is behind a face of a shape, so that nothing looks out: height of the posts' top as a share of the face's, part
+of the height that rails are spread over, and the rails' length as a share of the width."""
+CLAMP = 0.006
+"""How far the clamps of the rails stand out of the posts, m."""
+LATTICE_CHORD = 0.045
+"""Thickness of a lattice post's chords, m."""
+_LARGE, _LARGE_POST, _MOST_LATTICES = 8.0, 0.15, 2
+"""Area of a board from which it stands on lattice posts (m2), the least diameter of these (m), their number at most."""
+_SPEED_LIMIT = "274"
+"""Number of the sign whose subtype is a speed, km/h."""
 
 
 class TrafficSign(StandingThing):
@@ -42,6 +51,56 @@ class TrafficSign(StandingThing):
     lower_edge: float = quantity(2.0, ge=0.3, le=8, unit="m", description="Lower edge of the face above the surface.")
     posts: int = quantity(1, ge=1, le=4, unit="1", description="Number of posts.")
     post_diameter: float = quantity(0.076, ge=0.03, le=0.4, unit="m", description="Diameter of a post.")
+
+    @property
+    def on_lattices(self) -> bool:
+        """Return whether its posts are lattices instead of tubes."""
+        large = self.width * self.height >= _LARGE
+        return large and self.post_diameter >= _LARGE_POST and self.posts <= _MOST_LATTICES
+
+    def twin(self) -> TwinTypes:
+        """Return its types: a sign."""
+        return TwinTypes("IfcSign.PICTORAL", "pole.signalPost", reference=self.code)
+
+    def signals(self) -> dict[str, Signal]:
+        """Return what its face tells."""
+        kind, _, subtype = self.code.partition("-")
+        speed = float(subtype) if kind == _SPEED_LIMIT and subtype.isdigit() else None
+        return {"face": Signal(kind, subtype or "-1", speed=speed, text="\n".join(self.text))}
+
+    def bodies(self, place: Place) -> list[Body]:
+        """Return the face, the posts, each from the ground below it, and the rails and clamps between them."""
+        share, spread, long = BEHIND[self.shape]
+        half, top = self.post_diameter / 2.0, self.lower_edge + self.height * share
+        outline = face_outline(self.shape, self.width, self.height) + (0.0, self.lower_edge + self.height / 2.0)
+        face = plate(outline, -(half + RAIL + PLATE), -(half + RAIL))
+        across = ((np.arange(self.posts) + 0.5) / self.posts - 0.5) * self.width
+        feet = place.ground(across, np.zeros(self.posts)) + self.elevation - BURIED
+        posts = [
+            body
+            for x, foot in zip(across.tolist(), feet.tolist(), strict=True)
+            for body in self._post(x, foot, max(top, foot + 0.1))
+        ]
+        reach = max(self.width * long / 2.0, across[-1] + half + CLAMP)
+        size = (2.0 * reach, 2.0 * half + RAIL + CLAMP, self.height * spread)
+        middle = (0.0, (CLAMP - RAIL) / 2.0, self.lower_edge + self.height * spread / 2.0)
+        return [
+            Body(face, "board_back", "face"),
+            *posts,
+            Body(box(size, middle), "board_back", "rails", detail=RAIL),
+        ]
+
+    def _post(self, x: float, low: float, high: float) -> list[Body]:
+        """Return a tube, or the three chords of a lattice and its diagonals."""
+        wide, steel = self.post_diameter, "galvanised_steel"
+        if not self.on_lattices:
+            return [Body(post(wide, low, high, x), steel)]
+        turn = np.pi / 2.0 + 2.0 * np.pi * np.arange(3) / 3.0
+        places = (wide - LATTICE_CHORD) / 2.0 * np.column_stack([np.cos(turn), np.sin(turn)]) + (x, 0.0)
+        square = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]) * LATTICE_CHORD
+        diagonals = box((wide, wide, high - low + LATTICE_CHORD), (x, 0.0, (high + low) / 2.0))
+        chords = [Body(prism(square + place, low, high), steel) for place in places]
+        return [*chords, Body(diagonals, steel, "diagonals", detail=LATTICE_CHORD)]
 
     def footprint(self) -> Iterator[Block]:
         """Yield the boxes of its posts, then that of its face."""

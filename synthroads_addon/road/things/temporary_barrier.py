@@ -6,12 +6,13 @@ from collections.abc import Iterator
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import Float
 from ...base.schema import quantity
-from .thing import Block, LengthwiseThing
+from .body import Body, Course, box
+from .thing import Block, LengthwiseThing, TwinTypes
 
-TEMPORARY_FLANKS = {
+FLANKS = {
     "steel": (
         (1.0, -0.02), (1.0, 0.05), (0.5, 0.17), (0.3, 0.3), (0.3, 0.62), (0.5, 0.72), (0.5, 0.92), (0.36, 1.0),
     ),
@@ -20,8 +21,11 @@ TEMPORARY_FLANKS = {
     ),
 }  # fmt: skip
 """One flank of a movable barrier's element, as those of concrete barriers; a little sunk."""
-TEMPORARY_GAP = 0.03
+GAP = 0.03
 """Gap between two elements of a movable barrier, m."""
+REFLECTOR = (0.12, 0.02, 0.06)
+"""A reflector on an element of steel: along it, across, height, m."""
+_SHORTEST = 0.05  # m
 LONGEST_PLASTIC = 2.5
 """Elements up to this length (m) are of plastic, by turns red and white; longer ones are of steel."""
 
@@ -37,10 +41,54 @@ class TemporaryBarrier(LengthwiseThing):
     base_width: float = quantity(0.4, ge=0.1, le=1.0, unit="m", description="Width of its foot.")
     segment_length: float = quantity(4.0, ge=1, le=12, unit="m", description="Length of one element.")
 
-    def offset_at(self, station: NDArray[np.float64]) -> NDArray[np.float64]:
+    def offset_at(self, station: Float) -> Float:
         """Return the offsets of its axis at stations of any shape, m."""
         share = (station - self.start_station) / max(self.end_station - self.start_station, 1e-3)
         return self.offset + (self.end_offset - self.offset) * share
+
+    @property
+    def plastic(self) -> bool:
+        """Return whether its elements are of plastic, else of steel."""
+        return self.segment_length <= LONGEST_PLASTIC
+
+    def twin(self) -> TwinTypes:
+        """Return its types: a guardrail that is moved."""
+        return TwinTypes("IfcRailing.GUARDRAIL", "barrier.temporaryBarrier")
+
+    def reach(self) -> tuple[float, float]:
+        """Return half its foot's width, m."""
+        return self.base_width / 2.0, self.base_width / 2.0
+
+    def bodies(self, course: Course) -> list[Body]:
+        """Return its elements, each straight from foot to foot, and the reflectors on those of steel."""
+        if self.end_on(course.length) is None:
+            return []
+        gap = GAP / 2.0
+        station = np.clip(self.element_ends(self.segment_length) + (gap, -gap), 0.0, course.length)
+        number = np.flatnonzero(station[:, 1] - station[:, 0] >= _SHORTEST)
+        ends = station[number].ravel()
+        feet = course.feet(ends, self.offset_at(ends)).reshape(-1, 2, 3)
+        along = (feet[:, 1] - feet[:, 0]) / np.linalg.norm(feet[:, 1] - feet[:, 0], axis=1)[:, None]
+        left = np.stack([-along[:, 1], along[:, 0], np.zeros(len(along))], axis=1)
+        left /= np.linalg.norm(left, axis=1)[:, None]
+        up = np.cross(along, left)
+        flank = np.array(FLANKS["plastic" if self.plastic else "steel"]) * (
+            self.base_width / 2.0,
+            self.height,
+        )
+        outline = np.concatenate([flank, flank[::-1] * (-1.0, 1.0)])
+        corners = outline[:, :1] * left[:, None, None] + outline[:, 1:] * up[:, None, None]
+        colours = ("plastic_red", "plastic_white") if self.plastic else ("galvanised_steel", "galvanised_steel")
+        shapes = feet[:, :, None] + corners
+        made = [Body(shape, colours[i % 2]) for i, shape in zip(number.tolist(), shapes, strict=True)]
+        return made if self.plastic else [*made, *self._reflectors(feet.mean(axis=1), np.stack([along, left, up], 1))]
+
+    def _reflectors(self, middle: Float, axes: Float) -> list[Body]:
+        """Return the reflectors on either flank of elements around middles (E, 3), whose axes (E, 3, 3) are rows."""
+        beside = self.base_width / 2.0 * FLANKS["steel"][5][0] + REFLECTOR[1] / 4.0
+        shapes = [box(REFLECTOR, (0.0, side * beside, self.height * 0.82)) for side in (1.0, -1.0)]
+        pairs = ((shape, place, frame) for shape in shapes for place, frame in zip(middle, axes, strict=True))
+        return [Body(place + shape @ frame, "reflector", detail=REFLECTOR[1]) for shape, place, frame in pairs]
 
     def footprint(self) -> Iterator[Block]:
         """Yield nothing: it stands on the pavement and runs obliquely."""

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from ...base.arrays import Float
 from ..objects import LineObject, PointObject, RoadObject
+from .body import Body, Course, Place
 
 _FACE_REACH = 0.03
 """Half the depth that a sign's or a board's face is given room for, m."""
+_SHORTEST, _SHORTEST_RAMP = 0.01, 1e-3
+"""Length from which there is something along the road, and from which its ends are ramped, m."""
 SHORTEST_ELEMENT = 0.1
 """A rest of this share of an element (of a bay of a noise barrier) makes the last one longer instead of one more."""
 
@@ -34,6 +39,47 @@ class Block(NamedTuple):
     top: float
 
 
+class TwinTypes(NamedTuple):
+    """What a thing is in the formats of the geometric-semantic model.
+
+    Attributes:
+        ifc: entity, predefined type, and of an assembly where it is put together, with dots between them.
+        opendrive: type and subtype of the object, with a dot between them.
+        cityjson: type of the city object.
+        cityjson_part: type of the city objects that its parts are; empty where it is one body.
+        kind: its object type in IFC; its class's name if empty.
+        reference: number or text that says which one of its kind it is.
+    """
+
+    ifc: str = "IfcBuildingElementProxy.ELEMENT"
+    opendrive: str = "obstacle.none"
+    cityjson: str = "CityFurniture"
+    cityjson_part: str = ""
+    kind: str = ""
+    reference: str = ""
+
+
+class Signal(NamedTuple):
+    """What a face tells drivers, in OpenDRIVE's words.
+
+    Attributes:
+        type, subtype: numbers in the country's catalogue of signs.
+        country: two letters, or OpenDRIVE.
+        speed: a limit's speed, km/h.
+        text: what is written on it.
+        dynamic: whether it changes.
+        facing: 1 if it faces the traffic that the thing faces, -1 if the opposite one.
+    """
+
+    type: str
+    subtype: str = "-1"
+    country: str = "DE"
+    speed: float | None = None
+    text: str = ""
+    dynamic: bool = False
+    facing: float = 1.0
+
+
 class Thing(RoadObject):
     """Base of everything that stands on and beside a road.
 
@@ -45,13 +91,40 @@ class Thing(RoadObject):
     order: ClassVar[int] = 1000
     obstacle: ClassVar[str] = ""
 
+    @property
+    def semantic_class(self) -> str:
+        """Return the class of its points."""
+        return self.points_class
+
     def footprint(self) -> Iterator[Block]:
         """Yield the boxes in which nothing else may stand."""
         raise NotImplementedError
 
+    def twin(self) -> TwinTypes:
+        """Return its types in the formats of the geometric-semantic model."""
+        return TwinTypes()
+
 
 class StandingThing(Thing, PointObject):
     """Base of what stands at one place."""
+
+    def bodies(self, place: Place) -> list[Body]:
+        """Return its bodies in its frame; none if its shape isn't known here."""
+        raise NotImplementedError
+
+    def signals(self) -> Mapping[str, Signal]:
+        """Return what those of its parts that are faces for drivers tell."""
+        return {}
+
+    @property
+    def turn(self) -> float:
+        """Return the turn of its frame about the vertical, rad; 0 where it faces traffic with the stations."""
+        return math.radians(self.rotation_deg)
+
+    @property
+    def foot_offset(self) -> float:
+        """Return the offset at which it has its foot, m."""
+        return self.offset
 
     def upright(self, half: float, top: float) -> Block:
         """Return what stands upright on its foot, half (m) its half width both ways."""
@@ -70,7 +143,39 @@ class StandingThing(Thing, PointObject):
 class LengthwiseThing(Thing, LineObject):
     """Base of what runs along the road."""
 
+    def bodies(self, course: Course) -> list[Body]:
+        """Return its bodies on the road."""
+        raise NotImplementedError
+
+    def reach(self) -> tuple[float, float]:
+        """Return how far it reaches to the right and to the left of its axis, m."""
+        raise NotImplementedError
+
     def strip(self, right: float, left: float, height: float) -> Block:
         """Return what is as high (m) all along, and reaches so far (m) to the right and to the left of its axis."""
         start, end = sorted((self.start_station, self.end_station))
         return Block("barrier", start, end, self.offset - right, self.offset + left, 0.0, height)
+
+    def end_on(self, length: float) -> float | None:
+        """Return the station of its end on a road of a length (m); None if nothing of it is on the road."""
+        end = min(self.end_station, length)
+        return end if end - self.start_station >= _SHORTEST else None
+
+    def ramp_length(self, end: float) -> float:
+        """Return over which length (m) it is ramped at either end if it ends at a station (m); 0 if it isn't."""
+        ramp = min(float(getattr(self, "terminal_length", 0.0)), (end - self.start_station) / 2.0)
+        return ramp if ramp > _SHORTEST_RAMP else 0.0
+
+    def height_share(self, end: float, station: Float) -> Float:
+        """Return the share (N,) of its height that it has at stations (N,) if it ends at a station (m)."""
+        ramp = self.ramp_length(end)
+        if not ramp:
+            return np.ones(station.shape)
+        return np.clip(np.minimum(station - self.start_station, end - station) / ramp, 0.0, 1.0)
+
+    def element_ends(self, length: float) -> Float:
+        """Return the stations (E, 2) at which its elements of a length (m) begin and end; the last takes the rest."""
+        span = self.end_station - self.start_station
+        count = max(1, int(np.ceil(span / length - SHORTEST_ELEMENT)))
+        start = self.start_station + np.arange(count) * length
+        return np.column_stack([start, np.append(start[1:], self.end_station)])

@@ -2,13 +2,32 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import ClassVar, Literal
 
-from ...base.schema import quantity
-from .thing import Block, StandingThing
+import numpy as np
 
-TRAFFIC_LIGHT_POST = 0.089
+from ...base.arrays import Float
+from ...base.schema import quantity
+from .body import BURIED, Body, Place, box, moved, post
+from .thing import Block, Signal, StandingThing, TwinTypes
+
+CHAMBER, BOARD = (1.3, 0.7, 1.25), 1.9
+"""A chamber of the housing (across, along, up) and the width of the board behind it, in diameters of a light."""
+MARGIN = 0.05
+"""What the board is higher than the housing above and below, m."""
+BEHIND, RIM = 0.005, 0.004
+"""From the post to the middle of the board's rim, and the rim's depth, m."""
+PANEL, EDGE = (0.008, 0.001), 0.018
+"""Depth of the board, and how far its middle is before its rim's; the width of the rim, m."""
+VISOR = (0.56, 0.004, 0.55, 0.5)
+"""A visor: radius in diameters of a light, thickness (m), reach in diameters, and how much farther per m above."""
+VISOR_TURNS = tuple(math.radians(-35.0 + 250.0 * i / 8.0) for i in range(9))
+"""Where the corners of a visor are around its light, rad."""
+JOINT = 0.02
+"""What a chamber is lower than its place, in diameters of a light."""
+POST = 0.089
 """Diameter of a traffic light's post, m."""
 
 
@@ -21,6 +40,48 @@ class TrafficLight(StandingThing):
     height: float = quantity(3.2, ge=1.5, le=8, unit="m", description="Top above the surface.")
     lights: int = quantity(3, ge=1, le=4, unit="1", description="Number of lights.")
     light_diameter: float = quantity(0.2, ge=0.1, le=0.4, unit="m", description="Diameter of a light.")
+
+    def level(self, number: int) -> float:
+        """Return the height of a light's middle above the surface, m; 0 is the uppermost."""
+        return self.height - MARGIN - (number + 0.5) * self.light_diameter * CHAMBER[2]
+
+    def twin(self) -> TwinTypes:
+        """Return its types: a signal."""
+        return TwinTypes("IfcSignal.VISUAL", "pole.signalPost")
+
+    def signals(self) -> dict[str, Signal]:
+        """Return what its lights are: OpenDRIVE's number of lights one above the other."""
+        return {"head": Signal("1000001", country="OpenDRIVE", dynamic=True)}
+
+    def bodies(self, place: Place) -> list[Body]:
+        """Return post, board, chambers and visors; the lights lie inside these."""
+        wide, rear = self.light_diameter, -POST / 2.0
+        across, along, up = (share * wide for share in CHAMBER)
+        tall = up * self.lights
+        middle = (0.0, rear - BEHIND, self.height - MARGIN - tall / 2.0)
+        shapes = [box((wide * BOARD, RIM, tall + 2.0 * MARGIN), middle)]
+        deep, before = PANEL
+        edge, panel = 2.0 * (MARGIN - EDGE), (0.0, middle[1] - before, middle[2])
+        shapes.append(box((wide * BOARD - 2.0 * EDGE, deep, tall + edge), panel))
+        front = -along + rear - 0.01
+        lamps = []
+        for number in range(self.lights):
+            level = self.level(number)
+            shapes.append(box((across, along, up - JOINT * wide), (0.0, -along / 2.0 - 0.055, level)))
+            shapes.append(moved(self._visor(), (0.0, front, level)))
+            lamps.append(box((wide, 0.12 * wide, wide), (0.0, front - 0.06 * wide, level)))
+        mast = Body(post(POST, -BURIED, self.height - 0.03), "galvanised_steel")
+        head = [Body(shape, "plastic_black", "head") for shape in shapes]
+        return [*head, mast, *(Body(lamp, "lamp_red", "lamps", detail=0.12 * wide) for lamp in lamps)]
+
+    def _visor(self) -> Float:
+        """Return a sheet bent over a light, open below, that reaches forward; the light's middle is the origin."""
+        radius, thick, reach, more = VISOR
+        turn, outer = np.array(VISOR_TURNS), radius * self.light_diameter
+        ring = np.column_stack([np.cos(turn), np.zeros(len(turn)), np.sin(turn)])
+        outline = np.concatenate([ring * outer, ring[::-1] * (outer - thick)])
+        ahead = reach * self.light_diameter + more * np.maximum(outline[:, 2], 0.0)
+        return np.stack([outline, outline - ahead[:, None] * (0.0, 1.0, 0.0)])
 
     def footprint(self) -> Iterator[Block]:
         """Yield the box of its post."""

@@ -8,16 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from ...road.geometry import RoadGeometry
-from ...road.objects import LineObject, PointObject
 from ...road.parameters import RoadParameters
-from ...road.section import Arrow
-from ...road.things.asset import Asset
-from ...road.things.overpass import Overpass
 from ..attributes import attributes_of
-from ..bodies.along import bodies_along
-from ..bodies.at import Place, bodies_at, bridge_bodies, places_of
-from ..faces import Faces
+from ..faces import Faces, loft
 from ..surfaces import road_stations
+from ..things import Frame, PlacedThing, placed_things
 from .model import CityGeometry, CityModel, CityObject, solids
 from .road import road_objects
 
@@ -45,7 +40,8 @@ def write_cityjson(parameters: RoadParameters, path: Path, tolerance: float) -> 
     model.write(path, metadata)
 
 
-_LOD = "2"
+_LOD = "3"
+"""Level of detail of furniture and structures: true shapes without fittings."""
 
 
 def furniture_objects(geometry: RoadGeometry, tolerance: float) -> Iterator[CityObject]:
@@ -55,37 +51,33 @@ def furniture_objects(geometry: RoadGeometry, tolerance: float) -> Iterator[City
         geometry: the road.
         tolerance: chord error of what runs along the road, m.
     """
-    objects = geometry.parameters.objects
-    standing = {name: item for name, item in objects.items() if isinstance(item, PointObject) and not _is_painted(item)}
-    places = dict(zip(standing, places_of(geometry, list(standing.values())), strict=True))
-    for name, item in objects.items():
-        if isinstance(item, Overpass):
-            yield from _bridge(places[name], name, item)
-        elif isinstance(item, LineObject):
-            bodies = solids(bodies_along(geometry, item, tolerance), _LOD)
-            yield CityObject(name, "CityFurniture", attributes_of(item), bodies)
-        elif isinstance(item, Asset):
-            yield CityObject(name, "CityFurniture", attributes_of(item), _point(places[name]))
-        elif name in standing and isinstance(item, PointObject):
-            bodies = solids(bodies_at(places[name], item), _LOD)
-            yield CityObject(name, "CityFurniture", attributes_of(item), bodies)
+    for placed in placed_things(geometry, tolerance):
+        types, parts = placed.thing.twin(), _faces_of_parts(placed)
+        attributes = attributes_of(placed.thing)
+        if not types.cityjson_part:
+            shapes = solids((face for faces in parts.values() for face in faces), _LOD) or _point(placed.frame)
+            yield CityObject(placed.name, types.cityjson, attributes, shapes)
+            continue
+        names = {part: f"{placed.name}/{part}" for part in parts}
+        yield CityObject(placed.name, types.cityjson, attributes, children=tuple(names.values()))
+        for part, faces in parts.items():
+            about = {"instance": placed.thing.instance, "class": placed.thing.semantic_class}
+            about |= {"function": part.rstrip("-0123456789")}
+            yield CityObject(names[part], types.cityjson_part, about, solids(faces, _LOD), parent=placed.name)
 
 
-def _is_painted(item: PointObject) -> bool:
-    return isinstance(item, Arrow)
+def _faces_of_parts(placed: PlacedThing) -> dict[str, list[Faces]]:
+    """Return the bodies of a thing by its parts, fittings left out."""
+    parts: dict[str, list[Faces]] = {}
+    for body in placed.bodies:
+        if not body.detail:
+            parts.setdefault(body.part, []).append(loft(placed.local(body)))
+    return parts
 
 
-def _point(place: Place) -> tuple[CityGeometry, ...]:
-    """Return a free asset's place: what it looks like is its library's."""
-    point = Faces(place.origin[None], np.zeros(1, np.int64), np.ones(1, np.int64))
+def _point(frame: Frame | None) -> tuple[CityGeometry, ...]:
+    """Return the place of something whose shape isn't known here."""
+    if frame is None:
+        return ()
+    point = Faces(frame.origin[None], np.zeros(1, np.int64), np.ones(1, np.int64))
     return (CityGeometry("MultiPoint", "0", (point,)),)
-
-
-def _bridge(place: Place, name: str, bridge: Overpass) -> Iterator[CityObject]:
-    """Yield a Bridge, which has no geometry itself, and its constructive elements."""
-    parts = {f"{name}/{part}": body for part, body in bridge_bodies(place, bridge).items()}
-    yield CityObject(name, "Bridge", attributes_of(bridge), children=tuple(parts))
-    for part, body in parts.items():
-        function = part.rpartition("/")[2].rstrip("-0123456789")
-        about = {"instance": bridge.instance, "class": "bridge", "function": function}
-        yield CityObject(part, "BridgeConstructiveElement", about, solids([body], _LOD), parent=name)

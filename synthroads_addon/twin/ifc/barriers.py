@@ -12,18 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...road.objects import LineObject
-from ...road.things.concrete_barrier import CONCRETE_FLANKS, CONCRETE_TIP, ConcreteBarrier
-from ...road.things.guardrail import (
-    GUARDRAIL_BEAM,
-    GUARDRAIL_LOWEST_POST,
-    GUARDRAIL_POST,
-    GUARDRAIL_POST_TOP,
-    GUARDRAIL_SPACER,
-    GUARDRAIL_TIP,
-    Guardrail,
-)
+from ...road.things import concrete_barrier as concrete_barrier_sizes
+from ...road.things import guardrail as sizes
+from ...road.things import temporary_barrier as temporary_barrier_sizes
+from ...road.things.concrete_barrier import ConcreteBarrier
+from ...road.things.guardrail import Guardrail
 from ...road.things.noise_barrier import NoiseBarrier
-from ...road.things.temporary_barrier import LONGEST_PLASTIC, TEMPORARY_FLANKS, TEMPORARY_GAP, TemporaryBarrier
+from ...road.things.temporary_barrier import TemporaryBarrier
 from ...road.things.thing import SHORTEST_ELEMENT
 from ..surfaces import height_share, left_of, ramp_length
 from .entities import Entity, Float
@@ -35,7 +30,7 @@ _WALL_BURIED = 0.4
 """Depth of a noise barrier's posts and plinth below the surface, m."""
 _CONCRETE_BURIED, _POST_BURIED = 0.1, 0.35
 """Depth of a concrete barrier and of a guardrail's posts below the surface, m."""
-_POST_REACH = GUARDRAIL_POST[0] / 2.0
+_POST_REACH = sizes.POST[0] / 2.0
 _SHEET = 0.003
 """Thickness of a guardrail's beam, m."""
 _SPACER_HALF = (0.05, 0.11)
@@ -97,10 +92,10 @@ def _guardrail(scene: Scene, item: Guardrail) -> list[_Mesh]:
     """Return beams, posts and spacers."""
     station = _rows(scene, item)
     spacer, sides = (
-        GUARDRAIL_SPACER[item.faces],
+        sizes.SPACER[item.faces],
         {"left": [1.0], "right": [-1.0], "both": [1.0, -1.0]}[item.faces],
     )
-    front = np.array(GUARDRAIL_BEAM)
+    front = np.array(sizes.BEAM)
     rear = front - (_SHEET, 0.0)
     meshes = []
     for side in sides:
@@ -108,7 +103,7 @@ def _guardrail(scene: Scene, item: Guardrail) -> list[_Mesh]:
         up, down = (rear, front) if side > 0.0 else (front, rear)
         ring = np.concatenate([up[::-1], down])
         across = side * (ring[:, 0] + spacer + _POST_REACH)
-        height = _ramped_height(item, station, GUARDRAIL_TIP)[:, None] + ring[:, 1]
+        height = _ramped_height(item, station, sizes.TIP)[:, None] + ring[:, 1]
         meshes.append(_swept(scene, item, station, across, height))
     return [*meshes, *_posts(scene, item, sides, spacer)]
 
@@ -118,12 +113,12 @@ def _posts(scene: Scene, item: Guardrail, sides: list[float], spacer: float) -> 
     low, high = ((station - item.start_station) / item.post_spacing for station in _span(scene, item))
     numbers = np.arange(np.ceil(low - 1e-4), np.floor(high + 1e-4) + 1.0)
     station = item.start_station + item.post_spacing * numbers
-    top = _ramped_height(item, station, GUARDRAIL_TIP)
-    station, top = station[top >= GUARDRAIL_LOWEST_POST], top[top >= GUARDRAIL_LOWEST_POST]
+    top = _ramped_height(item, station, sizes.TIP)
+    station, top = station[top >= sizes.LOWEST_POST], top[top >= sizes.LOWEST_POST]
     if not len(station):
         return []
-    offset, half = np.full(station.shape, item.offset), (_POST_REACH, GUARDRAIL_POST[1] / 2.0)
-    meshes = [_boxes(scene, station, offset, half, (np.full(station.shape, -_POST_BURIED), top - GUARDRAIL_POST_TOP))]
+    offset, half = np.full(station.shape, item.offset), (_POST_REACH, sizes.POST[1] / 2.0)
+    meshes = [_boxes(scene, station, offset, half, (np.full(station.shape, -_POST_BURIED), top - sizes.POST_TOP))]
     along, tall = _SPACER_HALF
     levels = (top - _BEAM_MIDDLE - tall, top - _BEAM_MIDDLE + tall)
     for side in sides:
@@ -134,18 +129,24 @@ def _posts(scene: Scene, item: Guardrail, sides: list[float], spacer: float) -> 
 
 def _concrete(scene: Scene, item: ConcreteBarrier) -> list[_Mesh]:
     station = _rows(scene, item)
-    tall = np.maximum(_ramped_height(item, station, 0.0), CONCRETE_TIP)
-    flank = np.array(CONCRETE_FLANKS[item.profile])
+    tall = np.maximum(_ramped_height(item, station, 0.0), concrete_barrier_sizes.TIP)
+    flank = np.array(concrete_barrier_sizes.FLANKS[item.profile])
     across, height = _both_flanks(flank, item.base_width / 2.0, tall, _CONCRETE_BURIED)
     return [_swept(scene, item, station, across, height)]
 
 
 def _temporary(scene: Scene, item: TemporaryBarrier) -> list[_Mesh]:
     """Return the elements of a movable barrier, each straight between its ends."""
-    flank = np.array(TEMPORARY_FLANKS["plastic" if item.segment_length <= LONGEST_PLASTIC else "steel"])
+    flank = np.array(
+        temporary_barrier_sizes.FLANKS[
+            "plastic" if item.segment_length <= temporary_barrier_sizes.LONGEST_PLASTIC else "steel"
+        ]
+    )
     meshes = []
     for start, end in _bays(scene, item, item.segment_length):
-        station = np.clip([start + TEMPORARY_GAP / 2.0, end - TEMPORARY_GAP / 2.0], *_span(scene, item))
+        station = np.clip(
+            [start + temporary_barrier_sizes.GAP / 2.0, end - temporary_barrier_sizes.GAP / 2.0], *_span(scene, item)
+        )
         if station[1] - station[0] < _SHORTEST:
             continue
         across, height = _both_flanks(flank, item.base_width / 2.0, np.full(2, item.height), 0.0)

@@ -11,14 +11,19 @@ from collections.abc import Callable
 from typing import Any
 
 from ...road.objects import PointObject
+from ...road.things import beacon as beacon_sizes
+from ...road.things import delineator as sizes
+from ...road.things import kilometre_board as kilometre_board_sizes
+from ...road.things import sign as sign_sizes
+from ...road.things import traffic_light as traffic_light_sizes
 from ...road.things.asset import Asset
-from ...road.things.beacon import BEACON_BLADE, BEACON_BLADE_BOTTOM, BEACON_FOOT, ConstructionBeacon
+from ...road.things.beacon import ConstructionBeacon
 from ...road.things.cabinet import Cabinet
-from ...road.things.delineator import DELINEATOR, Delineator
-from ...road.things.kilometre_board import KILOMETRE_POST, KilometreBoard
+from ...road.things.delineator import Delineator
+from ...road.things.kilometre_board import KilometreBoard
 from ...road.things.pole import Pole
-from ...road.things.sign import SIGN_RAIL, TrafficSign
-from ...road.things.traffic_light import TRAFFIC_LIGHT_POST, TrafficLight
+from ...road.things.sign import TrafficSign
+from ...road.things.traffic_light import TrafficLight
 from .entities import Entity
 from .scene import Scene
 from .solids import Solids
@@ -97,7 +102,7 @@ def _sign(scene: Scene, name: str, item: TrafficSign) -> None:
         height = item.lower_edge + item.height * _POST_TOP[item.shape] + BURIED
         beside = [((number + 0.5) / item.posts - 0.5) * item.width for number in range(item.posts)]
         posts = [solids.cylinder(item.post_diameter, (0.0, y, -BURIED), height) for y in beside]
-        middle = (-item.post_diameter / 2.0 - SIGN_RAIL, 0.0, item.lower_edge + item.height / 2.0)
+        middle = (-item.post_diameter / 2.0 - sign_sizes.RAIL, 0.0, item.lower_edge + item.height / 2.0)
         return [solids.plate(item.shape, item.width, item.height, middle, _FACE), *posts]
 
     sign = _stand(scene, "IfcSign", name, item, body, "PICTORAL")
@@ -107,7 +112,9 @@ def _sign(scene: Scene, name: str, item: TrafficSign) -> None:
 def _board(scene: Scene, name: str, item: KilometreBoard) -> None:
     def body(solids: Solids) -> list[Entity]:
         middle = (_FACE, 0.0, item.lower_edge + item.height / 2.0)
-        post = solids.cylinder(KILOMETRE_POST, (0.0, 0.0, -BURIED), item.lower_edge + item.height / 2.0 + BURIED)
+        post = solids.cylinder(
+            kilometre_board_sizes.POST, (0.0, 0.0, -BURIED), item.lower_edge + item.height / 2.0 + BURIED
+        )
         return [solids.plate("rectangle", item.width, item.height, middle, 2.0 * _FACE), post]
 
     sign = _stand(scene, "IfcSign", name, item, body, "MARKER")
@@ -116,7 +123,7 @@ def _board(scene: Scene, name: str, item: KilometreBoard) -> None:
 
 def _delineator(scene: Scene, name: str, item: Delineator) -> None:
     def body(solids: Solids) -> list[Entity]:
-        outline = [(along, -away) for away, along in DELINEATOR]
+        outline = [(along, -away) for away, along in sizes.OUTLINE]
         return [solids.prism(outline, (0.0, 0.0, -BURIED), item.height + BURIED)]
 
     sign = _stand(scene, "IfcSign", name, item, body, "MARKER")
@@ -125,9 +132,9 @@ def _delineator(scene: Scene, name: str, item: Delineator) -> None:
 
 def _beacon(scene: Scene, name: str, item: ConstructionBeacon) -> None:
     def body(solids: Solids) -> list[Entity]:
-        middle = (BEACON_BLADE / 2.0, 0.0, BEACON_BLADE_BOTTOM + item.height / 2.0)
-        blade = solids.plate("rectangle", item.width, item.height, middle, BEACON_BLADE)
-        wide, long, high = BEACON_FOOT
+        middle = (beacon_sizes.BLADE / 2.0, 0.0, beacon_sizes.BLADE_BOTTOM + item.height / 2.0)
+        blade = solids.plate("rectangle", item.width, item.height, middle, beacon_sizes.BLADE)
+        wide, long, high = beacon_sizes.FOOT
         tenon = solids.box((0.05, 0.07, 0.1), (0.0, 0.0, 0.07))
         return [blade, tenon, solids.box((long, wide, high), (0.0, 0.0, 0.0))]
 
@@ -150,13 +157,13 @@ def _about_sign(scene: Scene, sign: Entity, item: PointObject, material: str, re
 def _light(scene: Scene, name: str, item: TrafficLight) -> None:
     def body(solids: Solids) -> list[Entity]:
         tall = item.lights * item.light_diameter * _CHAMBER_HEIGHT + 2.0 * _LIGHT_MARGIN
-        post = solids.cylinder(TRAFFIC_LIGHT_POST, (0.0, 0.0, -BURIED), item.height + BURIED - 0.03)
-        middle = (-TRAFFIC_LIGHT_POST / 2.0, 0.0, item.height - tall / 2.0)
+        post = solids.cylinder(traffic_light_sizes.POST, (0.0, 0.0, -BURIED), item.height + BURIED - 0.03)
+        middle = (-traffic_light_sizes.POST / 2.0, 0.0, item.height - tall / 2.0)
         board = solids.plate("rectangle", _LIGHT_BOARD * item.light_diameter, tall, middle, 0.01)
         lamps = []
         for number in range(item.lights):
             level = item.height - _LIGHT_MARGIN - (number + 0.5) * item.light_diameter * _CHAMBER_HEIGHT
-            place = (-TRAFFIC_LIGHT_POST / 2.0 - 0.01, 0.0, level)
+            place = (-traffic_light_sizes.POST / 2.0 - 0.01, 0.0, level)
             lamps.append(solids.plate("round", item.light_diameter, item.light_diameter, place, 0.14))
         return [post, board, *lamps]
 

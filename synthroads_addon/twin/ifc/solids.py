@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from ...road.things.sign import SIGN_OUTLINES
+from ...road.things.sign_outline import SIGN_OUTLINES
 from .entities import Entity, IfcFile, short
 
 Point2 = tuple[float, float]

@@ -6,15 +6,10 @@ import math
 
 import numpy as np
 
-from ...road.things.gantry import GANTRY_HANGER, Gantry, GantrySign
-from ...road.things.overpass import (
-    BRIDGE_ABUTMENT,
-    BRIDGE_BEARING,
-    BRIDGE_BURIED,
-    BRIDGE_PIER_LENGTH,
-    BRIDGE_SEAT,
-    Overpass,
-)
+from ...road.things import gantry as sizes
+from ...road.things import overpass as overpass_sizes
+from ...road.things.gantry import Gantry, GantrySign
+from ...road.things.overpass import Overpass
 from .entities import Entity
 from .scene import IfcPlace, Scene
 from .solids import Point2, Solids
@@ -84,7 +79,7 @@ class _IfcGantry:
         middle = self.bottom + item.beam_height / 2.0 if small else self.low + sign.height / 2.0
         z = middle - sign.height / 2.0
         # The middle of the board, before the beam as its traffic sees it.
-        x = -sign.facing * (item.beam_depth / 2.0 + GANTRY_HANGER + sign.depth / 2.0)
+        x = -sign.facing * (item.beam_depth / 2.0 + sizes.HANGER + sign.depth / 2.0)
         solid = self.solids.box((sign.depth, sign.width, sign.height), (x, sign.offset - item.offset, z))
         entity, material, kind = _SIGNS[sign.kind]
         part = self._part(entity, f"sign-{number}", solid, material, kind)
@@ -134,11 +129,11 @@ class _Bridge:
         above, below = self._part("superstructure"), self._part("substructure")
         self._deck(above)
         for number, offset in enumerate(item.pier_offsets, 1):
-            size = (item.width * BRIDGE_PIER_LENGTH, item.pier_width)
+            size = (item.width * overpass_sizes.PIER_LENGTH, item.pier_width)
             self._support(below, "IfcColumn", f"pier-{number}", "PIERSTEM", offset - item.offset, size)
         for name, face, behind in (("left", self.left, 1.0), ("right", self.right, -1.0)):
-            size = (item.width, BRIDGE_ABUTMENT)
-            middle = face + behind * BRIDGE_ABUTMENT / 2.0
+            size = (item.width, overpass_sizes.ABUTMENT)
+            middle = face + behind * overpass_sizes.ABUTMENT / 2.0
             self._support(below, "IfcWall", f"abutment-{name}", "RETAININGWALL", middle, size)
 
     def _part(self, kind: str) -> Entity:
@@ -148,7 +143,7 @@ class _Bridge:
         )
 
     def _deck(self, part: Entity) -> None:
-        item, left, right = self.item, self.left + BRIDGE_SEAT, self.right - BRIDGE_SEAT
+        item, left, right = self.item, self.left + overpass_sizes.SEAT, self.right - overpass_sizes.SEAT
         half = item.width / 2.0
         deck = self.solids.prism(self._strip(left, right, -half, half), (0.0, 0.0, self.low), item.deck_thickness)
         self._element(part, "IfcSlab", "deck", deck, "USERDEFINED", "bridge_concrete", "BRIDGEDECK")
@@ -168,8 +163,8 @@ class _Bridge:
         x = -self.shear * y
         station, offset = self.scene.geometry.alignment.project(self.place.plan(np.array([x]), np.array([y])))
         ground, _ = self.scene.at(float(station[0]), float(offset[0]))
-        foot = ground - float(self.place.origin[2]) - BRIDGE_BURIED
-        height = max(self.low - BRIDGE_BEARING - foot, BRIDGE_BEARING)
+        foot = ground - float(self.place.origin[2]) - overpass_sizes.BURIED
+        height = max(self.low - overpass_sizes.BEARING - foot, overpass_sizes.BEARING)
         body = self.solids.box((*size, height), (x, y, foot))
         self._element(part, entity, name, body, kind, "bridge_concrete")
 

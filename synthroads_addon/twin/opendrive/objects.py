@@ -11,11 +11,12 @@ import numpy as np
 from ...road.objects import LineObject, PointObject, RoadObject
 from ...road.paint import arrow_outlines, hatching_outlines
 from ...road.section import Arrow, Hatching, LineMarking
+from ...road.things import delineator as sizes
 from ...road.things.asset import Asset
 from ...road.things.beacon import ConstructionBeacon
 from ...road.things.cabinet import Cabinet
 from ...road.things.concrete_barrier import ConcreteBarrier
-from ...road.things.delineator import DELINEATOR_REACH, Delineator
+from ...road.things.delineator import Delineator
 from ...road.things.gantry import Gantry
 from ...road.things.guardrail import Guardrail
 from ...road.things.kilometre_board import KilometreBoard
@@ -307,7 +308,7 @@ _SIZES: dict[type[RoadObject], Callable[[Any], _Size]] = {
     Delineator: lambda item: (
         "pole",
         "delineator",
-        {"length": 2.0 * DELINEATOR_REACH, "width": 2.0 * DELINEATOR_REACH, "height": item.height},
+        {"length": 2.0 * sizes.REACH, "width": 2.0 * sizes.REACH, "height": item.height},
     ),
     Pole: lambda item: ("pole", item.kind, {"radius": item.diameter / 2.0, "height": item.height}),
     Cabinet: lambda item: (

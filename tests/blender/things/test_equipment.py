@@ -9,9 +9,10 @@ import pytest
 from synthroads_addon.base.classes import class_id
 from synthroads_addon.blender.things.delineator import REFLECTOR
 from synthroads_addon.road.objects import ObjectT
+from synthroads_addon.road.things import kilometre_board as sizes
 from synthroads_addon.road.things.cabinet import Cabinet
 from synthroads_addon.road.things.delineator import Delineator
-from synthroads_addon.road.things.kilometre_board import KILOMETRE_POST, KilometreBoard
+from synthroads_addon.road.things.kilometre_board import KilometreBoard
 from synthroads_addon.road.things.pole import Pole
 from synthroads_addon.road.things.traffic_light import TrafficLight
 from tests.helpers.scenes.furnished_road import (
@@ -131,7 +132,7 @@ class TestKilometreBoard:
         assert np.count_nonzero(along < -0.99) == np.count_nonzero(along > 0.99) > 10
         assert len(along) == np.count_nonzero(np.abs(along) > 0.99)
         post = own(road, name, "galvanised_steel")
-        assert np.ptp(post[..., :2], axis=(0, 1)).max() == pytest.approx(KILOMETRE_POST, abs=MEASURE)
+        assert np.ptp(post[..., :2], axis=(0, 1)).max() == pytest.approx(sizes.POST, abs=MEASURE)
 
     def test_longer_numbers_have_more_faces(self, road: FurnishedRoad) -> None:
         before = len(road.mesh("board").triangles)

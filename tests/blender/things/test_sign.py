@@ -22,7 +22,8 @@ from synthroads_addon.blender.things.sign.pictograms import NAMES, PICTOGRAMS
 from synthroads_addon.blender.things.sign.writing import LETTERS, LINES
 from synthroads_addon.materials.table import materials
 from synthroads_addon.road import stretches
-from synthroads_addon.road.things.sign import SIGN_RAIL, TrafficSign
+from synthroads_addon.road.things import sign as sizes
+from synthroads_addon.road.things.sign import TrafficSign
 from synthroads_addon.road.things.sign_catalogue import Pictogram, sign_catalogue
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from tests.blender.nodes.test_nodes import evaluated
@@ -107,7 +108,7 @@ class TestSign:
         assert low[0] + high[0] == pytest.approx(0.0, abs=MEASURE)
         assert low[2] == pytest.approx(sign.lower_edge, abs=MEASURE)
         assert high[2] == pytest.approx(sign.lower_edge + sign.height, abs=MEASURE)
-        front = -(sign.post_diameter / 2 + SIGN_RAIL + PLATE)
+        front = -(sign.post_diameter / 2 + sizes.RAIL + PLATE)
         drawn = RAISED if sign.text or name in sign_catalogue().signs else 0.0
         assert (low[1], high[1]) == (pytest.approx(front - drawn, abs=5e-4), pytest.approx(front, abs=5e-4))
 
@@ -129,7 +130,7 @@ class TestSign:
     def test_its_plate_is_closed(self, road: FurnishedRoad, name: str) -> None:
         sign, mesh = sign_of(road, name), road.mesh(name)
         own = own_frame(road, name, corners(mesh, is_front(mesh) | of_material(mesh, "board_back")))
-        front = -(sign.post_diameter / 2 + SIGN_RAIL)
+        front = -(sign.post_diameter / 2 + sizes.RAIL)
         plate = own[(own[..., 1].max(axis=1) < front + 2e-4) & (own[..., 1].min(axis=1) > front - PLATE - RAISED / 2)]
         assert open_edges(plate) == 0
         area = np.linalg.norm(np.cross(plate[:, 1] - plate[:, 0], plate[:, 2] - plate[:, 0]), axis=1).sum() / 2

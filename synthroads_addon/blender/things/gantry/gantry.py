@@ -9,7 +9,8 @@ import bpy
 import numpy as np
 
 from ....base.classes import class_id
-from ....road.things.gantry import GANTRY_BOARD, GANTRY_DISPLAY, GANTRY_HANGER, GANTRY_OVERHANG, Gantry, GantrySign
+from ....road.things import gantry as sizes
+from ....road.things.gantry import Gantry, GantrySign
 from ...materials import material
 from ...nodes import operations as op
 from ...nodes.backbone import height_on
@@ -93,7 +94,7 @@ def gantry_group(tree: Tree) -> None:
 
 def _thickness(signs: Value) -> Value:
     """Return the depth of a sign's body (a field on the signs' points)."""
-    return op.switch(op.named_attribute(signs.tree, "display", "INT").equals(1), GANTRY_BOARD, GANTRY_DISPLAY)
+    return op.switch(op.named_attribute(signs.tree, "display", "INT").equals(1), sizes.BOARD, sizes.DISPLAY)
 
 
 def _levels(tree: Tree, gantry: _Gantry, road: Value) -> tuple[Value, Value]:
@@ -103,7 +104,7 @@ def _levels(tree: Tree, gantry: _Gantry, road: Value) -> tuple[Value, Value]:
         return tree.node("GeometryNodeAttributeStatistic", gantry.signs, attribute=value, data_type="FLOAT")["Max"]
 
     reach = op.maximum(op.unary("ABSOLUTE", gantry.left_end), op.unary("ABSOLUTE", gantry.right_end)) + 10.0
-    beyond = _thickness(gantry.signs) + GANTRY_HANGER
+    beyond = _thickness(gantry.signs) + sizes.HANGER
     front, rear = (
         gantry.beam_depth * 0.5
         + op.maximum(most(op.switch(op.named_attribute(tree, "facing") * side > 0.0, 0.0, beyond)), 0.0)
@@ -111,7 +112,7 @@ def _levels(tree: Tree, gantry: _Gantry, road: Value) -> tuple[Value, Value]:
     )
     below = highest_below(pavement_near(road, reach), -gantry.left_end, -gantry.right_end, (-front, rear))
     low = below + gantry.clearance
-    return low, low + op.maximum(most(op.named_attribute(tree, "height")) - gantry.beam_height, 0.0) * GANTRY_OVERHANG
+    return low, low + op.maximum(most(op.named_attribute(tree, "height")) - gantry.beam_height, 0.0) * sizes.OVERHANG
 
 
 def _posts(tree: Tree, gantry: _Gantry, surfaces: tuple[Value, Value], bottom: Value) -> Value:
@@ -165,7 +166,7 @@ def _place_signs(tree: Tree, gantry: _Gantry, low: Value, bottom: Value) -> Valu
     z = op.switch(behind, low + tall * 0.5, bottom + gantry.beam_height * 0.5)
     thickness = _thickness(gantry.signs)
     signs = op.store(gantry.signs, "thickness", thickness)
-    y = op.named_attribute(tree, "facing") * -1.0 * (gantry.beam_depth * 0.5 + GANTRY_HANGER + thickness)
+    y = op.named_attribute(tree, "facing") * -1.0 * (gantry.beam_depth * 0.5 + sizes.HANGER + thickness)
     signs = op.set_position(signs, op.vector(tree, op.component(op.position(tree), "X"), y, z))
     return op.store(signs, "level", bottom + gantry.beam_height * 0.5 - z)
 
@@ -183,13 +184,13 @@ def _boards(tree: Tree, gantry: _Gantry, signs: Value) -> tuple[Value, Value]:
     hangers = []
     for side in (-1.0, 1.0):
         x = wide * (0.32 * side)
-        back = op.named_attribute(tree, "facing") * (thick + GANTRY_HANGER / 2)
-        upright = op.vector(tree, 0.1, GANTRY_HANGER + 0.01, op.maximum(tall - 0.2, tall * 0.5))
+        back = op.named_attribute(tree, "facing") * (thick + sizes.HANGER / 2)
+        upright = op.vector(tree, 0.1, sizes.HANGER + 0.01, op.maximum(tall - 0.2, tall * 0.5))
         hangers.append(
             put_on_points(signs, box(tree, 1.0), op.position(tree) + op.vector(tree, x, back), upright, facing)
         )
         # A clamp that reaches into the beam.
-        inwards = op.named_attribute(tree, "facing") * (thick + GANTRY_HANGER + gantry.beam_depth * 0.1)
+        inwards = op.named_attribute(tree, "facing") * (thick + sizes.HANGER + gantry.beam_depth * 0.1)
         clamp = op.vector(tree, 0.16, gantry.beam_depth * 0.3 + 0.05, gantry.beam_height * 0.3)
         place = op.position(tree) + op.vector(tree, x, inwards, op.named_attribute(tree, "level"))
         hangers.append(put_on_points(signs, box(tree, 1.0), place, clamp, facing))

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from ....road.things.overpass import BRIDGE_DECK
+from ....road.things import overpass as sizes
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import Inputs, material_of, metres
 from ...nodes.solids import box, flip_faces, loft, move_geometry, paint_faces, put_on_points, row_of_points
 
-WEB = BRIDGE_DECK[1][0], BRIDGE_DECK[2][0]
+WEB = sizes.DECK[1][0], sizes.DECK[2][0]
 """Where the webs begin and end beside the middle, as shares of half the deck's width."""
 PAVEMENT = 0.05
 """Thickness of the asphalt, m."""
@@ -63,7 +63,7 @@ def bridge_deck_group(tree: Tree) -> None:
 
 
 def _deck(tree: Tree, ends: tuple[Value, Value], width: Value, height: Value) -> Value:
-    half = [(0.0, y, z) for y, z in BRIDGE_DECK]
+    half = [(0.0, y, z) for y, z in sizes.DECK]
     outline = half + [(x, -y, z) for x, y, z in reversed(half)]
 
     def place(point: Value, row: Value) -> Value:

@@ -6,7 +6,8 @@ import bpy
 import numpy as np
 
 from ....base.classes import class_id
-from ....road.things.overpass import BRIDGE_BEARING, BRIDGE_BURIED, BRIDGE_SEAT, Overpass
+from ....road.things import overpass as sizes
+from ....road.things.overpass import Overpass
 from ...nodes import operations as op
 from ...nodes.backbone import height_on
 from ...nodes.builder import Tree, Value, makes_group
@@ -103,8 +104,8 @@ def _deck(bridge: _Overpass, low: Value, wings: dict[float, Value]) -> Value:
     left, right = bridge.faces[-1.0], bridge.faces[1.0]
     deck = bridge.tree.call(
         bridge_deck_group(),
-        deck_start=left - BRIDGE_SEAT,
-        deck_end=right + BRIDGE_SEAT,
+        deck_start=left - sizes.SEAT,
+        deck_end=right + sizes.SEAT,
         start=left - wings[-1.0],
         end=right + wings[1.0],
         width=bridge.width,
@@ -124,7 +125,7 @@ def _abutment(bridge: _Overpass, low: Value, feet: dict[float, Value], wings: di
         bridge_abutment_group(),
         width=bridge.width,
         thickness=bridge.deck_thickness,
-        foot=feet[side] - low - BRIDGE_BURIED,
+        foot=feet[side] - low - sizes.BURIED,
         wing_length=wings[side],
         concrete_material=bridge.concrete_material,
         steel_material=bridge.steel_material,
@@ -145,9 +146,9 @@ def _piers(bridge: _Overpass, surfaces: tuple[Value, Value], shear: Value, low: 
     )
     x = op.component(op.position(tree), "X")
     plan = op.vector(tree, x, x * shear)
-    points = op.store(bridge.piers, "foot", height_on(*surfaces, plan) - BRIDGE_BURIED)
-    tall = low - BRIDGE_BEARING - op.named_attribute(tree, "foot")
-    top = plan + op.vector(tree, 0.0, 0.0, low - BRIDGE_BEARING)
+    points = op.store(bridge.piers, "foot", height_on(*surfaces, plan) - sizes.BURIED)
+    tall = low - sizes.BEARING - op.named_attribute(tree, "foot")
+    top = plan + op.vector(tree, 0.0, 0.0, low - sizes.BEARING)
     bodies = put_on_points(points, pier["Body"], top, op.vector(tree, 1.0, 1.0, tall))
     return op.realize(op.join(bodies, put_on_points(points, pier["Bearings"], plan + op.vector(tree, 0.0, 0.0, low))))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ....road.things.overpass import BRIDGE_ABUTMENT, BRIDGE_BEARING, BRIDGE_PIER_LENGTH, BRIDGE_SEAT
+from ....road.things import overpass as sizes
 from ...nodes import operations as op
 from ...nodes.builder import Operand, Tree, Value, makes_group
 from ...nodes.inputs import Inputs, material_of, metres
@@ -38,17 +38,17 @@ def bridge_abutment_group(tree: Tree) -> None:
         return box(tree, length + op.vector(tree, 0.0, size), corner + length * 0.5)
 
     with tree.frame("Seat and back wall"):
-        level = height * 0.0 - BRIDGE_BEARING
-        walls = [wall(0.0, BRIDGE_ABUTMENT, level, wide)]
-        walls.append(wall(BRIDGE_SEAT + 0.04, BRIDGE_ABUTMENT - 0.01, height - PAVEMENT * 0.5, wide - 0.02))
+        level = height * 0.0 - sizes.BEARING
+        walls = [wall(0.0, sizes.ABUTMENT, level, wide)]
+        walls.append(wall(sizes.SEAT + 0.04, sizes.ABUTMENT - 0.01, height - PAVEMENT * 0.5, wide - 0.02))
     with tree.frame("Wing walls"):
         for side in (1.0, -1.0):
             beside = (wide * 0.5 - _WALL / 2) * side
-            walls.append(wall(BRIDGE_ABUTMENT - 0.02, abutment.wing_length, height - PAVEMENT * 0.6, _WALL, beside))
+            walls.append(wall(sizes.ABUTMENT - 0.02, abutment.wing_length, height - PAVEMENT * 0.6, _WALL, beside))
     with tree.frame("Bearings below the webs"):
-        beside, below = width * (0.25 * sum(WEB)), -BRIDGE_BEARING / 2
+        beside, below = width * (0.25 * sum(WEB)), -sizes.BEARING / 2
         pads = [
-            box(tree, (0.5, 0.6, BRIDGE_BEARING + 0.02), op.vector(tree, BRIDGE_SEAT / 2, beside * side, below))
+            box(tree, (0.5, 0.6, sizes.BEARING + 0.02), op.vector(tree, sizes.SEAT / 2, beside * side, below))
             for side in (1.0, -1.0)
         ]
     with tree.frame("All"):
@@ -80,7 +80,7 @@ def bridge_pier_group(tree: Tree) -> None:
     # z says which end a point belongs to.
     outline = [(x, y, 1.0) for x, y in end] + [(-x, -y, -1.0) for x, y in end]
     with tree.frame("Body"):
-        straight = (op.maximum(deck * BRIDGE_PIER_LENGTH, width * 1.02) - width) * 0.5
+        straight = (op.maximum(deck * sizes.PIER_LENGTH, width * 1.02) - width) * 0.5
 
         def place(point: Value, row: Value) -> Value:
             y = op.component(point, "Y") * width + op.component(point, "Z") * straight
@@ -89,7 +89,7 @@ def bridge_pier_group(tree: Tree) -> None:
         body = loft(tree, lambda number: op.choose(number, outline), len(outline), 2, place)
     with tree.frame("Bearings"):
         beside = op.minimum(deck * (0.25 * sum(WEB)), straight)
-        size = op.vector(tree, op.minimum(width * 0.8, 0.6), 0.5, BRIDGE_BEARING + 0.02)
-        pads = [box(tree, size, op.vector(tree, 0.0, beside * side, -BRIDGE_BEARING / 2)) for side in (1.0, -1.0)]
+        size = op.vector(tree, op.minimum(width * 0.8, 0.6), 0.5, sizes.BEARING + 0.02)
+        pads = [box(tree, size, op.vector(tree, 0.0, beside * side, -sizes.BEARING / 2)) for side in (1.0, -1.0)]
     tree.output("Body", paint_faces(body, pier.concrete_material), description="The pier, from z = -1 to 0")
     tree.output("Bearings", paint_faces(op.join(*pads), pier.steel_material), description="The bearings")

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 
 from ....base.classes import class_id
+from ....road.things import sign as sizes
+from ....road.things.sign import TrafficSign
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import Inputs, boolean, instance_number, integer, material_of, metres, share, socket
@@ -31,7 +33,7 @@ class Face(Inputs):
     corner_radius = metres(0.05, (0.001, 1.0), "Radius of its corners")
     edge_width = metres(0.0, (0.0, 0.5), "Width of the bright edge outside of the border; 0 for none")
     border_width = metres(0.02, (0.0, 1.0), "Width of the border; 0 for none")
-    thickness = metres(0.003, (0.001, 0.2), "Thickness of the plate")
+    thickness = metres(sizes.PLATE, (0.001, 0.2), "Thickness of the plate")
     line_1 = socket("String", _LINE, panel="Writing")
     line_2 = socket("String", _LINE, panel="Writing")
     line_3 = socket("String", _LINE, panel="Writing")
@@ -90,7 +92,7 @@ def sign_face_group(tree: Tree) -> None:
         drawn = [move_geometry(part, (0.0, 0.0, RAISED)) for part in _draw_writing(tree, face)]
     with tree.frame("Upright, and labelled"):
         mesh = op.transform(op.join(back, *front, *drawn), rotation=(math.pi / 2.0, 0.0, 0.0))
-        mesh = op.label(mesh, class_id("road_sign"), face.instance)
+        mesh = op.label(mesh, class_id(TrafficSign.points_class), face.instance)
     tree.output("Mesh", mesh, description="Plate; its front is at y = 0")
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from ....road.things.sign import TrafficSign
 from ....road.things.sign_catalogue import sign_type
+from ....road.things.sign_outline import corner_radius
 from ...materials import material
 from .outline import SHAPES
 from .pictograms import NAMES
@@ -46,9 +47,6 @@ _OF_SHAPE = {
 # Shares of the smaller side of a face, and a border's limits in m.
 _RING, _RIM, _LINE = 0.1, 0.012, 0.022
 _LINE_LIMITS = (0.008, 0.04)
-_CORNERS = {"round": 0.06, "triangle": 0.06, "rectangle": 0.05, "octagon": 0.03, "arrow": 0.04}
-_CORNER_LIMITS = (0.01, 0.1)
-"""Limits of a corner's radius, m."""
 
 _WHOLE: Box = (0.08, 0.92, 0.06, 0.94)
 _TEXT: dict[str, Box] = {
@@ -95,14 +93,14 @@ def face_inputs(style: FaceStyle, shape: str, width: float, height: float, text:
     """
     side = min(width, height)
     ringed = style.border == "red"
-    line, corner = float(np.clip(_LINE * side, *_LINE_LIMITS)), float(np.clip(_CORNERS[shape] * side, *_CORNER_LIMITS))
+    line = float(np.clip(_LINE * side, *_LINE_LIMITS))
     writing, drawing = _boxes(style.pictogram, shape)
     lines = [*text, *([""] * LINES)][:LINES]
     return {
         "Shape": SHAPES.index(shape),
         "Width": width,
         "Height": height,
-        "Corner Radius": corner,
+        "Corner Radius": corner_radius(shape, width, height),
         "Edge Width": _RIM * side if ringed else 0.0,
         "Border Width": _RING * side if ringed else line,
         **{f"Line {number}": entry for number, entry in enumerate(lines, 1)},

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from ....road.things.sign import SIGN_OUTLINES
+from ....road.things.sign_outline import CORNER_STEPS, MOST_OF_SIDE, ROUND_STEPS, SIGN_OUTLINES
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import Inputs, integer, metres
 
 SHAPES = ("round", "triangle", "rectangle", "octagon", "arrow")
 """Shapes by their number in the group's input."""
-_STEPS, _ROUND_STEPS = 5, 13
-"""Points per corner, and per quarter of a round sign."""
 _SHARPEST = 0.35
 """Share of its radius that a corner keeps, however far inside."""
 
@@ -34,7 +32,7 @@ def sign_outline_group(tree: Tree) -> None:
         number = op.index(tree)
         corner, step = number // steps, number % steps
     with tree.frame("Radius; a round sign is nothing but corners"):
-        half = op.minimum(width, height) * 0.499
+        half = op.minimum(width, height) * MOST_OF_SIDE
         outer = op.minimum(op.switch(outline.shape.equals(0), outline.corner_radius, half), half)
         inner = op.maximum(outer - inset, outer * _SHARPEST)
     with tree.frame("Middle of the corner's arc, and of those beside it"):
@@ -77,7 +75,7 @@ def _corners_of(tree: Tree, shape: Value) -> tuple[Value, Value, Value]:
     rows = []
     for name in SHAPES:
         outline = "rectangle" if name == "round" else name
-        points = _ROUND_STEPS if name == "round" else _STEPS
+        points = ROUND_STEPS if name == "round" else CORNER_STEPS
         rows.append((float(starts[outline]), float(len(SIGN_OUTLINES[outline])), float(points)))
     row = op.choose(shape, rows)
     start, count, steps = (op.round_up(op.component(row, axis)) for axis in "XYZ")

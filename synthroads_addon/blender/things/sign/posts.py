@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 
+from ....road.things import sign as sizes
+from ....road.things.body import BURIED
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import boolean, integer, material_of, metres, socket
 from ...nodes.solids import bars, paint_faces, row_of_points, tube
-from ...nodes.standing import BURIED, OnSurface, on_surface, put_on
+from ...nodes.standing import OnSurface, on_surface, put_on
 
 MOST_POSTS = 4
 _PANEL = 0.9
 """Height of a lattice post's panels, m."""
-_CHORD, _DIAGONAL = 0.045, 0.02
-"""Thickness of a lattice post's chords and diagonals, m."""
+_DIAGONAL = 0.02
+"""Thickness of a lattice post's diagonals, m."""
 
 
 class _Posts(OnSurface):
@@ -45,7 +47,7 @@ def sign_posts_group(tree: Tree) -> None:
     with tree.frame("Tube of height 1"):
         pipe = tube(tree, diameter * 0.5, 1.0)
     with tree.frame("Lattice post of height 1"):
-        girder = _lattice(tree, diameter * 0.5 - _CHORD / 2.0, top + BURIED)
+        girder = _lattice(tree, diameter * 0.5 - sizes.LATTICE_CHORD / 2.0, top + BURIED)
     with tree.frame("Posts"):
         post = op.switch(sign.lattice, pipe, girder)
         posts = put_on(places, post, op.vector(tree, 1.0, 1.0, op.named_attribute(tree, "tall")))
@@ -63,7 +65,7 @@ def _lattice(tree: Tree, radius: Value, height: Value) -> Value:
 
     chords = row_of_points(tree, 3)
     foot = corner(op.index(tree))
-    chords = bars(chords, foot, foot + (0.0, 0.0, 1.0), _CHORD)
+    chords = bars(chords, foot, foot + (0.0, 0.0, 1.0), sizes.LATTICE_CHORD)
     panels = op.round_up(height / _PANEL)
     number = op.index(tree)
     side, panel = number // panels, number % panels

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ....base.classes import class_id
-from ....road.things.sign import SIGN_RAIL, TrafficSign
+from ....road.things import sign as sizes
+from ....road.things.sign import TrafficSign
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import Inputs, boolean, integer, material_of, metres
@@ -15,18 +16,9 @@ from .looks import sign_face_inputs
 from .outline import SHAPES
 from .posts import MOST_POSTS, sign_posts_group
 
-# By the shape's number: height of the posts' top as a share of the face's, part of the height that rails are spread
-# over, and the rails' length as a share of the width, so that nothing looks out from behind the face.
-_BEHIND = {
-    "round": (0.9, 1.0, 0.5),
-    "triangle": (0.6, 0.7, 0.4),
-    "rectangle": (0.97, 1.0, 0.94),
-    "octagon": (0.93, 1.0, 0.6),
-    "arrow": (0.9, 1.0, 0.7),
-}
 _RAIL_SPACING = 0.9  # m
 _PLAY = 0.0005  # m between rails and what is before and behind them
-_CLAMP = (0.006, 0.05)  # m beyond the post, and in height
+_CLAMP = 0.05  # m, height
 
 
 class _SignInputs(Inputs):
@@ -43,11 +35,11 @@ def sign_group(tree: Tree) -> None:
     standing, face, sign = Standing(tree), Face(tree), _SignInputs(tree)
 
     with tree.frame("What is behind the face, by its shape"):
-        behind = op.choose(face.shape, [_BEHIND[shape] for shape in SHAPES])
+        behind = op.choose(face.shape, [sizes.BEHIND[shape] for shape in SHAPES])
         top, spread, long = (op.component(behind, axis) for axis in "XYZ")
     with tree.frame("Face, in front of the posts"):
         plate = tree.call(sign_face_group(), instance=standing.instance, **face.values).value
-        front = (sign.post_diameter * 0.5 + face.thickness + SIGN_RAIL) * -1.0
+        front = (sign.post_diameter * 0.5 + face.thickness + sizes.RAIL) * -1.0
         plate = move_geometry(plate, op.vector(tree, 0.0, front, sign.lower_edge + face.height * 0.5))
     mounting = _mounting(tree, face, sign, spread, long)
     with tree.frame("Put onto the points"):
@@ -67,7 +59,7 @@ def sign_group(tree: Tree) -> None:
             material=sign.post_material,
         ).value
     with tree.frame("Labels"):
-        mesh = standing.label(op.join(mesh, posts), class_id("road_sign"))
+        mesh = standing.label(op.join(mesh, posts), class_id(TrafficSign.points_class))
     tree.output("Mesh", mesh, description="Sign with its posts")
 
 
@@ -80,23 +72,17 @@ def _mounting(tree: Tree, face: Face, sign: _SignInputs, spread: Value, long: Va
             return sign.lower_edge + face.height * spread * ((number + 0.5) / count)
 
         # A little less deep than the gap: faces that coincide with the plate's have no first hit.
-        bar = box(tree, op.vector(tree, face.width * long, SIGN_RAIL - 2.0 * _PLAY, SIGN_RAIL))
-        depth = (sign.post_diameter + SIGN_RAIL) * -0.5
+        bar = box(tree, op.vector(tree, face.width * long, sizes.RAIL - 2.0 * _PLAY, sizes.RAIL))
+        depth = (sign.post_diameter + sizes.RAIL) * -0.5
         rails = put_on_points(row_of_points(tree, count), bar, op.vector(tree, 0.0, depth, level(op.index(tree))))
     with tree.frame("Clamps around the posts"):
-        radius, height = sign.post_diameter * 0.5 + _CLAMP[0], _CLAMP[1]
+        radius, height = sign.post_diameter * 0.5 + sizes.CLAMP, _CLAMP
         clamp = tube(tree, radius, height, 8)
         number = op.index(tree)
         beside = (((number % sign.posts) + 0.5) / sign.posts - 0.5) * face.width
         place = op.vector(tree, beside, 0.0, level(number // sign.posts) - height / 2.0)
         clamps = put_on_points(row_of_points(tree, sign.posts * count), clamp, place)
         return paint_faces(op.join(rails, clamps), face.back_material)
-
-
-_LARGE = 8.0
-"""Area of a board from which it stands on lattice posts, m2."""
-_LARGE_POST, _MOST_LATTICES = 0.15, 2
-"""Least diameter of lattice posts, m, and their number at most."""
 
 
 def build_signs(builder: ModelBuilder) -> None:
@@ -107,11 +93,6 @@ def build_signs(builder: ModelBuilder) -> None:
             sign,
             sign_group(),
             **sign_face_inputs(sign),
-            lattice=_stands_on_lattices(sign),
+            lattice=sign.on_lattices,
             post_material="galvanised_steel",
         )
-
-
-def _stands_on_lattices(sign: TrafficSign) -> bool:
-    large = sign.width * sign.height >= _LARGE
-    return large and sign.post_diameter >= _LARGE_POST and sign.posts <= _MOST_LATTICES

@@ -1,0 +1,177 @@
+"""Bodies of things: closed solids in true dimensions, each with its material, and the places that they are made for.
+
+Every shape is a row of sections, one behind the other: outlines of the same number of corners, joined from corner to
+corner, the first and the last closed by lids. Outlines that aren't convex begin where corner i faces the last but i.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...base.arrays import Float
+
+Point2 = tuple[float, float]
+Point3 = tuple[float, float, float]
+
+BURIED = 0.3
+"""Depth to which posts and foundations reach below the surface, m."""
+_BAR_AXIS = np.array([1.0, 0.0, 0.0])
+
+
+@dataclass(frozen=True)
+class Body:
+    """A closed body.
+
+    Attributes:
+        sections: (R, K, 3) R >= 2 outlines of K corners, m, in the thing's frame: of what stands at one place x to the
+            right of traffic with the stations, y along it, z up from its foot; of what runs along the road the local
+            frame.
+        material: name in the material table.
+        part: name of the part of the thing that it belongs to; empty for the thing itself.
+        ifc: entity and predefined type of that part in IFC, with a dot between them.
+        detail: 0, or for fittings too small for a model of the whole their size, m: the box around them then.
+    """
+
+    sections: Float
+    material: str
+    part: str = ""
+    ifc: str = ""
+    detail: float = 0.0
+
+
+@dataclass(frozen=True)
+class Place:
+    """Surroundings of what stands at one place, in its frame.
+
+    Attributes:
+        ground: height of the surface at x (N,) and y (N,), m.
+        pavement: height of the pavement's highest point below a rectangle, m: its limits in x and in y, and by how much
+            y grows per x. Where nothing below is paved it is 0.
+        slope: run of batters per metre of height.
+    """
+
+    ground: Callable[[ArrayLike, ArrayLike], Float]
+    pavement: Callable[[Point2, Point2, float], float]
+    slope: float
+
+
+LEVEL = Place(lambda x, y: np.zeros(np.broadcast(x, y).shape), lambda x, y, shear: 0.0, 1.5)
+"""A level surface, all paved."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """The road along which something runs, in local coordinates.
+
+    Attributes:
+        length: of the road, m.
+        feet: points (N, 3) on the surface at stations (N,) and offsets (N,).
+        left: level unit vectors (N, 3) to the left at stations (N,).
+        rows: stations (N,) at which what runs along the road needs a section: its offsets by station, its first and
+            last station, and further stations.
+    """
+
+    length: float
+    feet: Callable[[Float, Float], Float]
+    left: Callable[[Float], Float]
+    rows: Callable[[Callable[[Float], Float], float, float, Sequence[float]], Float]
+
+
+# --- shapes at one place --------------------------------------------------------------------------------------------
+
+
+def prism(outline: Sequence[Point2] | Float, low: float, high: float) -> Float:
+    """Return the body over an outline (x, y) between two heights."""
+    flat = np.asarray(outline, dtype=np.float64)
+    return np.stack([np.column_stack([flat, np.full(len(flat), z)]) for z in (low, high)])
+
+
+def box(size: Sequence[float], middle: Sequence[float] = (0.0, 0.0, 0.0)) -> Float:
+    """Return a box of a size (x, y, z) around its middle."""
+    (x, y, z), half = middle, np.asarray(size, dtype=np.float64) / 2.0
+    corners = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]) * half[:2] + (x, y)
+    return prism(corners, z - half[2], z + half[2])
+
+
+def plate(outline: Sequence[Point2] | Float, front: float, back: float) -> Float:
+    """Return the upright plate over an outline (x, z) between two y."""
+    flat = np.asarray(outline, dtype=np.float64)
+    return np.stack([np.column_stack([flat[:, 0], np.full(len(flat), y), flat[:, 1]]) for y in (front, back)])
+
+
+def circle(diameter: float, sides: int = 12) -> Float:
+    """Return the corners (K, 2) of a round outline; they lie on its circle."""
+    turn = 2.0 * np.pi * np.arange(sides) / sides
+    return diameter / 2.0 * np.column_stack([np.cos(turn), np.sin(turn)])
+
+
+def post(diameter: float, low: float, high: float, x: float = 0.0, y: float = 0.0, sides: int = 12) -> Float:
+    """Return a round post."""
+    return prism(circle(diameter, sides) + (x, y), low, high)
+
+
+def moved(sections: Float, by: Sequence[float], scale: Sequence[float] = (1.0, 1.0, 1.0)) -> Float:
+    """Return sections scaled, then moved."""
+    return sections * np.asarray(scale) + np.asarray(by)
+
+
+def tilted(sections: Float, angle: float) -> Float:
+    """Return sections turned about the x axis (rad)."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    return sections @ np.array([(1.0, 0.0, 0.0), (0.0, cosine, sine), (0.0, -sine, cosine)])
+
+
+def bar(start: Sequence[float], end: Sequence[float], width: float) -> Float:
+    """Return a square bar from one place to another; it is turned there from the x axis the shortest way."""
+    first, last = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
+    along = (last - first) / np.linalg.norm(last - first)
+    axis = np.cross(_BAR_AXIS, along)
+    if not axis.any():
+        axis = np.array([0.0, 0.0, 1.0])
+    axis /= np.linalg.norm(axis)
+    cosine = float(_BAR_AXIS @ along)
+    sine = math.sqrt(max(1.0 - cosine**2, 0.0))
+    sides = np.array([(0.0, y, z) for y, z in ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))]) * width
+    turned = sides * cosine + np.cross(axis, sides) * sine + axis * (sides @ axis)[:, None] * (1.0 - cosine)
+    return np.stack([first + turned, last + turned])
+
+
+# --- shapes along the road ------------------------------------------------------------------------------------------
+
+
+def swept(feet: Float, left: Float, across: ArrayLike, height: ArrayLike) -> Float:
+    """Return an outline swept along the road.
+
+    Args:
+        feet, left: (N, 3) points below its axis, and unit vectors to the left.
+        across: (K,) distances of its corners to the left of the axis, m.
+        height: (K,) or (N, K) heights above the feet, m.
+    """
+    sections = feet[:, None] + np.asarray(across)[None, :, None] * left[:, None]
+    sections[..., 2] += height
+    return sections
+
+
+def boxes(feet: Float, left: Float, size: Sequence[Any], low: ArrayLike, beside: float = 0.0) -> list[Float]:
+    """Return upright boxes beside feet (N, 3).
+
+    Args:
+        left: (N, 3) unit vectors to the left.
+        size: across, along and height, m, each one for all or (N,).
+        low: height of the undersides above the feet, m, one for all or (N,).
+        beside: distance of their middles to the left of the feet, m.
+    """
+    across, along, tall = (np.broadcast_to(value, len(feet))[:, None] for value in size)
+    ahead = np.stack([left[:, 1], -left[:, 0], left[:, 2]], axis=1)
+    corners = np.array([(-0.5, -0.5), (-0.5, 0.5), (0.5, 0.5), (0.5, -0.5)])
+    plan = feet[:, None] + (corners[:, 0] * across + beside)[..., None] * left[:, None]
+    plan = plan + (corners[:, 1] * along)[..., None] * ahead[:, None]
+    under = plan + np.broadcast_to(low, len(feet))[:, None, None] * np.array([0.0, 0.0, 1.0])
+    over = under + tall[..., None] * np.array([0.0, 0.0, 1.0])
+    return list(np.stack([under, over], axis=1))

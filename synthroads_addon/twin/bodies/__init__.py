@@ -1,1 +1,0 @@
-"""Bodies of furniture and structures in true dimensions."""
