@@ -40,6 +40,11 @@ class RoadObject(Model):
         ge=1, le=2**32 - 1, unit="1", description="Number that the object's faces and points carry."
     )
 
+    @property
+    def semantic_class(self) -> str:
+        """Return the class of its points."""
+        return self.points_class
+
 
 ObjectT = TypeVar("ObjectT", bound=RoadObject)
 

@@ -107,9 +107,19 @@ def loft(sections: Float) -> Faces:
     sides = np.stack([start + here, start + after, start + count + after, start + count + here], axis=-1)
     last = (rows - 1) * count
     caps = Faces(points, np.concatenate([here[::-1], last + here]), np.array([count, count]))
+    if max(_off_plane(sections[0]), _off_plane(sections[-1])) > FLAT / 2.0:
+        triangles = strip_triangles(caps)
+        caps = Faces(points, triangles.ravel(), np.full(len(triangles), 3))
     body = quads(points, sides.reshape(-1, 4))
     closed = Faces(points, np.concatenate([body.corners, caps.corners]), np.concatenate([body.sizes, caps.sizes]))
     return closed if volume(closed) >= 0.0 else turn_polygons(closed)
+
+
+def _off_plane(ring: Float) -> float:
+    """Return how far the corners (K, 3) of a polygon lie from its plane at most, m."""
+    arms = ring - ring.mean(axis=0)
+    normal = np.cross(arms, np.roll(arms, -1, axis=0)).sum(axis=0)
+    return float(np.abs(arms @ normal).max() / max(float(np.linalg.norm(normal)), 1e-12))
 
 
 def turn_polygons(faces: Faces) -> Faces:

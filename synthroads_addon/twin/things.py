@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..road.geometry import RoadGeometry
-from ..road.surface import highest_pavement
+from ..road.terrain import highest_pavement
 from ..road.things.body import Body, Course, Place
 from ..road.things.thing import LengthwiseThing, StandingThing, Thing
 from .surfaces import Float, close_stations, left_of, needed_rows, on_ground
@@ -88,15 +88,21 @@ def placed_things(geometry: RoadGeometry, tolerance: float) -> Iterator[PlacedTh
         geometry: the road.
         tolerance: largest chord error of what runs along it, m.
     """
-    things = {name: item for name, item in geometry.parameters.objects.items() if isinstance(item, Thing)}
-    standing = {name: item for name, item in things.items() if isinstance(item, StandingThing)}
-    frames = dict(zip(standing, frames_of(geometry, list(standing.values())), strict=True))
+    standing = standing_things(geometry)
     course = _course(geometry, tolerance)
-    for name, item in things.items():
+    for name, item in geometry.parameters.objects.items():
         if isinstance(item, StandingThing):
-            yield PlacedThing(name, item, frames[name], item.bodies(frames[name].place()))
+            yield next(standing)
         elif isinstance(item, LengthwiseThing):
             yield PlacedThing(name, item, None, item.bodies(course))
+
+
+def standing_things(geometry: RoadGeometry) -> Iterator[PlacedThing]:
+    """Yield all things of a road that stand at one place, in the order of the parameter set."""
+    standing = geometry.parameters.of_type(StandingThing)
+    frames = frames_of(geometry, list(standing.values()))
+    for (name, item), frame in zip(standing.items(), frames, strict=True):
+        yield PlacedThing(name, item, frame, item.bodies(frame.place()))
 
 
 def frames_of(geometry: RoadGeometry, items: Sequence[StandingThing]) -> list[Frame]:

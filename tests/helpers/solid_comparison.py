@@ -9,6 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from synthroads_addon.road.things.body import Body
+from synthroads_addon.twin.faces import loft, strip_triangles
+
 Float = NDArray[np.float64]
 ALIKE = 1.02e-3
 """Distance (m) within which points are the same: a millimetre, and what 32 bits leave of it."""
@@ -27,6 +30,12 @@ class Misfit(NamedTuple):
 
     of_mesh: Float
     of_bodies: Float
+
+
+def triangles_of(body: Body) -> Float:
+    """Return the triangles (T, 3, 3) of a body."""
+    faces = loft(body.sections)
+    return faces.points[strip_triangles(faces)]
 
 
 def compare(mesh: Float, bodies: Sequence[Float], fittings: Sequence[Float]) -> Misfit:
@@ -82,20 +91,16 @@ def _distance(points: Float, triangles: Float) -> Float:
 
 
 def _to_nearest(points: Float, triangles: Float) -> Float:
-    corners = [triangles[None, :, i] for i in range(3)]
-    place = points[:, None]
+    place, corners = points[:, None], [triangles[None, :, i] for i in range(3)]
     normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
-    size = np.linalg.norm(normal, axis=2)
-    unit = normal / np.maximum(size, 1e-15)[..., None]
-    above = np.abs(np.einsum("ijk,ijk->ij", place - corners[0], np.broadcast_to(unit, (1, *unit.shape[1:]))))
-    within = size > 1e-15
-    nearest = np.full(above.shape, np.inf)
-    for i in range(3):
-        start, end = corners[i], corners[(i + 1) % 3]
+    size = np.linalg.norm(normal, axis=2, keepdims=True)
+    normal = normal / np.maximum(size, 1e-15)
+    within = np.broadcast_to(size[..., 0] > 1e-15, (len(points), len(triangles)))
+    nearest = np.full(within.shape, np.inf)
+    for start, end in zip(corners, (*corners[1:], corners[0]), strict=True):
         edge, reach = end - start, place - start
-        share = np.clip(
-            np.einsum("ijk,ijk->ij", reach, edge + 0.0 * reach) / np.maximum((edge**2).sum(2), 1e-30), 0.0, 1.0
-        )
+        share = np.clip((reach * edge).sum(axis=2) / np.maximum((edge**2).sum(axis=2), 1e-30), 0.0, 1.0)
         nearest = np.minimum(nearest, np.linalg.norm(reach - share[..., None] * edge, axis=2))
-        within = within & (np.einsum("ijk,ijk->ij", np.cross(edge + 0.0 * reach, reach), unit + 0.0 * reach) >= 0.0)
+        within = within & ((np.cross(np.broadcast_to(edge, reach.shape), reach) * normal).sum(axis=2) >= 0.0)
+    above = np.abs(((place - corners[0]) * normal).sum(axis=2))
     return np.where(within, above, nearest).min(axis=1)

@@ -127,6 +127,12 @@ def tilted(sections: Float, angle: float) -> Float:
     return sections @ np.array([(1.0, 0.0, 0.0), (0.0, cosine, sine), (0.0, -sine, cosine)])
 
 
+def turned(sections: Float, angle: float) -> Float:
+    """Return sections turned about the z axis (rad)."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    return sections @ np.array([(cosine, sine, 0.0), (-sine, cosine, 0.0), (0.0, 0.0, 1.0)])
+
+
 def bar(start: Sequence[float], end: Sequence[float], width: float) -> Float:
     """Return a square bar from one place to another; it is turned there from the x axis the shortest way."""
     first, last = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)

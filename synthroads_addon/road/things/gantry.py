@@ -150,13 +150,15 @@ class Gantry(StandingThing):
         """Return its types: what signs hang on."""
         return TwinTypes("IfcElementAssembly.SIGNALASSEMBLY.SITE", f"gantry.{self.kind}", kind=f"Gantry {self.kind}")
 
+    def part_models(self) -> dict[str, GantrySign]:
+        """Return its signs."""
+        return {f"sign-{number}": sign for number, sign in enumerate(self.signs, 1)}
+
     def signals(self) -> dict[str, Signal]:
         """Return what its boards and displays tell."""
         return {
-            f"sign-{number}": Signal(
-                sign.kind, text="\n".join(sign.text), dynamic=sign.kind == "display", facing=sign.facing
-            )
-            for number, sign in enumerate(self.signs, 1)
+            name: Signal(sign.kind, text="\n".join(sign.text), dynamic=sign.kind == "display", facing=sign.facing)
+            for name, sign in self.part_models().items()
         }
 
     def bodies(self, place: Place) -> list[Body]:
@@ -171,8 +173,8 @@ class Gantry(StandingThing):
         made.append(Body(joints, "gantry_steel", "joints", detail=JOINT / 2.0))
         for number, offset in enumerate(self.post_offsets(), 1):
             made += self._post(place, f"post-{number}", offset, bottom)
-        for number, sign in enumerate(self.signs, 1):
-            made += self._board(f"sign-{number}", sign, (low, bottom))
+        for name, sign in self.part_models().items():
+            made += self._board(name, sign, (low, bottom))
         return [*made, *self._catwalk(place, (left, right), bottom + self.beam_height)] if self.catwalk else made
 
     def _beam(self, length: float) -> list[Float]:
@@ -193,13 +195,13 @@ class Gantry(StandingThing):
             for z in (-1.0, 1.0)
         ]
         bays = int(np.ceil(length / (max(height, TRUSS_BAY[0]) * TRUSS_BAY[1])))
-        start, middle = np.array([wide / 2.0, 0.0, height / 2.0]), np.array([0.0, 0.0, 0.5])
+        begin, half = np.array([wide / 2.0, 0.0, height / 2.0]), np.array([0.0, 0.0, 0.5])
         for number in range(bays * len(TRUSS_BARS) + TRUSS_FRAME):
             bay, kind = divmod(number, len(TRUSS_BARS))
             turned = 1.0 - 2.0 * (bay % 2)
             size = ((length - wide) / bays, beside * turned, 2.0 * above * turned)
-            ends = start + (np.array(TRUSS_BARS[kind]) + (bay, 0.0, 0.0) - middle) * size
-            chords.append(bar(*ends, wide * TRUSS_BAR))
+            first, last = begin + (np.array(TRUSS_BARS[kind]) + (bay, 0.0, 0.0) - half) * size
+            chords.append(bar(first, last, wide * TRUSS_BAR))
         return chords
 
     def _post(self, place: Place, name: str, offset: float, bottom: float) -> list[Body]:
@@ -214,6 +216,8 @@ class Gantry(StandingThing):
             return box(size, (x, 0.0, (low + high) / 2.0))
 
         plate_top = foot + PLINTH + BASE_PLATE
+        if plate_top >= top:
+            return []
         parts = (
             (block(0.0, plate_top - PLATE_SUNK, top), "gantry_steel", 0.0),
             (block(PLINTH_MARGIN, foot - BURIED, foot + PLINTH), "bridge_concrete", 0.0),
@@ -272,7 +276,8 @@ class Gantry(StandingThing):
         walk = [moved(shape, (0.0, 0.0, level)) for shape in shapes]
         ladder, rungs = self._ladder(place, ends, level)
         return [
-            *(Body(shape, "gantry_steel", "catwalk", "IfcPlate.USERDEFINED") for shape in (*walk, *ladder)),
+            *(Body(shape, "gantry_steel", "catwalk", "IfcPlate.USERDEFINED") for shape in walk),
+            *(Body(shape, "gantry_steel", "ladder", "IfcStair.LADDER") for shape in ladder),
             Body(moved(supports, (0.0, 0.0, level)), "gantry_steel", "catwalk", detail=CATWALK_SUPPORT),
             Body(rungs, "gantry_steel", "rungs", detail=LADDER_RUNG[1]),
         ]

@@ -64,7 +64,7 @@ class NoiseBarrier(LengthwiseThing):
         end = self.end_on(course.length)
         if end is None:
             return []
-        bays = self.model_copy(update={"end_station": end}).element_ends(self.post_spacing)
+        bays = self.model_copy(update={"end_station": end}).element_ends(self.post_spacing, end)
         station = np.append(bays[:, 0], end)
         feet, left, width = course.feet(station, self.offset_at(station)), course.left(station), self.post_width
         tall = self.height + BURIED

@@ -93,15 +93,15 @@ class Overpass(StandingThing):
         shear, half = float(np.tan(np.deg2rad(self.rotation_deg))), self.width / 2.0
         faces = self.offset - self.left_abutment, self.offset - self.right_abutment
         low = place.pavement(faces, (-half, half), shear) + self.clearance
-        made, ends = [], []
+        walls, ends = [], []
         for number, (side, x) in enumerate(zip((-1.0, 1.0), faces, strict=True), 1):
             ground = float(np.min(place.ground([x, x], np.array([half, -half]) + x * shear))) - low
             wing = float(np.clip((self.deck_thickness - ground) * place.slope, *WINGS))
             ends.append(x + side * wing)
             for body in self._abutment(f"abutment-{number}", ground - BURIED, wing):
-                made.append(replace(body, sections=moved(body.sections, (x, 0.0, 0.0), (side, 1.0, 1.0))))
-        made += self._deck((faces[0] - SEAT, faces[1] + SEAT), (ends[0], ends[1]))
-        skewed = [replace(body, sections=_skewed(body.sections, shear, low)) for body in made]
+                walls.append(replace(body, sections=moved(body.sections, (x, 0.0, 0.0), (side, 1.0, 1.0))))
+        deck = self._deck((faces[0] - SEAT, faces[1] + SEAT), (ends[0], ends[1]))
+        skewed = [replace(body, sections=_skewed(body.sections, shear, low)) for body in (*deck, *walls)]
         for number, offset in enumerate(self.pier_offsets, 1):
             x = self.offset - offset
             foot = float(place.ground([x], [x * shear])[0]) - BURIED - low
@@ -113,10 +113,12 @@ class Overpass(StandingThing):
         """Return the deck between two x, and the pavement, edge beams and railings on it between two others."""
         width, height, (start, end) = self.width, self.deck_thickness, reach
         half = np.array(DECK) * (width / 2.0, height - PAVEMENT / 2.0)
-        shapes = [_across(np.concatenate([half, half[::-1] * (-1.0, 1.0)]), ends)]
+        slab = half[[0, *range(3, len(half))]]
+        shapes = [_across(np.concatenate([slab, slab[::-1] * (-1.0, 1.0)]), ends)]
+        shapes += [_across(half[:4] * (side, 1.0), ends) for side in (1.0, -1.0)]
         size = (end - start, width * (1.0 - 1.96 * EDGE), PAVEMENT)
         shapes.append(box(size, ((start + end) / 2.0, 0.0, height - PAVEMENT / 2.0)))
-        materials = ("bridge_concrete", "asphalt")
+        materials = (*["bridge_concrete"] * 3, "asphalt")
         made = [Body(shape, m, "deck", "IfcSlab.USERDEFINED") for shape, m in zip(shapes, materials, strict=True)]
         inner, nose = width / 2.0 - width * EDGE, width / 2.0 - NOSE
         top, seat, hang = height + CURB, height - PAVEMENT, min(height * HANG[0], HANG[1])

@@ -38,7 +38,7 @@ def face_outline(shape: str, width: float, height: float) -> Float:
     radius = most if shape == "round" else min(corner_radius(shape, width, height), most)
     middles = corners * (width - 2.0 * radius, height - 2.0 * radius)
     sides = middles - np.roll(middles, 1, axis=0)
-    normals = np.column_stack([sides[:, 1], -sides[:, 0]]) / np.linalg.norm(sides, axis=1)[:, None]
+    normals = np.column_stack([sides[:, 1], -sides[:, 0]]) / np.maximum(np.linalg.norm(sides, axis=1), 1e-300)[:, None]
     heading = np.arctan2(normals[:, 1], normals[:, 0])
     turn = (np.roll(heading, -1) - heading) % (2.0 * np.pi)
     share = np.linspace(0.0, 1.0, ROUND_STEPS if shape == "round" else CORNER_STEPS)

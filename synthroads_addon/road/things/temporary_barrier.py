@@ -53,7 +53,7 @@ class TemporaryBarrier(LengthwiseThing):
 
     def twin(self) -> TwinTypes:
         """Return its types: a guardrail that is moved."""
-        return TwinTypes("IfcRailing.GUARDRAIL", "barrier.temporaryBarrier")
+        return TwinTypes("IfcRailing.GUARDRAIL", "barrier.temporaryBarrier", temporary=True)
 
     def reach(self) -> tuple[float, float]:
         """Return half its foot's width, m."""
@@ -64,7 +64,7 @@ class TemporaryBarrier(LengthwiseThing):
         if self.end_on(course.length) is None:
             return []
         gap = GAP / 2.0
-        station = np.clip(self.element_ends(self.segment_length) + (gap, -gap), 0.0, course.length)
+        station = np.clip(self.element_ends(self.segment_length, course.length) + (gap, -gap), 0.0, course.length)
         number = np.flatnonzero(station[:, 1] - station[:, 0] >= _SHORTEST)
         ends = station[number].ravel()
         feet = course.feet(ends, self.offset_at(ends)).reshape(-1, 2, 3)

@@ -9,6 +9,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from ...base.arrays import Float
+from ...base.schema import Model
 from ..objects import LineObject, PointObject, RoadObject
 from .body import Body, Course, Place
 
@@ -49,6 +50,7 @@ class TwinTypes(NamedTuple):
         cityjson_part: type of the city objects that its parts are; empty where it is one body.
         kind: its object type in IFC; its class's name if empty.
         reference: number or text that says which one of its kind it is.
+        temporary: whether it is there for a time only.
     """
 
     ifc: str = "IfcBuildingElementProxy.ELEMENT"
@@ -57,6 +59,7 @@ class TwinTypes(NamedTuple):
     cityjson_part: str = ""
     kind: str = ""
     reference: str = ""
+    temporary: bool = False
 
 
 class Signal(NamedTuple):
@@ -91,11 +94,6 @@ class Thing(RoadObject):
     order: ClassVar[int] = 1000
     obstacle: ClassVar[str] = ""
 
-    @property
-    def semantic_class(self) -> str:
-        """Return the class of its points."""
-        return self.points_class
-
     def footprint(self) -> Iterator[Block]:
         """Yield the boxes in which nothing else may stand."""
         raise NotImplementedError
@@ -103,6 +101,10 @@ class Thing(RoadObject):
     def twin(self) -> TwinTypes:
         """Return its types in the formats of the geometric-semantic model."""
         return TwinTypes()
+
+    def part_models(self) -> Mapping[str, Model]:
+        """Return what the parameter set says of single parts, by their names."""
+        return {}
 
 
 class StandingThing(Thing, PointObject):
@@ -173,9 +175,9 @@ class LengthwiseThing(Thing, LineObject):
             return np.ones(station.shape)
         return np.clip(np.minimum(station - self.start_station, end - station) / ramp, 0.0, 1.0)
 
-    def element_ends(self, length: float) -> Float:
-        """Return the stations (E, 2) at which its elements of a length (m) begin and end; the last takes the rest."""
-        span = self.end_station - self.start_station
-        count = max(1, int(np.ceil(span / length - SHORTEST_ELEMENT)))
-        start = self.start_station + np.arange(count) * length
-        return np.column_stack([start, np.append(start[1:], self.end_station)])
+    def element_ends(self, step: float, length: float) -> Float:
+        """Return the stations (E, 2) of the ends of its elements of a length on a road (m); the last takes the rest."""
+        count = max(1.0, math.ceil((self.end_station - self.start_station) / step - SHORTEST_ELEMENT))
+        border = np.arange(min(count, max(math.ceil((length - self.start_station) / step), 0.0)) + 1.0)
+        station = np.where(border < count, self.start_station + border * step, self.end_station)
+        return np.column_stack([station[:-1], station[1:]])

@@ -65,6 +65,7 @@ class IfcFile:
         self._keys: set[str] = set()
         self._gathered: dict[tuple[str, int, str], tuple[Entity, list[Entity]]] = {}
         self._materials: dict[str, Entity] = {}
+        self._styles: dict[str, Entity] = {}
         self._directions: dict[tuple[float, ...], Entity] = {}
         self._shapes: dict[object, Entity] = {}
         self.project: Entity = None
@@ -229,6 +230,12 @@ class IfcFile:
             self._materials[name] = self._material(name)
         self.gather("IfcRelAssociatesMaterial", self._materials[name], [item])
 
+    def paint(self, item: Entity, name: str) -> None:
+        """Give one body of an object the colour of a material that isn't the object's."""
+        if name not in self._materials:
+            self._materials[name] = self._material(name)
+        self.add("IfcStyledItem", item, [self._styles[name]], None)
+
     def _material(self, name: str) -> Entity:
         """Add a material and its colour."""
         entry = materials().get(name, materials()[UNKNOWN])
@@ -237,7 +244,7 @@ class IfcFile:
         material = self.add("IfcMaterial", Name=name)
         colour = self.add("IfcColourRgb", None, red, green, blue)
         shading = self.add("IfcSurfaceStyleShading", colour, None)
-        style = self.add("IfcSurfaceStyle", name, "BOTH", [shading])
+        style = self._styles[name] = self.add("IfcSurfaceStyle", name, "BOTH", [shading])
         item = self.add("IfcStyledItem", None, [style], None)
         shown = self.add("IfcStyledRepresentation", self.contexts["Body"], "Style", "Material", [item])
         self.add("IfcMaterialDefinitionRepresentation", None, None, [shown], material)

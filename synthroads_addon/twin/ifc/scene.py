@@ -5,22 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...road.geometry import RoadGeometry
-from ...road.objects import PointObject, RoadObject
-from ...road.terrain import highest_pavement
-from ...road.things.asset import Asset
+from ...road.objects import RoadObject
 from ..surfaces import on_ground
 from .alignment import Axis, linear_placement, local_placement
 from .entities import Entity, Float, IfcFile
-
-_ACROSS, _ROWS = 0.05, 7
-"""Distance (m) of the points across the road at which the pavement is looked at (3.5 mm at 7 % crossfall), and their
-rows along it."""
 
 
 @dataclass(frozen=True)
@@ -40,11 +33,6 @@ class IfcPlace:
     def frame(self, ifc: IfcFile) -> Entity:
         """Add a placement in this frame, at its origin."""
         return ifc.add("IfcLocalPlacement", self.placement, ifc.flat_axes)
-
-    def plan(self, x: Float, y: Float) -> Float:
-        """Return local points (N, 2) at places (N,) of this frame."""
-        cosine, sine = math.cos(self.heading), math.sin(self.heading)
-        return self.origin[:2] + np.column_stack([cosine * x - sine * y, sine * x + cosine * y])
 
     def inside(self, points: Float) -> Float:
         """Return local points (..., 3) in this frame."""
@@ -103,11 +91,10 @@ class Scene:
         points[:, 2] += above
         return points
 
-    def rows(self, start: float, end: float, *more: float) -> Float:
-        """Return the stations (N,) of rows from a start to an end (m), both included; ``more`` are rows as well."""
+    def rows(self, start: float, end: float) -> Float:
+        """Return the stations (N,) of rows from a start to an end (m), both included."""
         inside = self.stations[(self.stations > start) & (self.stations < end)]
-        extra = [station for station in more if start < station < end]
-        return np.unique(np.concatenate([[start], inside, extra, [end]]))
+        return np.unique(np.concatenate([[start], inside, [end]]))
 
     def place(self, station: float, offset: float, above: float = 0.0) -> IfcPlace:
         """Return a frame on the surface, or above it; beyond the road's ends it lies on its end."""
@@ -123,28 +110,6 @@ class Scene:
             placement = local_placement(self.ifc, origin, float(heading[0]))
         return IfcPlace(placement, origin, float(heading[0]))
 
-    def place_of(self, item: PointObject) -> IfcPlace:
-        """Return the frame at a point object's foot; its rotation isn't in it."""
-        return self.place(item.station, item.offset, item.elevation)
-
-    def pavement_below(
-        self, place: IfcPlace, along: tuple[float, float], across: tuple[float, float], shear: float = 0.0
-    ) -> float:
-        """Return the local elevation (m) of the pavement's highest point below something; without any, the place's.
-
-        Args:
-            place: frame of what spans the road.
-            along: its rear and front end in the frame, m.
-            across: its left and right end there, m.
-            shear: by how much it lies farther back per metre to the left (m/m): a skew bridge.
-        """
-        left, right = across
-        count = max(2, math.ceil((left - right) / _ACROSS) + 1)
-        beside, ahead = np.meshgrid(np.linspace(left, right, count), np.linspace(*along, _ROWS))
-        plan = place.plan((ahead - shear * beside).ravel(), beside.ravel())
-        highest = highest_pavement(self.geometry, *self.geometry.alignment.project(plan))
-        return float(place.origin[2]) if highest is None else highest
-
     def container(self, station: float, offset: float) -> Entity:
         """Return the part of the road that something stands in: a carriageway, the median, or beside the road."""
         _, index = self.at(station, offset)
@@ -157,15 +122,9 @@ class Scene:
 
     def describe(self, entity: Entity, item: RoadObject) -> None:
         """Give an entity what the parameter set says of its object, under the same names, and its class."""
-        label = item.class_name if isinstance(item, Asset) else item.points_class
+        label = item.semantic_class
         values = self.ifc.parameters_of(item) | ({"class": self.ifc.value(label)} if label else {})
         self.ifc.properties(entity, "SynthRoads", values)
-
-    def add_part(self, whole: Entity, place: IfcPlace, entity: str, name: str, kind: str, **named: Any) -> Entity:
-        """Add an element of a predefined type that is part of another one, in its frame."""
-        part = self.ifc.product(entity, name, kind, placement=place.frame(self.ifc), **named)
-        self.ifc.gather("IfcRelAggregates", whole, [part])
-        return part
 
     def stand(self, entity: Entity, container: Entity) -> None:
         """Put an element that is placed along the alignment into its container."""

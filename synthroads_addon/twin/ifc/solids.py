@@ -1,92 +1,68 @@
-"""Bodies of what stands at one place, as extrusions, in a driver's frame.
-
-The frame's origin is the foot; x points away from the driver whom the object faces, y to the driver's left, z up. An
-object's rotation about the vertical turns its body within its placement.
-"""
+"""Bodies of products: outlines pushed along an axis as extrusions, others as closed meshes."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
-from ...road.things.sign_outline import SIGN_OUTLINES
+import numpy as np
+
+from ...base.arrays import Float
+from ..faces import loft, strip_triangles
 from .entities import Entity, IfcFile, short
 
-Point2 = tuple[float, float]
-Point3 = tuple[float, float, float]
+_FLAT = 1e-9  # m
 
 
-class Solids:
-    """Makes extrusions that are turned about the vertical by an angle (rad).
+def give_bodies(ifc: IfcFile, product: Entity, bodies: Sequence[tuple[Float, str]]) -> None:
+    """Give a product its bodies, and the material of the first of them; the others have their materials' colours.
 
-    What has no extent along one of its axes, as the post of a gantry whose beam lies below the post's foot, has no
-    body: None.
+    Products of the same bodies share them.
+
+    Args:
+        ifc: the file.
+        product: in whose frame they are.
+        bodies: sections (R, K, 3) as in `road.things.body`, and names of materials.
     """
-
-    def __init__(self, ifc: IfcFile, turn: float = 0.0) -> None:
-        self.ifc = ifc
-        self._turn = turn
-
-    def box(self, size: Point3, foot: Point3) -> Entity | None:
-        """Add a box of a size along x, y and z; ``foot`` is the middle of its underside."""
-        if _flat(*size):
-            return None
-        axes = self.ifc.add("IfcAxis2Placement2D", self.ifc.point(0.0, 0.0), None)
-        profile = self.ifc.add("IfcRectangleProfileDef", "AREA", None, axes, *short(size[:2]))
-        return self._upwards(profile, foot, size[2])
-
-    def cylinder(self, diameter: float, foot: Point3, height: float) -> Entity | None:
-        """Add an upright cylinder."""
-        if _flat(diameter / 2.0, height):
-            return None
-        axes = self.ifc.add("IfcAxis2Placement2D", self.ifc.point(0.0, 0.0), None)
-        profile = self.ifc.add("IfcCircleProfileDef", "AREA", None, axes, short(diameter / 2.0))
-        return self._upwards(profile, foot, height)
-
-    def prism(self, outline: Sequence[Point2], foot: Point3, height: float) -> Entity | None:
-        """Add an upright prism over an outline in x and y around its foot."""
-        if _flat(height):
-            return None
-        return self._upwards(self._outline(outline), foot, height)
-
-    def plate(self, shape: str, width: float, height: float, middle: Point3, thickness: float) -> Entity | None:
-        """Add an upright plate that faces the driver; ``middle`` is that of its back."""
-        if _flat(width / 2.0, height / 2.0, thickness):
-            return None
-        ifc = self.ifc
-        if shape not in SIGN_OUTLINES:
-            axes = ifc.add("IfcAxis2Placement2D", ifc.point(0.0, 0.0), None)
-            half = short((width / 2.0, height / 2.0))
-            profile = ifc.add("IfcEllipseProfileDef", "AREA", None, axes, *half)
-        else:
-            profile = self._outline([(u * width, v * height) for u, v in SIGN_OUTLINES[shape]])
-        # The profile's x runs to the driver's right, its y up; it is extruded towards the driver.
-        towards = self._direction(-1.0, 0.0)
-        right = self._direction(0.0, -1.0)
-        return self._extruded(profile, middle, (towards, right), thickness)
-
-    def _upwards(self, profile: Entity, foot: Point3, height: float) -> Entity:
-        return self._extruded(profile, foot, (self.ifc.direction(0.0, 0.0, 1.0), self._direction(1.0, 0.0)), height)
-
-    def _outline(self, points: Sequence[Point2]) -> Entity:
-        corners = self.ifc.add("IfcCartesianPointList2D", short([*points, points[0]]))
-        curve = self.ifc.add("IfcIndexedPolyCurve", corners, None, False)
-        return self.ifc.add("IfcArbitraryClosedProfileDef", "AREA", None, curve)
-
-    def _direction(self, x: float, y: float) -> Entity:
-        return self.ifc.direction(*self._turned(x, y), 0.0)
-
-    def _turned(self, x: float, y: float) -> Point2:
-        cosine, sine = math.cos(self._turn), math.sin(self._turn)
-        return cosine * x - sine * y, sine * x + cosine * y
-
-    def _extruded(self, profile: Entity, place: Point3, axes: tuple[Entity, Entity], depth: float) -> Entity:
-        """Extrude a profile along the first of two axes; the second is the profile's x."""
-        x, y, z = place
-        position = self.ifc.add("IfcAxis2Placement3D", self.ifc.point(*self._turned(x, y), z), *axes)
-        return self.ifc.add("IfcExtrudedAreaSolid", profile, position, self.ifc.direction(0.0, 0.0, 1.0), short(depth))
+    key = tuple((sections.round(9).tobytes(), sections.shape, material) for sections, material in bodies)
+    ifc.made_of(product, bodies[0][1])
+    if ifc.has_shape(key):
+        product.Representation = ifc.shape((), "", key)
+        return
+    swept = [_extrusion(sections) for sections, _ in bodies]
+    if all(extrusion is not None for extrusion in swept):
+        kind, items = "SweptSolid", [_extrude(ifc, *extrusion) for extrusion in swept if extrusion]
+    else:
+        kind, items = "Tessellation", [_mesh(ifc, sections) for sections, _ in bodies]
+    for item, (_, material) in zip(items, bodies, strict=True):
+        if item is not None and material != bodies[0][1]:
+            ifc.paint(item, material)
+    product.Representation = ifc.shape(items, kind, key)
 
 
-def _flat(*lengths: float) -> bool:
-    """Return whether one of some lengths (m) isn't positive as it would be written."""
-    return min(short(lengths)) <= 0.0
+def _mesh(ifc: IfcFile, sections: Float) -> Entity | None:
+    faces = loft(sections)
+    return ifc.mesh(faces.points, strip_triangles(faces), True)
+
+
+def _extrude(ifc: IfcFile, outline: Float, way: Float) -> Entity | None:
+    """Add an outline (K, 3), pushed along a vector at right angles to it; None if it has no extent."""
+    depth, side = float(np.linalg.norm(way)), outline[1] - outline[0]
+    axis, u = way / depth, side / max(float(np.linalg.norm(side)), _FLAT)
+    middle = outline.mean(axis=0)
+    flat = (outline - middle) @ np.stack([u, np.cross(axis, u)], axis=1)
+    if min(short([depth, *np.ptp(flat, axis=0)])) <= 0.0:
+        return None
+    corners = ifc.add("IfcCartesianPointList2D", short([*flat, flat[0]]))
+    curve = ifc.add("IfcIndexedPolyCurve", corners, None, False)
+    profile = ifc.add("IfcArbitraryClosedProfileDef", "AREA", None, curve)
+    position = ifc.add("IfcAxis2Placement3D", ifc.point(*middle), ifc.direction(*axis), ifc.direction(*u))
+    return ifc.add("IfcExtrudedAreaSolid", profile, position, ifc.direction(0.0, 0.0, 1.0), short(depth))
+
+
+def _extrusion(sections: Float) -> tuple[Float, Float] | None:
+    """Return the outline and the way of sections that are one flat outline pushed at right angles; else None."""
+    if len(sections) > 2:
+        return None
+    ways = sections[1] - sections[0]
+    level = np.abs((sections[0] - sections[0][0]) @ ways[0])
+    return None if max(np.ptp(ways, axis=0).max(), level.max()) > _FLAT or not ways.any() else (sections[0], ways[0])

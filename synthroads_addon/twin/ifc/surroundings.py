@@ -9,10 +9,11 @@ import numpy as np
 from ...road.alignment import clip_offset
 from ...road.lane_lines import lane_of
 from ...road.surroundings import Terrain, Vegetation, Vehicle
+from ...road.things.body import box, turned
 from ...road.things.vehicles import CHASSIS, VEHICLE_TYPES
 from .entities import Entity
 from .scene import Scene, grid_triangles
-from .solids import Solids
+from .solids import give_bodies
 
 _SPACINGS = ((12.0, 1.0), (40.0, 4.0), (math.inf, 10.0))
 """Up to a distance from the road's edge (m) the terrain has a column every so many metres."""
@@ -81,9 +82,8 @@ def _vehicles(scene: Scene) -> None:
 
 def _vehicle(scene: Scene, name: str, item: Vehicle, offset: float, turn: float) -> None:
     ifc, kind = scene.ifc, VEHICLE_TYPES[item.model]
-    body = Solids(ifc, turn).box((kind.length, kind.width, kind.height), (0.0, 0.0, 0.0))
-    placement, shape = scene.place(item.station, offset).placement, ifc.shape([body], "SweptSolid")
-    made = ifc.product("IfcVehicle", name, "VEHICLEWHEELED", item.model, placement, Representation=shape)
+    made = ifc.product("IfcVehicle", name, "VEHICLEWHEELED", item.model, scene.place(item.station, offset).placement)
+    around = box((kind.length, kind.width, kind.height), (0.0, 0.0, kind.height / 2.0))
+    give_bodies(ifc, made, [(turned(around, turn), "car_paint")])
     scene.describe(made, item)
     scene.stand(made, scene.container(item.station, offset))
-    ifc.made_of(made, "car_paint")

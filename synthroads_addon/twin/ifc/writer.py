@@ -17,13 +17,11 @@ from ...road.objects import PointObject
 from ...road.parameters import RoadParameters
 from ..surfaces import road_stations
 from .alignment import write_alignment
-from .barriers import write_barriers
 from .entities import Entity, IfcFile
-from .furniture import write_furniture
 from .road import write_carriageways, write_markings, write_road
 from .scene import Scene
-from .structures import write_gantries, write_overpasses
 from .surroundings import write_surroundings
+from .things import write_things
 
 _LONGEST = 200_000.0
 """Longest road that is written as one file, m: as long as scenarios can be."""
@@ -67,10 +65,7 @@ def write_ifc(
     scene.look_up((item.station, item.offset) for item in parameters.of_type(PointObject).values())
     write_carriageways(scene)
     write_markings(scene)
-    write_barriers(scene)
-    write_furniture(scene)
-    write_gantries(scene)
-    write_overpasses(scene)
+    write_things(scene)
     write_surroundings(scene)
     ifc.relate()
     ifc.write(path, parameters.metadata.identifier, parameters.metadata.generator)

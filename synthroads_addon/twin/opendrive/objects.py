@@ -3,41 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
-from ...road.objects import LineObject, PointObject, RoadObject
+from ...base.arrays import Float
+from ...road.objects import RoadObject
 from ...road.paint import arrow_outlines, hatching_outlines
 from ...road.section import Arrow, Hatching, LineMarking
-from ...road.things import delineator as sizes
-from ...road.things.asset import Asset
-from ...road.things.beacon import ConstructionBeacon
-from ...road.things.cabinet import Cabinet
-from ...road.things.concrete_barrier import ConcreteBarrier
-from ...road.things.delineator import Delineator
-from ...road.things.gantry import Gantry
-from ...road.things.guardrail import Guardrail
-from ...road.things.kilometre_board import KilometreBoard
-from ...road.things.noise_barrier import NoiseBarrier
-from ...road.things.overpass import Overpass
-from ...road.things.pole import Pole
-from ...road.things.sign import TrafficSign
-from ...road.things.temporary_barrier import TemporaryBarrier
-from ...road.things.traffic_light import TrafficLight
+from ...road.things.body import Body
+from ...road.things.thing import LengthwiseThing, StandingThing, Thing
+from ..things import PlacedThing
 from .numbers import Numbers
-from .pieces import CLOSE, Float
+from .pieces import CLOSE
 from .places import Ground, side_of
 from .surface import RoadFrame
 from .xml import Element, Value, element, notes
-
-LIGHT_POST, BOARD_POST = 0.12, 0.06
-"""Diameters of a traffic light's and a kilometre board's post, m."""
-BEAM_REACH, POST_REACH, BEACON_REACH = 0.2, 0.05, 0.1
-_ABUTMENT = 1.0  # m, thickness of the walls that an overpass ends at
-
-Corners = Iterable[tuple[float, float]]
 
 
 class Objects:
@@ -48,145 +30,89 @@ class Objects:
         ground: what they stand on.
         frame: the carriageway that is the road: it has what stands on its side of the centreline.
         numbers: ids of parts.
+        standing: what stands at one place, with its bodies, by id.
     """
 
-    def __init__(self, parent: Element, ground: Ground, frame: RoadFrame, numbers: Numbers) -> None:
+    def __init__(
+        self,
+        parent: Element,
+        ground: Ground,
+        frame: RoadFrame,
+        numbers: Numbers,
+        standing: Mapping[str, PlacedThing],
+    ) -> None:
         self.parent = parent
         self.ground = ground
         self.frame = frame
         self.numbers = numbers
+        self.standing = standing
 
     def write(self, loose: Iterable[tuple[str, LineMarking, float, float]]) -> None:
         """Add its objects in the order of the parameter set, then the lines that follow no lane."""
         for name, item in self.ground.geometry.parameters.objects.items():
-            make = _MAKERS.get(type(item))
-            if make and side_of(self.ground.geometry, item) == self.frame.side:
-                make(self, name, item)
+            if side_of(self.ground.geometry, item) != self.frame.side:
+                continue
+            if isinstance(item, LengthwiseThing):
+                self.barrier(name, item)
+            elif isinstance(item, StandingThing):
+                self.upright(name, item)
+            elif isinstance(item, Hatching | Arrow):
+                self.painted(name, item)
         parts: dict[str, int] = {}
         for name, line, start, end in loose:
             parts[name] = parts.get(name, 0) + 1
             self.loose_line(name, line, (start, end), parts[name])
 
-    # --- along the road ---------------------------------------------------------------------------------------------
+    # --- things -----------------------------------------------------------------------------------------------------
 
-    def barrier(self, name: str, item: LineObject) -> None:
+    def barrier(self, name: str, item: LengthwiseThing) -> None:
         """Add what runs along the road: repeats with distance 0, linear from one to the next."""
-        subtype, width, beside = _cross_section(item)
-        rows = self.ground.along(item, self.frame, beside)
+        right, left = item.reach()
+        width, (kind, subtype) = right + left, _types(item)
+        rows = self.ground.along(item, self.frame, (left - right) / 2.0)
         if not len(rows):
             return
-        attributes: dict[str, Value] = {"type": "barrier", "subtype": subtype, "hdg": 0.0}
-        attributes |= {"length": float(rows[-1, 0] - rows[0, 0]), "width": width, "height": _tall(item)}
+        attributes: dict[str, Value] = {"type": kind, "subtype": subtype, "hdg": 0.0}
+        attributes |= {"length": float(rows[-1, 0] - rows[0, 0]), "width": width}
+        attributes["height"] = float(getattr(item, "height", 0.0))
         made = self._placed(name, item, attributes, rows[0, :3])
         for (s0, t0, z0, h0), (s1, t1, z1, h1) in zip(rows[:-1].tolist(), rows[1:].tolist(), strict=True):
             repeat: dict[str, Value] = {"s": s0, "length": s1 - s0, "distance": 0.0, "tStart": t0, "tEnd": t1}
             repeat |= {"heightStart": h0, "heightEnd": h1, "zOffsetStart": _fine(z0), "zOffsetEnd": _fine(z1)}
             element(made, "repeat", {**repeat, "widthStart": width, "widthEnd": width})
-        details = {"offset": item.offset}
-        for code in ("faces", "post_spacing", "segment_length", "panel", "profile", "terminal_length"):
-            if (value := getattr(item, code, None)) is not None:
-                details[code] = value
-        notes(made, name, item.instance, object_type=type(item).__name__, **details)
+        _describe(made, name, item)
 
-    # --- at one place -----------------------------------------------------------------------------------------------
-
-    def upright(self, name: str, item: Any) -> None:
-        """Add what stands at one place as a box or a cylinder."""
-        kind, subtype, size = _SIZES[type(item)](item)
-        made = self._object(name, item, {"type": kind, "subtype": subtype, "hdg": _turn(item), **size})
-        arm = getattr(item, "arm_length", 0.0)
-        details = {code: getattr(item, code) for code in ("class_name", "library", "scale") if hasattr(item, code)}
-        if arm > 0.0:
-            details["arm_length"] = arm
-        notes(made, name, item.instance, object_type=type(item).__name__, **details)
-        if arm > 0.0:
-            line = element(element(made, "skeleton"), "polyline", {"id": 1})
-            for number, (v, z) in enumerate(((0.0, 0.0), (0.0, item.height), (arm, item.height)), 1):
-                element(line, "vertexLocal", {"id": number, "u": 0.0, "v": v, "z": z})
-
-    def posts(self, name: str, item: TrafficSign | KilometreBoard | TrafficLight) -> None:
-        """Add the posts of a signal as one object."""
-        count = item.posts if isinstance(item, TrafficSign) else 1
-        light = isinstance(item, TrafficLight)
-        diameter = item.post_diameter if isinstance(item, TrafficSign) else LIGHT_POST if light else BOARD_POST
-        top = item.height if isinstance(item, TrafficLight) else item.lower_edge + item.height
-        size: dict[str, Value] = {"height": top, "radius": diameter / 2.0}
-        if count > 1:
-            size = {"height": top, "length": diameter, "width": item.width}  # type: ignore[union-attr]
-        attributes: dict[str, Value] = {"type": "pole", "subtype": "signalPost", "hdg": _turn(item), **size}
-        made = self._object(name, item, attributes)
-        if count > 1:
-            places = [((i + 0.5) / count - 0.5) * item.width for i in range(count)]  # type: ignore[union-attr]
-            half = diameter / 2.0
-            outlines = [_rectangle((-half, half), (v - half, v + half)) for v in places]
-            _local_outlines(made, [(outline, 0.0, top) for outline in outlines])
-        notes(made, name, item.instance, object_type=type(item).__name__)
-
-    def gantry(self, name: str, item: Gantry) -> None:
-        """Add a gantry: its beam and its posts as outlines around its place."""
-        foot = self.ground.foot(name)
-        _, bottom = gantry_levels(self.ground, item)
-        left, right = item.left_offset - item.offset, item.right_offset - item.offset
-        deep, half = item.beam_depth / 2.0, item.post_width / 2.0
-        bodies = [(_rectangle((-deep, deep), (right, left)), bottom - foot, item.beam_height)]
-        ends = {"left": [left], "right": [right]}[item.post_side]
-        middle = -item.offset if item.kind == "two_sided" else None
-        if item.kind != "cantilever":
-            ends = [left, right] + ([] if middle is None else [middle])
-        ground = self.ground.height(np.full(len(ends), item.station), np.array(ends) + item.offset)
-        for v, base in zip(ends, (ground + item.elevation - foot).tolist(), strict=True):
-            top = bottom - foot + (0.0 if v == middle else item.beam_height)
-            bodies.append((_rectangle((-deep, deep), (v - half, v + half)), base, max(top - base, 0.0)))
-        size: dict[str, Value] = {
-            "length": item.beam_depth,
-            "width": left - right,
-            "height": bottom + item.beam_height - foot,
-        }
-        made = self._object(name, item, {"type": "gantry", "subtype": item.kind, "hdg": _turn(item), **size})
-        _local_outlines(made, bodies)
-        notes(made, name, item.instance, object_type="Gantry", beam=item.beam, clearance=item.clearance)
-
-    def overpass(self, name: str, item: Overpass) -> None:
-        """Add a bridge over the road: deck, piers and abutments as outlines; the road below is an underpass."""
-        shear = math.tan(math.radians(item.rotation_deg))
-        half, foot = item.width / 2.0, self.ground.foot(name)
-        s0, s1 = item.station - half, item.station + half
-        below = self.ground.pavement_below((s0, s1), (item.right_abutment, item.left_abutment), -shear)
-        low = below + item.clearance - foot
-        left, right = item.left_abutment - item.offset, item.right_abutment - item.offset
-        bodies = [(_leaning((-half, half), (right, left), shear), low, item.deck_thickness)]
-        for offset in item.pier_offsets:
-            v, wide = offset - item.offset, item.pier_width / 2.0
-            base = self._base(item, offset) - foot
-            along = _rectangle((-v * shear - half * 0.8, -v * shear + half * 0.8), (v - wide, v + wide))
-            bodies.append((along, base, max(low - base, 0.0)))
-        for face, outwards in ((left, _ABUTMENT), (right, -_ABUTMENT)):
-            base = self._base(item, face + item.offset) - foot
-            wall = _leaning((-half, half), (min(face, face + outwards), max(face, face + outwards)), shear)
-            bodies.append((wall, base, max(low - base, 0.0)))
-        size: dict[str, Value] = {"length": item.width, "width": left - right, "height": low + item.deck_thickness}
-        made = self._object(name, item, {"type": "building", "subtype": "overpass", "hdg": 0.0, **size})
-        _local_outlines(made, bodies)
-        details = {"clearance": item.clearance, "parapet_height": item.parapet_height}
-        notes(made, name, item.instance, object_type="Overpass", **details)
+    def upright(self, name: str, item: StandingThing) -> None:
+        """Add what stands at one place: each of its bodies but signs' faces is an outline around its place."""
+        kind, subtype = _types(item)
+        signals = item.signals()
+        bodies = [b for b in self.standing[name].bodies if not b.detail and b.part not in signals]
+        attributes: dict[str, Value] = {"type": kind, "subtype": subtype, "hdg": math.remainder(item.turn, math.tau)}
+        if bodies:
+            corners = np.concatenate([body.sections.reshape(-1, 3) for body in bodies])
+            width, length, _ = np.ptp(corners, axis=0).tolist()
+            attributes |= {"length": length, "width": width, "height": float(corners[:, 2].max())}
+        made = self._object(name, item, attributes, (item.station, item.offset, self.ground.foot(name)))
+        outlines = element(made, "outlines") if bodies else made
+        for number, body in enumerate(bodies):
+            outline = element(outlines, "outline", {"id": number, "outer": True, "closed": True})
+            for corner, (u, v, low, high) in enumerate(_upright_outline(body).tolist()):
+                where: dict[str, Value] = {"id": corner, "u": u, "v": v, "z": _fine(low), "height": _fine(high - low)}
+                element(outline, "cornerLocal", where)
+        _describe(made, name, item)
 
     def underpasses(self) -> None:
         """Add the stretches below bridges as tunnels open to the sides, of each road; they follow all objects."""
         first = self.frame.side == next(iter(self.ground.geometry.sections))
-        for name, item in self.ground.geometry.parameters.of_type(Overpass).items():
-            start = max(item.station - item.width / 2.0, 0.0)
-            end = min(item.station + item.width / 2.0, self.ground.geometry.length)
-            attributes: dict[str, Value] = {
-                "id": item.instance if first else self.numbers.next(),
-                "name": name,
-                "s": start,
-                "length": end - start,
-            }
-            made = element(self.parent, "tunnel", {**attributes, "type": "underpass", "daylight": 1.0, "lighting": 0.0})
-            notes(made, name, item.instance)
-
-    def _base(self, item: Overpass, offset: float) -> float:
-        return float(self.ground.height(np.array([item.station]), np.array([offset]))[0])
+        for name, item in self.ground.geometry.parameters.of_type(Thing).items():
+            for block in item.footprint() if item.twin().cityjson == "Bridge" else ():
+                if block.part != "beam":
+                    continue
+                start, end = max(block.start, 0.0), min(block.end, self.ground.geometry.length)
+                number = item.instance if first else self.numbers.next()
+                about: dict[str, Value] = {"id": number, "name": name, "s": start, "length": end - start}
+                made = element(self.parent, "tunnel", {**about, "type": "underpass", "daylight": 1.0, "lighting": 0.0})
+                notes(made, name, item.instance)
 
     # --- painted ----------------------------------------------------------------------------------------------------
 
@@ -202,7 +128,9 @@ class Objects:
         at = (item.station, item.offset) if isinstance(item, Arrow) else tuple(corners.mean(axis=0).tolist())
         z = float(self.ground.height(np.array(at[:1]), np.array(at[1:]))[0])
         subtype = "hatching" if isinstance(item, Hatching) else f"arrow_{item.kind}"
-        attributes: dict[str, Value] = {"type": "roadMark", "subtype": subtype, "hdg": _turn(item)}
+        turn = item.rotation_deg if isinstance(item, Arrow) else 0.0
+        heading = math.radians((turn + 180.0) % 360.0 - 180.0)
+        attributes: dict[str, Value] = {"type": "roadMark", "subtype": subtype, "hdg": heading}
         made = self._object(name, item, {**attributes, "height": item.film_thickness}, (*at, z))
         place = self.frame.place(corners[:, 0], corners[:, 1], heights)
         rows = np.column_stack([place.s, place.t, place.h])
@@ -245,17 +173,8 @@ class Objects:
         place = self.frame.place(stations, middle, self.ground.height(stations, middle))
         return np.column_stack([place.s, place.t, place.h])
 
-    def _object(
-        self,
-        name: str,
-        item: RoadObject,
-        attributes: dict[str, Value],
-        place: tuple[float, ...] | None = None,
-    ) -> Element:
-        """Add an object; without a place (station, offset, height) it stands on its foot."""
-        if place is None:
-            assert isinstance(item, PointObject)
-            place = (item.station, item.offset, self.ground.foot(name))
+    def _object(self, name: str, item: RoadObject, attributes: dict[str, Value], place: tuple[float, ...]) -> Element:
+        """Add an object at a station, offset and height."""
         found = self.frame.place(*(np.array([value]) for value in place))
         return self._placed(name, item, attributes, np.array([found.s[0], found.t[0], found.h[0]]))
 
@@ -269,80 +188,37 @@ class Objects:
         return element(self.parent, "object", {**about, "orientation": "none", "dynamic": "no", **attributes})
 
 
-def gantry_levels(ground: Ground, item: Gantry) -> tuple[float, float]:
-    """Return the heights of a gantry's lowest part and of its beam's lower edge above the reference line, m."""
-    span = (item.station - item.reach(1.0), item.station + item.reach(-1.0))
-    low = ground.pavement_below(span, (item.right_offset, item.left_offset)) + item.clearance
-    return low, item.beam_bottom(low)
+def _types(item: Thing) -> tuple[str, str]:
+    """Return the type and the subtype of a thing."""
+    kind, _, subtype = item.twin().opendrive.partition(".")
+    return kind, subtype
+
+
+_SAID = ("instance", "type", "name", "station", "elevation", "rotation_deg", "start_station", "end_station")
+"""Fields that an object's own attributes say."""
+
+
+def _describe(made: Element, name: str, item: Thing) -> None:
+    """Add what the parameter set says of a thing, but where it stands and what has parts."""
+    values = {key: value for key, value in item.to_dict().items() if key not in _SAID}
+    simple: dict[str, Any] = {key: value for key, value in values.items() if isinstance(value, str | int | float)}
+    notes(made, name, item.instance, object_type=type(item).__name__, **simple)
+
+
+def _upright_outline(body: Body) -> Float:
+    """Return an outline around a body (K, 4): u ahead, v to the left, its lowest and its highest z there."""
+    first, last = body.sections[0], body.sections[-1]
+    if len(body.sections) > 2 or np.abs(first[:, :2] - last[:, :2]).max() > CLOSE:
+        (x0, y0, z0), (x1, y1, z1) = body.sections.min(axis=(0, 1)), body.sections.max(axis=(0, 1))
+        corners = np.array([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
+        return np.column_stack([corners[:, 1], -corners[:, 0], np.full(4, z0), np.full(4, z1)])
+    low, high = np.sort(np.stack([first[:, 2], last[:, 2]]), axis=0)
+    return np.column_stack([first[:, 1], -first[:, 0], low, high])
 
 
 def _fine(value: float) -> float:
     """Return a height rounded so that the last bits of the terrain's sines don't show."""
     return round(value, 6)
-
-
-def _turn(item: RoadObject) -> float:
-    degrees = getattr(item, "rotation_deg", 0.0)
-    return math.radians((degrees + 180.0) % 360.0 - 180.0)
-
-
-def _tall(item: LineObject) -> float:
-    return float(getattr(item, "height", 0.0))
-
-
-def _cross_section(item: LineObject) -> tuple[str, float, float]:
-    """Return a barrier's subtype, its width, and how far its middle lies to the left of its axis, m."""
-    if isinstance(item, Guardrail):
-        if item.faces == "both":
-            return "guardRail", 2.0 * BEAM_REACH, 0.0
-        beside = (BEAM_REACH - POST_REACH) / 2.0
-        return "guardRail", BEAM_REACH + POST_REACH, beside if item.faces == "left" else -beside
-    if isinstance(item, NoiseBarrier):
-        return "noiseBarrier", max(item.thickness, item.post_width), 0.0
-    subtype = "concreteBarrier" if isinstance(item, ConcreteBarrier) else "temporaryBarrier"
-    return subtype, float(getattr(item, "base_width", 0.0)), 0.0
-
-
-_Size = tuple[str, str, dict[str, Value]]
-_SIZES: dict[type[RoadObject], Callable[[Any], _Size]] = {
-    Delineator: lambda item: (
-        "pole",
-        "delineator",
-        {"length": 2.0 * sizes.REACH, "width": 2.0 * sizes.REACH, "height": item.height},
-    ),
-    Pole: lambda item: ("pole", item.kind, {"radius": item.diameter / 2.0, "height": item.height}),
-    Cabinet: lambda item: (
-        "obstacle",
-        item.kind,
-        {"length": item.depth, "width": item.width, "height": item.height},
-    ),
-    ConstructionBeacon: lambda item: (
-        "obstacle",
-        "constructionBeacon",
-        {"length": 2.0 * BEACON_REACH, "width": item.width, "height": item.height},
-    ),
-    Asset: lambda item: ("none", item.name, {}),
-}
-"""Class -> type, subtype and size of its object: length along its heading, width across."""
-
-
-def _rectangle(u: tuple[float, float], v: tuple[float, float]) -> list[tuple[float, float]]:
-    return [(u[0], v[0]), (u[1], v[0]), (u[1], v[1]), (u[0], v[1])]
-
-
-def _leaning(u: tuple[float, float], v: tuple[float, float], shear: float) -> list[tuple[float, float]]:
-    """Return a rectangle of which u falls by `shear` per v."""
-    return [(x - y * shear, y) for x, y in _rectangle(u, v)]
-
-
-def _local_outlines(parent: Element, bodies: Iterable[tuple[Corners, float, float]]) -> None:
-    """Add outlines around the object's place, each with its bottom and its height (m)."""
-    outlines = element(parent, "outlines")
-    for number, (corners, bottom, height) in enumerate(bodies):
-        outline = element(outlines, "outline", {"id": number, "outer": True, "closed": True})
-        for corner, (u, v) in enumerate(corners):
-            where: dict[str, Value] = {"id": corner, "u": u, "v": v, "z": _fine(bottom), "height": _fine(height)}
-            element(outline, "cornerLocal", where)
 
 
 def _road_outline(parent: Element, number: int, corners: Float, height: float, closed: bool = True) -> None:
@@ -351,13 +227,3 @@ def _road_outline(parent: Element, number: int, corners: Float, height: float, c
     outline = element(parent, "outline", {**attributes, "fillType": "paint" if closed else None})
     for corner, (s, t, z) in enumerate(corners.tolist()):
         element(outline, "cornerRoad", {"id": corner, "s": s, "t": t, "dz": _fine(z), "height": height})
-
-
-_MAKERS: dict[type, Callable[[Objects, str, Any], None]] = {
-    **dict.fromkeys((Guardrail, ConcreteBarrier, NoiseBarrier, TemporaryBarrier), Objects.barrier),
-    **dict.fromkeys(_SIZES, Objects.upright),
-    **dict.fromkeys((TrafficSign, KilometreBoard, TrafficLight), Objects.posts),
-    **dict.fromkeys((Hatching, Arrow), Objects.painted),
-    Gantry: Objects.gantry,
-    Overpass: Objects.overpass,
-}

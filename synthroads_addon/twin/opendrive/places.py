@@ -8,31 +8,33 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...road.geometry import RoadGeometry
-from ...road.objects import LineObject, PointObject, RoadObject, Side
+from ...road.objects import PointObject, RoadObject, Side
 from ...road.section import Carriageway, Hatching, Turnout
-from ...road.terrain import highest_pavement, known_elevation
-from ...road.things.gantry import GantrySign
-from ..surfaces import height_share, ramp_length
+from ...road.terrain import known_elevation
+from ...road.things.thing import LengthwiseThing
 from .pieces import CLOSE, Float, chords, merged_stations
 from .surface import RoadFrame
 
-_COLUMNS, _ROWS = 240, 7
 
-
-def side_of(geometry: RoadGeometry, item: RoadObject | GantrySign) -> Side:
+def side_of(geometry: RoadGeometry, item: RoadObject) -> Side:
     """Return the carriageway that something is written with: the one on its side of the centreline, or the only one.
 
     What is painted belongs to the carriageway whose pavement it is on.
     """
-    if len(geometry.sections) == 1:
-        return next(iter(geometry.sections))
     if isinstance(item, Hatching):
         turnout = geometry.parameters.objects[item.turnout]
         assert isinstance(turnout, Turnout)
         carriageway = geometry.parameters.objects[turnout.carriageway]
         assert isinstance(carriageway, Carriageway)
         return carriageway.side
-    return "left" if getattr(item, "offset", 0.0) > 0.0 else "right"
+    return side_at(geometry, getattr(item, "offset", 0.0))
+
+
+def side_at(geometry: RoadGeometry, offset: float) -> Side:
+    """Return the carriageway on the side of an offset, or the only one."""
+    if len(geometry.sections) == 1:
+        return next(iter(geometry.sections))
+    return "left" if offset > 0.0 else "right"
 
 
 class Ground:
@@ -65,7 +67,7 @@ class Ground:
         along = np.clip(station, 0.0, self.geometry.length)
         return known_elevation(self.geometry, along, offset) - self.geometry.profile.elevation(along)
 
-    def along(self, item: LineObject, frame: RoadFrame, beside: float) -> Float:
+    def along(self, item: LengthwiseThing, frame: RoadFrame, beside: float) -> Float:
         """Return rows (N, 4) of s, t, h and height of an object along the road, m.
 
         Between two of them all is linear within the tolerance.
@@ -81,28 +83,16 @@ class Ground:
         sections = self.geometry.sections.values()
         bends = [s for section in sections for s in section.kinks()]
         bends += [point.station for section in sections for point in section.carriageway.crossfall]
-        bends += [start + ramp_length(item, end), end - ramp_length(item, end)]
+        bends += [start + item.ramp_length(end), end - item.ramp_length(end)]
         tall: Any = getattr(item, "height", 0.0)
 
         def rows(station: Float) -> Float:
             offset = item.offset_at(station)
             place = frame.place(station, offset + beside, self.height(station, offset))
-            share = height_share(item, end, station)
+            share = item.height_share(end, station)
             return np.column_stack([place.s - station, place.t, place.h, tall * share])
 
         stations = chords(rows, merged_stations(bends, start, end), self.tolerance, shortest=0.05)
         found = rows(stations)
         found[:, 0] += stations
         return found
-
-    def pavement_below(self, stations: tuple[float, float], offsets: tuple[float, float], lean: float = 0.0) -> float:
-        """Return the height of the pavement's highest point within a rectangle above the profile at its middle, m.
-
-        Stations grow by ``lean`` per offset from its middle. Where nothing there is paved it is 0.
-        """
-        geometry = self.geometry
-        middle, across = sum(stations) / 2.0, sum(offsets) / 2.0
-        s, t = (grid.ravel() for grid in np.meshgrid(np.linspace(*stations, _ROWS), np.linspace(*offsets, _COLUMNS)))
-        s = s + lean * (t - across)
-        highest = highest_pavement(geometry, s, t)
-        return 0.0 if highest is None else highest - float(geometry.profile.elevation(middle))

