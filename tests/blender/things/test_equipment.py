@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.classes import class_id
-from synthroads_addon.blender.things.delineator import REFLECTOR
 from synthroads_addon.road.objects import ObjectT
 from synthroads_addon.road.things import kilometre_board as sizes
 from synthroads_addon.road.things.cabinet import Cabinet
-from synthroads_addon.road.things.delineator import Delineator
+from synthroads_addon.road.things.delineator import REFLECTOR, Delineator
 from synthroads_addon.road.things.kilometre_board import KilometreBoard
 from synthroads_addon.road.things.pole import Pole
 from synthroads_addon.road.things.traffic_light import TrafficLight

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from synthroads_addon.base.classes import class_id
 from synthroads_addon.blender.materials import material
-from synthroads_addon.blender.nodes.standing import BURIED
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.blender.things.sign.face import RAISED, sign_face_group
 from synthroads_addon.blender.things.sign.looks import FaceStyle, face_inputs
@@ -23,6 +22,7 @@ from synthroads_addon.blender.things.sign.writing import LETTERS, LINES
 from synthroads_addon.materials.table import materials
 from synthroads_addon.road import stretches
 from synthroads_addon.road.things import sign as sizes
+from synthroads_addon.road.things.body import BURIED
 from synthroads_addon.road.things.sign import TrafficSign
 from synthroads_addon.road.things.sign_catalogue import Pictogram, sign_catalogue
 from synthroads_addon.scanning.scene.mesh import SceneMesh
