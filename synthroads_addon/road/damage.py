@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from ..base.arrays import Float
+from ..base.arrays import Bool, Float, Int
 from .section import Pothole, Rut
 from .section_geometry import CarriagewaySection
 
@@ -12,19 +14,39 @@ _SLIVER = 2e-4
 """Columns of a mesh are at least this share of a strip's width apart: below a millimetre."""
 
 
+_SHALLOW = 1e-6
+"""What is no deeper (m) is no damage: a cosine is never quite 0."""
+
+
 def damage_depth(section: CarriagewaySection, station: Float, offset: Float) -> Float:
     """Return the depth (N,) of ruts and potholes at stations and offsets (N,), m; where both are, the deeper one."""
-    pavement = section.carriageway.pavement
     depth = np.zeros(station.shape)
-    for rut in pavement.ruts:
-        near = (station > rut.start_station) & (station < rut.end_station)
-        if near.any():
-            depth[near] = np.maximum(depth[near], _rut_depth(section, rut, station[near], offset[near]))
-    for pothole in pavement.potholes:
-        near = np.abs(station - pothole.station) < pothole.length / 2.0
-        if near.any():
-            depth[near] = np.maximum(depth[near], _pothole_depth(pothole, station[near], offset[near]))
+    for near, of_one in _depths(section, station, offset):
+        depth[near] = np.maximum(depth[near], of_one)
     return depth
+
+
+def deepest_damage(section: CarriagewaySection, station: Float, offset: Float) -> Int:
+    """Return the damage (N,) that is deepest at stations and offsets (N,): ruts count first, potholes after; -1: none.
+
+    Of two that are as deep the first counts.
+    """
+    deepest, result = np.full(station.shape, _SHALLOW), np.full(station.shape, -1, dtype=np.int64)
+    for number, (near, of_one) in enumerate(_depths(section, station, offset)):
+        deeper = np.flatnonzero(near)[of_one > deepest[near]]
+        result[deeper] = number
+        deepest[near] = np.maximum(deepest[near], of_one)
+    return result
+
+
+def _depths(section: CarriagewaySection, station: Float, offset: Float) -> Iterator[tuple[Bool, Float]]:
+    """Yield of every rut, then of every pothole, which places (N,) lie along it, and its depth (K,) there, m."""
+    for rut in section.carriageway.pavement.ruts:
+        near = (station > rut.start_station) & (station < rut.end_station)
+        yield near, _rut_depth(section, rut, station[near], offset[near]) if near.any() else np.empty(0)
+    for pothole in section.carriageway.pavement.potholes:
+        near = np.abs(station - pothole.station) < pothole.length / 2.0
+        yield near, _pothole_depth(pothole, station[near], offset[near])
 
 
 def _rut_depth(section: CarriagewaySection, rut: Rut, station: Float, offset: Float) -> Float:

@@ -7,6 +7,7 @@ is a polyline through the boundaries; between stations it follows the alignment,
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +15,7 @@ from numpy.typing import ArrayLike
 from ..base.arrays import Float, Index, Int
 from .alignment import Alignment, Element
 from .damage import damage_depth
+from .instances import InstanceNumbers
 from .objects import Side, width_at
 from .parameters import AlignmentObject, RoadParameters
 from .profile import IntersectionPoint, Profile
@@ -72,6 +74,11 @@ class RoadGeometry:
     def length(self) -> float:
         """Return the length of the centreline, m."""
         return self.alignment.length
+
+    @cached_property
+    def numbers(self) -> InstanceNumbers:
+        """The instance numbers of all objects and of what they consist of."""
+        return InstanceNumbers(self.parameters)
 
     def crossfall(self, carriageway: Carriageway, station: ArrayLike) -> Float:
         """Return the crossfall (m/m, positive where the surface falls to the right) at the stations, same shape."""

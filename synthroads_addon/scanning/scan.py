@@ -272,7 +272,7 @@ class BlockScan:
             intensity=intensity,
             rgb=np.zeros((len(pulse), 3), dtype=np.uint16),
             class_id=target.face_values("class_id", face),
-            instance_id=target.face_values("instance_id", face),
+            instance_id=target.instances(face, pulses.time[pulse]),
             return_number=number,
             number_of_returns=returns,
             gps_time=pulses.time[pulse],

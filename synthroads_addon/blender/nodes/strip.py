@@ -19,12 +19,16 @@ from .inputs import (
 
 _DETAIL = (
     "Finer columns: a point per column and row (row by row within a column, from the left), with the attributes share "
-    "(1 at the left edge, 0 at the right one) and depth (m below the plane); two columns if empty"
+    "(1 at the left edge, 0 at the right one), depth (m below the plane) and damage (instance number of what the face "
+    "after it is of; 0 for the strip itself); two columns if empty"
 )
 NARROW = 0.25
 """Strips narrower than this (m) have two columns whatever their detail: nothing of it lies there."""
 CLOSED = 1e-4
 """Where a strip is narrower than this (m) it has no faces."""
+
+
+_DAMAGE = "damage"
 
 
 class StripFaces(Inputs):
@@ -75,12 +79,20 @@ def strip_group(tree: Tree) -> None:
         offset = limit_offset(left * share + right * (1.0 - share), curvature)
         inside = (offset - right) / op.maximum(left - right, 1e-9)
         height = left_height * inside + right_height * (1.0 - inside) - depth
+    with tree.frame("Instance of every face: the damage that it is of, or the strip"):
+        face = op.index(tree)
+        corner = face // (rows - 1) * rows + face % (rows - 1)
+        damage = op.sample_index(detail, op.named_attribute(tree, "damage", "INT"), corner)
+        mesh = op.store(mesh, _DAMAGE, op.switch(detailed > 0, 0, damage), "FACE")
     with tree.frame("Place and label"):
         place = axis + leftwards * offset + op.vector(tree, 0.0, 0.0, height)
         mesh = op.store(op.store(mesh, "offset", offset), "row", number)
         mesh = op.store(mesh, "strip_width", left - right)
         mesh = op.store(mesh, "station", op.sample_index(backbone, op.named_attribute(tree, "station"), number))
-        mesh = op.label(op.set_position(mesh, place), faces.class_, faces.instance, faces.material)
+        damage = op.named_attribute(tree, _DAMAGE, "INT")
+        instance = op.switch(damage.equals(0), damage, faces.instance)
+        mesh = op.label(op.set_position(mesh, place), faces.class_, instance, faces.material)
+        mesh = tree.node("GeometryNodeRemoveAttribute", mesh, name=_DAMAGE).value
         # Of faces that narrow, rounding would decide which way they look.
         mesh = op.delete_faces(op.delete_degenerate(mesh), op.named_attribute(tree, "strip_width") < CLOSED)
     tree.output("Mesh", mesh, description="Ribbon whose faces look up")

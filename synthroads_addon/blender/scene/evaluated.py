@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ...base.class_mapping import ClassMapping
 from ...base.errors import InputError
 from ...road.geometry import RoadGeometry
+from ...road.instances import PassNumbers
 from ...scanning.scene.mesh import SceneMesh
 from ...scanning.scene.motion import (
     LaneMotion,
@@ -182,7 +183,7 @@ def _moving(reading: _Reading, carrier: Hashable, motion: Motion, tables: SceneT
         if far > _FARTHEST_FROM_MOTION:
             wrong = f"must be that of the road in the scene: a vehicle is {far:.0f} m off its lane"
             raise InputError("geometry", None, wrong)
-    return MovingMesh(mesh, motion)
+    return MovingMesh(mesh, motion, reading.again.get(carrier))
 
 
 @dataclass(frozen=True)
@@ -226,6 +227,7 @@ class _Reading:
     Attributes:
         labels: of its objects.
         motions: of what moves, by carrier.
+        again: numbers of later passes of the road's vehicles, by carrier.
     """
 
     def __init__(
@@ -239,6 +241,7 @@ class _Reading:
     ) -> None:
         self.labels = Labels(depsgraph.scene, classes, class_ids)
         self.motions: dict[Hashable, Motion] = {}
+        self.again: dict[Hashable, PassNumbers] = {}
         self._chosen = None if objects is None else {item.original for item in objects}
         self._lanes = lanes or {}
         self._speed_factor = speed_factor
@@ -376,6 +379,7 @@ class _Reading:
                 middle = motion.pose(np.zeros(1))[1][0]
                 motion = motion.from_elsewhere(place[:3, :3] @ middle + place[:3, 3])
             self.motions[key] = motion
+            self.again[key] = motion.line.geometry.numbers.passes[role]
         return key
 
     def _numbered(self) -> list[Label]:

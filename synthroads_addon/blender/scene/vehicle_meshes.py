@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ...base.classes import class_id
+from ...road.instances import PassNumbers
 from ...road.surroundings import Vehicle
 from ...scanning.scene.mesh import SceneMesh
 from ...scanning.scene.motion import Motion, MovingMesh, ScannedScene
@@ -30,7 +31,11 @@ class VehicleMeshes:
         self._materials: dict[str, None] = {}
 
     def with_traffic(
-        self, static: SceneMesh, vehicles: Mapping[str, Vehicle], motions: Mapping[str, Motion]
+        self,
+        static: SceneMesh,
+        vehicles: Mapping[str, Vehicle],
+        motions: Mapping[str, Motion],
+        passes: Mapping[str, PassNumbers],
     ) -> ScannedScene:
         """Return what stands together with vehicles that drive.
 
@@ -38,6 +43,7 @@ class VehicleMeshes:
             static: what stands.
             vehicles: by id.
             motions: theirs, in the static mesh's frame.
+            passes: numbers of their later passes.
         """
         models = {vehicle.model: self._model(vehicle.model) for vehicle in vehicles.values()}
         for mesh in (static, *models.values()):
@@ -45,7 +51,7 @@ class VehicleMeshes:
         names = tuple(self._materials)
         meshes = {model: _with_materials(mesh, names) for model, mesh in models.items()}
         moving = tuple(
-            MovingMesh(_with_instance(meshes[vehicle.model], vehicle.instance), motions[name])
+            MovingMesh(_with_instance(meshes[vehicle.model], vehicle.instance), motions[name], passes[name])
             for name, vehicle in vehicles.items()
         )
         return ScannedScene(_with_materials(static, names), moving)

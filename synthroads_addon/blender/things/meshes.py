@@ -48,7 +48,7 @@ def on_plan(geometry: RoadGeometry, items: Sequence[PointObject]) -> Float:
     return np.column_stack([position + offset[:, None] * left, geometry.profile.elevation(station)])
 
 
-def signed_instance(instances: Sequence[int]) -> NDArray[np.int32]:
+def signed_instance(instances: Sequence[int] | NDArray[np.integer]) -> NDArray[np.int32]:
     """Return instance numbers as the nodes hold them: they have 32 bits and no sign, the nodes' numbers have one."""
     return np.array(instances, dtype=np.uint32).astype(np.int32)
 

@@ -91,9 +91,9 @@ def _scene_pictures(
             aim(parameters)
             made.append(_render(folder / f"scene-{name}-{view}.png", quality, say))
     mesh = scene_mesh()
-    for kind, instance in _kinds(parameters):
+    for kind, item in _kinds(parameters):
         picture = f"object-{kind}"
-        if kind not in closed_up and only in picture and _close_up(parameters, mesh, instance):
+        if kind not in closed_up and only in picture and _close_up(parameters, mesh, item):
             closed_up.add(kind)
             made.append(_render(folder / f"{picture}.png", quality.half(), say))
     return made
@@ -154,9 +154,9 @@ def _driver(parameters: RoadParameters) -> None:
     )
 
 
-def _kinds(parameters: RoadParameters) -> Iterator[tuple[str, int]]:
-    """Yield (kind, instance) of what can be shown close up: the type, and what of it there are several kinds of."""
-    for item in parameters.objects.values():
+def _kinds(parameters: RoadParameters) -> Iterator[tuple[str, str]]:
+    """Yield (kind, id) of what can be shown close up: the type, and what of it there are several kinds of."""
+    for key, item in parameters.objects.items():
         name = type(item).__name__
         if name in _NOT_SHOWN or isinstance(item, AlignmentObject):
             continue
@@ -169,15 +169,15 @@ def _kinds(parameters: RoadParameters) -> Iterator[tuple[str, int]]:
             "",
         )
         species = getattr(item, "species", "")
-        yield "-".join(filter(None, (name.lower(), species or variant))), item.instance
+        yield "-".join(filter(None, (name.lower(), species or variant))), key
 
 
-def _close_up(parameters: RoadParameters, mesh: SceneMesh, instance: int) -> bool:
-    """Aim at the faces of an instance from the road, at a distance that suits their size; False if it has none."""
-    corners = mesh.vertices[mesh.triangles[mesh.instance_id == instance]].reshape(-1, 3)
+def _close_up(parameters: RoadParameters, mesh: SceneMesh, name: str) -> bool:
+    """Aim at the faces of an object from the road, at a distance that suits their size; False if it has none."""
+    geometry = RoadGeometry(parameters)
+    corners = mesh.vertices[mesh.triangles[geometry.numbers.belong(name, mesh.instance_id)]].reshape(-1, 3)
     if not len(corners):
         return False
-    geometry = RoadGeometry(parameters)
     station, offset = geometry.alignment.project(corners[:, :2].astype(np.float64))
     # Of what is long or scattered, a piece in its middle.
     anchor = np.argmin(np.abs(station - np.median(station)))

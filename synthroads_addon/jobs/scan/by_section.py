@@ -113,7 +113,7 @@ class SectionScan:
         passing = vehicles_through(section, self.cut, self._motions, self._scenario.scan.traffic_speed_factor)
         vehicles = {name: motion.vehicle for name, motion in passing.items()}
         motions = {name: ShiftedMotion(motion, frame) for name, motion in passing.items()}
-        scene = self._vehicles.with_traffic(static, vehicles, motions)
+        scene = self._vehicles.with_traffic(static, vehicles, motions, self._road.numbers.passes)
         # The vehicles' materials may be new.
         vary(whole.materials, whole.environment, self._scenario.own_materials())
         return scene, frame

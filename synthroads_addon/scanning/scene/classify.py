@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...base.class_mapping import fits_pattern
 from ...base.classes import ClassScheme, ClassSelector, class_id
 from ...base.errors import InputError, nearest_name
+from ...road.instances import InstanceNumbers
 from ...road.objects import RoadObject
 from ...road.parameters import AnyObject, RoadParameters
 from ...road.things.asset import Asset
@@ -65,7 +66,8 @@ def classify_scene(scene: ScannedScene, scheme: ClassScheme, road: RoadParameter
     selectors = list(scheme.selectors())
     if not selectors:
         return scene
-    rules = [_Rule(number, selector, _numbers_of(selector, road)) for number, selector in selectors]
+    numbers = InstanceNumbers(road) if road else None
+    rules = [_Rule(number, selector, _names_of(selector, road), numbers) for number, selector in selectors]
     moving = tuple(replace(body, mesh=_classify(body.mesh, rules)) for body in scene.moving)
     return replace(scene, static=_classify(scene.static, rules), moving=moving)
 
@@ -77,12 +79,14 @@ class _Rule:
     Attributes:
         number: ``class_id`` of what it finds.
         selector: what it looks for.
-        instances: numbers of the objects that it means; None if it means no objects in particular.
+        names: ids of the objects that it means; None if it means no objects in particular.
+        numbers: of the road's objects.
     """
 
     number: int
     selector: ClassSelector
-    instances: NDArray[np.uint32] | None
+    names: frozenset[str] | None
+    numbers: InstanceNumbers | None
 
     def fits(self, mesh: SceneMesh) -> NDArray[np.bool_]:
         """Return which faces (T,) it finds."""
@@ -92,8 +96,10 @@ class _Rule:
         if self.selector.material is not None:
             materials = [fits_pattern(name, self.selector.material) for name in mesh.materials]
             found &= np.array(materials, dtype=bool)[mesh.material]
-        if self.instances is not None:
-            found &= np.isin(mesh.instance_id, self.instances)
+        if self.names is not None:
+            present, faces = np.unique(mesh.instance_id, return_inverse=True)
+            owners = [self.numbers.owner(number) if self.numbers else None for number in present.tolist()]
+            found &= np.array([owner in self.names for owner in owners], dtype=bool)[faces]
         return found
 
 
@@ -104,12 +110,12 @@ def _classify(mesh: SceneMesh, rules: Iterable[_Rule]) -> SceneMesh:
     return replace(mesh, class_id=class_ids)
 
 
-def _numbers_of(selector: ClassSelector, road: RoadParameters | None) -> NDArray[np.uint32] | None:
-    """Return the instance numbers of the objects that a selector means; None if it says nothing of objects."""
+def _names_of(selector: ClassSelector, road: RoadParameters | None) -> frozenset[str] | None:
+    """Return the ids of the objects that a selector means; None if it says nothing of objects."""
     if selector.thing is None and selector.asset is None:
         return None
-    items = road.objects.values() if road else ()
-    return np.array([item.instance for item in items if _means(selector, item)], dtype=np.uint32)
+    items = road.objects.items() if road else ()
+    return frozenset(name for name, item in items if _means(selector, item))
 
 
 def _means(selector: ClassSelector, item: RoadObject) -> bool:

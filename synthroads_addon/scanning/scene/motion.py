@@ -9,10 +9,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...base.arrays import Bool, Float
+from ...base.arrays import Bool, Float, Int
 from ...base.errors import InputError
 from ...road.alignment import finite_array
 from ...road.geometry import RoadGeometry
+from ...road.instances import PassNumbers
 from ...road.lane_lines import LaneLine, lane_of
 from ...road.surroundings import Vehicle
 from ...road.things.vehicles import CHASSIS, VEHICLE_GAP, VEHICLE_TYPES
@@ -34,6 +35,9 @@ class Motion(Protocol):
         finite even where the body isn't there; the same from any thread.
         """
 
+    def passes(self, time: Float) -> Int:
+        """Return how often the body has left and come in again before times (K,), s."""
+
 
 @dataclass(frozen=True)
 class MovingMesh:
@@ -42,10 +46,12 @@ class MovingMesh:
     Attributes:
         mesh: its triangles in the body frame; ``origin`` has no meaning there and is 0.
         motion: of the body frame.
+        again: instance numbers of its triangles when it has come in again; as in the mesh if None.
     """
 
     mesh: SceneMesh
     motion: Motion
+    again: PassNumbers | None = None
 
 
 @dataclass(frozen=True)
@@ -81,6 +87,10 @@ class LinearMotion:
         rotation = np.broadcast_to(np.eye(3), (len(time), 3, 3))
         return rotation, self.place + time[:, None] * self.velocity, np.ones(len(time), dtype=bool)
 
+    def passes(self, time: Float) -> Int:
+        """Return 0: it never comes again."""
+        return np.zeros(len(time), dtype=np.int64)
+
 
 @dataclass(frozen=True)
 class ShiftedMotion:
@@ -98,6 +108,10 @@ class ShiftedMotion:
         """Return the motion's pose in this frame."""
         rotation, place, present = self.whole.pose(time)
         return rotation, place - self.origin, present
+
+    def passes(self, time: Float) -> Int:
+        """Return the motion's passes."""
+        return self.whole.passes(time)
 
 
 class LaneMotion:
@@ -155,6 +169,12 @@ class LaneMotion:
         station, present = self._place(np.asarray(time, dtype=np.float64))
         rotation, translation = self._wheel_pose(station)
         return rotation, translation, present
+
+    def passes(self, time: Float) -> Int:
+        """Return how often it has come in again before times (K,)."""
+        if self._way is None or self.speed_factor == 0.0:
+            return np.zeros(len(time), dtype=np.int64)
+        return self._way.passes(np.asarray(time, dtype=np.float64) * self.speed_factor)
 
     def from_elsewhere(self, place: Float) -> LaneMotion:
         """Return the motion of the same vehicle if it is beside a place (3,) of the local frame at the time 0."""
@@ -293,6 +313,11 @@ class VehiclePasses:
         distance = np.where(time <= self.leave, self.start + self.speed * time, again)
         half = self.length / 2.0 - OVERHANG
         return distance, (distance >= half) & (distance <= self.whole - half)
+
+    def passes(self, time: Float) -> Int:
+        """Return which of its passes it is on at times (K,): 0 the one that it is on at the time 0."""
+        again = 1 + np.floor_divide(time - self.entry, self.period)
+        return np.where(time <= self.leave, 0, np.maximum(again, 0)).astype(np.int64)
 
     def from_elsewhere(self, start: float) -> VehiclePasses:
         """Return the same for a vehicle that is elsewhere at the time 0; it comes in as much later as it leaves."""

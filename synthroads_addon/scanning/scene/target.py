@@ -100,6 +100,18 @@ class Target:
         result[faces < 0] = _NO_FACE[name]
         return np.asarray(result)
 
+    def instances(self, faces: Faces, times: Float) -> NDArray[np.uint32]:
+        """Return the instance numbers of faces (H,) met at times (H,), s: what comes in again has another one."""
+        result = np.array(self.face_values("instance_id", faces), dtype=np.uint32)
+        for part, moving in zip(self._parts[1:], self.moving, strict=True):
+            if moving.again is None:
+                continue
+            mine = np.flatnonzero((faces >= part.first) & (faces < part.first + part.count))
+            passes = moving.motion.passes(times[mine])
+            later = passes > 0
+            result[mine[later]] = moving.again.first + (passes[later] - 1) * moving.again.step
+        return result
+
     def motions(self, begin: float, end: float, spacing: float, driven: Track | None = None) -> list[Track]:
         """Return the moving parts' poses between two times, on knots ``spacing`` (s) apart.
 

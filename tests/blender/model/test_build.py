@@ -202,8 +202,9 @@ class TestMarkings:
     def test_dashes_are_where_the_parameters_say(self) -> None:
         road = built(demo_parameters(), TOLERANCE, {"road"})
         mesh = road.mesh("Road")
-        for line in road.parameters.of_type(LineMarking).values():
-            chosen = mesh.triangles[mesh.instance_id == line.instance]
+        for name, line in road.parameters.of_type(LineMarking).items():
+            numbers = mesh.instance_id[road.geometry.numbers.belong(name, mesh.instance_id)]
+            chosen = mesh.triangles[road.geometry.numbers.belong(name, mesh.instance_id)]
             station, offset = road.located(mesh.vertices[np.unique(chosen)])
             left, right = (edges[0] for edges in road.geometry.marking_edges(line, 0.0))
             assert np.isclose(offset.max(), left, atol=ROUNDING)
@@ -216,6 +217,13 @@ class TestMarkings:
             assert np.isclose(area.sum(), wanted, rtol=2e-3)
             inside = (station[:, None] > dashes[:, 0] - 1e-3) & (station[:, None] < dashes[:, 1] + 1e-3)
             assert inside.any(axis=1).all()
+            if line.dash_length:
+                part = numbers - road.geometry.numbers.parts[name].first
+                begin = road.located(mesh.vertices[chosen[:, 0]])[0]
+                assert ((begin > dashes[part, 0] - 1e-3) & (begin < dashes[part, 1] + 1e-3)).all()
+                assert np.unique(part).tolist() == list(range(len(dashes)))
+            else:
+                assert set(numbers.tolist()) == {line.instance}
 
     def test_a_changed_dash_is_exact_without_python(self) -> None:
         road = built(demo_parameters(), TOLERANCE, {"road"})
@@ -224,7 +232,8 @@ class TestMarkings:
         for key, value in {"Dash Length": 4.3, "Gap Length": 7.9, "Start Station": 3.1}.items():
             set_modifier_input(road.modifier("Road"), f"{words} {key}", value)
         mesh = road.mesh("Road")
-        station, _ = road.located(mesh.vertices[np.unique(mesh.triangles[mesh.instance_id == line.instance])])
+        of_line = road.geometry.numbers.belong(name, mesh.instance_id)
+        station, _ = road.located(mesh.vertices[np.unique(mesh.triangles[of_line])])
         changed = line.model_copy(update={"dash_length": 4.3, "gap_length": 7.9, "start_station": 3.1})
         ends = road.geometry.dashes(changed).ravel()
         assert np.abs(station[:, None] - ends).min(axis=0).max() < 2e-3
@@ -324,13 +333,13 @@ class TestLabels:
         mesh = scene_mesh()
         road = Built(parameters, RoadGeometry(parameters), model)
         assert not (mesh.class_id == 255).any()
-        numbers = {item.instance for item in parameters.objects.values()} - {parameters.alignment.instance}
-        assert set(np.unique(mesh.instance_id)) == numbers
+        owners = {road.geometry.numbers.owner(number) for number in np.unique(mesh.instance_id).tolist()}
+        assert owners == {name for name, item in parameters.objects.items() if item is not parameters.alignment}
         assert "unknown" not in {mesh.materials[index] for index in np.unique(mesh.material)}
         expected = {Vegetation: "vegetation", Guardrail: "guardrail", Delineator: "warning_post"}
-        for item in parameters.objects.values():
+        for name, item in parameters.objects.items():
             if type(item) in expected:
-                found = np.unique(mesh.class_id[mesh.instance_id == item.instance])
+                found = np.unique(mesh.class_id[road.geometry.numbers.belong(name, mesh.instance_id)])
                 assert found.tolist() == [class_id(expected[type(item)])]
         self.plants_grow_in_their_band(road)
 
@@ -406,8 +415,9 @@ class TestLiveEditsOfTheRoad:
             station, offset = truth.located(vertices)
             assert np.abs(offset[:, None] - truth.geometry.offsets(0.0)).min(axis=1).max() < ROUNDING
             assert np.abs(vertices[:, 2] - truth.surface(station, offset)).max() < ROUNDING
-            for line in wider.of_type(LineMarking).values():
-                _, offset = truth.located(mesh.vertices[np.unique(mesh.triangles[mesh.instance_id == line.instance])])
+            for name, line in wider.of_type(LineMarking).items():
+                of_line = truth.geometry.numbers.belong(name, mesh.instance_id)
+                _, offset = truth.located(mesh.vertices[np.unique(mesh.triangles[of_line])])
                 assert np.isclose(offset.max(), truth.geometry.marking_edges(line, 0.0)[0][0], atol=ROUNDING)
 
     def test_guardrails_and_terrain_follow_the_road(self) -> None:

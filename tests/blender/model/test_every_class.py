@@ -10,6 +10,7 @@ from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.checking.checker import check
 from synthroads_addon.materials.table import UNKNOWN
+from synthroads_addon.road.instances import InstanceNumbers
 from synthroads_addon.road.parameters import AlignmentObject, RoadParameters
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.scene.mesh import SceneMesh
@@ -37,14 +38,14 @@ def test_all_17_classes_occur(mesh: SceneMesh) -> None:
 
 
 def test_every_face_has_an_instance_of_the_set_and_a_material(parameters: RoadParameters, mesh: SceneMesh) -> None:
-    known = {item.instance for item in parameters.objects.values()}
-    found = set(np.unique(mesh.instance_id).tolist())
-    assert found <= known
+    numbers = InstanceNumbers(parameters)
+    owners = {numbers.owner(number) for number in np.unique(mesh.instance_id).tolist()}
+    assert owners <= set(parameters.objects)
     assert UNKNOWN not in {mesh.materials[i] for i in np.unique(mesh.material)}
     # Whatever stands in the set has faces, but for the axis.
     missing = {
         name
         for name, item in parameters.objects.items()
-        if item.instance not in found and not isinstance(item, AlignmentObject)
+        if name not in owners and not isinstance(item, AlignmentObject)
     }
     assert missing == set()

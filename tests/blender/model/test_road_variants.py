@@ -18,6 +18,7 @@ from synthroads_addon.blender.model.build import RoadModel, build_road
 from synthroads_addon.blender.model.read_back import edited_parameters
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.blender.things.road.layout import names_in_words, side_of
+from synthroads_addon.road.damage import deepest_damage
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.guidelines import SECTIONS_OF_CLASS
 from synthroads_addon.road.parameters import RoadParameters
@@ -176,6 +177,9 @@ def test_strips_of_turnouts_carry_the_turnouts_instances() -> None:
     wanted = np.zeros(len(station), np.int64)
     for number, strip in enumerate(road.geometry.strips):
         wanted[strips == number] = road.geometry.instances(strip, station[strips == number])
+    for name, carriageway in road.parameters.of_type(Carriageway).items():
+        damage = deepest_damage(road.geometry.sections[carriageway.side], station, offset)
+        wanted[damage >= 0] = road.geometry.numbers.parts[name].first + damage[damage >= 0]
     assert np.mean(mesh.instance_id[chosen] != wanted) < 2e-3  # but for slivers across a border
 
 

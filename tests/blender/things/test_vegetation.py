@@ -16,6 +16,8 @@ from synthroads_addon.blender.things.vegetation import shrub, tree
 from synthroads_addon.blender.things.vegetation.build import species_shapes
 from synthroads_addon.blender.things.vegetation.grass import tuft_group
 from synthroads_addon.materials.table import materials
+from synthroads_addon.road.instances import GRASS_STRIPS
+from synthroads_addon.road.plants import grown_plants
 from synthroads_addon.road.surroundings import SPECIES, Vegetation
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from tests.helpers.scenes.furnished_road import Data, Float, FurnishedRoad, normals, of_material, pieces
@@ -27,6 +29,8 @@ MOST_TRIANGLES = {"tree": 3000, "shrub": 1100, "grass": 12}
 """Of one plant: what keeps the scenes as large as they are meant to be."""
 TREE_HEIGHT, SHRUB_HEIGHT, GRASS_HEIGHT = (6.0, 9.0), (1.0, 2.0), (0.1, 0.4)
 LENGTH = 120.0
+LEANING = 0.08
+"""Horizontal distance of a leaning plant's top from its foot, as a share of its height."""
 MARGIN = 0.05
 """Difference in height of a leaning plant from an upright one, as a share of its height."""
 
@@ -196,10 +200,57 @@ class TestOnTheRoad:
         for name in STANDS:
             mesh = road.mesh(name)
             assert np.unique(mesh.class_id).tolist() == [class_id("vegetation")]
-            assert np.unique(mesh.instance_id).tolist() == [road.instance(name)]
+            known = road.geometry.numbers.parts[name]
+            assert set(np.unique(mesh.instance_id).tolist()) <= set(range(known.first, known.first + known.count))
             wanted = {name} if name in GRASSES else {f"{name}_bark", f"{name}_leaves"}
             assert {mesh.materials[index] for index in np.unique(mesh.material)} == wanted
             assert np.isfinite(normals(mesh)).all()
+
+    @pytest.mark.parametrize("name", [*TREES, *SHRUBS])
+    def test_each_plant_is_where_the_road_says_and_has_a_number_of_its_own(
+        self, road: FurnishedRoad, name: str
+    ) -> None:
+        item, terrain, mesh = road.parameters.objects[name], road.parameters.terrain, road.mesh(name)
+        assert isinstance(item, Vegetation)
+        assert terrain is not None
+        known = grown_plants(road.geometry, item, terrain, SHAPES[item.kind][name]["crown_radius"])
+        first = road.geometry.numbers.parts[name].first
+        assert np.unique(mesh.instance_id).tolist() == (first + known.number).tolist()
+        for number, place, height, radius in zip(*vars(known).values(), strict=True):
+            corners = mesh.vertices[mesh.triangles[mesh.instance_id == first + number]].reshape(-1, 3) + road.origin
+            assert corners[:, 2].max() - place[2] == pytest.approx(height, rel=MARGIN)
+            reach = np.linalg.norm(corners[:, :2] - place[:2], axis=1)
+            assert 0.6 * radius < reach.max() < 1.4 * radius + LEANING * height
+            if item.kind == "tree":
+                foot = corners[corners[:, 2].argmin(), :2]
+                assert np.linalg.norm(foot - place[:2]) < 0.05 * height
+
+    def test_a_plant_that_the_road_does_not_have_does_not_grow(self, road: FurnishedRoad) -> None:
+        item, before = road.model.objects["birch"], np.unique(road.mesh("birch").instance_id)
+        stands = item.data.attributes["stands"].data
+        row = int(before[0]) - road.geometry.numbers.parts["birch"].first
+        stands[row].value = 0
+        item.data.update()
+        bpy.context.view_layer.update()
+        assert np.unique(road.mesh("birch").instance_id).tolist() == before[1:].tolist()
+        # A stand that was edited decides for itself.
+        edited = road.edit("birch", "Band End", 34.9)
+        assert before[0] in edited.instance_id
+        stands[row].value = 1
+        item.data.update()
+        assert np.unique(road.edit("birch", "Band End", 35.0).instance_id).tolist() == before.tolist()
+
+    def test_grass_has_a_number_for_each_strip_that_it_grows_on(self, road: FurnishedRoad) -> None:
+        for name in GRASSES:
+            mesh, first = road.mesh(name), road.geometry.numbers.parts[name].first
+            strips = 2 if name == "reed" else len(GRASS_STRIPS)
+            assert np.unique(mesh.instance_id).tolist() == list(range(first, first + strips))
+            middle = mesh.vertices[mesh.triangles].mean(axis=1)
+            _, offset = road.located(middle)
+            strip = mesh.instance_id - first
+            for number, side in ((0, 1.0), (1, -1.0), (2, 1.0), (3, -1.0)):
+                assert (side * offset[strip == number] > 8.0).all(), GRASS_STRIPS[number]
+            assert (np.abs(offset[strip == 4]) < 2.6).all()
 
     def test_seeds_make_other_plants_and_the_same_seed_the_same(self, road: FurnishedRoad) -> None:
         before, places = road.mesh("hazel").vertices, feet(road, "hazel")[:, :2]

@@ -12,7 +12,7 @@ from ....road.objects import nominal_width
 from ....road.parameters import RoadParameters
 from ....road.section import Carriageway, LineMarking, Median
 from ...nodes.inputs import input_name
-from ..meshes import attribute, fill
+from ..meshes import attribute, fill, signed_instance
 from ..model_builder import ModelBuilder
 from .layout import detail_points, names_in_words, road_layout, side_of, strip_widths, varying_widths, width_field
 from .markings import LINE_FIELDS
@@ -31,21 +31,25 @@ def build_surface(builder: ModelBuilder) -> None:
         for side, section in builder.geometry.sections.items()
     }
     details = run_aside(lambda: detail_points(builder.geometry, station, builder.tolerance))
-    for name, (share, depth) in details.items():
+    for name, points in details.items():
         mesh = bpy.data.meshes.new("SR Detail")
-        fill(mesh, np.column_stack([share, depth, 0.0 * share]))
-        attribute(mesh, "share", share)
-        attribute(mesh, "depth", depth)
+        fill(mesh, np.column_stack([points.share, points.depth, 0.0 * points.share]))
+        attribute(mesh, "share", points.share)
+        attribute(mesh, "depth", points.depth)
+        attribute(mesh, "damage", signed_instance(points.instance))
         builder.add(f"{name} Detail", mesh, support=True)
-    inputs = {**materials, **_road_inputs(builder.parameters, builder.zero)}
+    inputs = {**materials, **_road_inputs(builder.parameters, builder.geometry, builder.zero)}
     builder.add("Road", None, road_group(road_layout(builder.parameters)), inputs)
 
 
-def _road_inputs(parameters: RoadParameters, zero: float = 0.0) -> dict[str, float | int | bool]:
+def _road_inputs(
+    parameters: RoadParameters, geometry: RoadGeometry, zero: float = 0.0
+) -> dict[str, float | int | bool]:
     """Return the values of the group's inputs, without objects and materials.
 
     Args:
         parameters: the road, or what of it is on a stretch.
+        geometry: the whole road's.
         zero: station that the nodes count theirs from, m.
     """
     inputs: dict[str, float | int | bool] = {}
@@ -77,9 +81,19 @@ def _road_inputs(parameters: RoadParameters, zero: float = 0.0) -> dict[str, flo
         values = {field: getattr(line, field) for field in LINE_FIELDS}
         stations = {"start_station": line.start_station - zero, "end_station": line.end_station - zero}
         give(place, **values | stations, instance=line.instance)
+        give(place, first_dash_instance=_first_dash(name, line, geometry))
         if line.kind == "free":
             give(place, distance=nominal_width(line.offset))
     return inputs
+
+
+def _first_dash(name: str, line: LineMarking, geometry: RoadGeometry) -> int:
+    """Return the instance number of the first dash of a line that may be cut to a stretch."""
+    whole = geometry.parameters.objects[name]
+    assert isinstance(whole, LineMarking)
+    period = line.dash_length + line.gap_length
+    before = round((line.start_station - whole.start_station) / period) if period else 0
+    return geometry.numbers.parts[name].first + before
 
 
 def backbone_mesh(geometry: RoadGeometry, station: Float, origin: Float, zero: float = 0.0) -> bpy.types.Mesh:

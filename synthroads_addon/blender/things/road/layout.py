@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ....road.damage import damage_columns, damage_depth, damaged_strips
+from ....road.damage import damage_columns, damage_depth, damaged_strips, deepest_damage
 from ....road.geometry import RoadGeometry, sections_of
 from ....road.objects import AnyWidth, nominal_width, width_at
 from ....road.parameters import RoadParameters
@@ -18,6 +18,7 @@ from ....road.stretches import BEYOND
 from ....road.turnout_geometry import TURNOUT_STRIPS
 
 Float = NDArray[np.float64]
+Int = NDArray[np.int64]
 
 TURNOUT_NAMES = tuple(kind.replace("_", " ").title() for kind in TURNOUT_STRIPS)
 """Strips that turnouts make, from the hard shoulder outwards, as the inputs and attributes name them."""
@@ -198,13 +199,25 @@ def _turnout_widths(side: str, section: CarriagewaySection, station: Float) -> d
     return values
 
 
-def detail_points(geometry: RoadGeometry, station: Float, tolerance: float) -> dict[str, tuple[Float, Float]]:
-    """Return share and depth of every point of the damaged strips' grids.
+@dataclass(frozen=True)
+class DetailPoints:
+    """Points of a damaged strip's grid, (columns * rows,) each, row by row within a column, columns from the left.
 
-    By the strips' names (``Right Lane 1``): both (columns * rows,), row by row within a column, columns from the left;
-    the rows are the stations (N,).
+    Attributes:
+        share: of the strip's width, 1 at its left edge.
+        depth: below the undamaged surface, m.
+        instance: of the damage that makes up the cell after the point, in both directions; 0 where there is none.
     """
+
+    share: Float
+    depth: Float
+    instance: Int
+
+
+def detail_points(geometry: RoadGeometry, station: Float, tolerance: float) -> dict[str, DetailPoints]:
+    """Return the points of the damaged strips' grids by the strips' names (``Right Lane 1``); rows are the stations."""
     points = {}
+    ids = {id(item): name for name, item in geometry.parameters.objects.items()}
     for section in geometry.sections.values():
         carriageway = section.carriageway
         names, distances = strip_names(section), section.distances(station)
@@ -221,8 +234,24 @@ def detail_points(geometry: RoadGeometry, station: Float, tolerance: float) -> d
             steps = _steps(station, distances[:, strip : strip + 2])
             share[1:-1, steps], depth[:, steps] = 0.0, 0.0
             order = slice(None, None, -carriageway.sign)
-            points[f"{carriageway.side.title()} {names[strip]}"] = (share[order].ravel(), depth[order].ravel())
+            damage = _damage_of_cells(section, station, offset[order])
+            numbers = geometry.numbers.parts[ids[id(carriageway)]].first + damage
+            points[f"{carriageway.side.title()} {names[strip]}"] = DetailPoints(
+                share[order].ravel(), depth[order].ravel(), np.where(damage < 0, 0, numbers).ravel()
+            )
     return points
+
+
+def _damage_of_cells(section: CarriagewaySection, station: Float, offset: Float) -> Int:
+    """Return the damage of each cell between stations (N,) and offsets (C, N) at its first corner; -1 for none.
+
+    A cell is of the damage that is deepest in its middle.
+    """
+    middle = (station[1:] + station[:-1]) / 2.0
+    across = (offset[1:, 1:] + offset[1:, :-1] + offset[:-1, 1:] + offset[:-1, :-1]) / 4.0
+    result = np.full(offset.shape, -1, dtype=np.int64)
+    result[:-1, :-1] = deepest_damage(section, np.tile(middle, len(across)), across.ravel()).reshape(across.shape)
+    return result
 
 
 def _steps(station: Float, edges: Float) -> NDArray[np.bool_]:

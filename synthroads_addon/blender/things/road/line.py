@@ -7,7 +7,7 @@ from ...nodes import operations as op
 from ...nodes.axis import rows_along
 from ...nodes.backbone import last_station, look_up, station_ribbon
 from ...nodes.builder import Tree, Value, makes_group
-from ...nodes.inputs import FAR, Inputs, backbone_socket, instance_number, integer, material_of, metres
+from ...nodes.inputs import FAR, INSTANCES, Inputs, backbone_socket, instance_number, integer, material_of, metres
 from ...nodes.solids import row_of_points
 from ...nodes.strip import strip_group
 
@@ -25,6 +25,7 @@ class Dashes(Inputs):
     end_station = metres(1e6, (0.0, 1e6), "End of the line")
     film_thickness = metres(0.003, (0.0005, 0.006), "Height above the pavement")
     instance = instance_number()
+    first_dash_instance = integer(0, INSTANCES, "Instance number of the first dash; the others have those after it")
 
 
 class LinePaint(Inputs):
@@ -63,6 +64,10 @@ def marking_group(tree: Tree) -> None:
         for name, value in zip(_EDGES, across, strict=True):
             backbone = op.store(backbone, name, value)
     rows = _with_ends(tree, backbone, (first, end, length, period, count))
+    with tree.frame("Instance number: the line's own, or one for each dash"):
+        station = op.named_attribute(tree, "station")
+        dash = tree.node("FunctionNodeFloatToInt", (station - first) / period, rounding_mode="FLOOR").value
+        instance = op.switch(dashed, line.instance, line.first_dash_instance + dash)
     with tree.frame("Ribbon over all rows; the faces of the gaps are deleted"):
         ribbon = tree.call(
             strip_group(),
@@ -71,10 +76,9 @@ def marking_group(tree: Tree) -> None:
             right_offset=op.named_attribute(tree, "edge_right"),
             left_height=op.named_attribute(tree, "edge_left_height") + film,
             right_height=op.named_attribute(tree, "edge_right_height") + film,
-            instance=line.instance,
+            instance=instance,
             **paint.values,
         ).value
-        station = op.named_attribute(tree, "station")
         painted = (station > first) & (station < end) & ((station - first) % period < length)
         tree.output("Mesh", op.delete_faces(ribbon, ~painted), description="Dashes whose faces look up")
 

@@ -24,7 +24,7 @@ class LineInputs(Dashes, _Width):
     """Inputs of a line whose middle is given."""
 
 
-LINE_FIELDS = tuple(field.name for field in LineInputs.fields() if field.name != "instance")
+LINE_FIELDS = tuple(field.name for field in LineInputs.fields() if not field.name.endswith("instance"))
 """Those that stand for fields of `LineMarking`."""
 
 

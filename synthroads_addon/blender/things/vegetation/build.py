@@ -6,17 +6,22 @@ import math
 from functools import cache
 from typing import Any
 
+import bpy
+import numpy as np
+
 from ....base.files import PRESETS
 from ....base.schema import read_json
-from ....road.surroundings import Vegetation
+from ....base.stepper import run_aside
+from ....road.plants import ROADSIDE_SHARE, SEEDS, plant_places
+from ....road.section import Median
+from ....road.surroundings import Terrain, Vegetation
+from ..meshes import attribute, fill
 from ..model_builder import ModelBuilder
 from .grass import grass_group
 from .shrub import shrub_group
 from .tree import tree_group
 
 _GROUPS = {"grass": grass_group, "shrub": shrub_group, "tree": tree_group}
-_ROADSIDE_SHARE = 0.8
-"""Grass on verges and median, as a share of the density elsewhere; reed grows on neither."""
 
 
 @cache
@@ -36,19 +41,37 @@ def build_vegetation(builder: ModelBuilder) -> None:
             name,
             plants,
             _GROUPS[plants.kind](),
+            None if plants.kind == "grass" else _places_mesh(builder, plants, terrain),
+            instance=builder.geometry.numbers.parts[name].first,
             reach=terrain.half_width,
             first_metre=math.floor(builder.stretch[0]),
             zero=builder.zero,
-            seed=plants.seed % 2**30,
+            seed=plants.seed % SEEDS,
             detail=builder.detail,
             **species_shapes()[plants.kind][plants.species],
             **_further_inputs(plants, builder),
         )
 
 
+def _places_mesh(builder: ModelBuilder, plants: Vegetation, terrain: Terrain) -> bpy.types.Mesh:
+    """Return a vertex for each place of a stand on the stretch, see `plants.decided_places`."""
+    places = run_aside(lambda: plant_places(builder.geometry, plants, terrain, *builder.stretch))
+    mesh = bpy.data.meshes.new("SR Places")
+    fill(mesh, np.zeros((len(places.number), 3)))
+    attribute(mesh, "id", places.number)
+    attribute(mesh, "stands", places.stands.astype(np.int64))
+    attribute(mesh, "seed", np.full(len(places.number), plants.seed % SEEDS))
+    inputs = {"density": plants.density, "band_start": plants.band_start, "band_end": plants.band_end}
+    for name, value in {**inputs, "reach": terrain.half_width}.items():
+        attribute(mesh, name, np.full(len(places.number), value))
+    return mesh
+
+
 def _further_inputs(plants: Vegetation, builder: ModelBuilder) -> dict[str, Any]:
     """Return the inputs that only one kind of plant has: materials, and the density on verges and median."""
     if plants.kind == "grass":
-        roadside = plants.density * _ROADSIDE_SHARE * (plants.species != "reed")
-        return {"roadside_density": roadside, "roadside_reach": builder.widest, "material": plants.species}
+        roadside = plants.density * ROADSIDE_SHARE * (plants.species != "reed")
+        median = next((item.instance for item in builder.parameters.of_type(Median).values()), 0)
+        reach = {"roadside_reach": builder.widest, "median_instance": median}
+        return {"roadside_density": roadside, "material": plants.species, **reach}
     return {"bark_material": f"{plants.species}_bark", "leaves_material": f"{plants.species}_leaves"}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ....base.classes import class_id
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
-from ...nodes.inputs import Inputs, integer, material_of, metres, number, share
+from ...nodes.inputs import INSTANCES, Inputs, integer, material_of, metres, number, share
 from ...nodes.solids import Point
 from .plants import Stand, one_high, plant_points, points_in_band, points_on
 
@@ -21,6 +21,7 @@ class _Roadside(Inputs):
     roadside_density = number(1.0, (0.0, 50.0), "Tufts per area of verge and median (1/m2)")
     roadside_reach = metres(30.0, (1.0, 100.0), "Farthest verge from the axis")
     roadside_height = share(0.5, (0.0, 1.0), "Height there, as a share of the height elsewhere")
+    median_instance = integer(0, INSTANCES, "Instance number of the median's faces; 0 if it has none of its own")
     material = material_of("the blades")
 
 
@@ -43,12 +44,13 @@ def grass_group(tree: Tree) -> None:
 
     with tree.frame("Places on the terrain"):
         points = points_in_band(tree, stand, stand.density * stand.detail)
-        points = op.store(points, "share", 1.0)
+        points = op.store(op.store(points, "share", 1.0), "strip", _on_right(tree))
     with tree.frame("Places on verges and median"):
         beside = op.named_attribute(tree, "class_id", "INT").equals(class_id("roadside"))
         faces = op.separate(op.object_geometry(stand.road), beside, "FACE")
         density = roadside.roadside_density * stand.detail
         mown = points_on(tree, stand, faces, density, roadside.roadside_reach, stand.seed + 7)
+        mown = op.store(mown, "strip", op.switch(_in_median(tree, faces, roadside), 2 + _on_right(tree), 4))
         points = op.join(points, op.store(mown, "share", roadside.roadside_height))
     with tree.frame("Kinds of tufts"):
         variants = [tree.call(tuft_group(), **shape.values, seed=100 * n).value for n in range(_VARIANTS)]
@@ -57,9 +59,28 @@ def grass_group(tree: Tree) -> None:
         height = op.random(tree, stand.smallest_height, stand.largest_height, stand.seed + 3) * share
         # Low tufts are broad for their height. Fewer tufts are broader, so that they cover as much of the ground.
         broad = (height + stand.largest_height * share) * 0.65 / op.unary("SQRT", op.maximum(stand.detail, 0.05))
-        mesh = plant_points(tree, stand, points, variants, op.vector(tree, broad, broad, height), 0.12)
-        mesh = op.label(mesh, class_id("vegetation"), stand.instance, roadside.material)
+        scale, number = op.vector(tree, broad, broad, height), stand.instance + op.named_attribute(tree, "strip", "INT")
+        mesh = plant_points(tree, points, variants, scale, 0.12, stand.seed, number)
+        mesh = op.store(mesh, "class_id", class_id("vegetation"), "FACE")
+        mesh = tree.node("GeometryNodeSetMaterial", mesh, material=roadside.material).value
     tree.output("Mesh", mesh, description="Grass; only faces that scanner and camera can see")
+
+
+def _on_right(tree: Tree) -> Value:
+    """Return 1 for points on the right of the axis, 0 for those on its left."""
+    return op.switch(op.named_attribute(tree, "offset") < 0.0, 0, 1)
+
+
+def _in_median(tree: Tree, faces: Value, roadside: _Roadside) -> Value:
+    """Return whether points on the verges and the median are on the median."""
+    at = tree.node(
+        "GeometryNodeSampleNearestSurface",
+        data_type="INT",
+        mesh=faces,
+        value=op.named_attribute(tree, "instance_id", "INT"),
+        sample_position=op.position(tree),
+    ).value
+    return (at - roadside.median_instance).equals(0) & ~roadside.median_instance.equals(0)
 
 
 @makes_group("SR Grass Tuft")

@@ -1,23 +1,25 @@
 """Placement of grass and trees: where plants grow, and how they are put there.
 
 A plant's place, size and turn follow from its seed and its number, and its number from the metre of road that it stands
-beside: a stretch of a road has the whole road's plants.
+beside: a stretch of a road has the whole road's plants. `road.plants` works out the same without Blender.
 """
 
 from __future__ import annotations
 
+from ....road.instances import SPARE
+from ....road.plants import BREADTH, BREADTHS, CHANCE, HEIGHT, KIND, OFFSET, PICK, STATION
 from ...nodes import operations as op
 from ...nodes.backbone import first_station, last_station, look_up, station_ribbon
 from ...nodes.builder import Operand, Tree, Value
-from ...nodes.inputs import Inputs, backbone_socket, instance_number, integer, metres, number, share, socket
+from ...nodes.inputs import INSTANCES, Inputs, backbone_socket, integer, metres, number, share, socket
 
-_SPARE = 1.5
-"""Places that are looked at for each one that is wanted: outside of curves and on slopes there is more ground to a
-metre of road. Where it were even more, plants would stand thinner."""
+_NUMBER = "plant_instance"
 _ABOVE = 1000.0
 """Height from which the ground is looked for, m."""
 
-_NEEDED_NO_MORE = ("distance", "station", "offset", "edge", "share", "id")
+_ASIDE = 1.0
+"""Distance (m) that the road's edge may have moved by hand before decided places beyond the band are left out."""
+_NEEDED_NO_MORE = ("distance", "station", "offset", "edge", "share", "id", "strip")
 """Attributes of the places that the plants' many points would only carry along."""
 
 
@@ -37,13 +39,24 @@ class Stand(Inputs):
     zero = integer(0, (0, 2**20), "Whole metre of the road that the stations count from")
     seed = integer(0, (0, 2**31 - 1), "Seed of places, sizes and turns")
     detail = share(1.0, (0.0, 1.0), "Share of the triangles")
-    instance = instance_number()
+    instance = integer(0, INSTANCES, "Instance number of the first; the others have those after it")
 
 
-def points_in_band(tree: Tree, stand: Stand, density: Operand) -> Value:
-    """Return points spread at random over the terrain in the band."""
+DECIDED = ("density", "band_start", "band_end", "reach")
+"""Inputs of a stand that the places of `decided_places` were decided for: their points carry them, and the seed."""
+
+
+def decided_places(tree: Tree) -> Value:
+    """Declare the places of a stand that are decided already, by which model and twin have the same plants."""
+    about = "Places decided already: points with id, stands (0 or 1) and the inputs that this holds for; may be empty"
+    return tree.input("Places", "Geometry", description=about)
+
+
+def points_in_band(tree: Tree, stand: Stand, density: Operand, places: Value | None = None) -> Value:
+    """Return points spread at random over the terrain in the band; `places` may say where none grows."""
     surface = op.object_geometry(stand.terrain)
-    return points_on(tree, stand, surface, density, stand.reach, stand.seed, (stand.band_start, stand.band_end))
+    band = stand.band_start, stand.band_end
+    return points_on(tree, stand, surface, density, stand.reach, stand.seed, band, places)
 
 
 def points_on(
@@ -54,6 +67,7 @@ def points_on(
     reach: Value,
     seed: Value,
     band: tuple[Value, Value] | None = None,
+    places: Value | None = None,
 ) -> Value:
     """Return points spread at random over a surface, as many per area of it everywhere.
 
@@ -63,21 +77,22 @@ def points_on(
         reach: how far from the axis they are looked for, m.
         seed: of their places.
         band: limits of the distance, m; none if None.
+        places: those that are decided, see `decided_places`; none if None.
     """
     axis = op.object_geometry(stand.backbone)
     ribbon = station_ribbon(axis)
     first = stand.first_metre - stand.zero
     rows = _integer(op.round_up(last_station(axis)) - first, 0)
     per_metre = reach * 2.0 * density
-    each = _integer(op.round_up(per_metre * _SPARE), 1)
+    each = _integer(op.round_up(per_metre * SPARE), 1)
     points = tree.node("GeometryNodePoints", count=rows * each).value
     number = op.index(tree)
     metre = number // each
     # A number of its own for every place on the road, however much of the road is here.
     points = op.store(points, "id", (stand.first_metre + metre) * each + number % each)
     identity = op.named_attribute(tree, "id", "INT")
-    points = op.store(points, "station", (metre + first) + op.random(tree, 0.0, 1.0, seed + 11, identity))
-    points = op.store(points, "offset", op.random(tree, -1.0, 1.0, seed + 12, identity) * reach)
+    points = op.store(points, "station", (metre + first) + op.random(tree, 0.0, 1.0, seed + STATION, identity))
+    points = op.store(points, "offset", op.random(tree, -1.0, 1.0, seed + OFFSET, identity) * reach)
     station, offset = op.named_attribute(tree, "station"), op.named_attribute(tree, "offset")
     points = op.delete_points(points, (station < first_station(axis)) | (station > last_station(axis)))
     above = look_up(ribbon, "axis", station) + look_up(ribbon, "left", station) * offset + (0.0, 0.0, _ABOVE)
@@ -92,10 +107,27 @@ def points_on(
     # Ground per metre of road and metre across it: longer outside of a curve, and on a slope.
     ground = 1.0 - look_up(ribbon, "curvature", station) * offset
     needed = per_metre * ground / op.maximum(op.component(ray["Hit Normal"], "Z"), 0.1)
-    gone = ~ray["Is Hit"] | (op.random(tree, 0.0, 1.0, seed + 13, identity) * each > needed)
+    gone = ~ray["Is Hit"] | (op.random(tree, 0.0, 1.0, seed + CHANCE, identity) * each > needed)
     if band is not None:
         gone = gone | (ray["Attribute"] < band[0]) | (ray["Attribute"] > band[1])
+        if places is not None:
+            aside = (ray["Attribute"] < band[0] - _ASIDE) | (ray["Attribute"] > band[1] + _ASIDE)
+            decided, stands = _decisions(stand, places, identity)
+            gone = op.switch(decided, gone, ~ray["Is Hit"] | ~stands | aside)
     return op.set_position(op.delete_points(points, gone), ray["Hit Position"])
+
+
+def _decisions(stand: Stand, places: Value, identity: Value) -> tuple[Value, Value]:
+    """Return whether all places were decided for the stand as it is, and whether a plant grows at each."""
+    tree = places.tree
+    decided = op.sample_index(places, op.named_attribute(tree, "seed", "INT"), 0).equals(stand.seed)
+    decided = decided & (op.point_count(places) > 0)
+    for name in DECIDED:
+        at_first = op.sample_index(places, op.named_attribute(tree, name), 0)
+        decided = decided & (op.unary("ABSOLUTE", at_first - stand.values[name]) < 1e-9)
+    first = op.sample_index(places, op.named_attribute(tree, "id", "INT"), 0)
+    stands = op.sample_index(places, op.named_attribute(tree, "stands", "INT"), identity - first)
+    return decided, stands > 0
 
 
 def _integer(value: Value, least: int) -> Value:
@@ -103,11 +135,35 @@ def _integer(value: Value, least: int) -> Value:
     return value.tree.node("FunctionNodeIntegerMath", value, least, operation="MAXIMUM").value
 
 
-def plant_points(tree: Tree, stand: Stand, points: Value, variants: list[Value], height: Value, lean: float) -> Value:
-    """Put one of the variants (of height 1) on each point, turned and leant at random, and make it real."""
+def own_numbers(tree: Tree, stand: Stand) -> Value:
+    """Return the instance number of each plant, by the number of its place."""
+    return stand.instance + op.named_attribute(tree, "id", "INT")
+
+
+def sizes(tree: Tree, stand: Stand, kind: str) -> Value:
+    """Return the scale of each plant: its height, and across it more or less."""
+    tall = op.random(tree, stand.smallest_height, stand.largest_height, stand.seed + HEIGHT)
+    across = tall * op.random(tree, *BREADTHS[kind], stand.seed + BREADTH)
+    return op.vector(tree, across, across, tall)
+
+
+def plant_points(
+    tree: Tree, points: Value, variants: list[Value], scale: Value, lean: float, seed: Value, number: Value
+) -> Value:
+    """Put one of the variants (of height 1) on each point, turned and leant at random, and make it real.
+
+    Args:
+        tree: the group.
+        points: where they stand.
+        variants: plants of height 1.
+        scale: of each, m.
+        lean: largest, rad.
+        seed: of the choice and the turns.
+        number: instance number of each.
+    """
     bodies = op.join(*(tree.node("GeometryNodeGeometryToInstance", variant).value for variant in variants))
     # A whole random number would be another one in Blender 5.
-    share = op.random(tree, 0.0, len(variants) - 0.001, stand.seed + 2)
+    share = op.random(tree, 0.0, len(variants) - PICK, seed + KIND)
     pick = tree.node("FunctionNodeFloatToInt", share, rounding_mode="FLOOR").value
     plants = tree.node(
         "GeometryNodeInstanceOnPoints",
@@ -115,12 +171,15 @@ def plant_points(tree: Tree, stand: Stand, points: Value, variants: list[Value],
         instance=bodies,
         pick_instance=True,
         instance_index=pick,
-        rotation=op.random_turn(tree, (-lean, -lean, 0.0), (lean, lean, 6.2832), stand.seed + 1),
-        scale=height,
+        rotation=op.random_turn(tree, (-lean, -lean, 0.0), (lean, lean, 6.2832), seed + 1),
+        scale=scale,
     ).value
+    plants = op.store(plants, _NUMBER, number, "INSTANCE")
     for name in _NEEDED_NO_MORE:
         plants = tree.node("GeometryNodeRemoveAttribute", plants, name=name).value
-    return op.realize(plants)
+    mesh = op.realize(plants)
+    mesh = op.store(mesh, "instance_id", op.named_attribute(tree, _NUMBER, "INT"), "FACE")
+    return tree.node("GeometryNodeRemoveAttribute", mesh, name=_NUMBER).value
 
 
 def one_high(plant: Value) -> Value:

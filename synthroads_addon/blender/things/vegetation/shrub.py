@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from ....base.classes import class_id
+from ....road.plants import KINDS
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import metres
 from .crown import Crown, Plant, PlantMaterials, bend_stems, crown_group
-from .plants import Stand, plant_points, points_in_band
+from .plants import Stand, decided_places, own_numbers, plant_points, points_in_band, sizes
 
 # Kinds of one species: seed, and a factor on the crown's radius.
-_KINDS = ((5, 1.0), (17, 0.82), (29, 1.15))
+_KINDS = tuple(zip((5, 17, 29), KINDS["shrub"], strict=True))
 _LEAN = 0.06
 _DEFAULTS = {
     "crown_bottom": 0.05,
@@ -35,21 +36,19 @@ class _ShrubInputs(Crown):
 @makes_group("SR Shrub")
 def shrub_group(tree: Tree) -> None:
     """Shrubs of one species in a band beside the road, of three kinds, with gaps between their leaves."""
-    stand = Stand(tree, defaults=_STAND)
+    places, stand = decided_places(tree), Stand(tree, defaults=_STAND)
     with tree.panel("Shape at height 1"):
         shape = _ShrubInputs(tree, defaults=_DEFAULTS)
     with tree.panel("Materials"):
         materials = PlantMaterials(tree)
     with tree.frame("Places"):
-        points = points_in_band(tree, stand, stand.density)
+        points = points_in_band(tree, stand, stand.density, places)
     with tree.frame("Kinds of shrubs"):
         kinds = [_kind(tree, {**shape.values, **materials.values, "detail": stand.detail}, *kind) for kind in _KINDS]
     with tree.frame("Shrubs"):
-        tall = op.random(tree, stand.smallest_height, stand.largest_height, stand.seed + 3)
-        broad = op.random(tree, 0.85, 1.25, stand.seed + 4)
-        scale = op.vector(tree, tall * broad, tall * broad, tall)
-        mesh = plant_points(tree, stand, points, kinds, scale, _LEAN)
-        mesh = op.label(mesh, class_id("vegetation"), stand.instance)
+        scale, number = sizes(tree, stand, "shrub"), own_numbers(tree, stand)
+        mesh = plant_points(tree, points, kinds, scale, _LEAN, stand.seed, number)
+        mesh = op.store(mesh, "class_id", class_id("vegetation"), "FACE")
     tree.output("Mesh", mesh, description="Shrubs")
 
 

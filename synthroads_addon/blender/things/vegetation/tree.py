@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from ....base.classes import class_id
+from ....road.plants import KINDS
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import metres
 from ...nodes.solids import paint_faces
 from .crown import Crown, Plant, PlantMaterials, bend_stems, crown_group
-from .plants import Stand, plant_points, points_in_band
+from .plants import Stand, decided_places, own_numbers, plant_points, points_in_band, sizes
 
 # Kinds of one species: seed, and factors on the crown's bottom and radius.
-_KINDS = ((11, 1.0, 1.0), (23, 0.85, 0.86), (37, 1.2, 1.12))
+_KINDS = tuple(zip((11, 23, 37), (1.0, 0.85, 1.2), KINDS["tree"], strict=True))
 _SIDES, _ROWS = 7, 5
 _FOOT = 0.02
 """Depth of the trunk's foot in the ground, so that it shows no gap on a batter."""
@@ -28,21 +29,19 @@ class _TreeInputs(Crown):
 @makes_group("SR Tree")
 def tree_group(tree: Tree) -> None:
     """Trees of one species in a band beside the road, of three kinds, with gaps between their leaves."""
-    stand = Stand(tree, defaults=_STAND)
+    places, stand = decided_places(tree), Stand(tree, defaults=_STAND)
     with tree.panel("Shape at height 1"):
         shape = _TreeInputs(tree)
     with tree.panel("Materials"):
         materials = PlantMaterials(tree)
     with tree.frame("Places"):
-        points = points_in_band(tree, stand, stand.density)
+        points = points_in_band(tree, stand, stand.density, places)
     with tree.frame("Kinds of trees"):
         kinds = [_kind(tree, {**shape.values, **materials.values, "detail": stand.detail}, *kind) for kind in _KINDS]
     with tree.frame("Trees"):
-        tall = op.random(tree, stand.smallest_height, stand.largest_height, stand.seed + 3)
-        slender = op.random(tree, 0.9, 1.15, stand.seed + 4)
-        scale = op.vector(tree, tall * slender, tall * slender, tall)
-        mesh = plant_points(tree, stand, points, kinds, scale, _LEAN)
-        mesh = op.label(mesh, class_id("vegetation"), stand.instance)
+        scale, number = sizes(tree, stand, "tree"), own_numbers(tree, stand)
+        mesh = plant_points(tree, points, kinds, scale, _LEAN, stand.seed, number)
+        mesh = op.store(mesh, "class_id", class_id("vegetation"), "FACE")
     tree.output("Mesh", mesh, description="Trees")
 
 

@@ -1,0 +1,211 @@
+"""Instance numbers as fine as things: every dash, plant, damage, strip of grass and pass of a vehicle has its own.
+
+An object has the number that its parameter set says. What it consists of has numbers that follow from the set: blocks
+of free numbers, the lowest ones, in the order of the objects. A block's length depends on the kind of object and the
+road's length only, so that a line's dashes or a stand's density may change without any other number changing.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.arrays import Bool
+from ..base.errors import InputError
+from .objects import RoadObject
+from .parameters import RoadParameters
+from .section import Carriageway, LineMarking
+from .surroundings import Terrain, Vegetation, Vehicle
+
+GRASS_STRIPS = ("left-band", "right-band", "left-verge", "right-verge", "median")
+"""Strips that grass of one species grows on, in the order of their numbers."""
+SPARE = 1.5
+"""Places that are looked at for each plant that is wanted: outside of curves and on slopes there is more ground to a
+metre of road. Where it were even more, plants would stand thinner."""
+LARGEST = 2**32 - 1
+_SHORTEST_PERIOD = 2.0
+"""Dashes of a line have room for one in so many metres of road."""
+_PLANTS_PER_METRE = 8
+"""Places of a stand have room for so many in a metre of road."""
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Numbers of an object's parts.
+
+    Attributes:
+        kind: ``dash``, ``damage``, ``strip``, ``tree`` or ``shrub``.
+        first: number of the first.
+        count: how many there may be: places where none grows, or that lie beyond the road's end, are among them.
+        room: numbers that are kept for them, so that the panel's edits can make more of them.
+    """
+
+    kind: str
+    first: int
+    count: int
+    room: int
+
+
+@dataclass(frozen=True)
+class PassNumbers:
+    """Numbers of the passes of a vehicle that leaves the road and comes in again.
+
+    Attributes:
+        first: number of its second pass; the first has the vehicle's own.
+        step: from one pass to the next.
+    """
+
+    first: int
+    step: int
+
+    def number(self, own: int, passes: int) -> int:
+        """Return the number of a pass, 0 the first, of a vehicle with a number of its own."""
+        return own if passes <= 0 else self.first + (passes - 1) * self.step
+
+
+class InstanceNumbers:
+    """Numbers of everything in a parameter set that points can be of.
+
+    Args:
+        parameters: the whole road's, not those of a stretch.
+
+    Attributes:
+        parts: of objects that consist of parts, by id.
+        passes: of the vehicles, by id.
+
+    Raises:
+        InputError: there are not enough numbers of 32 bits.
+    """
+
+    def __init__(self, parameters: RoadParameters) -> None:
+        self._parameters = parameters
+        taken = sorted(item.instance for item in parameters.objects.values())
+        free = _FreeNumbers(taken)
+        length = math.ceil(parameters.alignment.length)
+        self.parts: dict[str, Parts] = {}
+        for name, item in parameters.objects.items():
+            kind, count, room = _parts_of(item, parameters, length)
+            if count:
+                self.parts[name] = Parts(kind, free.block(max(count, room), name), count, max(count, room))
+        vehicles = parameters.of_type(Vehicle)
+        first = free.rest()
+        self.passes = {name: PassNumbers(first + number, len(vehicles)) for number, name in enumerate(vehicles)}
+
+    def name_of(self, number: int) -> str | None:
+        """Return what a number stands for: an object's id, with a slash and its part; None if it stands for nothing."""
+        if number in self._own:
+            return self._own[number]
+        starts, names = self._blocks
+        block = bisect_right(starts, number) - 1
+        if block >= 0:
+            name = names[block]
+            part = number - self.parts[name].first
+            if part < self.parts[name].room:
+                return f"{name}/{self.part_name(name, part)}"
+        if self.passes:
+            first = next(iter(self.passes.values())).first
+            again, vehicle = divmod(number - first, len(self.passes))
+            if again >= 0:
+                return f"{list(self.passes)[vehicle]}/pass-{again + 1}"
+        return None
+
+    def part_name(self, name: str, part: int) -> str:
+        """Return the name of an object's part, counted from 0."""
+        kind, item = self.parts[name].kind, self._parameters.objects[name]
+        if kind == "strip":
+            return GRASS_STRIPS[part]
+        if isinstance(item, Carriageway):
+            return f"{'rut' if part < len(item.pavement.ruts) else 'pothole'}-{part}"
+        return f"{kind}-{part}"
+
+    def part(self, name: str, part: int) -> tuple[str, int]:
+        """Return the id and the number of an object's part, counted from 0."""
+        return f"{name}/{self.part_name(name, part)}", self.parts[name].first + part
+
+    def owner(self, number: int) -> str | None:
+        """Return the id of the object that a number is of, or of a part of; None if it stands for nothing."""
+        name = self.name_of(number)
+        return None if name is None else name.partition("/")[0]
+
+    def belong(self, name: str, numbers: NDArray[np.integer]) -> Bool:
+        """Return which numbers (N,) are an object's or its parts'; not those of later passes."""
+        found: Bool = numbers == self._parameters.objects[name].instance
+        if name in self.parts:
+            parts = self.parts[name]
+            found |= (numbers >= parts.first) & (numbers < parts.first + parts.room)
+        return found
+
+    def to_dict(self) -> dict[str, object]:
+        """Return the numbers of parts and passes as JSON data, as a job's report has them."""
+        parts = {
+            name: {"instance": self._parameters.objects[name].instance, "part": one.kind, "first": one.first}
+            | {"count": one.count}
+            for name, one in self.parts.items()
+        }
+        passes = {name: {"first": one.first, "step": one.step} for name, one in self.passes.items()}
+        return {"parts": parts, "passes": passes}
+
+    @cached_property
+    def _own(self) -> dict[int, str]:
+        return {item.instance: name for name, item in self._parameters.objects.items()}
+
+    @cached_property
+    def _blocks(self) -> tuple[list[int], list[str]]:
+        """Return where the blocks begin, and whose they are, in the order of their numbers."""
+        ordered = sorted((one.first, name) for name, one in self.parts.items())
+        return [first for first, _ in ordered], [name for _, name in ordered]
+
+
+class _FreeNumbers:
+    """Numbers that no object has, lowest first.
+
+    Args:
+        taken: numbers of the objects, in order.
+    """
+
+    def __init__(self, taken: list[int]) -> None:
+        ends = [*taken, LARGEST + 1]
+        self._gaps = [(a + 1, b) for a, b in zip([0, *taken], ends, strict=True) if b > a + 1]
+
+    def block(self, count: int, name: str) -> int:
+        """Return the first of so many numbers side by side, and take them."""
+        for place, (start, end) in enumerate(self._gaps):
+            if end - start >= count:
+                self._gaps[place] = (start + count, end)
+                return start
+        raise InputError(f"objects.{name}", count, f"consists of so many parts: no numbers up to {LARGEST} are left")
+
+    def rest(self) -> int:
+        """Return the first number after all that are taken."""
+        return self._gaps[-1][0] if self._gaps else LARGEST
+
+
+def _parts_of(item: RoadObject, parameters: RoadParameters, length: int) -> tuple[str, int, int]:
+    """Return what an object consists of, of how many parts, and how many numbers are kept for them."""
+    if isinstance(item, Carriageway):
+        return "damage", len(item.pavement.ruts) + len(item.pavement.potholes), 0
+    if isinstance(item, LineMarking):
+        return "dash", dash_count(item, parameters.alignment.length), math.ceil(length / _SHORTEST_PERIOD) + 1
+    if isinstance(item, Vegetation) and item.kind == "grass":
+        return "strip", len(GRASS_STRIPS), 0
+    if isinstance(item, Vegetation) and parameters.terrain is not None:
+        return item.kind, places_per_metre(item, parameters.terrain) * length, _PLANTS_PER_METRE * length
+    return "", 0, 0
+
+
+def places_per_metre(plants: Vegetation, terrain: Terrain) -> int:
+    """Return how many places for plants a metre of road has: in the nodes' float32, so that rounding is the same."""
+    per_metre = np.float32(np.float32(terrain.half_width) * np.float32(2.0)) * np.float32(plants.density)
+    return max(1, math.ceil(np.float32(per_metre * np.float32(SPARE))))
+
+
+def dash_count(line: LineMarking, length: float) -> int:
+    """Return how many dashes a line has on a road of a length (m); 1 for a solid one, whose dash is the line itself."""
+    period = line.dash_length + line.gap_length
+    reach = min(line.end_station, length) - line.start_station
+    return max(1, math.ceil(reach / period)) if period else 1

@@ -1,0 +1,146 @@
+"""Where the plants of a stand grow, and how large each is: as the node groups place them, without Blender.
+
+Every metre of road has as many places as the stand's density needs at most, each with a number. Where a place lies,
+whether a plant grows there and how tall it is follow from its number and the stand's seed, by the hash of Blender's
+node *Random Value* (Jenkins' lookup3). So a stretch of a road has the whole road's plants.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.arrays import Bool, Float, Int
+from .alignment import clip_offset
+from .geometry import RoadGeometry
+from .instances import places_per_metre
+from .surface import known_elevation
+from .surroundings import Terrain, Vegetation
+
+STATION, OFFSET, CHANCE = 11, 12, 13
+"""Added to a stand's seed: for a place's station within its metre, its offset, and whether a plant grows there."""
+KIND, HEIGHT, BREADTH = 2, 3, 4
+"""Added to a stand's seed: for which of the kinds of its species a plant is, its height and its breadth."""
+KINDS = {"tree": (1.0, 0.86, 1.12), "shrub": (1.0, 0.82, 1.15)}
+"""Kind of plant -> factors on the crown's radius of the kinds that each species has."""
+BREADTHS = {"tree": (0.9, 1.15), "shrub": (0.85, 1.25)}
+"""Kind of plant -> limits of a plant's breadth for its height."""
+PICK = 0.001
+"""A random number from 0 to the number of kinds less this picks one."""
+SEEDS = 2**30
+"""A stand's seed is taken modulo this: the nodes have whole numbers of 32 bits with a sign."""
+ROADSIDE_SHARE = 0.8
+"""Grass on verges and median, as a share of the density elsewhere; reed grows on neither."""
+_SLOPE = 0.25
+"""Half the distance over which the ground's slope is measured, m."""
+
+
+@dataclass(frozen=True)
+class PlantPlaces:
+    """Places of a stand along a stretch of road, those of the first metre first.
+
+    Attributes:
+        number: (N,) of each place.
+        station, offset: (N,) m.
+        stands: (N,) whether a plant grows there.
+    """
+
+    number: Int
+    station: Float
+    offset: Float
+    stands: Bool
+
+
+@dataclass(frozen=True)
+class Plants:
+    """Plants of a stand.
+
+    Attributes:
+        number: (N,) of each plant's place.
+        position: (N, 3) local, of its foot, m.
+        height: (N,) m.
+        crown_radius: (N,) m, where the crown is widest.
+    """
+
+    number: Int
+    position: Float
+    height: Float
+    crown_radius: Float
+
+
+def random_share(seed: int, number: Int) -> NDArray[np.float32]:
+    """Return the random numbers (N,) from 0 to 1 that Blender's nodes have for a seed and ids (N,)."""
+    start = np.uint32(0xDEADBEEF + (2 << 2) + 13)
+    with np.errstate(over="ignore"):
+        a = np.full(len(number), start + np.uint32(seed % 2**32))
+        b = start + number.astype(np.uint32)
+        c = np.full(len(number), start)
+        for one, other, bits in (("c", "b", 14), ("a", "c", 11), ("b", "a", 25), ("c", "b", 16)):
+            a, b, c = _mixed(a, b, c, one, other, bits)
+        for one, other, bits in (("a", "c", 4), ("b", "a", 14), ("c", "b", 24)):
+            a, b, c = _mixed(a, b, c, one, other, bits)
+    return c.astype(np.float32) / np.float32(0xFFFFFFFF)
+
+
+Words = NDArray[np.uint32]
+
+
+def _mixed(a: Words, b: Words, c: Words, one: str, other: str, bits: int) -> tuple[Words, Words, Words]:
+    """Return the state of the hash after one step: ``one ^= other; one -= rotated(other)``."""
+    words = {"a": a, "b": b, "c": c}
+    turned = (words[other] << np.uint32(bits)) | (words[other] >> np.uint32(32 - bits))
+    words[one] = (words[one] ^ words[other]) - turned
+    return words["a"], words["b"], words["c"]
+
+
+def plant_places(
+    geometry: RoadGeometry, plants: Vegetation, terrain: Terrain, start: float = 0.0, end: float | None = None
+) -> PlantPlaces:
+    """Return the places of a stand in the whole metres that hold a stretch from ``start`` to ``end``, m.
+
+    Where plants grow there are as many on each square metre of ground, sloping or not, as the density says.
+    """
+    each, seed = places_per_metre(plants, terrain), plants.seed % SEEDS
+    last = math.ceil(geometry.length if end is None else min(end, geometry.length))
+    number = np.arange(math.floor(start) * each, last * each, dtype=np.int64)
+    station: Float = number // each + random_share(seed + STATION, number).astype(np.float64)
+    offset = (random_share(seed + OFFSET, number).astype(np.float64) * 2.0 - 1.0) * terrain.half_width
+    curvature = geometry.alignment.curvature(np.minimum(station, geometry.length))
+    boundaries = geometry.offsets(np.minimum(station, geometry.length))
+    distance = np.maximum(offset - boundaries[:, 0], boundaries[:, -1] - offset)
+    stands = (station <= geometry.length) & (distance > 0.0) & (clip_offset(offset, curvature) == offset)
+    stands &= (distance >= plants.band_start) & (distance <= plants.band_end)
+    left = np.flatnonzero(stands)
+    ground = (1.0 - curvature[left] * offset[left]) * _steepness(geometry, station[left], offset[left], curvature[left])
+    needed = terrain.half_width * 2.0 * plants.density * ground
+    stands[left] = random_share(seed + CHANCE, number[left]) * each <= needed
+    return PlantPlaces(number, station, offset, stands)
+
+
+def _steepness(geometry: RoadGeometry, station: Float, offset: Float, curvature: Float) -> Float:
+    """Return the area of ground (N,) above each square metre in plan."""
+    along = _SLOPE / np.maximum(1.0 - curvature * offset, 0.02)
+
+    def height(ahead: Float | float, beside: float) -> Float:
+        return known_elevation(geometry, np.clip(station + ahead, 0.0, geometry.length), offset + beside)
+
+    rise = (height(along, 0.0) - height(-along, 0.0)) / (2.0 * _SLOPE)
+    across = (height(0.0, _SLOPE) - height(0.0, -_SLOPE)) / (2.0 * _SLOPE)
+    return np.minimum(np.sqrt(1.0 + rise**2 + across**2), 10.0)
+
+
+def grown_plants(geometry: RoadGeometry, plants: Vegetation, terrain: Terrain, crown_radius: float) -> Plants:
+    """Return the trees or shrubs of a stand; `crown_radius` is that of its species for a height of 1."""
+    places = plant_places(geometry, plants, terrain)
+    number, seed = places.number[places.stands], plants.seed % SEEDS
+    station, offset = places.station[places.stands], places.offset[places.stands]
+    height = plants.height_min + (plants.height_max - plants.height_min) * random_share(seed + HEIGHT, number)
+    low, high = BREADTHS[plants.kind]
+    broad = low + (high - low) * random_share(seed + BREADTH, number)
+    factors = np.array(KINDS[plants.kind])
+    kind = np.floor(random_share(seed + KIND, number) * (len(factors) - PICK)).astype(np.intp)
+    position = np.column_stack([geometry.alignment.place(station, offset), known_elevation(geometry, station, offset)])
+    return Plants(number, position, height, height * broad * factors[kind] * crown_radius)
