@@ -90,6 +90,7 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
             scene, report["choice"] = choose_settings(scene, begun, timer)
             files = JobFiles(scene.scenario)
         files.write_road(folder, road, timer)
+        report["instances"] = road.numbers.to_dict()
         if scene:
             report["counts"] = scene.write_files(folder, timer)
             if warnings := empty_scan_warnings(report["counts"]):

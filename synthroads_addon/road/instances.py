@@ -132,6 +132,13 @@ class InstanceNumbers:
         name = self.name_of(number)
         return None if name is None else name.partition("/")[0]
 
+    def about(self, instance: int) -> dict[str, int]:
+        """Return where the numbers of the parts and passes of an object with a number begin, as attributes."""
+        name = self._own[instance]
+        parts, again = self.parts.get(name), self.passes.get(name)
+        told = {"first_part_instance": parts.first, "part_count": parts.count} if parts else {}
+        return told | ({"first_pass_instance": again.first, "pass_step": again.step} if again else {})
+
     def belong(self, name: str, numbers: NDArray[np.integer]) -> Bool:
         """Return which numbers (N,) are an object's or its parts'; not those of later passes."""
         found: Bool = numbers == self._parameters.objects[name].instance

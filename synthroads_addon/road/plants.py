@@ -17,8 +17,8 @@ from ..base.arrays import Bool, Float, Int
 from .alignment import clip_offset
 from .geometry import RoadGeometry
 from .instances import places_per_metre
-from .surface import known_elevation
 from .surroundings import Terrain, Vegetation
+from .terrain import known_elevation
 
 STATION, OFFSET, CHANCE = 11, 12, 13
 """Added to a stand's seed: for a place's station within its metre, its offset, and whether a plant grows there."""
@@ -106,7 +106,7 @@ def plant_places(
     each, seed = places_per_metre(plants, terrain), plants.seed % SEEDS
     last = math.ceil(geometry.length if end is None else min(end, geometry.length))
     number = np.arange(math.floor(start) * each, last * each, dtype=np.int64)
-    station: Float = number // each + random_share(seed + STATION, number).astype(np.float64)
+    station = (number // each).astype(np.float64) + random_share(seed + STATION, number)
     offset = (random_share(seed + OFFSET, number).astype(np.float64) * 2.0 - 1.0) * terrain.half_width
     curvature = geometry.alignment.curvature(np.minimum(station, geometry.length))
     boundaries = geometry.offsets(np.minimum(station, geometry.length))

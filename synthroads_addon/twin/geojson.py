@@ -148,6 +148,7 @@ class _Writer:
         points[:, 2] += item.film_thickness
         lines = np.split(points, np.flatnonzero(np.diff(owner)) + 1)
         about = attributes_of(item) | {"id": name, "feature": "marking", "dashes": np.round(dashes, DIGITS).tolist()}
+        about |= self.geometry.numbers.about(item.instance)
         yield _feature(about, "MultiLineString", [self._map(line) for line in lines])
 
     def _painted(self, name: str, item: Hatching | Arrow) -> Iterator[Feature]:

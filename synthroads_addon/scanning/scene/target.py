@@ -100,7 +100,7 @@ class Target:
         result[faces < 0] = _NO_FACE[name]
         return np.asarray(result)
 
-    def instances(self, faces: Faces, times: Float) -> NDArray[np.uint32]:
+    def instances(self, faces: Index, times: Float) -> AnyArray:
         """Return the instance numbers of faces (H,) met at times (H,), s: what comes in again has another one."""
         result = np.array(self.face_values("instance_id", faces), dtype=np.uint32)
         for part, moving in zip(self._parts[1:], self.moving, strict=True):

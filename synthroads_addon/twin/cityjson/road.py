@@ -64,16 +64,18 @@ def road_objects(geometry: RoadGeometry, stations: Float, tolerance: float) -> I
     surfaces = _surfaces(geometry, stations, tolerance)
     for name, item in parameters.objects.items():
         if isinstance(item, Carriageway | Median | Turnout):
-            yield _road(name, item, surfaces.pop(item.instance, []))
+            yield _road(geometry, name, item, surfaces.pop(item.instance, []))
 
 
-def _road(name: str, item: RoadObject, surfaces: list[Surface]) -> CityObject:
+def _road(geometry: RoadGeometry, name: str, item: RoadObject, surfaces: list[Surface]) -> CityObject:
     function = {Carriageway: "carriageway", Median: "median"}.get(type(item), "turnout")
     if isinstance(item, Turnout):
         function = item.kind.replace("_", " ")
     attributes = attributes_of(item) | {"class": "motorway", "function": function}
     if isinstance(item, Carriageway):
         attributes["direction"] = "with stations" if item.traffic > 0 else "against stations"
+        if ruts := item.pavement.ruts:
+            attributes["rut_instances"] = dict(geometry.numbers.part(name, number) for number in range(len(ruts)))
     if not surfaces:
         return CityObject(name, "Road", attributes)
     faces = [part for _, part in surfaces]
@@ -92,10 +94,12 @@ def _surfaces(geometry: RoadGeometry, stations: Float, tolerance: float) -> dict
         if isinstance(item, LineMarking | Hatching | Arrow):
             owner = geometry.parameters.objects[item.turnout if isinstance(item, Hatching) else item.carriageway]
             by_road.setdefault(owner.instance, []).extend(_marking(geometry, name, item, stations))
-    for section in geometry.sections.values():
-        surfaces = by_road.setdefault(section.carriageway.instance, [])
-        for pothole in section.carriageway.pavement.potholes:
-            about = {"type": "TransportationHole", "function": "pothole"} | pothole.model_dump()
+    for name, carriageway in geometry.parameters.of_type(Carriageway).items():
+        surfaces = by_road.setdefault(carriageway.instance, [])
+        for number, pothole in enumerate(carriageway.pavement.potholes, len(carriageway.pavement.ruts)):
+            part, instance = geometry.numbers.part(name, number)
+            about = {"type": "TransportationHole", "function": "pothole", "id": part, "instance": instance}
+            about |= pothole.model_dump()
             surfaces.append((about, pothole_surface(geometry, pothole, tolerance)))
     return {instance: [pair for pair in pairs if len(pair[1])] for instance, pairs in by_road.items()}
 
@@ -137,7 +141,9 @@ def _marking(
     starts = np.cumsum(faces.sizes) - faces.sizes
     for number, (start, end) in enumerate(dashes.tolist()):
         polygons = np.flatnonzero(owner == number)
-        dash = {"start_station": round(start, 6), "end_station": round(end, 6)}
+        dash: dict[str, Any] = {"start_station": round(start, 6), "end_station": round(end, 6)}
+        if item.dash_length:
+            dash["id"], dash["instance"] = geometry.numbers.part(name, number)
         yield about | dash, _part(faces, starts, polygons)
 
 

@@ -266,10 +266,10 @@ class _Direction:
         ]
         damages += [("pothole", hole, hole.station, hole.offset) for hole in pavement.potholes]
         for number, (kind, damage, station, offset) in enumerate(damages):
-            name = f"{self.name}/{kind}-{number}"
+            name, instance = self.scene.geometry.numbers.part(self.name, number)
             placement = self.scene.place(station, offset).placement
             defect = ifc.product("IfcSurfaceFeature", name, "DEFECT", kind, placement)
-            ifc.label(defect, self.carriageway.instance, self.carriageway.points_class, damage)
+            ifc.label(defect, instance, self.carriageway.points_class, damage)
             ifc.gather("IfcRelAdheresToElement", self.pavement, [defect])
 
     def _rut_offset(self, rut: Rut) -> float:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from ...base.crs import wkt
 from ...road.geometry import RoadGeometry
+from ...road.instances import InstanceNumbers
 from ...road.parameters import AlignmentObject, RoadParameters
 from ...road.section import Carriageway, LineMarking, Median, Turnout
 from ...road.surroundings import Terrain, Vegetation, Vehicle
@@ -139,8 +140,10 @@ def geo_reference(epsg: int) -> str:
 
 def _list_rest(root: Element, parameters: RoadParameters) -> None:
     """Name what has no element of its own: centreline, parts whose lanes bear their number, ground, plants, traffic."""
+    numbers = InstanceNumbers(parameters)
     kinds = (AlignmentObject, Carriageway, Median, Turnout, LineMarking, Terrain, Vegetation, Vehicle)
     for name, item in parameters.objects.items():
         if isinstance(item, kinds):
             entry = element(root, "userData", {"code": "instance", "value": item.instance})
-            element(entry, "parameterObject", {"id": name, "type": type(item).__name__, "instance": item.instance})
+            about = {"id": name, "type": type(item).__name__, "instance": item.instance}
+            element(entry, "parameterObject", {**about, **numbers.about(item.instance)})

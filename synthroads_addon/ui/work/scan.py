@@ -161,10 +161,11 @@ def _write_files(scan: RoadScan, measure: _Measure, output: _Output) -> int:
     files = JobFiles(scan.scenario)
     files.write_road(output.folder, scan.road, output.timer)
     told: dict[str, Any] = {"counts": measure(output)} if set(files.outputs) & set(OF_POINTS) else {}
+    told["instances"] = scan.road.numbers.to_dict()
     if warnings := empty_scan_warnings(told.get("counts", {})):
         told["warnings"] = warnings
     files.write_report(output.folder, told, output.timer)
-    return int(told["counts"]["points"]) if told else 0
+    return int(told["counts"]["points"]) if "counts" in told else 0
 
 
 class SYNTHROADS_OT_scan(LongOperator, bpy.types.Operator):

@@ -13,6 +13,7 @@ import pytest
 
 from synthroads_addon.base.classes import classes
 from synthroads_addon.road.geometry import RoadGeometry
+from synthroads_addon.road.instances import InstanceNumbers
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.section import Carriageway, LineMarking
 from synthroads_addon.road.surroundings import Terrain, Vegetation, Vehicle
@@ -203,13 +204,14 @@ def test_dashes_begin_end_and_measure_as_the_parameters_say(full_city: City) -> 
     geometry = RoadGeometry(road)
     found: dict[str, list[tuple[float, float]]] = {}
     for _, about, rings in full_city.surfaces("TransportationMarking"):
-        item = road.objects[about["id"]]
+        owner = about["id"].partition("/")[0]
+        item = road.objects[owner]
         if not isinstance(item, LineMarking):
             continue
         _, station, _ = on_road(road, rings)
         assert station.min() == pytest.approx(about["start_station"], abs=0.001)
         assert station.max() == pytest.approx(about["end_station"], abs=0.001)
-        found.setdefault(about["id"], []).append((about["start_station"], about["end_station"]))
+        found.setdefault(owner, []).append((about["start_station"], about["end_station"]))
         ring = rings[0] - np.array(road.transform.translate)
         if len(ring) == 4:
             # From right to left behind, in the plane of the pavement.
@@ -230,11 +232,25 @@ def test_ids_and_instances_are_those_of_the_set_and_the_cloud(
     city = full_city if index is None else city_of(road, tmp_path)
     wanted = {name: item.instance for name, item in road.objects.items() if not isinstance(item, NOT_IN_TWIN)}
     found = {name: item["attributes"]["instance"] for name, item in city.objects.items()}
-    painted = {about["id"]: about["instance"] for _, about, _ in city.surfaces("TransportationMarking")}
+    kinds = ("TransportationMarking", "TransportationHole")
+    surfaces = (about for kind in kinds for _, about, _ in city.surfaces(kind))
+    painted = {about["id"]: about["instance"] for about in surfaces}
+    fine = {name: painted.pop(name) for name in list(painted) if "/" in name}
+    numbers = InstanceNumbers(road)
+    assert {name: numbers.name_of(number) for name, number in fine.items()} == {name: name for name in fine}
+    assert {name.partition("/")[0] for name in fine} == {
+        *(name for name, line in road.of_type(LineMarking).items() if line.dash_length),
+        *(name for name, item in road.of_type(Carriageway).items() if item.pavement.potholes),
+    }
+    wanted = {
+        name: number
+        for name, number in wanted.items()
+        if not (isinstance(line := road.objects[name], LineMarking) and line.dash_length)
+    }
     parts = {name: number for name, number in found.items() if "/" in name}
     assert {name: number for name, number in found.items() if name not in parts} | painted == wanted
     assert {name.split("/")[0] for name in parts} == set(road.of_type(Overpass))
-    assert city.instances() == set(wanted.values())
+    assert city.instances() == {*wanted.values(), *fine.values()}
 
 
 def test_classes_are_those_of_the_cloud(full_city: City) -> None:

@@ -18,6 +18,7 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import unit_of
 from synthroads_addon.road.alignment import Alignment, Element
 from synthroads_addon.road.geometry import RoadGeometry
+from synthroads_addon.road.instances import InstanceNumbers
 from synthroads_addon.road.lane_lines import lane_of
 from synthroads_addon.road.objects import LineObject, PointObject, width_at
 from synthroads_addon.road.parameters import AlignmentObject, HorizontalElement, RoadParameters
@@ -422,12 +423,17 @@ def test_georeferencing(road) -> None:
 
 
 def _check_instances(file: Any, parameters: RoadParameters) -> None:
-    """Every object is there under its id with its number, and no other numbers are."""
+    """Every object and its damage is there under its id with its number, and no other numbers are."""
     numbers = {name: item.instance for name, item in parameters.objects.items()}
     found: dict[str, set[int]] = {}
     for item in file.by_type("IfcObject"):
         if "instance" in said(item):
             found.setdefault(item.Name, set()).add(said(item)["instance"])
+    assert {name: {number} for name, number in numbers.items()}.items() <= found.items()
+    known = InstanceNumbers(parameters)
+    for name, item in parameters.of_type(Carriageway).items():
+        damage = len(item.pavement.ruts) + len(item.pavement.potholes)
+        numbers |= dict(known.part(name, number) for number in range(damage))
     assert {name: {number} for name, number in numbers.items()}.items() <= found.items()
     assert set().union(*found.values()) == set(numbers.values())
 
