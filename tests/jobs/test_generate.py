@@ -20,6 +20,7 @@ from synthroads_addon.jobs.generate import Job, generate
 from synthroads_addon.jobs.job_files import FILES
 from synthroads_addon.jobs.scan.plan import Site
 from synthroads_addon.road.geometry import RoadGeometry
+from synthroads_addon.road.instances import InstanceNumbers
 from synthroads_addon.road.parameters import read_parameters
 from synthroads_addon.scenario.scenario import load_scenario
 from tests.helpers.label_truth import misplaced_points
@@ -65,8 +66,10 @@ def test_every_file_is_written_and_agrees(tmp_path: Path, monkeypatch: pytest.Mo
     las = laspy.read(tmp_path / "cloud.laz")
     assert len(las) == report["counts"]["points"] > 50_000
     parameters = read_parameters(tmp_path / "parameters.json")
-    instances = {item.instance for item in parameters.objects.values()}
-    assert set(np.unique(las.instance_id)) <= instances
+    names = [InstanceNumbers(parameters).name_of(number) for number in np.unique(las.instance_id).tolist()]
+    assert {str(name).partition("/")[0] for name in names} <= set(parameters.objects)
+    assert any("/dash-" in str(name) for name in names)
+    assert report["instances"]["parts"].keys() >= {str(name).partition("/")[0] for name in names if "/" in str(name)}
     line = json.loads((tmp_path / "centerline.geojson").read_text())["features"][0]
     ends = np.array(line["geometry"]["coordinates"])[[0, -1]]
     assert np.linalg.norm(np.diff(ends[:, :2], axis=0)) == pytest.approx(120, abs=1)
