@@ -145,5 +145,9 @@ def _list_rest(root: Element, parameters: RoadParameters) -> None:
     for name, item in parameters.objects.items():
         if isinstance(item, kinds):
             entry = element(root, "userData", {"code": "instance", "value": item.instance})
-            about = {"id": name, "type": type(item).__name__, "instance": item.instance}
-            element(entry, "parameterObject", {**about, **numbers.about(item.instance)})
+            first = numbers.about(item.instance)
+            element(
+                entry,
+                "parameterObject",
+                {"id": name, "type": type(item).__name__, "instance": item.instance, **first},
+            )
