@@ -12,9 +12,9 @@ import numpy as np
 from ....base.files import PRESETS
 from ....base.schema import read_json
 from ....base.stepper import run_aside
-from ....road.plants import ROADSIDE_SHARE, SEEDS, plant_places
 from ....road.section import Median
 from ....road.surroundings import Terrain, Vegetation
+from ....road.vegetation.plants import ROADSIDE_SHARE, SEEDS, plant_places
 from ..meshes import attribute, fill
 from ..model_builder import ModelBuilder
 from .grass import grass_group

@@ -1,13 +1,13 @@
 """Placement of grass and trees: where plants grow, and how they are put there.
 
 A plant's place, size and turn follow from its seed and its number, and its number from the metre of road that it stands
-beside: a stretch of a road has the whole road's plants. `road.plants` works out the same without Blender.
+beside: a stretch of a road has the whole road's plants. `road.vegetation.plants` works out the same without Blender.
 """
 
 from __future__ import annotations
 
 from ....road.instances import SPARE
-from ....road.plants import BREADTH, BREADTHS, CHANCE, HEIGHT, KIND, OFFSET, PICK, STATION
+from ....road.vegetation.plants import BREADTH, BREADTHS, CHANCE, HEIGHT, KIND, OFFSET, PICK, STATION
 from ...nodes import operations as op
 from ...nodes.backbone import first_station, last_station, look_up, station_ribbon
 from ...nodes.builder import Operand, Tree, Value

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ....base.classes import class_id
-from ....road.plants import KINDS
+from ....road.vegetation.plants import KINDS
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import metres

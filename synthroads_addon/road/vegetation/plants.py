@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Bool, Float, Int
-from .alignment import clip_offset
-from .geometry import RoadGeometry
-from .instances import places_per_metre
-from .surroundings import Terrain, Vegetation
-from .terrain import known_elevation
+from ...base.arrays import Bool, Float, Int
+from ..alignment import clip_offset
+from ..geometry import RoadGeometry
+from ..instances import places_per_metre
+from ..surroundings import Terrain, Vegetation
+from ..terrain import known_elevation
 
 STATION, OFFSET, CHANCE = 11, 12, 13
 """Added to a stand's seed: for a place's station within its metre, its offset, and whether a plant grows there."""

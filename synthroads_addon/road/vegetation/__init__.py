@@ -1,0 +1,1 @@
+"""Plants: where those of a stand grow, and how large each is."""
