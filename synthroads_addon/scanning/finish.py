@@ -40,15 +40,15 @@ class Finish:
     def block(self, result: BlockResult) -> BlockResult:
         """Return a block, or several joined, as the sink gets it."""
         plan = self.plan
-        if result.seen is not None and (plan.coloured or plan.detects_later):
+        if result.seen is not None and (plan.colour_layers or plan.detects_after_layers):
             result = self._with_layers(result, result.seen)
         points = result.points
         if result.seen is not None and plan.relief is not None:
-            place = result.seen.position + plan.frame
+            place = result.seen.position + plan.frame_origin
             points = shift_along_normals(
                 points, place, plan.relief, plan.relief_strength, plan.seed, plan.relief_octaves
             )
-        changes: dict[str, AnyArray | None] = dict.fromkeys(points.attributes().keys() & OPTIONAL - plan.kept)
+        changes: dict[str, AnyArray | None] = dict.fromkeys(points.attributes().keys() & OPTIONAL - plan.kept_layers)
         if plan.range_corrected:
             changes["intensity"] = points.intensity * points.range**2
         return replace(result, points=points.with_arrays(changes), seen=None)
@@ -56,15 +56,17 @@ class Finish:
     def _with_layers(self, result: BlockResult, seen: SeenPoints) -> BlockResult:
         """Return a block with its points' colours and layers, and with the intensities that follow from these."""
         plan = self.plan
-        values = sample_points(self.source, seen, plan.coloured | (_OF_INTENSITY if plan.detects_later else set()))
-        changes: dict[str, Any] = {name: values.arrays[name] for name in plan.coloured}
+        values = sample_points(
+            self.source, seen, plan.colour_layers | (_OF_INTENSITY if plan.detects_after_layers else set())
+        )
+        changes: dict[str, Any] = {name: values.arrays[name] for name in plan.colour_layers}
         changes["color_source"] = values.source
-        if plan.detects_later:
-            assert plan.means is not None
-            factors = layer_brightness(plan.means, plan.surfaces, result.points, seen, values)
+        if plan.detects_after_layers:
+            assert plan.material_means is not None
+            factors = layer_brightness(plan.material_means, plan.surfaces, result.points, seen, values)
             changes["intensity"] = result.points.intensity * factors
         result = replace(result, points=result.points.with_arrays(changes))
-        if plan.detects_later:
+        if plan.detects_after_layers:
             result = detect_echoes(result, plan.setting)
         assert result.points.color_source is not None
         return replace(result, sources=np.bincount(result.points.color_source, minlength=256))

@@ -81,19 +81,21 @@ class ScanPlan:
         path: the scanner's.
         rings: rays on each ring around the beam's axis.
         seed: of everything random.
-        attenuation: 1/m of range.
-        effects: what changes the echoes of pulses, in this order.
-        wanted: names of the optional per-point layers that the scan itself fills.
-        targets: whether to say where each point was seen, for colours and relief: `BlockResult.seen`.
-        detects_later: intensities are yet to change, see `finish`: every echo that may pass the detector is kept, and
-            nothing saturates.
-        frame: (3,) where the scene's local frame begins, in the coordinates of the surfaces' random fields, m: those of
-            the whole road where only a section of it is scanned.
-        only: blocks that are scanned, in their order; all if None.
-        driven: whether a vehicle carries the scanner.
-        coloured: ``rgb`` and material layers that the points get.
-        kept: optional per-point layers that the sink gets; the others are needed on the way.
-        means: of the materials, which the layers of single points vary around.
+        noise: random errors of the measurement.
+        attenuation: of the beam by the air, 1/m of range.
+        effects: effects that change the echoes of pulses, in the order in which they act.
+        beam: whether the rays of a pulse diverge from the aperture or run parallel.
+        measured_layers: names of the optional per-point layers that the scan itself fills.
+        records_seen_points: whether blocks tell where each point was seen (`BlockResult.seen`), for colours and relief.
+        detects_after_layers: whether intensities still change by the points' own layers, see `finish`: until then every
+            echo that may pass the detector is kept, and nothing saturates.
+        frame_origin: (3,) origin of the scene's local frame in the coordinates of the surfaces' random fields, m: those
+            of the whole road where only a section of it is scanned.
+        chosen_blocks: blocks that are scanned, in their order; all if None.
+        on_vehicle: whether a vehicle carries the scanner.
+        colour_layers: ``rgb`` and material layers that the points get.
+        kept_layers: optional per-point layers that the sink gets; the others are needed on the way only.
+        material_means: means of the scene's materials, around which the layers of single points vary.
         range_corrected: intensities are multiplied by the squared range, after the detector.
         relief: micro-relief of the materials; None without.
         relief_strength: factor on it.
@@ -114,15 +116,15 @@ class ScanPlan:
     attenuation: float = 0.0
     effects: tuple[EchoEffect, ...] = ()
     beam: Literal["conical", "cylindrical"] = "conical"
-    wanted: frozenset[str] = frozenset()
-    targets: bool = False
-    detects_later: bool = False
-    frame: Float = field(default_factory=lambda: np.zeros(3))
-    only: tuple[Block, ...] | None = None
-    driven: bool = False
-    coloured: frozenset[str] = frozenset()
-    kept: frozenset[str] = frozenset()
-    means: Surfaces | None = None
+    measured_layers: frozenset[str] = frozenset()
+    records_seen_points: bool = False
+    detects_after_layers: bool = False
+    frame_origin: Float = field(default_factory=lambda: np.zeros(3))
+    chosen_blocks: tuple[Block, ...] | None = None
+    on_vehicle: bool = False
+    colour_layers: frozenset[str] = frozenset()
+    kept_layers: frozenset[str] = frozenset()
+    material_means: Surfaces | None = None
     range_corrected: bool = False
     relief: MicroRelief | None = None
     relief_strength: float = 0.0
@@ -144,7 +146,7 @@ class ScanPlan:
     @property
     def most_returns(self) -> int:
         """Return how many returns of a pulse are kept at most."""
-        return self.setting.device.maximum_returns * (_SPARE if self.detects_later else 1)
+        return self.setting.device.maximum_returns * (_SPARE if self.detects_after_layers else 1)
 
     @property
     def cut(self) -> Blocks:
@@ -157,7 +159,7 @@ class ScanPlan:
 
     def blocks(self) -> Iterator[Block]:
         """Yield (strip, number) of every block that is scanned, in the order of time."""
-        return self.cut.all() if self.only is None else iter(self.only)
+        return self.cut.all() if self.chosen_blocks is None else iter(self.chosen_blocks)
 
     def forecast(self) -> ScanForecast:
         """Return what the scan of the whole path will take."""
@@ -165,7 +167,7 @@ class ScanPlan:
 
     def block_count(self) -> int:
         """Return how many blocks are scanned."""
-        return self.cut.count() if self.only is None else len(self.only)
+        return self.cut.count() if self.chosen_blocks is None else len(self.chosen_blocks)
 
     def summary(self) -> dict[str, Any]:
         """Return the figures that are known before the scan begins, as JSON data."""

@@ -72,7 +72,12 @@ def record(plan: ScanPlan, sink: Sink, timer: StageTimer | None = None) -> dict[
 def record_as_measured(plan: ScanPlan) -> list[BlockResult]:
     """Return the blocks of a plan without layers or relief, with normals, materials and the places that were seen."""
     blocks = CollectedBlocks()
-    record(replace(plan, services=None, targets=True, wanted=plan.wanted | {"normal", "material"}), blocks)
+    record(
+        replace(
+            plan, services=None, records_seen_points=True, measured_layers=plan.measured_layers | {"normal", "material"}
+        ),
+        blocks,
+    )
     return blocks.results
 
 

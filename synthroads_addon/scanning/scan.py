@@ -113,7 +113,7 @@ class BlockScan:
         if plan.surfaces.varying:
             echoes = self.vary_brightness(traced, echoes, poses.motions)
         strong = np.flatnonzero(
-            echoes.intensity >= setting.threshold * (PROVISIONAL_THRESHOLD if plan.detects_later else 1.0)
+            echoes.intensity >= setting.threshold * (PROVISIONAL_THRESHOLD if plan.detects_after_layers else 1.0)
         )
         weak = len(echoes.pulse) - len(strong)
         if weak:
@@ -162,7 +162,7 @@ class BlockScan:
             track,
             # Linear between knots, errors would lose some of their spread if they changed much meanwhile.
             Track.between(measured, begin, end, min(spacing, noise.correlation_time / 50.0)) if noisy else track,
-            self.plan.target.motions(begin, end, min(spacing, _MOTION_KNOTS), track if self.plan.driven else None),
+            self.plan.target.motions(begin, end, min(spacing, _MOTION_KNOTS), track if self.plan.on_vehicle else None),
         )
 
     def emit(self, strip: Strip, poses: Poses, angle: Float | None, first: int, count: int) -> Pulses:
@@ -234,7 +234,7 @@ class BlockScan:
         if target.moving:
             (position,) = target.at_time_zero(face, position, traced.rays.time[ray % len(traced.rays.time)], motions)
         intensity = echoes.intensity.copy()
-        place = position.T + self.plan.frame
+        place = position.T + self.plan.frame_origin
         intensity[uneven] *= spread_factors(surfaces, material[uneven], place, self.plan.seed)
         return replace(echoes, intensity=intensity)
 
@@ -259,9 +259,9 @@ class BlockScan:
         if errors.range is not None:
             range_errors = errors.range_errors(number_in_block[pulse], number, plan.most_returns)
             distance = distance + setting.range_sigma * range_errors
-        intensity, clipped = saturate(echoes.intensity, np.inf if plan.detects_later else setting.saturation)
+        intensity, clipped = saturate(echoes.intensity, np.inf if plan.detects_after_layers else setting.saturation)
         normal = None
-        if plan.targets or "normal" in plan.wanted:
+        if plan.records_seen_points or "normal" in plan.measured_layers:
             normal = target.normals(face, along, pulses.time[pulse], motions)
             if self._in_air:
                 air = np.flatnonzero(face < 0)
@@ -280,10 +280,10 @@ class BlockScan:
             strip=np.full(len(pulse), strip.index, dtype=np.uint16),
             range=distance,
             incidence_deg=np.rad2deg(np.arccos(np.minimum(np.abs(along), 1.0))).astype(np.float32),
-            **fill_layers(measured, plan.wanted),
+            **fill_layers(measured, plan.measured_layers),
         )
         seen = None
-        if plan.targets and normal is not None:
+        if plan.records_seen_points and normal is not None:
             ray, reach = traced.ray_of(hit), traced.pick("distance", hit)
             seen = self._seen_targets(traced.rays, ray, reach, face, normal, motions)
         return points, seen, clipped

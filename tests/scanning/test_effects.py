@@ -62,8 +62,8 @@ def everything(points: PointBlock) -> bytes:
 def scan_with(*effects: object, mesh: SceneMesh | None = None, rays: int = 1, **changes: object) -> ScanPlan:
     """Return a scan of a plane with effects, its points told where they were seen."""
     scan = scan_of(plane(100.0) if mesh is None else mesh, rays)
-    wanted = scan.wanted | {"material"}
-    return replace(scan, effects=effects, targets=True, wanted=wanted, **changes)
+    layers = scan.measured_layers | {"material"}
+    return replace(scan, effects=effects, records_seen_points=True, measured_layers=layers, **changes)
 
 
 def line(scan: ScanPlan, key: int = 0) -> BlockResult:
@@ -183,12 +183,12 @@ def test_points_in_the_air_go_through_colours_and_relief(by_layers: bool) -> Non
         mesh = mesh_of(plane(100.0).vertices, plane().triangles, name)
         rows = [materials()[name]]
         varying = surfaces_of(rows, spread=not by_layers)
-        scan = scan_with(HalfRange(), mesh=mesh, surfaces=varying, detects_later=by_layers, seed=3)
+        scan = scan_with(HalfRange(), mesh=mesh, surfaces=varying, detects_after_layers=by_layers, seed=3)
         scan = replace(
             scan,
-            coloured=frozenset({"rgb", "roughness"}),
-            kept=frozenset({"material", "color_source", "true_range", "roughness"}),
-            means=surfaces_of(rows),
+            colour_layers=frozenset({"rgb", "roughness"}),
+            kept_layers=frozenset({"material", "color_source", "true_range", "roughness"}),
+            material_means=surfaces_of(rows),
             relief=micro_relief([name], rows),
             relief_strength=1.0,
             relief_octaves=2,

@@ -37,11 +37,17 @@ class Striped:
 
 
 def finish_of(scan: ScanPlan, source: Any, corrected: bool = False) -> Callable[[BlockResult], BlockResult]:
-    return Finish(replace(scan, means=scan.surfaces, range_corrected=corrected, kept=KEPT), source).block
+    plan = replace(scan, material_means=scan.surfaces, range_corrected=corrected, kept_layers=KEPT)
+    return Finish(plan, source).block
+
+
+def detected_later(scan: ScanPlan) -> ScanPlan:
+    layers = scan.measured_layers | {"material"}
+    return replace(scan, records_seen_points=True, detects_after_layers=True, measured_layers=layers)
 
 
 def finished(scan: ScanPlan, dark: float, bright: float, material: str = "asphalt") -> BlockResult:
-    later = replace(scan, targets=True, detects_later=True, wanted=scan.wanted | {"material"})
+    later = detected_later(scan)
     return finish_of(later, Striped(material, dark, bright))(middle_pulses(later, 200))
 
 
@@ -117,7 +123,7 @@ def test_what_passes_is_numbered_anew(most: int) -> None:
     ground = [(a, b, 0.0) for a in (-99.0, 99.0) for b in (-99.0, 99.0)]
     first = len(strip)
     mesh = mesh_of(strip + ground, [*faces, (first, first + 2, first + 3), (first, first + 3, first + 1)])
-    scan = replace(scan_of(mesh, rays=19), targets=True, detects_later=True)
+    scan = replace(scan_of(mesh, rays=19), records_seen_points=True, detects_after_layers=True)
     scan.path.pose = lambda strip, time: (  # type: ignore[method-assign]
         np.tile([-10.0, 0.0, 60.0], (len(time), 1)),
         np.broadcast_to(np.eye(3), (len(time), 3, 3)),
@@ -166,7 +172,7 @@ def test_corrected_intensities_do_not_depend_on_the_range() -> None:
             pose(strip, time)[0] * [1.0, 1.0, height / 60.0],
             pose(strip, time)[1],
         )
-        later = replace(scan, targets=True, detects_later=True, wanted=scan.wanted | {"material"})
+        later = detected_later(scan)
         source = Striped("asphalt", 0.2, 0.2)
         both = [finish_of(later, source, corrected=corrected)(middle_pulses(later, 200)) for corrected in (False, True)]
         received, corrected = (result.points for result in both)

@@ -262,7 +262,7 @@ def test_nothing_drives_through_the_scanner_s_own_vehicle(driven: bool) -> None:
     moving = [
         MovingMesh(box(14, lane), LinearMotion((28.0, 0.0, 0.0), place=(-7.0, y, 0.0))) for lane, y in lanes.items()
     ]
-    scan = replace(scan_of(plane(), path=Standing(1.0, 20.0), moving=moving, minimum_range=0.1), driven=driven)
+    scan = replace(scan_of(plane(), path=Standing(1.0, 20.0), moving=moving, minimum_range=0.1), on_vehicle=driven)
     points = scan_pulses(scan, scan.path.strips[0], 0, 150_000).points
     seen = {lane: points.gps_time[points.instance_id == lane] for lane in lanes}
     if not driven:

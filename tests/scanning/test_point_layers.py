@@ -26,5 +26,5 @@ def test_the_function_of_the_page_fills_it(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(point_layers, "FILLERS", dict(point_layers.FILLERS))
     exec(block_of_page(PAGE, "python"), dict(vars(point_layers)))
     scan = scan_of(plane(), divergence=(1e-3, 2e-3))
-    points = middle_pulses(replace(scan, wanted=scan.wanted | {"footprint"})).points
+    points = middle_pulses(replace(scan, measured_layers=scan.measured_layers | {"footprint"})).points
     np.testing.assert_allclose(points.more["footprint"], 2e-3 * points.true_range)

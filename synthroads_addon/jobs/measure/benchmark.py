@@ -77,7 +77,7 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         record_to_files([plan], files, timer)
         seconds, memory = timer.seconds, peak_memory_mb()
         # The scene, its caster and the materials are the same for every number of rays.
-        bare = replace(plan, targets=False, wanted=frozenset())
+        bare = replace(plan, records_seen_points=False, measured_layers=frozenset())
         casting = {rays: _cast_beside(replace(bare, rings=RINGS[rays])) for rays in _RAYS}
         writing = _writing(files)
         floors = [*casting.values(), writing]
@@ -114,7 +114,7 @@ def _cast_beside(plan: ScanPlan) -> Rate:
     for block in blocks:
         BlockScan(replace(plan, target=target)).block(*block)
     origins, directions = map(np.concatenate, zip(*kept, strict=True))
-    few = replace(plan, only=tuple(blocks), threads=threads)
+    few = replace(plan, chosen_blocks=tuple(blocks), threads=threads)
 
     def ours() -> float:
         return len(origins) / seconds_of(lambda: deque(scan_blocks(few), maxlen=0))

@@ -100,7 +100,7 @@ class SectionScan:
         assert plan.request is not None
         seen_from = replace(path, strips=strip_parts(self.cut, section.blocks))
         request = replace(plan.request, path=seen_from, frame=(frame[0], frame[1], frame[2]))
-        return replace(plan, frame=frame, only=section.blocks, request=request)
+        return replace(plan, frame_origin=frame, chosen_blocks=section.blocks, request=request)
 
     def _built(self, section: Section) -> tuple[ScannedScene, Float]:
         """Return what is scanned of a section, and where its frame begins in the road's."""

@@ -93,8 +93,8 @@ def scan_of(mesh: SceneMesh, rays: int = 1, path: Standing | None = None, moving
     setting = replace(setting, **{"range_sigma": 0.0, "threshold": 0.0, "saturation": np.inf, **changes})
     surfaces = surfaces_of(materials()[name] for name in mesh.materials)
     target = Target(ScannedScene(mesh, tuple(moving)), BruteForce)
-    wanted = frozenset({"rgb", "normal", "true_range", "true_xyz", "scanner"})
-    return ScanPlan(target, surfaces, setting, path or Standing(), RINGS[rays], seed=3, wanted=wanted)
+    layers = frozenset({"rgb", "normal", "true_range", "true_xyz", "scanner"})
+    return ScanPlan(target, surfaces, setting, path or Standing(), RINGS[rays], seed=3, measured_layers=layers)
 
 
 def scan_block(scan: ScanPlan, strip: Strip, block: int) -> BlockResult:

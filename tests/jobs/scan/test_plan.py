@@ -83,8 +83,8 @@ def test_every_default_is_filled_in_once() -> None:
     fog = WEATHERS["fog"].from_dict({"condition": "fog", "visibility": 500.0})
     assert plan.attenuation == fog.attenuation(device.wavelength_nm)
     assert planned(services, foggy, scan={"attenuation": 0.01}).attenuation == 0.01
-    assert not plan.driven
-    assert planned(services, scan={"platform": {"kind": "vehicle"}}).driven
+    assert not plan.on_vehicle
+    assert planned(services, scan={"platform": {"kind": "vehicle"}}).on_vehicle
     with pytest.raises(AttributeError):
         plan.seed = 2  # type: ignore[misc]
 
