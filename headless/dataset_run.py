@@ -227,6 +227,7 @@ class DatasetRun:
             with self._lock_folder():
                 self._open()
                 try:
+                    self._prepare()
                     self._make(submit)
                     self._close()
                 except BaseException:
@@ -259,11 +260,14 @@ class DatasetRun:
             yield
 
     def _open(self) -> None:
-        """Take over what is done or remove it, as is wanted, and remove what a run before left unfinished."""
+        """Take over what is done or remove it, as is wanted."""
         if (self.folder / MANIFEST).exists():
             self._open_again()
         elif {path.name for path in self.folder.iterdir()} - {LOCK, f".{MANIFEST}.part"}:
             raise OutputError("--output", str(self.folder), "holds other files; choose an empty folder")
+
+    def _prepare(self) -> None:
+        """Remove what a run before left unfinished, and make the folders of this one."""
         write_manifest(self.folder, self._manifest())  # first: a folder without one could never be resumed
         shutil.rmtree(self.folder / WORK, ignore_errors=True)
         for path in self._unknown():
