@@ -17,10 +17,11 @@ from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.cloud.points import PointBlock, concatenate
 from synthroads_addon.cloud.tools.quantile_mapping import steps_per_unit
 from synthroads_addon.cloud.tools.subsample import GridSubsampler
-from synthroads_addon.dataset.manifest import MANIFEST, SceneEntry, read_manifest
+from synthroads_addon.dataset.manifest import MANIFEST
 
 from .axis import MeasuredAxis
 from .packed import Packed, pack_tile
+from .roads import scene_folders
 from .sources import Source, labelled_blocks, read_tiles, tile_of
 from .tiles import CloudTile
 
@@ -33,27 +34,25 @@ _SMALLEST = 2_000
 
 
 def corridor_tiles(
-    folder: Path, scene: str, scheme: ClassScheme, voxel: float, corridor: float, length: float = 60.0
+    scene: Path, scheme: ClassScheme, voxel: float, corridor: float, length: float = 60.0
 ) -> Iterator[CloudTile]:
     """Yield the corridor of one scene of a data set, a tile per ``length`` of its road.
 
     The thinned corridor of one scene is held in memory: about 100 MB per km.
 
     Args:
-        folder: of the data set.
-        scene: its name there.
+        scene: its folder in the data set.
         scheme: classes wanted.
         voxel: edge of the cells of which one point each is kept, m.
         corridor: largest horizontal distance from the centreline, m.
         length: of a tile along the road, m.
     """
-    home = folder / "scenes" / scene
-    line = MeasuredAxis.read(home / "centerline.geojson")
+    line = MeasuredAxis.read(scene / "centerline.geojson")
     tree = cKDTree(line.position(line.stations(_SPACING)))
-    clouds = sorted(home.glob("cloud.*"))
+    clouds = sorted(scene.glob("cloud.*"))
     if not clouds:
-        raise InputError(str(home), None, "holds no cloud")
-    with open_cloud(clouds[0]) as cloud, GridSubsampler(voxel, home) as grid:
+        raise InputError(str(scene), None, "holds no cloud")
+    with open_cloud(clouds[0]) as cloud, GridSubsampler(voxel, scene) as grid:
         scale = steps_per_unit(cloud)
         for block in labelled_blocks(cloud, scheme, Source(path=str(clouds[0]))):
             away, _ = tree.query(block.xyz[:, :2], distance_upper_bound=corridor)
@@ -67,7 +66,7 @@ def corridor_tiles(
     for number in np.unique(station):
         part = points.select(station == number)
         if len(part) >= _SMALLEST:
-            yield tile_of(part, scene, np.floor(part.xyz.min(axis=0)), scale)
+            yield tile_of(part, scene.name, np.floor(part.xyz.min(axis=0)), scale)
 
 
 def _lean(block: PointBlock) -> PointBlock:
@@ -81,27 +80,13 @@ def packed_tiles(
 ) -> Iterator[Packed]:
     """Yield all tiles of a data set (its corridors), or of any other source of labelled points as it is."""
     if (folder / MANIFEST).is_file():
-        for scene in scenes_of(folder, split):
-            for tile in corridor_tiles(folder, scene.name, scheme, voxel, corridor):
+        for scene in scene_folders(folder, split):
+            for tile in corridor_tiles(scene, scheme, voxel, corridor):
                 yield pack_tile(tile)
         return
     for tile in read_tiles(Source(path=str(folder), split=split), scheme, voxel):
         if len(tile) >= _SMALLEST:
             yield pack_tile(tile)
-
-
-def scenes_of(folder: Path, split: str | None) -> list[SceneEntry]:
-    """Return the finished scenes of a data set's split.
-
-    Raises:
-        InputError: there are none.
-    """
-    scenes = [scene for scene in read_manifest(folder).scenes if scene.status == "done"]
-    chosen = [scene for scene in scenes if split in (None, scene.split)]
-    if not chosen:
-        known = ", ".join(dict.fromkeys(scene.split for scene in scenes)) or "none"
-        raise InputError("--split", split, f"holds no scene; there are the splits {known}")
-    return chosen
 
 
 def within(tiles: Iterable[Packed], limit: int, seed: int) -> list[Packed]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -86,7 +86,7 @@ def read_points(path: Path, classes: Collection[str] | None = None) -> Points:
     if not kept:
         what = "no point at all" if classes is None else f"no point of the classes {', '.join(sorted(classes))}"
         raise InputError(str(path), None, f"holds {what}")
-    return _points(header, kept, names)
+    return points_of(header, kept)
 
 
 def read_ground(path: Path) -> Points:
@@ -110,26 +110,29 @@ def full_color(largest: int) -> float:
     return SIXTEEN_BITS if largest > _EIGHT_BITS else _EIGHT_BITS
 
 
-def _points(header: CloudHeader, blocks: list[PointBlock], names: Mapping[int, str]) -> Points:
-    xyz = _join_arrays([block.xyz for block in blocks])
+def points_of(header: CloudHeader, blocks: Sequence[PointBlock], largest: int | None = None) -> Points:
+    """Return blocks of a cloud as points.
+
+    Args:
+        header: of the cloud.
+        blocks: at least one.
+        largest: of the cloud's colours; that of the blocks if not given.
+    """
+    xyz, intensity, rgb, class_id = (
+        np.concatenate([getattr(block, name) for block in blocks]) for name in ("xyz", "intensity", "rgb", "class_id")
+    )
     origin = np.floor(xyz.min(axis=0))
-    rgb = _join_arrays([block.rgb for block in blocks])
-    largest = int(rgb.max())
-    scale = (header.intensity_scale or 1.0) / SIXTEEN_BITS
+    largest = int(rgb.max()) if largest is None else largest
     return Points(
         origin=origin,
         xyz=xyz - origin,
-        intensity=_join_arrays([(block.intensity * scale).astype(np.float32) for block in blocks]),
+        intensity=(intensity * ((header.intensity_scale or 1.0) / SIXTEEN_BITS)).astype(np.float32),
         rgb=(rgb / full_color(largest)).astype(np.float32),
-        class_id=_join_arrays([block.class_id for block in blocks]),
-        class_names=dict(names),
+        class_id=class_id,
+        class_names=header.scheme.names(),
         has_color=header.has_color and largest > 0,
         epsg=header.epsg,
     )
-
-
-def _join_arrays(parts: list[AnyArray]) -> AnyArray:
-    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def thin(coord: NDArray[np.floating[Any]], cell: float) -> Index:

@@ -111,8 +111,9 @@ class LearningRoad(Points):
         half_width (both m) beside it.
         """
         half = 0.5 * thickness
+        ahead = np.column_stack([np.cos(frames.direction), np.sin(frames.direction)])
         corners = [
-            replace(frames, position=frames.position + x * _unit(frames.direction)).at(np.full(len(frames), y))
+            replace(frames, position=frames.position + x * ahead).at(np.full(len(frames), y))
             for x in (-half, half)
             for y in (-half_width, half_width)
         ]
@@ -147,16 +148,15 @@ class Slices:
     xy: Float
 
 
-def scene_folders(data_set: Path, split: str) -> list[Path]:
-    """Return the folders of a data set's scenes of one split that are done.
+def scene_folders(data_set: Path, split: str | None) -> list[Path]:
+    """Return the folders of a data set's scenes that are done, of one split or of all.
 
     Raises:
         MissingFileError: there is no manifest.
         InputError: no scene of the split is done.
     """
-    manifest = read_manifest(data_set)
-    done = [scene for scene in manifest.scenes if scene.status == "done"]
-    found = [data_set / "scenes" / scene.name for scene in done if scene.split == split]
+    done = [scene for scene in read_manifest(data_set).scenes if scene.status == "done"]
+    found = [data_set / "scenes" / scene.name for scene in done if split in (None, scene.split)]
     if not found:
         known = ", ".join(sorted({scene.split for scene in done}))
         raise InputError(f"{data_set}: split", split, f"has no scene that is done; there is {known or 'none at all'}")
@@ -250,10 +250,6 @@ def cut_beside_median(road: LearningRoad, error: float, rng: np.random.Generator
     """
     aside = rng.uniform(-error, error)
     return road if road.truth is None else replace(road, truth=replace(road.truth, room=road.truth.room + aside))
-
-
-def _unit(direction: Float) -> Float:
-    return np.column_stack([np.cos(direction), np.sin(direction)])
 
 
 def _cache_folder(folder: Path, cache: Path) -> Path:

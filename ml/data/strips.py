@@ -8,18 +8,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from synthroads_addon.base.arrays import Bool, Float
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.progress import Progress, silent
 from synthroads_addon.cloud.formats.base import CloudHeader
 from synthroads_addon.cloud.formats.registry import open_cloud
-from synthroads_addon.cloud.points import PointBlock
+from synthroads_addon.cloud.tools.subsample import TileFiles
 
 from .axis import MeasuredAxis
 from .frames import Frames, estimated_path
-from .points import GROUND_CLASSES, SIXTEEN_BITS, UNSORTED_CLASSES, Points, full_color
+from .points import GROUND_CLASSES, UNSORTED_CLASSES, points_of
 from .roads import REACH, LearningRoad
 
 LENGTH = 500.0
@@ -28,7 +27,6 @@ MARGIN = 40.0
 """How far a strip's points and frames reach beyond its ends, m: more than a sequence of slices is long."""
 _CELL = 1.0
 """Edge of the cells in which one point each is enough to find the path, m."""
-_STORED = np.dtype([("xyz", "<f8", 3), ("intensity", "<f4"), ("rgb", "<u2", 3), ("class_id", "u1")])
 
 
 @dataclass(frozen=True)
@@ -102,25 +100,21 @@ def strips(
         the strip's points, its frames in the points' local coordinates, and which of them are its own: the others
         belong to its neighbours and are only there so that sequences of slices reach across.
     """
-    with tempfile.TemporaryDirectory(prefix="synthroads-strips-") as folder:
-        there = _sorted_to(Path(folder), cloud, ground, path, progress)
+    with tempfile.TemporaryDirectory(prefix="synthroads-strips-") as folder, TileFiles(Path(folder)) as files:
+        _sort_points(files, cloud, ground, path, progress)
         own = np.floor(frames.station / LENGTH).astype(np.int64)
-        for number in np.unique(own).tolist():
+        for (number, _), block in files.by_tile():
             first, last = number * LENGTH - MARGIN, (number + 1) * LENGTH + MARGIN
             seen = (frames.station >= first) & (frames.station < last)
-            stored = np.fromfile(there[number], dtype=_STORED) if number in there else np.empty(0, _STORED)
-            if len(stored):
-                points = _points(stored, ground)
+            if number in own:
+                points = points_of(ground.header, [block], ground.largest_color)
                 line = _part(path, first - REACH, last + REACH).moved(-points.origin)
                 local = Frames(frames.position - points.origin[:2], frames.direction, frames.station).select(seen)
                 yield LearningRoad.of_points(cloud.stem, points, line), local, own[seen] == number
 
 
-def _sorted_to(
-    folder: Path, cloud: Path, ground: GroundReading, path: MeasuredAxis, progress: Progress
-) -> dict[int, Path]:
+def _sort_points(files: TileFiles, cloud: Path, ground: GroundReading, path: MeasuredAxis, progress: Progress) -> None:
     """Write the points near the path to a file per strip, margins included."""
-    files: dict[int, Path] = {}
     done = 0
     with open_cloud(cloud) as reader:
         for block in reader.blocks():
@@ -128,43 +122,12 @@ def _sorted_to(
             some = block.select(ground.classes[block.class_id])
             station, offset = path.project(some.xyz)
             near = np.abs(offset) <= REACH
-            rows, station = _rows(some.select(near), ground.header), station[near]
-            for number in _touched_strips(station):
+            some, station = some.select(near), station[near]
+            beside = np.concatenate([np.floor((station + by) / LENGTH) for by in (-MARGIN, MARGIN)])
+            for number in np.unique(beside).astype(np.int64):
                 inside = (station >= number * LENGTH - MARGIN) & (station < (number + 1) * LENGTH + MARGIN)
-                files.setdefault(number, folder / f"{number}.bin")
-                with files[number].open("ab") as file:
-                    rows[inside].tofile(file)
+                files.append(some.select(inside), np.tile([number, 0], (np.count_nonzero(inside), 1)))
             progress("sorting points", done / max(ground.header.count, 1))
-    return files
-
-
-def _touched_strips(station: Float) -> list[int]:
-    """Return the numbers of the strips that stations lie in or beside."""
-    both = np.concatenate([np.floor((station + by) / LENGTH) for by in (-MARGIN, MARGIN)])
-    return np.unique(both).astype(np.int64).tolist()
-
-
-def _rows(block: PointBlock, header: CloudHeader) -> NDArray[np.void]:
-    rows = np.empty(len(block), dtype=_STORED)
-    rows["xyz"] = block.xyz
-    rows["intensity"] = block.intensity * ((header.intensity_scale or 1.0) / SIXTEEN_BITS)
-    rows["rgb"] = block.rgb
-    rows["class_id"] = block.class_id
-    return rows
-
-
-def _points(rows: NDArray[np.void], ground: GroundReading) -> Points:
-    origin = np.floor(rows["xyz"].min(axis=0))
-    return Points(
-        origin=origin,
-        xyz=rows["xyz"] - origin,
-        intensity=rows["intensity"].copy(),
-        rgb=(rows["rgb"] / full_color(ground.largest_color)).astype(np.float32),
-        class_id=rows["class_id"].copy(),
-        class_names=dict(ground.header.scheme.names()),
-        has_color=ground.header.has_color and ground.largest_color > 0,
-        epsg=ground.header.epsg,
-    )
 
 
 def _part(path: MeasuredAxis, first: float, last: float) -> MeasuredAxis:

@@ -51,7 +51,7 @@ def test_corridor_of_a_scene_is_cut_along_its_road(tmp_path: Path) -> None:
     line = [[4e5 - 5.0, 5.6e6 + 20.0, 100.0], [4e5 + 155.0, 5.6e6 + 20.0, 100.0]]
     data = {"type": "LineString", "coordinates": line}
     (home / "centerline.geojson").write_text(json.dumps(data))
-    tiles = list(pack.corridor_tiles(tmp_path, "one", class_scheme("5"), 0.2, 8.0))
+    tiles = list(pack.corridor_tiles(tmp_path / "scenes" / "one", class_scheme("5"), 0.2, 8.0))
     assert len(tiles) == 3
     north = np.concatenate([tile.coord[:, 1] + tile.origin[1] for tile in tiles])
     assert 11.9 < north.min() - 5.6e6 < 12.3
