@@ -83,10 +83,16 @@ def axis_from_curve_group(tree: Tree) -> None:
         line = tree.node("GeometryNodeCurveToMesh", rows).value
         height = op.named_attribute(tree, "elevation")
         line = op.set_position(line, op.position(tree) + op.vector(tree, 0.0, 0.0, height))
+    with tree.frame("Directions at the ends go on turning as they do inside"):
+        number = op.index(tree)
+        inner = op.clip(number, 1, op.point_count(line) - 2)
+        forwards = op.named_attribute(tree, "forwards", "FLOAT_VECTOR")
+        beside = op.sample_index(line, forwards, inner)
+        line = op.store(line, "forwards", op.switch(inner.equals(number), forwards * 2.0 - beside, forwards))
     with tree.frame("Direction to the left"):
         forwards = op.named_attribute(tree, "forwards", "FLOAT_VECTOR")
         left = op.vector(tree, -op.component(forwards, "Y"), op.component(forwards, "X"))
-        line = op.store(line, "left", left)
+        line = op.store(line, "left", op.normalize(left))
     with tree.frame("Curvature: turn from the row before to the row behind"):
         line = op.store(line, "curvature", _curvature(tree, line, axis.smoothing))
     with tree.frame("Crossfalls"):
@@ -99,9 +105,9 @@ def axis_from_curve_group(tree: Tree) -> None:
 
 def _curvature(tree: Tree, line: Value, smoothing: Value) -> Value:
     """Return the curvature at every row, averaged over some rows."""
-    number = op.index(tree)
     last = op.point_count(line) - 1
-    before, behind = op.maximum(number - 1, 0), op.minimum(number + 1, last)
+    inner = op.clip(op.index(tree), 1, last - 1)
+    before, behind = op.maximum(inner - 1, 0), op.minimum(inner + 1, last)
 
     def at(name: str, row: Value, kind: str) -> Value:
         return op.sample_index(line, op.named_attribute(tree, name, kind), row)

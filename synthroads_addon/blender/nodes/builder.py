@@ -363,6 +363,16 @@ CATALOGUES: dict[str, dict[str, Make]] = {}
 """What makes the groups that users can use by hand: by catalogue of the asset library, by name."""
 
 
+def usual_materials(group: bpy.types.NodeTree) -> dict[str, str]:
+    """Return the entries of the material table that a group's inputs usually have, by the inputs' names."""
+    return dict(group.get(MATERIALS, {}))
+
+
+def offer_group(catalogue: str, name: str, make: Make) -> None:
+    """Offer users a group by hand that a function of arguments makes, see `CATALOGUES`."""
+    CATALOGUES.setdefault(catalogue, {})[name] = make
+
+
 def makes_group(name: str, catalogue: str = "") -> Callable[[Callable[[Tree], None]], Make]:
     """Turn a function that builds a node group into one that returns the node group `name`, see `node_group`.
 
@@ -377,7 +387,7 @@ def makes_group(name: str, catalogue: str = "") -> Callable[[Callable[[Tree], No
             return node_group(name, build)
 
         if catalogue:
-            CATALOGUES.setdefault(catalogue, {})[name] = make
+            offer_group(catalogue, name, make)
         return make
 
     return decorate

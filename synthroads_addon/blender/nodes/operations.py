@@ -26,6 +26,13 @@ def named_attribute(tree: Tree, name: str, data_type: str = "FLOAT") -> Value:
     return tree.node("GeometryNodeInputNamedAttribute", name, data_type=data_type).value
 
 
+def attribute_or(usual: Value, name: str) -> Value:
+    """Return the attribute `name`, a whole number or a number as `usual` is, which stands in where there is none."""
+    kind = _DATA_TYPES[usual.kind]
+    node = usual.tree.node("GeometryNodeInputNamedAttribute", name, data_type=kind)
+    return switch(node["Exists"], usual, node.value)
+
+
 def minimum(a: Value, b: Operand) -> Value:
     """Return the smaller of two numbers."""
     return a.tree.node("ShaderNodeMath", a, b, operation="MINIMUM").value
@@ -64,6 +71,11 @@ def dot(a: Value, b: Operand) -> Value:
 def length(a: Value) -> Value:
     """Return the length of a vector."""
     return a.tree.node("ShaderNodeVectorMath", a, operation="LENGTH")["Value"]
+
+
+def normalize(a: Value) -> Value:
+    """Return the vector at a length of 1."""
+    return a.tree.node("ShaderNodeVectorMath", a, operation="NORMALIZE").value
 
 
 def upright(along: Value) -> Value:

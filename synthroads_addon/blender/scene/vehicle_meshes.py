@@ -15,8 +15,8 @@ from ...scanning.scene.mesh import SceneMesh
 from ...scanning.scene.motion import Motion, MovingMesh, ScannedScene
 from ..compat import set_modifier_input
 from ..materials import material
+from ..nodes.builder import usual_materials
 from ..things.vehicle.models import model_group
-from ..things.vehicle.vehicle import MATERIALS
 from .evaluated import scene_mesh
 
 
@@ -69,7 +69,7 @@ def _model_mesh(model: str) -> SceneMesh:
     try:
         modifier = item.modifiers.new("SynthRoads", "NODES")
         modifier.node_group = model_group(model)
-        for key, entry in MATERIALS.items():
+        for key, entry in usual_materials(modifier.node_group).items():
             set_modifier_input(modifier, key, material(entry))
         bpy.context.view_layer.update()
         mesh = scene_mesh(objects=[item])

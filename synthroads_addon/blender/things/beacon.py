@@ -11,7 +11,7 @@ from ...road.things import beacon as sizes
 from ...road.things.beacon import ConstructionBeacon
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, makes_group
-from ..nodes.inputs import material_of, socket
+from ..nodes.inputs import boolean, material_of, metres, socket
 from ..nodes.solids import box, flip_faces, move_geometry, paint_faces, prism, put_on_points, row_of_points
 from ..nodes.standing import OnSurface
 from .model_builder import ModelBuilder
@@ -22,14 +22,17 @@ CELLS = (2, 8)
 
 class _BeaconInputs(OnSurface):
     points = socket("Geometry", "One point per beacon, at any height; pass_side +1 is left")
-    red_material = material_of("the red stripes")
-    white_material = material_of("the white stripes")
-    rubber_material = material_of("the foot")
-    housing_material = material_of("the lamp")
-    lens_material = material_of("the lamp's lens")
+    width = metres(0.25, (0.05, 1.0), "Width of blades whose points have no width")
+    height = metres(1.0, (0.2, 3.0), "Height of blades whose points have no height")
+    pass_on_left = boolean(True, "Traffic passes on the left of beacons whose points have no pass_side")
+    red_material = material_of("the red stripes", "sheeting_red")
+    white_material = material_of("the white stripes", "sheeting_white")
+    rubber_material = material_of("the foot", "rubber")
+    housing_material = material_of("the lamp", "plastic_black")
+    lens_material = material_of("the lamp's lens", "lamp_yellow")
 
 
-@makes_group("SR Beacon")
+@makes_group("SR Beacon", catalogue="Roadside")
 def beacon_group(tree: Tree) -> None:
     """A beacon on each point; points carry ``heading`` (rad), ``elevation``, ``width``, ``height``, ``pass_side``."""
     beacon = _BeaconInputs(tree)
@@ -47,16 +50,14 @@ def beacon_group(tree: Tree) -> None:
         points = beacon.places()
     with tree.frame("Beacons"):
         turned = op.turn(tree, z=op.named_attribute(tree, "heading"))
-        place, tall = op.position(tree), op.named_attribute(tree, "height")
+        place, tall = op.position(tree), op.attribute_or(beacon.height, "height")
+        wide = op.attribute_or(beacon.width, "width")
+        passed = op.attribute_or(op.switch(beacon.pass_on_left, -1, 1), "pass_side")
         bottom = place + (0.0, 0.0, sizes.BLADE_BOTTOM)
         parts = [put_on_points(points, foot, place, 1.0, turned)]
         for side, blade in zip((1, -1), blades, strict=True):
-            chosen = op.separate(points, op.named_attribute(tree, "pass_side", "INT").equals(side))
-            parts.append(
-                put_on_points(
-                    chosen, blade, bottom, op.vector(tree, op.named_attribute(tree, "width"), 1.0, tall), turned
-                )
-            )
+            chosen = op.separate(points, passed.equals(side))
+            parts.append(put_on_points(chosen, blade, bottom, op.vector(tree, wide, 1.0, tall), turned))
         parts.append(put_on_points(points, lamp, bottom + op.vector(tree, 0.0, 0.0, tall), 1.0, turned))
         beacons = op.join(*parts)
     with tree.frame("Labels"):
@@ -130,19 +131,12 @@ def build_beacons(builder: ModelBuilder) -> None:
     beacons = list(builder.parameters.of_type(ConstructionBeacon).values())
     if not beacons:
         return
-    materials = {
-        "Red Material": "sheeting_red",
-        "White Material": "sheeting_white",
-        "Rubber Material": "rubber",
-        "Housing Material": "plastic_black",
-        "Lens Material": "lamp_yellow",
-    }
     attributes = {
         "width": np.array([beacon.width for beacon in beacons]),
         "height": np.array([beacon.height for beacon in beacons]),
         "pass_side": np.array([_passing_side(beacon) for beacon in beacons]),
     }
-    builder.add("Beacons", builder.points("Beacons", beacons, attributes), beacon_group(), materials)
+    builder.add("Beacons", builder.points("Beacons", beacons, attributes), beacon_group())
 
 
 def _passing_side(beacon: ConstructionBeacon) -> int:

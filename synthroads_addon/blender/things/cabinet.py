@@ -18,32 +18,18 @@ _GAP = 0.006
 _SLOTS = 5
 _WIDE = 0.7
 """Width from which a cabinet has two doors, m."""
-_MATERIALS = {
-    "emergency_phone": {
-        "body_material": "plastic_orange",
-        "plinth_material": "concrete",
-        "band_material": "sheeting_white",
-        "writing_material": "sheeting_white",
-        "panel_material": "plastic_black",
-    },
-    "utility": {
-        "body_material": "cabinet_grey",
-        "plinth_material": "concrete",
-        "fitting_material": "plastic_black",
-    },
-}
 
 
 class _Cabinet(Standing):
     width = metres(0.8, (0.1, 5.0), "Width of its front")
     depth = metres(0.35, (0.1, 5.0), "Depth (m)")
     height = metres(1.1, (0.3, 5.0), "Top above the surface")
-    body_material = material_of("body parts")
-    plinth_material = material_of("plinth parts")
-    fitting_material = material_of("fitting parts")
+    body_material = material_of("body parts", "cabinet_grey")
+    plinth_material = material_of("plinth parts", "concrete")
+    fitting_material = material_of("fitting parts", "plastic_black")
 
 
-@makes_group("SR Cabinet")
+@makes_group("SR Cabinet", catalogue="Roadside")
 def cabinet_group(tree: Tree) -> None:
     """A utility cabinet, its doors towards those who drive along +y; points carry ``heading`` and ``elevation``."""
     cabinet = _Cabinet(tree)
@@ -92,4 +78,4 @@ def build_cabinets(builder: ModelBuilder) -> None:
     """Make one object per emergency phone and utility cabinet."""
     for name, cabinet in builder.parameters.of_type(Cabinet).items():
         group = emergency_phone_group() if cabinet.kind == "emergency_phone" else cabinet_group()
-        builder.add_thing(name, cabinet, group, **_MATERIALS[cabinet.kind])
+        builder.add_thing(name, cabinet, group)

@@ -27,10 +27,10 @@ class _Barrier(Lengthwise):
     terminal_length = metres(8.0, (0.0, 50.0), "Length of the ramp at each end")
     step = metres(2.0, (0.1, 8.0), "Largest length of a straight piece")
     instance = instance_number()
-    material = material_of("the barrier")
+    material = material_of("the barrier", "barrier_concrete")
 
 
-@makes_group("SR Concrete Barrier")
+@makes_group("SR Concrete Barrier", catalogue="Barriers")
 def concrete_barrier_group(tree: Tree) -> None:
     """A concrete barrier along the road, symmetric about its axis, with ramped ends."""
     barrier = _Barrier(tree)
@@ -99,5 +99,4 @@ def build_concrete_barriers(builder: ModelBuilder) -> None:
             end_station=builder.along(min(barrier.end_station, builder.geometry.length)),
             new_jersey=barrier.profile == "new_jersey",
             step=builder.step,
-            material="barrier_concrete",
         )

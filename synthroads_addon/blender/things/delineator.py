@@ -10,7 +10,7 @@ from ...road.things.body import BURIED
 from ...road.things.delineator import Delineator
 from ..nodes import operations as op
 from ..nodes.builder import Tree, Value, makes_group
-from ..nodes.inputs import material_of, socket
+from ..nodes.inputs import material_of, metres, socket
 from ..nodes.solids import paint_faces
 from ..nodes.standing import OnSurface, put_on
 from .model_builder import ModelBuilder
@@ -25,12 +25,13 @@ _UNDER, _PROUD = 0.001, 0.004
 
 class _Delineator(OnSurface):
     points = socket("Geometry", "One point per post, at any height")
-    white_material = material_of("this part")
-    black_material = material_of("this part")
-    reflector_material = material_of("this part")
+    height = metres(1.0, (0.2, 3.0), "Height of posts whose points have no height")
+    white_material = material_of("the body", "plastic_white")
+    black_material = material_of("the band", "plastic_black")
+    reflector_material = material_of("the reflectors", "reflector")
 
 
-@makes_group("SR Delineator")
+@makes_group("SR Delineator", catalogue="Roadside")
 def delineator_group(tree: Tree) -> None:
     """A delineator post on each point; points carry ``heading``, ``elevation``, ``height`` and ``instance``."""
     post = _Delineator(tree)
@@ -42,7 +43,7 @@ def delineator_group(tree: Tree) -> None:
         body = op.join(body, _front(tree, glass), _behind(tree, glass, 0.07), _behind(tree, glass, -0.07))
     with tree.frame("On the surface"):
         places = post.places()
-        tall = op.vector(tree, 1.0, 1.0, op.named_attribute(tree, "height"))
+        tall = op.vector(tree, 1.0, 1.0, op.attribute_or(post.height, "height"))
         posts = put_on(places, body, tall)
     with tree.frame("Labels"):
         posts = op.store(posts, "class_id", class_id(Delineator.points_class), "FACE")
@@ -99,9 +100,4 @@ def build_delineators(builder: ModelBuilder) -> None:
     if not posts:
         return
     mesh = builder.points("Delineators", posts, {"height": np.array([post.height for post in posts])})
-    materials = {
-        "White Material": "plastic_white",
-        "Black Material": "plastic_black",
-        "Reflector Material": "reflector",
-    }
-    builder.add("Delineators", mesh, delineator_group(), materials)
+    builder.add("Delineators", mesh, delineator_group())

@@ -22,14 +22,14 @@ class _Phone(Standing):
     width = metres(0.3, (0.05, 2.0), "Width of its front")
     depth = metres(0.3, (0.05, 2.0), "Depth (m)")
     height = metres(1.6, (0.3, 4.0), "Top above the surface")
-    body_material = material_of("the body")
-    plinth_material = material_of("the plinth")
-    band_material = material_of("the band")
-    writing_material = material_of("the writing")
-    panel_material = material_of("the panel")
+    body_material = material_of("the body", "plastic_orange")
+    plinth_material = material_of("the plinth", "concrete")
+    band_material = material_of("the band", "sheeting_white")
+    writing_material = material_of("the writing", "sheeting_white")
+    panel_material = material_of("the panel", "plastic_black")
 
 
-@makes_group("SR Emergency Phone")
+@makes_group("SR Emergency Phone", catalogue="Roadside")
 def emergency_phone_group(tree: Tree) -> None:
     """An emergency telephone, its front towards those who drive along +y; points carry ``heading``, ``elevation``."""
     phone = _Phone(tree)

@@ -36,7 +36,7 @@ class _Rail(Lengthwise):
     terminal_length = metres(12.0, (0.0, 50.0), "Length of the ramp at each end")
     beam_step = metres(2.0, (0.1, 8.0), "Largest length of a straight piece of beam")
     instance = instance_number()
-    material = material_of("beams and posts")
+    material = material_of("beams and posts", "galvanised_steel")
 
     def beams(self) -> tuple[tuple[float, Value], ...]:
         """Return the sides, +1 for the left and -1 for the right, and whether there is a beam."""
@@ -60,7 +60,7 @@ class _Rail(Lengthwise):
         return raise_place(place, rise), left
 
 
-@makes_group("SR Guardrail")
+@makes_group("SR Guardrail", catalogue="Barriers")
 def guardrail_group(tree: Tree) -> None:
     """A steel guardrail along the road: W-beams, posts and spacers, with ramped terminals."""
     rail = _Rail(tree)
@@ -182,5 +182,4 @@ def build_guardrails(builder: ModelBuilder) -> None:
             right_beam=rail.faces in ("right", "both"),
             spacer=sizes.SPACER[rail.faces],
             beam_step=builder.step,
-            material="galvanised_steel",
         )

@@ -22,10 +22,10 @@ _STYLE = FaceStyle("blue", "white", "white")
 
 class _Board(Inputs):
     lower_edge = metres(1.2, (0.0, 10.0), "Lower edge of the board above the surface")
-    post_material = material_of("the post")
+    post_material = material_of("the post", "galvanised_steel")
 
 
-@makes_group("SR Kilometre Board")
+@makes_group("SR Kilometre Board", catalogue="Signs")
 def kilometre_board_group(tree: Tree) -> None:
     """A board on a post, read from both sides; points carry ``heading`` (rad) and ``elevation`` (m)."""
     standing, face, board = Standing(tree), Face(tree), _Board(tree)
@@ -59,4 +59,4 @@ def build_kilometre_boards(builder: ModelBuilder) -> None:
     for name, board in builder.parameters.of_type(KilometreBoard).items():
         face = face_inputs(_STYLE, "rectangle", board.width, board.height, (board.text,))
         group = kilometre_board_group()
-        builder.add_thing(name, board, group, **face | {"thickness": sizes.BOARD}, post_material="galvanised_steel")
+        builder.add_thing(name, board, group, **face | {"thickness": sizes.BOARD})

@@ -18,7 +18,7 @@ from ...road.stretches import cut_stretch, frame_of
 from ...road.tessellation import sample_stations
 from ..compat import set_modifier_input
 from ..materials import material
-from ..nodes.builder import MATERIALS
+from ..nodes.builder import usual_materials
 from ..nodes.inputs import input_name
 from .meshes import on_plan, points_mesh, signed_instance
 
@@ -173,8 +173,7 @@ class ModelBuilder:
                 for name, kind in kinds.items()
                 if kind == "NodeSocketObject" and name in self.objects
             }
-            usual = dict(group.get(MATERIALS, {}))
-            for name, value in {**usual, **objects, **(inputs or {})}.items():
+            for name, value in {**usual_materials(group), **objects, **(inputs or {})}.items():
                 set_modifier_input(modifier, name, _to_input(name, kinds.get(name, ""), value))
         self._added(role, item)
 

@@ -57,13 +57,13 @@ class _Wall(Lengthwise):
     post_spacing = metres(4.0, (1.0, 10.0), "Distance between posts")
     post_width = metres(0.16, (0.05, 0.5), "Width of a post")
     instance = instance_number()
-    post_material = material_of("the posts")
-    panel_material = material_of("the panels")
-    frame_material = material_of("frames and caps")
-    plinth_material = material_of("the plinth")
+    post_material = material_of("the posts", "galvanised_steel")
+    panel_material = material_of("the panels", "noise_aluminium")
+    frame_material = material_of("frames and caps", "noise_aluminium")
+    plinth_material = material_of("the plinth", "noise_concrete")
 
 
-@makes_group("SR Noise Barrier")
+@makes_group("SR Noise Barrier", catalogue="Barriers")
 def noise_barrier_group(tree: Tree) -> None:
     """A noise barrier along the road: posts, and between them level panels on a plinth."""
     wall = _Wall(tree)
@@ -252,8 +252,6 @@ def build_noise_barriers(builder: ModelBuilder) -> None:
             noise_barrier_group(),
             end_station=builder.along(min(wall.end_station, builder.geometry.length)),
             panel=_KINDS.index(wall.panel),
-            post_material="galvanised_steel",
             panel_material=face,
             frame_material=frame,
-            plinth_material="noise_concrete",
         )

@@ -28,8 +28,8 @@ class _PaintedArea(Inputs):
     outlines = socket("Geometry", "Faces with x = station, y = offset")
     backbone = backbone_socket("Object")
     road = socket("Object", "Surface that is painted")
-    material = material_of("the paint")
-    yellow_material = material_of("temporary paint")
+    material = material_of("the paint", "paint_white")
+    yellow_material = material_of("temporary paint", "paint_yellow")
 
 
 @makes_group("SR Painted Area")
@@ -70,8 +70,7 @@ def build_painted_areas(builder: ModelBuilder) -> None:
     attribute(mesh, "film", np.repeat([item.film_thickness for item in items], sizes))
     attribute(mesh, "yellow", np.repeat([float(item.color == "yellow") for item in items], sizes))
     attribute(mesh, "instance", np.repeat(signed_instance([item.instance for item in items]), sizes))
-    materials = {"Material": "paint_white", "Yellow Material": "paint_yellow"}
-    builder.add("Painted Areas", mesh, painted_area_group(), materials)
+    builder.add("Painted Areas", mesh, painted_area_group())
 
 
 def _outlines(builder: ModelBuilder) -> Iterator[tuple[NDArray[np.float64], Hatching | Arrow]]:

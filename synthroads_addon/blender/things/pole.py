@@ -24,16 +24,16 @@ class _Pole(Standing):
     height = metres(12.0, (1.0, 40.0), "Top above the surface")
     diameter = metres(0.18, (0.03, 1.0), "Diameter at the foot (m)")
     arm_length = metres(1.5, (0.0, 10.0), "Length of the arm; 0 for none")
-    steel_material = material_of("mast and arm")
-    housing_material = material_of("luminaire and housings")
-    glass_material = material_of("lamps and lenses")
+    steel_material = material_of("mast and arm", "galvanised_steel")
+    housing_material = material_of("luminaire and housings", "cabinet_grey")
+    glass_material = material_of("lamps and lenses", "lamp_glass")
 
     def rise(self) -> Value:
         """Return how much higher the arm ends than it begins."""
         return self.arm_length * sizes.ARM_RISE
 
 
-@makes_group("SR Pole")
+@makes_group("SR Pole", catalogue="Roadside")
 def pole_group(tree: Tree) -> None:
     """A pole, its arm to the left of those who drive along +y; points carry ``heading`` (rad) and ``elevation`` (m)."""
     pole = _Pole(tree)
@@ -120,7 +120,5 @@ def build_poles(builder: ModelBuilder) -> None:
             pole,
             pole_group(),
             surveillance=pole.kind == "surveillance",
-            steel_material="galvanised_steel",
-            housing_material="cabinet_grey",
             glass_material="lamp_glass" if pole.kind == "lighting" else "display",
         )

@@ -27,12 +27,12 @@ class _TemporaryBarrier(Lengthwise):
     segment_length = metres(4.0, (1.0, 12.0), "Length of one element along the road")
     plastic = boolean(False, "Hollow plastic elements, else steel ones")
     instance = instance_number()
-    material = material_of("the first, third, ... element")
-    second_material = material_of("the second, fourth, ... element")
-    reflector_material = material_of("the reflectors on steel elements")
+    material = material_of("the first, third, ... element", "galvanised_steel")
+    second_material = material_of("the second, fourth, ... element", "galvanised_steel")
+    reflector_material = material_of("the reflectors on steel elements", "reflector")
 
 
-@makes_group("SR Temporary Barrier")
+@makes_group("SR Temporary Barrier", catalogue="Barriers")
 def temporary_barrier_group(tree: Tree) -> None:
     """Movable barrier elements along the road, from one offset to another, every second one in another colour."""
     barrier = _TemporaryBarrier(tree)
@@ -122,5 +122,4 @@ def build_temporary_barriers(builder: ModelBuilder) -> None:
             plastic=plastic,
             material="plastic_red" if plastic else "galvanised_steel",
             second_material="plastic_white" if plastic else "galvanised_steel",
-            reflector_material="reflector",
         )

@@ -42,7 +42,7 @@ class _Terrain(Inputs):
     batter_slope = number(1.5, (0.5, 10.0), "Run of the batter per metre of height (m/m)")
     columns = integer(40, (3, 500), "Points across each side, closer near the road")
     instance = instance_number()
-    material = material_of("the ground")
+    material = material_of("the ground", "grass_ground")
 
 
 @makes_group("SR Terrain")
@@ -127,7 +127,7 @@ def build_terrain(builder: ModelBuilder) -> None:
     ground = _ground_mesh(builder.geometry, terrain, builder.tolerance, builder.stretch, builder.origin)
     builder.add("Ground", ground, support=True)
     columns = int(np.clip(terrain.half_width * 0.6, 12, 120))
-    builder.add_thing("Terrain", terrain, terrain_group(), columns=columns, material="grass_ground")
+    builder.add_thing("Terrain", terrain, terrain_group(), columns=columns)
 
 
 def _ground_mesh(

@@ -15,33 +15,24 @@ from ..nodes.solids import box, cone, loft, move_geometry, paint_faces, put_on_p
 from ..nodes.standing import Standing
 from .model_builder import ModelBuilder
 
-_MATERIALS = {
-    "post_material": "galvanised_steel",
-    "housing_material": "plastic_black",
-    "rim_material": "sheeting_white",
-    "red_material": "lamp_red",
-    "yellow_material": "lamp_yellow",
-    "green_material": "lamp_green",
-}
-
 
 class _Light(Standing):
     height = metres(3.2, (1.0, 10.0), "Top above the surface")
     lights = integer(3, (1, 4), "Number of lights")
     light_diameter = metres(0.2, (0.05, 0.5), "Diameter of a light")
-    post_material = material_of("the post")
-    housing_material = material_of("housing, visors and board")
-    rim_material = material_of("the board's rim")
-    red_material = material_of("the red light")
-    yellow_material = material_of("yellow lights")
-    green_material = material_of("the green light")
+    post_material = material_of("the post", "galvanised_steel")
+    housing_material = material_of("housing, visors and board", "plastic_black")
+    rim_material = material_of("the board's rim", "sheeting_white")
+    red_material = material_of("the red light", "lamp_red")
+    yellow_material = material_of("yellow lights", "lamp_yellow")
+    green_material = material_of("the green light", "lamp_green")
 
     def level(self, number: Value) -> Value:
         """Return the height of a light's middle above the surface, 0 being the uppermost."""
         return self.height - sizes.MARGIN - (number + 0.5) * self.light_diameter * sizes.CHAMBER[2]
 
 
-@makes_group("SR Traffic Light")
+@makes_group("SR Traffic Light", catalogue="Roadside")
 def traffic_light_group(tree: Tree) -> None:
     """A traffic light, seen by those who drive along +y; points carry ``heading`` (rad) and ``elevation`` (m)."""
     light = _Light(tree)
@@ -142,4 +133,4 @@ def _visor(tree: Tree, diameter: Value) -> Value:
 def build_traffic_lights(builder: ModelBuilder) -> None:
     """Make one object per traffic light."""
     for name, light in builder.parameters.of_type(TrafficLight).items():
-        builder.add_thing(name, light, traffic_light_group(), **_MATERIALS)
+        builder.add_thing(name, light, traffic_light_group())

@@ -10,9 +10,9 @@ from synthroads_addon.base.classes import class_id
 from synthroads_addon.blender.compat import set_modifier_input
 from synthroads_addon.blender.materials import material
 from synthroads_addon.blender.materials.looks import COLOR
+from synthroads_addon.blender.nodes.builder import usual_materials
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.blender.things.vehicle.models import model_group
-from synthroads_addon.blender.things.vehicle.vehicle import MATERIALS
 from synthroads_addon.materials.table import materials
 from synthroads_addon.road.section import Carriageway
 from synthroads_addon.road.surroundings import Vehicle
@@ -55,7 +55,7 @@ def alone(model: str) -> SceneMesh:
     bpy.context.scene.collection.objects.link(item)
     modifier = item.modifiers.new("Nodes", "NODES")
     modifier.node_group = model_group(model)
-    for key, entry in MATERIALS.items():
+    for key, entry in usual_materials(modifier.node_group).items():
         set_modifier_input(modifier, key, material(entry))
     bpy.context.view_layer.update()
     return scene_mesh(objects=[item])

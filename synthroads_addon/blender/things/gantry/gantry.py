@@ -46,15 +46,15 @@ class _Gantry(Inputs):
     beam_depth = metres(0.6, (0.2, 3.0), "Depth of the beam along the road")
     post_width = metres(0.5, (0.1, 1.5), "Width of a post")
     catwalk = boolean(False, "A catwalk on the beam, and a ladder to it")
-    steel_material = material_of("beam, posts and catwalk")
-    concrete_material = material_of("the plinths")
-    board_material = material_of("painted boards")
-    display_material = material_of("variable displays")
+    steel_material = material_of("beam, posts and catwalk", "gantry_steel")
+    concrete_material = material_of("the plinths", "bridge_concrete")
+    board_material = material_of("painted boards", "board_back")
+    display_material = material_of("variable displays", "display")
     shade = number(0.5, (0.0, 1.0), "Base colour of the steel")
     instance = instance_number()
 
 
-@makes_group("SR Gantry")
+@makes_group("SR Gantry", catalogue="Structures")
 def gantry_group(tree: Tree) -> None:
     """A gantry around the origin, its beam along x (right), level, so high that its clearance is kept.
 
@@ -199,12 +199,6 @@ def _boards(tree: Tree, gantry: _Gantry, signs: Value) -> tuple[Value, Value]:
 
 _LIT = 0.9
 """Share of a display's sides that lights up."""
-_MATERIALS = {
-    "steel_material": "gantry_steel",
-    "concrete_material": "bridge_concrete",
-    "board_material": "board_back",
-    "display_material": "display",
-}
 
 
 def build_gantries(builder: ModelBuilder) -> None:
@@ -225,7 +219,6 @@ def build_gantries(builder: ModelBuilder) -> None:
             beam=KINDS.index(gantry.beam),
             # Displays are looked after from above; boards are not.
             catwalk=any(sign.kind == "display" for sign in gantry.signs),
-            **_MATERIALS,
         )
         builder.stand(name, gantry, gantry.rotation_deg)
         for place, sign in enumerate(gantry.signs, 1):

@@ -39,11 +39,11 @@ class _Overpass(Inputs):
     parapet_height = metres(1.1, (0.0, 3.0), "Top of the railings above the deck; none below 0.5 m")
     pier_width = metres(1.0, (0.2, 4.0), "Width of a pier across the road")
     slope = number(1.5, (0.5, 10.0), "Run of the embankments per metre of height (m/m)")
-    concrete_material = material_of("deck, piers and walls")
-    edge_material = material_of("edge beams")
-    steel_material = material_of("railings and bearings")
-    pavement_material = material_of("the crossing road")
-    ground_material = material_of("the embankments")
+    concrete_material = material_of("deck, piers and walls", "bridge_concrete")
+    edge_material = material_of("edge beams", "barrier_concrete")
+    steel_material = material_of("railings and bearings", "galvanised_steel")
+    pavement_material = material_of("the crossing road", "asphalt")
+    ground_material = material_of("the embankments", "grass_ground")
     instance = instance_number()
 
     def __init__(self, tree: Tree) -> None:
@@ -52,7 +52,7 @@ class _Overpass(Inputs):
         self.faces = {-1.0: -self.left_abutment, 1.0: -self.right_abutment}
 
 
-@makes_group("SR Overpass")
+@makes_group("SR Overpass", catalogue="Structures")
 def overpass_group(tree: Tree) -> None:
     """A level bridge around the origin, which crosses along x; the road that it spans runs along y.
 
@@ -175,13 +175,6 @@ def _embankment(bridge: _Overpass, ground: Value, low: Value, wing: Value, shear
 _LONGEST_APPROACH = 150.0
 _APPROACH_ALONE = 20.0
 """Length (m) of the embankments where there is no terrain."""
-_MATERIALS = {
-    "concrete_material": "bridge_concrete",
-    "edge_material": "barrier_concrete",
-    "steel_material": "galvanised_steel",
-    "pavement_material": "asphalt",
-    "ground_material": "grass_ground",
-}
 
 
 def build_overpasses(builder: ModelBuilder) -> None:
@@ -206,6 +199,5 @@ def build_overpasses(builder: ModelBuilder) -> None:
             right_abutment=bridge.right_abutment - bridge.offset,
             skew=float(np.deg2rad(bridge.rotation_deg)),
             slope=terrain.batter_slope if terrain else 1.5,
-            **_MATERIALS,
         )
         builder.stand(name, bridge)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import bpy
 
 from ....base.classes import class_id
 from ...nodes import operations as op
 from ...nodes.axis import rows_along
-from ...nodes.builder import Operand, Tree, Value, makes_group, node_group
+from ...nodes.builder import Operand, Tree, Value, makes_group, node_group, offer_group
 from ...nodes.inputs import (
     Input,
     Inputs,
@@ -194,3 +196,6 @@ def _boundaries(
     main = main if turnouts else plane
     plane = plane + turnouts.verge_extra_width if turnouts else plane
     return distances, plane, op.switch(side.turns_about_inner_edge, (inner + main) * 0.5, inner)
+
+
+offer_group("Road", "SR Carriageway 3 Lanes", partial(carriageway_group, 3))

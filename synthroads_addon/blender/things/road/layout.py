@@ -46,6 +46,10 @@ class MarkingLayout:
 
     Attributes:
         name: what its inputs call it, without the side: ``Lane Line 1``.
+        kind: as `LineMarking` has it.
+        boundary: of lanes that it lies on, counted from the outer edge of lane 1.
+        varies: whether its distance from the axis changes along the road.
+        yellow: whether it is temporary.
     """
 
     name: str

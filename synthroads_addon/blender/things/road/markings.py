@@ -72,7 +72,8 @@ def markings_group(lanes: int, turnouts: bool, lines: tuple[MarkingLayout, ...])
 def declare_line(tree: Tree, line: MarkingLayout, words: str) -> dict[str, Value]:
     """Declare the inputs of a line under a heading of its own; return them by field."""
     kind = LineOnItsOwn if line.kind == "free" else LineInputs
-    return kind(tree, words, words, {"dash_length": 0.0, "gap_length": 0.0}).values
+    solid = {} if line.kind == "lane" else {"dash_length": 0.0, "gap_length": 0.0}
+    return kind(tree, words, words, solid).values
 
 
 class LineOnItsOwn(LineInputs, Distance):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import bpy
 
@@ -11,12 +12,12 @@ from ....base.classes import class_id
 from ...nodes import operations as op
 from ...nodes.axis import AxisInputs
 from ...nodes.backbone import row
-from ...nodes.builder import Node, Tree, Value, node_group
+from ...nodes.builder import Node, Tree, Value, node_group, offer_group
 from ...nodes.inputs import Input, Inputs, input_name, inputs_class, instance_number, material_of, metres, socket
 from ...nodes.solids import row_of_points
 from ...nodes.strip import strip_group
 from .carriageway import SideInputs, carriageway_group, width_fields
-from .layout import TURNOUT_NAMES, SideLayout, attribute_name, detail_field, strips_of, width_field
+from .layout import TURNOUT_NAMES, MarkingLayout, SideLayout, attribute_name, detail_field, strips_of, width_field
 from .markings import declare_line, markings_group
 
 MARKINGS = "Markings"
@@ -211,3 +212,14 @@ def _edges(tree: Tree, backbone: Value, sides: list[_Side]) -> Iterator[Value]:
         points = op.store(op.set_position(points, place), "edge", sign)
         # A mesh line has edges; only its points are wanted.
         yield tree.node("GeometryNodeDeleteGeometry", points, domain="EDGE", mode="EDGE_FACE").value
+
+
+_LINES = (
+    MarkingLayout("Outer Edge Line", "outer_edge"),
+    MarkingLayout("Lane Line", "lane", 1),
+    MarkingLayout("Inner Edge Line", "inner_edge", 2),
+)
+BY_HAND = (SideLayout("Left", 2, _LINES), SideLayout("Right", 2, _LINES))
+"""The road that users find in the asset library."""
+
+offer_group("Road", "SR Road", partial(road_group, BY_HAND))

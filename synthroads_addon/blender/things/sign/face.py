@@ -52,11 +52,11 @@ class Face(Inputs):
     pictogram_right = share(0.9, (0.0, 1.0), _DRAWING_BORDER, panel="Pictogram")
     pictogram_bottom = share(0.1, (0.0, 1.0), _DRAWING_BORDER, panel="Pictogram")
     pictogram_top = share(0.9, (0.0, 1.0), _DRAWING_BORDER, panel="Pictogram")
-    ground_material = material_of("the ground", panel="Materials")
-    border_material = material_of("the border", panel="Materials")
-    edge_material = material_of("the edge", panel="Materials")
-    writing_material = material_of("the writing", panel="Materials")
-    back_material = material_of("the back", panel="Materials")
+    ground_material = material_of("the ground", "sheeting_blue", panel="Materials")
+    border_material = material_of("the border", "sheeting_white", panel="Materials")
+    edge_material = material_of("the edge", "sheeting_white", panel="Materials")
+    writing_material = material_of("the writing", "sheeting_white", panel="Materials")
+    back_material = material_of("the back", "board_back", panel="Materials")
 
 
 class _LabelledFace(Face):

@@ -26,10 +26,10 @@ class _SignInputs(Inputs):
     posts = integer(1, (1, MOST_POSTS), "Number of posts")
     post_diameter = metres(0.076, (0.02, 0.5), "Diameter of a post")
     lattice = boolean(False, "Lattice posts instead of tubes")
-    post_material = material_of("the posts")
+    post_material = material_of("the posts", "galvanised_steel")
 
 
-@makes_group("SR Sign")
+@makes_group("SR Sign", catalogue="Signs")
 def sign_group(tree: Tree) -> None:
     """A traffic sign on its posts, facing those who drive along +y; points carry ``heading`` and ``elevation``."""
     standing, face, sign = Standing(tree), Face(tree), _SignInputs(tree)
@@ -94,5 +94,4 @@ def build_signs(builder: ModelBuilder) -> None:
             sign_group(),
             **sign_face_inputs(sign),
             lattice=sign.on_lattices,
-            post_material="galvanised_steel",
         )

@@ -40,8 +40,8 @@ class Crown(Inputs):
 class PlantMaterials(Inputs):
     """Materials of one plant, or of a stand."""
 
-    bark_material = material_of("trunk, branches and stems")
-    leaves_material = material_of("the leaves")
+    bark_material = material_of("trunk, branches and stems", "maple_bark")
+    leaves_material = material_of("the leaves", "maple_leaves")
 
 
 class _Growth(Inputs):

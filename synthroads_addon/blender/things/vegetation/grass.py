@@ -22,7 +22,7 @@ class _Roadside(Inputs):
     roadside_reach = metres(30.0, (1.0, 100.0), "Farthest verge from the axis")
     roadside_height = share(0.5, (0.0, 1.0), "Height there, as a share of the height elsewhere")
     median_instance = integer(0, INSTANCES, "Instance number of the median's faces; 0 if it has none of its own")
-    material = material_of("the blades")
+    material = material_of("the blades", "meadow")
 
 
 class _Tuft(Inputs):

@@ -56,7 +56,7 @@ def _kind(tree: Tree, inputs: dict[str, Value], seed: int, wider: float) -> Valu
     return tree.call(shape_group(), **inputs | {"crown_radius": inputs["crown_radius"] * wider}, seed=seed).value
 
 
-@makes_group("SR Shrub Shape")
+@makes_group("SR Shrub Shape", catalogue="Plants")
 def shape_group(tree: Tree) -> None:
     """One shrub of height 1: stems and leaves."""
     shape, plant = _ShrubInputs(tree, defaults=_DEFAULTS), Plant(tree)

@@ -50,7 +50,7 @@ def _kind(tree: Tree, inputs: dict[str, Value], seed: int, lower: float, wider: 
     return tree.call(shape_group(), **inputs | changed, seed=seed).value
 
 
-@makes_group("SR Tree Shape")
+@makes_group("SR Tree Shape", catalogue="Plants")
 def shape_group(tree: Tree) -> None:
     """One tree of height 1: trunk, branches and leaves."""
     shape, plant = _TreeInputs(tree), Plant(tree)

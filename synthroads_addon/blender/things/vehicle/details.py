@@ -14,15 +14,15 @@ from ...nodes.solids import Point, box, move_geometry, paint_faces, put_on_point
 class VehicleMaterials(Inputs):
     """Materials of a vehicle."""
 
-    paint_material = socket("Material", "Paint, in the vehicle's colour")
-    glass_material = socket("Material", "Windows")
-    rubber_material = socket("Material", "Tyres")
-    chrome_material = socket("Material", "Rims and bright metal")
-    black_material = socket("Material", "Bumpers, frames and other dark parts")
-    white_light_material = socket("Material", "Headlights")
-    red_light_material = socket("Material", "Tail lights")
-    plate_material = socket("Material", "Number plates")
-    cover_material = socket("Material", "Tarpaulin or box of a truck")
+    paint_material = material_of("paint, in the vehicle's colour", "car_paint")
+    glass_material = material_of("windows", "glass")
+    rubber_material = material_of("tyres", "rubber")
+    chrome_material = material_of("rims and bright metal", "chrome")
+    black_material = material_of("bumpers, frames and other dark parts", "plastic_black")
+    white_light_material = material_of("headlights", "lamp_glass")
+    red_light_material = material_of("tail lights", "lamp_red")
+    plate_material = material_of("number plates", "number_plate")
+    cover_material = material_of("tarpaulin or box of a truck", "tarpaulin")
 
     def __getitem__(self, name: str) -> Value:
         """Return a material by the name that parts have it by, such as ``paint``."""

@@ -7,15 +7,16 @@ They are put together as `presets/vehicles.json` says: a model is a list of fram
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import bpy
 
 from ....base.files import PRESETS
 from ....base.schema import read_json
+from ....road.things.vehicles import CHASSIS
 from ...nodes import operations as op
-from ...nodes.builder import Tree, Value, node_group
+from ...nodes.builder import Tree, Value, node_group, offer_group
 from .details import VehicleMaterials, ball, boxes, rod, smooth, wheels
 from .hull import hull
 
@@ -53,3 +54,7 @@ def _settings(part: dict[str, Any]) -> dict[str, Any]:
 
 def _as_tuples(value: Any) -> Any:
     return tuple(_as_tuples(item) for item in value) if isinstance(value, list) else value
+
+
+for _model in CHASSIS:
+    offer_group("Vehicles", f"SR {_model.title()}", partial(model_group, _model))

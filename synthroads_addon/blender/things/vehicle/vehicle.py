@@ -114,20 +114,6 @@ def _on_road(road: Value, place: Value, way: Value) -> Value:
     return flat + op.vector(tree, 0.0, 0.0, height)
 
 
-MATERIALS = {
-    "Paint Material": "car_paint",
-    "Glass Material": "glass",
-    "Rubber Material": "rubber",
-    "Chrome Material": "chrome",
-    "Black Material": "plastic_black",
-    "White Light Material": "lamp_glass",
-    "Red Light Material": "lamp_red",
-    "Plate Material": "number_plate",
-    "Cover Material": "tarpaulin",
-}
-"""Material inputs of the groups -> entries of the material table."""
-
-
 def build_vehicles(builder: ModelBuilder) -> None:
     """Make one object per vehicle, so that each can be moved on its own."""
     lines: dict[tuple[str, int], LaneLine] = {}
@@ -138,7 +124,7 @@ def build_vehicles(builder: ModelBuilder) -> None:
         grade = lines[lane].carriageway.traffic * builder.geometry.profile.grade(np.array([vehicle.station]))
         place = vehicle_place(lines[lane], vehicle)
         mesh = builder.points("Vehicle", [place], {COLOR: np.array([vehicle.color]), "grade": grade})
-        builder.add(name, mesh, vehicle_group(vehicle.model), MATERIALS)
+        builder.add(name, mesh, vehicle_group(vehicle.model))
 
 
 def vehicle_place(line: LaneLine, vehicle: Vehicle) -> PointObject:

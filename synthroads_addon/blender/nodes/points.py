@@ -1,0 +1,43 @@
+"""SR Points along Axis: places for things that stand beside a road, at even distances along any curve."""
+
+from __future__ import annotations
+
+import math
+
+from . import operations as op
+from .axis import AxisInputs
+from .backbone import last_station, look_up, station_ribbon
+from .builder import Tree, makes_group
+from .inputs import boolean, metres
+from .solids import row_of_points
+
+
+class _Points(AxisInputs):
+    start_station = metres(0.0, (0.0, 1e6), "Station of the first point")
+    end_station = metres(0.0, (0.0, 1e6), "No point stands beyond it; 0 is the end of what is followed")
+    spacing = metres(50.0, (0.1, 10_000.0), "Distance between points")
+    offset = metres(0.0, (-1000.0, 1000.0), "Offset of the points, positive to the left")
+    against_traffic = boolean(False, "For those who drive against the stations, else with them")
+
+
+@makes_group("SR Points along Axis", catalogue="Tools")
+def points_along_axis_group(tree: Tree) -> None:
+    """Points with ``heading`` and ``elevation``, as groups of things that stand at a place take them."""
+    inputs = _Points(tree)
+    with tree.frame("Number of points"):
+        axis = inputs.axis()
+        end = op.switch(inputs.end_station > 0.0, last_station(axis), inputs.end_station)
+        number = (end - inputs.start_station) / inputs.spacing + 1e-4
+        count = tree.node("FunctionNodeFloatToInt", number, rounding_mode="FLOOR").value + 1
+    with tree.frame("Places, looking along the axis"):
+        ribbon = station_ribbon(axis)
+        points = row_of_points(tree, count)
+        station = inputs.start_station + op.index(tree) * inputs.spacing
+        left = look_up(ribbon, "left", station)
+        # The heading is the turn from +y; the left is a quarter of a turn further than the way ahead.
+        turn = tree.node("ShaderNodeMath", op.component(left, "Y"), op.component(left, "X"), operation="ARCTAN2").value
+        heading = turn + op.switch(inputs.against_traffic, -math.pi, 0.0)
+        points = op.store(op.store(points, "heading", heading), "elevation", 0.0)
+        points = op.set_position(points, look_up(ribbon, "axis", station) + left * inputs.offset)
+        points = tree.node("GeometryNodeDeleteGeometry", points, domain="EDGE", mode="EDGE_FACE").value
+    tree.output("Points", points, description="Points with heading and elevation")
