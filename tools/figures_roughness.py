@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from synthroads_addon.base.noise import field as noise_field  # noqa: E402
+from synthroads_addon.base.noise import noise_field  # noqa: E402
 from synthroads_addon.base.random_streams import stream  # noqa: E402
 from synthroads_addon.cloud.points import PointBlock  # noqa: E402
 from synthroads_addon.scanning.relief import OCTAVES, RELIEF, MicroRelief, shift_along_normals  # noqa: E402

@@ -37,7 +37,7 @@ _TURN = ((15.0, 6.0, -10.0), (6.0, 10.0, 15.0), (10.0, -15.0, 6.0))
 each axis at least 18 degrees off every axis and diagonal of the lattice (the best of all with whole numbers to 60)."""
 
 
-def field(position: Float, wavelength: float | Float, seed: int, octaves: int = 4) -> Float:
+def noise_field(position: Float, wavelength: float | Float, seed: int, octaves: int = 4) -> Float:
     """Return the field at positions: mean 0, standard deviation 1 at every place, nearly normal from 3 octaves on.
 
     The correlation falls to 1/e at about 0.28 of the wavelength (4 octaves) and is 0 beyond 1.75 of it.

@@ -137,7 +137,7 @@ def select_class(cloud: RealCloud, chosen: Index, selection: str) -> RealClass:
     )
 
 
-def seen_from(real: RealClass, scanner: Float) -> tuple[Float, Float]:
+def ranges_and_incidences(real: RealClass, scanner: Float) -> tuple[Float, Float]:
     """Return ranges (N,), m, and incidence angles (N,), rad, of points that a scanner at one place saw.
 
     The surface's normal is that of the plane through the points of each square of `_CELL`; where those are few or in

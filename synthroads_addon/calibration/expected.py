@@ -174,7 +174,7 @@ class Expectation:
         self._share = None if strip is None else self._share_on(strip)
         self._texture = None if texture is None else self._of_texture(texture, rng)
 
-    def linear(self, material: Material, beside: Material | None = None) -> Float:
+    def linear_intensities(self, material: Material, beside: Material | None = None) -> Float:
         """Return the linear intensities (`SAMPLES`,) that come back.
 
         Args:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..base.arrays import Float, Index
 from ..base.errors import InputError
-from ..base.noise import field
+from ..base.noise import noise_field
 from ..materials.reflectance import LUMINANCE, facet_terms
 from ..materials.surfaces import OCTAVES
 from ..materials.table import Material
@@ -80,7 +80,7 @@ def fit_level_and_spreads(
         got = np.quantile(receiver.to_stored(apply_gain(expectation, material, _fit(x, material), beside)), FITTED)
         return np.asarray((got - quantiles) / width)
 
-    start = float(np.median(expectation.linear(material, beside[0] if beside else None)))
+    start = float(np.median(expectation.linear_intensities(material, beside[0] if beside else None)))
     if start <= 0.0:
         raise InputError("material", material.to_dict(), "gives nothing back at these incidence angles and ranges")
     level = np.log(float(receiver.to_linear(quantiles[1:2])[0]) / start)
@@ -95,8 +95,10 @@ def apply_gain(expectation: Expectation, material: Material, fit: Fit, beside: t
     """Return linear intensities with a fit's spreads and level; what lies beside a strip keeps its own level."""
     uneven = material.model_copy(update={"spread_below": fit.below, "spread_above": fit.above})
     if beside is None:
-        return fit.level * expectation.linear(uneven)
-    return fit.level * expectation.linear(uneven, brighten_material(beside[0], beside[1] / fit.level, limited=False))
+        return fit.level * expectation.linear_intensities(uneven)
+    return fit.level * expectation.linear_intensities(
+        uneven, brighten_material(beside[0], beside[1] / fit.level, limited=False)
+    )
 
 
 def _fit(x: Float, material: Material) -> Fit:
@@ -126,7 +128,7 @@ def _levenberg_marquardt(miss: Function, x: Float) -> Float:
     return x
 
 
-def gain_of(
+def common_gain(
     materials: Sequence[Material], levels: Sequence[float], hold: int | None = None, given: float | None = None
 ) -> float:
     """Return the one gain of the device that explains the levels of all classes.
@@ -210,7 +212,7 @@ def fitted_wavelength(place: Float, intensity: Float) -> float:
     real = _within(_scores(intensity), squares)
     misfits = []
     for wavelength in WAVELENGTHS:
-        values = field(place - place.min(axis=0), wavelength, 1, OCTAVES)
+        values = noise_field(place - place.min(axis=0), wavelength, 1, OCTAVES)
         misfits.append(float(np.nansum((_within(_scores(values), squares) - real) ** 2)))
     return WAVELENGTHS[int(np.argmin(misfits))]
 

@@ -18,7 +18,7 @@ from ..base.progress import exhaust
 from ..materials.surfaces import Reflection
 from ..materials.table import Material, materials, read_material_table, write_material_table
 from ..scanning.devices.device import load_device
-from .classes import RealClass, RealCloud, class_by_label, read_real, seen_from
+from .classes import RealClass, RealCloud, class_by_label, ranges_and_incidences, read_real
 from .expected import Expectation, Receiver, Texture, Views, chosen_views, read_texture
 from .fit import (
     FITTED,
@@ -26,10 +26,10 @@ from .fit import (
     Fit,
     apply_gain,
     brighten_material,
+    common_gain,
     fit_level_and_spreads,
     fitted_slope,
     fitted_wavelength,
-    gain_of,
     interquartile_range,
 )
 from .pavement import RoadClasses, road_classes
@@ -216,7 +216,7 @@ def steps(job: CalibrationJob) -> Generator[float, None, Calibration]:
     """Compare, and fit if asked to; yield the share that is done, return the result.
 
     The classes share one gain. With a fit each takes the level that its quantiles need, and the gain is what they have
-    in common, see `calibration.fit.gain_of`; without, it is the one with which the medians come nearest.
+    in common, see `calibration.fit.common_gain`; without, it is the one with which the medians come nearest.
 
     Raises:
         InputError: an input is wrong, or the classes can't be explained by materials.
@@ -354,7 +354,7 @@ def _with_facets(job: CalibrationJob, material: Material, real: RealClass, views
 def _views(job: CalibrationJob, real: RealClass | None) -> Views:
     """Return how a class was seen: as its points say, from the scanner's place, or as chosen."""
     if real is not None and job.scanner is not None:
-        distance, incidence = seen_from(real, np.array(job.scanner))
+        distance, incidence = ranges_and_incidences(real, np.array(job.scanner))
         return Views(incidence, distance)
     if real is not None and np.isfinite(real.distance).all() and np.isfinite(real.incidence).all():
         return Views(real.incidence, real.distance)
@@ -391,7 +391,7 @@ def _result(
     gain = 1.0
     if job.real is not None:
         levels = [fit.level for fit in fits]
-        gain = gain_of(rows, levels, hold, job.gain) if fitting else job.gain or _mean(levels)
+        gain = common_gain(rows, levels, hold, job.gain) if fitting else job.gain or _mean(levels)
     if fitting:
         rows = [
             brighten_material(row, fit.level / gain).model_copy(

@@ -63,7 +63,7 @@ def _vector(names: tuple[str, ...], array: str, dtype: str, scale: float, unit: 
     )
 
 
-Filled = Literal["scan", "material", "colour"]
+LayerFiller = Literal["scan", "material", "colour"]
 """Who fills a layer: the scan (`scanning.point_layers`), the materials' layers, or the source of colours."""
 
 
@@ -75,14 +75,14 @@ class Layer:
         label: for people.
         columns: in files, in their order.
         types: of the `PointBlock` arrays that they are of.
-        filled: who fills them.
+        filler: who fills them.
         always: the arrays are there in any case, whether files hold them or not.
     """
 
     label: str
     columns: tuple[Column, ...]
     types: dict[str, str]
-    filled: Filled = "scan"
+    filler: LayerFiller = "scan"
     always: bool = False
 
 
@@ -95,7 +95,7 @@ LABELS: tuple[Column, ...] = (
 
 def _material_layer(name: str) -> Layer:
     column = _scalar(name, name, "uint16", 1e-4, "1", f"material {name}, 0 to 1")
-    return Layer(name.capitalize(), column, {name: "float32"}, filled="material")
+    return Layer(name.capitalize(), column, {name: "float32"}, filler="material")
 
 
 LAYERS: dict[str, Layer] = {
@@ -139,7 +139,7 @@ LAYERS: dict[str, Layer] = {
         "Colour Source",
         _scalar("color_source", "color_source", "uint8", None, "1", "image that gave the colour"),
         {"color_source": "uint8"},
-        filled="colour",
+        filler="colour",
     ),
 }
 """Layers by the name by which a scenario asks for them (`CloudScenario.attributes`)."""
@@ -155,9 +155,9 @@ _TYPES = {"class_id": "uint8", "instance_id": "uint32"} | {
 }
 
 
-def optional_arrays(*filled: Filled) -> frozenset[str]:
+def optional_arrays(*fillers: LayerFiller) -> frozenset[str]:
     """Return the names of the arrays that a block may lack: of all layers, or of those that one of these fills."""
-    rows = (layer for layer in LAYERS.values() if not layer.always and (not filled or layer.filled in filled))
+    rows = (layer for layer in LAYERS.values() if not layer.always and (not fillers or layer.filler in fillers))
     return frozenset(array for layer in rows for array in layer.types)
 
 

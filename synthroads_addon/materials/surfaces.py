@@ -7,8 +7,8 @@ negative and ``spread_above`` elsewhere. M makes the mean of the factor 1, so th
 mean over its surface. Two spreads are what it takes to hold the quartiles and the 90th percentile of real asphalt and
 real markings; see `docs/calibration.md`.
 
-The field is `base.noise.field`, of position alone: a place has the same factor in every strip, for every scanner and
-every order of the blocks. It is evaluated once per return, where the ray met the surface that gave most of it: the
+The field is `base.noise.noise_field`, of position alone: a place has the same factor in every strip, for every scanner
+and every order of the blocks. It is evaluated once per return, where the ray met the surface that gave most of it: the
 factor is that of the footprint as a whole, and grain much finer than the footprint is not described by it.
 """
 
@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.arrays import Float
-from ..base.noise import field
+from ..base.noise import noise_field
 from .reflectance import facet_terms, reflectivity, returned_share
 from .table import Material
 
@@ -139,7 +139,7 @@ def spread_factors(surfaces: Surfaces, material: NDArray[np.integer], position: 
         position: (N, 3) local, in the scene as it stands at the time 0, m.
         seed: the scene's.
     """
-    normal = field(position, surfaces.spread_wavelength[material], seed ^ _PURPOSE, OCTAVES)
+    normal = noise_field(position, surfaces.spread_wavelength[material], seed ^ _PURPOSE, OCTAVES)
     scale = surfaces.spread_scale[material]
     sigma = np.where(normal < 0.0, surfaces.spread_below[material], surfaces.spread_above[material])
     return np.asarray(np.exp(normal * sigma) * scale)

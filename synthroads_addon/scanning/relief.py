@@ -15,7 +15,7 @@ import numpy as np
 
 from ..base.arrays import Float
 from ..base.errors import InputError
-from ..base.noise import field
+from ..base.noise import noise_field
 from ..cloud.points import PointBlock
 from ..materials.table import UNKNOWN, Material, materials
 
@@ -136,7 +136,7 @@ def shift_along_normals(
         return points
     rough = uneven if len(uneven) < len(points) else slice(None)
     material = points.material[rough]
-    texture = field(position[rough], relief.wavelength[material], seed, octaves)
+    texture = noise_field(position[rough], relief.wavelength[material], seed, octaves)
     height = strength * relief.amplitude[material] * texture
     xyz, distance = points.xyz.copy(), points.range.copy()
     xyz[rough] += height[:, None] * points.normal[rough]

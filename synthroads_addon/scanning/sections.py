@@ -80,12 +80,12 @@ def sections(cut: Blocks, geometry: RoadGeometry, length: float, shadows: float 
     beyond = BORDER + shadows + _skew(geometry)
     for number, blocks in enumerate(owned):
         if blocks:
-            low, high = reach(cut, geometry, blocks)
+            low, high = reached_stations(cut, geometry, blocks)
             start, end = number * length, min((number + 1) * length, geometry.length)
             yield Section(start, end, max(low - beyond, 0.0), min(high + beyond, geometry.length), tuple(blocks))
 
 
-def reach(cut: Blocks, geometry: RoadGeometry, blocks: list[Block]) -> tuple[float, float]:
+def reached_stations(cut: Blocks, geometry: RoadGeometry, blocks: list[Block]) -> tuple[float, float]:
     """Return the stations between which the rays of some blocks can meet anything."""
     stations = []
     for strip, numbers in _by_strip(blocks):

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from synthroads_addon.base import noise as noise_field
-from synthroads_addon.base.noise import MAX_OCTAVES, field
+from synthroads_addon.base import noise as noise_module
+from synthroads_addon.base.noise import MAX_OCTAVES, noise_field
 from synthroads_addon.base.random_streams import stream
 
 TURN = np.array([[15, 6, -10], [6, 10, 15], [10, -15, 6]]) / 19.0
@@ -52,25 +52,25 @@ def by_definition(position: np.ndarray, wavelength: float, seed: int, octaves: i
 def test_follows_its_definition(octaves: int) -> None:
     position = scattered(50)
     expected = [by_definition(row, 0.3, 11, octaves) for row in position]
-    assert field(position, 0.3, 11, octaves) == pytest.approx(expected, abs=2e-5)
+    assert noise_field(position, 0.3, 11, octaves) == pytest.approx(expected, abs=2e-5)
 
 
 @pytest.mark.parametrize("place", [0.0, 0.25, 0.5])
 def test_variance_is_one_at_every_place_of_a_cell(place: float) -> None:
     """Plain interpolation has 1/8 in the middle."""
     nodes = np.random.default_rng(1).integers(-500, 500, (40_000, 3)) + place + 1e-6
-    values = field(nodes @ TURN, 2.0, 5, octaves=1)
+    values = noise_field(nodes @ TURN, 2.0, 5, octaves=1)
     assert values.std() == pytest.approx(1.0, abs=0.02)
     assert values.mean() == pytest.approx(0.0, abs=0.02)
 
 
 @pytest.mark.parametrize("octaves", [1, 2, 4, 6, MAX_OCTAVES])
 def test_variance_is_one_with_any_octaves(octaves: int) -> None:
-    assert field(scattered(100_000), 0.5, 2, octaves).std() == pytest.approx(1.0, abs=0.01)
+    assert noise_field(scattered(100_000), 0.5, 2, octaves).std() == pytest.approx(1.0, abs=0.01)
 
 
 def test_nearly_normal() -> None:
-    values = field(scattered(200_000), 0.5, 4, 4)
+    values = noise_field(scattered(200_000), 0.5, 4, 4)
     share = [np.mean(np.abs(values) < k) for k in (1, 2, 3)]
     assert share == pytest.approx([0.683, 0.954, 0.997], abs=0.02)
     assert abs(np.mean(values**3)) < 0.02
@@ -78,7 +78,7 @@ def test_nearly_normal() -> None:
 
 def correlation(step: np.ndarray, octaves: int = 4) -> float:
     position = scattered(100_000, 3)
-    return float(np.mean(field(position, 1.0, 6, octaves) * field(position + step, 1.0, 6, octaves)))
+    return float(np.mean(noise_field(position, 1.0, 6, octaves) * noise_field(position + step, 1.0, 6, octaves)))
 
 
 def test_correlation_is_that_of_the_documentation() -> None:
@@ -96,7 +96,7 @@ def test_continuous_across_cells() -> None:
     """No steps: over 1e-6 of a wavelength nothing changes by more than the steepest slope times that."""
     start = scattered(2_000, 8)
     line = (start[:, None, :] + np.linspace(0, 1, 400)[None, :, None] * np.array([0.8, 0.6, 0.0])).reshape(-1, 3)
-    near = field(line, 1.0, 9, 3) - field(line + 1e-6, 1.0, 9, 3)
+    near = noise_field(line, 1.0, 9, 3) - noise_field(line + 1e-6, 1.0, 9, 3)
     assert np.abs(near).max() < 1e-4
 
 
@@ -105,27 +105,27 @@ def test_continuous_across_cells() -> None:
 def test_blocks_and_order_do_not_matter(cut: int, chunk: int, seed: int) -> None:
     position = scattered(3000, 7)
     wavelength = np.where(np.arange(3000) % 2, 0.2, 0.4)
-    whole = field(position, wavelength, seed)
+    whole = noise_field(position, wavelength, seed)
     order = np.random.default_rng(cut).permutation(3000)
     shuffled = np.empty(3000)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(noise_field, "CHUNK", chunk)
+        patch.setattr(noise_module, "CHUNK", chunk)
         for part in (order[:cut], order[cut:]):
-            shuffled[part] = field(position[part], wavelength[part], seed)
+            shuffled[part] = noise_field(position[part], wavelength[part], seed)
     assert (shuffled == whole).all()
 
 
 def test_seeds_and_wavelengths_are_unrelated() -> None:
     position = scattered(50_000)
-    first = field(position, 0.2, 1)
-    for other in (field(position, 0.2, 2), field(position, 0.31, 1)):
+    first = noise_field(position, 0.2, 1)
+    for other in (noise_field(position, 0.2, 2), noise_field(position, 0.31, 1)):
         assert np.mean(first * other) == pytest.approx(0.0, abs=0.02)
 
 
 def test_octaves_are_unrelated() -> None:
     position = scattered(50_000)
-    coarse = field(position, 0.2, 1, 1)
-    fine = field(position, 0.2, 1, 2) * math.sqrt(1.5) - coarse
+    coarse = noise_field(position, 0.2, 1, 1)
+    fine = noise_field(position, 0.2, 1, 2) * math.sqrt(1.5) - coarse
     assert fine.std() == pytest.approx(math.sqrt(0.5), abs=0.02)
     assert np.mean(coarse * fine) == pytest.approx(0.0, abs=0.02)
 
@@ -133,16 +133,16 @@ def test_octaves_are_unrelated() -> None:
 def test_map_coordinates_keep_the_field() -> None:
     """At 5.6e6 m a float64 still tells places 1 nm apart."""
     position = scattered(50_000, size=50) + np.array([294_000.0, 5_628_000.0, 180.0])
-    values = field(position, 0.1, 3, 6)
+    values = noise_field(position, 0.1, 3, 6)
     assert values.std() == pytest.approx(1.0, abs=0.02)
-    assert np.abs(values - field(position + 1e-7, 0.1, 3, 6)).max() < 1e-3
+    assert np.abs(values - noise_field(position + 1e-7, 0.1, 3, 6)).max() < 1e-3
 
 
 def test_no_points() -> None:
-    assert field(np.empty((0, 3)), np.empty(0), 1).shape == (0,)
+    assert noise_field(np.empty((0, 3)), np.empty(0), 1).shape == (0,)
 
 
 @pytest.mark.parametrize("octaves", [0, -1, MAX_OCTAVES + 1])
 def test_octaves_out_of_range(octaves: int) -> None:
     with pytest.raises(ValueError, match="octaves"):
-        field(np.zeros((1, 3)), 1.0, 1, octaves)
+        noise_field(np.zeros((1, 3)), 1.0, 1, octaves)

@@ -12,15 +12,15 @@ from PIL import Image
 from headless.cli import main
 from synthroads_addon.base.arrays import otsu
 from synthroads_addon.base.errors import InputError, OutputError
-from synthroads_addon.base.noise import field
-from synthroads_addon.calibration.classes import RealClass, class_by_label, read_real, seen_from
+from synthroads_addon.base.noise import noise_field
+from synthroads_addon.calibration.classes import RealClass, class_by_label, ranges_and_incidences, read_real
 from synthroads_addon.calibration.expected import Expectation, Receiver, Views, chosen_views, read_texture, texture_of
 from synthroads_addon.calibration.fit import (
     BRIGHTEST,
     brighten_material,
+    common_gain,
     fitted_slope,
     fitted_wavelength,
-    gain_of,
 )
 from synthroads_addon.calibration.job import Calibration, CalibrationJob, MaterialTarget, calibrate, save_fitted, steps
 from synthroads_addon.calibration.pavement import RoadClasses, axis_coordinates, road_classes
@@ -45,10 +45,11 @@ def test_expected_intensities_are_the_laser_equations(reflection) -> None:
     expectation = Expectation(views, Receiver(attenuation=0.002), reflection)
     args = (np.cos(expectation.incidence), expectation.distance)
     wanted = intensity_of(ASPHALT.reflectivity, *args, ASPHALT.slope if reflection == "oren_nayar" else 0.0, 0.002)
-    assert expectation.linear(ASPHALT) == pytest.approx(wanted)
+    assert expectation.linear_intensities(ASPHALT) == pytest.approx(wanted)
     assert len(np.unique(np.stack([expectation.incidence, expectation.distance]), axis=1).T) == 6
     leaves = materials()["leaves"]
-    assert expectation.linear(leaves).max() < expectation.linear(leaves.model_copy(update={"transmission": 0.0})).max()
+    opaque = leaves.model_copy(update={"transmission": 0.0})
+    assert expectation.linear_intensities(leaves).max() < expectation.linear_intensities(opaque).max()
 
 
 def test_many_views_are_a_sample_of_all() -> None:
@@ -59,12 +60,12 @@ def test_many_views_are_a_sample_of_all() -> None:
 
 def test_spread_keeps_the_mean_and_is_two_sided() -> None:
     expectation = Expectation(chosen_views((0.0,), (1.0,)), Receiver())
-    values = expectation.linear(even(spread_below=0.4, spread_above=0.2))
+    values = expectation.linear_intensities(even(spread_below=0.4, spread_above=0.2))
     assert values.mean() == pytest.approx(ASPHALT.reflectivity, rel=0.01)
     low, middle, high = np.log(np.quantile(values, (0.25, 0.5, 0.75)))
     assert (middle - low) / (high - middle) == pytest.approx(2.0, rel=0.06)
     again = Expectation(chosen_views((0.0,), (1.0,)), Receiver())
-    assert np.array_equal(values, again.linear(even(spread_below=0.4, spread_above=0.2)))
+    assert np.array_equal(values, again.linear_intensities(even(spread_below=0.4, spread_above=0.2)))
 
 
 def test_a_strip_narrower_than_the_footprint_is_mixed_with_what_lies_beside() -> None:
@@ -72,8 +73,8 @@ def test_a_strip_narrower_than_the_footprint_is_mixed_with_what_lies_beside() ->
     wide, narrow = (
         Expectation(views, Receiver((2e-3, 2e-3), range_corrected=True), strip=width) for width in (2.0, 0.05)
     )
-    assert np.median(wide.linear(PAINT, ASPHALT)) == pytest.approx(PAINT.reflectivity + 1.0)
-    mixed = narrow.linear(PAINT, ASPHALT)
+    assert np.median(wide.linear_intensities(PAINT, ASPHALT)) == pytest.approx(PAINT.reflectivity + 1.0)
+    mixed = narrow.linear_intensities(PAINT, ASPHALT)
     assert ASPHALT.reflectivity < mixed.mean() < 0.6 * (PAINT.reflectivity + 1.0)
     # The middle of a Gaussian beam of the radius w on a strip of the width b: erf(b / sqrt 2 / w).
     assert mixed.max() < 0.45 * (PAINT.reflectivity + 1.0) + ASPHALT.reflectivity
@@ -94,7 +95,8 @@ def test_a_texture_gives_the_spread_of_its_pixels_over_the_footprint(tmp_path: P
     assert texture.values.mean() == pytest.approx(1.0)
     assert texture.mean_color == pytest.approx((0.2, 0.2, 0.2), abs=0.01)
     views = chosen_views((0.0,), (50.0,))
-    fine, coarse = (Expectation(views, Receiver((d, d)), texture=texture).linear(ASPHALT) for d in (0.0, 2e-3))
+    expectations = (Expectation(views, Receiver((d, d)), texture=texture) for d in (0.0, 2e-3))
+    fine, coarse = (expectation.linear_intensities(ASPHALT) for expectation in expectations)
     ratio = (0.12 + 0.15) / (0.12 + 0.05)
     assert np.quantile(fine, 0.9) / np.quantile(fine, 0.1) == pytest.approx(ratio, rel=1e-6)
     assert coarse.std() < 0.5 * fine.std()
@@ -140,14 +142,14 @@ def test_a_comparison_changes_nothing_and_shows_what_is_wrong(tmp_path: Path) ->
 
 def test_the_gain_is_one_for_all_and_changes_materials_least() -> None:
     rows = [even(), PAINT]
-    assert gain_of(rows, [4.0, 4.41]) == pytest.approx(4.2)
-    assert gain_of(rows, [4.0, 4.41], hold=1) == 4.41
-    assert gain_of(rows, [4.0, 4.41], given=6.0) == 6.0
+    assert common_gain(rows, [4.0, 4.41]) == pytest.approx(4.2)
+    assert common_gain(rows, [4.0, 4.41], hold=1) == 4.41
+    assert common_gain(rows, [4.0, 4.41], given=6.0) == 6.0
     # The paint may not reflect more than all: the gain is as large as that needs.
     least = 50.0 * PAINT.reflectivity / BRIGHTEST
-    assert gain_of(rows, [2.0, 50.0]) == pytest.approx(least)
+    assert common_gain(rows, [2.0, 50.0]) == pytest.approx(least)
     with pytest.raises(InputError, match="--hold"):
-        gain_of(rows, [2.0, 50.0], hold=0)
+        common_gain(rows, [2.0, 50.0], hold=0)
 
 
 def test_the_specular_changes_and_the_colour_stays_as_long_as_it_can() -> None:
@@ -189,7 +191,7 @@ def test_the_slope_is_found_where_angles_differ() -> None:
 def test_the_wavelength_is_found(wavelength: float) -> None:
     rng = np.random.default_rng(2)
     place = np.column_stack([rng.random((40_000, 2)) * (120.0, 12.0), np.zeros(40_000)])
-    seen = np.exp(0.4 * field(place, wavelength, 77, 3))
+    seen = np.exp(0.4 * noise_field(place, wavelength, 77, 3))
     assert fitted_wavelength(place, seen) == wavelength
 
 
@@ -235,7 +237,7 @@ def test_ranges_and_angles_from_one_place_follow_the_ground() -> None:
     place = np.column_stack([plan, 0.2 * plan[:, 0]])
     none = np.full(4000, np.nan)
     real = RealClass("", place, np.ones(4000), 0, none, none)
-    distance, incidence = seen_from(real, np.array([0.0, 0.0, 50.0]))
+    distance, incidence = ranges_and_incidences(real, np.array([0.0, 0.0, 50.0]))
     normal = np.array([-0.2, 0.0, 1.0]) / np.hypot(0.2, 1.0)
     towards = np.array([0.0, 0.0, 50.0]) - place
     assert distance == pytest.approx(np.linalg.norm(towards, axis=1))

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from synthroads_addon.base.noise import field
+from synthroads_addon.base.noise import noise_field
 from synthroads_addon.materials import surfaces as module
 from synthroads_addon.materials.surfaces import OCTAVES, mean_over_median, spread_factors, surfaces_of
 from synthroads_addon.materials.table import Material, materials
@@ -32,7 +32,7 @@ def test_the_mean_is_one_whatever_the_spreads(below: float, above: float) -> Non
 
 def test_logarithms_are_normal_on_either_side(monkeypatch: pytest.MonkeyPatch) -> None:
     z = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
-    monkeypatch.setattr(module, "field", lambda *_: z)
+    monkeypatch.setattr(module, "noise_field", lambda *_: z)
     factors = spread_factors(surfaces_of([UNEVEN]), np.zeros(len(z), dtype=np.intp), np.zeros((len(z), 3)), 1)
     assert np.diff(np.log(factors)) == pytest.approx([0.4, 0.4, 0.2, 0.2])
     assert factors[2] == pytest.approx(1.0 / float(mean_over_median(0.4, 0.2)))
@@ -41,7 +41,7 @@ def test_logarithms_are_normal_on_either_side(monkeypatch: pytest.MonkeyPatch) -
 def test_the_field_of_three_octaves_is_nearly_normal() -> None:
     rng = np.random.default_rng(0)
     place = np.column_stack([rng.random((100_000, 2)) * 2000.0, np.zeros(100_000)])
-    values = field(place, 1.0, 5, OCTAVES)
+    values = noise_field(place, 1.0, 5, OCTAVES)
     assert np.quantile(values, (0.05, 0.25, 0.5, 0.75, 0.9)) == pytest.approx(
         (-1.645, -0.674, 0.0, 0.674, 1.282), abs=0.045
     )

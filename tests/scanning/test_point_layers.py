@@ -17,7 +17,7 @@ PAGE = "extend/layer.md"
 
 def test_the_row_of_the_page_is_a_layer() -> None:
     row = eval(f"{{{block_of_page(PAGE, 'text')}}}", vars(layers))["footprint"]
-    assert (row.types, row.filled) == ({"footprint": "float64"}, "scan")
+    assert (row.types, row.filler) == ({"footprint": "float64"}, "scan")
     assert [(column.name, column.array, column.unit) for column in row.columns] == [("footprint", "footprint", "m")]
     assert len(row.columns[0].description) <= 31
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.base.noise import field
+from synthroads_addon.base.noise import noise_field
 from synthroads_addon.cloud.points import PointBlock, concatenate
 from synthroads_addon.materials.table import Material, materials
 from synthroads_addon.scanning.relief import (
@@ -94,7 +94,7 @@ def test_points_move_along_the_normal_and_nothing_else_changes() -> None:
     # Normals are float32, and float64 has steps of 1e-9 at 5.6e6 m.
     assert np.abs(shift - height[:, None] * points.normal).max() < 1e-8
     relief = relief_of(*ROAD)
-    expected = 2.0 * relief.amplitude[points.material] * field(position, relief.wavelength[points.material], 1)
+    expected = 2.0 * relief.amplitude[points.material] * noise_field(position, relief.wavelength[points.material], 1)
     assert height == pytest.approx(expected, abs=1e-8)
     assert (result.xyz[points.material == 4] == points.xyz[points.material == 4]).all()
     for name, array in points.attributes().items():
@@ -144,7 +144,7 @@ def test_neighbours_have_like_heights() -> None:
     rng = np.random.default_rng(0)
     position = rng.uniform(-50, 50, (50_000, 3)) * np.array([1, 1, 0])
     here, near, far = (
-        field(position + np.array([step, 0, 0]), RELIEF["soil"].wavelength, 1) for step in (0, 0.02, 2.0)
+        noise_field(position + np.array([step, 0, 0]), RELIEF["soil"].wavelength, 1) for step in (0, 0.02, 2.0)
     )
     assert np.mean(here * near) > 0.8
     assert abs(np.mean(here * far)) < 0.02
@@ -188,7 +188,7 @@ def test_the_mean_surface_stays(name: str, size: float, side: float) -> None:
     axis = np.arange(step / 2, side, step)
     position = np.stack(np.meshgrid(axis, axis, [0.0], indexing="ij"), axis=-1).reshape(-1, 3)
     amplitude, wavelength = (np.full(len(position), value) for value in RELIEF[name])
-    height = amplitude * field(position, wavelength, 2)
+    height = amplitude * noise_field(position, wavelength, 2)
     cell = np.minimum((position[:, :2] // size).astype(int), number - 1) @ [number, 1]
     means = np.bincount(cell, height) / np.bincount(cell)
     assert np.sqrt(np.mean(means**2)) < 0.0002
@@ -202,7 +202,7 @@ def profile_depth(name: str) -> float:
     direction = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(300)])
     lines = along[:, None] * direction[:, None] + rng.uniform(-300, 300, (300, 1, 3))
     amplitude, wavelength = (np.full(30_000, value) for value in RELIEF[name])
-    z = (amplitude * field(lines.reshape(-1, 3), wavelength, 1, 6)).reshape(300, 100).T
+    z = (amplitude * noise_field(lines.reshape(-1, 3), wavelength, 1, 6)).reshape(300, 100).T
     z = z - along[:, None] * np.polyfit(along, z, 1)[0] - np.polyfit(along, z, 1)[1]
     return float((z[:50].max(axis=0) + z[50:].max(axis=0)).mean() / 2)
 

@@ -99,7 +99,7 @@ def map_intensity(
         if per_class:
             names = cloud.header.scheme.names()
             distances = {names.get(label, str(label)): gap for label, gap in mapping.class_distances().items()}
-            result |= {"class_distances": distances, "classes_mapped_together": mapping.alone}
+            result |= {"class_distances": distances, "classes_mapped_together": mapping.classes_without_target}
         return result
 
 

@@ -97,7 +97,7 @@ class IntensityMapping:
 
     Attributes:
         scale: 16-bit steps per unit of the mapped intensities: the target's.
-        alone: names of the classes that the target lacks; empty unless ``per_class``.
+        classes_without_target: names of the classes that the target lacks; empty unless ``per_class``.
 
     Raises:
         InputError: one of the clouds has no points.
@@ -110,7 +110,7 @@ class IntensityMapping:
             if not counts:
                 raise InputError(str(cloud.header.path), None, "has no points")
         self._have, self._want = _total(have), _total(want)
-        self.alone: list[str] = []
+        self.classes_without_target: list[str] = []
         self._class_targets: dict[int, Int] = {}
         if per_class:
             self._maps = self._class_maps(source, target, have, want)
@@ -151,7 +151,7 @@ class IntensityMapping:
         self._class_targets = {label: want[other] for label, other in pairs.items() if other is not None}
         maps = {label: QuantileMap(have[label], counts) for label, counts in self._class_targets.items()}
         rest = [label for label in have if label not in maps]
-        self.alone = [names.get(label, str(label)) for label in rest]
+        self.classes_without_target = [names.get(label, str(label)) for label in rest]
         if rest:
             together = QuantileMap(_total({label: have[label] for label in rest}), self._want)
             maps |= dict.fromkeys(rest, together)

@@ -250,7 +250,7 @@ def sample_nearby(image: RenderedImage, position: Float, material: UInt16, limit
     good = (i >= 0) & (i < width) & (j >= 0) & (j < height)
     i, j = np.where(good, i, 0), np.where(good, j, 0)
     good &= image.material[j, i] == material[:, None] + 1
-    away = np.linalg.norm(view.place(i, j, image.depth[j, i]) - position[:, None, :], axis=2)
+    away = np.linalg.norm(view.unproject(i, j, image.depth[j, i]) - position[:, None, :], axis=2)
     away[~good] = np.inf
     best = np.arange(len(position)), away.argmin(axis=1)
     near = away[best] < limit
@@ -284,5 +284,5 @@ def views_near(views: Sequence[View], lines: Sequence[SeenPoints]) -> list[View]
         if not len(places):
             continue
         near = np.flatnonzero(away <= places[-1] + 1e-5)
-        parts += [views[number].around(line.position, _MARGIN) for number in near]
+        parts += [views[number].crop_to(line.position, _MARGIN) for number in near]
     return [part for part in parts if part is not None]

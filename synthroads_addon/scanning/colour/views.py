@@ -59,13 +59,13 @@ class View:
             scale = self.focal / depth
             return self.centre[0] + right * scale, self.centre[1] - up * scale, depth
 
-    def place(self, column: NDArray[np.integer], row: NDArray[np.integer], depth: NDArray[np.floating]) -> Float:
+    def unproject(self, column: NDArray[np.integer], row: NDArray[np.integer], depth: NDArray[np.floating]) -> Float:
         """Return the places (..., 3) that the middles of pixels (...) show at depths (...) along the axis, m."""
         right, up = (column + 0.5 - self.centre[0]) / self.focal, (self.centre[1] - row - 0.5) / self.focal
         ray = np.stack([right, up, -np.ones_like(right)], axis=-1) @ self.rotation.T
         return np.asarray(self.position + depth.astype(np.float64)[..., None] * ray)
 
-    def around(self, points: Float, margin: int) -> View | None:
+    def crop_to(self, points: Float, margin: int) -> View | None:
         """Return the part of the image that shows points (N, 3), with a margin, px; None if it shows none of them."""
         x, y, depth = self.project(points)
         shown = (depth > 0.0) & (x >= 0.0) & (x <= self.size[0]) & (y >= 0.0) & (y <= self.size[1])
