@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from ....base.classes import class_id
+from ....road.things.gantry import Gantry
 from ...nodes import operations as op
 from ...nodes.builder import Tree, makes_group
 from ...nodes.inputs import INSTANCES, Inputs, integer, socket
@@ -35,5 +36,5 @@ def gantry_sign_group(tree: Tree) -> None:
         turned = op.turn(tree, z=op.switch(op.named_attribute(tree, "facing") > 0.0, math.pi, 0.0))
         mesh = op.realize(put_on_points(points, plate, op.position(tree), 1.0, turned))
     with tree.frame("Labels"):
-        mesh = op.label(mesh, class_id("shield_gantry"), instance)
+        mesh = op.label(mesh, class_id(Gantry.points_class), instance)
     tree.output("Mesh", mesh, description="The face")

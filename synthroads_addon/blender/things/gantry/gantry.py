@@ -22,11 +22,7 @@ from ..meshes import attribute, fill
 from ..model_builder import ModelBuilder
 from ..sign.looks import FaceStyle, face_inputs
 from .board import gantry_sign_group
-from .structure import KINDS, gantry_beam_group, gantry_catwalk_group, gantry_post_group
-
-_LADDER_FOOT, _RUNG = 2.3, 0.3  # m
-_ENCLOSED = 0.02
-"""The posts at the ends of the beam enclose it by so much, m."""
+from .structure import gantry_beam_group, gantry_catwalk_group, gantry_post_group
 
 
 class _Gantry(Inputs):
@@ -86,7 +82,7 @@ def gantry_group(tree: Tree) -> None:
     with tree.frame("Labels"):
         steel = paint_faces(op.join(beam, walk, hangers), gantry.steel_material)
         mesh = op.store(op.realize(op.join(steel, posts, boards)), "shade", gantry.shade)
-        mesh = op.label(mesh, class_id("shield_gantry"), gantry.instance)
+        mesh = op.label(mesh, class_id(Gantry.points_class), gantry.instance)
         # Boards have their sign's attributes: only its point is to have its number.
         mesh = op.store(mesh, "number", 0)
     tree.output("Mesh", op.join(mesh, signs), description="The gantry, and a point in the middle of every sign's face")
@@ -124,11 +120,11 @@ def _posts(tree: Tree, gantry: _Gantry, surfaces: tuple[Value, Value], bottom: V
         (gantry.middle_post, gantry.middle_post_place, False),
     ):
         foot = height_on(*surfaces, op.vector(tree, -place)) + gantry.elevation
-        top = bottom + (gantry.beam_height + _ENCLOSED if outer else 0.05)
+        top = bottom + (gantry.beam_height + sizes.POST_ENCLOSES if outer else sizes.POST_ENTERS)
         post = tree.call(
             gantry_post_group(),
             width=gantry.post_width,
-            depth=gantry.beam_depth + (2.0 * _ENCLOSED) if outer else gantry.beam_depth * 0.9,
+            depth=gantry.beam_depth + (2.0 * sizes.POST_ENCLOSES) if outer else gantry.beam_depth * sizes.POST_SHARE,
             height=top - foot,
             steel_material=gantry.steel_material,
             concrete_material=gantry.concrete_material,
@@ -139,23 +135,24 @@ def _posts(tree: Tree, gantry: _Gantry, surfaces: tuple[Value, Value], bottom: V
 
 def _catwalk(tree: Tree, gantry: _Gantry, surfaces: tuple[Value, Value], top: Value) -> Value:
     """Return the catwalk on the beam, and the ladder at the right post, or at the left one if there is no right."""
-    clear = gantry.post_width * 0.5 + 0.05
+    clear = gantry.post_width * 0.5 + sizes.CATWALK_CLEAR
     length = op.maximum(gantry.left_end - gantry.right_end - clear * 2.0, 1.0)
     walk = tree.call(gantry_catwalk_group(), length=length, beam_depth=gantry.beam_depth).value
     walk = move_geometry(walk, op.vector(tree, clear - gantry.left_end, 0.0, top))
     # Behind the boards of the carriageway that the post stands beside.
     place = op.switch(gantry.right_post, gantry.left_end, gantry.right_end)
     side = op.switch(gantry.right_post, -1.0, 1.0)
-    foot = height_on(*surfaces, op.vector(tree, -place)) + gantry.elevation + _LADDER_FOOT
-    tall = top + 1.1 - foot
-    rail = box(tree, op.vector(tree, 0.05, 0.05, tall), op.vector(tree, 0.0, 0.0, tall * 0.5))
+    foot = height_on(*surfaces, op.vector(tree, -place)) + gantry.elevation + sizes.LADDER_FOOT
+    tall = top + sizes.CATWALK_RAIL - foot
+    (wide, thick, step), half = sizes.LADDER_RUNG, sizes.LADDER_HALF
+    rail = box(tree, op.vector(tree, sizes.LADDER_RAIL, sizes.LADDER_RAIL, tall), op.vector(tree, 0.0, 0.0, tall * 0.5))
     rungs = put_on_points(
-        row_of_points(tree, op.round_up(tall / _RUNG - 1.0)),
-        box(tree, (0.4, 0.03, 0.03)),
-        op.vector(tree, 0.0, 0.0, (op.index(tree) + 0.5) * _RUNG),
+        row_of_points(tree, op.round_up(tall / step - 1.0)),
+        box(tree, (wide, thick, thick)),
+        op.vector(tree, 0.0, 0.0, (op.index(tree) + 0.5) * step),
     )
-    ladder = op.join(move_geometry(rail, (-0.2, 0.0, 0.0)), move_geometry(rail, (0.2, 0.0, 0.0)), rungs)
-    away = (gantry.beam_depth * 0.5 + 0.2) * side
+    ladder = op.join(move_geometry(rail, (-half, 0.0, 0.0)), move_geometry(rail, (half, 0.0, 0.0)), rungs)
+    away = (gantry.beam_depth * 0.5 + sizes.LADDER_AWAY) * side
     return op.join(walk, move_geometry(op.realize(ladder), op.vector(tree, -place, away, foot)))
 
 
@@ -182,10 +179,11 @@ def _boards(tree: Tree, gantry: _Gantry, signs: Value) -> tuple[Value, Value]:
         size = op.vector(tree, wide, thick, tall)
         boards.append(put_on_points(chosen, paint_faces(body, finish), op.position(tree), size, facing))
     hangers = []
+    share, hung, longer = sizes.HUNG
     for side in (-1.0, 1.0):
-        x = wide * (0.32 * side)
+        x = wide * (share * side)
         back = op.named_attribute(tree, "facing") * (thick + sizes.HANGER / 2)
-        upright = op.vector(tree, 0.1, sizes.HANGER + 0.01, op.maximum(tall - 0.2, tall * 0.5))
+        upright = op.vector(tree, hung, sizes.HANGER + longer, op.maximum(tall - 0.2, tall * 0.5))
         hangers.append(
             put_on_points(signs, box(tree, 1.0), op.position(tree) + op.vector(tree, x, back), upright, facing)
         )
@@ -216,9 +214,8 @@ def build_gantries(builder: ModelBuilder) -> None:
             right_post=not cantilever or gantry.post_side == "right",
             middle_post=gantry.kind == "two_sided",
             middle_post_place=-gantry.offset,
-            beam=KINDS.index(gantry.beam),
-            # Displays are looked after from above; boards are not.
-            catwalk=any(sign.kind == "display" for sign in gantry.signs),
+            beam=sizes.BEAMS.index(gantry.beam),
+            catwalk=gantry.catwalk,
         )
         builder.stand(name, gantry, gantry.rotation_deg)
         for place, sign in enumerate(gantry.signs, 1):

@@ -4,24 +4,13 @@ from __future__ import annotations
 
 import math
 
+from ....road.things import gantry as sizes
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import Inputs, integer, material_of, metres
 from ...nodes.solids import bars, box, move_geometry, paint_faces, prism, put_on_points, row_of_points
 
-KINDS = ("box", "truss", "tube")
-# Bars of one bay of the truss from x = 0 to 1, y = -1 to 1, z = 0 to 1; the first four are its frame.
-_BARS = [
-    ((0.0, -1.0, 0.0), (0.0, -1.0, 1.0)), ((0.0, 1.0, 0.0), (0.0, 1.0, 1.0)),
-    ((0.0, -1.0, 0.0), (0.0, 1.0, 0.0)), ((0.0, -1.0, 1.0), (0.0, 1.0, 1.0)),
-    ((0.0, -1.0, 0.0), (1.0, -1.0, 1.0)), ((0.0, 1.0, 0.0), (1.0, 1.0, 1.0)),
-    ((0.0, -1.0, 0.0), (1.0, 1.0, 0.0)), ((0.0, -1.0, 1.0), (1.0, 1.0, 1.0)),
-]  # fmt: skip
-_FRAME = 4
-_BAY = 1.2
-"""Length of a bay as a share of the truss's height."""
 _JOINT_SPACING = 9.0  # m, between the bolted joints of a box or tube
-_TUBE_SIDES = 20
 
 
 class _Beam(Inputs):
@@ -42,7 +31,7 @@ def gantry_beam_group(tree: Tree) -> None:
     with tree.frame("Truss"):
         lattice = op.join(_chords(tree, length, height, depth), _lattice(tree, length, height, depth))
     with tree.frame("Tube"):
-        round_ = tree.node("GeometryNodeMeshCylinder", vertices=_TUBE_SIDES, radius=0.5, depth=1.0).value
+        round_ = tree.node("GeometryNodeMeshCylinder", vertices=sizes.TUBE_SIDES, radius=0.5, depth=1.0).value
         lying = op.transform(round_, rotation=op.turn(tree, y=math.pi / 2))
         size = op.vector(tree, length, depth, height)
         tube = op.transform(lying, translation=middle, scale=size)
@@ -56,7 +45,8 @@ def gantry_beam_group(tree: Tree) -> None:
 
 def _chord(height: Value) -> Value:
     """Return the width of the truss's chords."""
-    return op.minimum(op.maximum(height * 0.1, 0.06), 0.16)
+    share, least, most = sizes.TRUSS_CHORD
+    return op.minimum(op.maximum(height * share, least), most)
 
 
 def _chords(tree: Tree, length: Value, height: Value, depth: Value) -> Value:
@@ -77,18 +67,18 @@ def _chords(tree: Tree, length: Value, height: Value, depth: Value) -> Value:
 def _lattice(tree: Tree, length: Value, height: Value, depth: Value) -> Value:
     """Return posts, cross bars and diagonals; every second bay is turned upside down."""
     width = _chord(height)
-    bays = op.round_up(length / (op.maximum(height, 0.5) * _BAY))
-    points = row_of_points(tree, bays * len(_BARS) + _FRAME)
-    bay, number = op.index(tree) // len(_BARS), op.index(tree) % len(_BARS)
+    bays = op.round_up(length / (op.maximum(height, sizes.TRUSS_BAY[0]) * sizes.TRUSS_BAY[1]))
+    points = row_of_points(tree, bays * len(sizes.TRUSS_BARS) + sizes.TRUSS_FRAME)
+    bay, number = op.index(tree) // len(sizes.TRUSS_BARS), op.index(tree) % len(sizes.TRUSS_BARS)
     mirror = 1.0 - (bay % 2) * 2.0
     ends = []
     for end in (0, 1):
-        corner = op.choose(number, [bar[end] for bar in _BARS])
+        corner = op.choose(number, [bar[end] for bar in sizes.TRUSS_BARS])
         x = (bay + op.component(corner, "X")) * (length - width) / bays + width * 0.5
         y = op.component(corner, "Y") * mirror * ((depth - width) * 0.5)
         z = (op.component(corner, "Z") - 0.5) * mirror * (height - width) + height * 0.5
         ends.append(op.vector(tree, x, y, z))
-    return bars(points, ends[0], ends[1], width * 0.65)
+    return bars(points, ends[0], ends[1], width * sizes.TRUSS_BAR)
 
 
 def _joints(tree: Tree, kind: Value, length: Value, height: Value, depth: Value) -> Value:
@@ -97,18 +87,11 @@ def _joints(tree: Tree, kind: Value, length: Value, height: Value, depth: Value)
     points = row_of_points(tree, pieces - 1)
     place = op.vector(tree, (op.index(tree) + 1) * (length / pieces), 0.0, height * 0.5)
     plate = box(tree, op.vector(tree, 0.08, depth + 0.06, height * 0.97))
-    ring = tree.node("GeometryNodeMeshCylinder", vertices=_TUBE_SIDES, radius=0.5, depth=0.08).value
+    ring = tree.node("GeometryNodeMeshCylinder", vertices=sizes.TUBE_SIDES, radius=0.5, depth=0.08).value
     ring = op.transform(ring, rotation=op.turn(tree, y=math.pi / 2))
-    ring = op.transform(ring, scale=op.vector(tree, 1.0, depth + 0.08, height * 0.995))
+    ring = op.transform(ring, scale=op.vector(tree, 1.0, depth + sizes.JOINT, height * 0.995))
     flange = op.join(op.only_if(kind.equals(0), plate), op.only_if(kind.equals(2), ring))
     return put_on_points(points, flange, place)
-
-
-_SPACING = 2.0  # m, between the railings' posts
-_HANDRAIL = 1.1  # m above the grating
-_BAR = 0.045
-_NARROWEST = 0.7
-_SUPPORT, _GRATING = 0.06, 0.04
 
 
 class _Catwalk(Inputs):
@@ -119,41 +102,48 @@ class _Catwalk(Inputs):
 @makes_group("SR Gantry Catwalk")
 def gantry_catwalk_group(tree: Tree) -> None:
     """A catwalk from x = 0 on along x, in the middle of y, standing on z = 0: grating, supports, railings."""
+    support, grate, bar = sizes.CATWALK_SUPPORT, sizes.CATWALK_GRATING, sizes.CATWALK_BAR
     catwalk = _Catwalk(tree)
-    length, width = catwalk.length, op.maximum(catwalk.beam_depth, _NARROWEST)
+    length, width = catwalk.length, op.maximum(catwalk.beam_depth, sizes.NARROWEST_CATWALK)
     with tree.frame("Grating and toe boards"):
-        level = _SUPPORT + _GRATING / 2
-        grating = box(tree, op.vector(tree, length, width, _GRATING), op.vector(tree, length * 0.5, 0.0, level))
-        toe = box(tree, op.vector(tree, length, 0.01, 0.12), op.vector(tree, length * 0.5, 0.0, _SUPPORT + 0.1))
-        rail = box(tree, op.vector(tree, length, _BAR, _BAR), op.vector(tree, length * 0.5, 0.0, 0.0))
+        level = support + grate / 2
+        thin, tall, middle = sizes.CATWALK_TOE
+        grating = box(tree, op.vector(tree, length, width, grate), op.vector(tree, length * 0.5, 0.0, level))
+        toe = box(
+            tree,
+            op.vector(tree, length, thin, tall),
+            op.vector(tree, length * 0.5, 0.0, support + middle),
+        )
+        rail = box(tree, op.vector(tree, length, bar, bar), op.vector(tree, length * 0.5, 0.0, 0.0))
     with tree.frame("Railings on both sides"):
-        edge = width * 0.5 - _BAR / 2
-        top = _SUPPORT + _GRATING + _HANDRAIL
+        edge = width * 0.5 - bar / 2
+        top = support + grate + sizes.CATWALK_RAIL
         parts = [grating]
         for side in (-1.0, 1.0):
             parts.append(move_geometry(toe, op.vector(tree, 0.0, edge * side)))
             parts += [
-                move_geometry(rail, op.vector(tree, 0.0, edge * side, z)) for z in (top - _BAR / 2, top - _HANDRAIL / 2)
+                move_geometry(rail, op.vector(tree, 0.0, edge * side, z))
+                for z in (top - bar / 2, top - sizes.CATWALK_RAIL / 2)
             ]
     with tree.frame("Posts of the railings, and supports below the grating"):
-        bays = op.round_up(length / _SPACING)
+        bays = op.round_up(length / sizes.CATWALK_SPACING)
         points = row_of_points(tree, bays + 1)
-        x = op.index(tree) * ((length - _BAR) / bays) + _BAR / 2
-        tall = top - _BAR - _SUPPORT
-        post = box(tree, (_BAR * 0.8, _BAR * 0.8, tall), (0.0, 0.0, _SUPPORT + tall / 2))
+        x = op.index(tree) * ((length - bar) / bays) + bar / 2
+        tall = top - bar - support
+        thick = bar * sizes.CATWALK_POST
+        post = box(tree, (thick, thick, tall), (0.0, 0.0, support + tall / 2))
         frame = [move_geometry(post, op.vector(tree, 0.0, edge * side)) for side in (-1.0, 1.0)]
-        support = box(tree, op.vector(tree, 0.06, width * 0.96, _SUPPORT + 0.02), (0.0, 0.0, _SUPPORT / 2))
+        support = box(
+            tree,
+            op.vector(tree, support, width * 0.96, support + 0.02),
+            (0.0, 0.0, support / 2),
+        )
         parts.append(put_on_points(points, op.join(support, *frame), op.vector(tree, x)))
     with tree.frame("All"):
         mesh = op.realize(op.join(*parts))
     tree.output("Mesh", mesh, description="The catwalk")
 
 
-PLINTH = 0.3
-"""Top of the plinth above the surface, m."""
-BURIED = 0.6
-"""Depth of the plinth below the surface, m."""
-_PLATE, _PLATE_MARGIN, _PLINTH_MARGIN = 0.04, 0.12, 0.2
 _BOLT = [(0.025, 0.0), (0.0125, 0.0217), (-0.0125, 0.0217), (-0.025, 0.0), (-0.0125, -0.0217), (0.0125, -0.0217)]
 _BOLTS = [(x, y, 0.0) for x in (-1.0, 0.0, 1.0) for y in (-1.0, 0.0, 1.0) if x or y]
 
@@ -172,18 +162,20 @@ def gantry_post_group(tree: Tree) -> None:
     inputs = _Post(tree)
     width, depth, height = inputs.width, inputs.depth, inputs.height
     with tree.frame("Plinth"):
-        margin = 2.0 * _PLINTH_MARGIN
-        size = op.vector(tree, width + margin, depth + margin, PLINTH + BURIED)
-        plinth = paint_faces(box(tree, size, (0.0, 0.0, (PLINTH - BURIED) / 2)), inputs.concrete_material)
+        margin = 2.0 * sizes.PLINTH_MARGIN
+        size = op.vector(tree, width + margin, depth + margin, sizes.PLINTH + sizes.BURIED)
+        plinth = paint_faces(box(tree, size, (0.0, 0.0, (sizes.PLINTH - sizes.BURIED) / 2)), inputs.concrete_material)
     with tree.frame("Base plate"):
-        margin = 2.0 * _PLATE_MARGIN
-        plate = box(tree, op.vector(tree, width + margin, depth + margin, _PLATE + 0.01), (0.0, 0.0, PLINTH + 0.015))
+        margin = 2.0 * sizes.PLATE_MARGIN
+        thick = sizes.BASE_PLATE + sizes.PLATE_SUNK
+        middle = sizes.PLINTH + (sizes.BASE_PLATE - sizes.PLATE_SUNK) / 2
+        plate = box(tree, op.vector(tree, width + margin, depth + margin, thick), (0.0, 0.0, middle))
     with tree.frame("Post"):
-        tall = height - PLINTH - _PLATE + 0.01
+        tall = height - sizes.PLINTH - sizes.BASE_PLATE + sizes.PLATE_SUNK
         post = box(
             tree,
             op.vector(tree, width, depth, tall),
-            op.vector(tree, 0.0, 0.0, tall * 0.5 + (PLINTH + _PLATE - 0.01)),
+            op.vector(tree, 0.0, 0.0, tall * 0.5 + (sizes.PLINTH + sizes.BASE_PLATE - sizes.PLATE_SUNK)),
         )
     with tree.frame("Bolts"):
         bolts = _bolts(tree, width, depth)
@@ -194,6 +186,6 @@ def gantry_post_group(tree: Tree) -> None:
 
 def _bolts(tree: Tree, width: Value, depth: Value) -> Value:
     """Return bolts around the post, on the base plate."""
-    half = op.vector(tree, width * 0.5 + _PLATE_MARGIN * 0.55, depth * 0.5 + _PLATE_MARGIN * 0.55, 0.0)
-    place = op.choose(op.index(tree), _BOLTS) * half + (0.0, 0.0, PLINTH + 0.03)
+    half = op.vector(tree, width * 0.5 + sizes.PLATE_MARGIN * 0.55, depth * 0.5 + sizes.PLATE_MARGIN * 0.55, 0.0)
+    place = op.choose(op.index(tree), _BOLTS) * half + (0.0, 0.0, sizes.PLINTH + 0.03)
     return put_on_points(row_of_points(tree, len(_BOLTS)), prism(tree, _BOLT, (1.0, 1.0, 0.06)), place)

@@ -8,19 +8,8 @@ from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import Inputs, material_of, metres
 from ...nodes.solids import box, flip_faces, loft, move_geometry, paint_faces, put_on_points, row_of_points
 
-WEB = sizes.DECK[1][0], sizes.DECK[2][0]
-"""Where the webs begin and end beside the middle, as shares of half the deck's width."""
-PAVEMENT = 0.05
-"""Thickness of the asphalt, m."""
-EDGE = 0.1
-"""Width of an edge beam as a share of the deck's."""
 # An edge beam: 1 for its inner side and 0 for the outer one; 1 for the back of its nose; 1 on top, 0 and -1 below.
 _BEAM = [(0.0, 0.0, -1.0), (0.0, 0.0, 1.0), (1.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 1.0, -1.0)]
-_CURB = 0.15
-"""Height of the edge beams above the pavement, m."""
-_NOSE = (0.3, 0.45)
-"""Thickness of the edge beam's outer face, and how far it hangs below the pavement, m."""
-_LOWEST_PARAPET = 0.5
 
 
 class _Deck(Inputs):
@@ -48,14 +37,16 @@ def bridge_deck_group(tree: Tree) -> None:
         beam = paint_faces(_edge_beam(tree, (start, end), width, height), inputs.edge_material)
         beams = op.join(beam, flip_faces(op.transform(beam, scale=(1.0, -1.0, 1.0))))
     with tree.frame("Pavement between the edge beams"):
-        size = op.vector(tree, end - start, width * (1.0 - 1.96 * EDGE), PAVEMENT)
-        road = box(tree, size, op.vector(tree, (start + end) * 0.5, 0.0, height - PAVEMENT / 2))
+        size = op.vector(tree, end - start, width * (1.0 - 1.96 * sizes.EDGE), sizes.PAVEMENT)
+        road = box(tree, size, op.vector(tree, (start + end) * 0.5, 0.0, height - sizes.PAVEMENT / 2))
     with tree.frame("Railings"):
-        railing = tree.call(bridge_railing_group(), length=end - start, height=inputs.parapet_height - _CURB).value
-        beside = width * 0.5 - 0.2
-        pair = [move_geometry(railing, op.vector(tree, start, beside * side, height + _CURB)) for side in (1.0, -1.0)]
+        railing = tree.call(bridge_railing_group(), length=end - start, height=inputs.parapet_height - sizes.CURB).value
+        beside = width * 0.5 - sizes.RAILING_INSIDE
+        pair = [
+            move_geometry(railing, op.vector(tree, start, beside * side, height + sizes.CURB)) for side in (1.0, -1.0)
+        ]
         railings = op.only_if(
-            inputs.parapet_height > _LOWEST_PARAPET, paint_faces(op.join(*pair), inputs.steel_material)
+            inputs.parapet_height > sizes.LOWEST_PARAPET, paint_faces(op.join(*pair), inputs.steel_material)
         )
     with tree.frame("All"):
         mesh = op.join(deck, beams, paint_faces(road, inputs.pavement_material), railings)
@@ -69,28 +60,26 @@ def _deck(tree: Tree, ends: tuple[Value, Value], width: Value, height: Value) ->
     def place(point: Value, row: Value) -> Value:
         x = op.switch(row > 0, *ends)
         y = op.component(point, "Y") * width * 0.5
-        return op.vector(tree, x, y, op.component(point, "Z") * (height - PAVEMENT * 0.5))
+        return op.vector(tree, x, y, op.component(point, "Z") * (height - sizes.PAVEMENT * 0.5))
 
     return loft(tree, lambda number: op.choose(number, outline), len(outline), 2, place)
 
 
 def _edge_beam(tree: Tree, ends: tuple[Value, Value], width: Value, height: Value) -> Value:
     """Return the edge beam on the left of an observer who looks along x."""
-    hang = op.minimum(height * 0.6, _NOSE[1])
+    share, most = sizes.HANG
+    hang = op.minimum(height * share, most)
 
     def place(point: Value, row: Value) -> Value:
-        inwards = op.component(point, "X") * (width * EDGE) + op.component(point, "Y") * _NOSE[0]
+        inwards = op.component(point, "X") * (width * sizes.EDGE) + op.component(point, "Y") * sizes.NOSE
         z = op.component(point, "Z")
-        rise = op.switch(z > 0.5, op.switch(z < -0.5, -PAVEMENT, -hang), _CURB)
+        rise = op.switch(z > 0.5, op.switch(z < -0.5, -sizes.PAVEMENT, -hang), sizes.CURB)
         return op.vector(tree, op.switch(row > 0, *ends), width * 0.5 - inwards, height + rise)
 
     return loft(tree, lambda number: op.choose(number, _BEAM), len(_BEAM), 2, place)
 
 
-_POST_SPACING, _BAR_SPACING = 2.0, 0.14  # m
-_POST, _BAR, _RAIL, _HANDRAIL = 0.06, 0.016, 0.04, (0.09, 0.06)  # m
-_LOWER = 0.1
-"""Lower rail above the deck, m."""
+_BAR_SPACING = 0.14  # m
 
 
 class _Railing(Inputs):
@@ -101,27 +90,36 @@ class _Railing(Inputs):
 @makes_group("SR Bridge Railing")
 def bridge_railing_group(tree: Tree) -> None:
     """A railing from x = 0 on along x, standing on z = 0."""
+    post, thin, low = sizes.RAILING_POST, sizes.RAILING_RAIL, sizes.RAILING_LOWER
     railing = _Railing(tree)
     length, height = railing.length, railing.height
     with tree.frame("Rails"):
-        wide, high = _HANDRAIL
-        rail = box(tree, op.vector(tree, length, _RAIL, _RAIL), op.vector(tree, length * 0.5, 0.0, _LOWER))
-        upper = move_geometry(rail, op.vector(tree, 0.0, 0.0, height - high - 0.1 - _LOWER))
+        wide, high = sizes.RAILING_HAND
+        rail = box(
+            tree,
+            op.vector(tree, length, thin, thin),
+            op.vector(tree, length * 0.5, 0.0, low),
+        )
+        upper = move_geometry(rail, op.vector(tree, 0.0, 0.0, height - high - 2.0 * low))
         hand = box(tree, op.vector(tree, length, wide, high), op.vector(tree, length * 0.5, 0.0, height - high / 2))
     with tree.frame("Posts"):
-        bays = op.round_up(length / _POST_SPACING)
+        bays = op.round_up(length / sizes.RAILING_SPACING)
         points = row_of_points(tree, bays + 1)
-        x = op.index(tree) * ((length - _POST) / bays) + _POST / 2
+        x = op.index(tree) * ((length - post) / bays) + post / 2
         tall = height - high / 2
         posts = put_on_points(
-            points, box(tree, op.vector(tree, _POST, _POST, tall)), op.vector(tree, x, 0.0, tall * 0.5)
+            points,
+            box(tree, op.vector(tree, post, post, tall)),
+            op.vector(tree, x, 0.0, tall * 0.5),
         )
     with tree.frame("Bars between the rails"):
         points = row_of_points(tree, op.round_up(length / _BAR_SPACING) - 1)
         x = (op.index(tree) + 1) * _BAR_SPACING
-        tall = height - high - 0.1 - _LOWER
-        open_ = tree.node("GeometryNodeMeshCylinder", vertices=4, fill_type="NONE", radius=_BAR * 0.7, depth=tall).value
-        bars = put_on_points(points, open_, op.vector(tree, x, 0.0, tall * 0.5 + _LOWER))
+        tall = height - high - 2.0 * low
+        open_ = tree.node(
+            "GeometryNodeMeshCylinder", vertices=4, fill_type="NONE", radius=sizes.RAILING_BAR * 0.7, depth=tall
+        ).value
+        bars = put_on_points(points, open_, op.vector(tree, x, 0.0, tall * 0.5 + low))
     with tree.frame("All"):
         mesh = op.realize(op.join(rail, upper, hand, posts, bars))
     tree.output("Mesh", mesh, description="The railing")

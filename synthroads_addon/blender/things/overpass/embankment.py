@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from ....base.classes import class_id
+from ....road.things.overpass import Overpass
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import Inputs, material_of, metres, number, socket
@@ -85,7 +86,7 @@ def _crown(tree: Tree, bank: _Bank) -> Value:
     mesh = op.set_position(mesh, place)
     middle = (op.index(tree) // (_EDGE - 1)).equals(1)
     ground = tree.node("FunctionNodeInputInt", integer=class_id("ground")).value
-    label = op.switch(middle, ground, class_id("bridge"))
+    label = op.switch(middle, ground, class_id(Overpass.points_class))
     mesh = op.store(paint_faces(mesh, bank.ground_material), "class_id", label, "FACE")
     return paint_faces(mesh, bank.pavement_material, middle)
 

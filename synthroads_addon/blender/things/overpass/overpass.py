@@ -16,12 +16,9 @@ from ...nodes.inputs import Inputs, instance_number, material_of, metres, number
 from ...nodes.solids import flip_faces, move_geometry, put_on_points
 from ..meshes import fill
 from ..model_builder import ModelBuilder
-from .deck import EDGE, bridge_deck_group
+from .deck import bridge_deck_group
 from .embankment import bridge_embankment_group
 from .supports import bridge_abutment_group, bridge_pier_group
-
-_WINGS = (3.0, 12.0)
-"""Shortest and longest wing walls, m."""
 
 
 class _Overpass(Inputs):
@@ -81,7 +78,7 @@ def overpass_group(tree: Tree) -> None:
         ground = op.join(*surfaces)
         banks = [_embankment(bridge, ground, low, wings[side], shear, side) for side in (-1.0, 1.0)]
     with tree.frame("Labels"):
-        mesh = op.join(op.store(mesh, "class_id", class_id("bridge"), "FACE"), *banks)
+        mesh = op.join(op.store(mesh, "class_id", class_id(Overpass.points_class), "FACE"), *banks)
         mesh = op.store(mesh, "instance_id", bridge.instance, "FACE")
     tree.output("Mesh", mesh, description="The bridge; its embankments' slopes are ground")
 
@@ -97,7 +94,7 @@ def _lowest(bridge: _Overpass, surfaces: tuple[Value, Value], shear: Value, face
 def _wing_length(bridge: _Overpass, low: Value, foot: Value) -> Value:
     """Return the length of the wing walls, so that the embankment's cones reach the abutment's face."""
     needed = (low + bridge.deck_thickness - foot) * bridge.slope
-    return op.clip(needed, *_WINGS)
+    return op.clip(needed, *sizes.WINGS)
 
 
 def _deck(bridge: _Overpass, low: Value, wings: dict[float, Value]) -> Value:
@@ -164,7 +161,7 @@ def _embankment(bridge: _Overpass, ground: Value, low: Value, wing: Value, shear
         length=op.maximum(approach, wing + 1.0),
         top=low + bridge.deck_thickness,
         width=bridge.width,
-        edge_width=bridge.width * EDGE,
+        edge_width=bridge.width * sizes.EDGE,
         shear=shear,
         slope=bridge.slope,
         pavement_material=bridge.pavement_material,

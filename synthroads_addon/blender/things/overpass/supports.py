@@ -9,11 +9,6 @@ from ...nodes import operations as op
 from ...nodes.builder import Operand, Tree, Value, makes_group
 from ...nodes.inputs import Inputs, material_of, metres
 from ...nodes.solids import box, loft, paint_faces
-from .deck import PAVEMENT, WEB
-
-_WALL = 0.5
-"""Thickness of the wing walls, m."""
-_INSIDE = 0.06  # m from the deck's edge to the wing walls
 
 
 class _Abutment(Inputs):
@@ -30,7 +25,7 @@ def bridge_abutment_group(tree: Tree) -> None:
     """An abutment whose face looks to -x and stands on x = 0; the deck's underside is z = 0."""
     abutment = _Abutment(tree)
     width, height = abutment.width, abutment.thickness
-    wide = width - 2.0 * _INSIDE
+    wide = width - 2.0 * sizes.WALL_INSIDE
 
     def wall(start: float, end: Operand, top: Value, size: Operand, middle: Operand = 0.0) -> Value:
         corner = op.vector(tree, start, middle, abutment.foot)
@@ -40,13 +35,22 @@ def bridge_abutment_group(tree: Tree) -> None:
     with tree.frame("Seat and back wall"):
         level = height * 0.0 - sizes.BEARING
         walls = [wall(0.0, sizes.ABUTMENT, level, wide)]
-        walls.append(wall(sizes.SEAT + 0.04, sizes.ABUTMENT - 0.01, height - PAVEMENT * 0.5, wide - 0.02))
+        walls.append(
+            wall(
+                sizes.SEAT + sizes.BACK_WALL[0],
+                sizes.ABUTMENT - sizes.BACK_WALL[1],
+                height - sizes.PAVEMENT * 0.5,
+                wide - 0.02,
+            )
+        )
     with tree.frame("Wing walls"):
         for side in (1.0, -1.0):
-            beside = (wide * 0.5 - _WALL / 2) * side
-            walls.append(wall(sizes.ABUTMENT - 0.02, abutment.wing_length, height - PAVEMENT * 0.6, _WALL, beside))
+            beside = (wide * 0.5 - sizes.WALL / 2) * side
+            walls.append(
+                wall(sizes.ABUTMENT - 0.02, abutment.wing_length, height - sizes.PAVEMENT * 0.6, sizes.WALL, beside)
+            )
     with tree.frame("Bearings below the webs"):
-        beside, below = width * (0.25 * sum(WEB)), -sizes.BEARING / 2
+        beside, below = width * (0.25 * sum(sizes.WEB)), -sizes.BEARING / 2
         pads = [
             box(tree, (0.5, 0.6, sizes.BEARING + 0.02), op.vector(tree, sizes.SEAT / 2, beside * side, below))
             for side in (1.0, -1.0)
@@ -57,10 +61,6 @@ def bridge_abutment_group(tree: Tree) -> None:
             paint_faces(op.join(*pads), abutment.steel_material),
         )
     tree.output("Mesh", mesh, description="The abutment")
-
-
-_ROUND = 8
-"""Points of a rounded end."""
 
 
 class _Pier(Inputs):
@@ -75,7 +75,7 @@ def bridge_pier_group(tree: Tree) -> None:
     """A pier along y whose bearings carry a deck with its underside on z = 0; its body is 1 high, to be stretched."""
     pier = _Pier(tree)
     width, deck = pier.pier_width, pier.width
-    angles = [math.pi * i / (_ROUND - 1) for i in range(_ROUND)]
+    angles = [math.pi * i / (sizes.PIER_ROUND - 1) for i in range(sizes.PIER_ROUND)]
     end = [(0.5 * math.cos(a), 0.5 * math.sin(a)) for a in angles]
     # z says which end a point belongs to.
     outline = [(x, y, 1.0) for x, y in end] + [(-x, -y, -1.0) for x, y in end]
@@ -88,7 +88,7 @@ def bridge_pier_group(tree: Tree) -> None:
 
         body = loft(tree, lambda number: op.choose(number, outline), len(outline), 2, place)
     with tree.frame("Bearings"):
-        beside = op.minimum(deck * (0.25 * sum(WEB)), straight)
+        beside = op.minimum(deck * (0.25 * sum(sizes.WEB)), straight)
         size = op.vector(tree, op.minimum(width * 0.8, 0.6), 0.5, sizes.BEARING + 0.02)
         pads = [box(tree, size, op.vector(tree, 0.0, beside * side, -sizes.BEARING / 2)) for side in (1.0, -1.0)]
     tree.output("Body", paint_faces(body, pier.concrete_material), description="The pier, from z = -1 to 0")
