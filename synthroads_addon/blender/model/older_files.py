@@ -8,21 +8,11 @@ import bpy
 
 from ...road.parameters import RoadParameters
 from ...road.section import LineMarking, Turnout
-from ..nodes.inputs import input_name
 from ..things.road.layout import names_in_words, side_of
 from ..things.road.road import MARKINGS
 
-_FIELDS = {
-    "Distance": "distance",
-    "Width": "width",
-    "Dash": "dash_length",
-    "Gap": "gap_length",
-    "Start Station": "start_station",
-    "End Station": "end_station",
-    "Film Thickness": "film_thickness",
-    "Instance": "instance",
-}
-"""Names of the inputs of lines and turnouts behind the id, as they were, and their fields now."""
+_RENAMED = {"Dash": "Dash Length", "Gap": "Gap Length"}
+"""Inputs of lines that also have another name behind the id or the words."""
 
 
 def rename_inputs(parameters: RoadParameters, objects: Mapping[str, bpy.types.Object]) -> None:
@@ -36,22 +26,26 @@ def rename_inputs(parameters: RoadParameters, objects: Mapping[str, bpy.types.Ob
     group = item.modifiers[0].node_group if item and item.modifiers else None
     if group is None:
         return
-    interface, names = group.interface, dict(_names(parameters))
-    older = [entry for entry in interface.items_tree if entry.name in names]
+    interface, words = group.interface, dict(_words(parameters))
+    older = [(entry, name) for entry in interface.items_tree if (name := _name_in_words(entry.name, words))]
     if not older:
         return
     markings = interface.new_panel(MARKINGS, default_closed=True)
-    for entry in older:
+    for entry, name in older:
         if entry.item_type == "PANEL":
             interface.move_to_parent(entry, markings, len(markings.interface_items))
-        entry.name = names[entry.name]
+        entry.name = name
 
 
-def _names(parameters: RoadParameters) -> Iterator[tuple[str, str]]:
-    """Yield the old and the new name of panels and inputs of lines and turnouts."""
+def _name_in_words(name: str, words: Mapping[str, str]) -> str:
+    """Return the new name of a panel or an input that is named by an id (which has no spaces); empty for others."""
+    key, _, rest = name.removeprefix("Marking ").partition(" ")
+    return f"{words[key]} {_RENAMED.get(rest, rest)}".strip() if key in words else ""
+
+
+def _words(parameters: RoadParameters) -> Iterator[tuple[str, str]]:
+    """Yield the ids of lines and turnouts, and what they are called now."""
     words = names_in_words(parameters)
     for key, item in parameters.objects.items():
         if isinstance(item, LineMarking | Turnout):
-            name = f"{side_of(parameters, item)} {words[key]}"
-            yield f"Marking {key}", name
-            yield from ((f"{key} {old}", input_name(field, name)) for old, field in _FIELDS.items())
+            yield key, f"{side_of(parameters, item)} {words[key]}"
