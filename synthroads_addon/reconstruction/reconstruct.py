@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,7 +21,7 @@ from .objects import face_guardrails, find_barriers, find_posts, measure_ground,
 from .path import SPACING, CloudPath, alignment_path, first_path, path_through
 from .profiles import STRETCH, Profiles, make_profiles, register_path
 from .section import SIDES, MeasuredSection, Side, SideSection, measure_section, snap_to_standard
-from .smoothing import smooth
+from .smoothing import robust_scale, smooth
 
 Predictor = Callable[[RoadCloud, CloudPath], tuple[Float, Float]]
 """Returns offset and standard deviation (M,) of the axis at each point of a path; NaN where it knows none."""
@@ -193,7 +193,7 @@ def _replace_faults(raw: Float, smoothed: Float) -> Float:
     The fit smooths by itself: values that are smooth already would pass for exact and get an element for every bend.
     """
     apart = np.abs(raw - smoothed)
-    usual = 1.4826 * float(np.nanmedian(apart))
+    usual = robust_scale(apart[np.isfinite(apart)])
     return np.where(np.isfinite(raw) & (apart <= 4.0 * max(usual, 1e-3)), raw, smoothed)
 
 
@@ -245,37 +245,27 @@ def _smooth_fall(measured: Surface) -> Float:
 
 def _notes(cloud: RoadCloud, section: MeasuredSection, measured: Measured) -> list[str]:
     """Return what a reader of the parameter set must know."""
-    notes = []
-    if cloud.strays:
-        notes.append(f"{cloud.strays:,} points lie far from all others and weren't used")
-    if cloud.epsg is None:
-        notes.append("the cloud doesn't say its map system: EPSG:25832 was written")
-    if not cloud.labelled:
-        notes.append("pavement was told from ground by brightness, as the cloud has no such classes")
-    if not cloud.marked:
-        notes.append("paint was told from pavement by brightness: lines have the usual widths")
-    if section.kind == "single":
-        notes.append(
-            "a single carriageway: written as two carriageways that meet in the middle line, one per direction"
-        )
-    if not measured.ground.verge_seen:
-        notes.append("the verge's width is the usual one, as the cloud has no such class")
-    for side in section.sides.values():
-        notes += _notes_on(side)
-    return notes
+    single = "a single carriageway: written as two carriageways that meet in the middle line, one per direction"
+    remarks = [
+        (cloud.strays > 0, f"{cloud.strays:,} points lie far from all others and weren't used"),
+        (cloud.epsg is None, "the cloud doesn't say its map system: EPSG:25832 was written"),
+        (not cloud.labelled, "pavement was told from ground by brightness, as the cloud has no such classes"),
+        (not cloud.marked, "paint was told from pavement by brightness: lines have the usual widths"),
+        (section.kind == "single", single),
+        (not measured.ground.verge_seen, "the verge's width is the usual one, as the cloud has no such class"),
+        *(remark for side in section.sides.values() for remark in _remarks_on(side)),
+    ]
+    return [text for applies, text in remarks if applies]
 
 
-def _notes_on(side: SideSection) -> list[str]:
-    """Return what a reader must know of one direction."""
-    notes = []
-    if not side.edge_seen:
-        notes.append(f"{side.side}: the pavement's outer edge isn't in the cloud: 0.5 m beyond the outermost line")
-    if not side.closed:
-        notes.append(f"{side.side}: the outermost line is dashed: there may be further lanes beyond the cloud")
+def _remarks_on(side: SideSection) -> Iterator[tuple[bool, str]]:
+    """Yield what may have to be said of one direction, and whether it has to."""
+    hidden, name = any(line is None for line in side.lines[1:-1]), side.side
+    yield not side.edge_seen, f"{name}: the pavement's outer edge isn't in the cloud: 0.5 m beyond the outermost line"
+    yield not side.closed, f"{name}: the outermost line is dashed: there may be further lanes beyond the cloud"
     if side.assumed:
-        notes.append(f"{side.side}: lines weren't seen: the lanes are those of {side.assumed}, about as wide as it")
+        yield True, f"{name}: lines weren't seen: the lanes are those of {side.assumed}, about as wide as it"
     elif side.mirrored:
-        notes.append(f"{side.side}: the edge line was seen on the other side only and is taken to be as far away")
-    elif any(line is None for line in side.lines[1:-1]):
-        notes.append(f"{side.side}: a lane line isn't seen where it must be")
-    return notes
+        yield True, f"{name}: the edge line was seen on the other side only and is taken to be as far away"
+    else:
+        yield hidden, f"{name}: a lane line isn't seen where it must be"
