@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
             result["comparison"] = compared(road.parameters)
         (folder / REPORT).write_text(canonical_json(result), encoding="utf-8")
         write_twin(road.parameters, folder, arguments.twin)
-    return 0, result, summary(result, arguments.output)
+    return 3 if road.judgement.doubts else 0, result, summary(result, arguments.output)
 
 
 def _comparison(truth: Path | None) -> Callable[[RoadParameters], dict[str, Any]] | None:
@@ -123,6 +123,7 @@ def _write(found: Reconstruction, cloud: RoadCloud, folder: Path, no_picture: bo
     geometry = RoadGeometry(found.parameters)
     (folder / PARAMETERS).write_text(found.parameters.to_json(), encoding="utf-8")
     line = centerline_geojson(geometry, sample_stations(geometry, 0.005))
+    line["features"][0]["properties"]["doubtful"] = found.judgement.to_dict()["doubtful"]
     (folder / CENTRELINE).write_text(canonical_json(line), encoding="utf-8")
     result = report(found, cloud)
     if not no_picture:
@@ -151,6 +152,8 @@ def summary(result: dict[str, Any], output: Path) -> str:
     objects = result["objects"]
     lines.append(f"  {len(objects['barriers'])} barriers, {len(objects['delineators'])} delineators")
     lines += [f"  note: {note}" for note in result["notes"]]
+    for doubt in result["judgement"]["doubtful"]:
+        lines.append(f"  doubtful from {doubt['start']:.0f} to {doubt['end']:.0f} m: {'; '.join(doubt['why'])}")
     if "comparison" in result:
         off = result["comparison"]["centreline"]
         apart = f"{off['mae']:.3f} m on average, {off['largest']:.3f} m at most" if off else "nothing in common"

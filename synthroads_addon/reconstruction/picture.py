@@ -17,7 +17,7 @@ from .cloud import RoadCloud
 from .profiles import Profiles
 from .reconstruct import Reconstruction
 
-AXIS, EDGE, MARK, BARRIER, POST = "#d1006b", "#ff8c00", "#00a2ff", "#7a3cff", "#00b050"
+AXIS, EDGE, MARK, BARRIER, POST, DOUBT = "#d1006b", "#ff8c00", "#00a2ff", "#7a3cff", "#00b050", "#ff0000"
 _SIZE = (13.0, 9.0)  # inches
 _DPI = 110
 _STRETCH = 150.0  # m of the road that are shown large
@@ -63,6 +63,8 @@ def plan(axes: Any, found: Reconstruction, geometry: RoadGeometry, span: tuple[f
         for column in (0, bounds.shape[1] - 2):
             label = "pavement's edges" if number == 0 == column else None
             axes.plot(station, bounds[:, column], color=EDGE, lw=0.9, label=label)
+    for number, doubt in enumerate(found.judgement.doubts):
+        axes.axvspan(doubt.start, doubt.end, color=DOUBT, alpha=0.25, lw=0, label=None if number else "doubtful")
     _markings(axes, geometry, span)
     _objects(axes, geometry)
     axes.set(xlim=span, ylim=(low, high), xlabel="station, m", ylabel="offset, m")

@@ -15,6 +15,7 @@ from ..road.parameters import RoadParameters
 from .assemble import Measured, RotationAxis, assemble_parameters
 from .cloud import PointKind, RoadCloud
 from .edges import Surface, paved_edge, surface
+from .judgement import Judgement, judge
 from .layout import Centre, RoadKind, RoadLayout, centre_of, find_layout
 from .lines import find_lines
 from .objects import face_guardrails, find_barriers, find_posts, measure_ground, standing_points
@@ -64,6 +65,7 @@ class Reconstruction:
         path: parallel to the road, along which the lines were found.
         profiles, layout: along the alignment.
         surfaces: by side, along the alignment.
+        judgement: where its axis isn't to be trusted.
         notes: what a reader must know.
     """
 
@@ -74,6 +76,7 @@ class Reconstruction:
     profiles: Profiles
     layout: RoadLayout
     surfaces: dict[Side, Surface]
+    judgement: Judgement
     notes: list[str] = field(default_factory=list)
 
 
@@ -119,7 +122,8 @@ def reconstruct(cloud: RoadCloud, options: Options | None = None, progress: Prog
     )
     parameters = assemble_parameters(measured)
     notes = [*layout.notes, *_notes(cloud, section, measured)]
-    return Reconstruction(parameters, measured, centre, path, profiles, layout, surfaces, notes)
+    judgement = judge(profiles, layout, section)
+    return Reconstruction(parameters, measured, centre, path, profiles, layout, surfaces, judgement, notes)
 
 
 def straighten_path(cloud: RoadCloud, options: Options) -> tuple[CloudPath, float]:

@@ -32,6 +32,7 @@ def report(found: Reconstruction, cloud: RoadCloud) -> dict[str, Any]:
         "cloud": _cloud(cloud),
         "road": section.kind,
         "length": round(geometry.length, 3),
+        "judgement": found.judgement.to_dict(),
         "centreline": _centreline(found),
         "section": section_report(section),
         "surface": _surface(found, cloud, geometry),

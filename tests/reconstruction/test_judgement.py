@@ -1,0 +1,236 @@
+"""A reconstruction says where it isn't to be trusted: on drawn profiles, on thrown clouds, and on real scans."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from headless.cli import main
+from synthroads_addon.base.arrays import Float
+from synthroads_addon.base.classes import class_id
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.reconstruction.cloud import read_road_cloud
+from synthroads_addon.reconstruction.judgement import Judgement, judge
+from synthroads_addon.reconstruction.layout import Band, RoadLayout
+from synthroads_addon.reconstruction.lines import Line
+from synthroads_addon.reconstruction.path import CloudPath
+from synthroads_addon.reconstruction.profiles import Profiles
+from synthroads_addon.reconstruction.reconstruct import Reconstruction, reconstruct
+from synthroads_addon.road.centerline import read_axis
+from synthroads_addon.road.geometry import RoadGeometry
+from tests.helpers.clouds.road_clouds import block_of, write
+
+REAL = sorted((Path(__file__).resolve().parents[2].parent / "shared" / "real").glob("als_*_axis.csv"))
+ROWS = 200
+Across = Callable[[Float, Float, np.random.Generator], tuple[Float, Float]]
+"""Heights and brightness of points at offsets and stations (N,)."""
+
+
+# --- drawn profiles --------------------------------------------------------------------------------------------------
+
+
+def profiles(
+    pavement: list[tuple[float, float]], half: float = 15.0, kerb: float = 0.0, grass: float = 0.5
+) -> Profiles:
+    """Return 200 m of profiles with pavement between some offsets, and ground of a brightness as high as a kerb."""
+    offsets = 0.1 * (np.arange(round(20.0 * half)) + 0.5) - half
+    rng = np.random.default_rng(1)
+    paved = np.any([(offsets > low) & (offsets < high) for low, high in pavement], axis=0)
+    shape = (ROWS, len(offsets))
+    brightness = np.where(paved, 0.2, grass) + rng.normal(0.0, 0.02, shape)
+    height = np.where(paved, 0.0, kerb) + rng.normal(0.0, 0.005, shape)
+    path = CloudPath(np.column_stack([np.arange(ROWS + 1.0), np.zeros(ROWS + 1)]), np.zeros(ROWS + 1))
+    grids = [np.ones(shape), np.zeros(shape), None, height, brightness]
+    return Profiles(path, np.arange(ROWS) + 0.5, offsets, *grids)  # type: ignore[arg-type]
+
+
+def line(offset: float | Float, width: float = 0.12) -> Line:
+    """Return a line, or an edge as a line where it has no width, at an offset or offsets (40,)."""
+    measured = np.broadcast_to(np.asarray(offset, dtype=float), (ROWS // 5,))
+    zeros = np.zeros(ROWS // 5)
+    return Line(5.0 * np.arange(ROWS // 5) + 2.5, measured, measured, zeros, zeros, zeros, 0.0, float(ROWS), width)
+
+
+def judged(ground: Profiles, *guides: Line) -> Judgement:
+    """Return what is said of an axis made from one line in the middle, or from the inner ones of two carriageways."""
+    if len(guides) == 1:
+        bands = (Band(-4.0, 4.0, [guides[0]], (line(-4.0, 0.0), line(4.0, 0.0))),)
+        section: Any = SimpleNamespace(kind="single")
+        return judge(ground, RoadLayout("single", bands, ground.count, ()), section)
+    right, left = guides
+    bands = (Band(-12.0, -2.0, [right], (line(-12.0, 0.0), right)), Band(2.0, 12.0, [left], (left, line(12.0, 0.0))))
+    width, sides = SimpleNamespace(value=10.0), {}
+    for name, sign in (("right", -1), ("left", 1)):
+        sides[name] = SimpleNamespace(sign=sign, inner_offset=SimpleNamespace(value=2.0), paved_width=width)
+    section = SimpleNamespace(kind="dual", sides=sides)
+    return judge(ground, RoadLayout("dual", bands, ground.count, ()), section)
+
+
+def reasons(judgement: Judgement) -> set[str]:
+    """Return the beginnings of all that is said against it."""
+    return {reason[:19] for doubt in judgement.doubts for reason in doubt.reasons}
+
+
+@pytest.mark.parametrize(("kerb", "grass"), [(0.0, 0.5), (0.1, 0.2), (0.1, 0.5)])
+def test_an_axis_in_the_pavements_middle_is_trusted(kerb: float, grass: float) -> None:
+    for shift in (-0.5, 0.0, 0.5):
+        found = judged(profiles([(shift - 3.5, shift + 3.5)], kerb=kerb, grass=grass), line(0.0))
+        assert (found.doubts, found.trusted) == ([], 1.0)
+        assert found.middles == pytest.approx(shift, abs=0.15)
+
+
+@pytest.mark.parametrize(("kerb", "grass"), [(0.0, 0.5), (0.1, 0.2)])
+@pytest.mark.parametrize("shift", [-3.4, -1.0, 1.0, 3.4])
+def test_an_axis_beside_the_pavements_middle_is_not(shift: float, kerb: float, grass: float) -> None:
+    found = judged(profiles([(shift - 3.5, shift + 3.5)], kerb=kerb, grass=grass), line(0.0))
+    assert [(doubt.start, doubt.end) for doubt in found.doubts] == [(0.0, 199.5)]
+    assert reasons(found) == {"the pavement's midd"}
+    assert found.trusted == 0.0
+
+
+def test_an_edge_must_be_seen_on_both_sides() -> None:
+    assert reasons(judged(profiles([(-3.5, 3.5)], half=3.4), line(0.0))) == {"the pavement's edge"}
+    assert reasons(judged(profiles([(-3.5, 15.0)]), line(0.0))) == {"the pavement's edge"}
+    nothing_differs = judged(profiles([(-3.5, 3.5)], grass=0.2), line(0.0))
+    assert reasons(nothing_differs) == {"the pavement's edge"}
+
+
+def test_where_nothing_is_seen_for_long_the_axis_is_guessed() -> None:
+    ground, offsets = profiles([(-3.5, 3.5)]), np.zeros(ROWS // 5)
+    offsets[15:22] = np.nan  # 35 m
+    assert judged(ground, line(offsets)).doubts == []
+    offsets[10:30] = np.nan  # 100 m: what is seen before and behind it is too far away
+    (doubt,) = judged(ground, line(offsets)).doubts
+    assert (doubt.start, doubt.end) == (60.0, 140.0)
+    assert doubt.reasons == ("neither lines nor edges are seen",)
+
+
+def test_lines_must_agree_with_the_axis() -> None:
+    offsets = np.zeros(ROWS // 5)
+    offsets[10:20] = 0.6
+    (doubt,) = judged(profiles([(-3.5, 3.5)]), line(offsets)).doubts
+    assert (doubt.start, doubt.end) == (40.0, 110.0)
+    assert doubt.reasons == ("the lines lie more than 0.5 m beside it",)
+    offsets[10:20] = 0.4
+    assert judged(profiles([(-3.5, 3.5)]), line(offsets)).doubts == []
+
+
+def test_a_dual_carriageways_axis_lies_in_the_medians_middle() -> None:
+    for shift, doubts in ((0.0, set()), (0.6, set()), (1.0, {"the median's middle"})):
+        ground = profiles([(-12.0, shift - 2.0), (shift + 2.0, 12.0)])
+        assert reasons(judged(ground, line(-2.5), line(2.5))) == doubts
+
+
+def test_where_the_median_is_paved_the_lines_beside_it_must_do() -> None:
+    ground = profiles([(-12.0, 12.0)])
+    assert judged(ground, line(-2.5), line(2.5)).doubts == []
+    assert reasons(judged(ground, line(-2.5), line(2.5, 0.0))) == {"neither the median'"}
+
+
+# --- thrown clouds ---------------------------------------------------------------------------------------------------
+
+
+def rural(offset: Float, station: Float, rng: np.random.Generator) -> tuple[Float, Float]:
+    """A road of 7 m with edge lines and a dashed line in its middle, between grass."""
+    away = np.abs(offset)
+    paint = ((away < 0.06) & (station % 6.0 < 3.0)) | (np.abs(away - 3.2) < 0.06)
+    grass = rng.normal(0.0, 1.0, len(offset))
+    height = np.where(away < 3.5, -0.025 * away, -0.0875 - 0.2 * (away - 3.5) + 0.04 * grass)
+    return height, np.where(paint, 0.7, np.where(away < 3.5, 0.18, 0.45 + 0.06 * grass))
+
+
+def ending(offset: Float, station: Float, rng: np.random.Generator) -> tuple[Float, Float]:
+    """That road for 80 m, and then grass."""
+    height, brightness = rural(offset, station, rng)
+    grass = rng.normal(0.0, 1.0, len(offset))
+    beyond = station > 80.0
+    return np.where(beyond, -0.2 + 0.04 * grass, height), np.where(beyond, 0.45 + 0.06 * grass, brightness)
+
+
+def village(offset: Float, station: Float, rng: np.random.Generator) -> tuple[Float, Float]:
+    """A street of 6 m between kerbs, without lines; its only bright strip is the gutter along one edge."""
+    away, grass = np.abs(offset), rng.normal(0.0, 1.0, len(offset))
+    height = np.where(away < 3.0, 0.0, np.where(away < 4.8, 0.11, 0.13 + 0.04 * grass))
+    brightness = np.where(away < 3.0, 0.2, np.where(away < 4.8, 0.28, 0.45 + 0.06 * grass))
+    return height, np.where((offset > 2.7) & (offset < 3.0), 0.6, brightness)
+
+
+def field(offset: Float, station: Float, rng: np.random.Generator) -> tuple[Float, Float]:
+    """Grass without a road."""
+    return rng.normal(0.0, 0.06, len(offset)), 0.45 + rng.normal(0.0, 0.08, len(offset))
+
+
+def thrown(path: Path, across: Across, length: float = 100.0, low: float = -9.0, high: float = 9.0) -> Path:
+    """Write a cloud of ground along the map's x axis between two offsets (m), 12 points/m2."""
+    rng = np.random.default_rng(3)
+    count = int(12.0 * length * (high - low))
+    station, offset = rng.uniform(0.0, length, count), rng.uniform(low, high, count)
+    height, brightness = across(offset, station, rng)
+    xyz = np.column_stack([500_000.0 + station, 5_600_000.0 + offset, 100.0 + height + rng.normal(0.0, 0.01, count)])
+    brightness = np.clip(brightness + rng.normal(0.0, 0.02, count), 0.0, 1.0)
+    return write(path, block_of(xyz, brightness, np.full(count, class_id("ground"), np.uint8)))
+
+
+def axis_offset(found: Reconstruction) -> Float:
+    """Return the offsets (N,) of the axis in such a cloud, m."""
+    geometry = RoadGeometry(found.parameters)
+    place = geometry.alignment.position(np.arange(10.0, geometry.length - 10.0, 5.0))
+    return place[:, 1] + found.parameters.transform.translate[1] - 5_600_000.0
+
+
+def test_a_road_between_grass_is_trusted(tmp_path: Path) -> None:
+    found = reconstruct(read_road_cloud(thrown(tmp_path / "rural.laz", rural)))
+    assert np.abs(axis_offset(found)).max() < 0.1
+    assert found.judgement.doubts == []
+
+
+def test_a_street_whose_axis_would_lie_along_its_edge_is_marked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cloud = thrown(tmp_path / "village.laz", village, low=-12.0, high=12.0)
+    assert main(["reconstruct", str(cloud), "--output", str(tmp_path / "out"), "--no-picture"]) == 3
+    assert "the pavement's middle lies more than 0.75 m beside it" in capsys.readouterr().out
+    report = json.loads((tmp_path / "out/reconstruction.json").read_text())
+    assert report["judgement"]["trusted"] == 0.0
+    line = json.loads((tmp_path / "out/centerline.geojson").read_text())["features"][0]
+    assert np.array(line["geometry"]["coordinates"])[:, 1] == pytest.approx(5_600_002.85, abs=0.1)  # the gutter
+    (stretch,) = line["properties"]["doubtful"]
+    assert stretch == report["judgement"]["doubtful"][0]
+    assert stretch["end"] - stretch["start"] > 0.95 * report["length"]
+
+
+def test_where_the_road_ends_the_rest_is_marked(tmp_path: Path) -> None:
+    (doubt,) = reconstruct(read_road_cloud(thrown(tmp_path / "ending.laz", ending, 130.0))).judgement.doubts
+    assert 60.0 < doubt.start < 85.0
+
+
+def test_half_a_road_is_marked_all_along(tmp_path: Path) -> None:
+    found = reconstruct(read_road_cloud(thrown(tmp_path / "half.laz", rural, low=0.3)))
+    assert found.judgement.trusted == 0.0
+
+
+def test_a_field_is_no_road(tmp_path: Path) -> None:
+    cloud = read_road_cloud(thrown(tmp_path / "field.laz", field, low=0.0))
+    with pytest.raises(InputError, match="neither lines nor edges of a carriageway"):
+        reconstruct(cloud)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not REAL, reason="the real scans aren't here")
+@pytest.mark.parametrize("path", REAL, ids=lambda path: path.stem)
+def test_what_is_trusted_of_a_real_road_lies_within_a_metre_of_its_axis(path: Path) -> None:
+    found = reconstruct(read_road_cloud(path.with_name(path.name.replace("_axis.csv", ".laz"))))
+    geometry = RoadGeometry(found.parameters)
+    known = read_axis(path)[:, :2] - found.parameters.transform.translate[:2]
+    station, offset = geometry.alignment.project(known)
+    trusted = (station > 0.0) & (station < geometry.length)
+    for doubt in found.judgement.doubts:
+        trusted &= (station < doubt.start) | (station > doubt.end)
+    assert trusted.sum() > 200
+    assert np.abs(offset[trusted]).max() < 1.0
