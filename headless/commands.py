@@ -1,6 +1,6 @@
 """How a sub-command is run: its arguments, what it prints, and the exit code that an error becomes.
 
-Exit codes: 0 done; 1 a defect of ours; 2 bad input; 3 violations found, scenes of a set failed, or a result is doubtful;
+Exit codes: 0 done; 1 a defect of ours; 2 bad input; 3 violations found, scenes of a set failed, or a doubtful result;
 130 interrupted.
 """
 

@@ -180,9 +180,10 @@ def _run_at_axis(profiles: Profiles, inside: Bool, known: Bool) -> tuple[float, 
         return np.nan, np.nan
     run = np.flatnonzero(label == np.bincount(near).argmax())
     first, last = int(run[0]), int(run[-1])
-    ends = profiles.offsets[first] - 0.5 * ACROSS, profiles.offsets[last] + 0.5 * ACROSS
-    beyond = known[max(0, first - _BEYOND) : first], known[last + 1 : last + 1 + _BEYOND]
-    return tuple(end if 2 * side.sum() >= _BEYOND else np.nan for end, side in zip(ends, beyond, strict=True))
+    right, left = profiles.offsets[first] - 0.5 * ACROSS, profiles.offsets[last] + 0.5 * ACROSS
+    right_seen = 2 * known[max(0, first - _BEYOND) : first].sum() >= _BEYOND
+    left_seen = 2 * known[last + 1 : last + 1 + _BEYOND].sum() >= _BEYOND
+    return float(right) if right_seen else np.nan, float(left) if left_seen else np.nan
 
 
 def _is_near(seen: Bool) -> Bool:
