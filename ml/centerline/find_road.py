@@ -11,8 +11,9 @@ import numpy as np
 from synthroads_addon.base.arrays import Float
 from synthroads_addon.base.progress import Progress, silent
 
+from ..data.axis import MeasuredAxis
 from ..data.corridor import CORRIDOR
-from ..data.frames import along, read_path
+from ..data.frames import along
 from ..data.strips import find_ground, path_through, strips
 from ..networks.centerline.models import TARGETS
 from .predictor import CenterlinePredictor, Regression
@@ -21,21 +22,19 @@ _HEIGHT = TARGETS.index("height")
 
 
 def find_road(
-    predictor: CenterlinePredictor, cloud: Path, path: Path | None = None, progress: Progress = silent
+    predictor: CenterlinePredictor, cloud: Path, line: MeasuredAxis | None = None, progress: Progress = silent
 ) -> Regression:
     """Find centreline and corridor along a cloud's road, in map coordinates and bounded memory however long it is.
 
     Args:
         predictor: a trained model.
         cloud: file with the road's points.
-        path: line along the road, or the scanner's trajectory (CSV or GeoJSON, map coordinates); None: it is found in
-            the cloud, as the middle of its ground.
+        line: along the road, map coordinates; None: it is found in the cloud, as the middle of its ground.
         progress: told the share that is done.
 
     Raises:
-        MissingFileError, InputError: a file is missing or damaged, or the cloud holds no ground.
+        MissingFileError, InputError: the file is missing or damaged, or the cloud holds no ground.
     """
-    line = None if path is None else read_path(path)
     ground = find_ground(cloud, progress)
     line = line or path_through(ground)
     frames = along(line, predictor.settings.frame_spacing)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import torch
@@ -67,6 +67,7 @@ class Regression:
         return self.value[:, 0]
 
 
+@dataclass(eq=False)
 class CenterlinePredictor:
     """A model with its calibration; called with a road and frames it is a predictor for `scores.evaluation`.
 
@@ -74,21 +75,17 @@ class CenterlinePredictor:
         model: trained.
         settings: how its slices are cut.
         use: how it is used.
-        calibration: of each target by name; None: deviations are the model's own.
+        calibration: of each target by name; deviations of those that it lacks are the model's own.
     """
 
-    def __init__(
-        self,
-        model: CenterlineModel,
-        settings: SliceSettings,
-        use: UseOptions,
-        calibration: Mapping[str, IntervalCalibration] | None = None,
-    ) -> None:
-        self.model = model
-        self.settings = settings
-        self.use = use
-        found = calibration or {}
-        self.calibration = {name: found.get(name, IntervalCalibration()) for name in TARGETS}
+    model: CenterlineModel
+    settings: SliceSettings
+    use: UseOptions
+    calibration: Mapping[str, IntervalCalibration] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Complete the calibration."""
+        self.calibration = {name: self.calibration.get(name, IntervalCalibration()) for name in TARGETS}
 
     def __call__(self, road: LearningRoad, frames: Frames) -> Float:
         """Return (M, 4 + 2 K), `evaluation.CORRIDOR_COLUMNS`; the height is an elevation."""

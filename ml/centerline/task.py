@@ -19,6 +19,7 @@ from synthroads_addon.base.schema import canonical_json, read_json
 from ..configuration import Configuration
 from ..data.batches import Batches, BatchOptions, DataOptions, Roads, fixed_batches, quiet, read_roads
 from ..data.effects import SequenceEffects
+from ..data.frames import read_path
 from ..data.slices import Batch, SliceSettings
 from ..networks.centerline.losses import LossOptions, centerline_loss
 from ..networks.centerline.models import TARGETS, CenterlineModel, ModelOptions
@@ -128,7 +129,8 @@ def predict(run: Run[CenterlineConfiguration], prediction: Prediction, progress:
         if path.exists() and not prediction.overwrite:
             raise OutputError("--output", str(path), "is there already; --overwrite replaces it")
     ready = predictor(run)
-    found = find_road(ready, prediction.cloud, prediction.path, progress)
+    line = None if prediction.path is None else read_path(prediction.path)
+    found = find_road(ready, prediction.cloud, line, progress)
     name = prediction.cloud.stem
     text = canonical_json(geojson(found, name, ready.settings.frame_spacing))
     calibration = {name: one.to_dict() for name, one in ready.calibration.items()}

@@ -9,7 +9,7 @@ ends in ``offset``.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, get_args
 
 import numpy as np
@@ -86,6 +86,7 @@ class Seeds:
         return chosen, int(random.choice(np.flatnonzero(self._tiles[chosen].segment == label)))
 
 
+@dataclass(eq=False)
 class CropDataset(Dataset[Item]):
     """Map-style: the crops of one epoch, each drawn from its own stream.
 
@@ -101,21 +102,14 @@ class CropDataset(Dataset[Item]):
         seed, epoch: of all that is random.
     """
 
-    def __init__(
-        self,
-        tiles: Sequence[CloudTile],
-        scalings: dict[str, Scaling],
-        settings: CropSettings,
-        plan: Sequence[Draw],
-        seeds: Seeds,
-        *,
-        effects: CropEffects = NO_EFFECTS,
-        seed: int = 0,
-        epoch: int = 0,
-    ) -> None:
-        self.tiles, self.scalings, self.settings = tiles, scalings, settings
-        self.plan, self.seeds, self.effects = plan, seeds, effects
-        self.seed, self.epoch = seed, epoch
+    tiles: Sequence[CloudTile]
+    scalings: dict[str, Scaling]
+    settings: CropSettings
+    plan: Sequence[Draw]
+    seeds: Seeds
+    effects: CropEffects = field(kw_only=True, default=NO_EFFECTS)
+    seed: int = field(kw_only=True, default=0)
+    epoch: int = field(kw_only=True, default=0)
 
     def __len__(self) -> int:
         return len(self.plan)
@@ -126,23 +120,19 @@ class CropDataset(Dataset[Item]):
         return _draw_crop(self, draw.tile, random)
 
 
+@dataclass(eq=False)
 class CropStream(IterableDataset[Item]):
     """Iterable and endless: crops of random tiles with effects on the fly; each worker has a stream of its own.
 
     Args: see `CropDataset`.
     """
 
-    def __init__(
-        self,
-        tiles: Sequence[CloudTile],
-        scalings: dict[str, Scaling],
-        settings: CropSettings,
-        seeds: Seeds,
-        effects: CropEffects,
-        seed: int,
-    ) -> None:
-        self.tiles, self.scalings, self.settings = tiles, scalings, settings
-        self.seeds, self.effects, self.seed = seeds, effects, seed
+    tiles: Sequence[CloudTile]
+    scalings: dict[str, Scaling]
+    settings: CropSettings
+    seeds: Seeds
+    effects: CropEffects
+    seed: int
 
     def __iter__(self) -> Iterator[Item]:
         worker = get_worker_info()

@@ -15,6 +15,7 @@ A sample is a dictionary of tensors; S is the number of slices of a sequence, N 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -68,6 +69,7 @@ class SliceSettings(Part):
         return min(SPACING, self.spacing)
 
 
+@dataclass(eq=False)
 class SliceDataset(Dataset[Sample]):
     """Sequences drawn at random from roads, each road as often, with a path and effects drawn for each.
 
@@ -85,26 +87,21 @@ class SliceDataset(Dataset[Sample]):
         InputError: no road is long enough for a sequence.
     """
 
-    def __init__(
-        self,
-        roads: Sequence[LearningRoad],
-        settings: SliceSettings,
-        samples: int,
-        seed: int,
-        effects: SequenceEffects | None = None,
-        purpose: str = "slices",
-    ) -> None:
-        self.roads = list(roads)
-        self.settings = settings
-        self.samples = samples
-        self.seed = seed
-        self.effects = effects
-        self.purpose = purpose
+    roads: Sequence[LearningRoad]
+    settings: SliceSettings
+    samples: int
+    seed: int
+    effects: SequenceEffects | None = None
+    purpose: str = "slices"
+
+    def __post_init__(self) -> None:
+        """Find where sequences can begin."""
         self.epoch = 0
-        self._starts = [starts for number, road in enumerate(self.roads) if (starts := _starts(road, number, settings))]
+        places = (_starts(road, number, self.settings) for number, road in enumerate(self.roads))
+        self._starts = [starts for starts in places if starts]
         if not self._starts:
-            length = settings.spacing * (settings.slices - 1)
-            raise InputError("roads", len(self.roads), f"none has a known {settings.truth} over {length:g} m")
+            length = self.settings.spacing * (self.settings.slices - 1)
+            raise InputError("roads", len(self.roads), f"none has a known {self.settings.truth} over {length:g} m")
 
     def __len__(self) -> int:
         return self.samples
@@ -138,12 +135,11 @@ class SliceDataset(Dataset[Sample]):
         return sample(cut, settings, rng, number, np.arange(settings.slices))
 
 
+@dataclass(eq=False)
 class IterableSlices(IterableDataset[Sample]):
     """The samples of a `SliceDataset` without end, the epochs one after another, shared out to the workers."""
 
-    def __init__(self, dataset: SliceDataset) -> None:
-        super().__init__()
-        self.dataset = dataset
+    dataset: SliceDataset
 
     def __iter__(self) -> Iterator[Sample]:
         worker = get_worker_info()
@@ -154,6 +150,7 @@ class IterableSlices(IterableDataset[Sample]):
             number += step
 
 
+@dataclass(eq=False)
 class FrameSlices(Dataset[Sample]):
     """All frames of a path along one road, as sequences in order; the last of a stretch overlaps the one before.
 
@@ -167,11 +164,15 @@ class FrameSlices(Dataset[Sample]):
         step: slices from one sequence's start to the next one's; so many as a sequence has if not given.
     """
 
-    def __init__(self, road: LearningRoad, frames: Frames, settings: SliceSettings, step: int | None = None) -> None:
-        self.road = road
-        self.frames = frames
-        self.settings = settings
-        self.runs = sequences(frames, settings.slices, step and min(step, settings.slices), settings.spacing)
+    road: LearningRoad
+    frames: Frames
+    settings: SliceSettings
+    step: int | None = None
+
+    def __post_init__(self) -> None:
+        """Find the sequences."""
+        length = self.settings.slices
+        self.runs = sequences(self.frames, length, self.step and min(self.step, length), self.settings.spacing)
 
     def __len__(self) -> int:
         return len(self.runs)

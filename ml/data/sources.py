@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from synthroads_addon.base.arrays import AnyArray, Float
+from synthroads_addon.base.arrays import AnyArray, Bool, Float
 from synthroads_addon.base.classes import UNLABELLED, ClassScheme
 from synthroads_addon.base.errors import InputError, MissingFileError
 from synthroads_addon.base.files import files_below
@@ -78,10 +78,10 @@ def read_tiles(source: Source, scheme: ClassScheme, voxel: float | None) -> Iter
         raise MissingFileError(str(path), None, "no such file or folder of labelled points")
     for tile in tiles:
         try:
-            kept = None if voxel is None else thin(tile.coord, voxel)
+            kept = slice(None) if voxel is None else thin(tile.coord, voxel)
         except ValueError:
             raise InputError(str(path), None, f"a tile of {tile.scene} is too large for cells of {voxel:g} m") from None
-        yield tile if kept is None else tile.select(kept)
+        yield tile.select(kept)
 
 
 def _is_pack(path: Path) -> bool:
@@ -98,12 +98,13 @@ def _packed_tiles(path: Path, scheme: ClassScheme, voxel: float | None) -> Itera
         raise InputError("voxel", voxel, f"must be at least {pack.voxel:g} m, as the points of {path} were thinned")
     table = table_between(dict(enumerate(class_names(pack.scheme))), scheme, str(path))
     for place in range(len(pack)):
-        yield _relabel(pack.tile(place), table)
+        tile = pack.tile(place)
+        yield replace(tile, segment=_places(tile.segment, tile.segment != IGNORED, table))
 
 
-def _relabel(tile: CloudTile, table: NDArray[np.int16]) -> CloudTile:
-    known = tile.segment != IGNORED
-    return replace(tile, segment=np.where(known, table[np.where(known, tile.segment, 0)], IGNORED).astype(np.int16))
+def _places(numbers: AnyArray, known: Bool, table: NDArray[np.int16]) -> NDArray[np.int16]:
+    """Return the places in a scheme of a source's numbers (N,), ignored where they aren't known."""
+    return np.where(known, table[np.where(known, numbers, 0)], IGNORED).astype(np.int16)
 
 
 def _folder_tiles(path: Path, scheme: ClassScheme, source: Source) -> Iterator[CloudTile]:
@@ -181,7 +182,7 @@ def _pointcept_tile(folder: Path, table: NDArray[np.int16]) -> CloudTile:
         coord,
         color if color is not None and color.any() else None,
         strength if strength is not None and strength.any() else None,
-        np.where(known, table[np.where(known, segment, 0)], IGNORED).astype(np.int16),
+        _places(segment, known, table),
     )
 
 

@@ -37,7 +37,7 @@ class CloudTile:
     def __len__(self) -> int:
         return len(self.coord)
 
-    def select(self, keep: AnyArray) -> CloudTile:
+    def select(self, keep: AnyArray | slice) -> CloudTile:
         """Return the points chosen by a mask or indices."""
         return replace(
             self,

@@ -39,7 +39,6 @@ LARGEST = 100_000
 """Points of a piece, margin included; what has more is cut in four, down to `_SMALLEST_EDGE`."""
 _SMALLEST_EDGE = 1.5
 
-
 Classifier = Callable[[Item], torch.Tensor]
 """Turns a batch of one item into the scores of its points."""
 
@@ -66,23 +65,19 @@ def pieces(
     if len(wanted) == 0:
         return
     position = np.asarray(plan, dtype=np.float64)
-    yield from _cut_squares(position, wanted, np.arange(len(plan)), position[wanted].min(axis=0), edge, margin, largest)
 
+    def cut(inside: Index, seen: Index, low: Float, edge: float, margin: float) -> Iterator[tuple[Index, Index]]:
+        """Cut points into squares counted from ``low``; ``seen`` holds all that the squares may see."""
+        cells = np.floor((position[inside] - low) / edge).astype(np.int64)
+        for cell in np.unique(cells, axis=0):
+            core, corner, near = inside[np.all(cells == cell, axis=1)], low + cell * edge, position[seen]
+            around = seen[np.all((near >= corner - margin) & (near < corner + edge + margin), axis=1)]
+            if len(around) > largest and edge / 2 >= _SMALLEST_EDGE:
+                yield from cut(core, around, corner, edge / 2, min(margin, edge / 2))
+            else:
+                yield core, around
 
-def _cut_squares(
-    position: Float, own: Index, seen: Index, low: Float, edge: float, margin: float, largest: int
-) -> Iterator[tuple[Index, Index]]:
-    """Cut points into squares counted from ``low``; ``seen`` holds all that the squares may see."""
-    cells = np.floor((position[own] - low) / edge).astype(np.int64)
-    for cell in np.unique(cells, axis=0):
-        inside = own[np.all(cells == cell, axis=1)]
-        corner = low + cell * edge
-        near = position[seen]
-        around = seen[np.all((near >= corner - margin) & (near < corner + edge + margin), axis=1)]
-        if len(around) > largest and edge / 2 >= _SMALLEST_EDGE:
-            yield from _cut_squares(position, inside, around, corner, edge / 2, min(margin, edge / 2), largest)
-        else:
-            yield inside, around
+    yield from cut(wanted, np.arange(len(plan)), position[wanted].min(axis=0), edge, margin)
 
 
 def label_tile(

@@ -15,7 +15,7 @@ from ml.centerline.predictor import CenterlinePredictor, Regression, UseOptions,
 from ml.data import strips
 from ml.data.axis import MeasuredAxis
 from ml.data.corridor import CORRIDOR
-from ml.data.frames import Frames, along, displace_frames
+from ml.data.frames import Frames, along, displace_frames, read_path
 from ml.data.roads import LearningRoad
 from ml.networks.centerline.models import TARGETS
 from ml.scores.calibration import IntervalCalibration
@@ -171,9 +171,9 @@ def test_strips_make_no_difference(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     cloud = write_cloud(tmp_path / "cloud.laz", analytic_roads.points(density=2.0))
     path = _path_file(tmp_path)
     ready = predictor(step=1)
-    whole = find_road(ready, cloud, path)
+    whole = find_road(ready, cloud, read_path(path))
     monkeypatch.setattr(strips, "LENGTH", 30.0)
-    parts = find_road(ready, cloud, path)
+    parts = find_road(ready, cloud, read_path(path))
     assert len(whole.frames) == len(parts.frames) > 90
     np.testing.assert_allclose(parts.value, whole.value, atol=2e-3)
     np.testing.assert_allclose(parts.std, whole.std, rtol=0.02)
