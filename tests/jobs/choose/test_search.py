@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,8 @@ from synthroads_addon.scenario.scenario import Scenario, apply_change, load_scen
 pytestmark = pytest.mark.any_blender
 
 ROOT = Path(__file__).parents[3]
+NEAR, BUDGET = 0.25, 30.0
+"""Share of the expected time that a job may take more or less; time that it may take where that is what is asked, s."""
 SMALL = (
     "road.length=100",
     "road.half_width=25",
@@ -156,19 +159,49 @@ def test_a_scene_that_is_there_is_scanned_within_a_tolerance(tmp_path: Path) -> 
     assert not (tmp_path / "refused").exists()
 
 
-def random_scenes() -> list[tuple[str, list[str]]]:
-    """Return ten short scenes that differ in road, seed and platform."""
-    uav = ["road.length=100", "road.half_width=30", "scan.platform.lateral_offsets=[5]", "scan.pulse_rate_khz=100"]
+def scenes() -> dict[str, list[str]]:
+    """Return five short scenes, one of them each platform's, with which the shipped table wasn't made."""
+    uav = ["road.length=150", "road.half_width=30", "scan.platform.lateral_offsets=[5]", "scan.pulse_rate_khz=100"]
     uav += ["scan.field_of_view_deg=360"]
-    high = [*uav, "scan.platform.height=100", "road.trees_per_hectare=80"]
-    vehicle, tripod = ["road.length=100", "road.half_width=25"], ["road.length=100", "road.half_width=30"]
-    airborne = ["road.length=300", "road.half_width=60"]
-    rows = [("rq31-600m", uav), ("every-class-1500m", [*uav, "road.length=150"]), ("rq31-600m", high)]
-    rows += [("mobile-mapping-300m", vehicle), ("tripod-200m", tripod), ("airborne-1000m", airborne)]
-    rows += [("every-class-1500m", [*high, "road.length=150"]), ("mobile-mapping-300m", [*vehicle, "road.length=150"])]
-    rows += [("rq31-600m", [*uav, "road.grass_density=0.5"]), ("tripod-200m", [*tripod, "road.grass_density=0.2"])]
-    common = ['outputs=["cloud"]', "colour.rgb=false"]
-    return [(name, [*changes, *common, f"seed={100 + number}"]) for number, (name, changes) in enumerate(rows)]
+    return {
+        "every-class-1500m": uav,
+        "rq31-600m": [*uav, "scan.platform.height=100", "road.trees_per_hectare=80", "road.grass_density=0.5"],
+        "mobile-mapping-300m": ["road.length=150", "road.half_width=25"],
+        "tripod-200m": ["road.length=100", "road.half_width=30", "road.grass_density=0.2"],
+        "airborne-1000m": ["road.length=300", "road.half_width=60"],
+    }
+
+
+@dataclass(frozen=True)
+class Done:
+    """A job that is done: as it was asked for, its report, and its seconds by the clock."""
+
+    asked: Scenario
+    report: dict[str, Any]
+    seconds: float
+
+    @classmethod
+    def of(cls, name: str, number: int, folder: Path, choice: str) -> Done:
+        """Do the job of one of `scenes` with a choice."""
+        common = ('outputs=["cloud"]', "colour.rgb=false", f"seed={100 + number}", choice)
+        asked, begun = load_scenario(name, [*scenes()[name], *common]), time.perf_counter()
+        report = generate(Job(asked, folder / name, new_file=True, begun=begun))
+        return cls(asked, report, time.perf_counter() - begun)
+
+    def deviation(self) -> float:
+        """Return how much longer it took than was expected, as a share of that."""
+        return self.seconds / self.report["choice"]["expected"]["seconds"] - 1.0
+
+    def __str__(self) -> str:
+        chosen, expected = self.report["choice"]["chosen"], self.report["choice"]["expected"]["seconds"]
+        return f"{self.asked.title}: {self.seconds:.1f} s, expected {expected} ({self.deviation():+.0%}), {chosen}"
+
+
+@pytest.fixture(scope="module")
+def within_tolerance(tmp_path_factory: pytest.TempPathFactory) -> list[Done]:
+    """Do the five jobs within a tolerance."""
+    folder, choice = tmp_path_factory.mktemp("tolerance"), "tolerance=height=4mm,position=3cm,intensity=10%,labels=2%"
+    return [Done.of(name, number, folder, choice) for number, name in enumerate(scenes())]
 
 
 def errors_afterwards(scenario: Scenario) -> dict[str, float]:
@@ -193,35 +226,28 @@ def errors_afterwards(scenario: Scenario) -> dict[str, float]:
 
 
 @pytest.mark.slow
-def test_tolerances_are_kept_in_nine_of_ten_random_scenes(tmp_path: Path) -> None:
-    kept = []
-    for number, (name, changes) in enumerate(random_scenes()):
-        tolerance = "tolerance=height=4mm,position=3cm,intensity=10%,labels=2%"
-        scenario = load_scenario(name, [*changes, tolerance])
-        report = generate(Job(scenario, tmp_path / str(number), new_file=True))
-        found = errors_afterwards(Scenario.from_dict(report["scenario"]))
-        assert scenario.tolerance
-        limits = scenario.tolerance.limits()
-        kept.append(all(found[kind] <= limit for kind, limit in limits.items()))
-        shown = {kind: f"{found[kind]:.4f} of {limit:g}" for kind, limit in limits.items()}
-        print(f"{name} {scenario.seed}: {report['choice']['chosen']} {shown} {'kept' if kept[-1] else 'broken'}")
-    assert sum(kept) >= 9
+def test_no_tolerance_is_broken_in_scenes_that_the_table_was_not_made_with(within_tolerance: list[Done]) -> None:
+    for done in within_tolerance:
+        assert done.asked.tolerance
+        found = errors_afterwards(Scenario.from_dict(done.report["scenario"]))
+        limits = done.asked.tolerance.limits()
+        print(done, {kind: f"{found[kind]:.4f} of {limit:g}" for kind, limit in limits.items()})
+        assert all(found[kind] <= limit for kind, limit in limits.items()), done.asked.title
 
 
 @pytest.mark.slow
-def test_times_are_kept_in_nine_of_ten_random_scenes(tmp_path: Path) -> None:
-    """On a machine with other work these times say nothing."""
-    kept = []
-    for number, (name, changes) in enumerate(random_scenes()):
-        seconds = 15.0 + 5.0 * number
-        line = [sys.executable, "-m", "headless.generate", "--scenario", name, "--time-budget", f"{seconds}s", "--json"]
-        line += [word for change in changes[:-2] for word in ("--set", change)]
-        line += ["--set", changes[-1], "--set", 'outputs=["cloud"]', "--output", str(tmp_path / str(number))]
-        begin = time.perf_counter()
-        done = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, timeout=900, check=False)
-        took = time.perf_counter() - begin
-        assert done.returncode == 0, done.stderr
-        choice = json.loads(done.stdout)["choice"]
-        kept.append(took <= 1.2 * seconds)
-        print(f"{name}: {took:.1f} of {seconds:.0f} s, expected {choice['expected']['seconds']} by {choice['by']}")
-    assert sum(kept) >= 9
+def test_the_time_of_a_tolerance_is_foreseen(within_tolerance: list[Done]) -> None:
+    """On a machine with other work this says nothing."""
+    for done in within_tolerance:
+        print(done)
+    assert [str(done) for done in within_tolerance if abs(done.deviation()) > NEAR] == []
+
+
+@pytest.mark.slow
+def test_a_time_is_kept_and_foreseen(tmp_path: Path) -> None:
+    """On a machine with other work this says nothing."""
+    jobs = [Done.of(name, number, tmp_path, f"time_budget={BUDGET}") for number, name in enumerate(scenes())]
+    for done in jobs:
+        print(done)
+    assert [str(done) for done in jobs if done.seconds > BUDGET] == []
+    assert [str(done) for done in jobs if abs(done.deviation()) > NEAR] == []
