@@ -57,7 +57,9 @@ def run(arguments: argparse.Namespace) -> Outcome:
     if arguments.part:
         result = _measure_part(json.loads(arguments.part))
         return 0, result, canonical_json(result)
-    _scenario(arguments.scenario, arguments.changes, arguments.quick)
+    outputs = _scenario(arguments.scenario, arguments.changes, arguments.quick).outputs
+    if "cloud" not in outputs:
+        raise InputError("outputs", list(outputs), "must have the cloud, on which writing is measured")
     for cores in arguments.cores:
         if not 1 <= cores <= available_cores():
             raise InputError("--cores", cores, f"must be 1 to {available_cores()}, the cores that are there")

@@ -266,11 +266,12 @@ class NumberField(OptionalField):
 
     def read_given(self, owner: Any, base: Any) -> float:
         """Return the number."""
-        return exact(getattr(owner, self.name), base)
+        value = exact(getattr(owner, self.name), base)
+        return round(value) if self.kind is int else value
 
     def write_given(self, owner: Any, value: Any) -> None:
         """Show a number, as far as Blender's numbers reach."""
-        setattr(owner, self.name, fitting(value) if self.kind is int else value)
+        setattr(owner, self.name, fitting(value) if isinstance(getattr(owner, self.name), int) else value)
 
     def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
         """Draw the number; a slider has its name inside."""

@@ -32,13 +32,15 @@ def number_property(
 
     `beside` is the other end of an interval: both show as many digits as the larger one needs.
     Blender's limits are inclusive: a limit that the schema excludes is refused when the scenario is made.
+    Whole numbers that may be left out and be larger than 32 bits are limits of something: they have floats, as far as
+    these reach, and begin where they do no harm.
     """
     unit = unit_of(info) if unit is None else unit
     low, high = _limits(info)
-    unlimited = default is None and whole and high > LARGEST_INTEGER  # a limit that begins where it does no harm
-    first = LARGEST_INTEGER if unlimited else min(max(default or 0, low), high)
+    large = default is None and whole and high > LARGEST_INTEGER
+    first = high if large else min(max(default or 0, low), high)
     share = is_share(info)
-    if whole:
+    if whole and not large:
         pixels = {"subtype": "PIXEL"} if unit == "px" else {}
         limits = {"min": int(max(low, -LARGEST_INTEGER)), "max": int(min(high, LARGEST_INTEGER))}
         return bpy.props.IntProperty(default=fitting(int(first)), **limits, **pixels, **arguments)
@@ -49,7 +51,7 @@ def number_property(
         min=low,
         max=high,
         step=1 if fine or share else 10 if abs(first) < 2 else 100,
-        precision=4 if fine else 2,
+        precision=0 if large else 4 if fine else 2,
         subtype="FACTOR" if share else "NONE",
         unit=BLENDERS.get(unit, "NONE"),
         **arguments,

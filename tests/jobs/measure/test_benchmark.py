@@ -59,9 +59,11 @@ def test_a_quick_run_measures_every_line(tmp_path: Path, capfd: pytest.CaptureFi
     assert "casting and radiometry, 61 rays per pulse" in shown
 
 
-def test_wrong_numbers_of_cores_are_refused(capfd: pytest.CaptureFixture[str]) -> None:
+def test_bad_input_is_refused_before_anything_is_measured(capfd: pytest.CaptureFixture[str]) -> None:
     assert main(["benchmark", "--cores", "0"]) == 2
     assert "--cores is 0: must be 1 to" in capfd.readouterr().err
+    assert main(["benchmark", "--cores", "1", "--set", 'outputs=["parameters"]']) == 2
+    assert "outputs is ['parameters']: must have the cloud" in capfd.readouterr().err
     assert main(["benchmark", "--document", "/nowhere/x.md", "--cores", "1"]) == 2
     assert "--document is '/nowhere/x.md': cannot be read" in capfd.readouterr().err
 

@@ -22,7 +22,7 @@ from synthroads_addon.road.guidelines import SECTIONS_OF_CLASS, STANDARD_CROSS_S
 from synthroads_addon.scanning.devices.device import device_names, load_device
 from synthroads_addon.scanning.platforms.registry import PLATFORMS
 from synthroads_addon.scenario.road import Interval, interval
-from synthroads_addon.scenario.scan import ScanScenario
+from synthroads_addon.scenario.scan import MOST_POSSIBLE, ScanScenario
 from synthroads_addon.scenario.scenario import FIDELITIES, Scenario, load_scenario, scenario_names
 from synthroads_addon.ui.fields import fields as kinds
 from synthroads_addon.ui.fields.groups import (
@@ -261,7 +261,8 @@ def test_numbers_are_the_schemas(panel: Any, path: str) -> None:
     assert shown.hard_min == (np.float32(low) if shown.type == "FLOAT" else low)
     assert shown.hard_max == np.float32(high) or (shown.type == "INT" and shown.hard_max == min(high, 2**31 - 1))
     assert shown.description == schema["description"].removesuffix(".")
-    assert shown.type == ("INT" if "integer" in json.dumps(schema) else "FLOAT")
+    large = field.optional and high > 2**31 - 1
+    assert shown.type == ("INT" if "integer" in json.dumps(schema) and not large else "FLOAT")
     assert shown.unit == BLENDERS.get(schema["unit"], "NONE")
     said = schema["unit"] in ("1", "px", *BLENDERS) or "(" in shown.name or "per" in shown.name.lower()
     assert said, f"{shown.name} says no unit"
@@ -464,6 +465,19 @@ def test_what_is_inherited_is_what_the_scenario_has(panel: Any) -> None:
     assert PATHS["scan.rays_per_pulse"].inherited(panel) == numbers.rays_per_pulse
     assert PATHS["colour.image_spacing"].inherited(panel) == colour.image_spacing
     assert PATHS["colour.samples"].inherited(panel) == colour.samples
+
+
+@pytest.mark.parametrize("pulses", [7, 5_000_000_000, 40_000_000_001, MOST_POSSIBLE])
+def test_a_scan_may_have_more_pulses_than_fit_into_32_bits(panel: Any, pulses: int) -> None:
+    panel.take(Scenario.from_dict({"scan": {"most_pulses": pulses}}))
+    assert panel.scenario().scan.most_pulses == pulses
+
+
+def test_a_limit_of_pulses_begins_where_it_refuses_nothing(panel: Any) -> None:
+    panel.scan.own_most_pulses = True
+    assert panel.scenario().scan.most_pulses == MOST_POSSIBLE
+    panel.scan.most_pulses = 3e10
+    assert panel.scenario().scan.most_pulses == 30_000_000_000
 
 
 def test_a_seed_too_long_for_blender_is_kept_until_another_is_given(panel: Any) -> None:
