@@ -59,7 +59,10 @@ def test_a_quick_run_measures_every_line(tmp_path: Path, capfd: pytest.CaptureFi
     assert "casting and radiometry, 61 rays per pulse" in shown
 
 
-def test_bad_input_is_refused_before_anything_is_measured(capfd: pytest.CaptureFixture[str]) -> None:
+def test_bad_input_is_refused_before_anything_is_measured(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("headless.benchmark._all", lambda _: pytest.fail("measured"))
     assert main(["benchmark", "--cores", "0"]) == 2
     assert "--cores is 0: must be 1 to" in capfd.readouterr().err
     assert main(["benchmark", "--cores", "1", "--set", 'outputs=["parameters"]']) == 2
