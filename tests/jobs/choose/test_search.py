@@ -31,7 +31,6 @@ from synthroads_addon.scenario.scenario import Scenario, apply_change, load_scen
 
 pytestmark = pytest.mark.any_blender
 
-ROOT = Path(__file__).parents[3]
 NEAR, BUDGET = 0.25, 30.0
 """Share of the expected time that a job may take more or less; time that it may take where that is what is asked, s."""
 SMALL = (
