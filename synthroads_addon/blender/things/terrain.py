@@ -16,6 +16,7 @@ from ..nodes import operations as op
 from ..nodes.backbone import limit_offset, row
 from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.inputs import (
+    FAR,
     Inputs,
     backbone_socket,
     instance_number,
@@ -90,17 +91,23 @@ def _side_group(tree: Tree) -> None:
     backbone, side, columns = inputs.backbone, inputs.side, inputs.columns
 
     with tree.frame("Columns from left to right, rows as the backbone's"):
-        mesh, column, number = op.grid(tree, columns, op.point_count(backbone))
-        share = column / (columns - 1.0)
-        outwards = op.switch(side > 0.0, share, 1.0 - share)
+        # One more than those that are spread: the first two are the edge and the batter's toe.
+        mesh, column, number = op.grid(tree, columns + 1, op.point_count(backbone))
+        rank = op.switch(side > 0.0, column, columns - column)
+        outwards = op.maximum(rank - 1, 0) / (columns - 1.0)
         spread = outwards * _FINE + op.power(outwards, 2.2) * (1.0 - _FINE)
     with tree.frame("Offset, cut where it would fold"):
         axis, left, curvature = row(backbone, number)
         start = op.sample_index(inputs.edge, op.position(tree), number)
         start_offset = op.dot(start - axis, left)
         width = op.maximum(inputs.half_width - start_offset * side, 0.0)
-        beyond = limit_offset(start_offset + width * spread * side, curvature) - start_offset
-        distance = beyond * side
+        farthest = (limit_offset(start_offset + width * side, curvature) - start_offset) * side
+        spread_out = (limit_offset(start_offset + width * spread * side, curvature) - start_offset) * side
+    with tree.frame("None but the edge lies within the batter, whose toe is a column"):
+        edge = op.store(inputs.edge, "toe", _toe(tree, inputs))
+        toe = op.minimum(op.sample_index(edge, op.named_attribute(tree, "toe"), number), farthest)
+        distance = op.switch(rank > 0, 0.0, op.maximum(spread_out, toe))
+        beyond = distance * side
     with tree.frame("Height: the ground, as far as the batter reaches to it"):
         place = start + left * beyond
         rise = _ground_above(tree, inputs.ground, place)
@@ -110,6 +117,22 @@ def _side_group(tree: Tree) -> None:
         mesh = op.store(mesh, "distance", distance)
         mesh = op.set_position(mesh, place + op.vector(tree, 0.0, 0.0, height))
         tree.output("Mesh", op.delete_degenerate(mesh))
+
+
+def _toe(tree: Tree, inputs: _TerrainInputs) -> Value:
+    """Return how far from the edge the batter meets the ground (a field on the edge's points)."""
+    start = op.position(tree)
+    _, left, _ = row(inputs.backbone, op.index(tree))
+    rises = op.switch(_ground_above(tree, inputs.ground, start) > 0.0, -1.0, 1.0)
+    along = left * (inputs.side * inputs.batter_slope) + op.vector(tree, 0.0, 0.0, rises)
+    ray = tree.node(
+        "GeometryNodeRaycast",
+        target_geometry=inputs.ground,
+        source_position=start,
+        ray_direction=along,
+        ray_length=2000.0,
+    )
+    return op.switch(ray["Is Hit"], FAR[1], ray["Hit Distance"] * (inputs.batter_slope / op.length(along)))
 
 
 def _ground_above(tree: Tree, ground: Value, place: Value) -> Value:
