@@ -36,7 +36,7 @@ _END = 5.0  # m: a barrier that ends so near to the road's end goes on beyond it
 
 
 @dataclass(frozen=True)
-class Measured:
+class RoadMeasurements:
     """All that a parameter set is made from.
 
     Attributes:
@@ -63,7 +63,7 @@ class Measured:
     title: str
 
 
-def assemble_parameters(measured: Measured) -> RoadParameters:
+def assemble_parameters(measured: RoadMeasurements) -> RoadParameters:
     """Return the parameter set of what was measured; the schema checks it.
 
     Raises:
@@ -88,7 +88,7 @@ def assemble_parameters(measured: Measured) -> RoadParameters:
     return RoadParameters.from_dict(data, source="reconstructed road")
 
 
-def _design_class(measured: Measured) -> str:
+def _design_class(measured: RoadMeasurements) -> str:
     """Return the design class that the radii and the nearest standard cross-section allow, the fastest first."""
     bend = max(max(abs(e.curvature_start), abs(e.curvature_end)) for e in measured.fit.alignment.elements)
     fast = [name for name, limits in LIMITS.items() if bend * limits.radius <= 1.02]
@@ -97,7 +97,7 @@ def _design_class(measured: Measured) -> str:
     return design_class_of(nearest, preferred) if nearest in STANDARD_CROSS_SECTIONS else preferred
 
 
-def _carriageway(measured: Measured, side: SideSection) -> Carriageway:
+def _carriageway(measured: RoadMeasurements, side: SideSection) -> Carriageway:
     return Carriageway(
         instance=1,
         side=side.side,
@@ -142,7 +142,7 @@ def _corners(station: Float, value: Float, tolerance: float) -> list[int]:
     return sorted(kept)
 
 
-def _markings(measured: Measured) -> Iterator[tuple[str, LineMarking]]:
+def _markings(measured: RoadMeasurements) -> Iterator[tuple[str, LineMarking]]:
     section = measured.section
     length = round_value(measured.fit.alignment.length)
     for side in SIDES:
@@ -190,7 +190,7 @@ def _dashes(line: Line | None, length: float, edge: bool = False) -> dict[str, f
     return {"dash_length": dash, "gap_length": gap, "start_station": start, "end_station": end}
 
 
-def _furniture(measured: Measured) -> Iterator[tuple[str, RoadObject]]:
+def _furniture(measured: RoadMeasurements) -> Iterator[tuple[str, RoadObject]]:
     length = round_value(measured.fit.alignment.length)
     for number, barrier in enumerate(measured.barriers, 1):
         start = 0.0 if barrier.start < _END else _length(barrier.start)

@@ -15,7 +15,7 @@ from .edges import paved_edge
 from .lines import USUAL, WAVELENGTH, Line
 from .path import SPACING
 from .profiles import ACROSS, STRETCH, Grid, Profiles
-from .smoothing import fill_gaps, mean_with_std, robust_scale, smooth, unseen
+from .smoothing import fill_gaps, hidden_std, mean_with_std, robust_scale, smooth
 
 RoadKind = Literal["dual", "single"]
 
@@ -242,7 +242,7 @@ def _whole(band: Band) -> bool:
 
 
 @dataclass(frozen=True)
-class Centre:
+class MeasuredAxis:
     """The axis beside the path, stretch by stretch.
 
     Attributes:
@@ -258,7 +258,7 @@ class Centre:
     raw: Float
 
 
-def centre_of(layout: RoadLayout) -> Centre:
+def axis_from_lines(layout: RoadLayout) -> MeasuredAxis:
     """Return the axis of a layout.
 
     Of a dual carriageway it is the middle between its two innermost lines, of a single one the line in its middle; for
@@ -289,7 +289,7 @@ def centre_of(layout: RoadLayout) -> Centre:
     level_std = float(np.hypot(level_std if np.isfinite(level_std) else 0.0, _shared_error(guides, smoothed.scatter)))
     known = np.isfinite(raw)
     held = np.interp(stations, stations[known], smoothed.values[known])  # no curve is guessed where nothing was seen
-    return Centre(stations, held, np.hypot(smoothed.std, level_std), raw)
+    return MeasuredAxis(stations, held, np.hypot(smoothed.std, level_std), raw)
 
 
 def axis_guides(layout: RoadLayout) -> tuple[Line, ...]:
@@ -317,8 +317,8 @@ def _vote_axis(lines: list[Line], axis: Float) -> Float:
 
 
 def _shared_error(guides: tuple[Line, ...], scatter: float) -> float:
-    """Return the standard deviation of what all offsets of the axis share, see `unseen`, m."""
-    return float(np.sqrt(sum(unseen(line.apart, scatter) ** 2 for line in guides))) / len(guides)
+    """Return the standard deviation of what all offsets of the axis share, see `hidden_std`, m."""
+    return float(np.sqrt(sum(hidden_std(line.apart, scatter) ** 2 for line in guides))) / len(guides)
 
 
 def _robust_spread(values: Float) -> float:

@@ -11,7 +11,7 @@ from scipy.signal import find_peaks
 from ..base.arrays import Bool, Float
 from .path import SPACING
 from .profiles import ACROSS, STRETCH, Grid, Profiles, SurfacePoints
-from .smoothing import mean_with_std, smooth, unseen
+from .smoothing import hidden_std, mean_with_std, smooth
 
 WAVELENGTH = 40.0
 """Shorter swings of a line's offset, m, are noise."""
@@ -183,7 +183,7 @@ def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line |
         stations=grid,
         measured=measured,
         offsets=np.where(within, smoothed.values, np.nan),
-        std=np.where(within, np.hypot(smoothed.std, unseen(apart, smoothed.scatter)), np.nan),
+        std=np.where(within, np.hypot(smoothed.std, hidden_std(apart, smoothed.scatter)), np.nan),
         apart=apart,
         cover=_cover(share),
         start=start,

@@ -54,7 +54,7 @@ _BEYOND = 4.0  # m outside of the verge, where the ground no longer is the road'
 
 
 @dataclass(frozen=True)
-class StandingObject:
+class StandingPoints:
     """Points of what stands, in the road's frame.
 
     Attributes:
@@ -68,9 +68,9 @@ class StandingObject:
     height: Float
     kind: NDArray[np.uint8]
 
-    def chosen(self, mask: Bool | Index) -> StandingObject:
+    def select(self, mask: Bool | Index) -> StandingPoints:
         """Return some of the points."""
-        return StandingObject(self.station[mask], self.offset[mask], self.height[mask], self.kind[mask])
+        return StandingPoints(self.station[mask], self.offset[mask], self.height[mask], self.kind[mask])
 
 
 @dataclass(frozen=True)
@@ -109,16 +109,16 @@ class GroundShape:
     verge_seen: bool
 
 
-def find_barriers(standing: StandingObject) -> tuple[list[FoundBarrier], Bool]:
+def find_barriers(standing: StandingPoints) -> tuple[list[FoundBarrier], Bool]:
     """Return the barriers along the road, and which points (N,) belong to one."""
     barriers: list[FoundBarrier] = []
     used = np.zeros(len(standing.station), dtype=bool)
     for kind in (PointKind.GUARDRAIL, PointKind.BARRIER, PointKind.NOISE_BARRIER, PointKind.FURNITURE):
         of_kind = np.flatnonzero(standing.kind == kind)
         for members in _linear(standing.station[of_kind], standing.offset[of_kind]):
-            part = standing.chosen(of_kind[members])
+            part = standing.select(of_kind[members])
             for piece in _pieces(part):
-                barrier = _barrier(part.chosen(piece), kind)
+                barrier = _barrier(part.select(piece), kind)
                 if barrier is not None:
                     barriers.append(barrier)
                     used[of_kind[members][piece]] = True
@@ -142,7 +142,7 @@ def _linear(station: Float, offset: Float) -> list[Index]:
     return [g for g in groups if len(g) >= _FEWEST_OF_BARRIER and np.ptp(station[g]) >= SHORTEST_BARRIER]
 
 
-def _pieces(part: StandingObject) -> list[Bool]:
+def _pieces(part: StandingPoints) -> list[Bool]:
     """Return masks of the pieces of a linear cluster along which its offset stays the same."""
     index = np.floor((part.station - part.station.min()) / _STRETCH).astype(np.int64)
     order = np.argsort(index, kind="stable")
@@ -158,7 +158,7 @@ def _pieces(part: StandingObject) -> list[Bool]:
     return [owner[index] == piece for piece in range(int(owner.max()) + 1)]
 
 
-def _barrier(part: StandingObject, kind: PointKind) -> FoundBarrier | None:
+def _barrier(part: StandingPoints, kind: PointKind) -> FoundBarrier | None:
     """Return the barrier of some points; None where they are too few, too short, or shaped otherwise."""
     count = len(part.station)
     if count < _FEWEST_OF_BARRIER:
@@ -179,7 +179,7 @@ def _barrier(part: StandingObject, kind: PointKind) -> FoundBarrier | None:
     return FoundBarrier(barrier_kind, float(start), float(end), offset, height, "both", std, count)
 
 
-def facing(barrier: FoundBarrier, side: Literal["left", "right", "both"]) -> FoundBarrier:
+def turn_beam(barrier: FoundBarrier, side: Literal["left", "right", "both"]) -> FoundBarrier:
     """Return a guardrail whose beam is on a side: its axis, that of the posts, lies behind the beam that is seen."""
     if barrier.kind != "guardrail" or side == "both":
         return barrier
@@ -187,7 +187,7 @@ def facing(barrier: FoundBarrier, side: Literal["left", "right", "both"]) -> Fou
     return replace(barrier, offset=barrier.offset + behind * (_BEAM + sizes.SPACER[side]), faces=side)
 
 
-def find_posts(standing: StandingObject, barrier_points: Bool) -> list[FoundPost]:
+def find_posts(standing: StandingPoints, barrier_points: Bool) -> list[FoundPost]:
     """Return the delineators: small clusters of their class, or lone ones of their height where the class is unknown.
 
     Args:
@@ -196,16 +196,16 @@ def find_posts(standing: StandingObject, barrier_points: Bool) -> list[FoundPost
     """
     posts: list[FoundPost] = []
     for kind in (PointKind.POST, PointKind.FURNITURE):
-        part = standing.chosen((standing.kind == kind) & ~barrier_points)
+        part = standing.select((standing.kind == kind) & ~barrier_points)
         tree = cKDTree(np.column_stack([standing.station, standing.offset])) if kind == PointKind.FURNITURE else None
         for members in _clusters(part):
-            post = _post(part.chosen(members), kind)
+            post = _post(part.select(members), kind)
             if post is not None and (tree is None or _stands_alone(tree, post, len(members))):
                 posts.append(post)
     return sorted(posts, key=lambda item: (item.station, item.offset))
 
 
-def _clusters(part: StandingObject) -> list[Index]:
+def _clusters(part: StandingPoints) -> list[Index]:
     """Return the points of each cluster that hangs together, in their order."""
     if not len(part.station):
         return []
@@ -217,7 +217,7 @@ def _clusters(part: StandingObject) -> list[Index]:
     return np.split(order, np.searchsorted(label[order], np.arange(1, number)))
 
 
-def _post(part: StandingObject, kind: PointKind) -> FoundPost | None:
+def _post(part: StandingPoints, kind: PointKind) -> FoundPost | None:
     """Return the post of a cluster, or None if it is no post's size."""
     count = len(part.station)
     top = float(part.height.max())
@@ -236,7 +236,7 @@ def _stands_alone(tree: cKDTree, post: FoundPost, count: int) -> bool:
     return bool(around <= count)
 
 
-def standing_points(cloud: RoadCloud, path: CloudPath, profiles: Profiles, section: MeasuredSection) -> StandingObject:
+def standing_points(cloud: RoadCloud, path: CloudPath, profiles: Profiles, section: MeasuredSection) -> StandingPoints:
     """Return what stands within reach of the road, with heights above the surface below."""
     chosen = cloud.of(*STANDING)
     xyz, kind = cloud.xyz[chosen], cloud.kind[chosen]
@@ -247,7 +247,7 @@ def standing_points(cloud: RoadCloud, path: CloudPath, profiles: Profiles, secti
     outside = np.where(offset > 0.0, offset - _outer(section, 1), -offset - _outer(section, -1))
     kept = (outside < _FARTHEST_UNKNOWN) | (kind != PointKind.FURNITURE)
     station, offset, kind, height = station[kept], offset[kept], kind[kept], height[kept]
-    return StandingObject(station, offset, height - ground_below(profiles, station, offset), kind)
+    return StandingPoints(station, offset, height - ground_below(profiles, station, offset), kind)
 
 
 def ground_below(profiles: Profiles, station: Float, offset: Float) -> Float:
@@ -269,7 +269,7 @@ def ground_below(profiles: Profiles, station: Float, offset: Float) -> Float:
 
 def face_guardrails(barriers: list[FoundBarrier], section: MeasuredSection) -> list[FoundBarrier]:
     """Return barriers with guardrails' beams on the side of the traffic that they protect from."""
-    return [facing(barrier, _face(barrier.offset, section)) for barrier in barriers]
+    return [turn_beam(barrier, _face(barrier.offset, section)) for barrier in barriers]
 
 
 def _face(offset: float, section: MeasuredSection) -> Literal["left", "right", "both"]:

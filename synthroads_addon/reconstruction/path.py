@@ -90,7 +90,7 @@ class CloudPath:
         _, nearest = cKDTree(self.points).query(middles)
         return np.asarray(SPACING * nearest[owner].astype(np.float64))
 
-    def moved(self, offset: Float) -> CloudPath:
+    def shift_by(self, offset: Float) -> CloudPath:
         """Return the path through what lies an offset (M,) to the left of each point."""
         return path_through(self.place(self.stations, offset))
 
@@ -169,10 +169,10 @@ def first_path(xy: Float) -> CloudPath:
     line = np.array([*back[::-1], *ahead[1:]])
     if (line[-1] - line[0]) @ (np.cos(0.01), np.sin(0.01)) < 0.0:
         line = line[::-1]
-    return smoothed_path(path_through(line), _WAVELENGTH)
+    return smooth_path(path_through(line), _WAVELENGTH)
 
 
-def smoothed_path(path: CloudPath, wavelength: float) -> CloudPath:
+def smooth_path(path: CloudPath, wavelength: float) -> CloudPath:
     """Return a path without its swings that are shorter than a wavelength (m)."""
     kept = path.points[::5]
     weights = np.ones(len(kept))

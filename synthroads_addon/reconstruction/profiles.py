@@ -218,7 +218,7 @@ def register_path(path: CloudPath, profiles: Profiles) -> CloudPath:
     inside = np.interp(along, middles, shift)
     inside += np.where(along < middles[0], (along - middles[0]) * ends[0], 0.0)
     inside += np.where(along > middles[-1], (along - middles[-1]) * ends[-1], 0.0)
-    return path.moved(inside)
+    return path.shift_by(inside)
 
 
 def _self_fit(block: Float) -> _Fit:

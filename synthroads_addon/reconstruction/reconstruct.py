@@ -12,11 +12,11 @@ from ..base.errors import InputError
 from ..base.progress import Progress, silent
 from ..fitting.fit import AxisFit, fit_axis
 from ..road.parameters import RoadParameters
-from .assemble import Measured, RotationAxis, assemble_parameters
+from .assemble import RoadMeasurements, RotationAxis, assemble_parameters
 from .cloud import PointKind, RoadCloud
 from .edges import Surface, paved_edge, surface
 from .judgement import Judgement, judge
-from .layout import Centre, RoadKind, RoadLayout, centre_of, find_layout
+from .layout import MeasuredAxis, RoadKind, RoadLayout, axis_from_lines, find_layout
 from .lines import find_lines
 from .objects import face_guardrails, find_barriers, find_posts, measure_ground, standing_points
 from .path import SPACING, CloudPath, alignment_path, first_path, path_through
@@ -70,8 +70,8 @@ class Reconstruction:
     """
 
     parameters: RoadParameters
-    measured: Measured
-    centre: Centre
+    measured: RoadMeasurements
+    centre: MeasuredAxis
     path: CloudPath
     profiles: Profiles
     layout: RoadLayout
@@ -92,7 +92,7 @@ def reconstruct(cloud: RoadCloud, options: Options | None = None, progress: Prog
     whole, cloud = cloud, cloud.near(path, half + _AROUND)
     progress("lines", 0.3)
     profiles, layout, centre = _axis(cloud, path, half, options)
-    path = path.moved(np.interp(path.stations, centre.stations, centre.offsets))
+    path = path.shift_by(np.interp(path.stations, centre.stations, centre.offsets))
     profiles, layout, centre = _axis(cloud, path, half, options)  # a straight line is smoothed better than a bent one
     progress("alignment", 0.5)
     fit, rotation = fit_axis_and_profile(profiles, layout, centre, options.tolerance)
@@ -108,7 +108,7 @@ def reconstruct(cloud: RoadCloud, options: Options | None = None, progress: Prog
     ground = measure_ground(whole, along, section, fit.profile.elevation(along.stations))
     standing = standing_points(cloud, along, profiles, section)
     barriers, used = find_barriers(standing)
-    measured = Measured(
+    measured = RoadMeasurements(
         fit=fit,
         cloud=cloud,
         section=section,
@@ -140,16 +140,18 @@ def straighten_path(cloud: RoadCloud, options: Options) -> tuple[CloudPath, floa
     return path, half
 
 
-def _axis(cloud: RoadCloud, path: CloudPath, half: float, options: Options) -> tuple[Profiles, RoadLayout, Centre]:
+def _axis(
+    cloud: RoadCloud, path: CloudPath, half: float, options: Options
+) -> tuple[Profiles, RoadLayout, MeasuredAxis]:
     """Return profiles along a path, which lines they show, and where the axis lies."""
     profiles = make_profiles(cloud, path, half, exact=True)
     layout = find_layout(profiles, find_lines(profiles), options.road)
     return profiles, layout, _centre(cloud, profiles, layout, options)
 
 
-def _centre(cloud: RoadCloud, profiles: Profiles, layout: RoadLayout, options: Options) -> Centre:
+def _centre(cloud: RoadCloud, profiles: Profiles, layout: RoadLayout, options: Options) -> MeasuredAxis:
     """Return the axis along the path: from the lines, or from a learned predictor."""
-    by_lines = centre_of(layout)
+    by_lines = axis_from_lines(layout)
     if options.predictor is None:
         return by_lines
     offset, std = options.predictor(cloud, profiles.path)
@@ -163,11 +165,11 @@ def _centre(cloud: RoadCloud, profiles: Profiles, layout: RoadLayout, options: O
     deviation = np.interp(stations, along[known], std[known])
     weights = np.where(inside, 1.0 / np.maximum(deviation, 0.01) ** 2, 0.0)
     smoothed = smooth(np.where(inside, raw, np.nan), weights, STRETCH * SPACING, 60.0)
-    return Centre(stations, smoothed.values, smoothed.std, np.where(inside, raw, np.nan))
+    return MeasuredAxis(stations, smoothed.values, smoothed.std, np.where(inside, raw, np.nan))
 
 
 def fit_axis_and_profile(
-    profiles: Profiles, layout: RoadLayout, centre: Centre, tolerance: float
+    profiles: Profiles, layout: RoadLayout, centre: MeasuredAxis, tolerance: float
 ) -> tuple[AxisFit, RotationAxis]:
     """Return alignment and profile through the axis, and the line about which the crossfall turns.
 
@@ -201,7 +203,7 @@ def _replace_faults(raw: Float, smoothed: Float) -> Float:
     return np.where(np.isfinite(raw) & (apart <= 4.0 * max(usual, 1e-3)), raw, smoothed)
 
 
-def _heights(profiles: Profiles, layout: RoadLayout, centre: Centre, rotation: str) -> tuple[Float, Float]:
+def _heights(profiles: Profiles, layout: RoadLayout, centre: MeasuredAxis, rotation: str) -> tuple[Float, Float]:
     """Return the heights (K,) of the right and left carriageway at the line that the crossfall turns about."""
     result = []
     axis = centre.offsets
@@ -247,7 +249,7 @@ def _smooth_fall(measured: Surface) -> Float:
     return smooth(measured.fall, known.astype(np.float64), STRETCH * SPACING, 15.0, order=2, usual=0.002).values
 
 
-def _notes(cloud: RoadCloud, section: MeasuredSection, measured: Measured) -> list[str]:
+def _notes(cloud: RoadCloud, section: MeasuredSection, measured: RoadMeasurements) -> list[str]:
     """Return what a reader of the parameter set must know."""
     single = "a single carriageway: written as two carriageways that meet in the middle line, one per direction"
     remarks = [

@@ -17,7 +17,7 @@ _FLOOR = 1e-9  # of the mean weight: what holds the solution where nothing was m
 
 
 @dataclass(frozen=True)
-class Smoothed:
+class SmoothedValues:
     """A smoothed sequence.
 
     Attributes:
@@ -33,7 +33,7 @@ class Smoothed:
 
 def smooth(
     values: Float, weights: Float, spacing: float, wavelength: float, order: int = ORDER, usual: float = 0.0
-) -> Smoothed:
+) -> SmoothedValues:
     """Smooth values (N,) at equal spacing by Whittaker's method, robustly (bisquare weights).
 
     Args:
@@ -51,7 +51,7 @@ def smooth(
     count = len(values)
     if known.sum() <= order:
         level = float(np.median(values[known])) if known.any() else 0.0
-        return Smoothed(np.full(count, level), np.full(count, np.inf), np.inf)
+        return SmoothedValues(np.full(count, level), np.full(count, np.inf), np.inf)
     given = np.where(known, values, 0.0)
     base = np.where(known, weights, 0.0)
     base = base / base[known].mean()
@@ -71,7 +71,7 @@ def smooth(
     scatter = float(np.sqrt(np.mean(residual**2))) if len(residual) else 0.0
     widening = np.sqrt(correlation_factor(residual))
     std = scatter * widening * np.sqrt(np.maximum(_inverse_diagonal(factor), 0.0))
-    return Smoothed(fitted, std, scatter)
+    return SmoothedValues(fitted, std, scatter)
 
 
 def correlation_factor(residual: Float) -> float:
@@ -89,7 +89,7 @@ def mean_with_std(values: Float, apart: Float | None = None) -> tuple[float, flo
     """Return a robust mean of values (N,) in order along the road and its standard deviation.
 
     Bisquare about the median; the deviation counts as many values as are independent of their neighbours, and what
-    `unseen` tells of the distances ``apart`` (N,) of the points they lie between. NaN and infinity for no values.
+    `hidden_std` tells of the distances ``apart`` (N,) of the points they lie between. NaN and infinity for no values.
     """
     known = np.isfinite(values)
     values = values[known]
@@ -106,10 +106,10 @@ def mean_with_std(values: Float, apart: Float | None = None) -> tuple[float, flo
     spread = float(np.sqrt(np.mean((values[kept] - middle) ** 2))) if kept.any() else 0.0
     independent = max(1.0, kept.sum() / correlation_factor(values[kept] - middle))
     std = spread / float(np.sqrt(independent))
-    return middle, float(np.hypot(std, unseen(apart[known], spread))) if apart is not None else std
+    return middle, float(np.hypot(std, hidden_std(apart[known], spread))) if apart is not None else std
 
 
-def unseen(apart: Float, scatter: float) -> float:
+def hidden_std(apart: Float, scatter: float) -> float:
     """Return the standard deviation of an offset that no scatter shows, because the points lie in rows along the road.
 
     What lies midway between two rows is off by up to half of their distance: evenly distributed, so by

@@ -12,7 +12,7 @@ from ..road.guidelines import LIMITS
 from ..road.objects import AnyWidth, Side
 from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Turnout
 from ..road.turnout_geometry import TurnoutShape
-from .placing.ranges import Range, Taken, free_ranges
+from .placing.ranges import Range, Reservations, free_ranges
 from .placing.site import PlacementSite
 
 NARROW, BROAD = 0.15, 0.30
@@ -54,7 +54,7 @@ class _Painter:
         """Yield the lines along lane boundaries: solid at the edges, dashed between lanes."""
         lanes, limits = self.carriageway.lanes, self.site.scenario.markings
         dash, gap = limits.lane_dash or LANE_DASH, limits.lane_gap or LANE_GAP
-        blocks = Taken(_block_span(shape) for shape in self.section.turnouts if shape.turnout.ramp)
+        blocks = Reservations(_block_span(shape) for shape in self.section.turnouts if shape.turnout.ramp)
         for number, span in enumerate(free_ranges(0.0, self.length, blocks)):
             name = f"{self.name}-line-0" + (f"-{number + 1}" if number else "")
             yield name, self._line("outer_edge", span, boundary=0, width=BROAD)

@@ -168,7 +168,7 @@ def may_change_lanes(scenario: RoadScenario, section: StandardCrossSection) -> b
     return len(section.lanes) >= (2 if by_hand else 3)
 
 
-def arrange(features: tuple[Feature, ...], length: float, rng: np.random.Generator) -> list[TurnoutPlace]:
+def arrange_features(features: tuple[Feature, ...], length: float, rng: np.random.Generator) -> list[TurnoutPlace]:
     """Draw which features a carriageway of a length (m) has, and their places in the order of traffic.
 
     Where they don't all fit, the certain ones (of share 1) come first.
@@ -182,17 +182,17 @@ def arrange(features: tuple[Feature, ...], length: float, rng: np.random.Generat
     order: list[tuple[float, Feature]] = []
     for *_, feature in sorted(candidates, key=lambda item: item[:3]):
         longer = sorted([*order, (rng.random(), feature)], key=lambda item: item[0])
-        if closest([(chosen, chosen.least) for _, chosen in longer])[-1] <= length:
+        if pack_features([(chosen, chosen.least) for _, chosen in longer])[-1] <= length:
             order = longer
     chosen = [feature for _, feature in order]
-    spare = length - closest([(feature, feature.least) for feature in chosen])[-1]
+    spare = length - pack_features([(feature, feature.least) for feature in chosen])[-1]
     extras = [[(high - low) * rng.random() for low, high in feature.lengths] for feature in chosen]
     granted = min(1.0, spare / max(math.fsum(map(math.fsum, extras)), 1e-9))
     lengths = [
         tuple(round_value(low + extra * granted) for (low, _), extra in zip(feature.lengths, parts, strict=True))
         for feature, parts in zip(chosen, extras, strict=True)
     ]
-    begins = closest([(f, f.fixed + math.fsum(parts)) for f, parts in zip(chosen, lengths, strict=True)])
+    begins = pack_features([(f, f.fixed + math.fsum(parts)) for f, parts in zip(chosen, lengths, strict=True)])
     spare = max(0.0, length - begins.pop())
     shifts = sorted(spare * rng.random() for _ in chosen)
     return [
@@ -201,7 +201,7 @@ def arrange(features: tuple[Feature, ...], length: float, rng: np.random.Generat
     ]
 
 
-def closest(stretches: Sequence[tuple[Feature, float]]) -> list[float]:
+def pack_features(stretches: Sequence[tuple[Feature, float]]) -> list[float]:
     """Return where features of given lengths (m) begin when each is as far forward as it may be, and where they end."""
     begins: list[float] = []
     reached, ends = -TURNOUT_GAP, dict[FeatureKind, float]()
@@ -299,7 +299,7 @@ class CarriagewaySampler:
         rng = stream(self.seed, "section", side)
         turnouts: dict[str, Turnout] = {}
         lanes = tuple(Lane(width=width) for width in self.section.lanes)
-        for place in arrange(self.features, self.length, rng):
+        for place in arrange_features(self.features, self.length, rng):
             if place.kind == "lane_change":
                 lanes = self._change_lane(lanes, place, side, rng)
                 continue

@@ -18,7 +18,7 @@ from ...road.things.noise_barrier import NoiseBarrier
 from ...scenario.road import BarrierLimits
 from .draw import draw, pick
 from .edge import STEP_OF_BARRIERS, Segment
-from .layout import BARRIER_AXIS, FAR_ZONE, Layout, Piece, Roadside
+from .layout import BARRIER_AXIS, FAR_ZONE, BarrierPiece, Layout, Roadside
 from .ranges import Range, draw_start, draw_stretch, free_ranges, lengthen_range, merge_ranges
 
 POST_SPACINGS = (4.0, 2.0, 1.33)
@@ -69,7 +69,7 @@ class BarrierSystem:
         """Return the first part of its barriers' ids."""
         return "concrete-barrier" if self.concrete else "guardrail"
 
-    def beside(self, roadside: Roadside, piece: Piece, terminal: float) -> LineObject:
+    def beside(self, roadside: Roadside, piece: BarrierPiece, terminal: float) -> LineObject:
         """Return a barrier of a piece; its nearest part stands 0.5 m from the base."""
         terminal = min(terminal, (piece.end - piece.start) / 4.0)
         if self.concrete:
@@ -191,7 +191,7 @@ def _inner(roadside: Roadside, segment: Segment) -> Range:
     return start, segment.end - _FROM_BORDER if segment.end < roadside.length else segment.end
 
 
-def _pieces(roadside: Roadside, stretches: list[Range]) -> Iterator[Piece]:
+def _pieces(roadside: Roadside, stretches: list[Range]) -> Iterator[BarrierPiece]:
     """Yield the barriers of stretches: one in each segment of the edge, long enough where there is room."""
     for segment in roadside.edge.segments:
         low, high = segment.start, segment.end
@@ -201,13 +201,13 @@ def _pieces(roadside: Roadside, stretches: list[Range]) -> Iterator[Piece]:
             if start < high and end > low
         ]
         for start, end in merge_ranges(inside, _JOIN):
-            piece = _prolong_piece(roadside, segment, Piece(start, end, segment.base, segment.ramp))
+            piece = _prolong_piece(roadside, segment, BarrierPiece(start, end, segment.base, segment.ramp))
             # Beside a gore no rule asks for a barrier: rather none than a stump.
             if not segment.ramp or piece.end - piece.start >= SHORTEST_BARRIER:
                 yield piece
 
 
-def _prolong_piece(roadside: Roadside, segment: Segment, piece: Piece) -> Piece:
+def _prolong_piece(roadside: Roadside, segment: Segment, piece: BarrierPiece) -> BarrierPiece:
     """Return a piece that fills a short segment made longer beside a neighbour that stands nearer to the road."""
     lack = SHORTEST_BARRIER - (piece.end - piece.start)
     if lack <= 0.0:

@@ -18,7 +18,7 @@ from ...road.things.beacon import ConstructionBeacon
 from ...road.things.temporary_barrier import TemporaryBarrier
 from .draw import draw, pick
 from .layout import Layout, Roadside
-from .ranges import Range, Taken, draw_start, free_ranges
+from .ranges import Range, Reservations, draw_start, free_ranges
 
 TAPERS_IN, TAPER_OUT = (60.0, 70.0, 80.0), 20.0
 """Lengths over which the lane is closed and opened again, m."""
@@ -77,7 +77,7 @@ def _zone(layout: Layout, roadside: Roadside, rng: np.random.Generator) -> Zone 
     limits, length = layout.site.scenario.furniture.construction_length, roadside.length
     section = layout.site.sections[roadside.side]
     turnouts = ((start - _TURNOUT_ROOM, end + _TURNOUT_ROOM) for start, end in roadside.turnouts.stretches)
-    free = free_ranges(0.0, length, Taken(turnouts), Taken(_changes(section.carriageway)))
+    free = free_ranges(0.0, length, Reservations(turnouts), Reservations(_changes(section.carriageway)))
     longest = max((end - start for start, end in free), default=0.0)
     least = max(TAPERS_IN[0] + SHORTEST_ALONG + TAPER_OUT, limits.minimum)
     most = min(longest, limits.maximum)

@@ -11,7 +11,7 @@ from ...road.things.pole import Pole
 from ...road.things.traffic_light import TrafficLight
 from .draw import draw, pick
 from .edge import ramp_station
-from .layout import Layout, Roadside, Spot
+from .layout import Layout, PlacementRequest, Roadside
 from .ranges import draw_start, free_ranges, nearest_free
 
 UTILITY_SIZES = ((0.8, 0.35, 1.1), (1.2, 0.4, 1.3), (0.6, 0.3, 0.9))
@@ -58,16 +58,16 @@ def plan_periodic(layout: Layout, rng: np.random.Generator) -> None:
 
 def put_kilometre_board(roadside: Roadside, station: float, halves: int) -> None:
     """Put a board that counts half kilometres."""
-    text = f"{halves // 2},{5 * (halves % 2)}"
+    fields = {"text": f"{halves // 2},{5 * (halves % 2)}"}
     outer = _gore_is_taken(roadside, station)
-    roadside.put(Spot("kilometre-board", KilometreBoard, station, _HALF, _BOARD_WIDTH, {"text": text}, outer=outer))
+    roadside.put(PlacementRequest("kilometre-board", KilometreBoard, station, _HALF, _BOARD_WIDTH, fields, outer=outer))
 
 
 def put_phone(roadside: Roadside, station: float) -> None:
     """Put an emergency phone."""
     outer = _gore_is_taken(roadside, station)
     fields = {"kind": "emergency_phone"}
-    roadside.put(Spot("emergency-phone", Cabinet, station, _HALF, _PHONE_WIDTH, fields, outer=outer))
+    roadside.put(PlacementRequest("emergency-phone", Cabinet, station, _HALF, _PHONE_WIDTH, fields, outer=outer))
 
 
 def _gore_is_taken(roadside: Roadside, station: float) -> bool:
@@ -85,7 +85,7 @@ def plan_traffic_lights(layout: Layout, rng: np.random.Generator) -> None:
             station = ramp_station(shape, min(shape.nose + LIGHT_BEFORE_NOSE, turnout.ramp.length))
             place = nearest_free(station, _HALF, LIGHT_BEFORE_NOSE, layout.length, roadside.near)
             if 0.0 <= station <= layout.length and place is not None:
-                roadside.put(Spot("traffic-light", TrafficLight, place, _HALF, LIGHT_WIDTH, outer=True))
+                roadside.put(PlacementRequest("traffic-light", TrafficLight, place, _HALF, LIGHT_WIDTH, outer=True))
 
 
 def plan_lighting(layout: Layout, rng: np.random.Generator) -> None:
@@ -128,9 +128,9 @@ def plan_cabinets(layout: Layout, rng: np.random.Generator) -> None:
         start = draw_start(rng, free_ranges(0.0, layout.length, roadside.near), 2.0 * _CABINET_HALF)
         if start is not None:
             fields = {"kind": "utility", "width": width, "depth": depth, "height": height}
-            roadside.put(Spot("cabinet", Cabinet, start + _CABINET_HALF, _CABINET_HALF, width, fields))
+            roadside.put(PlacementRequest("cabinet", Cabinet, start + _CABINET_HALF, _CABINET_HALF, width, fields))
 
 
 def _put_pole(roadside: Roadside, kind: str, station: float, height: float, diameter: float, arm: float) -> None:
     fields = {"kind": kind, "height": height, "diameter": diameter, "arm_length": arm}
-    roadside.put(Spot(f"pole-{kind}", Pole, station, _HALF, diameter, fields, obstacle=True))
+    roadside.put(PlacementRequest(f"pole-{kind}", Pole, station, _HALF, diameter, fields, obstacle=True))

@@ -88,7 +88,7 @@ def _behind(
 ) -> Iterator[tuple[str, RoadObject]]:
     """Yield what stands behind the barriers."""
     for roadside in layout.sides.values():
-        yield from roadside.stand()
+        yield from roadside.objects()
     yield from median_signs(layout)
     yield from gantries(layout, planned, streams["structures"])
     if bridge:

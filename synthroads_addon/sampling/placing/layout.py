@@ -18,7 +18,7 @@ from ...road.guidelines import OBSTACLE_LEAD, OBSTACLE_TAIL, TIGHT_CURVE
 from ...road.objects import PointObject, Side, least_width
 from ...road.things.sign import TrafficSign
 from .edge import EdgeProfile
-from .ranges import Range, Taken
+from .ranges import Range, Reservations
 from .site import PlacementSite
 
 BARRIER_AXIS = 0.70
@@ -37,7 +37,7 @@ _BESIDE_BARRIER = 0.5  # m along the road: what stands so near a barrier's end s
 _ISLAND_MARGIN = 0.6  # m: to a ramp's inner edge beyond what lies in the island
 
 
-class Piece(NamedTuple):
+class BarrierPiece(NamedTuple):
     """A barrier that stands.
 
     Attributes:
@@ -53,7 +53,7 @@ class Piece(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Spot:
+class PlacementRequest:
     """A thing of the small zone whose distance isn't known yet.
 
     Attributes:
@@ -92,7 +92,7 @@ class Roadside:
         crossed: stretches that an overpass crosses: no place for what is high.
         turnouts: stretches of turnouts.
         restless: stretches where an obstacle's barrier would meet a turnout.
-        spots: things of the small zone.
+        requests: things of the small zone.
         protected: stretches that need a barrier.
         pieces: the barriers that stand, in order.
     """
@@ -102,12 +102,12 @@ class Roadside:
         self.side, self.sign, self.traffic = side, carriageway.sign, carriageway.traffic
         self.length = site.length
         self.edge = EdgeProfile(section, self.length)
-        self.near, self.far, self.crossed = Taken(), Taken(), Taken()
-        self.turnouts = Taken(shape.range() for shape in section.turnouts)
-        self.restless = Taken((start - _CALM, end + _CALM) for start, end in self.turnouts.stretches)
-        self.spots: list[Spot] = []
+        self.near, self.far, self.crossed = Reservations(), Reservations(), Reservations()
+        self.turnouts = Reservations(shape.range() for shape in section.turnouts)
+        self.restless = Reservations((start - _CALM, end + _CALM) for start, end in self.turnouts.stretches)
+        self.requests: list[PlacementRequest] = []
         self.protected: list[Range] = []
-        self.pieces: list[Piece] = []
+        self.pieces: list[BarrierPiece] = []
 
     @property
     def facing(self) -> float:
@@ -127,13 +127,13 @@ class Roadside:
         """Ask for a barrier before an obstacle that stands between two stations."""
         self.protected.append(self._barrier_stretch(start, end))
 
-    def put(self, spot: Spot) -> None:
+    def put(self, request: PlacementRequest) -> None:
         """Put a thing into the small zone, and ask for its barrier."""
-        low, high = spot.station - spot.half, spot.station + spot.half
+        low, high = request.station - request.half, request.station + request.half
         self.near.add(low, high)
-        if spot.obstacle:
+        if request.obstacle:
             self.protect(low, high)
-        self.spots.append(spot)
+        self.requests.append(request)
 
     def front(self, start: float, end: float, depth: float, outer: bool = False) -> float:
         """Return the distance (m) from which zones are counted between two stations.
@@ -155,23 +155,24 @@ class Roadside:
         along = [p.base for p in self.pieces if p.start < last and p.end > first and not p.ramp]
         return max(self.front(start, end, depth), *along, 0.0)
 
-    def stand(self) -> Iterator[tuple[str, PointObject]]:
-        """Yield (id, object) of the spots in the order of their stations."""
+    def objects(self) -> Iterator[tuple[str, PointObject]]:
+        """Yield (id, object) of the requests in the order of their stations."""
         counts: Counter[str] = Counter()
-        for spot in sorted(self.spots, key=lambda item: item.station):
-            counts[spot.name] += 1
-            station, offset = round_value(spot.station), round_value(self.sign * self._distance(spot))
-            item = spot.make(instance=1, station=station, offset=offset, rotation_deg=self.facing, **spot.fields)
-            yield f"{spot.name}-{self.side}-{counts[spot.name]:03d}", item
+        for request in sorted(self.requests, key=lambda item: item.station):
+            counts[request.name] += 1
+            station, offset = round_value(request.station), round_value(self.sign * self._distance(request))
+            item = request.make(instance=1, station=station, offset=offset, rotation_deg=self.facing, **request.fields)
+            yield f"{request.name}-{self.side}-{counts[request.name]:03d}", item
 
-    def _distance(self, spot: Spot) -> float:
-        """Return the distance (m) of a spot's axis from the centreline."""
-        if spot.distance is not None:
-            return spot.distance
-        reach = max(spot.half, 1.0)
-        low, high, depth = spot.station - reach, spot.station + reach, SMALL_ZONE + spot.width + spot.shift
-        front = self.front_of_obstacle(low, high, depth) if spot.obstacle else self.front(low, high, depth, spot.outer)
-        return front + SMALL_ZONE + spot.width / 2.0 + spot.shift
+    def _distance(self, request: PlacementRequest) -> float:
+        """Return the distance (m) of a request's axis from the centreline."""
+        if request.distance is not None:
+            return request.distance
+        reach = max(request.half, 1.0)
+        low, high, depth = request.station - reach, request.station + reach, SMALL_ZONE + request.width + request.shift
+        obstacle, outer = request.obstacle, request.outer
+        front = self.front_of_obstacle(low, high, depth) if obstacle else self.front(low, high, depth, outer)
+        return front + SMALL_ZONE + request.width / 2.0 + request.shift
 
     def _barrier_stretch(self, start: float, end: float) -> Range:
         """Return the stretch of the barrier before an obstacle that stands between two stations."""
@@ -191,7 +192,7 @@ class MedianStrip:
     """
 
     inner: dict[Side, float]
-    taken: Taken = field(default_factory=Taken)
+    taken: Reservations = field(default_factory=Reservations)
     has_obstacles: bool = False
     signs: list[TrafficSign] = field(default_factory=list)
 

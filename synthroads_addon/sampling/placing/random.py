@@ -18,9 +18,9 @@ from ...road.things.traffic_light import TrafficLight
 from .barriers import TERMINAL, BarrierSystem
 from .draw import pick
 from .equipment import LARGEST_KILOMETRE, LIGHT_WIDTH, put_kilometre_board, put_phone
-from .layout import BARRIER_AXIS, Layout, Piece, Roadside, Spot
-from .ranges import Taken, draw_start, draw_stretch, free_ranges
-from .signs import destination_values, stand
+from .layout import BARRIER_AXIS, BarrierPiece, Layout, PlacementRequest, Roadside
+from .ranges import Reservations, draw_start, draw_stretch, free_ranges
+from .signs import destination_values, place_sign
 
 SIGNS_PER_KM, BOARDS_PER_KM, PHONES_PER_KM, DELINEATORS_PER_KM, BARRIERS_PER_KM = 5.0, 2.0, 0.5, 20.0, 2.0
 """How many there are of each beside a carriageway on average, about as many as by the rules."""
@@ -40,7 +40,7 @@ def plan_random_signs(layout: Layout, rng: np.random.Generator) -> None:
     for roadside in layout.sides.values():
         for _ in range(_count(SIGNS_PER_KM, layout, rng)):
             station = layout.length * rng.random()
-            stand(roadside, pick(rng, codes), station, layout.length, destination_values(rng), pick(rng, SHIFTS))
+            place_sign(roadside, pick(rng, codes), station, layout.length, destination_values(rng), pick(rng, SHIFTS))
 
 
 def plan_random_equipment(layout: Layout, rng: np.random.Generator) -> None:
@@ -54,7 +54,7 @@ def plan_random_equipment(layout: Layout, rng: np.random.Generator) -> None:
         if rng.random() < furniture.traffic_lights:
             for station in _stations(roadside, PHONES_PER_KM, layout, rng):
                 shift = pick(rng, SHIFTS)
-                roadside.put(Spot("traffic-light", TrafficLight, station, _HALF, LIGHT_WIDTH, shift=shift))
+                roadside.put(PlacementRequest("traffic-light", TrafficLight, station, _HALF, LIGHT_WIDTH, shift=shift))
 
 
 def random_median_barrier(layout: Layout, rng: np.random.Generator) -> Iterator[tuple[str, LineObject]]:
@@ -72,14 +72,14 @@ def random_front(
     layout: Layout, roadside: Roadside, rng: np.random.Generator
 ) -> Iterator[tuple[str, LineObject | Delineator]]:
     """Yield the barriers and delineators of one side."""
-    limits, taken = layout.site.scenario.barriers, Taken()
+    limits, taken = layout.site.scenario.barriers, Reservations()
     system = BarrierSystem.draw(rng, limits, limits.concrete_roadside)
     for _ in range(_count(BARRIERS_PER_KM, layout, rng) if limits.roadside else 0):
         segment = pick(rng, roadside.edge.segments)
         span = draw_stretch(rng, free_ranges(segment.start, segment.end, taken), *BARRIER_LENGTHS)
         if span:
             taken.add(*span)
-            roadside.pieces.append(Piece(*span, segment.base, segment.ramp))
+            roadside.pieces.append(BarrierPiece(*span, segment.base, segment.ramp))
     for number, piece in enumerate(roadside.pieces, start=1):
         moved = piece._replace(base=piece.base + pick(rng, BARRIER_SHIFTS))
         yield f"{system.name}-{roadside.side}-{number}", system.beside(roadside, moved, TERMINAL)
@@ -88,7 +88,7 @@ def random_front(
 
 
 def _delineators(
-    layout: Layout, roadside: Roadside, taken: Taken, rng: np.random.Generator
+    layout: Layout, roadside: Roadside, taken: Reservations, rng: np.random.Generator
 ) -> Iterator[tuple[str, Delineator]]:
     for number in range(1, _count(DELINEATORS_PER_KM, layout, rng) + 1):
         start = draw_start(rng, free_ranges(0.0, layout.length, taken), 2.0 * _DELINEATOR_HALF)

@@ -11,7 +11,7 @@ Range = tuple[float, float]
 """Lowest and highest station, m."""
 
 
-class Taken:
+class Reservations:
     """Stretches that are taken; they may overlap."""
 
     def __init__(self, stretches: Iterable[Range] = ()) -> None:
@@ -30,7 +30,7 @@ class Taken:
         return not self.within(start, end)
 
 
-def free_ranges(low: float, high: float, *taken: Taken) -> list[Range]:
+def free_ranges(low: float, high: float, *taken: Reservations) -> list[Range]:
     """Return the parts of low to high (m) that none has taken, in order."""
     free, reached = [], low
     for start, end in sorted(stretch for item in taken for stretch in item.within(low, high)):
@@ -63,7 +63,7 @@ def draw_stretch(rng: np.random.Generator, ranges: list[Range], least: float, mo
     return None if start is None else (start, start + length)
 
 
-def nearest_free(station: float, half: float, room: float, length: float, *taken: Taken) -> float | None:
+def nearest_free(station: float, half: float, room: float, length: float, *taken: Reservations) -> float | None:
     """Return the nearest station at which a thing fits between what is taken, or None.
 
     Args:

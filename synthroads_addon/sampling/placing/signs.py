@@ -16,7 +16,7 @@ from ...road.things.sign import TrafficSign
 from ...road.things.sign_catalogue import SignType, sign_catalogue
 from ...road.turnout_geometry import STEP, TurnoutShape
 from .edge import island_begin, ramp_station
-from .layout import MEDIAN_BARRIER_HALF, MEDIAN_OBSTACLE, Layout, Roadside, Spot
+from .layout import MEDIAN_BARRIER_HALF, MEDIAN_OBSTACLE, Layout, PlacementRequest, Roadside
 from .ranges import Range, nearest_free
 
 CURVE_SIGNS = (400.0, 200.0)
@@ -52,7 +52,8 @@ def plan_gore_signs(layout: Layout) -> None:
                 continue
             fields = sign.fields() | {"width": round_value(width), "code": GORE_SIGN, "text": sign.text}
             middle = (inner + outer) / 2.0
-            roadside.put(Spot("sign-gore", TrafficSign, station, _LARGE_HALF, width, fields, distance=middle))
+            board = PlacementRequest("sign-gore", TrafficSign, station, _LARGE_HALF, width, fields, distance=middle)
+            roadside.put(board)
 
 
 def plan_exit_signs(layout: Layout, rng: np.random.Generator) -> None:
@@ -63,7 +64,7 @@ def plan_exit_signs(layout: Layout, rng: np.random.Generator) -> None:
             values = {"number": number, "exit": names[0], "near": names[1], "middle": names[1], "far": names[2]}
             for distance, code in EXIT_SEQUENCE.items():
                 station = roadside.ahead(layout.site.begin(turnout), -distance)
-                stand(roadside, code, station, EXIT_SIGN_ROOM, values)
+                place_sign(roadside, code, station, EXIT_SIGN_ROOM, values)
 
 
 def plan_other_signs(layout: Layout, rng: np.random.Generator, zones: dict[Side, Range]) -> None:
@@ -81,14 +82,14 @@ def plan_other_signs(layout: Layout, rng: np.random.Generator, zones: dict[Side,
         limit = URBAN_LIMITS[int(rng.integers(len(URBAN_LIMITS)))]
         begin = 0.0 if roadside.traffic > 0 else layout.length
         if urban:
-            stand(roadside, limit, roadside.ahead(begin, LIMIT_BEHIND_BEGIN), _ROOM)
+            place_sign(roadside, limit, roadside.ahead(begin, LIMIT_BEHIND_BEGIN), _ROOM)
         for turnout in layout.site.turnouts_of_kind(side, "entry"):
             _behind_entry(layout, roadside, turnout, limit if urban else None, rng)
         for code, station in _curve_signs(layout, roadside):
-            stand_on_both_sides(layout, roadside, code, station)
+            place_sign_on_both_sides(layout, roadside, code, station)
 
 
-def stand(
+def place_sign(
     roadside: Roadside, code: str, station: float, room: float, values: dict[str, str] | None = None, shift: float = 0.0
 ) -> bool:
     """Put a sign as near as possible to a station; return whether there is room for it.
@@ -112,15 +113,15 @@ def stand(
         return False
     text = tuple(line.format(**values) for line in sign.text) if values else sign.text
     fields = sign.fields() | {"code": code, "text": text}
-    roadside.put(Spot("sign", TrafficSign, place, half, sign.width, fields, shift, obstacle=large))
+    roadside.put(PlacementRequest("sign", TrafficSign, place, half, sign.width, fields, shift, obstacle=large))
     if large:
         roadside.far.add(place - half, place + half)
     return True
 
 
-def stand_on_both_sides(layout: Layout, roadside: Roadside, code: str, station: float) -> None:
+def place_sign_on_both_sides(layout: Layout, roadside: Roadside, code: str, station: float) -> None:
     """Put a sign to the right of a carriageway, and one into the median where that has room for it."""
-    if not stand(roadside, code, station, _ROOM):
+    if not place_sign(roadside, code, station, _ROOM):
         return
     sign, median = sign_catalogue().signs[code], layout.median
     if median.has_obstacles or not layout.site.scenario.barriers.median:
@@ -170,15 +171,15 @@ def _behind_entry(
 ) -> None:
     end = roadside.ahead(layout.site.begin(turnout), turnout.length)
     if limit:
-        stand(roadside, limit, roadside.ahead(end, LIMIT_BEHIND_ENTRY), _ROOM)
-    stand(roadside, "453", roadside.ahead(end, TABLE_BEHIND_ENTRY), _ROOM, destination_values(rng))
+        place_sign(roadside, limit, roadside.ahead(end, LIMIT_BEHIND_ENTRY), _ROOM)
+    place_sign(roadside, "453", roadside.ahead(end, TABLE_BEHIND_ENTRY), _ROOM, destination_values(rng))
 
 
 def _announce_construction(layout: Layout, roadside: Roadside, zone: Range) -> None:
     first, last = zone if roadside.traffic > 0 else (zone[1], zone[0])
     for distance, code in CONSTRUCTION_SIGNS.items():
-        stand_on_both_sides(layout, roadside, code, roadside.ahead(first, -distance))
-    stand_on_both_sides(layout, roadside, "282", roadside.ahead(last, CONSTRUCTION_END))
+        place_sign_on_both_sides(layout, roadside, code, roadside.ahead(first, -distance))
+    place_sign_on_both_sides(layout, roadside, "282", roadside.ahead(last, CONSTRUCTION_END))
 
 
 def _curve_signs(layout: Layout, roadside: Roadside) -> Iterator[tuple[str, float]]:

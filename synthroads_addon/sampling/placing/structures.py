@@ -16,7 +16,7 @@ from ...road.things.overpass import Overpass
 from ...road.things.sign_catalogue import sign_catalogue
 from .draw import draw, pick
 from .layout import SMALL_ZONE, Layout, Roadside
-from .ranges import Taken, draw_start, free_ranges
+from .ranges import Reservations, draw_start, free_ranges
 
 Kind = Literal["one_sided", "two_sided", "cantilever"]
 BEAMS: tuple[tuple[Literal["box", "truss", "tube"], float, float], ...] = (
@@ -125,7 +125,7 @@ def _kind(layout: Layout, rng: np.random.Generator) -> tuple[Kind, tuple[Side, .
     return kind, sides if kind == "two_sided" else (side,)
 
 
-def _in_the_way(layout: Layout, kind: Kind, sides: tuple[Side, ...]) -> list[Taken]:
+def _in_the_way(layout: Layout, kind: Kind, sides: tuple[Side, ...]) -> list[Reservations]:
     """Return what a gantry has to keep clear of."""
     obstacles = [] if kind == "cantilever" else [layout.median.taken]
     for roadside in (layout.sides[side] for side in sides):

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from synthroads_addon.sampling.placing.ranges import (
-    Taken,
+    Reservations,
     draw_start,
     free_ranges,
     lengthen_range,
@@ -20,7 +20,7 @@ STRETCHES = st.lists(
 
 @given(STRETCHES, st.integers(0, 100), st.integers(1, 30))
 def test_what_is_free_is_what_none_has_taken(stretches: list[tuple[float, float]], start: int, length: int) -> None:
-    taken = Taken(stretches)
+    taken = Reservations(stretches)
     low, high = float(start), float(start + length)
     overlaps = any(a < high and b > low for a, b in stretches)
     assert taken.is_free(low, high) != overlaps
@@ -32,13 +32,13 @@ def test_what_is_free_is_what_none_has_taken(stretches: list[tuple[float, float]
 
 
 def test_free_of_several() -> None:
-    assert free_ranges(0.0, 10.0, Taken([(1.0, 2.0), (4.0, 5.0)]), Taken([(4.5, 7.0)])) == [
+    assert free_ranges(0.0, 10.0, Reservations([(1.0, 2.0), (4.0, 5.0)]), Reservations([(4.5, 7.0)])) == [
         (0.0, 1.0),
         (2.0, 4.0),
         (7.0, 10.0),
     ]
     assert free_ranges(0.0, 10.0) == [(0.0, 10.0)]
-    assert free_ranges(0.0, 10.0, Taken([(-5.0, 20.0)])) == []
+    assert free_ranges(0.0, 10.0, Reservations([(-5.0, 20.0)])) == []
 
 
 def test_a_place_is_drawn_evenly_from_all_that_have_room() -> None:
@@ -54,14 +54,14 @@ def test_a_place_is_drawn_evenly_from_all_that_have_room() -> None:
 
 
 def test_the_nearest_place() -> None:
-    taken = Taken([(9.0, 12.0)])
+    taken = Reservations([(9.0, 12.0)])
     assert nearest_free(5.0, 0.5, 3.0, 100.0, taken) == 5.0
     assert nearest_free(10.0, 0.5, 3.0, 100.0, taken) == 8.5
     assert nearest_free(11.0, 0.5, 3.0, 100.0, taken) == 12.5
     assert nearest_free(10.5, 0.5, 1.0, 100.0, taken) is None
-    assert nearest_free(0.2, 0.5, 3.0, 100.0, Taken([(0.0, 1.0)])) == 1.5
+    assert nearest_free(0.2, 0.5, 3.0, 100.0, Reservations([(0.0, 1.0)])) == 1.5
     # Nothing is moved off the road.
-    assert nearest_free(99.8, 0.5, 3.0, 100.0, Taken([(98.0, 99.6)])) == 97.5
+    assert nearest_free(99.8, 0.5, 3.0, 100.0, Reservations([(98.0, 99.6)])) == 97.5
 
 
 def test_ranges_are_joined_and_made_longer() -> None:
