@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 import numpy as np
 import torch
 from pydantic import Field
-from torch import Tensor
 
 from synthroads_addon.base.arrays import Bool, Float, Index
 from synthroads_addon.base.schema import quantity
@@ -19,8 +18,9 @@ from ..data.corridor import CORRIDOR, Truth
 from ..data.frames import Frames, interleave_count, stretches
 from ..data.roads import LearningRoad
 from ..data.slices import FrameSlices, SliceSettings, collate
-from ..networks.centerline.models import LINES, TARGETS, CenterlineModel, both_ways
+from ..networks.centerline.models import LINES, TARGETS, CenterlineModel, all_targets, both_ways
 from ..scores.calibration import IntervalCalibration, all_calibrated
+from ..training_loop import moved_to
 
 _NEAR = 2
 """A frame with no point in it nor in this many frames to either side has no prediction."""
@@ -152,16 +152,16 @@ class CenterlinePredictor:
     def _sequences(self, road: LearningRoad, frames: Frames) -> Iterator[tuple[Index, Float, Bool, Float, Float]]:
         """Yield of all slices of some sequences: frame, z origin, whether there are points, values and deviations."""
         data = FrameSlices(road, frames, self.settings, self.use.step)
-        device = next(self.model.parameters()).device
         self.model.eval()
         for first in range(0, len(data), self.use.batch):
             some = data.runs[first : first + self.use.batch]
             samples = [data[number] for number in range(first, first + len(some))]
-            batch = {name: values.to(device) for name, values in collate(samples).items()}
+            batch = moved_to(self.model, collate(samples))
             with torch.no_grad():
                 output = both_ways(self.model, batch) if self.use.mirror else self.model(batch)
-            values = _flat(output["center"], output["corridor"])
-            deviations = _flat(output["center_std"], output["corridor_std"])
+            values, deviations = (
+                all_targets(output, kind).flatten(0, 1).cpu().numpy().astype(np.float64) for kind in ("", "_std")
+            )
             filled = batch["mask"].any(-1).flatten().cpu().numpy()
             yield some.flatten(), batch["frame"][..., 3].flatten().cpu().numpy(), filled, values, deviations
 
@@ -204,15 +204,8 @@ def _crossing_of(one: Float, x: Float, y: Float, xx: Float, xy: Float) -> Float:
 
 def errors(found: Regression, truth: Truth) -> Float:
     """Return what was found minus the truth (M, T), NaN where either is missing."""
-    frames = found.frames
-    there = truth.at(frames.position, frames.direction, np.zeros(len(frames)))
+    there = truth.at(found.frames)
     return found.value - np.column_stack([there.center, there.corridor])
-
-
-def _flat(center: Tensor, corridor: Tensor) -> Float:
-    """Return values (B S, T) of the targets."""
-    both = torch.cat([center[..., None], corridor], dim=-1).flatten(0, 1)
-    return both.cpu().numpy().astype(np.float64)
 
 
 assert TARGETS[1:] == CORRIDOR

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -22,7 +22,7 @@ from ..data.effects import SequenceEffects
 from ..data.frames import read_path
 from ..data.slices import Batch, SliceSettings
 from ..networks.centerline.losses import LossOptions, centerline_loss
-from ..networks.centerline.models import TARGETS, CenterlineModel, ModelOptions
+from ..networks.centerline.models import TARGETS, CenterlineModel, ModelOptions, all_targets
 from ..networks.centerline.transformer import TransformerOptions
 from ..processes import helpers
 from ..registry import network_union
@@ -241,19 +241,14 @@ def calibrate(run: Run[CenterlineConfiguration], model: CenterlineModel, roads: 
 def _residuals(model: nn.Module, batches: Sequence[Batch]) -> tuple[Any, Any]:
     """Return errors and deviations (N, T) of all slices of some batches; errors are NaN where the truth is."""
     model.eval()
-    pairs = list(_pairs(model, batches))
-    return tuple(np.concatenate([pair[side] for pair in pairs]).astype(np.float64) for side in (0, 1))
-
-
-def _pairs(model: nn.Module, batches: Sequence[Batch]) -> Iterator[tuple[Any, Any]]:
+    error, std = [], []
     for batch in batches:
         moved = moved_to(model, batch)
         with torch.no_grad():
             output = model(moved)
-        value = torch.cat([output["center"][..., None], output["corridor"]], dim=-1)
-        std = torch.cat([output["center_std"][..., None], output["corridor_std"]], dim=-1)
-        true = torch.cat([moved["center"][..., None], moved["corridor"]], dim=-1)
-        yield (value - true).flatten(0, 1).cpu().numpy(), std.flatten(0, 1).cpu().numpy()
+        error.append((all_targets(output) - all_targets(moved)).flatten(0, 1).cpu().numpy())
+        std.append(all_targets(output, "_std").flatten(0, 1).cpu().numpy())
+    return np.concatenate(error).astype(np.float64), np.concatenate(std).astype(np.float64)
 
 
 def _mean_size(values: Any) -> float | None:

@@ -16,6 +16,7 @@ from synthroads_addon.road.section_geometry import CarriagewaySection
 from synthroads_addon.road.turnout_geometry import TURNOUT_STRIPS
 
 from .axis import MeasuredAxis
+from .frames import Frames
 
 TruthKind = Literal["road", "carriageway"]
 TRUTH_KINDS: tuple[TruthKind, ...] = ("road", "carriageway")
@@ -82,43 +83,28 @@ class Truth:
             right=None if self.right is None else self.right.moved(by),
         )
 
-    def at(self, position: Float, direction: Float, height: Float) -> Crossings:
-        """Return the truth in frames.
-
-        Args:
-            position: (M, 2) origins of the frames.
-            direction: (M,) directions of their x axes, rad. The road may run against them.
-            height: (M,) elevations of their origins, m.
-        """
-        center, station = self.axis.crossing(position, direction)
-        turn = self.axis.direction(station) - direction
+    def at(self, frames: Frames) -> Crossings:
+        """Return the truth in M frames; the road may run against them. Heights are those of the axis itself, m."""
+        center, station = self.axis.crossing(frames.position, frames.direction)
+        turn = self.axis.direction(station) - frames.direction
         against = np.cos(turn) < 0.0
+        unknown = np.full(len(center), np.nan)
+
+        def as_seen(left: Float, right: Float) -> Float:
+            """Return what is to the frames' left and right (M, 2) of what is to the road's."""
+            return np.column_stack([np.where(against, right, left), np.where(against, left, right)])
+
         edges = [
-            np.full(len(center), np.nan) if line is None else line.crossing(position, direction)[0]
+            unknown if line is None else line.crossing(frames.position, frames.direction)[0]
             for line in (self.left, self.right)
         ]
-        corridor = np.column_stack(
-            [
-                np.where(against, edges[1], edges[0]),
-                np.where(against, edges[0], edges[1]),
-                self._along(self.lanes, station),
-                self._along(self.lane_width, station),
-                (turn + np.pi / 2) % np.pi - np.pi / 2,
-                self.axis.elevation(station) - height if self.has_height else np.full(len(center), np.nan),
-            ]
-        )
+        heading = (turn + np.pi / 2) % np.pi - np.pi / 2
+        height = self.axis.elevation(station) if self.has_height else unknown
+        lanes = [self._along(values, station) for values in (self.lanes, self.lane_width)]
+        corridor = np.column_stack([as_seen(edges[0], edges[1]), *lanes, heading, height])
         corridor[np.isnan(center)] = np.nan
-        sides = [np.where(against, 1, 0), np.where(against, 0, 1)]
-        lines = np.column_stack([self._along(self.lines[:, 0], station), self._along(self.lines[:, 1], station)])
-        room = np.column_stack([self._along(self.room[:, 0], station), self._along(self.room[:, 1], station)])
-        row = np.arange(len(center))
-        return Crossings(
-            center,
-            station,
-            corridor,
-            lines=np.column_stack([lines[row, side] for side in sides]),
-            room=np.column_stack([room[row, side] for side in sides]),
-        )
+        lines, room = (as_seen(*(self._along(side, station) for side in both.T)) for both in (self.lines, self.room))
+        return Crossings(center, station, corridor, lines, room)
 
     def _along(self, values: Float, station: Float) -> Float:
         """Return values (M,) at stations between the vertices: the lower of both neighbours' where one is infinite."""

@@ -196,7 +196,7 @@ def stretch(road: LearningRoad, frames: Frames, settings: SliceSettings) -> Stre
         unknown = np.full((len(frames), len(CORRIDOR)), np.nan)
         center, corridor, lines, room = unknown[:, 0], unknown, unknown[:, :2], unknown[:, :2]
     else:
-        there = road.truth.at(frames.position, frames.direction, np.zeros(len(frames)))
+        there = road.truth.at(frames)
         center, corridor, lines, room = there.center, there.corridor, there.lines, there.room
     cut = Stretch(
         coord=np.column_stack([found.xy, road.xyz[found.index, 2].astype(np.float64)]),

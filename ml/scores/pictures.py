@@ -17,7 +17,6 @@ from synthroads_addon.base.classes import ClassScheme, class_scheme
 
 from ..data.classes import IGNORED
 from ..data.corridor import CORRIDOR
-from ..data.frames import Frames
 from ..data.tiles import CloudTile
 from .calibration import DEVIATIONS, LEVELS
 from .evaluation import CORRIDOR_COLUMNS, Case
@@ -172,7 +171,11 @@ def _beside(shown: Case, points: Float, view: PictureView) -> tuple[Float, Float
     there = np.isfinite(points).all(axis=1)
     station, offset = truth.axis.project(points[there])
     inside = (station >= view.first) & (station <= view.last) & truth.axis.inside(station)
-    station, offset = station[inside], offset[inside]
+    return _by_station(station[inside], offset[inside])
+
+
+def _by_station(station: Float, offset: Float) -> tuple[Float, Float]:
+    """Return stations and offsets of points ordered, with NaN where they aren't joined."""
     order = np.argsort(station)
     station, offset = station[order], offset[order]
     breaks = np.flatnonzero(np.diff(station) > _APART) + 1
@@ -191,32 +194,28 @@ def _half_width(column: Mapping[str, Float], name: str, level: int) -> Float:
 def _band(axes: Axes, shown: Case, view: PictureView, y: Float, width: Float, color: str, label: str | None) -> None:
     """Draw a line with an interval of 95 %."""
     station, offset = _beside(shown, shown.frames.at(y), view)
-    _, low = _across(shown, shown.frames, y - width, view)
-    at, high = _across(shown, shown.frames, y + width, view)
+    _, low = _across(shown, y - width, view)
+    at, high = _across(shown, y + width, view)
     axes.fill_between(at, low, high, color=color, alpha=0.35, lw=0, label=None if label is None else f"{label}, 95 %")
     axes.plot(station, offset, color=color, lw=1.3, label=label)
 
 
-def _across(shown: Case, frames: Frames, y: Float, view: PictureView) -> tuple[Float, Float]:
+def _across(shown: Case, y: Float, view: PictureView) -> tuple[Float, Float]:
     """Return the frames' stations on the true axis (K,) and the offsets of their points, in the frames' order."""
-    truth = shown.road.known_truth
-    _, station = truth.axis.crossing(frames.position, frames.direction)
+    axis, frames = shown.road.known_truth.axis, shown.frames
+    _, station = axis.crossing(frames.position, frames.direction)
     inside = (station >= view.first) & (station <= view.last) & np.isfinite(y)
-    _, offset = truth.axis.project(frames.at(y)[inside])
-    order = np.argsort(station[inside])
-    station, offset = station[inside][order], offset[order]
-    breaks = np.flatnonzero(np.diff(station) > _APART) + 1
-    return np.insert(station, breaks, np.nan), np.insert(offset, breaks, np.nan)
+    return _by_station(station[inside], axis.project(frames.at(y)[inside])[1])
 
 
 def _center_error(axes: Axes, shown: Case, view: PictureView, column: Mapping[str, Float]) -> None:
     y = column["center"]
-    station, offset = _across(shown, shown.frames, y, view)
+    station, offset = _across(shown, y, view)
     for level, alpha in ((95, 0.2), (68, 0.35)):
         width = _half_width(column, "center", level)
         if width.any():
-            at, low = _across(shown, shown.frames, y - width, view)
-            _, high = _across(shown, shown.frames, y + width, view)
+            at, low = _across(shown, y - width, view)
+            _, high = _across(shown, y + width, view)
             axes.fill_between(at, low, high, color=CENTER, alpha=alpha, lw=0, label=f"{level} %")
     axes.plot(station, offset, color=CENTER, lw=1.2, label="predicted centre")
     axes.axhline(0.0, color="black", lw=1.0)
@@ -225,7 +224,7 @@ def _center_error(axes: Axes, shown: Case, view: PictureView, column: Mapping[st
 
 
 def _lanes(axes: Axes, shown: Case, view: PictureView, column: Mapping[str, Float]) -> None:
-    there = shown.road.known_truth.at(shown.frames.position, shown.frames.direction, np.zeros(len(shown.frames)))
+    there = shown.road.known_truth.at(shown.frames)
     inside = np.flatnonzero((there.station >= view.first) & (there.station <= view.last))
     inside = inside[np.argsort(there.station[inside])]
     station = there.station[inside]

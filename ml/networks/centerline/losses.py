@@ -12,7 +12,7 @@ from synthroads_addon.base.schema import quantity
 
 from ...configuration import Part
 from ...data.slices import Batch
-from .models import LINES, SCALE, TARGETS, Output
+from .models import LINES, SCALE, TARGETS, Output, all_targets
 
 Figures = dict[str, float]
 
@@ -91,8 +91,7 @@ def centerline_loss(options: LossOptions, half_width: float) -> Callable[[nn.Mod
 
     def loss(model: nn.Module, batch: Batch) -> tuple[Tensor, Figures]:
         output: Output = model(batch)
-        true = torch.cat([batch["center"][..., None], batch["corridor"]], dim=-1)
-        found = torch.cat([output["center"][..., None], output["corridor"]], dim=-1)
+        true, found = all_targets(batch), all_targets(output)
         known = ~torch.isnan(true)
         error = (found - torch.where(known, true, found.detach())) / found.new_tensor(SCALE)
         weight = found.new_tensor([1.0] + [options.corridor] * (len(TARGETS) - 1))

@@ -15,6 +15,7 @@ spacing is the same road moved. Frames are only used relative to each other.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Literal
 
 import torch
@@ -177,6 +178,11 @@ class SequenceModel(CenterlineModel):
         weight = torch.exp(2.0 * torch.tanh(0.5 * self.trust(context)[..., 0]))
         guess, heading = parabola(frame, center, weight, torch.exp(self.stiffness))
         return guess, heading + found["corridor"][..., CORRIDOR.index("heading")]
+
+
+def all_targets(values: Mapping[str, Tensor], kind: str = "") -> Tensor:
+    """Return what is said of the centre and the corridor (..., T), columns `TARGETS`; ``kind`` may be ``_std``."""
+    return torch.cat([values[f"center{kind}"][..., None], values[f"corridor{kind}"]], dim=-1)
 
 
 def both_ways(model: nn.Module, batch: Batch) -> Output:

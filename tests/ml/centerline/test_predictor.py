@@ -139,7 +139,7 @@ def test_errors_of_the_truth_itself_are_none():
     known = road().truth
     assert known is not None
     places = frames()
-    there = known.at(places.position, places.direction, np.zeros(len(places)))
+    there = known.at(places)
     value = np.column_stack([there.center, there.corridor])
     found = Regression(places, value, *(np.ones_like(value) for _ in range(2)), np.ones((*value.shape, 2)))
     np.testing.assert_allclose(errors(found, known), 0.0, atol=1e-12)

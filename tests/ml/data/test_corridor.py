@@ -26,18 +26,13 @@ def on_the_axis(truth: Truth) -> Frames:
     return frames.select(slice(1, -1))
 
 
-def zeros(frames: Frames) -> np.ndarray:
-    return np.zeros(len(frames))
-
-
-@pytest.mark.parametrize("section", ["RQ31", "RQ36", "RQ43.5"])
 def test_whole_road_is_that_of_the_parameters(section: str) -> None:
     road = parameters(section)
     geometry = RoadGeometry(road)
     origin = np.array(road.transform.translate) + [100.0, -200.0, 3.0]
     truth = truths(road, "road", origin)[0]
     frames = on_the_axis(truth)
-    there = truth.at(frames.position, frames.direction, zeros(frames))
+    there = truth.at(frames)
     np.testing.assert_allclose(there.center, 0.0, atol=1e-3)
     offsets = geometry.offsets(frames.station)
     paved = [index for index, strip in enumerate(geometry.strips) if strip.class_name == "road"]
@@ -57,7 +52,7 @@ def test_frames_beside_the_axis_and_turned_see_the_road_where_it_is() -> None:
     truth = truths(parameters(), "road")[0]
     exact = on_the_axis(truth)
     frames = displace_frames(exact, np.random.default_rng(3), 12.0, 2.0, 60.0)
-    there = truth.at(frames.position, frames.direction, zeros(frames) + 1.5)
+    there = truth.at(frames)
     for name, line in (("left_edge", truth.left), ("right_edge", truth.right)):
         assert line is not None
         at = frames.at(there.corridor[:, COLUMN[name]])
@@ -72,9 +67,9 @@ def test_frames_beside_the_axis_and_turned_see_the_road_where_it_is() -> None:
 def test_frames_against_the_road_see_it_turned_by_half(kind: str) -> None:
     for truth in truths(parameters(), kind):  # type: ignore[arg-type]
         frames = displace_frames(on_the_axis(truth), np.random.default_rng(3), 12.0, 2.0, 60.0)
-        there = truth.at(frames.position, frames.direction, zeros(frames))
+        there = truth.at(frames)
         back = frames.turned_round()
-        turned = truth.at(back.position, back.direction, zeros(frames))
+        turned = truth.at(back)
         np.testing.assert_allclose(turned.center[::-1], -there.center, atol=1e-9)
         for name, other in (("left_edge", "right_edge"), ("right_edge", "left_edge")):
             np.testing.assert_allclose(
@@ -98,7 +93,7 @@ def test_carriageway_is_centred_on_its_lane_line() -> None:
         boundaries = section.lane_boundaries(station)
         np.testing.assert_allclose(sign * offset, boundaries[:, 1], atol=1e-6)
         frames = on_the_axis(truth)
-        there = truth.at(frames.position, frames.direction, zeros(frames))
+        there = truth.at(frames)
         outer, inner = boundaries[0, 0] - boundaries[0, 1], boundaries[0, 1] - boundaries[0, 2]
         left, right = (outer, inner) if sign > 0 else (inner, outer)
         np.testing.assert_allclose(there.lines, np.tile([left, right], (len(frames), 1)), atol=1e-6)
@@ -128,7 +123,7 @@ def test_where_a_lane_ends_their_number_is_unknown() -> None:
     road = dropped_lane()
     truth = truths(road, "road")[0]
     frames = on_the_axis(truth)
-    lanes = truth.at(frames.position, frames.direction, zeros(frames)).corridor[:, COLUMN["lanes"]]
+    lanes = truth.at(frames).corridor[:, COLUMN["lanes"]]
     before, behind = frames.station < 59.0, frames.station > 101.0
     tapering = (frames.station > 72.5) & (frames.station < 99.0)
     np.testing.assert_allclose(lanes[before], 6.0)
@@ -152,7 +147,7 @@ def test_ramps_leave_the_edge_unknown() -> None:
     geometry = RoadGeometry(road)
     truth = truths(road, "road")[0]
     frames = on_the_axis(truth)
-    there = truth.at(frames.position, frames.direction, zeros(frames))
+    there = truth.at(frames)
     checked = 0
     for column, section in (("left_edge", geometry.sections["left"]), ("right_edge", geometry.sections["right"])):
         for shape in section.turnouts:
@@ -170,16 +165,16 @@ def test_a_gap_in_the_axis_leaves_everything_unknown() -> None:
     axis = MeasuredAxis(np.column_stack([x, 0.0 * x, 70.0 + 0.01 * x]), np.diff(x) < 2.0)
     truth = Truth.measured(axis, "carriageway")
     frames = Frames(np.array([[10.0, 1.0], [45.0, 1.0]]), np.zeros(2), np.array([10.0, 45.0]))
-    there = truth.at(frames.position, frames.direction, np.array([70.0, 70.0]))
+    there = truth.at(frames)
     np.testing.assert_allclose(there.center, [-1.0, np.nan])
     assert np.isnan(there.corridor[1]).all()
     assert np.isnan(there.corridor[0, :4]).all()
-    np.testing.assert_allclose(there.corridor[0, 4:], [0.0, 0.1], atol=1e-9)
+    np.testing.assert_allclose(there.corridor[0, 4:], [0.0, 70.1], atol=1e-9)
     assert np.isinf(there.room[0]).all()
     flat = Truth.measured(MeasuredAxis(axis.points[:, :2]), "road")
-    assert np.isnan(flat.at(frames.position, frames.direction, zeros(frames)).corridor[0, COLUMN["height"]])
+    assert np.isnan(flat.at(frames).corridor[0, COLUMN["height"]])
     edged = replace(truth, left=MeasuredAxis(axis.points + [0.0, 4.0, 0.0]))
-    np.testing.assert_allclose(edged.at(frames.position, frames.direction, zeros(frames)).corridor[:, 0], [3.0, np.nan])
+    np.testing.assert_allclose(edged.at(frames).corridor[:, 0], [3.0, np.nan])
     moved = replace(truth, left=axis).moved([0.0, 5.0, 0.0])
     assert moved.left is not None
     np.testing.assert_allclose(moved.left.points[:, 1], 5.0)
