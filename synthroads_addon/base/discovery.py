@@ -36,7 +36,7 @@ def discover_models(package: str, base: type[M], tag: str) -> dict[str, type[M]]
 
 
 def discriminated_union(models: Mapping[str, type[BaseModel]], tag: str) -> Any:
-    """Return the type of a field that is one of several models; data without the tag are of the first.
+    """Return the type of a field that holds one of several models, told apart by a tag; the first model if untagged.
 
     A field that only other models have is refused with their names.
 

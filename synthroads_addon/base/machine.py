@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 def machine(versions: Mapping[str, str]) -> str:
-    """Return processor, cores that may be used, and versions of programs by their names, in words."""
+    """Describe the machine in words: its processor, the usable cores, and the versions of programs by their names."""
     programs = ", ".join(f"{name} {version}" for name, version in versions.items())
     return f"{_processor()}, {available_cores()} cores; {programs}"
 

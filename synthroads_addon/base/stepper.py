@@ -73,7 +73,7 @@ class Stepper(Generic[T]):
         return self._state is _State.ASIDE
 
     def run_for(self, seconds: float) -> bool:
-        """Let the work go on for about so long; return whether there is more of it. Raises what goes wrong in it."""
+        """Let the work run for about some seconds; return whether any is left. Raises what goes wrong in it."""
         self._deadline = time.perf_counter() + seconds
         with self._change:
             if self._state is _State.ASIDE:

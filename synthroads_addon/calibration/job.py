@@ -106,7 +106,7 @@ class CalibrationJob:
         return Receiver((mrad[0] * 1e-3, mrad[1] * 1e-3), self.attenuation, self.range_corrected, self.decibels)
 
     def start(self) -> dict[str, Material]:
-        """Return the table to begin with."""
+        """Return the material table that the calibration starts from."""
         return {**materials(), **self.scene, **(read_material_table(self.table) if self.table else {})}
 
 
@@ -238,7 +238,7 @@ def steps(job: CalibrationJob) -> Generator[float, None, Calibration]:
 
 
 def save_fitted(result: Calibration, path: Path, overwrite: bool = False) -> None:
-    """Write the fitted materials into a table of one's own; what else the job's table holds is kept.
+    """Write the fitted materials into a user's table, beside the other materials of the job's table.
 
     Raises:
         InputError: nothing was fitted, or the file can't be written, see `write_material_table`.
@@ -304,7 +304,7 @@ def _check_road(job: CalibrationJob, road: RoadClasses) -> None:
 
 @dataclass(frozen=True)
 class _FitInput:
-    """A class before its fit."""
+    """Everything that the fit of one class needs."""
 
     target: MaterialTarget
     before: Material

@@ -84,7 +84,7 @@ def road_classes(cloud: RealCloud, road: RoadClasses) -> dict[str, RealClass]:
 
 
 def _on_lines(intensity: Float, station: Float, offset: Float, road: RoadClasses) -> tuple[Index, float]:
-    """Return the points on dashes, and the threshold that tells dashes from gaps."""
+    """Return the points on the dashes of lines, and the intensity above which a stretch of line is a dash."""
     half = road.line_width / 2.0
     points, medians = [], []
     for line in road.lines:

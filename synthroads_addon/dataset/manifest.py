@@ -188,7 +188,7 @@ def write_manifest(folder: Path, manifest: Manifest) -> None:
 
 
 def paths_of_set(folder: Path, manifest: Manifest) -> list[str]:
-    """Return the paths in a data set's folder that the set made, besides its manifest and recipe.
+    """Return the paths that a data set wrote into its folder, besides its manifest and recipe.
 
     Args:
         folder: of the data set.
@@ -232,12 +232,12 @@ def _fits(place: PurePosixPath, pattern: str) -> bool:
 
 
 def begin_removal(folder: Path, paths: Iterable[str]) -> None:
-    """Write down what is to be removed from a folder once another manifest is there."""
+    """Record the paths that `finish_removal` is to remove from a folder once another manifest is there."""
     write_atomically(folder / REPLACED, canonical_json(list(paths)))
 
 
 def finish_removal(folder: Path) -> None:
-    """Remove what was written down, unless the manifest is still the one that names it; nothing if nothing was."""
+    """Remove the paths that `begin_removal` recorded, unless the manifest still names them; else do nothing."""
     if not (folder / REPLACED).is_file():
         return
     named = {name for scene in read_manifest(folder).scenes for name in scene.folders or ()}

@@ -98,7 +98,7 @@ def material_table_path(name_or_file: str) -> Path:
 
 
 def read_material_table(name_or_file: str | Path) -> dict[str, Material]:
-    """Return the materials of a table of one's own by name; what it doesn't name stays the shipped table's.
+    """Return the materials of a user's table by name; those that it doesn't name stay as the shipped table has them.
 
     Args:
         name_or_file: a file, or a text that `material_table_path` takes.

@@ -161,7 +161,7 @@ def _add_echoes(
 
 
 def _brightness(signals: HitSignals, attenuation: float) -> Float:
-    """Return what a surface sends back, from the intensity that is received of it; 0 where nothing is."""
+    """Return the brightness of surfaces from the intensities that are received of them; 0 where there is none."""
     white = received_intensity(1.0, signals.distance, attenuation)
     return np.divide(signals.intensity, white, out=np.zeros_like(white), where=white > 0.0)
 

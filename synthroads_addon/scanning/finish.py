@@ -75,7 +75,7 @@ class Finish:
 def layer_brightness(
     means: Surfaces, surfaces: Surfaces, points: PointBlock, seen: SeenPoints, values: LayerValues
 ) -> Float:
-    """Return how many times as bright points are by their own layers as by their materials' means (N,).
+    """Return the factors (N,) by which points are brighter by their own layers than by their materials' means.
 
     A return has the layers of what gave most of it. What beads and prisms send back doesn't depend on them, nor does
     what comes from the air.

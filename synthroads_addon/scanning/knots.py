@@ -129,7 +129,7 @@ def _knot_numbers(begin: float, end: float, spacing: float) -> tuple[int, int]:
 
 
 def _knots(track: Track, times: Float) -> tuple[Index, Float]:
-    """Return the knots before times (N,), and which share of the way to the next has passed."""
+    """Return the indices (N,) of the knots before times (N,), and the shares (N,) of the way to the next."""
     knot = (times - track.begin) / track.spacing
     index = np.clip(knot.astype(np.intp), 0, track.position.shape[1] - 2)
     knot -= index

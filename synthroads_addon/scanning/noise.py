@@ -120,7 +120,7 @@ def _weights(share: Float) -> tuple[Float, Float]:
 
 
 def _autoregression(innovations: Float) -> Float:
-    """Return the process (N, 6) of unit variance that its first value and white innovations make.
+    """Return the first-order process (N, 6) of unit variance that white innovations (N, 6) drive.
 
     The sum over all earlier innovations is built by doubling its reach: log2(N) passes over the array.
     """

@@ -55,7 +55,7 @@ class BlockResult:
 
 
 def join_results(results: list[BlockResult]) -> BlockResult:
-    """Return several blocks that aren't finished yet as one, in their order."""
+    """Join the results of several blocks, which aren't finished yet, to one in their order."""
     seen = [result.seen for result in results if result.seen is not None]
 
     def total(name: str) -> int:

@@ -97,7 +97,7 @@ def reached_stations(cut: Blocks, geometry: RoadGeometry, blocks: list[Block]) -
 
 
 def strip_parts(cut: Blocks, blocks: Sequence[Block]) -> tuple[Strip, ...]:
-    """Return the parts of strips that some blocks are, each with its strip's index."""
+    """Return the parts of strips that blocks cover, each with its strip's index."""
     parts = []
     for strip, numbers in _by_strip(blocks):
         for run in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1):
@@ -131,7 +131,7 @@ def vehicles_through(
 
 
 def _by_strip(blocks: Sequence[Block]) -> list[tuple[Strip, list[int]]]:
-    """Return the strips that blocks are of, and the blocks' numbers in each."""
+    """Group blocks by strip: return each strip with the numbers of its blocks."""
     strips = {strip.index: strip for strip, _ in blocks}.values()
     return [(strip, [number for owner, number in blocks if owner.index == strip.index]) for strip in strips]
 
@@ -165,7 +165,7 @@ def _rays(cut: Blocks, strip: Strip, block: int) -> tuple[Float, Float]:
 
 
 def _stations_of_rays(cut: Blocks, geometry: RoadGeometry, origin: Float, direction: Float) -> tuple[float, float]:
-    """Return the smallest and the largest station that rays come to where there can be anything."""
+    """Return the smallest and the largest station at which rays can meet anything."""
     farthest = cut.setting.maximum_range
     begin, _ = geometry.alignment.project(origin[:, :2])
     lowest, highest = _heights(geometry, float(begin.min()) - farthest, float(begin.max()) + farthest)

@@ -279,17 +279,17 @@ def drop_misfits(data: dict[str, Any], before: Mapping[str, Any], named: Abstrac
     if isinstance(road, dict):
         data = data | {"road": _without(road, _misfit_of_road(road, named))}
     for part, tag, kept in _KINDS:  # first: a scan with fields of another platform can't tell what its device can't do
-        data = _begin_anew(data, before, named, part, tag, kept)
+        data = _reset_part(data, before, named, part, tag, kept)
     scan = data.get("scan")
     if isinstance(scan, dict) and "scan.device" in named:
         data = data | {"scan": _without(scan, *_misfits_of_device(scan, named))}
     return data
 
 
-def _begin_anew(
+def _reset_part(
     data: dict[str, Any], before: Mapping[str, Any], named: AbstractSet[str], part: str, tag: str, kept: Sequence[str]
 ) -> dict[str, Any]:
-    """Return data in which a part of another kind than before has only what is kept or what the changes name."""
+    """Return data in which a platform or weather of another kind than before keeps what may stay or was changed."""
     scan = data.get("scan")
     given = scan.get(part) if isinstance(scan, dict) else None
     path = f"scan.{part}"

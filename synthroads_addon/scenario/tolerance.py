@@ -78,7 +78,7 @@ class Tolerance(ClosedModel):
 
 
 def _in_si(name: str, text: str) -> float | str:
-    """Return a text with its unit as a number; the text itself of a kind that there isn't, which is refused later."""
+    """Return the number of a text with a unit; an unknown kind's text stays as it is, and is refused later."""
     if name not in KINDS:
         return text
     try:
@@ -109,7 +109,7 @@ def with_unit(field: str, text: str, units: dict[str, float]) -> float:
 
 
 def parse_tolerance(text: str, field: str = "--tolerance") -> dict[str, float]:
-    """Return what ``height=5mm,colour=2,intensity=5%`` says, as a `Tolerance`'s data.
+    """Parse ``height=5mm,colour=2,intensity=5%`` into the data of a `Tolerance`.
 
     Raises:
         InputError: a kind that there isn't, or one named twice; a number or a unit is wrong, or a limit is exceeded.

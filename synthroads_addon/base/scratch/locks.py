@@ -76,7 +76,7 @@ def read_owner(text: str) -> Owner | None:
 
 
 def this_process(locked: bool = False) -> Owner:
-    """Return the process that asks."""
+    """Return the calling process as an owner."""
     pid = os.getpid()
     return Owner(socket.gethostname(), _boot_id(), pid, _start_of(pid) or 0, locked)
 
@@ -144,7 +144,7 @@ class LockHeldError(Exception):
 
 @contextmanager
 def exclusive(path: Path) -> Iterator[None]:
-    """Hold a lock file; it goes with the process however that ends. The file itself stays, empty.
+    """Hold a lock file while the context lasts; the system frees it if the process ends. The file stays, empty.
 
     Raises:
         LockHeldError: another process holds it, or may do so.

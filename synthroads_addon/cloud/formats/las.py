@@ -262,7 +262,7 @@ class LasReader(CloudReader):
 
 
 def open_to_copy(path: Path) -> laspy.LasReader:
-    """Open a file that `LasReader` takes with laspy itself, the records behind its points included.
+    """Open a LAS or LAZ file with laspy, with the extended records behind its points, to copy it.
 
     Raises:
         InputError: these records are damaged, or a header can't be written again as it is.
@@ -401,7 +401,7 @@ def _check_chunks(path: Path, start: int, record: bytes) -> None:
         layers = _layers_of(record)
         at = start + 8
         for number, length in enumerate(chunks):
-            if layers and not _layers_fill(file, at, length, *layers):
+            if layers and not _layers_add_up(file, at, length, *layers):
                 raise InputError(str(path), None, f"is damaged in chunk {number + 1:,} of {len(chunks):,}")
             at += length
 
@@ -434,8 +434,8 @@ def _layers_of(record: bytes) -> tuple[int, int] | None:
     return sum(length for _, length, _ in kinds), layers
 
 
-def _layers_fill(file: BinaryIO, at: int, length: int, point: int, layers: int) -> bool:
-    """Return whether a chunk's layers are as long together as the chunk: its first point, a number, their lengths."""
+def _layers_add_up(file: BinaryIO, at: int, length: int, point: int, layers: int) -> bool:
+    """Return whether a chunk's length is that of its first point, its number of points, and its layers together."""
     head = point + 4
     file.seek(at + head)
     lengths = file.read(4 * layers)

@@ -156,7 +156,7 @@ def draw_previews(
 
 
 def _strays_of(cloud: CloudReader) -> Strays | None:
-    """Return the points far from all others, which would make pictures of nothing but them; None if there are none."""
+    """Return the stray points of a cloud, which would make pictures far too wide; None if there are none."""
     strays = Strays()
     for block in cloud.blocks():
         strays.add(block.xyz)
@@ -300,7 +300,7 @@ def _summary(cloud: CloudReader, writer: CloudWriter) -> dict[str, Any]:
 
 
 def _check_output(source: Path, output: Path, overwrite: bool) -> None:
-    """Refuse an output that can't be, before any work."""
+    """Refuse an output file that can't be written, before any work."""
     check_ending(output, "--output")
     check_ending(source)
     if output.exists() and source.exists() and source.samefile(output):

@@ -109,7 +109,7 @@ class Raster:
         return result
 
     def _dot_growth(self, filled: Bool) -> int:
-        """Return by how many cells dots are to grow: by none where most cells between points are filled."""
+        """Return by how many cells to enlarge the points' dots; 0 where most cells between points are filled."""
         rows, columns = filled.any(axis=1), filled.any(axis=0)
         used = filled[rows][:, columns]
         share = float(used.mean()) if used.size else 1.0
@@ -145,7 +145,7 @@ Color = tuple[int, int, int]
 
 @dataclass(frozen=True)
 class GrayBar:
-    """Values that black and white stand for.
+    """Legend of a grey picture: the values that black and white stand for.
 
     Attributes:
         low, high: values of black and white.

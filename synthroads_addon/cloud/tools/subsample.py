@@ -98,7 +98,7 @@ class GridSubsampler(TileFiles):
         self.append(block, np.floor(block.xyz[:, :2] / self.cell).astype(np.int64) // self._tile)
 
     def blocks(self) -> Iterator[PointBlock]:
-        """Yield what stays, tile by tile, by time within a tile (which LAZ packs best): the order handed in is lost."""
+        """Yield the points that stay, tile by tile and by time within a tile, which LAZ packs best."""
         for _, tile in self.by_tile():
             points = tile.select(keep_one_per_cell(tile, self.cell))
             yield points.select(np.lexsort((points.return_number, points.gps_time)))

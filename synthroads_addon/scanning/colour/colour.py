@@ -55,7 +55,7 @@ _FALSE_COLOUR = ("roughness", "metallic", "specular")
 
 @dataclass(frozen=True)
 class LayerValues:
-    """Values of N points.
+    """Layers of N points, and which source each point took them from.
 
     Attributes:
         arrays: by layer: ``rgb`` (N, 3) uint16 sRGB, ``base_color`` (N, 3) float32 linear, the others (N,) float32.
@@ -109,7 +109,7 @@ class SeenPoints(ArrayRows):
 
 
 class LayerSource(Protocol):
-    """Gives points their layers.
+    """Source of the points' colours and material layers: images, a pixel per return, or the materials' means.
 
     Attributes:
         main_thread_only: it renders, which only Blender's main thread may; else any threads, side by side.
@@ -180,7 +180,7 @@ def encode_srgb(linear: NDArray[np.floating]) -> UInt16:
 
 
 def sample_points(source: LayerSource, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
-    """Return the wanted layers of points; 0, as if of a material, for those in the air."""
+    """Return the wanted layers of points; zeros for points in the air, whose source counts as the material."""
     solid = np.flatnonzero(points.material != NO_MATERIAL)
     on = points if len(solid) == len(points) else points.select(solid)
     values = source.sample(on, wanted)

@@ -210,8 +210,8 @@ def _cut_view(
     if not near.any():
         return None
     x, y = right[near] / -back[near], up[near] / -back[near]
-    left, aside = _within(x, limits[0])
-    bottom, top = _within(y, limits[1])
+    left, aside = _padded_range(x, limits[0])
+    bottom, top = _padded_range(y, limits[1])
     if aside <= left or top <= bottom:
         return None
     focal = min(focal, largest / max(aside - left, top - bottom))
@@ -219,8 +219,8 @@ def _cut_view(
     return View(place, rotation, focal, (float(-left * focal), float(top * focal)), size, time)
 
 
-def _within(values: Float, limit: float) -> tuple[float, float]:
-    """Return the range of values with a margin around it, since they are a sample, within the limits."""
+def _padded_range(values: Float, limit: float) -> tuple[float, float]:
+    """Return the range of sampled values, widened by a margin and cut at plus and minus the limit."""
     low, high = float(values.min()), float(values.max())
     spare = 0.02 * (1.0 + high - low)
     return max(low - spare, -limit), min(high + spare, limit)

@@ -212,7 +212,7 @@ def load_device(name_or_file: str) -> Device:
 
 
 def setting_of(device: Device, scan: DeviceChoice, range_sigma: float | None = None) -> ScannerSetting:
-    """Return a device as a choice sets it, whichever device the choice names.
+    """Return a device with the settings of a choice, whichever device the choice names.
 
     What the choice leaves open is the device's: its first mode, the mode's field of view, the fastest scan.
 

@@ -100,7 +100,7 @@ def _shots(setting: ScannerSetting, number: Numbers, with_frame: bool) -> PulseR
 
 
 def _mounting(setting: ScannerSetting, head: Numbers | None) -> Callable[[Float], Float]:
-    """Return the function that turns vectors (3, P) from their heads' frames, by number (P,), to the scanner's."""
+    """Return the function that turns vectors (3, P) from the frames of their heads (P,) to the scanner's frame."""
     angles = np.deg2rad([(h.yaw_deg, h.pitch_deg, h.roll_deg) for h in setting.device.heads])
     if not angles.any():
         return lambda vectors: vectors

@@ -53,7 +53,7 @@ class Guide:
         return self.profile.elevation(station)
 
     def ground(self, station: Float, offset: Float, damaged: bool) -> Float:
-        """Return the local elevation (K,) of what lies beneath, with or without ruts and potholes; NaN if unknown."""
+        """Return the local elevation (K,) of the ground below, with or without ruts and potholes; NaN where unknown."""
         return self.elevation(station)
 
     def known_ground(self, station: Float, offset: Float, damaged: bool) -> Float:

@@ -51,7 +51,7 @@ class Path(Protocol):
 
     @property
     def knot_spacing(self) -> float:
-        """Return the time (s) between knots from a strip's start on, at most.
+        """Return the largest time between two knots of a strip, s.
 
         Between the poses at two of them, linear interpolation of position and rotation matrix errs less than
         `KNOT_ERROR` at `KNOT_RANGE`. It can be shorter than the time between two pulses, where knots don't pay.

@@ -12,7 +12,7 @@ from .path import Path, Strip
 
 @dataclass(frozen=True)
 class PathStretches:
-    """A path of which only stretches are taken, or that is told in another local frame; see `platforms.path.Path`.
+    """A path reduced to some of its stretches, or moved to another local frame; see `platforms.path.Path`.
 
     Attributes:
         whole: the path.
@@ -40,7 +40,7 @@ class PathStretches:
         return sum(strip.duration for strip in self.strips) / sum(strip.duration for strip in self.whole.strips)
 
     def pose(self, strip: Strip, time: Float) -> tuple[Float, Float]:
-        """Return the whole path's pose in the local frame."""
+        """Return the poses of the whole path in this frame; see `platforms.path.Path.pose`."""
         of = next(whole for whole in self.whole.strips if whole.index == strip.index)
         position, rotation = self.whole.pose(of, time)
         return position - self.origin, rotation
@@ -62,7 +62,7 @@ def spread_stretches(path: Path, count: int, duration: float) -> PathStretches:
 
 
 def middle_stretches(path: Path, share: float) -> PathStretches:
-    """Return the middle of each strip, a share of its duration long."""
+    """Return the middle part of each strip, which lasts a share of the strip's duration."""
     strips = (
         Strip(strip.index, strip.start_time + strip.duration * (1.0 - share) / 2.0, strip.duration * share)
         for strip in path.strips

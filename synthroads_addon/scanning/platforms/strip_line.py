@@ -241,7 +241,7 @@ class EasedFunction:
         return centre + wrap_angle(values - centre) if self._angles else values
 
     def _at_nodes(self, numbers: Float) -> Float:
-        """Return the function at nodes; beyond the ends it goes on with the slope of the parabola that ends there."""
+        """Return the function's values at nodes, continued beyond the ends with the slope of a parabola there."""
         distance = numbers * self.step
         within = np.clip(distance, 0.0, self._length)
         values = self._function(within)

@@ -23,7 +23,7 @@ def bounds(mesh: SceneMesh) -> Float:
 
 
 def body_bounds(mesh: SceneMesh) -> Float:
-    """Return `bounds`; of a scene wider than `WIDE` without the vertices that lie far from all others."""
+    """Return the bounds (2, 3) of the triangles, m, without stray vertices where the scene is wider than `WIDE`."""
     strays = strays_of(mesh)
     if strays is None:
         return bounds(mesh)
