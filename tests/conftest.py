@@ -17,7 +17,7 @@ from zlib import crc32
 import hypothesis
 import pytest
 
-from tests.folders import BLENDER_TESTS
+from tests.folders import BLENDER_TESTS, LONG_FILES
 
 if TYPE_CHECKING:
     from synthroads_addon.cloud.points import PointBlock
@@ -57,9 +57,19 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         terminalreporter.write_line(f"skipped {count} times: {reason}")
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    """Have pytest-xdist hand files out in the order that they come in: it would begin with those of most tests."""
+    config.option.loadscopereorder = False
+
+
 @pytest.hookimpl(tryfirst=True)  # before pytest chooses by markers
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark a tenth of the tests that don't depend on Blender's release, drawn by their names, as `smoke`."""
+    """Put the files that take longest first, and mark tests as `smoke`.
+
+    These are a tenth of the tests that don't depend on Blender's release, drawn by their names.
+    """
+    order = {TESTS / name: number for number, name in enumerate(LONG_FILES)}
+    items.sort(key=lambda item: order.get(item.path, len(order)))
     for item in items:
         free = not _is_blenders(item.path) or item.get_closest_marker("any_blender")
         there = not item.get_closest_marker("first_python")

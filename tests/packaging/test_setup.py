@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import noxfile
-from tests.folders import BLENDER_TESTS
+from tests.folders import BLENDER_TESTS, LONG_FILES
 
 ROOT = Path(__file__).resolve().parents[2]
 MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
@@ -121,6 +121,10 @@ def test_extras_are_those_of_the_package() -> None:
 
 def test_nox_and_the_tests_agree_on_what_needs_blender() -> None:
     assert tuple(f"tests/{name}" for name in BLENDER_TESTS) == noxfile.BLENDER_TESTS
+
+
+def test_files_that_take_longest_are_there() -> None:
+    assert [name for name in LONG_FILES if not (ROOT / "tests" / name).is_file()] == []
 
 
 def test_blender_and_the_other_tests_have_processes_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
