@@ -66,13 +66,13 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put the files that take longest first, and mark tests as `smoke`.
 
-    These are a tenth of the tests that don't depend on Blender's release, drawn by their names.
+    These are a tenth of the quick tests that don't depend on Blender's release, drawn by their names.
     """
     order = {TESTS / name: number for number, name in enumerate(LONG_FILES)}
     items.sort(key=lambda item: order.get(item.path, len(order)))
     for item in items:
         free = not _is_blenders(item.path) or item.get_closest_marker("any_blender")
-        there = not item.get_closest_marker("first_python")
+        there = not item.get_closest_marker("first_python") and not item.get_closest_marker("slow")
         if free and there and crc32(item.nodeid.encode()) % 10 == 0:
             item.add_marker("smoke")
 

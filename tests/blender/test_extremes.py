@@ -46,6 +46,7 @@ def test_a_road_of_a_metre_is_built_and_scanned() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.any_blender
 def test_the_end_of_a_hundred_kilometres_is_as_exact_as_the_start() -> None:
     parameters = sample_road(RoadScenario(length=100_000.0), 4)
     geometry = RoadGeometry(parameters)

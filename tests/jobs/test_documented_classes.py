@@ -21,6 +21,7 @@ NEW = {"bench": (17, 80), "truck": (18, 81), "concrete_pavement": (19, 82)}
 
 
 @pytest.mark.slow
+@pytest.mark.any_blender
 def test_the_page_leads_from_a_scheme_to_a_network(tmp_path: Path) -> None:
     (tmp_path / "seats").mkdir()
     blocks = {

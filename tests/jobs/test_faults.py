@@ -245,7 +245,7 @@ def test_interrupted_at_any_moment_it_says_so_and_leaves_nothing(
 ) -> None:
     seconds, complete = whole[name]
     rng, codes = np.random.default_rng(5), []
-    for number in range(12):
+    for number in range(8):
         output = tmp_path / f"out{number}"
         begin = min(1.5 * loaded(), 0.9 * seconds)
         code, said = stopped(command(name, inputs, output), float(rng.uniform(begin, seconds)), signal.SIGINT)
@@ -258,7 +258,7 @@ def test_interrupted_at_any_moment_it_says_so_and_leaves_nothing(
             assert said.splitlines()[-1] == "interrupted; nothing was left half-written"
             assert not output.exists() or files(output).keys() == complete.keys()
             assert not list(output.glob(".*"))
-    assert codes.count(130) >= 6, codes
+    assert codes.count(130) >= 4, codes
 
 
 @pytest.mark.slow
@@ -277,7 +277,7 @@ def test_killed_at_any_moment_every_file_in_sight_is_whole(
     (temporary := tmp_path / "temporary").mkdir()
     monkeypatch.setenv("TMPDIR", str(temporary))
     signs = (signal.SIGKILL, signal.SIGTERM, signal.SIGKILL, signal.SIGHUP, signal.SIGKILL)
-    for number in range(10):
+    for number in range(7):
         arguments = [*command(name, inputs, output), "--overwrite"]
         sign = signs[number % len(signs)]
         code, _ = stopped(arguments, float(rng.uniform(0.2, 1.1) * seconds), sign)
@@ -285,7 +285,7 @@ def test_killed_at_any_moment_every_file_in_sight_is_whole(
         if code == 0:  # the machine has become faster meanwhile
             seconds *= 0.8
         check_whole(output)
-    assert killed >= 4
+    assert killed >= 3
     assert ran([*command(name, inputs, output), "--overwrite"]).returncode == 0
     assert list(temporary.iterdir()) == []
     assert sorted(path.name for path in output.iterdir()) == sorted(complete)

@@ -52,7 +52,7 @@ def scenario_of(design_class: str, cross_section: str, length: float, **limits: 
 
 @pytest.mark.parametrize(("design_class", "cross_section"), ROADS)
 @pytest.mark.parametrize("length", [1, 20, 120, 600, 3000, 20_000])
-@cases(2, 10)
+@cases(2, 5)
 def test_no_rule_is_broken(design_class: str, cross_section: str, length: int, count: int) -> None:
     scenario = scenario_of(design_class, cross_section, length)
     seeds = range(count if length < 20_000 else max(1, count // 5))

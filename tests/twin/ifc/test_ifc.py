@@ -35,6 +35,7 @@ from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.twin.ifc.alignment import plan_segments, write_alignment
 from synthroads_addon.twin.ifc.entities import IfcFile
 from synthroads_addon.twin.ifc.writer import write_ifc, write_project
+from tests.helpers.files.alignment_segments import gaps
 from tests.helpers.files.ifc_reading import (
     along,
     body,
@@ -113,6 +114,7 @@ def test_fifty_random_roads_are_valid_and_true(number: int, tmp_path) -> None:
     parameters = _moved(sample_road(limits, 1000 + number).to_dict())
     file = written(parameters, tmp_path)
     assert issues(file) == []
+    assert max(gaps(file).values()) < 1e-6
     geometry = RoadGeometry(parameters)
     _check_curves(file, geometry)
     _check_semantics(file, geometry.length)

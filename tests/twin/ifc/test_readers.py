@@ -16,7 +16,7 @@ from tests.helpers.files.alignment_segments import gaps
 from tests.helpers.files.ifc_reading import placement, written
 from tests.helpers.roads.checker_full_road import full
 from tests.helpers.roads.sampled_parts import scenario
-from tests.helpers.roads.twin_roads import NUMBER, full_road, one_of_many
+from tests.helpers.roads.twin_roads import full_road
 from tests.judges.ifc import issues
 
 MICROMETRE = 1e-6
@@ -105,12 +105,6 @@ def test_consecutive_segments_meet(full_file, axis: str) -> None:
     found = gaps(full_file), gaps(ifcopenshell.file.from_string(axis))
     assert len(found[1]) == 8
     assert max(gap for one in found for gap in one.values()) < MICROMETRE
-
-
-@pytest.mark.slow
-def test_consecutive_segments_of_fifty_roads_meet(tmp_path: Path) -> None:
-    for number in range(NUMBER):
-        assert max(gaps(written(one_of_many(number), tmp_path)).values()) < MICROMETRE
 
 
 @pytest.mark.parametrize(
