@@ -81,7 +81,7 @@ def commands() -> dict[str, list[str]]:
         **{f"pip-audit {lock.stem}": [*audit, str(lock)] for lock in sorted((ROOT / "tools" / "locks").glob("*.txt"))},
     }
     if sys.version_info[:2] == (3, 11):
-        checks["mypy"] = [sys.executable, "-m", "mypy", "--num-workers", "auto"]
+        checks["mypy"] = [sys.executable, "-m", "mypy"]
     else:  # the annotations are those of Blender 4.5's NumPy
         print("-- mypy is left out: types are checked with the libraries that Python 3.11 has")
     return checks
