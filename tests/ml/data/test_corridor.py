@@ -26,6 +26,7 @@ def on_the_axis(truth: Truth) -> Frames:
     return frames.select(slice(1, -1))
 
 
+@pytest.mark.parametrize("section", ["RQ31", "RQ36", "RQ43.5"])
 def test_whole_road_is_that_of_the_parameters(section: str) -> None:
     road = parameters(section)
     geometry = RoadGeometry(road)
