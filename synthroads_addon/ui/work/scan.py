@@ -7,6 +7,7 @@ main thread of a Blender: that is another one, which works on a copy of the file
 from __future__ import annotations
 
 from collections.abc import Callable, Generator
+from contextlib import closing
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -33,7 +34,7 @@ from ..fields.preferences import with_preferences
 from .common import has_road, is_free
 from .job import Aside, PanelJob, Report, Step, Work
 from .long_operator import LongOperator
-from .rendered_scan import SavedScene, save_open_scene
+from .rendered_scan import save_open_scene
 
 
 @dataclass(frozen=True)
@@ -70,16 +71,7 @@ _READ = 0.1
 """Share of a scan's progress that the reading of the scene takes up."""
 
 
-@dataclass(frozen=True)
-class _Output:
-    """Where the thread's files go, and what it tells."""
-
-    folder: Path
-    timer: StageTimer
-    report: Report
-
-
-_Measure: TypeAlias = Callable[[_Output], dict[str, Any]]
+_Measure: TypeAlias = Callable[[Report], dict[str, Any]]
 """Scans, writes the cloud and the previews, and returns the counts. It touches no data of Blender."""
 
 
@@ -94,13 +86,13 @@ def scan_work(scan: RoadScan) -> Work[Written]:
     timer, renders = StageTimer(), scenario.may_render
     with output_folder(scan.target, JobFiles(scenario).names, scan.overwrite) as folder:
         yield Step(0.0, "Reading")
-        measure = yield from (_save_copy(scan, folder, timer) if renders else _read_open_scene(scan, timer))
+        measure = yield from (_save_copy if renders else _read_open_scene)(scan, folder, timer)
         if "scene" in scenario.outputs:
             with timer.stage("scene file"):
                 save_scene(folder / "scene.blend")
 
         def write(report: Report) -> int:
-            return _write_files(scan, measure, _Output(folder, timer, report))
+            return _write_files(scan, folder, timer, lambda: measure(report))
 
         points = yield Aside(write, "Rendering" if renders else "Scanning", _READ, 1.0)
     return Written(points, scan.target)
@@ -111,60 +103,58 @@ def _save_copy(scan: RoadScan, folder: Path, timer: StageTimer) -> Generator[Ste
     with timer.stage("scene copy"):
         saved = save_open_scene(scan.scenario, scan.parameters, folder)
     yield Step(_READ)
-    return lambda output: _scan_saved_copy(saved, output)
+
+    def measure(report: Report) -> dict[str, Any]:
+        done = saved.scan(report)
+        timer.stages.update(done.stages)
+        return done.counts
+
+    return measure
 
 
-def _scan_saved_copy(saved: SavedScene, output: _Output) -> dict[str, Any]:
-    done = saved.scan(output.report)
-    output.timer.stages.update(done.stages)
-    return done.counts
-
-
-def _read_open_scene(scan: RoadScan, timer: StageTimer) -> Generator[Step, None, _Measure]:
+def _read_open_scene(scan: RoadScan, folder: Path, timer: StageTimer) -> Generator[Step, None, _Measure]:
     """Read the open scene; return what scans it."""
     speed_factor, class_ids = scan.scenario.scan.traffic_speed_factor, scan.scenario.cloud.scheme().source_ids()
     with timer.stage("scene mesh"):
         steps = scanned_scene_steps(geometry=scan.road, speed_factor=speed_factor, class_ids=class_ids)
         copied = yield from _shares(steps)
     services = SnapshotServices(copied.materials)
-    return lambda output: _scan_snapshot(scan, copied, services, output)
+
+    def measure(report: Report) -> dict[str, Any]:
+        site = Site.of_road(scan.scenario, scan.road)
+        with timer.stage("scene mesh"):
+            scene = copied.put_together()
+        report(0.02)
+        with timer.stage("caster"):
+            plan = site.plan(scene, services)
+        del scene
+        shares = {"images": (0.05, 0.05), "scan": (0.05, 1.0), "files": (1.0, 1.0)}
+        timer.progress = lambda stage, share: report(shares[stage][0] * (1.0 - share) + shares[stage][1] * share)
+        return record_to_files([plan], site.files(folder, plan.target.origin), timer)
+
+    return measure
 
 
 def _shares(steps: Generator[float, None, CopiedScene]) -> Generator[Step, None, CopiedScene]:
     """Pass on the steps of reading as shares of the whole."""
-    while True:
-        try:
-            yield Step(_READ * next(steps))
-        except StopIteration as end:
-            return end.value
-        except BaseException:
-            steps.close()
-            raise
+    with closing(steps):
+        while True:
+            try:
+                share = next(steps)
+            except StopIteration as end:
+                return end.value
+            yield Step(_READ * share)
 
 
-def _scan_snapshot(scan: RoadScan, copied: CopiedScene, services: SnapshotServices, output: _Output) -> dict[str, Any]:
-    """Scan what was read."""
-    site, timer = Site.of_road(scan.scenario, scan.road), output.timer
-    with timer.stage("scene mesh"):
-        scene = copied.put_together()
-    output.report(0.02)
-    with timer.stage("caster"):
-        plan = site.plan(scene, services)
-    del scene
-    shares = {"images": (0.05, 0.05), "scan": (0.05, 1.0), "files": (1.0, 1.0)}
-    timer.progress = lambda stage, share: output.report(shares[stage][0] * (1.0 - share) + shares[stage][1] * share)
-    return record_to_files([plan], site.files(output.folder, plan.target.origin), timer)
-
-
-def _write_files(scan: RoadScan, measure: _Measure, output: _Output) -> int:
+def _write_files(scan: RoadScan, folder: Path, timer: StageTimer, measure: Callable[[], dict[str, Any]]) -> int:
     """Write all files; return the number of points. Runs in a thread: it touches no data of Blender."""
     files = JobFiles(scan.scenario)
-    files.write_road(output.folder, scan.road, output.timer)
-    told: dict[str, Any] = {"counts": measure(output)} if set(files.outputs) & set(OF_POINTS) else {}
+    files.write_road(folder, scan.road, timer)
+    told: dict[str, Any] = {"counts": measure()} if set(files.outputs) & set(OF_POINTS) else {}
     told["instances"] = scan.road.numbers.to_dict()
     if warnings := empty_scan_warnings(told.get("counts", {})):
         told["warnings"] = warnings
-    files.write_report(output.folder, told, output.timer)
+    files.write_report(folder, told, timer)
     return int(told["counts"]["points"]) if "counts" in told else 0
 
 
