@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
+
+from synthroads_addon.base.text_table import markdown_table
 
 TABLE = "benchmark"
 """Name of the tables in a document."""
@@ -78,43 +80,37 @@ def judge_lines(result: dict[str, Any]) -> Iterator[tuple[str, float, bool]]:
             yield name, value, limit.is_kept_by(value)
 
 
-def _limits(result: dict[str, Any]) -> Iterator[str]:
+def _limits(result: dict[str, Any]) -> list[str]:
     runs = result["runs"]
     titles = ["", *(f"{run['cores']} core{'s' * (run['cores'] > 1)}" for run in runs), "limit", f"on {CORES} cores"]
-    yield from _head(titles)
     kept = {} if result["quick"] else {name: good for name, _, good in judge_lines(result)}
+    rows = []
     for name, limit in LIMITS.items():
         values = [_number(run["lines"].get(name), limit.digits) for run in runs]
         bound = f"{'at most' if limit.most else 'at least'} {limit.limit:g} {limit.unit}"
         verdict = {True: "kept", False: "**missed**", None: "–"}[kept.get(name)]
-        yield _row([limit.title, *values, bound, verdict])
+        rows.append([limit.title, *values, bound, verdict])
+    return markdown_table(titles, rows)
 
 
-def _stages(result: dict[str, Any]) -> Iterator[str]:
+def _stages(result: dict[str, Any]) -> list[str]:
     runs = result["runs"]
-    yield from _head(["stage of the demo job (s)", *(str(run["cores"]) for run in runs), "peak memory (MB)"])
+    rows = []
     for name in runs[0]["stages"]:
         seconds = [_number(run["stages"][name]["seconds"], 2) for run in runs]
-        yield _row([name, *seconds, _number(runs[-1]["stages"][name]["peak_memory_mb"], 0)])
+        rows.append([name, *seconds, _number(runs[-1]["stages"][name]["peak_memory_mb"], 0)])
+    return markdown_table(["stage of the demo job (s)", *(str(run["cores"]) for run in runs), "peak memory (MB)"], rows)
 
 
-def _floors(result: dict[str, Any]) -> Iterator[str]:
-    yield from _head(["beside its floor", "cores", "unit", "ours", "floor", "ours of the floor (%)"])
+def _floors(result: dict[str, Any]) -> list[str]:
+    rows = []
     for run in result["runs"]:
         for floor in run["floors"]:
             share = 100.0 * floor["ours"] / floor["floor"]
             values = [_number(floor[side], 2) for side in ("ours", "floor")]
-            yield _row([floor["name"], str(run["cores"]), floor["unit"], *values, f"{share:.0f}"])
+            rows.append([floor["name"], str(run["cores"]), floor["unit"], *values, f"{share:.0f}"])
+    return markdown_table(["beside its floor", "cores", "unit", "ours", "floor", "ours of the floor (%)"], rows)
 
 
 def _number(value: float | None, digits: int) -> str:
     return "–" if value is None else f"{value:,.{digits}f}"
-
-
-def _head(titles: Sequence[str]) -> Iterator[str]:
-    yield _row(titles)
-    yield "|" + "---|" * len(titles)
-
-
-def _row(cells: Sequence[str]) -> str:
-    return "| " + " | ".join(cells) + " |"

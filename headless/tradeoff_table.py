@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from synthroads_addon.base.text_table import markdown_table
 from synthroads_addon.jobs.measure.tradeoff import ALIKE, KNOBS
 from synthroads_addon.scenario.colour import USUAL_RANGE, image_scale
 from synthroads_addon.scenario.scenario import load_scenario
@@ -78,11 +79,12 @@ def front_lines(results: Sequence[Mapping[str, Any]]) -> list[str]:
     if not presets:
         return []
     noise = time_noise(results)
-    lines = ["| preset | on the front | faster, and as accurate in all errors |", "|---|---|---|"]
+    rows = []
     for row in presets:
         other = better_row(row, [one for one in job if one is not row], noise or 0.0)
         shown = "-" if other is None else f"{other['value']}: {other['seconds']:.1f} s for {row['seconds']:.1f} s"
-        lines.append(f"| {row['value']} | {'yes' if other is None else 'no'} | {shown} |")
+        rows.append([str(row["value"]), "yes" if other is None else "no", shown])
+    lines = markdown_table(["preset", "on the front", "faster, and as accurate in all errors"], rows)
     text = "times weren't measured twice, so every difference of time counts"
     if noise is not None:
         text = f"times of the same settings differ by up to {100.0 * noise:.0f} %: only what is faster by more counts"
@@ -118,11 +120,11 @@ def _table(measured: Sequence[Mapping[str, Any]], costs: tuple[str, ...]) -> lis
     plain = [name for name in costs if name in _COSTS]
     titles = ["knob", "value", *(_COSTS[name][0] for name in plain), *(f"{name} (%)" for name in shares)]
     titles += [ROW_TITLES[name] for name in errors]
-    lines = ["| " + " | ".join(titles) + " |", "|" + "---|" * len(titles)]
+    rows = []
     for row in measured:
         cells = [row["knob"], str(row["value"])]
         cells += ["-" if row[name] is None else format(row[name], _COSTS[name][1]) for name in plain]
         cells += [f"{100.0 * row['shares'].get(name, 0.0):.2f}" for name in shares]
         cells += [f"{row['errors'][name]:.3g}" if name in row["errors"] else "-" for name in errors]
-        lines.append("| " + " | ".join(cells) + " |")
-    return lines
+        rows.append(cells)
+    return markdown_table(titles, rows)

@@ -1,9 +1,9 @@
-"""Tables as plain text, for people at a terminal."""
+"""Tables as plain text for people at a terminal, and in Markdown."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 _NUMBER = re.compile(r"[-–+\d.,]*( \([\d.,]+\))?")
 
@@ -27,3 +27,9 @@ def text_table(head: Sequence[str], rows: Sequence[Sequence[str]], right: Collec
         ]
         lines.append("  ".join(cells).rstrip())
     return lines
+
+
+def markdown_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """Return the lines of a Markdown table, whose rows have as many cells each as there are titles."""
+    first, *rest = (f"| {' | '.join(cells)} |" for cells in (head, *rows))
+    return [first, "|" + "---|" * len(head), *rest]
