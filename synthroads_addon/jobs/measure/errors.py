@@ -18,32 +18,29 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import Bool, Float
 from ...base.random_streams import quantile_bound, ratio_bound
 from ...blender.cameras import HAS_RETURN_CAMERA, layer_source
 from ...cloud.points import PointBlock
 from ...scanning.beam import RINGS
 from ...scanning.colour.colour import (
-    FROM_MATERIAL,
     MATERIAL_LAYERS,
-    NEARBY,
     ColourSettings,
     LayerValues,
     SeenPoints,
     sample_points,
     source_name,
 )
-from ...scanning.colour.difference import cie_lab, ciede2000
+from ...scanning.colour.difference import colour_difference, known_rows, squared_error
 from ...scanning.colour.request import LayerRequest
 from ...scanning.plan import ScanPlan
 from ...scanning.relief import shift_along_normals
 from ...scanning.scan import BlockResult
 from ...scenario.colour import image_scale
 
-Float = NDArray[np.float64]
 Errors = dict[str, tuple[float, float]]
-"""Kind of error -> estimate, and its upper bound with the confidence `LEVEL`."""
+"""Kind of error -> estimate, and its upper bound with the confidence `base.random_streams.LEVEL`."""
 
 QUANTILE = 0.95
 CONVERGED = max(RINGS)
@@ -110,22 +107,6 @@ def render_layers(request: LayerRequest, parts: Sequence[SeenPoints]) -> list[La
         return [sample_points(source, seen, request.wanted) for seen in parts]
 
 
-def known_rows(truth: LayerValues) -> NDArray[np.bool_]:
-    """Return which points (N,) the truth was rendered for."""
-    return ~np.isin(truth.source, (FROM_MATERIAL, NEARBY))
-
-
-def colour_difference(mine: LayerValues, truth: LayerValues, rows: NDArray[np.bool_]) -> Float:
-    """Return CIEDE2000 between the colours of chosen points (N,)."""
-    return ciede2000(cie_lab(mine.arrays["rgb"][rows]), cie_lab(truth.arrays["rgb"][rows]))  # type: ignore[arg-type]
-
-
-def squared_error(name: str, mine: LayerValues, truth: LayerValues, rows: NDArray[np.bool_]) -> Float:
-    """Return the squared errors of a material layer at chosen points (N, components)."""
-    difference = mine.arrays[name][rows].astype(np.float64) - truth.arrays[name][rows].astype(np.float64)
-    return np.square(difference).reshape(len(difference), -1)
-
-
 def colour_errors(mine: Sequence[LayerValues], truth: Sequence[LayerValues], wanted: frozenset[str]) -> Errors:
     """Return the errors of the wanted colours and layers of parts of a cloud, of the points whose truth is known."""
     parts = [(a, b, known_rows(b)) for a, b in zip(mine, truth, strict=True)]
@@ -149,7 +130,7 @@ def errors_by_source(mine: LayerValues, truth: LayerValues) -> tuple[dict[str, f
     difference = colour_difference(mine, truth, known)
     squares = [squared_error(name, mine, truth, known) for name in MATERIAL_LAYERS]
 
-    def of(rows: NDArray[np.bool_]) -> dict[str, float]:
+    def of(rows: Bool) -> dict[str, float]:
         return {
             "colour_median": round(float(np.median(difference[rows])), 6),
             "colour_95": round(float(np.quantile(difference[rows], QUANTILE)), 6),

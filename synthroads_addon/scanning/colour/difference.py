@@ -1,11 +1,11 @@
-"""How different two colours look: CIEDE2000."""
+"""How different two colours look, by CIEDE2000, and two sets of the same points' layers."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ...base.arrays import Float, UInt16
-from .colour import decode_srgb
+from ...base.arrays import Bool, Float, UInt16
+from .colour import FROM_MATERIAL, NEARBY, LayerValues, decode_srgb
 
 _WHITE = np.array([0.95047, 1.0, 1.08883])
 _TO_XYZ = np.array(
@@ -49,3 +49,19 @@ def ciede2000(one: Float, other: Float) -> Float:
     r_t = -np.sin(np.radians(rotation)) * 2.0 * np.sqrt(chroma**7 / (chroma**7 + 25.0**7))
     dl, dc, dh = (l2 - l1) / s_l, (c2 - c1) / s_c, hue_difference / s_h
     return np.sqrt(dl * dl + dc * dc + dh * dh + r_t * dc * dh)
+
+
+def known_rows(truth: LayerValues) -> Bool:
+    """Return which points (N,) the truth was rendered for."""
+    return ~np.isin(truth.source, (FROM_MATERIAL, NEARBY))
+
+
+def colour_difference(mine: LayerValues, truth: LayerValues, rows: Bool) -> Float:
+    """Return CIEDE2000 between the colours of chosen points (N,)."""
+    return ciede2000(cie_lab(mine.arrays["rgb"][rows]), cie_lab(truth.arrays["rgb"][rows]))  # type: ignore[arg-type]
+
+
+def squared_error(name: str, mine: LayerValues, truth: LayerValues, rows: Bool) -> Float:
+    """Return the squared errors of a material layer at chosen points (N, components)."""
+    difference = mine.arrays[name][rows].astype(np.float64) - truth.arrays[name][rows].astype(np.float64)
+    return np.square(difference).reshape(len(difference), -1)
