@@ -35,7 +35,7 @@ MATERIALS = {
     "glass": ("acrylic_glass", "galvanised_steel"),
 }
 """Materials of a panel, and of its frame or cap."""
-_SHORTEST_BAY = 0.05  # m
+_SHORTEST_BAY, _NONE = 0.05, 1e-9  # m
 
 
 class NoiseBarrier(LengthwiseThing):
@@ -79,7 +79,7 @@ class NoiseBarrier(LengthwiseThing):
     def _walls(self, pairs: Float) -> list[Body]:
         """Return panels and plinths between the feet (B, 2, 3) of posts."""
         along = (pairs[:, 1] - pairs[:, 0]) * (1.0, 1.0, 0.0)
-        length = np.linalg.norm(along, axis=1)
+        length = np.maximum(np.linalg.norm(along, axis=1), _NONE)
         left = np.stack([-along[:, 1], along[:, 0], along[:, 2]], axis=1) / length[:, None]
         middle = pairs.mean(axis=1)
         middle[:, 2] = pairs[..., 2].min(axis=1)

@@ -25,7 +25,7 @@ GAP = 0.03
 """Gap between two elements of a movable barrier, m."""
 REFLECTOR = (0.12, 0.02, 0.06)
 """A reflector on an element of steel: along it, across, height, m."""
-_SHORTEST = 0.05  # m
+_SHORTEST, _NONE = 0.05, 1e-9  # m
 LONGEST_PLASTIC = 2.5
 """Elements up to this length (m) are of plastic, by turns red and white; longer ones are of steel."""
 
@@ -68,9 +68,8 @@ class TemporaryBarrier(LengthwiseThing):
         number = np.flatnonzero(station[:, 1] - station[:, 0] >= _SHORTEST)
         ends = station[number].ravel()
         feet = course.feet(ends, self.offset_at(ends)).reshape(-1, 2, 3)
-        along = (feet[:, 1] - feet[:, 0]) / np.linalg.norm(feet[:, 1] - feet[:, 0], axis=1)[:, None]
-        left = np.stack([-along[:, 1], along[:, 0], np.zeros(len(along))], axis=1)
-        left /= np.linalg.norm(left, axis=1)[:, None]
+        along = _unit(feet[:, 1] - feet[:, 0])
+        left = _unit(np.stack([-along[:, 1], along[:, 0], np.zeros(len(along))], axis=1))
         up = np.cross(along, left)
         flank = np.array(FLANKS["plastic" if self.plastic else "steel"]) * (
             self.base_width / 2.0,
@@ -93,3 +92,8 @@ class TemporaryBarrier(LengthwiseThing):
     def footprint(self) -> Iterator[Block]:
         """Yield nothing: it stands on the pavement and runs obliquely."""
         yield from ()
+
+
+def _unit(vectors: Float) -> Float:
+    """Return vectors (N, 3) of length 1; what has none keeps it: its coordinates are too large for its size."""
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1), _NONE)[:, None]
