@@ -130,7 +130,7 @@ def read_road_cloud(path: FilePath) -> RoadCloud:
     parts: list[_Points] = []
     with open_cloud(path) as cloud:
         header = cloud.header
-        table = kind_table(header.scheme)
+        table = _kind_table(header.scheme)
         names = header.scheme.names()
         counts = np.zeros(256, dtype=np.int64)
         for block in cloud.blocks():
@@ -142,23 +142,15 @@ def read_road_cloud(path: FilePath) -> RoadCloud:
         known = ", ".join(KIND_OF_CLASS)
         raise InputError(str(path), None, f"holds no points of a class that a road is made from ({known})")
     xyz, intensity, kind = map(np.concatenate, zip(*parts, strict=True))
-    points, strays = _without_strays((xyz, intensity, kind))
-    classes = {names.get(int(c), f"class_{c}"): int(counts[c]) for c in np.flatnonzero(counts)}
-    return replace(_sort_by_height(path, points, header.epsg, classes), strays=strays)
-
-
-def _without_strays(points: _Points) -> tuple[_Points, int]:
-    """Return the points without those that lie far from all others, and how many these are."""
     strays = Strays()
-    strays.add(points[0])
-    count = strays.count()
-    if not count:
-        return points, 0
-    stay = strays.stay(points[0])
-    return (points[0][stay], points[1][stay], points[2][stay]), count
+    strays.add(xyz)
+    stay = strays.stay(xyz) if strays.count() else np.ones(len(xyz), dtype=bool)
+    points = xyz[stay], intensity[stay], kind[stay]
+    classes = {names.get(int(c), f"class_{c}"): int(counts[c]) for c in np.flatnonzero(counts)}
+    return replace(_sort_by_height(path, points, header.epsg, classes), strays=strays.count())
 
 
-def kind_table(scheme: ClassScheme) -> NDArray[np.uint8]:
+def _kind_table(scheme: ClassScheme) -> NDArray[np.uint8]:
     """Return the (256,) table from a scheme's ids to `PointKind`."""
     table = np.full(256, PointKind.OTHER, dtype=np.uint8)
     for number, name in scheme.names().items():
@@ -166,12 +158,7 @@ def kind_table(scheme: ClassScheme) -> NDArray[np.uint8]:
     return table
 
 
-def _sort_by_height(
-    path: FilePath,
-    points: tuple[Float, NDArray[np.float32], NDArray[np.uint8]],
-    epsg: int | None,
-    classes: dict[str, int],
-) -> RoadCloud:
+def _sort_by_height(path: FilePath, points: _Points, epsg: int | None, classes: dict[str, int]) -> RoadCloud:
     """Return the cloud of points (map coordinates, intensity, kind), those without a class sorted or left out."""
     xyz, intensity, kind = points
     origin = np.round(np.append(xyz[:, :2].mean(axis=0), xyz[:, 2].min()))

@@ -60,7 +60,8 @@ class _Painter:
             yield name, self._line("outer_edge", span, boundary=0, width=BROAD)
         for boundary in range(1, len(lanes)):
             # Only an outermost or innermost lane ends: one of the two beside a boundary.
-            span = _overlap(*(_lane_stretch(lane.width, self.length) for lane in lanes[boundary - 1 : boundary + 1]))
+            (start, end), (begin, stop) = (_lane_stretch(lanes[i].width, self.length) for i in (boundary - 1, boundary))
+            span = max(start, begin), min(end, stop)
             line = self._line("lane", span, boundary=boundary, dash_length=dash, gap_length=gap)
             yield f"{self.name}-line-{boundary}", line
         span = (0.0, self.length)
@@ -145,7 +146,3 @@ def _lane_stretch(width: AnyWidth, length: float) -> Range:
     if widths[0] < widths[-1]:
         return round_value(float(np.interp(LANE_THERE, widths, stations))), length
     return 0.0, round_value(float(np.interp(LANE_THERE, widths[::-1], stations[::-1])))
-
-
-def _overlap(first: Range, second: Range) -> Range:
-    return max(first[0], second[0]), min(first[1], second[1])

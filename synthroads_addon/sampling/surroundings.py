@@ -22,6 +22,7 @@ from ..road.things.beacon import ConstructionBeacon
 from ..road.things.temporary_barrier import TemporaryBarrier
 from ..road.things.vehicles import COLORS, HEAVY_SPEED, VEHICLE_GAP, VEHICLE_LANE_WIDTH, VEHICLE_ROOM, VEHICLE_TYPES
 from ..scenario.road import Interval, MaterialLimits, RoadScenario
+from .placing.draw import draw
 from .placing.site import PlacementSite
 
 Kind = Literal["grass", "shrub", "tree"]
@@ -45,12 +46,6 @@ _LIGHT_SUMS = np.cumsum([0.0 if kind.heavy else kind.weight for kind in VEHICLE_
 _HEAVY_SUMS = np.cumsum([kind.weight if kind.heavy else 0.0 for kind in VEHICLE_TYPES.values()])
 _COLORS = list(COLORS)
 _COLOR_SUMS = np.cumsum(list(COLORS.values()))
-
-
-def draw(rng: np.random.Generator, limits: Interval) -> float:
-    """Draw a number within an interval."""
-    low, high = limits.minimum, limits.maximum
-    return min(max(round_value(low + (high - low) * rng.random()), low), high)
 
 
 def _seed(rng: np.random.Generator) -> int:

@@ -15,7 +15,8 @@ T = TypeVar("T")
 
 def draw(rng: np.random.Generator, limits: Interval) -> float:
     """Return a number within limits, each with the same chance."""
-    return round_value(limits.minimum + (limits.maximum - limits.minimum) * rng.random())
+    low, high = limits.minimum, limits.maximum
+    return min(max(round_value(low + (high - low) * rng.random()), low), high)
 
 
 def pick(rng: np.random.Generator, options: Sequence[T]) -> T:

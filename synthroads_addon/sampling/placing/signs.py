@@ -13,7 +13,7 @@ from ...road.guidelines import BARRIER_DISTANCE, EXIT_SEQUENCE, EXIT_SIGN_ROOM, 
 from ...road.objects import Side
 from ...road.section import Turnout
 from ...road.things.sign import TrafficSign
-from ...road.things.sign_catalogue import SignType, sign_catalogue
+from ...road.things.sign_catalogue import sign_catalogue
 from ...road.turnout_geometry import STEP, TurnoutShape
 from .edge import island_begin, ramp_station
 from .layout import MEDIAN_BARRIER_HALF, MEDIAN_OBSTACLE, Layout, PlacementRequest, Roadside
@@ -105,7 +105,7 @@ def place_sign(
     if not 0.0 <= station <= roadside.length:
         return False
     sign = sign_catalogue().signs[code]
-    large = is_obstacle(sign)
+    large = sign.post_diameter > OBSTACLE_POST  # so thick a post needs a barrier
     zones = (roadside.near, roadside.far, roadside.crossed) if large else (roadside.near,)
     half = _LARGE_HALF if large else _HALF
     place = nearest_free(station, half, room, roadside.length, *zones)
@@ -137,11 +137,6 @@ def place_sign_on_both_sides(layout: Layout, roadside: Roadside, code: str, stat
     axis = {"station": round_value(place), "offset": round_value(roadside.sign * offset)}
     fields: dict[str, Any] = {**axis, "rotation_deg": roadside.facing, "code": code, "text": sign.text, **sign.fields()}
     median.signs.append(TrafficSign(instance=1, **fields))
-
-
-def is_obstacle(sign: SignType) -> bool:
-    """Return whether a sign's posts are so thick that it needs a barrier."""
-    return sign.post_diameter > OBSTACLE_POST
 
 
 def destination_values(rng: np.random.Generator) -> dict[str, str]:
