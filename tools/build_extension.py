@@ -241,11 +241,40 @@ def stage(extension: Extension, target: str, wheels: list[Path], folder: Path) -
     shutil.copytree(extension.source, folder, ignore=LEFT_OUT, dirs_exist_ok=True)
     shutil.copy(ROOT / "LICENSE", folder)
     (folder / "THIRD_PARTY.txt").write_text(third_party_notice(wheels), encoding="utf-8", newline="\n")
+    if extension.source == PACKAGE:
+        shutil.copy(asset_library(ROOT / "build" / "asset_library"), folder / "presets" / "node_groups")
     (folder / "wheels").mkdir()
     for wheel in wheels:
         shutil.copy(wheel, folder / "wheels")
     manifest = complete_manifest(extension, target, [f"./wheels/{wheel.name}" for wheel in wheels])
     (folder / MANIFEST.name).write_text(manifest, encoding="utf-8", newline="\n")
+
+
+def asset_library(cache: Path) -> Path:
+    """Return the library of node groups as it is now; what the cache has of older sources is removed."""
+    digest = hashlib.sha256(str(blender_tool()).encode())
+    tools = ROOT / "tools"
+    sources = [*PACKAGE.rglob("*"), *(tools / "asset_previews").glob("*.png"), *tools.glob("*_library.py")]
+    for path in sorted((*sources, tools / "stable_blend.py")):
+        if path.is_file() and "__pycache__" not in path.parts:
+            digest.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes())
+    library = cache / digest.hexdigest()[:16] / "node_groups.blend"
+    if not library.exists():
+        shutil.rmtree(cache, ignore_errors=True)
+        library.parent.mkdir(parents=True)
+        write_asset_library(library.with_suffix(".part"))
+        library.with_suffix(".part").rename(library)
+    return library
+
+
+def write_asset_library(path: Path) -> None:
+    """Write the library of node groups in a Blender of its own, without the user's settings."""
+    command = [sys.executable, "-B", str(ROOT / "tools" / "asset_library.py"), str(path)]
+    with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
+        environment = {**os.environ, "BLENDER_USER_RESOURCES": folder}
+        answer = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    if answer.returncode != 0 or not path.exists():
+        raise BuildError(f"the library of node groups was not written:\n{answer.stdout}{answer.stderr}")
 
 
 def version() -> str:

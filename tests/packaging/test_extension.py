@@ -70,7 +70,8 @@ def test_holds_every_module_and_data_file_once(names: list[str]) -> None:
     expected = {path.as_posix() for path in kept if path.parts[0] != "reconstruction"}  # needs SciPy
     extra = {name for name in names if not name.startswith("wheels/")} - expected
     assert expected <= set(names)
-    assert extra == {"LICENSE", "THIRD_PARTY.txt", "blender_manifest.toml"}
+    library = "presets/node_groups/node_groups.blend"
+    assert extra == {"LICENSE", "THIRD_PARTY.txt", "blender_manifest.toml", library}
     assert len(names) == len(set(names))
 
 

@@ -9,6 +9,7 @@ from typing import get_args
 
 import bpy
 
+from ...blender.model.library import LIBRARY_FILE, LIBRARY_FOLDER, LIBRARY_NAME
 from ...scenario.scan import ScanScenario
 from ...scenario.scenario import Scenario
 from .wording import value_name
@@ -61,6 +62,35 @@ def with_preferences(scenario: Scenario) -> Scenario:
     return scenario.model_copy(update={"scan": scan.model_copy(update=update)})
 
 
+class SYNTHROADS_OT_add_asset_library(bpy.types.Operator):
+    """Have Blender's asset browser show SynthRoads' node groups: guardrails, signs and roads along your own curves"""
+
+    bl_idname = "synthroads.add_asset_library"
+    bl_label = "Add Asset Library"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """The library must be there, and not be known yet."""
+        if not (LIBRARY_FOLDER / LIBRARY_FILE).exists():
+            cls.poll_message_set("Only an installed extension has the library")
+            return False
+        if _has_asset_library(context):
+            cls.poll_message_set("Blender has it already")
+            return False
+        return True
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Add it to the asset libraries in Blender's preferences."""
+        context.preferences.filepaths.asset_libraries.new(name=LIBRARY_NAME, directory=str(LIBRARY_FOLDER))
+        self.report({"INFO"}, f"The asset browser has the library {LIBRARY_NAME} now")
+        return {"FINISHED"}
+
+
+def _has_asset_library(context: bpy.types.Context) -> bool:
+    libraries = context.preferences.filepaths.asset_libraries
+    return any(library.path and Path(library.path).resolve() == LIBRARY_FOLDER.resolve() for library in libraries)
+
+
 class SYNTHROADS_AP_preferences(bpy.types.AddonPreferences):
     """The add-on's entry in Blender's preferences."""
 
@@ -96,6 +126,7 @@ class SYNTHROADS_AP_preferences(bpy.types.AddonPreferences):
         for name in ("cores", "caster", "output_folder"):
             layout.prop(self, name)
         layout.prop(self, "library_folder", placeholder=_usual_library())
+        layout.operator(SYNTHROADS_OT_add_asset_library.bl_idname, icon="ASSET_MANAGER")
 
 
 def _usual_library() -> str:

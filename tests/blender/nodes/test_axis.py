@@ -48,9 +48,8 @@ def give(item: bpy.types.Object, group: bpy.types.NodeTree, **inputs: Any) -> No
 
 def meshes_of(item: bpy.types.Object) -> list[bpy.types.Mesh]:
     """Return the meshes that an object is evaluated to; a curve's mesh is an instance of it."""
-    graph = bpy.context.evaluated_depsgraph_get()
-    shown = [entry.object for entry in graph.object_instances]
-    return [other.data for other in shown if other.original == item and other.type == "MESH"]
+    shown = bpy.context.evaluated_depsgraph_get().object_instances
+    return [entry.object.data for entry in shown if entry.object.original == item and entry.object.type == "MESH"]
 
 
 def values(mesh: bpy.types.Mesh, name: str) -> np.ndarray[Any, Any]:

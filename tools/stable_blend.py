@@ -1,0 +1,206 @@
+"""Write a .blend file so that it no longer depends on where its data lay in memory."""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+_DATA = b"DATA"
+_POINTER = 8
+_STEP = 16
+"""Distance of the addresses that blocks are given, as if they lay one after the other."""
+
+
+@dataclass(frozen=True)
+class _Block:
+    """A block of a .blend file: its header begins at `head`, the address in it at `old_at`, its data at `data`."""
+
+    code: bytes
+    struct: int
+    old: int
+    old_at: int
+    data: int
+    size: int
+
+
+class _File:
+    """A .blend file (not compressed, little-endian), with headers of Blender 4 or 5."""
+
+    def __init__(self, content: bytes) -> None:
+        if content[:7] != b"BLENDER":
+            raise ValueError("not a .blend file, or a compressed one")
+        self.content = content
+        # "BLENDER-v405" or "BLENDER17-01v0502": the latter says how long the header is.
+        self._long = content[7:9].isdigit()
+        self._begin = int(content[7:9]) if self._long else 12
+
+    @cached_property
+    def blocks(self) -> list[_Block]:
+        """All blocks in their order."""
+        layout, old_at = ("<4sIQQQ", 8) if self._long else ("<4siQii", 8)
+        found, position = [], self._begin
+        while position < len(self.content):
+            values = struct.unpack_from(layout, self.content, position)
+            code, old = values[0], values[2]
+            number, size = (values[1], values[3]) if self._long else (values[3], values[1])
+            data = position + struct.calcsize(layout)
+            found.append(_Block(code, number, old, position + old_at, data, size))
+            position = data + size
+            if code == b"ENDB":
+                break
+        return found
+
+    def groups(self) -> Iterator[list[_Block]]:
+        """Yield the blocks of one data-block after the other, its own first."""
+        group: list[_Block] = []
+        for block in self.blocks:
+            if block.code != _DATA and group:
+                yield group
+                group = []
+            group.append(block)
+        yield group
+
+
+class _Structs:
+    """The structs that a .blend file describes in its block DNA1."""
+
+    def __init__(self, data: bytes) -> None:
+        self._data = data
+        names, end = self._strings(self._after(b"NAME", 0))
+        types, end = self._strings(self._after(b"TYPE", end))
+        start = self._after(b"TLEN", end)
+        self._sizes = struct.unpack_from(f"<{len(types)}H", data, start)
+        position = self._after(b"STRC", start + 2 * len(types))
+        (count,) = struct.unpack_from("<I", data, position)
+        position += 4
+        self._names, self._types = names, types
+        self._structs: list[tuple[int, list[tuple[int, int]]]] = []
+        for _ in range(count):
+            kind, number = struct.unpack_from("<HH", data, position)
+            values = struct.unpack_from(f"<{2 * number}H", data, position + 4)
+            self._structs.append((kind, list(zip(values[::2], values[1::2], strict=True))))
+            position += 4 + 4 * number
+        self._of_type = {kind: number for number, (kind, _) in enumerate(self._structs)}
+        self._known: dict[int, list[int]] = {}
+
+    def size(self, number: int) -> int:
+        """Return the bytes that a struct takes."""
+        return int(self._sizes[self._structs[number][0]])
+
+    def name(self, number: int) -> str:
+        """Return the name of a struct."""
+        return self._types[self._structs[number][0]]
+
+    def pointers(self, number: int) -> list[int]:
+        """Return where in a struct its pointers are."""
+        if number not in self._known:
+            self._known[number] = list(self._find_pointers(number))
+        return self._known[number]
+
+    def field(self, number: int, way: tuple[str, ...]) -> tuple[int, int]:
+        """Return where in a struct a field is, by the names on the way to it, and the bytes that it takes."""
+        position = 0
+        for kind, index in self._structs[number][1]:
+            length = self._length(kind, self._names[index])
+            if self._names[index] == way[0]:
+                within, size = self.field(self._of_type[kind], way[1:]) if way[1:] else (0, length)
+                return position + within, size
+            position += length
+        raise KeyError(way[0])
+
+    def _find_pointers(self, number: int) -> Iterator[int]:
+        position = 0
+        for kind, index in self._structs[number][1]:
+            name = self._names[index]
+            length = self._length(kind, name)
+            if name.startswith(("*", "(*")):
+                yield from range(position, position + length, _POINTER)
+            elif kind in self._of_type:
+                inner = self.pointers(self._of_type[kind])
+                for first in range(position, position + length, self._sizes[kind] or 1):
+                    yield from (first + within for within in inner)
+            position += length
+
+    def _length(self, kind: int, name: str) -> int:
+        count = 1
+        for size in re.findall(r"\[(\d+)\]", name):
+            count *= int(size)
+        return count * (_POINTER if name.startswith(("*", "(*")) else int(self._sizes[kind]))
+
+    def _after(self, tag: bytes, start: int) -> int:
+        return self._data.index(tag, start) + len(tag)
+
+    def _strings(self, position: int) -> tuple[list[str], int]:
+        (count,) = struct.unpack_from("<I", self._data, position)
+        position += 4
+        found = []
+        for _ in range(count):
+            end = self._data.index(b"\0", position)
+            found.append(self._data[position:end].decode())
+            position = end + 1
+        return found, position
+
+
+_CHANGING: dict[str, list[tuple[str, ...]]] = {
+    "bNodeTree": [("id", "session_uid")],
+    "AssetMetaData": [("catalog_simple_name[64]",), ("_pad[4]",)],
+}
+"""Fields by struct, the ways to them, that hold a running number, or memory that nothing was written to."""
+
+
+def make_stable(content: bytes) -> bytes:
+    """Return a .blend file with addresses counted from its beginning on, and nodes numbered in their order.
+
+    Pointers to what isn't in the file become 0, as Blender takes them when it reads it. The numbers by which nodes are
+    known from outside of their tree are random ones; nothing in a library refers to them.
+
+    Raises:
+        ValueError: the file is compressed, or none of Blender's.
+    """
+    file = _File(content)
+    (described,) = (block for block in file.blocks if block.code == b"DNA1")
+    structs = _Structs(content[described.data : described.data + described.size])
+    result = bytearray(content)
+    places = {block.old: _STEP * number for number, block in enumerate(file.blocks, 1) if block.code != _DATA}
+    number, nodes = 0, 0
+    for group in file.groups():
+        # The blocks of a data-block are its own: others may have had their addresses before.
+        own = {block.old: _STEP * (number + place) for place, block in enumerate(group, 1)}
+        number += len(group)
+        for block in group:
+            nodes = _rewrite(result, structs, block, places | own, nodes)
+    return bytes(result)
+
+
+def _rewrite(result: bytearray, structs: _Structs, block: _Block, places: dict[int, int], nodes: int) -> int:
+    """Rewrite one block; return how many nodes there have been."""
+    if block.old:
+        struct.pack_into("<Q", result, block.old_at, places[block.old])
+    if block.code in (b"DNA1", b"ENDB"):
+        return nodes
+    size, end = structs.size(block.struct), block.data + block.size
+    if block.struct == 0 or not size or block.size % size:
+        # Arrays of pointers, or bare numbers: of these none is an address.
+        _readdress(result, places, range(block.data, end - _POINTER + 1, _POINTER), keep=True)
+        return nodes
+    for first in range(block.data, end, size):
+        _readdress(result, places, (first + place for place in structs.pointers(block.struct)), keep=False)
+        name = structs.name(block.struct)
+        if name == "bNode":
+            nodes += 1
+            struct.pack_into("<i", result, first + structs.field(block.struct, ("identifier",))[0], nodes)
+        for way in _CHANGING.get(name, ()):
+            place, length = structs.field(block.struct, way)
+            result[first + place : first + place + length] = bytes(length)
+    return nodes
+
+
+def _readdress(result: bytearray, places: dict[int, int], where: Iterable[int], *, keep: bool) -> None:
+    """Replace addresses; unknown ones stay, or become 0."""
+    for position in where:
+        (old,) = struct.unpack_from("<Q", result, position)
+        if old:
+            struct.pack_into("<Q", result, position, places.get(old, old if keep else 0))
