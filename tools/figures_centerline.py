@@ -53,7 +53,7 @@ from ml.scores.evaluation import (  # noqa: E402
     skeleton_predictor,
     trivial_predictors,
 )
-from ml.scores.metrics import Spread, over_seeds  # noqa: E402
+from ml.scores.metrics import Spread, markdown, over_seeds  # noqa: E402
 from ml.scores.paint import with_painted_line  # noqa: E402
 from synthroads_addon.base.arrays import Float  # noqa: E402
 from synthroads_addon.base.errors import SynthRoadsError  # noqa: E402
@@ -78,6 +78,12 @@ CROPPINGS: dict[str, Cropping | None] = {
     "real-whole": None,
 }
 """Tables of the real roads, and how their slices are cropped."""
+ROAD_COLUMNS = {
+    "mae": tables.COLUMNS["mae"],
+    "chamfer_full": replace(tables.COLUMNS["chamfer_full"], title="Chamfer (m)"),
+}
+"""Columns of each road in a table that has several side by side."""
+COVERAGE_COLUMNS = {name: tables.COLUMNS[name] for name in ("coverage_68", "coverage_95")}
 REFERENCE = SkeletonSettings()
 OTHER = "other-scanner"
 
@@ -140,6 +146,29 @@ def grid_search(shown: Sequence[Case], masks: Sequence[str]) -> GridSearch:
 
 def _as_column(y: Float, road: LearningRoad, frames: Frames) -> Float:
     return y[:, None]
+
+
+def road_table(measured: Measured, roads: Mapping[str, str], columns: tables.Columns = ROAD_COLUMNS) -> str:
+    """Return a Markdown table of all predictors with some columns per road.
+
+    Args:
+        measured: the figures.
+        roads: title of each road to be shown, by name.
+        columns: of each road.
+    """
+    head = ["", *(f"{title}: {metric.title}" for title in roads.values() for metric in columns.values())]
+    body = [
+        [
+            name,
+            *(
+                tables.cell(rows.get(road, {}).get(figure), metric)
+                for road in roads
+                for figure, metric in columns.items()
+            ),
+        ]
+        for name, rows in measured.items()
+    ]
+    return markdown(head, body)
 
 
 class RememberingPredictor(CenterlinePredictor):
@@ -229,7 +258,11 @@ def baselines(search: GridSearch, half_width: float = HALF_WIDTH) -> dict[str, l
     reference = replace(REFERENCE, mask=best.mask)
     tuned, plain = (f"skeleton, {one.raster:g} m, {one.branch:g} m, {one.bin:g} m" for one in (best, reference))
     tuned = f"{tuned} (tuned)"
-    return {tuned: [skeleton_predictor(best)], plain: [skeleton_predictor(reference)], **trivial_predictors(half_width)}
+    return {
+        tuned: [skeleton_predictor(best)],
+        plain: [skeleton_predictor(reference)],
+        **trivial_predictors(half_width),
+    }
 
 
 def synthetic_roads(texts: Sequence[str], kind: TruthKind) -> list[LearningRoad]:
@@ -297,9 +330,9 @@ def other_scanners(
     titles = {title: title for title in sets}
     sure = {predictor: rows for predictor, rows in merged.items() if any("coverage_68" in row for row in rows.values())}
     distances = {predictor: rows for predictor, rows in merged.items() if predictor in plain}
-    found = {name: tables.road_table(distances, titles)}
+    found = {name: road_table(distances, titles)}
     if sure:
-        found[f"coverage-{name}"] = tables.road_table(sure, titles, tables.COVERAGE_COLUMNS)
+        found[f"coverage-{name}"] = road_table(sure, titles, COVERAGE_COLUMNS)
     return found | corridor_table(arguments, name, learned, every)
 
 
@@ -372,7 +405,7 @@ def real(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Model]]) 
         search = searched([shown], ["ground", "dark"], arguments.output / f"skeleton-{table}.json")
         measured = measure_real(arguments.seeds, roads, cropping, trained, search)
         tables.write_tables(arguments.output, table, measured)
-        result[table] = tables.road_table(measured, titles)
+        result[table] = road_table(measured, titles)
         if table == "real-slices":
             draw_real(arguments, roads[TUNED_ON], trained, search)
             painted = measure_painted(arguments.seeds, roads[PAINTED], cropping, trained, search)

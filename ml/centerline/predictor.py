@@ -19,7 +19,7 @@ from ..data.frames import Frames, interleave_count, stretches
 from ..data.roads import LearningRoad
 from ..data.slices import FrameSlices, SliceSettings, collate
 from ..networks.centerline.models import LINES, TARGETS, CenterlineModel, all_targets, both_ways
-from ..scores.calibration import IntervalCalibration, all_calibrated
+from ..scores.calibration import IntervalCalibration, calibrate_target
 from ..training_loop import moved_to
 
 _NEAR = 2
@@ -146,7 +146,8 @@ class CenterlinePredictor:
             raw.append(found.raw_std)
         every = np.concatenate(error)
         other = copy(self)
-        other.calibration = all_calibrated(TARGETS, every, np.concatenate(raw))
+        targets = zip(TARGETS, every.T, np.concatenate(raw).T, strict=True)
+        other.calibration = {name: calibrate_target(size, std) for name, size, std in targets}
         return other, every
 
     def _sequences(self, road: LearningRoad, frames: Frames) -> Iterator[tuple[Index, Float, Bool, Float, Float]]:

@@ -78,11 +78,6 @@ def calibrate_target(error: Float, std: Float) -> IntervalCalibration:
     )
 
 
-def all_calibrated(names: Sequence[str], error: Float, std: Float) -> dict[str, IntervalCalibration]:
-    """Return the calibration of several targets by name, from errors and deviations (N, T)."""
-    return {name: calibrate_target(error[:, column], std[:, column]) for column, name in enumerate(names)}
-
-
 def _pair(values: Sequence[float | None]) -> tuple[float, float]:
     first, second = (float("nan") if value is None else float(value) for value in values)
     return first, second

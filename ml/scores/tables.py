@@ -20,9 +20,6 @@ Measured = Mapping[str, Mapping[str, Mapping[str, Spread]]]
 Columns = Mapping[str, Metric]
 
 COLUMNS = in_tables(METRICS)
-ROAD_COLUMNS = {"mae": COLUMNS["mae"], "chamfer_full": replace(COLUMNS["chamfer_full"], title="Chamfer (m)")}
-"""Columns of each road in a table that has several side by side."""
-COVERAGE_COLUMNS = {name: COLUMNS[name] for name in ("coverage_68", "coverage_95")}
 CORRIDOR_COLUMNS = in_tables(TARGET_METRICS)
 TARGETS_SHOWN = {
     "center": ("centre (m)", 1.0),
@@ -60,22 +57,6 @@ def scaled(target: str, figures: Mapping[str, float | None]) -> dict[str, float]
     """Return the figures of a target of the corridor in the unit of `TARGETS_SHOWN`; NaN for None."""
     known = {name: math.nan if figure is None else figure for name, figure in figures.items()}
     return known | {"mae": TARGETS_SHOWN[target][1] * known["mae"]}
-
-
-def road_table(measured: Measured, roads: Mapping[str, str], columns: Columns = ROAD_COLUMNS) -> str:
-    """Return a Markdown table of all predictors with some columns per road.
-
-    Args:
-        measured: the figures.
-        roads: title of each road to be shown, by name.
-        columns: of each road.
-    """
-    head = ["", *(f"{title}: {metric.title}" for title in roads.values() for metric in columns.values())]
-    body = [
-        [name, *(cell(rows.get(road, {}).get(figure), metric) for road in roads for figure, metric in columns.items())]
-        for name, rows in measured.items()
-    ]
-    return markdown(head, body)
 
 
 def _cells(rows: Mapping[str, Mapping[str, Spread]], columns: Columns) -> tuple[list[str], list[list[str]]]:

@@ -12,11 +12,12 @@ from ml.data.frames import Frames, along
 from ml.data.roads import LearningRoad
 from ml.networks.centerline.models import TARGETS
 from ml.scores.evaluation import case, evaluate, skeleton_predictor
+from ml.scores.metrics import Spread
 from tests.helpers.clouds.centerline_batches import SETTINGS, small
 from tests.helpers.clouds.centerline_roads import strip_road
 from tests.helpers.roads.analytic_roads import roads
 from tools import figures_centerline
-from tools.figures_centerline import grid_search
+from tools.figures_centerline import grid_search, road_table
 
 
 def test_the_grid_search_takes_the_best_that_finds_enough() -> None:
@@ -58,3 +59,10 @@ def test_what_was_found_is_remembered_by_points_and_frames(monkeypatch: pytest.M
     assert not np.array_equal(other.value, wanted.value)
     remembering.regress(known, places.select(np.arange(len(places)) > 3))
     assert len(seen) == 4
+
+
+def test_roads_stand_side_by_side() -> None:
+    figures = {"model": {"a": {"mae": Spread(0.1234, 0.0056, 5)}}}
+    lines = road_table(figures, {"a": "A"}).splitlines()
+    assert lines[0] == "|  | A: MAE (m) | A: Chamfer (m) |"
+    assert lines[2] == "| model | 0.123 (0.006) | – |"
