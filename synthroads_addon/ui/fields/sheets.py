@@ -137,8 +137,3 @@ def _place_of(path: str) -> str:
     parts = path.split(".")[:-1]
     places = (".".join([*parts[:depth], "*"]) for depth in range(len(parts), -1, -1))
     return next((place for place in places if place in rows), "")
-
-
-def homeless() -> tuple[str, ...]:
-    """Return the fields that have no place: none, or the panels are wrong."""
-    return tuple(path for path in PATHS if not _place_of(path))
