@@ -50,7 +50,7 @@ _SHOWN: dict[str, dict[str, Any]] = {
 
 
 _FOLLOWED_BY = {"SR Axis from Curve": strip_group, "SR Points along Axis": delineator_group}
-"""What makes the group that shows what another one gives it."""
+"""Maker of the group that shows what another one gives it."""
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -38,7 +38,7 @@ SYSTEMS = [
         ("win32", "Windows", "nt", "AMD64"),
     )
 ]
-"""What markers ask of the systems that an environment may be made on."""
+"""Systems that an environment may be made on, as markers ask for them."""
 HEAD = "# Written by `nox -s lock`: the versions that are installed, with the hashes of their files.\n"
 
 

@@ -49,7 +49,7 @@ class ClassSelector(Model):
 
 
 Member = str | int | ClassSelector
-"""What a class stands for: a class of the full table, a number of a scene's own, or what a selector finds."""
+"""Source of a class: a class of the full table, a number of a scene's own, or what a selector finds."""
 
 
 def _form(member: object) -> str | None:

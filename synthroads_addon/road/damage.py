@@ -15,7 +15,7 @@ _SLIVER = 2e-4
 
 
 _SHALLOW = 1e-6
-"""What is no deeper (m) is no damage: a cosine is never quite 0."""
+"""Depth (m) up to which a place is undamaged: a cosine is never quite 0."""
 
 
 def damage_depth(section: CarriagewaySection, station: Float, offset: Float) -> Float:

@@ -20,7 +20,7 @@ LIBRARY_NAME = "SynthRoads"
 LIBRARY_FILE = "node_groups.blend"
 _CATALOGUES_FILE = "blender_assets.cats.txt"
 _DECLARING = (PARTS, points)
-"""What declares the groups when it is imported: things, and places for them."""
+"""Modules that declare node groups when they are imported: things, and places for them."""
 
 
 def write_library(path: Path, pictures: Path) -> list[str]:

@@ -360,7 +360,7 @@ def node_group(name: str, build: Callable[..., None], *arguments: object, descri
 
 Make = Callable[[], bpy.types.NodeTree]
 CATALOGUES: dict[str, dict[str, Make]] = {}
-"""What makes the groups that users can use by hand: by catalogue of the asset library, by name."""
+"""Makers of the groups that users can use by hand: by catalogue of the asset library, by name."""
 
 
 def usual_materials(group: bpy.types.NodeTree) -> dict[str, str]:

@@ -23,7 +23,7 @@ BLADE = 0.045
 SHEETING = 0.002
 """Distance of the stripes from the blade, m."""
 CORNER, SUNK = 0.06, 0.01
-"""What is cut off a foot's corners, and how far it is sunk, m."""
+"""Cut at a foot's corners, and how far it is sunk, m."""
 LEVELS = (0.7, (0.86, 0.92))
 """Height of a foot's lower part as a share, and the size of its upper one as shares of the lower's."""
 TENON, TENON_MIDDLE = (0.07, 0.05, 0.1), 0.12

@@ -25,7 +25,7 @@ FACE = 0.006
 BEAMS = ("box", "truss", "tube")
 TUBE_SIDES = 20
 JOINT = 0.08
-"""What a beam's joints are deeper than it, m."""
+"""Depth of a beam's joints beyond the beam's own, m."""
 TRUSS_CHORD = (0.1, 0.06, 0.16)
 """Width of a truss's chords as a share of its height, and its limits, m."""
 TRUSS_BAR, TRUSS_BAY = 0.65, (0.5, 1.2)

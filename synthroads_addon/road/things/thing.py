@@ -41,7 +41,7 @@ class Block(NamedTuple):
 
 
 class TwinTypes(NamedTuple):
-    """What a thing is in the formats of the geometric-semantic model.
+    """Names of a thing's types in the formats of the geometric-semantic model.
 
     Attributes:
         ifc: entity, predefined type, and of an assembly where it is put together, with dots between them.
@@ -63,7 +63,7 @@ class TwinTypes(NamedTuple):
 
 
 class Signal(NamedTuple):
-    """What a face tells drivers, in OpenDRIVE's words.
+    """Message of a face to drivers, in OpenDRIVE's words.
 
     Attributes:
         type, subtype: numbers in the country's catalogue of signs.

@@ -16,7 +16,7 @@ from .thing import Block, Signal, StandingThing, TwinTypes
 CHAMBER, BOARD = (1.3, 0.7, 1.25), 1.9
 """A chamber of the housing (across, along, up) and the width of the board behind it, in diameters of a light."""
 MARGIN = 0.05
-"""What the board is higher than the housing above and below, m."""
+"""Height of the board beyond the housing, above and below, m."""
 BEHIND, RIM = 0.005, 0.004
 """From the post to the middle of the board's rim, and the rim's depth, m."""
 PANEL, EDGE = (0.008, 0.001), 0.018
@@ -26,7 +26,7 @@ VISOR = (0.56, 0.004, 0.55, 0.5)
 VISOR_TURNS = tuple(math.radians(-35.0 + 250.0 * i / 8.0) for i in range(9))
 """Where the corners of a visor are around its light, rad."""
 JOINT = 0.02
-"""What a chamber is lower than its place, in diameters of a light."""
+"""Difference between the heights of a place and of its chamber, in diameters of a light."""
 POST = 0.089
 """Diameter of a traffic light's post, m."""
 

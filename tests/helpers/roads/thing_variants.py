@@ -41,7 +41,7 @@ FURTHER: dict[str, list[Data]] = {
     "NoiseBarrier": [{"thickness": 0.3, "panel": "wood"}, {"thickness": 0.3, "panel": "glass"}],
     "Pole": [{"arm_length": 0.0}, {"kind": "surveillance", "arm_length": 0.0}],
 }
-"""What the choices alone don't show."""
+"""Variants that the choices alone don't show."""
 
 
 def variants(kind: str) -> Iterator[Data]:

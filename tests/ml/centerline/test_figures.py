@@ -1,4 +1,4 @@
-"""What only the tables of the documentation need: the baseline's best settings, and predictors with a memory."""
+"""Parts of the documentation's tables: the baseline's best settings, and predictors with a memory."""
 
 from __future__ import annotations
 
