@@ -22,8 +22,8 @@ BEHIND = {
     "octagon": (0.93, 1.0, 0.6),
     "arrow": (0.9, 1.0, 0.7),
 }
-"""Extent of what is behind a face of a shape, so that nothing looks out: height of the posts' top as a share of the face's, part
-of the height that rails are spread over, and the rails' length as a share of the width."""
+"""Extent of what is behind a face of a shape, so that nothing looks out: height of the posts' top as a share of the
+face's, part of the height that rails are spread over, and the rails' length as a share of the width."""
 CLAMP = 0.006
 """How far the clamps of the rails stand out of the posts, m."""
 LATTICE_CHORD = 0.045
