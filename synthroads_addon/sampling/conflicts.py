@@ -14,7 +14,6 @@ from operator import attrgetter
 from ..base.errors import InputError
 from ..base.schema import Model
 from ..road.guidelines import (
-    CLEARANCE,
     EMERGENCY_BAY_LENGTH,
     EMERGENCY_BAY_TAPER,
     EMERGENCY_BAY_WIDTH,
@@ -27,13 +26,11 @@ from ..road.guidelines import (
     TURNOUT_LANE_WIDTH,
     TURNOUT_TAPER,
 )
+from ..road.limits import Interval
 from ..road.section import Marking, Pothole, Ramp, Rut, Turnout
 from ..road.surroundings import Environment, MaterialVariation, Terrain, Vegetation, Vehicle
-from ..road.things.guardrail import Guardrail
-from ..road.things.noise_barrier import NoiseBarrier
-from ..road.things.overpass import Overpass
-from ..road.things.pole import Pole
-from ..scenario.road import EnvironmentLimits, Interval, MaterialLimits, RoadScenario
+from ..road.things.registry import limits_of
+from ..scenario.road import EnvironmentLimits, MaterialLimits, RoadScenario
 from .placing.construction import SHORTEST_ALONG, TAPER_OUT, TAPERS_IN
 from .section import RampLimits, cross_section_of, features_of, may_change_lanes
 
@@ -59,11 +56,6 @@ _FIELDS: dict[str, tuple[type[Model], str]] = {
     "pavement.pothole_size": (Pothole, "width"),
     "pavement.pothole_depth": (Pothole, "depth"),
     "markings.film_thickness": (Marking, "film_thickness"),
-    "barriers.guardrail_height": (Guardrail, "height"),
-    "barriers.noise_barrier_height": (NoiseBarrier, "height"),
-    "furniture.lighting_height": (Pole, "height"),
-    "furniture.surveillance_height": (Pole, "height"),
-    "furniture.overpass_width": (Overpass, "width"),
     "vehicles.speed": (Vehicle, "speed"),
     "embankment_height": (Terrain, "embankment_height"),
     "undulation": (Terrain, "undulation"),
@@ -79,12 +71,6 @@ _FIELDS: dict[str, tuple[type[Model], str]] = {
 _PLAIN = {
     "lane_changes.taper_length": (0.0, 1e4),
     "pavement.potholes_per_km": (0.0, 1e4),
-    "barriers.noise_barrier_length": (0.0, 1e6),
-    "furniture.gantry_clearance": (CLEARANCE, 10.0),
-    "furniture.lighting_spacing": (1.0, 1e4),
-    "furniture.cabinets_per_km": (0.0, 1e3),
-    "furniture.overpass_clearance": (CLEARANCE, 20.0),
-    "furniture.construction_length": (0.0, 1e6),
     "vehicles.per_km": (0.0, 1e3),
     "vehicles.trucks": (0.0, 1.0),
 }
@@ -247,4 +233,11 @@ def _allowed_range(model: type[Model], name: str) -> tuple[float, float]:
     return low, high
 
 
-_ALLOWED = {path: _allowed_range(*field) for path, field in _FIELDS.items()} | _PLAIN
+def _allowed_by_things() -> Iterator[tuple[str, tuple[float, float]]]:
+    """Yield the intervals of the things' limits, and what they must keep to."""
+    for thing, limits in limits_of():
+        for name, allowed in limits.allowed.items():
+            yield f"{limits.group}.{name}", _allowed_range(thing, allowed) if isinstance(allowed, str) else allowed
+
+
+_ALLOWED = {path: _allowed_range(*field) for path, field in _FIELDS.items()} | _PLAIN | dict(_allowed_by_things())

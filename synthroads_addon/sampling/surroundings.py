@@ -13,6 +13,7 @@ from ..base.arrays import Bool, Float, Index
 from ..base.random_streams import stream
 from ..base.schema import round_value
 from ..road.guidelines import OBSTACLE_DISTANCE
+from ..road.limits import Interval
 from ..road.objects import AnyWidth, RoadObject, Side, least_width, nominal_width, width_at, width_kinks
 from ..road.parameters import AlignmentObject
 from ..road.section_geometry import CarriagewaySection
@@ -21,7 +22,7 @@ from ..road.terrain import fit_to_ground, road_elevation_model
 from ..road.things.beacon import ConstructionBeacon
 from ..road.things.temporary_barrier import TemporaryBarrier
 from ..road.things.vehicles import COLORS, HEAVY_SPEED, VEHICLE_GAP, VEHICLE_LANE_WIDTH, VEHICLE_ROOM, VEHICLE_TYPES
-from ..scenario.road import Interval, MaterialLimits, RoadScenario
+from ..scenario.road import MaterialLimits, RoadScenario
 from .placing.draw import draw
 from .placing.site import PlacementSite
 

@@ -2,38 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from ..base.schema import ClosedModel, Finite, notes, quantity
 from ..road.guidelines import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS, USUAL_SECTION, design_class_of
+from ..road.limits import Interval, interval, share
 from ..road.section import SHORTEST_DASH
 from ..road.surroundings import GRASSES, SHRUBS, TREES
-
-
-class Interval(ClosedModel):
-    """Limits that a sampled value lies within."""
-
-    minimum: Finite = Field(description="Smallest value.")
-    maximum: Finite = Field(description="Largest value.")
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Interval:
-        if self.maximum < self.minimum:
-            raise ValueError(f"maximum {self.maximum} must not be less than minimum {self.minimum}")
-        return self
-
-
-def interval(low: float, high: float, unit: str, description: str, title: str | None = None) -> Any:
-    """Declare an interval with its default limits."""
-    limits = Interval(minimum=low, maximum=high)
-    return Field(limits, title=title, description=description, json_schema_extra=notes(unit=unit))
-
-
-def share(default: float, description: str, title: str | None = None) -> Any:
-    """Declare a probability that a road (or a carriageway) has something."""
-    return quantity(default, "1", description, (0, 1), title=title)
+from ..road.things.registry import limits_model
 
 
 class FreeCrossSection(ClosedModel):
@@ -113,49 +91,23 @@ class MarkingLimits(ClosedModel):
     film_thickness: Interval = interval(0.0015, 0.004, "m", "Thickness of the film.")
 
 
-class BarrierLimits(ClosedModel):
+class _BarrierLimits(ClosedModel):
     """Guardrails, concrete barriers and noise barriers."""
 
     median: bool = Field(True, title="In the Median", description="A barrier in the median.")
     roadside: bool = Field(True, title="At the Edges", description="Barriers at the edges, by the safety rules.")
-    concrete_median: float = share(
-        0.3, "Probability that the median's barrier is of concrete.", title="Of Concrete in the Median"
-    )
-    concrete_roadside: float = share(
-        0.1, "Probability that a roadside barrier is of concrete.", title="Of Concrete at the Edges"
-    )
-    guardrail_height: Interval = interval(0.75, 0.9, "m", "Top of guardrails.")
-    noise_barrier: float = share(0.25, "Probability of a noise barrier beside a carriageway.", title="Noise Barriers")
-    noise_barrier_height: Interval = interval(2.5, 6.0, "m", "Height of noise barriers.", title="Their Height")
-    noise_barrier_length: Interval = interval(100.0, 800.0, "m", "Length of noise barriers.", title="Their Length")
 
 
-class FurnitureLimits(ClosedModel):
+class _FurnitureLimits(ClosedModel):
     """Signs, gantries and equipment."""
 
-    signs: bool = Field(True, description="Traffic signs.")
-    delineators: bool = Field(True, description="Delineator posts.")
-    gantries: float = share(0.3, "Probability of a gantry, where no spacing is given.")
-    gantry_spacing: float | None = quantity(
-        None, "m", "Spacing of gantries; they then stand all along.", (1, 10_000), unset="Single ones"
-    )
-    gantry_clearance: Interval = interval(5.0, 5.8, "m", "Clearance under gantries.")
-    lighting: float = share(0.15, "Probability of lighting poles.", title="Lighting Poles")
-    lighting_spacing: Interval = interval(35.0, 50.0, "m", "Spacing of lighting poles.", title="Their Spacing")
-    lighting_height: Interval = interval(10.0, 14.0, "m", "Height of lighting poles.", title="Their Height")
-    surveillance: float = share(0.2, "Probability of a surveillance pole.", title="Surveillance Pole")
-    surveillance_height: Interval = interval(8.0, 15.0, "m", "Height of surveillance poles.", title="Its Height")
-    traffic_lights: float = share(
-        0.3, "Probability that an entry is metered by traffic lights.", title="Traffic Lights at an Entry"
-    )
-    kilometre_boards: bool = Field(True, description="Kilometre boards every 500 m.")
-    emergency_phones: bool = Field(True, description="Emergency phones every 2 km.")
-    cabinets_per_km: Interval = interval(0.0, 3.0, "1/km", "Utility cabinets per km.", title="Cabinets (per km)")
-    overpass: float = share(0.15, "Probability of an overpass.")
-    overpass_clearance: Interval = interval(4.7, 5.6, "m", "Clearance under an overpass.", title="Its Clearance")
-    overpass_width: Interval = interval(6.0, 14.0, "m", "Width of an overpass.", title="Its Width")
-    construction_zone: float = share(0.1, "Probability that a carriageway long enough has a construction zone.")
-    construction_length: Interval = interval(120.0, 400.0, "m", "Length of a construction zone.", title="Its Length")
+
+if TYPE_CHECKING:
+    BarrierLimits: TypeAlias = Any
+    FurnitureLimits: TypeAlias = Any
+else:
+    BarrierLimits = limits_model("BarrierLimits", "barriers", _BarrierLimits)
+    FurnitureLimits = limits_model("FurnitureLimits", "furniture", _FurnitureLimits)
 
 
 class VehicleLimits(ClosedModel):

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from synthroads_addon.road.guidelines import OBSTACLE_DISTANCE
+from synthroads_addon.road.limits import Interval
 from synthroads_addon.road.objects import width_at
 from synthroads_addon.road.parameters import (
     AlignmentObject,
@@ -38,7 +39,7 @@ from synthroads_addon.sampling.surroundings import (
     sample_vegetation,
     sample_vehicles,
 )
-from synthroads_addon.scenario.road import EnvironmentLimits, Interval, MaterialLimits, RoadScenario
+from synthroads_addon.scenario.road import EnvironmentLimits, MaterialLimits, RoadScenario
 
 SEEDS = range(300)
 

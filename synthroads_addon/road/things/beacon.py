@@ -10,6 +10,7 @@ from pydantic import Field
 
 from ...base.arrays import Float
 from ...base.schema import quantity
+from ..limits import Interval, Limits, interval, share
 from ..objects import Side
 from .body import Body, Place, box, circle, moved, plate, prism
 from .thing import Block, StandingThing, TwinTypes
@@ -47,11 +48,22 @@ _REACH = 0.1
 """Half of the room along the road, m."""
 
 
+class ConstructionLimits(Limits):
+    """Limits of construction zones."""
+
+    place: ClassVar = 90
+    allowed: ClassVar = {"construction_length": (0.0, 1e6)}
+
+    construction_zone: float = share(0.1, "Probability that a carriageway long enough has a construction zone.")
+    construction_length: Interval = interval(120.0, 400.0, "m", "Length of a construction zone.", title="Its Length")
+
+
 class ConstructionBeacon(StandingThing):
     """A beacon (Leitbake) of a construction zone, red and white, its stripes falling to the side to pass it on."""
 
     points_class: ClassVar = "construction_barrier"
     order: ClassVar = 120
+    limits: ClassVar = ConstructionLimits
     type: Literal["ConstructionBeacon"] = "ConstructionBeacon"
     pass_side: Side = Field(description="Side, seen along the stations, on which traffic passes it.")
     width: float = quantity(0.25, ge=0.1, le=0.6, unit="m", description="Width of its blade.")

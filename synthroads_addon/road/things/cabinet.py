@@ -10,6 +10,7 @@ from pydantic import Field
 
 from ...base.arrays import Float
 from ...base.schema import quantity
+from ..limits import Interval, Limits, interval
 from .body import BURIED, Body, Place, box
 from .thing import Block, StandingThing, TwinTypes
 
@@ -37,11 +38,22 @@ def phone_outline() -> Float:
     return (corners[:, None] + radius * np.stack([np.cos(turn), np.sin(turn)], axis=2)).reshape(-1, 2)
 
 
+class CabinetLimits(Limits):
+    """Limits of emergency phones and cabinets."""
+
+    place: ClassVar = 70
+    allowed: ClassVar = {"cabinets_per_km": (0.0, 1e3)}
+
+    emergency_phones: bool = Field(True, description="Emergency phones every 2 km.")
+    cabinets_per_km: Interval = interval(0.0, 3.0, "1/km", "Utility cabinets per km.", title="Cabinets (per km)")
+
+
 class Cabinet(StandingThing):
     """An emergency phone or a utility cabinet."""
 
     points_class: ClassVar = "utility"
     order: ClassVar = 110
+    limits: ClassVar = CabinetLimits
     type: Literal["Cabinet"] = "Cabinet"
     kind: Literal["emergency_phone", "utility"] = Field(description="What it is.")
     width: float = quantity(0.3, ge=0.1, le=3, unit="m", description="Width, seen by the traffic beside it.")

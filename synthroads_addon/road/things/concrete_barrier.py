@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from ...base.schema import quantity
+from ..limits import Limits, share
 from .body import Body, Course, swept
 from .thing import Block, LengthwiseThing, TwinTypes
 
@@ -24,11 +25,26 @@ TIP = 0.08
 """Height at which a concrete barrier's ramped end breaks off, m."""
 
 
+class ConcreteLimits(Limits):
+    """How many barriers are of concrete."""
+
+    group: ClassVar = "barriers"
+    place: ClassVar = 10
+
+    concrete_median: float = share(
+        0.3, "Probability that the median's barrier is of concrete.", title="Of Concrete in the Median"
+    )
+    concrete_roadside: float = share(
+        0.1, "Probability that a roadside barrier is of concrete.", title="Of Concrete at the Edges"
+    )
+
+
 class ConcreteBarrier(LengthwiseThing):
     """A concrete barrier, symmetric about its axis."""
 
     points_class: ClassVar = "barrier"
     order: ClassVar = 20
+    limits: ClassVar = ConcreteLimits
     type: Literal["ConcreteBarrier"] = "ConcreteBarrier"
     profile: Literal["new_jersey", "step"] = Field("step", description="Shape of its cross-section.")
     height: float = quantity(0.9, ge=0.4, le=2.0, unit="m", description="Top above the surface.")

@@ -6,8 +6,10 @@ from collections.abc import Iterator
 from typing import ClassVar, Literal
 
 import numpy as np
+from pydantic import Field
 
 from ...base.schema import quantity
+from ..limits import Limits
 from .body import BURIED, Body, Place, box
 from .thing import Block, StandingThing, TwinTypes
 
@@ -23,11 +25,20 @@ REACH = 0.06
 """Half the width of a delineator, m."""
 
 
+class DelineatorLimits(Limits):
+    """Whether there are delineators."""
+
+    place: ClassVar = 20
+
+    delineators: bool = Field(True, description="Delineator posts.")
+
+
 class Delineator(StandingThing):
     """A delineator post (Leitpfosten) beside the road."""
 
     points_class: ClassVar = "warning_post"
     order: ClassVar = 50
+    limits: ClassVar = DelineatorLimits
     type: Literal["Delineator"] = "Delineator"
     height: float = quantity(1.0, ge=0.3, le=1.5, unit="m", description="Top above the surface.")
 

@@ -10,6 +10,8 @@ from pydantic import Field, model_validator
 
 from ...base.arrays import Float
 from ...base.schema import Model, quantity
+from ..guidelines import CLEARANCE
+from ..limits import Interval, Limits, interval, share
 from ..objects import Side
 from .body import Body, Place, bar, box, circle, moved
 from .thing import Block, Signal, StandingThing, TwinTypes
@@ -82,6 +84,19 @@ class GantrySign(Model):
         return 1.0 if self.offset < 0.0 else -1.0
 
 
+class GantryLimits(Limits):
+    """Limits of gantries."""
+
+    place: ClassVar = 30
+    allowed: ClassVar = {"gantry_clearance": (CLEARANCE, 10.0)}
+
+    gantries: float = share(0.3, "Probability of a gantry, where no spacing is given.")
+    gantry_spacing: float | None = quantity(
+        None, "m", "Spacing of gantries; they then stand all along.", (1, 10_000), unset="Single ones"
+    )
+    gantry_clearance: Interval = interval(5.0, 5.8, "m", "Clearance under gantries.")
+
+
 class Gantry(StandingThing):
     """A shield gantry across one carriageway (one_sided), across both (two_sided), or on one post (cantilever).
 
@@ -92,6 +107,7 @@ class Gantry(StandingThing):
 
     points_class: ClassVar = "shield_gantry"
     order: ClassVar = 70
+    limits: ClassVar = GantryLimits
     obstacle: ClassVar = "gantry's post"
     type: Literal["Gantry"] = "Gantry"
     kind: Literal["one_sided", "two_sided", "cantilever"] = Field(description="What it spans.")

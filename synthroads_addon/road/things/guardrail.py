@@ -10,6 +10,7 @@ from pydantic import Field
 
 from ...base.arrays import Float
 from ...base.schema import quantity
+from ..limits import Interval, Limits, interval
 from .body import Body, Course, boxes, swept
 from .thing import Block, LengthwiseThing, TwinTypes
 
@@ -40,11 +41,22 @@ _FACE, _REAR = 0.2, 0.05
 """From the axis to the face of the beam, and to the rear of the posts, m."""
 
 
+class GuardrailLimits(Limits):
+    """Limits of guardrails."""
+
+    group: ClassVar = "barriers"
+    place: ClassVar = 20
+    allowed: ClassVar = {"guardrail_height": "height"}
+
+    guardrail_height: Interval = interval(0.75, 0.9, "m", "Top of guardrails.")
+
+
 class Guardrail(LengthwiseThing):
     """A steel guardrail: W-beam on posts, ramped down at its terminals. Its offset is that of the posts' axis."""
 
     points_class: ClassVar = "guardrail"
     order: ClassVar = 10
+    limits: ClassVar = GuardrailLimits
     type: Literal["Guardrail"] = "Guardrail"
     faces: Literal["left", "right", "both"] = Field(description="Side that the beam is mounted on.")
     height: float = quantity(0.75, ge=0.3, le=1.5, unit="m", description="Top of the beam above the surface.")

@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from ...base.schema import quantity
+from ..limits import Limits
 from .body import BURIED, Body, Place, plate, post
 from .sign_outline import face_outline
 from .thing import Block, Signal, StandingThing, TwinTypes
@@ -20,11 +21,20 @@ _POST_REACH = 0.03
 """Half of what a post is given room for, m."""
 
 
+class KilometreBoardLimits(Limits):
+    """Whether there are kilometre boards."""
+
+    place: ClassVar = 60
+
+    kilometre_boards: bool = Field(True, description="Kilometre boards every 500 m.")
+
+
 class KilometreBoard(StandingThing):
     """A kilometre board: blue, white writing."""
 
     points_class: ClassVar = "road_sign"
     order: ClassVar = 100
+    limits: ClassVar = KilometreBoardLimits
     type: Literal["KilometreBoard"] = "KilometreBoard"
     text: str = Field(max_length=12, description="Its kilometre, as written.")
     width: float = quantity(0.55, ge=0.1, le=2, unit="m", description="Width of the board.")

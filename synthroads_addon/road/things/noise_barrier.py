@@ -10,6 +10,7 @@ from pydantic import Field
 
 from ...base.arrays import Float
 from ...base.schema import quantity
+from ..limits import Interval, Limits, interval, share
 from .body import Body, Course, boxes
 from .thing import Block, LengthwiseThing, TwinTypes
 
@@ -38,11 +39,24 @@ MATERIALS = {
 _SHORTEST_BAY, _NONE = 0.05, 1e-9  # m
 
 
+class NoiseBarrierLimits(Limits):
+    """Limits of noise barriers."""
+
+    group: ClassVar = "barriers"
+    place: ClassVar = 30
+    allowed: ClassVar = {"noise_barrier_height": "height", "noise_barrier_length": (0.0, 1e6)}
+
+    noise_barrier: float = share(0.25, "Probability of a noise barrier beside a carriageway.", title="Noise Barriers")
+    noise_barrier_height: Interval = interval(2.5, 6.0, "m", "Height of noise barriers.", title="Their Height")
+    noise_barrier_length: Interval = interval(100.0, 800.0, "m", "Length of noise barriers.", title="Their Length")
+
+
 class NoiseBarrier(LengthwiseThing):
     """A noise barrier: panels between posts. Its offset is that of the panels' middle."""
 
     points_class: ClassVar = "noise_barrier"
     order: ClassVar = 30
+    limits: ClassVar = NoiseBarrierLimits
     type: Literal["NoiseBarrier"] = "NoiseBarrier"
     height: float = quantity(4.0, ge=1, le=12, unit="m", description="Top above the surface.")
     panel: Literal["aluminium", "concrete", "wood", "glass"] = Field("aluminium", description="Kind of its panels.")

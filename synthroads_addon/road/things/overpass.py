@@ -11,6 +11,8 @@ from pydantic import Field
 
 from ...base.arrays import Float
 from ...base.schema import quantity
+from ..guidelines import CLEARANCE
+from ..limits import Interval, Limits, interval, share
 from .body import Body, Place, Point2, Point3, box, moved, prism
 from .thing import Block, StandingThing, TwinTypes
 
@@ -51,6 +53,17 @@ _FAR = 1000.0
 """How far abutments reach, m: their embankments go on to the ground."""
 
 
+class OverpassLimits(Limits):
+    """Limits of overpasses."""
+
+    place: ClassVar = 80
+    allowed: ClassVar = {"overpass_width": "width", "overpass_clearance": (CLEARANCE, 20.0)}
+
+    overpass: float = share(0.15, "Probability of an overpass.")
+    overpass_clearance: Interval = interval(4.7, 5.6, "m", "Clearance under an overpass.", title="Its Clearance")
+    overpass_width: Interval = interval(6.0, 14.0, "m", "Width of an overpass.", title="Its Width")
+
+
 class Overpass(StandingThing):
     """A bridge that crosses over the road. Station and offset are those of its middle.
 
@@ -60,6 +73,7 @@ class Overpass(StandingThing):
 
     points_class: ClassVar = "bridge"
     order: ClassVar = 130
+    limits: ClassVar = OverpassLimits
     obstacle: ClassVar = "pier"
     type: Literal["Overpass"] = "Overpass"
     width: float = quantity(10.0, ge=2, le=60, unit="m", description="Width of its deck along the road.")

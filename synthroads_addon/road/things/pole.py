@@ -10,6 +10,7 @@ from pydantic import Field
 
 from ...base.arrays import Float
 from ...base.schema import quantity
+from ..limits import Interval, Limits, interval, share
 from .body import BURIED, Body, Place, box, circle, moved, post, prism, tilted
 from .thing import Block, StandingThing, TwinTypes
 
@@ -38,11 +39,29 @@ POLE_CABINET = (0.3, 0.22, 0.45, 2.2)
 """A cabinet on a mast: width, depth, height, the height of its middle, m."""
 
 
+class PoleLimits(Limits):
+    """Limits of lighting and surveillance poles."""
+
+    place: ClassVar = 40
+    allowed: ClassVar = {
+        "lighting_height": "height",
+        "surveillance_height": "height",
+        "lighting_spacing": (1.0, 1e4),
+    }
+
+    lighting: float = share(0.15, "Probability of lighting poles.", title="Lighting Poles")
+    lighting_spacing: Interval = interval(35.0, 50.0, "m", "Spacing of lighting poles.", title="Their Spacing")
+    lighting_height: Interval = interval(10.0, 14.0, "m", "Height of lighting poles.", title="Their Height")
+    surveillance: float = share(0.2, "Probability of a surveillance pole.", title="Surveillance Pole")
+    surveillance_height: Interval = interval(8.0, 15.0, "m", "Height of surveillance poles.", title="Its Height")
+
+
 class Pole(StandingThing):
     """A lighting pole, or one for surveillance cameras; its arm points away from rotation 0's traffic to the left."""
 
     points_class: ClassVar = "pole"
     order: ClassVar = 80
+    limits: ClassVar = PoleLimits
     obstacle: ClassVar = "pole"
     type: Literal["Pole"] = "Pole"
     kind: Literal["lighting", "surveillance"] = Field("lighting", description="What it carries.")

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from ...base.schema import quantity
+from ..limits import Limits
 from .body import BURIED, Body, Place, box, plate, post, prism
 from .sign_outline import face_outline
 from .thing import Block, Signal, StandingThing, TwinTypes
@@ -34,11 +35,20 @@ _SPEED_LIMIT = "274"
 """Number of the sign whose subtype is a speed, km/h."""
 
 
+class SignLimits(Limits):
+    """Whether there are signs."""
+
+    place: ClassVar = 10
+
+    signs: bool = Field(True, description="Traffic signs.")
+
+
 class TrafficSign(StandingThing):
     """A traffic sign on one or two posts. At rotation 0 it faces traffic with the stations."""
 
     points_class: ClassVar = "road_sign"
     order: ClassVar = 60
+    limits: ClassVar = SignLimits
     obstacle: ClassVar = "sign's post"
     type: Literal["TrafficSign"] = "TrafficSign"
     code: str = Field(

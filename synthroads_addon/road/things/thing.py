@@ -10,6 +10,7 @@ import numpy as np
 
 from ...base.arrays import Float
 from ...base.schema import Model
+from ..limits import Limits
 from ..objects import LineObject, PointObject, RoadObject
 from .body import Body, Course, Place
 
@@ -88,10 +89,12 @@ class Thing(RoadObject):
 
     Attributes:
         order: place among the things in lists of them; those without one come last.
+        limits: what a scenario says of how it is sampled; None where that has no fields for it.
         obstacle: what its foot is called for people, where a barrier must stand before it; empty if none must.
     """
 
     order: ClassVar[int] = 1000
+    limits: ClassVar[type[Limits] | None] = None
     obstacle: ClassVar[str] = ""
 
     def footprint(self) -> Iterator[Block]:

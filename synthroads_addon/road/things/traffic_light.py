@@ -10,6 +10,7 @@ import numpy as np
 
 from ...base.arrays import Float
 from ...base.schema import quantity
+from ..limits import Limits, share
 from .body import BURIED, Body, Place, box, moved, post
 from .thing import Block, Signal, StandingThing, TwinTypes
 
@@ -31,11 +32,22 @@ POST = 0.089
 """Diameter of a traffic light's post, m."""
 
 
+class TrafficLightLimits(Limits):
+    """How many entries are metered."""
+
+    place: ClassVar = 50
+
+    traffic_lights: float = share(
+        0.3, "Probability that an entry is metered by traffic lights.", title="Traffic Lights at an Entry"
+    )
+
+
 class TrafficLight(StandingThing):
     """A traffic light on its post, e.g. where an entry is metered."""
 
     points_class: ClassVar = "traffic_light"
     order: ClassVar = 90
+    limits: ClassVar = TrafficLightLimits
     type: Literal["TrafficLight"] = "TrafficLight"
     height: float = quantity(3.2, ge=1.5, le=8, unit="m", description="Top above the surface.")
     lights: int = quantity(3, ge=1, le=4, unit="1", description="Number of lights.")

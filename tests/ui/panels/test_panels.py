@@ -15,11 +15,11 @@ import synthroads_addon
 from synthroads_addon.base.schema import note_of
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.model.store import remember
+from synthroads_addon.road.limits import Interval
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.devices.device import DEVICES, device_names
 from synthroads_addon.scanning.platforms.registry import PLATFORMS
 from synthroads_addon.scanning.weather.registry import WEATHERS
-from synthroads_addon.scenario.road import Interval
 from synthroads_addon.scenario.scenario import Scenario, load_scenario, scenario_names
 from synthroads_addon.ui.fields import preferences
 from synthroads_addon.ui.fields.choices import BY_HAND
