@@ -16,7 +16,7 @@ from ...road.parameters import RoadParameters
 from ..materials import vary
 from ..nodes.builder import remove_unused_groups
 from ..things.model_builder import ROLE, ModelBuilder
-from .parts import PARTS, required_parts
+from ..things.registry import model_parts, required_parts
 from .stage import DataBlockLog, in_scene, new_staging, remove_staged, remove_with_meshes
 
 COLLECTION = "SynthRoads"
@@ -61,7 +61,7 @@ def build_road(
         parameters: the road.
         tolerance: largest chord error of the road's surface, m.
         vegetation_detail: share of the vegetation's triangles, 0 to 1; 0 builds none.
-        parts: which of `PARTS` are wanted; all if None. What they need from others is built hidden.
+        parts: which of `model_parts` are wanted; all if None. What they need from others is built hidden.
         stretch: stations between which it is built, with an origin of its own (see `road.stretches`), from
             and to the nearest rows of the whole road's surface; the whole road if None.
         geometry: of the parameters, if there is one already.
@@ -134,9 +134,10 @@ class _Build:
         stretch: tuple[float, float] | None,
         geometry: RoadGeometry | None = None,
     ) -> None:
-        self._wanted = set(PARTS if parts is None else parts)
-        if self._wanted - set(PARTS):
-            raise ValueError(f"parts: {sorted(self._wanted - set(PARTS))} are not among {tuple(PARTS)}")
+        known = model_parts()
+        self._wanted = set(known if parts is None else parts)
+        if self._wanted - set(known):
+            raise ValueError(f"parts: {sorted(self._wanted - set(known))} are not among {tuple(known)}")
         self._scene = bpy.context.scene.name
         remove_staged()
         self.log = DataBlockLog()
@@ -149,11 +150,11 @@ class _Build:
         """Make the objects; see `base.stepper` for how this is done in steps."""
         self._builder.lay_out()
         there = required_parts(self._wanted)
-        for number, (name, build) in enumerate(PARTS.items()):
+        for number, (name, part) in enumerate(model_parts().items(), 1):
             if name in there:
                 self._builder.hidden = name not in self._wanted
-                build(self._builder)
-            self.share = (number + 1) / len(PARTS)
+                part.build(self._builder)
+            self.share = number / len(model_parts())
 
     def evaluate(self) -> None:
         """Have Blender work out what is new."""

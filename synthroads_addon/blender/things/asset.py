@@ -20,11 +20,13 @@ from ..files import complaint, stderr_if_it_succeeds
 from ..labels import CLASS_PROPERTY, INSTANCE_PROPERTY
 from .meshes import on_plan
 from .model_builder import ModelBuilder
+from .registry import model_part
 
 KEY = "synthroads_asset"
 """Custom property of an asset's collection: the file (and object) that it was read from."""
 
 
+@model_part("assets", 170, on_the_road=True)
 def build_assets(builder: ModelBuilder) -> None:
     """Add an instance of its asset's collection for every asset of the set.
 

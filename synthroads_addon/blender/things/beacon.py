@@ -15,6 +15,7 @@ from ..nodes.inputs import boolean, material_of, metres, socket
 from ..nodes.solids import box, flip_faces, move_geometry, paint_faces, prism, put_on_points, row_of_points
 from ..nodes.standing import OnSurface
 from .model_builder import ModelBuilder
+from .registry import model_part
 
 CELLS = (2, 8)
 """Cells across and up a blade, each cut by the border of a stripe: of 0.25 m x 1 m they are squares."""
@@ -126,6 +127,7 @@ def _lamp(tree: Tree, housing: Value, lens: Value) -> Value:
     return op.join(body, paint_faces(parts[0], housing), paint_faces(parts[1], lens))
 
 
+@model_part("beacons", 80)
 def build_beacons(builder: ModelBuilder) -> None:
     """Make all beacons as one object."""
     beacons = list(builder.parameters.of_type(ConstructionBeacon).values())

@@ -12,6 +12,7 @@ from ..nodes.solids import box, paint_faces, put_on_points, row_of_points
 from ..nodes.standing import Standing
 from .emergency_phone import emergency_phone_group
 from .model_builder import ModelBuilder
+from .registry import model_part
 
 _GAP = 0.006
 """The joint around doors, m."""
@@ -74,6 +75,7 @@ def _block(tree: Tree, cabinet: _Cabinet, inset: float, low: Value | float, high
     return box(tree, size, op.vector(tree, 0.0, 0.0, (high + low) * 0.5))
 
 
+@model_part("cabinets", 150)
 def build_cabinets(builder: ModelBuilder) -> None:
     """Make one object per emergency phone and utility cabinet."""
     for name, cabinet in builder.parameters.of_type(Cabinet).items():

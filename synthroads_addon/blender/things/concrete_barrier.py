@@ -12,6 +12,7 @@ from ..nodes.foot import Lengthwise, foot_at
 from ..nodes.inputs import boolean, instance_number, material_of, metres
 from ..nodes.solids import loft, row_of_points
 from .model_builder import ModelBuilder
+from .registry import model_part
 
 
 def _outline(profile: str) -> list[tuple[float, float, float]]:
@@ -89,6 +90,7 @@ def _sweep_profile(tree: Tree, line: Value, barrier: _Barrier) -> Value:
     return loft(tree, outline, len(_outline("step")), op.point_count(line), place, {"station": station})
 
 
+@model_part("concrete_barriers", 50)
 def build_concrete_barriers(builder: ModelBuilder) -> None:
     """Make one object per concrete barrier."""
     for name, barrier in builder.parameters.of_type(ConcreteBarrier).items():

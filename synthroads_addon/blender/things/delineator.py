@@ -14,6 +14,7 @@ from ..nodes.inputs import material_of, metres, socket
 from ..nodes.solids import paint_faces
 from ..nodes.standing import OnSurface, put_on
 from .model_builder import ModelBuilder
+from .registry import model_part
 
 # Rows of the body from below: z on the axis; the slant applies above the surface only.
 _LEVELS = (-BURIED, 0.0, 0.64, 0.89, sizes.TOP)
@@ -94,6 +95,7 @@ def _reflector_body(face: Value, glass: Value) -> Value:
     return paint_faces(solid, glass)
 
 
+@model_part("delineators", 160, on_the_road=True)
 def build_delineators(builder: ModelBuilder) -> None:
     """Make all delineator posts as one object."""
     posts = list(builder.parameters.of_type(Delineator).values())

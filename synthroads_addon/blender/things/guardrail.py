@@ -12,6 +12,7 @@ from ..nodes.foot import Lengthwise
 from ..nodes.inputs import boolean, instance_number, material_of, metres
 from ..nodes.solids import row_of_points
 from .model_builder import ModelBuilder
+from .registry import model_part
 
 BEAM_PROFILE = [(x, 0.0, z) for x, z in sizes.BEAM]
 BEAM_PROFILE += [(x - sizes.SHEET, 0.0, z) for x, z in reversed(sizes.BEAM)]
@@ -170,6 +171,7 @@ def _post(tree: Tree) -> Value:
     return op.set_position(mesh, section + op.vector(tree, 0.0, 0.0, number))
 
 
+@model_part("guardrails", 40, on_the_road=True)
 def build_guardrails(builder: ModelBuilder) -> None:
     """Make one object per guardrail."""
     for name, rail in builder.parameters.of_type(Guardrail).items():

@@ -13,6 +13,7 @@ from ..nodes.inputs import Inputs, material_of, metres
 from ..nodes.solids import move_geometry
 from ..nodes.standing import Standing, put_on
 from .model_builder import ModelBuilder
+from .registry import model_part
 from .sign.face import Face, sign_face_group
 from .sign.looks import FaceStyle, face_inputs
 from .sign.posts import sign_posts_group
@@ -54,6 +55,7 @@ def kilometre_board_group(tree: Tree) -> None:
     tree.output("Mesh", mesh, description="Board with its post")
 
 
+@model_part("kilometre_boards", 120)
 def build_kilometre_boards(builder: ModelBuilder) -> None:
     """Make one object per kilometre board."""
     for name, board in builder.parameters.of_type(KilometreBoard).items():

@@ -16,6 +16,7 @@ from ..nodes.foot import Lengthwise, foot_at
 from ..nodes.inputs import Inputs, instance_number, integer, material_of, metres
 from ..nodes.solids import box, paint_faces, prism, put_on_points, row_of_points
 from .model_builder import ModelBuilder
+from .registry import model_part
 
 _KINDS = ("aluminium", "concrete", "wood", "glass")
 _SUNK = 0.003  # m: faces that coincide have no first hit
@@ -242,6 +243,7 @@ def _glass_pane(tree: Tree, panel: _Panel) -> Value:
     return op.join(paint_faces(op.join(*frame), panel.frame_material), paint_faces(pane, panel.panel_material))
 
 
+@model_part("noise_barriers", 60)
 def build_noise_barriers(builder: ModelBuilder) -> None:
     """Make one object per noise barrier."""
     for name, wall in builder.parameters.of_type(NoiseBarrier).items():

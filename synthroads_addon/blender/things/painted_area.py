@@ -19,6 +19,7 @@ from ..nodes.inputs import Inputs, backbone_socket, material_of, socket
 from ..nodes.solids import paint_faces
 from .meshes import attribute, fill_polygons, signed_instance
 from .model_builder import ModelBuilder
+from .registry import model_part
 
 _LONGEST = 1.0
 """Outlines are cut into pieces no longer than this (m), so that they follow the road's curves and its crossfall."""
@@ -56,6 +57,7 @@ def painted_area_group(tree: Tree) -> None:
     tree.output("Mesh", mesh, description="Paint whose faces look up")
 
 
+@model_part("painted_areas", 30, on_the_road=True)
 def build_painted_areas(builder: ModelBuilder) -> None:
     """Make all painted areas as one object."""
     outlines = run_aside(lambda: list(_outlines(builder)))

@@ -14,6 +14,7 @@ from ..nodes.inputs import boolean, material_of, metres
 from ..nodes.solids import box, cone, move_geometry, paint_faces, prism, row_of_points, tube
 from ..nodes.standing import Standing, put_on
 from .model_builder import ModelBuilder
+from .registry import model_part
 
 _GLASS = [(-0.16, -0.1), (-0.16, 0.1), (-0.56, 0.1), (-0.56, -0.1)]
 """Glass under a luminaire: x from its mount on, y, m."""
@@ -112,6 +113,7 @@ def _camera(tree: Tree, pole: _Pole) -> Value:
     return op.transform(camera, rotation=(math.radians(sizes.CAMERA_TILT), 0.0, 0.0))
 
 
+@model_part("poles", 130)
 def build_poles(builder: ModelBuilder) -> None:
     """Make one object per pole."""
     for name, pole in builder.parameters.of_type(Pole).items():

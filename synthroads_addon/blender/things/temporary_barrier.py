@@ -13,6 +13,7 @@ from ..nodes.foot import Lengthwise, foot_at
 from ..nodes.inputs import boolean, instance_number, material_of, metres
 from ..nodes.solids import box, loft, paint_faces, put_on_points, row_of_points
 from .model_builder import ModelBuilder
+from .registry import model_part
 
 _STEEL, _PLASTIC = sizes.FLANKS["steel"], sizes.FLANKS["plastic"]
 
@@ -111,6 +112,7 @@ def _put_on_elements(tree: Tree, points: Value, body: Value, whole: bool) -> Val
     return put_on_points(points, body, start, op.vector(tree, length, 1.0, 1.0), turned.value)
 
 
+@model_part("temporary_barriers", 70)
 def build_temporary_barriers(builder: ModelBuilder) -> None:
     """Make one object per movable barrier."""
     for name, barrier in builder.parameters.of_type(TemporaryBarrier).items():

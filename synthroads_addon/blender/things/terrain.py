@@ -28,6 +28,7 @@ from ..nodes.inputs import (
 )
 from .meshes import fill
 from .model_builder import ModelBuilder
+from .registry import model_part
 
 Float = NDArray[np.float64]
 
@@ -142,6 +143,7 @@ def _ground_above(tree: Tree, ground: Value, place: Value) -> Value:
     return op.switch(ray["Is Hit"], 0.0, 1000.0 - ray["Hit Distance"])
 
 
+@model_part("terrain", 20)
 def build_terrain(builder: ModelBuilder) -> None:
     """Make the ground as it was, and the terrain that joins it to the road."""
     terrain = builder.parameters.terrain

@@ -14,6 +14,7 @@ from ..nodes.inputs import integer, material_of, metres
 from ..nodes.solids import box, cone, loft, move_geometry, paint_faces, put_on_points, row_of_points, tube
 from ..nodes.standing import Standing
 from .model_builder import ModelBuilder
+from .registry import model_part
 
 
 class _Light(Standing):
@@ -130,6 +131,7 @@ def _visor(tree: Tree, diameter: Value) -> Value:
     return loft(tree, outline, 2 * len(sizes.VISOR_TURNS), 2, place)
 
 
+@model_part("traffic_lights", 140)
 def build_traffic_lights(builder: ModelBuilder) -> None:
     """Make one object per traffic light."""
     for name, light in builder.parameters.of_type(TrafficLight).items():

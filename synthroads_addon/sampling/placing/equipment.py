@@ -13,6 +13,7 @@ from .draw import draw, pick
 from .edge import ramp_station
 from .layout import Layout, PlacementRequest, Roadside
 from .ranges import draw_start, free_ranges, nearest_free
+from .registry import small_thing
 
 UTILITY_SIZES = ((0.8, 0.35, 1.1), (1.2, 0.4, 1.3), (0.6, 0.3, 0.9))
 """Width, depth and height of utility cabinets, m."""
@@ -88,6 +89,7 @@ def plan_traffic_lights(layout: Layout, rng: np.random.Generator) -> None:
                 roadside.put(PlacementRequest("traffic-light", TrafficLight, place, _HALF, LIGHT_WIDTH, outer=True))
 
 
+@small_thing("equipment", 20)
 def plan_lighting(layout: Layout, rng: np.random.Generator) -> None:
     """Put lighting poles all along one side or both; each stands behind a barrier, so none beside turnouts."""
     limits = layout.site.scenario.furniture
@@ -105,6 +107,7 @@ def plan_lighting(layout: Layout, rng: np.random.Generator) -> None:
             _put_pole(roadside, "lighting", station, height, LIGHTING_DIAMETER, arm)
 
 
+@small_thing("equipment", 10)
 def plan_surveillance(layout: Layout, rng: np.random.Generator) -> None:
     """Put a surveillance pole somewhere beside the road."""
     limits = layout.site.scenario.furniture
@@ -118,6 +121,7 @@ def plan_surveillance(layout: Layout, rng: np.random.Generator) -> None:
         _put_pole(roadside, "surveillance", start + _HALF, height, SURVEILLANCE_DIAMETER, arm)
 
 
+@small_thing("equipment", 30)
 def plan_cabinets(layout: Layout, rng: np.random.Generator) -> None:
     """Put utility cabinets at random stations, as many per km as drawn."""
     sides = list(layout.sides.values())

@@ -14,9 +14,10 @@ from ...road.objects import RoadObject
 from .barriers import median_barriers, plan_noise_barrier, roadside_barriers
 from .construction import construction_zones
 from .delineators import delineator_stations, delineators
-from .equipment import plan_cabinets, plan_lighting, plan_periodic, plan_surveillance, plan_traffic_lights
+from .equipment import plan_periodic, plan_traffic_lights
 from .layout import Layout
 from .random import plan_random_equipment, plan_random_signs, random_front, random_median_barrier
+from .registry import small_things
 from .signs import median_signs, plan_exit_signs, plan_gore_signs, plan_other_signs
 from .site import PlacementSite
 from .structures import GantryPlan, OverpassPlan, gantries, overpass, plan_gantries, plan_overpass
@@ -48,9 +49,10 @@ def place_furniture(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
         plan_traffic_lights(layout, streams["equipment"])
     else:
         plan_random_equipment(layout, streams["equipment"])
-    plan_surveillance(layout, streams["equipment"])
-    plan_lighting(layout, streams["equipment"])
-    plan_cabinets(layout, streams["equipment"])
+    for item in small_things():
+        if item.stream not in streams:
+            streams[item.stream] = site.stream("furniture", item.stream)
+        item.plan(layout, streams[item.stream])
     yield from _fronts_by_rules(layout, streams) if by_rules else _fronts_at_random(layout, streams)
     yield from _behind(layout, streams, planned, bridge)
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.classes import class_id
-from synthroads_addon.blender.model.parts import PARTS
 from synthroads_addon.blender.scene.evaluated import scene_mesh
+from synthroads_addon.blender.things.registry import model_parts
 from synthroads_addon.road.terrain import surface_elevation
 from synthroads_addon.road.things.registry import THINGS
 from synthroads_addon.road.things.thing import Thing
@@ -30,7 +30,7 @@ class BuiltThings:
     """Variants of things on a straight road, built."""
 
     def __init__(self, objects: dict[str, Data]) -> None:
-        parts = [part for part in PARTS if part not in ("vegetation", "vehicles")]
+        parts = [part for part in model_parts() if part not in ("vegetation", "vehicles")]
         self.road = FurnishedRoad(straight_road(objects), parts)
         shown = [item for role, item in self.road.model.objects.items() if role not in GROUND]
         self._mesh = scene_mesh(objects=shown)

@@ -15,6 +15,7 @@ from synthroads_addon.blender.model.stage import DataBlockLog, remove_staged
 from synthroads_addon.blender.model.store import find_road, recall
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.blender.things.model_builder import ROLE
+from synthroads_addon.blender.things.registry import model_parts
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import load_scenario
@@ -147,7 +148,8 @@ def test_a_part_that_fails_leaves_the_road_before(monkeypatch: pytest.MonkeyPatc
     def fail(builder: Any) -> None:
         raise InputError("asset", None, "cannot be read")
 
-    monkeypatch.setitem(model_module.PARTS, "delineators", fail)
+    parts = model_parts()
+    monkeypatch.setitem(parts, "delineators", parts["delineators"]._replace(build=fail))
     for run in (lambda: build_road(parameters(), 0.02, 0.1), lambda: finish(build_steps(parameters(), 0.02, 0.1))):
         with pytest.raises(InputError, match="cannot be read"):
             run()

@@ -20,6 +20,7 @@ from ...nodes.inputs import Inputs, boolean, instance_number, integer, material_
 from ...nodes.solids import box, move_geometry, paint_faces, put_on_points, row_of_points
 from ..meshes import attribute, fill
 from ..model_builder import ModelBuilder
+from ..registry import model_part
 from ..sign.looks import FaceStyle, face_inputs
 from .board import gantry_sign_group
 from .structure import gantry_beam_group, gantry_catwalk_group, gantry_post_group
@@ -199,6 +200,7 @@ _LIT = 0.9
 """Share of a display's sides that lights up."""
 
 
+@model_part("gantries", 90)
 def build_gantries(builder: ModelBuilder) -> None:
     """Make one object per gantry, and one per face of its signs."""
     for name, gantry in builder.parameters.of_type(Gantry).items():

@@ -16,6 +16,7 @@ from ...nodes.inputs import Inputs, instance_number, material_of, metres, number
 from ...nodes.solids import flip_faces, move_geometry, put_on_points
 from ..meshes import fill
 from ..model_builder import ModelBuilder
+from ..registry import model_part
 from .deck import bridge_deck_group
 from .embankment import bridge_embankment_group
 from .supports import bridge_abutment_group, bridge_pier_group
@@ -174,6 +175,7 @@ _APPROACH_ALONE = 20.0
 """Length (m) of the embankments where there is no terrain."""
 
 
+@model_part("overpasses", 100)
 def build_overpasses(builder: ModelBuilder) -> None:
     """Make one object per overpass."""
     terrain = builder.parameters.terrain

@@ -14,6 +14,7 @@ from ....road.section import Carriageway, LineMarking, Median
 from ...nodes.inputs import input_name
 from ..meshes import attribute, fill, signed_instance
 from ..model_builder import ModelBuilder
+from ..registry import model_part
 from .layout import detail_points, names_in_words, road_layout, side_of, strip_widths, varying_widths, width_field
 from .markings import LINE_FIELDS
 from .road import road_group
@@ -21,6 +22,7 @@ from .road import road_group
 Float = NDArray[np.float64]
 
 
+@model_part("road", 10, on_the_road=True)
 def build_surface(builder: ModelBuilder) -> None:
     """Make the backbone and the road's surface."""
     station = builder.stations

@@ -11,6 +11,7 @@ from ...nodes.inputs import Inputs, boolean, integer, material_of, metres
 from ...nodes.solids import box, move_geometry, paint_faces, put_on_points, row_of_points, tube
 from ...nodes.standing import Standing, put_on
 from ..model_builder import ModelBuilder
+from ..registry import model_part
 from .face import Face, sign_face_group
 from .looks import sign_face_inputs
 from .outline import SHAPES
@@ -85,6 +86,7 @@ def _mounting(tree: Tree, face: Face, sign: _SignInputs, spread: Value, long: Va
         return paint_faces(op.join(rails, clamps), face.back_material)
 
 
+@model_part("signs", 110)
 def build_signs(builder: ModelBuilder) -> None:
     """Make one object per traffic sign."""
     for name, sign in builder.parameters.of_type(TrafficSign).items():

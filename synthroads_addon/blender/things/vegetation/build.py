@@ -17,6 +17,7 @@ from ....road.surroundings import Terrain, Vegetation
 from ....road.vegetation.plants import ROADSIDE_SHARE, SEEDS, plant_places
 from ..meshes import attribute, fill
 from ..model_builder import ModelBuilder
+from ..registry import model_part
 from .grass import grass_group
 from .shrub import shrub_group
 from .tree import tree_group
@@ -31,6 +32,7 @@ def species_shapes() -> dict[str, dict[str, dict[str, float]]]:
     return shapes
 
 
+@model_part("vegetation", 190)
 def build_vegetation(builder: ModelBuilder) -> None:
     """Make one object per stand of plants."""
     terrain = builder.parameters.terrain

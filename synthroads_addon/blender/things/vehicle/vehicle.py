@@ -15,6 +15,7 @@ from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group, node_group
 from ...nodes.inputs import Inputs, metres, socket
 from ..model_builder import ModelBuilder
+from ..registry import model_part
 from .details import VehicleMaterials
 from .models import model_group
 
@@ -114,6 +115,7 @@ def _on_road(road: Value, place: Value, way: Value) -> Value:
     return flat + op.vector(tree, 0.0, 0.0, height)
 
 
+@model_part("vehicles", 180)
 def build_vehicles(builder: ModelBuilder) -> None:
     """Make one object per vehicle, so that each can be moved on its own."""
     lines: dict[tuple[str, int], LaneLine] = {}

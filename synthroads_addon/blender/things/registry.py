@@ -1,0 +1,63 @@
+"""Parts of a model: each file or folder beside this one registers what builds its part by `model_part`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from importlib import import_module
+from pkgutil import walk_packages
+from typing import NamedTuple
+
+from .model_builder import ModelBuilder
+
+Build = Callable[[ModelBuilder], None]
+_LAST = 1000
+"""Order of a part that has none."""
+
+
+class ModelPart(NamedTuple):
+    """Part of a model.
+
+    Attributes:
+        order, name: its place in the order of building, and its name.
+        build: adds its objects to a model.
+        on_the_road: whether it needs no terrain; all others stand on it.
+    """
+
+    order: int
+    name: str
+    build: Build
+    on_the_road: bool
+
+
+_PARTS: dict[str, ModelPart] = {}
+
+
+def model_part(name: str, order: int = _LAST, on_the_road: bool = False) -> Callable[[Build], Build]:
+    """Register a function that builds a part of a model.
+
+    Raises:
+        ValueError: another part has this name.
+    """
+
+    def register(build: Build) -> Build:
+        known = _PARTS.setdefault(name, ModelPart(order, name, build, on_the_road))
+        if known.build is not build:
+            raise ValueError(f"{known.build.__module__} and {build.__module__} both have a part named {name!r}")
+        return build
+
+    return register
+
+
+@cache
+def model_parts() -> dict[str, ModelPart]:
+    """Return all parts by name, in the order in which they are built."""
+    for file in walk_packages(import_module(__package__).__path__, f"{__package__}."):
+        import_module(file.name)
+    return {part.name: part for part in sorted(_PARTS.values(), key=lambda part: part[:2])}
+
+
+def required_parts(wanted: set[str]) -> set[str]:
+    """Return the parts that must be there for those wanted: what they stand on, too."""
+    standing = any(not model_parts()[name].on_the_road for name in wanted)
+    return wanted | ({"road"} if wanted else set()) | ({"terrain"} if standing else set())
