@@ -26,9 +26,9 @@ from ..road.guidelines import (
     TURNOUT_LANE_WIDTH,
     TURNOUT_TAPER,
 )
-from ..road.limits import Interval
 from ..road.section import Marking, Pothole, Ramp, Rut, Turnout
 from ..road.surroundings import Environment, MaterialVariation, Terrain, Vegetation, Vehicle
+from ..road.things.limits import Interval
 from ..road.things.registry import limits_of
 from ..scenario.road import EnvironmentLimits, MaterialLimits, RoadScenario
 from .placing.construction import SHORTEST_ALONG, TAPER_OUT, TAPERS_IN

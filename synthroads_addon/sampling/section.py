@@ -30,10 +30,10 @@ from ..road.guidelines import (
     TURNOUT_TAPER,
     StandardCrossSection,
 )
-from ..road.limits import Interval
 from ..road.objects import Side, WidthPoint, nominal_width, width_at
 from ..road.parameters import AlignmentObject
 from ..road.section import Carriageway, Lane, Pavement, Pothole, Ramp, Rut, Turnout
+from ..road.things.limits import Interval
 from ..road.turnout_geometry import BLEND, NOSE_BEFORE_END, NOSE_WIDTH, STEP
 from ..scenario.road import FreeCrossSection, RoadScenario
 

@@ -13,13 +13,13 @@ from ..base.arrays import Bool, Float, Index
 from ..base.random_streams import stream
 from ..base.schema import round_value
 from ..road.guidelines import OBSTACLE_DISTANCE
-from ..road.limits import Interval
 from ..road.objects import AnyWidth, RoadObject, Side, least_width, nominal_width, width_at, width_kinks
 from ..road.parameters import AlignmentObject
 from ..road.section_geometry import CarriagewaySection
 from ..road.surroundings import Environment, MaterialVariation, Terrain, Vegetation, Vehicle
 from ..road.terrain import fit_to_ground, road_elevation_model
 from ..road.things.beacon import ConstructionBeacon
+from ..road.things.limits import Interval
 from ..road.things.temporary_barrier import TemporaryBarrier
 from ..road.things.vehicles import COLORS, HEAVY_SPEED, VEHICLE_GAP, VEHICLE_LANE_WIDTH, VEHICLE_ROOM, VEHICLE_TYPES
 from ..scenario.road import MaterialLimits, RoadScenario

@@ -12,7 +12,7 @@ from pydantic import Field, field_validator, model_validator
 from ..base.errors import InputError, MissingFileError
 from ..base.files import PRESETS, stamp
 from ..base.schema import ClosedModel, quantity, read_json
-from ..road.limits import Interval, interval
+from ..road.things.limits import Interval, interval
 
 SUFFIXES = (".blend", ".glb", ".obj")
 LIBRARIES = PRESETS / "assets"

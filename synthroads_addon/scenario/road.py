@@ -8,9 +8,9 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from ..base.schema import ClosedModel, Finite, notes, quantity
 from ..road.guidelines import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS, USUAL_SECTION, design_class_of
-from ..road.limits import Interval, interval, share
 from ..road.section import SHORTEST_DASH
 from ..road.surroundings import GRASSES, SHRUBS, TREES
+from ..road.things.limits import Interval, interval, share
 from ..road.things.registry import limits_model
 
 

@@ -10,11 +10,11 @@ import pytest
 from pydantic.fields import FieldInfo
 
 from synthroads_addon.base.schema import ClosedModel, Model, unit_of
-from synthroads_addon.road.limits import Interval
 from synthroads_addon.road.parameters import Metadata
 from synthroads_addon.road.section import Lane, Pavement, Pothole, Ramp, Rut
 from synthroads_addon.road.surroundings import Environment, MaterialVariation
 from synthroads_addon.road.things.gantry import GantrySign
+from synthroads_addon.road.things.limits import Interval
 from synthroads_addon.scenario.road import RoadScenario
 from tests.helpers.roads.parameter_sets import LIBRARY_ONLY, OBJECTS
 

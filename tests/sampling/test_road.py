@@ -14,8 +14,8 @@ import pytest
 from synthroads_addon.base.schema import ClosedModel
 from synthroads_addon.checking.checker import check
 from synthroads_addon.road.guidelines import SECTIONS_OF_CLASS
-from synthroads_addon.road.limits import Interval
 from synthroads_addon.road.parameters import RoadParameters, parameters_schema
+from synthroads_addon.road.things.limits import Interval
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
 from tests.helpers.files.mutations import cases

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 from synthroads_addon.road.guidelines import OBSTACLE_DISTANCE
-from synthroads_addon.road.limits import Interval
 from synthroads_addon.road.objects import width_at
 from synthroads_addon.road.parameters import (
     AlignmentObject,
@@ -28,6 +27,7 @@ from synthroads_addon.road.parameters import (
 from synthroads_addon.road.section import Carriageway
 from synthroads_addon.road.surroundings import SPECIES, Terrain, Vegetation, Vehicle
 from synthroads_addon.road.things.beacon import ConstructionBeacon
+from synthroads_addon.road.things.limits import Interval
 from synthroads_addon.road.things.temporary_barrier import TemporaryBarrier
 from synthroads_addon.road.things.vehicles import COLORS, VEHICLE_TYPES
 from synthroads_addon.sampling.placing.site import PlacementSite

@@ -10,9 +10,9 @@ from pydantic import Field
 
 from ...base.arrays import Float
 from ...base.schema import quantity
-from ..limits import Interval, Limits, interval, share
 from ..objects import Side
 from .body import Body, Place, box, circle, moved, plate, prism
+from .limits import Interval, Limits, interval, share
 from .thing import Block, StandingThing, TwinTypes
 
 FOOT = (0.40, 0.80, 0.11)

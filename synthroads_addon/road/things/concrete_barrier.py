@@ -9,8 +9,8 @@ import numpy as np
 from pydantic import Field
 
 from ...base.schema import quantity
-from ..limits import Limits, share
 from .body import Body, Course, swept
+from .limits import Limits, share
 from .thing import Block, LengthwiseThing, TwinTypes
 
 FLANKS = {

@@ -9,8 +9,8 @@ import numpy as np
 from pydantic import Field
 
 from ...base.schema import quantity
-from ..limits import Limits
 from .body import BURIED, Body, Place, box
+from .limits import Limits
 from .thing import Block, StandingThing, TwinTypes
 
 OUTLINE = (

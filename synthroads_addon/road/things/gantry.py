@@ -11,9 +11,9 @@ from pydantic import Field, model_validator
 from ...base.arrays import Float
 from ...base.schema import Model, quantity
 from ..guidelines import CLEARANCE
-from ..limits import Interval, Limits, interval, share
 from ..objects import Side
 from .body import Body, Place, bar, box, circle, moved
+from .limits import Interval, Limits, interval, share
 from .thing import Block, Signal, StandingThing, TwinTypes
 
 HANGER = 0.18

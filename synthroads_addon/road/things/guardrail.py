@@ -10,8 +10,8 @@ from pydantic import Field
 
 from ...base.arrays import Float
 from ...base.schema import quantity
-from ..limits import Interval, Limits, interval
 from .body import Body, Course, boxes, swept
+from .limits import Interval, Limits, interval
 from .thing import Block, LengthwiseThing, TwinTypes
 
 BEAM = (

@@ -8,8 +8,8 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from ...base.schema import quantity
-from ..limits import Limits
 from .body import BURIED, Body, Place, plate, post
+from .limits import Limits
 from .sign_outline import face_outline
 from .thing import Block, Signal, StandingThing, TwinTypes
 

@@ -10,8 +10,8 @@ from pydantic import Field
 
 from ...base.arrays import Float
 from ...base.schema import quantity
-from ..limits import Interval, Limits, interval, share
 from .body import Body, Course, boxes
+from .limits import Interval, Limits, interval, share
 from .thing import Block, LengthwiseThing, TwinTypes
 
 FLANGE, INSIDE, WEB = 0.475, 0.42, 0.02

@@ -12,8 +12,8 @@ from pydantic import Field
 from ...base.arrays import Float
 from ...base.schema import quantity
 from ..guidelines import CLEARANCE
-from ..limits import Interval, Limits, interval, share
 from .body import Body, Place, Point2, Point3, box, moved, prism
+from .limits import Interval, Limits, interval, share
 from .thing import Block, StandingThing, TwinTypes
 
 DECK = ((0.18, 0.6), (0.24, 0.0), (0.52, 0.0), (0.6, 0.62), (0.985, 0.78), (0.985, 1.0))

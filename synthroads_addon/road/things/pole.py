@@ -10,8 +10,8 @@ from pydantic import Field
 
 from ...base.arrays import Float
 from ...base.schema import quantity
-from ..limits import Interval, Limits, interval, share
 from .body import BURIED, Body, Place, box, circle, moved, post, prism, tilted
+from .limits import Interval, Limits, interval, share
 from .thing import Block, StandingThing, TwinTypes
 
 MAST_TAPER, MAST_SIDES = 0.45, 16

@@ -8,7 +8,7 @@ from pydantic import create_model
 
 from ...base.discovery import discover_models
 from ...base.schema import ClosedModel
-from ..limits import Limits
+from .limits import Limits
 from .thing import Thing
 
 THINGS = discover_models(__package__, Thing, "type")

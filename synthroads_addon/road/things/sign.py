@@ -9,8 +9,8 @@ import numpy as np
 from pydantic import Field
 
 from ...base.schema import quantity
-from ..limits import Limits
 from .body import BURIED, Body, Place, box, plate, post, prism
+from .limits import Limits
 from .sign_outline import face_outline
 from .thing import Block, Signal, StandingThing, TwinTypes
 

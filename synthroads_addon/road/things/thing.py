@@ -10,9 +10,9 @@ import numpy as np
 
 from ...base.arrays import Float
 from ...base.schema import Model
-from ..limits import Limits
 from ..objects import LineObject, PointObject, RoadObject
 from .body import Body, Course, Place
+from .limits import Limits
 
 _FACE_REACH = 0.03
 """Half the depth that a sign's or a board's face is given room for, m."""

@@ -10,8 +10,8 @@ import numpy as np
 
 from ...base.arrays import Float
 from ...base.schema import quantity
-from ..limits import Limits, share
 from .body import BURIED, Body, Place, box, moved, post
+from .limits import Limits, share
 from .thing import Block, Signal, StandingThing, TwinTypes
 
 CHAMBER, BOARD = (1.3, 0.7, 1.25), 1.9

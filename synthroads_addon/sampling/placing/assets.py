@@ -9,9 +9,9 @@ import numpy as np
 from ...base.arrays import Float
 from ...base.errors import InputError
 from ...base.schema import round_value
-from ...road.limits import Interval
 from ...road.section_geometry import CarriagewaySection
 from ...road.things.asset import Asset
+from ...road.things.limits import Interval
 from ...scenario.assets import FARTHEST, AssetPlacement, read_asset_library
 from .site import PlacementSite
 

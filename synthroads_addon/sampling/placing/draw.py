@@ -8,7 +8,7 @@ from typing import TypeVar
 import numpy as np
 
 from ...base.schema import round_value
-from ...road.limits import Interval
+from ...road.things.limits import Interval
 
 T = TypeVar("T")
 

@@ -21,7 +21,7 @@ from pydantic.fields import FieldInfo
 
 from ...base.errors import InputError
 from ...base.schema import note_of, unit_of
-from ...road.limits import Interval
+from ...road.things.limits import Interval
 from ...scenario.scenario import Scenario
 from .choices import ITEMS
 from .inherited import SOURCES, Value

@@ -10,7 +10,7 @@ import bpy
 from pydantic import BaseModel, create_model
 from pydantic.fields import FieldInfo
 
-from ...road.limits import Interval
+from ...road.things.limits import Interval
 from . import fields as kinds
 from .choices import BY_HAND, BY_HAND_ENDING, STANDARD_PARTS, Items
 from .fields import Field, FilesField, Hooks, OptionalField

@@ -12,8 +12,8 @@ import numpy as np
 
 from synthroads_addon.base.schema import ClosedModel, Model
 from synthroads_addon.road.guidelines import LIMITS
-from synthroads_addon.road.limits import Interval
 from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.things.limits import Interval
 from synthroads_addon.road.things.vehicles import VEHICLE_TYPES
 from synthroads_addon.scenario.road import RoadScenario
 

@@ -19,7 +19,7 @@ import synthroads_addon
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import ClosedModel, quantity
 from synthroads_addon.road.guidelines import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS
-from synthroads_addon.road.limits import Interval, interval
+from synthroads_addon.road.things.limits import Interval, interval
 from synthroads_addon.scanning.devices.device import device_names, load_device
 from synthroads_addon.scanning.platforms.registry import PLATFORMS
 from synthroads_addon.scenario.scan import MOST_POSSIBLE, ScanScenario

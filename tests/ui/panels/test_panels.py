@@ -15,7 +15,7 @@ import synthroads_addon
 from synthroads_addon.base.schema import note_of
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.model.store import remember
-from synthroads_addon.road.limits import Interval
+from synthroads_addon.road.things.limits import Interval
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.devices.device import DEVICES, device_names
 from synthroads_addon.scanning.platforms.registry import PLATFORMS

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from ..base.schema import ClosedModel, Finite, notes, quantity
+from ...base.schema import ClosedModel, Finite, notes, quantity
 
 
 class Interval(ClosedModel):
