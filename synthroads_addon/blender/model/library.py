@@ -12,14 +12,14 @@ from ..files import empty_file
 from ..materials import material
 from ..nodes import points
 from ..nodes.builder import CATALOGUES, KEY, MATERIALS, usual_materials
-from .parts import PARTS
+from ..things.registry import model_parts
 
 LIBRARY_FOLDER = PRESETS / "node_groups"
 """Folder of the extension with the library and its catalogues."""
 LIBRARY_NAME = "SynthRoads"
 LIBRARY_FILE = "node_groups.blend"
 _CATALOGUES_FILE = "blender_assets.cats.txt"
-_DECLARING = (PARTS, points)
+_DECLARING = (model_parts(), points)
 """Modules that declare node groups when they are imported: things, and places for them."""
 
 
