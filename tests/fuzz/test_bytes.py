@@ -205,7 +205,7 @@ def test_points_that_are_not_finite_are_refused_by_name(tmp_path: Path, ending: 
     points = replace(points, xyz=np.where(np.arange(300).reshape(100, 3) == 31, value, points.xyz))
     from synthroads_addon.cloud.formats import base as writing
 
-    monkeypatch.setattr(writing.CloudWriter, "finite", lambda self, values, name: values)
+    monkeypatch.setattr(writing.CloudWriter, "check_finite", lambda self, values, name: values)
     path = tmp_path / f"cloud{ending}"
     with open_writer(path, None, ORIGIN, 1.0, ()) as writer:
         writer.write(points)

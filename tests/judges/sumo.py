@@ -7,6 +7,7 @@ import re
 import subprocess
 import tempfile
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -127,9 +128,12 @@ def crowd(net: Net, folder: Path) -> set[str]:
 
 
 def _run(program: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    import sumo
+    # Not imported: on import it has every other PROJ in this process take its tables of coordinate systems.
+    spec = find_spec("sumo")
+    assert spec is not None
+    assert spec.origin is not None
 
-    home = Path(sumo.SUMO_HOME)
+    home = Path(spec.origin).parent
     environment = {**os.environ, "SUMO_HOME": str(home), "PROJ_DATA": str(home / "data" / "proj")}
     command = [str(home / "bin" / program), *arguments]
     return subprocess.run(command, capture_output=True, text=True, check=False, env=environment)

@@ -50,7 +50,8 @@ class Objects:
     def write(self, loose: Iterable[tuple[str, LineMarking, float, float]]) -> None:
         """Add its objects in the order of the parameter set, then the lines that follow no lane."""
         for name, item in self.ground.geometry.parameters.objects.items():
-            if side_of(self.ground.geometry, item) != self.frame.side:
+            written = isinstance(item, LengthwiseThing | StandingThing | Hatching | Arrow)
+            if not written or side_of(self.ground.geometry, item) != self.frame.side:
                 continue
             if isinstance(item, LengthwiseThing):
                 self.barrier(name, item)

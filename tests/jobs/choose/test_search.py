@@ -57,10 +57,10 @@ def few_lines(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("few_lines")
 def test_a_tolerance_takes_what_keeps_it_and_leaves_what_is_given(tmp_path: Path) -> None:
-    words = ("tolerance=height=8mm,intensity=3%,labels=2%", "scan.relief_octaves=3")
+    words = ("tolerance=height=8mm,intensity=2%,labels=2%", "scan.relief_octaves=3")
     report = report_of(tmp_path, *words)
     choice = report["choice"]
-    assert choice["asked"] == {"tolerance": {"height": 0.008, "intensity": 0.03, "labels": 0.02}}
+    assert choice["asked"] == {"tolerance": {"height": 0.008, "intensity": 0.02, "labels": 0.02}}
     assert choice["kept"] == {"scan.relief_octaves": 3}
     assert choice["by"].startswith("pilot measurements")
     assert choice["chosen"].items() >= {"geometric_tolerance": 0.008, "colour.source": "material"}.items()

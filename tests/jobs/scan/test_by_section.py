@@ -27,7 +27,7 @@ from synthroads_addon.scanning.beam import RINGS
 from synthroads_addon.scanning.blocks import Blocks
 from synthroads_addon.scanning.colour.colour import FROM_MATERIAL
 from synthroads_addon.scanning.colour.difference import cie_lab, ciede2000
-from synthroads_addon.scanning.sections import reach, sections
+from synthroads_addon.scanning.sections import reached_stations, sections
 from synthroads_addon.scenario.road import RoadScenario
 from synthroads_addon.scenario.scan import scanner_setting
 from synthroads_addon.scenario.scenario import Scenario
@@ -166,7 +166,7 @@ def test_as_much_is_built_as_the_rays_reach(tmp_path: Path, kind: str, pitch: fl
     assert [part.start for part in parts] == [300.0 * i for i in range(6)]
     assert sorted((s.index, b) for part in parts for s, b in part.blocks) == [(s.index, b) for s, b in cut.all()]
     for part in parts:
-        low, high = reach(cut, geometry, list(part.blocks))
+        low, high = reached_stations(cut, geometry, list(part.blocks))
         assert part.low <= max(low - 20.0, 0.0)
         assert part.high >= min(high + 20.0, geometry.length)
         assert part.start - part.low < 60.0 + beyond + 25.0

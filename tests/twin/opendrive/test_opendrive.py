@@ -344,6 +344,15 @@ def test_lane_types_and_owners(file: Callable[[str], Path]) -> None:
 # --- as readers read it -------------------------------------------------------------------------------------------
 
 
+def test_a_line_that_leads_across_the_lanes_is_written(tmp_path: Path) -> None:
+    """Its offset is given by points; such lines lead around construction zones."""
+    road = everything()
+    name = next(n for n, item in road.objects.items() if isinstance(item, LineMarking) and item.kind == "lane")
+    across = [{"station": 0.0, "width": 4.0}, {"station": 40.0, "width": 8.0}]
+    written(changed(road, **{name: {"kind": "free", "boundary": 0, "offset": across}}), tmp_path)
+    assert f'name="{name}' in (tmp_path / "road.xodr").read_text()
+
+
 def test_ids_are_numbers_and_names_are_the_sets(road: RoadParameters, read: Roads) -> None:
     for tag in ("road", "object", "signal", "tunnel"):
         ids = [item.attrib["id"] for item in read.root.iter(tag)]
