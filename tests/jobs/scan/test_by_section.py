@@ -35,6 +35,8 @@ from tests.helpers.scenes.sparse_scanner import sparse_scanner
 
 CUT = 30.0
 """How far (m) from a stretch's ends the model is no longer that of where it is cut."""
+OF_THE_FACE = ("incidence", "intensity", "red", "green", "blue")
+"""Fields of a point that follow from the slope of the face that the ray met."""
 
 
 def barriers() -> RoadParameters:
@@ -104,14 +106,20 @@ def cloud_of(folder: Path, scenario: Scenario) -> tuple[dict[str, Any], Any]:
 @pytest.mark.any_blender
 @pytest.mark.parametrize("traffic", [0.0])
 def test_the_points_don_t_depend_on_the_sections(tmp_path: Path, traffic: float) -> None:
+    """Where points are and what of is the same; of two faces whose edge a ray meets either may be the one.
+
+    Which one depends on the order of the caster's tree, and so on what else is built. The range is that of both.
+    """
     whole, wanted = cloud_of(tmp_path / "whole", job(tmp_path, 100.0, traffic_speed_factor=traffic))
     report, found = cloud_of(tmp_path / "cut", job(tmp_path, 57.0, traffic_speed_factor=traffic))
     assert "sections" not in whole["counts"]
     assert report["counts"]["sections"] == 3
     assert report["counts"]["triangles"] < whole["counts"]["triangles"]
     assert len(wanted) > 13_000
-    for name in set(wanted.dtype.names) - {"material"}:
+    for name in set(wanted.dtype.names) - {"material", *OF_THE_FACE}:
         np.testing.assert_array_equal(found[name], wanted[name], err_msg=name)
+    on_other_faces = np.any([found[name] != wanted[name] for name in OF_THE_FACE], axis=0)
+    assert on_other_faces.sum() <= 1e-4 * len(wanted)
     same = ("pulses", "rays", "points", "below_threshold", "saturated", "points_by_class", "intensity_scale")
     assert {name: report["counts"][name] for name in same} == {name: whole["counts"][name] for name in same}
 
