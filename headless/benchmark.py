@@ -1,7 +1,5 @@
 """Measure each stage of the demo job beside its floor, and hold the job against what it must reach."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

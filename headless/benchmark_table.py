@@ -1,7 +1,5 @@
 """Lines of `synthroads benchmark`, the limits that they are held against, and the tables."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any

@@ -6,8 +6,6 @@ Beside an axis:  synthroads calibrate --real CLOUD --axis CSV --paved=-7,-1 --li
 Without a cloud: synthroads calibrate --material asphalt --incidence-deg 0,30,60 --range 50
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

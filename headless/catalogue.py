@@ -3,8 +3,6 @@
 Files of one's own are described in the same way.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The console command `synthroads` with all of its sub-commands."""
 
-from __future__ import annotations
-
 import argparse
 from collections.abc import Sequence
 from typing import Any

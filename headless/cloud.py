@@ -1,7 +1,5 @@
 """Work with point cloud files (LAZ, LAS, PLY, E57, NPZ): describe, thin out, map intensities, convert, draw."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -4,8 +4,6 @@ Exit codes: 0 done; 1 a defect of ours; 2 bad input; 3 violations found, scenes 
 130 interrupted.
 """
 
-from __future__ import annotations
-
 import argparse
 import errno
 import io

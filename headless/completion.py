@@ -3,8 +3,6 @@
 The scripts are made by `shtab` from the parsers: a shell that has read one asks no program at each press of the key.
 """
 
-from __future__ import annotations
-
 import argparse
 import shlex
 from collections.abc import Iterable, Sequence

@@ -1,7 +1,5 @@
 """Make a data set of many scenes from a recipe: each scene in a process of its own, resumable, with checksums."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

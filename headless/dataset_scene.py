@@ -4,8 +4,6 @@ It ends when whoever began it does: its standard input is then closed. What it m
 nobody else looks into before `DONE` is there.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import sys

@@ -1,7 +1,5 @@
 """Measure a trained run on data sets or clouds with known truth: prints the scores, writes tables and pictures."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

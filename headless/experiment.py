@@ -3,8 +3,6 @@
 One table has all scores. What is trained already isn't trained again: after an interruption the same command goes on.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

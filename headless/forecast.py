@@ -3,8 +3,6 @@
 Seconds per step, measured, are multiplied by the steps of the whole training. Scores after the epochs take more.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Render the gallery: scenes, every kind of object close up, design classes, and materials with their layers."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

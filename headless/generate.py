@@ -1,7 +1,5 @@
 """Make a road, scan it, and write the labelled cloud with the parameters that it was made from."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 import time

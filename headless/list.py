@@ -1,7 +1,5 @@
 """List what comes under a name: scenarios, scanners, recipes, classes, trainings; and the fields that --set takes."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -1,7 +1,5 @@
 """Documents with places for tables between markers, which the commands that measure fill."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 

@@ -4,8 +4,6 @@ All of it goes through one logger: errors and failures are always shown, notes a
 details with ``--verbose`` only. Standard output is left to results.
 """
 
-from __future__ import annotations
-
 import argparse
 import importlib.metadata
 import json

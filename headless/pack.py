@@ -3,8 +3,6 @@
 What doesn't fit into the limit is left out, of each road as much.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

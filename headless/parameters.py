@@ -1,7 +1,5 @@
 """Sample road parameters and write them to standard output: one set, or many as JSON lines."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

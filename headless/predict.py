@@ -1,7 +1,5 @@
 """Use a trained run on a cloud: label its points, or find its road's centreline and corridor."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Scan a scene that is there already: .blend, .glb, .gltf, .obj, .ply, .stl, .fbx or .usd; the file is only read."""
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -1,7 +1,5 @@
 """Measure error against time for each knob that trades one for the other, on scenes that differ."""
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """The plot of the trade-off: error against time, one panel per kind of error."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The tables of the trade-off: costs and errors of each row, and which presets lie on the front."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 

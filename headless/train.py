@@ -1,7 +1,5 @@
 """Train a model: PointNeXt for segmentation, or one of the centreline models, as a configuration says."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

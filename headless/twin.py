@@ -1,7 +1,5 @@
 """Write the geometric-semantic model of a road: CityJSON, IFC, OpenDRIVE and GeoJSON. Needs no Blender."""
 
-from __future__ import annotations
-
 import argparse
 import sys
 from pathlib import Path

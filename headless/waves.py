@@ -1,7 +1,5 @@
 """The scene that other simulators are compared on: waves over 100 m x 100 m, as a mesh and as an .obj file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

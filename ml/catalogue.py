@@ -1,7 +1,5 @@
 """Catalogue of learning, with key figures; read without PyTorch."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path

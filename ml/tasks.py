@@ -1,7 +1,5 @@
 """Learning tasks, as the commands see them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module

@@ -1,7 +1,5 @@
 """The training loop of all tasks: AdamW, warm-up and cosine, clipping, exact resuming, bfloat16, several processes."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Iterable

@@ -1,7 +1,5 @@
 """A trained model used on a cloud of which nothing is known, strip by strip."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

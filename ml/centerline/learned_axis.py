@@ -1,7 +1,5 @@
 """The axis as a trained centreline model tells it, by way of `synthroads predict`."""
 
-from __future__ import annotations
-
 from pathlib import Path as FilePath
 from tempfile import TemporaryDirectory
 

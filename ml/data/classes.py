@@ -1,7 +1,5 @@
 """Classes of training data: whatever a source calls its classes, as numbers of the scheme that is learned."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import ClassVar
 

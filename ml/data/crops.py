@@ -6,8 +6,6 @@ int64, -1 ignored; ``offset`` (1,) int64, N. A batch has the points of its items
 ends in ``offset``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, get_args

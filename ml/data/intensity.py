@@ -6,8 +6,6 @@ a line is brighter than what lies beside it. So there are two features, both of 
 and a power a factor: the `level` on the whole, and the `contrast` to what is around.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from synthroads_addon.base.arrays import Float

@@ -1,7 +1,5 @@
 """The corridor of a data set's roads as packed tiles, as many as fit into a file of training data."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -6,8 +6,6 @@ ordered by cube and place, and packed by deflate column of bytes by column of by
 file is an NPZ: ``notes`` (JSON) and one member per tile, so that tiles can be read one by one.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import zipfile

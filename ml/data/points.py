@@ -1,7 +1,5 @@
 """A cloud's points in memory, for learning: local coordinates, shares instead of raw steps, classes by name."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Points on their way into a network, as effects change them: `Crop` of a tile, `Stretch` of a road."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

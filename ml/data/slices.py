@@ -12,8 +12,6 @@ A sample is a dictionary of tensors; S is the number of slices of a sequence, N 
   metres; ``station`` (S,) float64 along the path; ``number`` (S,) int64 of the frame; ``road`` int64, its number.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Where labelled points come from: packed files, data sets in Pointcept's layout, and clouds of any kind."""
 
-from __future__ import annotations
-
 import tempfile
 import zipfile
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """A long cloud along its road, one strip of it in memory at a time."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Base of the networks that give every point a class; and what networks compute in single precision always."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import wraps
 from typing import Any, ParamSpec, TypeVar

@@ -12,8 +12,6 @@ each says. Where a slice has fewer than `FEWEST` points there is no prediction.
   edge lines or verges of a rural road; strips of `STRIP`, with at least `FEWEST_OF_STRIP` points.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 

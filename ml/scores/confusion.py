@@ -1,7 +1,5 @@
 """Scores of a segmentation, all from one confusion matrix that is summed over the whole test set."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -18,8 +18,6 @@ clouds are cut into, and a cubic meets a road's own axis in them: to 2 cm on a w
 motorway.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property

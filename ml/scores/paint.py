@@ -5,8 +5,6 @@ the paint differs from the axis by what the axis differs from the paint. This li
 predictor; it is a second truth, independent of how the first was drawn.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

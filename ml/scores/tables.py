@@ -1,7 +1,5 @@
 """Figures of predicted roads as JSON, text and Markdown: mean (standard deviation over seeds, ddof 1) of each."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace

@@ -3,8 +3,6 @@
 `synthroads experiment` runs them. What is trained already isn't trained again.
 """
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path

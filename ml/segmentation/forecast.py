@@ -4,8 +4,6 @@ Tiles in Pointcept's layout are counted, slivers included that a training leaves
 the epochs take more.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from itertools import chain, count

@@ -1,7 +1,5 @@
 """Batches for training and for the norms' statistics: tiles read, crops drawn, neighbours found in the workers."""
 
-from __future__ import annotations
-
 import math
 import signal
 import sys

@@ -4,8 +4,6 @@ First pass: points go into square tiles on disk. Then each tile is labelled, see
 the file is copied record by record, with the class as one more attribute. Memory holds a tile and its surroundings.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack

@@ -1,7 +1,5 @@
 """From the network's points back to all points: pieces with overlap, and voxels' classes carried to the full cloud."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import groupby

@@ -1,7 +1,5 @@
 """Segmentation as one of the learning tasks: train, evaluate, predict."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace

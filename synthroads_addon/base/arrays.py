@@ -1,7 +1,5 @@
 """Types of arrays by what they hold, records of arrays, and a threshold that parts an array's values in two."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any, Self

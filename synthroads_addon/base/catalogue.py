@@ -1,7 +1,5 @@
 """Catalogue of things that have a name, kind by kind: shipped ones and files of one's own, with their key figures."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`ClassMapping`: which classes things have in a scene that nobody labelled, by their names."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from fnmatch import fnmatchcase
 

@@ -3,8 +3,6 @@
 A module of its own, as PyYAML isn't among the packages of the Blender extension.
 """
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

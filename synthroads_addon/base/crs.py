@@ -1,7 +1,5 @@
 """Well-known text of map coordinate systems: the usual ones are shipped, others need `pyproj`."""
 
-from __future__ import annotations
-
 from functools import cache
 
 from .errors import InputError

@@ -1,7 +1,5 @@
 """Models that are found by the files of a folder, so that a new file is all that a new kind costs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from importlib import import_module
 from pkgutil import iter_modules

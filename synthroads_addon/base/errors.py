@@ -4,8 +4,6 @@
 command line turns them into one line and exit code 2, the panel into a message. Anything else is a defect of ours.
 """
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Iterable
 

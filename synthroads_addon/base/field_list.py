@@ -3,8 +3,6 @@
 All of it comes from the JSON Schema that pydantic derives from the class, so it is what a value is checked against.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Reading text files, and writing a job's files so that nothing half-written ever stands under its final name."""
 
-from __future__ import annotations
-
 import errno
 import os
 import shutil

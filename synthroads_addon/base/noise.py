@@ -10,8 +10,6 @@ plain interpolation would have only an eighth of the variance in a cell's middle
 on surfaces of any tilt and place. The lattice is turned from octave to octave against the axes of road and scanner.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

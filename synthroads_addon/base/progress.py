@@ -1,7 +1,5 @@
 """How long work reports where it is, and how it is stopped; and how each stage is measured."""
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Callable, Generator, Iterator

@@ -3,8 +3,6 @@
 Upper confidence bounds of samples are drawn by them as well: the bootstrap.
 """
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Sequence
 

@@ -4,8 +4,6 @@ An attitude is heading, pitch and roll: R = Rz(heading) Ry(-pitch) Rx(roll), whe
 local x, pitch > 0 is nose up and roll > 0 is right side down. Matrices map body vectors to local ones.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -20,8 +20,6 @@ needs no turn in `run_aside`::
 Outside of a `Stepper` these three do nothing but their work, so the same function runs straight through as well.
 """
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable

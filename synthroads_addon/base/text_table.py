@@ -1,7 +1,5 @@
 """Tables as plain text for people at a terminal, and in Markdown."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Iterable, Sequence
 

@@ -1,7 +1,5 @@
 """Values of texts that somebody typed for a field, by the type that the field is declared with."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Sequence
 from types import NoneType, UnionType

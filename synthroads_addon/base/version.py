@@ -1,7 +1,5 @@
 """The version of SynthRoads, and the name under which it signs what it writes."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The points of a class in a real cloud: by the cloud's labels, or by where they lie beside an axis."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -7,8 +7,6 @@ seen is a plane of the material, or a strip of it on another one. Linear intensi
 target struck at a right angle at 1 m gives 1; `Receiver` says what a device writes into its files for that.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 """A material's parameters from a real class: brightness and spread by quantiles, facet slope by incidence angles, the
 wavelength of the variation by how alike neighbours are."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -3,8 +3,6 @@
 `steps` yields the share that is done, so that the panel can show progress and stop it; `calibrate` runs it through.
 """
 
-from __future__ import annotations
-
 from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path

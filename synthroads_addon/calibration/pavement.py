@@ -12,8 +12,6 @@ definition, and their distribution would say nothing. Of every line that the use
 The pavement is what lies between given offsets, more than `CLEAR` from every line's nominal place.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 """The result of a calibration as a picture: real and expected intensities of each class, and the fall-off with the
 incidence angle. Drawn with Pillow alone, so that it looks the same in Blender."""
 
-from __future__ import annotations
-
 import io
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Which rules of the guidelines (RAA, RMS, RPS) a road breaks. It works on any parameter set, hand-made or sampled."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..road.parameters import RoadParameters

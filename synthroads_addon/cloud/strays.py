@@ -4,8 +4,6 @@ Places are counted in cubes of a quarter of a kilometre, of which only those tha
 make a part. What lies in parts with hardly anything in them strays from the rest.
 """
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

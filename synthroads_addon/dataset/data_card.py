@@ -1,7 +1,5 @@
 """The data card: what a data set is, how it was made, what is in it and under which licence, for people."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence

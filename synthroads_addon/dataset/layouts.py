@@ -4,8 +4,6 @@ Both cut the cloud into square tiles with coordinates relative to the tile's cor
 hold map coordinates to half a metre only. Where a tile lies stands beside it.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from itertools import product

@@ -5,8 +5,6 @@ the new manifest takes the old one's place. From then on nobody who reads the ma
 opens the folder after a crash removes the rest of it.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """A cloud cut into square tiles on disk, so that layouts can be written tile by tile in bounded memory."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path

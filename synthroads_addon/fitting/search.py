@@ -10,8 +10,6 @@ A chain is scored by the Bayesian information criterion, with one independent ob
 an element, unless the data are exact.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

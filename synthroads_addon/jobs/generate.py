@@ -1,7 +1,5 @@
 """The main job: scenario -> parameters -> model -> scan -> cloud -> files. What no output needs is not made."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`JobFiles`: the files of a job that need no scene, and ``report.json``: what every job writes about itself."""
 
-from __future__ import annotations
-
 import platform as machine
 import sys
 from collections.abc import Mapping

@@ -4,8 +4,6 @@ Lambert's and Oren and Nayar's surfaces and retro-reflection are in it. Mirror-l
 out on purpose.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

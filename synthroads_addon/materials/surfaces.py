@@ -12,8 +12,6 @@ and every order of the blocks. It is evaluated once per return, where the ray me
 factor is that of the footprint as a whole, and grain much finer than the footprint is not described by it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -18,8 +18,6 @@ What only the scanner reads is assumed as follows; `docs/radiometry.md` has the 
   shipped table has none; `synthroads calibrate` fits it to real clouds.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from functools import cache

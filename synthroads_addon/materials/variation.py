@@ -5,8 +5,6 @@ that what the camera sees and what the laser measures change alike. Facets and r
 paint has lost its beads with its film, and beads under water retro-reflect little.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

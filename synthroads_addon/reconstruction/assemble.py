@@ -1,7 +1,5 @@
 """Measurements as a parameter set: the same kind that is sampled or written by hand."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal

@@ -1,7 +1,5 @@
 """How far a reconstructed road is from the true one: for tests and figures, never for the reconstruction itself."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

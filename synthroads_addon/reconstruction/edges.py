@@ -1,7 +1,5 @@
 """The pavement's edges and its surface: where it ends on either side, how high it lies, and how it falls."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import dataclass
 

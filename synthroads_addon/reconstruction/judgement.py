@@ -6,8 +6,6 @@ or the ground steps up or down. A single carriageway's axis must lie in the midd
 what lies between two such pavements.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Which lines belong together: carriageways, their lanes, and the median, and the axis that all of them agree on."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Literal

@@ -1,7 +1,5 @@
 """Line markings: found in cross profiles, followed along the path, and described: offset, width, dashes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

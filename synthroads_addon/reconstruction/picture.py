@@ -1,7 +1,5 @@
 """A picture of a reconstruction: the road's lines over the cloud seen from above, a cross-section, and the heights."""
 
-from __future__ import annotations
-
 from pathlib import Path as FilePath
 from typing import Any
 

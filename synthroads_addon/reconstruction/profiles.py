@@ -3,8 +3,6 @@
 To make a path parallel to the road, each stretch is laid over those before it so that lines and edges coincide.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The whole way from a cloud to a parameter set, step by step."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 

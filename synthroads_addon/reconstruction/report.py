@@ -1,7 +1,5 @@
 """Content of `reconstruction.json`: where the cloud is from the reconstructed road, and how sure each number is."""
 
-from __future__ import annotations
-
 from dataclasses import asdict
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Smooth values along the road with their standard deviations, unmoved by single outliers."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -6,8 +6,6 @@ length is left is shared out among straights and arcs. Clothoids are never cut: 
 or an arc.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ Each function yields sentences, one for each limit that can't be kept. The sampl
 which there is none.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Line markings, hatching and arrows as the cross-section and the turnouts ask for them (RMS)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -1,7 +1,5 @@
 """From a seed and limits to one road. Rules hold by construction: nothing is drawn and rejected."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from typing import Any
 

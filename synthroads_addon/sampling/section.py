@@ -5,8 +5,6 @@ the length that is left is then shared out among them. Nothing is drawn and reje
 count in the direction of its traffic until they become stations.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Surroundings of a sampled road: ground, plants, traffic, light and weather, materials. Nothing drawn is rejected."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from itertools import groupby, pairwise

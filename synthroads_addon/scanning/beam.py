@@ -5,8 +5,6 @@ beam of full divergence D has w = tan(D / 2) at a distance of 1. The two diverge
 pattern's two coordinates.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

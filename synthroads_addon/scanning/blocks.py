@@ -1,7 +1,5 @@
 """How a scan is cut into blocks of pulses, whatever is scanned."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

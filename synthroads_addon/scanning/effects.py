@@ -1,7 +1,5 @@
 """Effects between tracing and returns, such as drops in the air, that change a pulse's echoes; and how they act."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 

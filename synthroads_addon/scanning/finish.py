@@ -1,7 +1,5 @@
 """Finish of a block's points after the scan: colours and layers, intensities from these, micro-relief."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

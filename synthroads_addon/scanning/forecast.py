@@ -1,7 +1,5 @@
 """Forecast of a scan before it begins: pulses, time, memory; and the refusal of one that nobody can have meant."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ..base.errors import InputError

@@ -13,8 +13,6 @@ exp(-32) of its influence, so a block is computed from its own and the previous 
 be asked for in any order, at the same cost.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..base.arrays import Float

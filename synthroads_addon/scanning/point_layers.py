@@ -1,7 +1,5 @@
 """Per-point layers that the scan itself fills: one function for each `PointBlock` array, see `cloud.layers`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ An echo's intensity is ``share / d^2 * exp(-a d)``; the share is what the surfac
 at 1 m, gives 1.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

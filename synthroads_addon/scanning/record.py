@@ -1,7 +1,5 @@
 """`record`: a scan from its plan to the points, block by block, into whatever takes them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack

@@ -5,8 +5,6 @@ each wavelength: the same place has the same height in every strip, and pulses n
 Strength 1 is the relief that pavements and soils have been measured to have (`RELIEF`), 0 none, more an exaggeration.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """From the surfaces that the rays of a pulse meet to its returns: echoes closer than the range resolution are one."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One block of pulses, from the path to the points. Pure arrays: the casters are all that knows the scene."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

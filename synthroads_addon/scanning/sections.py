@@ -5,8 +5,6 @@ own pulses: where their rays leave the scene's heights, the corridor beside the 
 meets the same surfaces whatever the sections are.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Rays followed through permeable surfaces: all that each of them meets, and the share of light that arrives there."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which choices of settings, by a tolerance or a time, a scenario can ask for."""
 
-from __future__ import annotations
-
 from ..base.errors import InputError
 from ..scanning.colour.colour import MATERIAL_LAYERS
 from .scenario import OF_POINTS, Scenario

@@ -1,7 +1,5 @@
 """`ScanScenario`: how a scene is scanned: device, platform, beam, radiometry, noise."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator

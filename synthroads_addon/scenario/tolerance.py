@@ -1,7 +1,5 @@
 """`Tolerance`: how large the errors of a cloud may be; and the words for it, ``height=5mm,intensity=5%``."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from typing import Any

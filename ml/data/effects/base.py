@@ -1,7 +1,5 @@
 """Fields that the effects of both tasks have, and what is alike of both."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Effects on the intensities and colours of a sequence: other scanners, materials, markings and cameras."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from synthroads_addon.base.arrays import Bool, Float

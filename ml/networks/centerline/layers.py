@@ -8,8 +8,6 @@ moment of what they gather. A point belongs to the two nearest cells or kernel p
 to 1, and sums are divided by the number of points, so that density matters little.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import torch

@@ -1,7 +1,5 @@
 """Losses of the centreline models: a Gaussian likelihood of what is known, and where the lines lie."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import torch

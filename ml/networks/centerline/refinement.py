@@ -4,8 +4,6 @@ What was found at first is known to a tenth of a kernel point's spacing. Seen fr
 run straight along the slices, dashes of one slice complete those of another, and what is left to find is small.
 """
 
-from __future__ import annotations
-
 import torch
 from torch import Tensor, nn
 

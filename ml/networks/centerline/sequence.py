@@ -1,7 +1,5 @@
 """`Sequence`: fixed kernel points, and an LSTM that runs along the slices at every kernel point, both ways."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """`Single`: deformable kernel points and self-attention; each slice by itself."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import Field

@@ -4,8 +4,6 @@ The latter runs at every kernel point and for all of them together; lines are fo
 that of a parabola through the centres, in the frames' geometry.
 """
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import Field

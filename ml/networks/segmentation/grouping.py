@@ -8,8 +8,6 @@ is negative. Nothing of the size points x neighbours x channels is kept, not eve
 variance over all pairs follow from how often each support point is a neighbour and from which directions it is seen.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

@@ -7,8 +7,6 @@ nearest points, and a head. Its outputs and gradients are those of the authors' 
 what is linear is done where there are fewer points (see `grouping`).
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Literal
 

@@ -4,8 +4,6 @@ Each has a lock file that names its owner. A folder whose owner is known to be d
 beside it.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -3,8 +3,6 @@
 The system frees the lock of an open file when its process ends, however it ends; some file systems know none.
 """
 
-from __future__ import annotations
-
 import errno
 import json
 import os

@@ -1,7 +1,5 @@
 """Rules for the centreline: radii, clothoids, straights, grades and roundings (RAA)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import partial
 from itertools import pairwise

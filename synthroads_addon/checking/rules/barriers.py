@@ -1,7 +1,5 @@
 """Rules for barriers (RPS): where they must stand, and how."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from itertools import islice, product

@@ -1,7 +1,5 @@
 """Rules for the crossfall and its run-offs (RAA)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

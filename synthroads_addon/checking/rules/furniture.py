@@ -1,7 +1,5 @@
 """Rules for what stands beside the road: delineators, boards, phones; and that bodies stand where they can."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import pairwise
 

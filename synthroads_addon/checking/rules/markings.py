@@ -1,7 +1,5 @@
 """Rules for markings (RMS)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from itertools import product
 

@@ -1,7 +1,5 @@
 """Obstacles on the road as boxes along station, offset and height, and where they stand beside the carriageways."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

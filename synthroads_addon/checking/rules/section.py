@@ -1,7 +1,5 @@
 """Rules for the cross-section (RAA): lanes and their tapers, median, shoulders, strips; and the pavement's damage."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from functools import partial
 

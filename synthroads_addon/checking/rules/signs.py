@@ -1,7 +1,5 @@
 """Rules for signs, and for the clearance under what spans the pavement."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

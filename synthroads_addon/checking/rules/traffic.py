@@ -1,7 +1,5 @@
 """Rules for construction zones, and for vehicles."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import NamedTuple

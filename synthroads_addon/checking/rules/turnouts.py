@@ -1,7 +1,5 @@
 """Rules for turnouts (RAA): exits, entries and emergency bays."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from itertools import pairwise, product
 

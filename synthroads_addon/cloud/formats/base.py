@@ -1,7 +1,5 @@
 """`CloudWriter` and `CloudReader`: what the writers and the readers of all formats have in common."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

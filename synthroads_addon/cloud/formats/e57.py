@@ -4,8 +4,6 @@ pye57's own writer takes whole clouds, in single precision, which at a northing 
 Here coordinates are scaled integers of 0.1 mm about a pose that carries the offset, so nothing is lost.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import suppress

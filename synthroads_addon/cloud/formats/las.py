@@ -5,8 +5,6 @@ Besides the standard fields each written point has as extra bytes ``class_id`` (
 of the 16-bit intensity and the table of classes stand as JSON in the VLR ``SynthRoads`` 1.
 """
 
-from __future__ import annotations
-
 import json
 import struct
 from collections.abc import Iterator

@@ -4,8 +4,6 @@ The arrays are gathered in a file each and put together at the end, so that no m
 `numpy.load` reads the result, uncompressed.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import shutil

@@ -5,8 +5,6 @@ that shrinks as the number grows. What the file says of itself stands as JSON in
 because common readers take lines of 1023 characters at most.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from pathlib import Path

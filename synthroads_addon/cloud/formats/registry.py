@@ -1,7 +1,5 @@
 """The formats of clouds by the endings of their files: `open_cloud` reads any of them, `open_writer` writes any."""
 
-from __future__ import annotations
-
 import importlib.util
 from importlib import import_module
 from pathlib import Path

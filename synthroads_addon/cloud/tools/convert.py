@@ -1,7 +1,5 @@
 """Operations on a cloud's file: convert, thin out, map intensities, draw. All in memory that stays the same."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path

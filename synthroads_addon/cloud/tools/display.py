@@ -6,8 +6,6 @@ strip keeps its share, and no pattern of lines arises as it would from every n-t
 so that the first of them, however many, are an even choice as well: as many as can be drawn while a view is turned.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path

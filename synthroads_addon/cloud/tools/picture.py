@@ -1,7 +1,5 @@
 """A picture of a cloud: points gathered into its cells block by block, and its frame of title, legend and axes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ Intensities are taken in the 65,536 steps of 16 bits, so that two histograms hol
 stays the same for clouds of any size.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

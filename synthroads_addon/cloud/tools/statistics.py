@@ -1,7 +1,5 @@
 """Figures that describe a cloud, gathered block by block: for comparing synthetic scans with real ones."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from typing import Any
 

@@ -5,8 +5,6 @@ on the points' order nor on how they come in blocks. Points are first sorted int
 tile after tile is thinned out in memory.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The settings that a choice can take for a scenario's knobs: what the scenario gives itself stays as it is."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from operator import attrgetter
 from typing import Any, NamedTuple

@@ -4,8 +4,6 @@ Each kind of error depends on the options of one knob alone, and the costs of se
 settings within a tolerance are the cheapest option of every knob that keeps its own.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ same bytes. A time is held against the shipped table's times, scaled by one shor
 table's then, unless a tolerance is to be kept as well.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 Made by ``python tools/make_tradeoff_prior.py`` on one built-in scenario of each platform.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache

@@ -3,8 +3,6 @@
 A process measures one number of cores: those that it may use.
 """
 
-from __future__ import annotations
-
 import tempfile
 from collections import deque
 from collections.abc import Callable

@@ -11,8 +11,6 @@ Points come in parts, short stretches of a path: values within a part are alike,
 follows from the number of parts. Kinds, units and names are those of `scenario.tolerance.KINDS`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Rows of the trade-off: one setting, the time and memory of the whole job, and its errors against truth."""
 
-from __future__ import annotations
-
 import sys
 import tempfile
 import time

@@ -1,7 +1,5 @@
 """The knobs that trade speed for accuracy, the values that they are measured at, and the tables of it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any

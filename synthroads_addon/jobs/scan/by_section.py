@@ -3,8 +3,6 @@
 The points are those of the road built whole. They come section by section, and within one in the order of time.
 """
 
-from __future__ import annotations
-
 import gc
 from collections.abc import Generator, Iterator
 from contextlib import closing

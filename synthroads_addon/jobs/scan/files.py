@@ -1,7 +1,5 @@
 """A scan into files: the cloud and the previews while blocks of points are written to them."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager

@@ -1,7 +1,5 @@
 """Free assets of the scenario's libraries, placed by their rules beside the road or in the median."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

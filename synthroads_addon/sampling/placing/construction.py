@@ -1,7 +1,5 @@
 """Construction zones: beacons that close the outermost lane, movable barriers behind them, yellow lines before them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Delineators: every 50 m and closer in curves, on the outer side of either carriageway (HLB)."""
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_right
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """The two draws of the placement: a number from an interval of the scenario, and one of several choices."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import TypeVar
 

@@ -1,7 +1,5 @@
 """The pavement's edge along one carriageway, made ready for the many questions of the placement."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

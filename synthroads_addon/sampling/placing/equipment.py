@@ -1,7 +1,5 @@
 """Equipment beside the road: kilometre boards, emergency phones, cabinets, traffic lights and poles."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...road.guidelines import EMERGENCY_PHONE_SPACING, KILOMETRE_BOARD_SPACING

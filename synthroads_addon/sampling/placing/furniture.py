@@ -4,8 +4,6 @@ What needs much room, or has its station by a rule, is planned first: it reserve
 barriers. Then the barriers are built, and then what stands behind them, which so finds its distance from the road.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

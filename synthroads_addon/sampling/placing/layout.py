@@ -5,8 +5,6 @@ cabinets) and one of noise barriers. Things of different zones cannot meet; thin
 road by reserving their stretches before they are built. A thing's distance is known last, when the barriers stand.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field

@@ -4,8 +4,6 @@ Nothing stands on the pavement or in another thing's place: barriers and delinea
 next, as by the rules.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

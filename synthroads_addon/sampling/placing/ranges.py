@@ -1,7 +1,5 @@
 """Stretches along the road that are taken, and how something finds room between them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 

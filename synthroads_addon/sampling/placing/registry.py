@@ -1,7 +1,5 @@
 """Small things beside the road: files of this folder register what plans them by `small_thing`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from importlib import import_module

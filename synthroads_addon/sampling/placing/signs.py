@@ -1,7 +1,5 @@
 """Traffic signs: before exits, in gores, after entries, before tight curves and construction zones."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any

@@ -1,7 +1,5 @@
 """Site of furniture: what its placement needs to know of a road that is being sampled."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal

@@ -1,7 +1,5 @@
 """Shield gantries and the overpass. They are planned first and built when the barriers stand."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import cos, radians, sin, tan

@@ -1,7 +1,5 @@
 """Colours and material layers of points: what every source of them gives, and the materials' own values."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol

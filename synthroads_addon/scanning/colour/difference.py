@@ -1,7 +1,5 @@
 """How different two colours look, by CIEDE2000, and two sets of the same points' layers."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...base.arrays import Bool, Float, UInt16

@@ -1,7 +1,5 @@
 """Points take their layers from images: the image that fits best, the occlusion test, and the sampling."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Light on the scene as the points' colours need it: sun, open sky, and the drifting shadows of clouds."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -1,7 +1,5 @@
 """`LayerRequest`: which colours and layers are wanted, of which scene."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Shots of a device: when each pulse of its heads is fired, and where to."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import lru_cache

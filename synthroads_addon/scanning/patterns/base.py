@@ -6,8 +6,6 @@ y left, z up. Every pulse is worked out from its own number: nothing is summed u
 billionth is as exact as the first.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import ClassVar

@@ -1,7 +1,5 @@
 """Patterns of lines across the forward direction: mirrors that turn or swing, and rows of a grid."""
 
-from __future__ import annotations
-
 import math
 from typing import ClassVar, Literal
 

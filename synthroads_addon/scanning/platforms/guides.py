@@ -4,8 +4,6 @@ A guide is a curve in plan, evaluated by station (m) in float64, with an elevati
 offsets count to the left.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

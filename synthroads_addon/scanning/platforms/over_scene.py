@@ -1,7 +1,5 @@
 """Paths over a scene that nobody prepared: along a line, its road or its middle, or at given places."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path as FilePath
 

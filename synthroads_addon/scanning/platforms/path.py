@@ -1,7 +1,5 @@
 """Base of all paths: strips, poses, and knots between which poses may be interpolated."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Protocol
 

@@ -1,7 +1,5 @@
 """Stretches of a path: a sample in place of all of it, or what a section of the road is scanned from."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One strip's line in plan, by the distance travelled, and functions of that distance without jerks."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Interface of ray casters, and what every caster shares: the range from the face's plane in float64."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 import numpy as np

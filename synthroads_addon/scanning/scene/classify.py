@@ -1,7 +1,5 @@
 """Classes that a scheme tells apart beyond the full table, given to the faces of a scene: see `ClassSelector`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import get_args

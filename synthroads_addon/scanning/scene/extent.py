@@ -1,7 +1,5 @@
 """Where a scene is: what a scan of a scene that nobody prepared goes by."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...base.arrays import Float

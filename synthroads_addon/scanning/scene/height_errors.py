@@ -1,7 +1,5 @@
 """Heights of a road's mesh against the analytic surface that it was made from."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...base.arrays import Float

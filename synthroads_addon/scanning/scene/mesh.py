@@ -1,7 +1,5 @@
 """`SceneMesh`: a scene as triangles with class, instance and material; what casters and radiometry read."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 
 import numpy as np

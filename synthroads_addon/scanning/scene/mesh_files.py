@@ -5,8 +5,6 @@ is left of a truncated file without a word. Its reader of glTF, in Python, makes
 says, and reads whatever an address in the file names, also outside of its folder.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

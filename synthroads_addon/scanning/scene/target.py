@@ -1,7 +1,5 @@
 """Target of rays: the static scene and what moves in it, their faces numbered one after the other."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple

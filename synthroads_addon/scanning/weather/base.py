@@ -1,7 +1,5 @@
 """Base of all weathers: fields in a scenario, attenuation of the beam, and echoes of their own if they have any."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import ClassVar
 

@@ -9,8 +9,6 @@ Optical attenuation in fog and clouds, Proc. SPIE 4530 (2001); Carbonneau, Wisel
 optical wireless, Proc. SPIE 3532 (1998); Recommendation ITU-R P.1814 (2007), for snow.
 """
 
-from __future__ import annotations
-
 import math
 
 CONTRAST = 0.02
