@@ -36,7 +36,7 @@ _FIELDS = {
     "allow_large": "scan.most_pulses",
 }
 """Arguments that are short for fields of the scenario."""
-_SAME = ("output", "scene", "path", "classes", "epsg", "origin", "up", "overwrite")
+_SAME = ("output", "scene", "path", "classes", "road", "epsg", "origin", "up", "overwrite")
 """Arguments that the scan of a scene has under the same name."""
 
 
@@ -58,6 +58,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--speed", type=float, metavar="M/S", help="speed over ground, m/s (the platform's usual one)")
     parser.add_argument("--rays", type=int, metavar="N", help="rays per pulse (the fidelity's own)")
     parser.add_argument("--classes", type=Path, metavar="FILE", help="JSON: classes by names (none), see docs/scan.md")
+    text = "the road that is scanned, by its root's name, where a .blend has several (the one that is active in it)"
+    parser.add_argument("--road", metavar="NAME", help=text)
     text = f"take the scan from it: {names}, or a .json file (the defaults of a scenario)"
     parser.add_argument("--scenario", metavar="NAME_OR_FILE", help=text)
     add_changes_argument(parser)

@@ -59,12 +59,14 @@ class RoadScene:
         road: that the file shows, or is to show.
         model: that was built for it; None before, and in a file that shows the road already.
         scene: of that model, as it was read; None before.
+        road_id: of the road in the file; that of the one that is meant in it if empty.
     """
 
     scenario: Scenario
     road: RoadGeometry
     model: RoadModel | None = None
     scene: ScannedScene | None = None
+    road_id: str = ""
 
     @cached_property
     def site(self) -> Site:
@@ -89,7 +91,8 @@ class RoadScene:
         """Return the open scene, which shows the road, as it is scanned."""
         if self.scene is None:
             factor, class_ids = self.scenario.scan.traffic_speed_factor, self.scenario.cloud.scheme().source_ids()
-            self.scene = scanned_scene(geometry=self.road, speed_factor=factor, class_ids=class_ids)
+            road = self.model.road_id if self.model else self.road_id
+            self.scene = scanned_scene(geometry=self.road, speed_factor=factor, class_ids=class_ids, road=road)
         return self.scene
 
     def rebuild(self, changes: Mapping[str, Any]) -> ScannedScene:
@@ -119,7 +122,7 @@ class RoadScene:
             return scan_by_section(self.site, self.road, folder, timer)
         with timer.stage("model"):
             model = self.model or self.build()
-            remember(model.collection, self.road.parameters, scenario, "")
+            remember(model.root, self.road.parameters, scenario, "")
         counts = self.scan(folder, timer) if set(scenario.outputs) & set(OF_POINTS) else {}
         if "scene" in scenario.outputs:
             with timer.stage("scene file"):

@@ -46,6 +46,7 @@ class SceneScan:
         path: CSV or GeoJSON of a line that the platform follows, in map coordinates.
         tripods: positions (x, y) or (x, y, z) of a tripod in map coordinates; z is that of the scanner itself.
         classes: JSON file with classes by name, see `ClassMapping`.
+        road: name of the scene's road, where it has several; the one that is active or was chosen in it if None.
         epsg: of the map; that of the scene's road, or unknown, if None.
         origin: map coordinates of the scene's own origin, m; those of the scene's road, or 0, if None.
         up: see `blender.scene.foreign.open_scene`.
@@ -59,6 +60,7 @@ class SceneScan:
     path: Path | None = None
     tripods: tuple[tuple[float, ...], ...] = ()
     classes: Path | None = None
+    road: str | None = None
     epsg: int | None = None
     origin: tuple[float, float, float] | None = None
     up: UpAxis | None = None
@@ -79,7 +81,7 @@ def scan_scene(job: SceneScan, progress: Progress = silent) -> dict[str, Any]:
     begun, timer = job.begun or time.perf_counter(), StageTimer(progress)
     mapping, report = check_scene_scan(job), dict[str, Any](scene=job.scene.name if job.scene else None)
     with output_folder(job.output, JobFiles(job.scenario, road=False).names, job.overwrite) as folder:
-        read, road, warnings = open_and_read(job, mapping, timer)
+        read, road, warnings = open_and_read(job, mapping, timer, report)
         scene = ForeignScene(scene_site(job, read.static, road), read)
         if job.scenario.chooses:
             scene, report["choice"] = choose_settings(scene, begun, timer)
@@ -119,9 +121,9 @@ def check_scene_scan(job: SceneScan) -> ClassMapping | None:
 
 
 def open_and_read(
-    job: SceneScan, mapping: ClassMapping | None, timer: StageTimer
+    job: SceneScan, mapping: ClassMapping | None, timer: StageTimer, report: dict[str, Any]
 ) -> tuple[ScannedScene, RoadGeometry | None, list[str]]:
-    """Open a job's scene and return it as it is scanned, its road, and warnings.
+    """Open a job's scene and return it as it is scanned, its road, and warnings; report which road that is.
 
     Raises:
         InputError: the file can't be read, there is nothing to scan in it, or it has a road and an origin is given.
@@ -134,12 +136,15 @@ def open_and_read(
         if job.scene is not None:
             open_scene(job.scene, job.up)
     with timer.stage("scene mesh"):
-        parameters = open_road()
+        opened = open_road(job.road)
+        parameters = opened.parameters if opened else None
+        report |= {"road": opened.name} if opened else {}
         if parameters and job.origin is not None:
             raise InputError("--origin", list(job.origin), "can't be given: the road in the scene has one of its own")
         factor, class_ids = job.scenario.scan.traffic_speed_factor, job.scenario.cloud.scheme().source_ids()
+        further: dict[str, Any] = {"class_ids": class_ids, "road": opened.road_id if opened else ""}
         road = RoadGeometry(parameters) if parameters else None
-        scene = scanned_scene(None, None, mapping, road, factor, number_objects=True, class_ids=class_ids)
+        scene = scanned_scene(None, None, mapping, road, factor, number_objects=True, **further)
         if not len(scene.static) and not scene.moving:
             name = str(job.scene) if job.scene else "open scene"
             raise InputError(name, None, "holds nothing visible with faces that could be scanned")

@@ -13,11 +13,35 @@ from types import ModuleType
 import bpy
 
 from .fields import preferences, properties
-from .panels import calibration, calibration_settings, cloud_view, edit, export, panels, presets, road_files, rules
+from .panels import (
+    calibration,
+    calibration_settings,
+    cloud_view,
+    edit,
+    export,
+    panels,
+    presets,
+    road_choice,
+    road_files,
+    rules,
+)
 from .work import build, long_operator, scan
 
 MODULES = (
-    *(preferences, properties, long_operator, build, scan, presets, road_files, panels, rules, edit, cloud_view),
+    *(
+        preferences,
+        properties,
+        long_operator,
+        build,
+        road_choice,
+        scan,
+        presets,
+        road_files,
+        panels,
+        rules,
+        edit,
+        cloud_view,
+    ),
     *(export, calibration_settings, calibration),
 )
 

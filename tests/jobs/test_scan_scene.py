@@ -276,7 +276,7 @@ def road_scene(tmp_path: Path) -> tuple[Path, RoadGeometry]:
     scenario = load_scenario("rq31-600m", ["road.length=60", "road.half_width=25", "fidelity=draft"])
     parameters = sample_road(scenario.road, scenario.seed)
     model = build_road(parameters, 0.02, 0.0)
-    remember(model.collection, parameters, scenario, "")
+    remember(model.root, parameters, scenario, "")
     return write_scene(tmp_path / "road.blend"), RoadGeometry(parameters)
 
 

@@ -15,13 +15,15 @@ from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ..materials import vary
 from ..nodes.builder import remove_unused_groups
-from ..things.model_builder import ROLE, ModelBuilder
+from ..things.model_builder import ModelBuilder
 from ..things.registry import model_parts, required_parts
-from .stage import DataBlockLog, in_scene, new_staging, remove_staged, remove_with_meshes
+from .roads import FRAME, NAME, OF_ROAD, ROAD, new_root, parts_and_copies, place_root, renew_ids, road_meant, road_of_id
+from .stage import DataBlockLog, new_staging, remove_staged, remove_with_meshes
 
 COLLECTION = "SynthRoads"
-ORIGIN = "synthroads_origin"
-"""Custom property of the collection: map coordinates of the local origin."""
+"""Name of the collection that a new road is put into."""
+MADE_COLLECTION = "synthroads_collection"
+"""Custom property of a collection that was made for a road: it goes with the last object in it."""
 
 _TURN = 0.03
 """Seconds that a build may take before it lets its caller go on."""
@@ -30,19 +32,48 @@ _EVALUATION, _MOST_AT_ONCE = 0.1, 32
 
 
 @dataclass(frozen=True)
+class Place:
+    """Which road a new one takes the place of.
+
+    Attributes:
+        road: the id of its root; the road that is meant in the scene (`roads.road_meant`) if empty.
+        beside: it takes no other's place: it is one more road.
+        keep_moves: where the user has moved the road before, it stays; else it is put where its parameters say.
+    """
+
+    road: str = ""
+    beside: bool = False
+    keep_moves: bool = True
+
+    def root(self, scene: bpy.types.Scene) -> bpy.types.Object | None:
+        """Return the root of the road that is replaced; None if there is none."""
+        return None if self.beside else road_of_id(scene, self.road)
+
+
+MEANT = Place()
+
+
+@dataclass(frozen=True)
 class RoadModel:
     """A road in the scene.
 
     Attributes:
-        collection: holds all of the model's objects.
+        root: the empty that all of the model's objects hang on, see `roads`.
+        collection: that all of them were put into.
         objects: by role: ``Backbone``, ``Road``, ``Ground``, ``Terrain``, ``Delineators``, and the parameter
             set's ids of guardrails and vegetation. Hidden helpers are among them.
-        origin: (3,) map coordinates of the local origin.
+        origin: (3,) map coordinates of the root's place when it was built.
     """
 
+    root: bpy.types.Object
     collection: bpy.types.Collection
     objects: dict[str, bpy.types.Object]
     origin: NDArray[np.float64]
+
+    @property
+    def road_id(self) -> str:
+        """Return the road's id, which its root has."""
+        return str(self.root[ROAD])
 
 
 def build_road(
@@ -52,8 +83,9 @@ def build_road(
     parts: Collection[str] | None = None,
     stretch: tuple[float, float] | None = None,
     geometry: RoadGeometry | None = None,
+    place: Place = MEANT,
 ) -> RoadModel:
-    """Build the road in the current scene; a road built before is replaced, other objects stay as they are.
+    """Build the road in the current scene, in the place of one built before; all else stays as it is.
 
     If it can't be built, the file is as it was before.
 
@@ -70,7 +102,7 @@ def build_road(
         ValueError: a part that there is none of.
         InputError: an asset of the set can't be read.
     """
-    work = _Build(parameters, tolerance, vegetation_detail, parts, stretch, geometry)
+    work = _Build(parameters, tolerance, vegetation_detail, parts, stretch, geometry, place)
     try:
         with work.log.record():
             work.build()
@@ -88,6 +120,7 @@ def build_steps(
     vegetation_detail: float = 1.0,
     parts: Collection[str] | None = None,
     stretch: tuple[float, float] | None = None,
+    place: Place = MEANT,
 ) -> Generator[float | None, None, RoadModel]:
     """Build the road as `build_road` does, in steps between which the window may live; return the model.
 
@@ -98,7 +131,7 @@ def build_steps(
     Yields:
         the share that is done, 0 to 1, or None while there is nothing to do in this thread.
     """
-    work = _Build(parameters, tolerance, vegetation_detail, parts, stretch)
+    work = _Build(parameters, tolerance, vegetation_detail, parts, stretch, None, place)
     stepper = Stepper(work.build, "SynthRoads build")
     try:
         more = True
@@ -133,18 +166,26 @@ class _Build:
         parts: Collection[str] | None,
         stretch: tuple[float, float] | None,
         geometry: RoadGeometry | None = None,
+        place: Place = MEANT,
     ) -> None:
         known = model_parts()
         self._wanted = set(known if parts is None else parts)
         if self._wanted - set(known):
             raise ValueError(f"parts: {sorted(self._wanted - set(known))} are not among {tuple(known)}")
-        self._scene = bpy.context.scene.name
+        scene = bpy.context.scene
+        self._scene, self._place = scene.name, place
         remove_staged()
+        renew_ids()
         self.log = DataBlockLog()
         self.share = 0.0
+        root = place.root(scene)
         with self.log.record():
-            self._collection = new_staging(bpy.context.scene)
-        self._builder = ModelBuilder(parameters, self._collection, tolerance, detail, stretch, geometry)
+            self._collection = new_staging(scene)
+            if root is None:
+                root = new_root()
+                self._collection.objects.link(root)
+        self._road = str(root[ROAD])
+        self._builder = ModelBuilder(parameters, self._collection, tolerance, detail, stretch, geometry, root)
 
     def build(self) -> None:
         """Make the objects; see `base.stepper` for how this is done in steps."""
@@ -168,45 +209,60 @@ class _Build:
 
     def swap(self) -> RoadModel:
         """Put the new road in the place of the one built before."""
-        parameters, builder = self._builder.parameters, self._builder
-        remove_road(keep=self._collection)
-        collection = bpy.data.collections.get(COLLECTION)
-        if collection is None:
-            collection = self._collection
-            collection.name = COLLECTION
-        else:
-            if not in_scene(collection, bpy.data.scenes[self._scene]):
-                bpy.data.scenes[self._scene].collection.children.link(collection)
+        parameters, builder, scene = self._builder.parameters, self._builder, bpy.data.scenes[self._scene]
+        root = next(item for item in scene.objects if item.get(ROAD) == self._road)
+        collection = self._collection
+        if FRAME in root:
+            _remove_parts(root)
+            collection = _home(root, scene)
             for item in builder.objects.values():
                 collection.objects.link(item)
             bpy.data.collections.remove(self._collection)
+        else:
+            collection.name = COLLECTION
+            collection[MADE_COLLECTION] = True
+        self.log.keep(collection)
         for role, item in builder.objects.items():
             item.name = role  # its mesh keeps the name it has: to rename a mesh is to evaluate all that hangs on it
-        self.log.keep(collection)
+            item[OF_ROAD], item[NAME] = self._road, item.name
         origin = np.array(parameters.transform.translate) + builder.origin
-        collection[ORIGIN] = [float(value) for value in origin]
+        place_root(root, origin, scene, self._place.keep_moves)
         remove_unused_groups()
         vary(parameters.materials, parameters.environment)
-        return RoadModel(collection, builder.objects, origin)
+        return RoadModel(root, collection, builder.objects, origin)
 
 
-def scene_origin(scene: bpy.types.Scene) -> NDArray[np.float64] | None:
-    """Return the map coordinates (3,) of the road's local origin in a scene; None without a road."""
-    for collection in scene.collection.children_recursive:
-        if ORIGIN in collection:
-            return np.array(collection[ORIGIN], dtype=np.float64)
-    return None
+def _home(root: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Collection:
+    """Return the collection that a root is in, in a scene."""
+    inside = {scene.collection, *scene.collection.children_recursive}
+    return next(collection for collection in root.users_collection if collection in inside)
 
 
-def remove_road(keep: bpy.types.Collection | None = None) -> None:
-    """Remove the objects that `build_road` made, and its collection unless the user keeps something in it.
+def _remove_parts(root: bpy.types.Object) -> None:
+    """Remove the objects that were built for a road, in all scenes; copies that the user made of some stay."""
+    objects = set()
+    for scene in bpy.data.scenes:
+        if root in scene.objects.values():
+            objects |= set(parts_and_copies(root, scene)[0].values())
+    remove_with_meshes(sorted(objects, key=lambda item: item.name_full))
+
+
+def remove_road(root: bpy.types.Object | None = None) -> None:
+    """Remove a road: the objects that were built for it, its root, and their collection if nothing else is in it.
 
     Args:
-        keep: the objects of this collection stay.
+        root: of the road; that of the one that is meant in the current scene if None.
     """
-    staying = set(keep.objects) if keep else set()
-    objects = [item for item in bpy.data.objects if ROLE in item and item not in staying]
-    remove_with_meshes(objects)
-    collection = bpy.data.collections.get(COLLECTION)
-    if collection is not None and not collection.all_objects:
-        bpy.data.collections.remove(collection)
+    root = root or road_meant(bpy.context.scene)
+    if root is None:
+        return
+    homes = [collection for collection in root.users_collection if MADE_COLLECTION in collection]
+    _remove_parts(root)
+    for child in root.children:  # what the user hung on it keeps its place
+        place = child.matrix_world.copy()
+        child.parent = None
+        child.matrix_world = place
+    bpy.data.objects.remove(root)
+    for collection in homes:
+        if not collection.all_objects and not collection.children:
+            bpy.data.collections.remove(collection)

@@ -1,4 +1,4 @@
-"""Roads that an older version has built: their inputs get the names that this version gives them."""
+"""Roads that an older version has built: they get a root, and inputs the names that this version gives them."""
 
 from __future__ import annotations
 
@@ -8,11 +8,42 @@ import bpy
 
 from ...road.parameters import RoadParameters
 from ...road.section import LineMarking, Turnout
+from ..things.model_builder import ROLE
 from ..things.road.layout import names_in_words, side_of
 from ..things.road.road import MARKINGS
+from .roads import FRAME, NAME, OF_ROAD, ORIGIN, ROAD, new_root
 
+PARAMETERS = "synthroads_parameters"
+"""Custom property of a road's root, and in older files of its collection: the parameter set as JSON."""
 _RENAMED = {"Dash": "Dash Length", "Gap": "Gap Length"}
 """Inputs of lines that also have another name behind the id or the words."""
+
+
+def adopt_older_roads() -> list[bpy.types.Object]:
+    """Give roads that hang on no root one each, with what their collections say of them; return these roots.
+
+    Up to version 0.1 a road was a collection with its parameter set, whatever its name is now. Nothing moves.
+    """
+    return [_adopt(collection) for collection in bpy.data.collections if _is_older_road(collection)]
+
+
+def _is_older_road(collection: bpy.types.Collection) -> bool:
+    return PARAMETERS in collection and ORIGIN in collection and collection.library is None
+
+
+def _adopt(collection: bpy.types.Collection) -> bpy.types.Object:
+    root = new_root()
+    collection.objects.link(root)
+    for key in [key for key in collection.keys() if key.startswith("synthroads_")]:  # noqa: SIM118
+        root[key] = collection[key]
+        del collection[key]
+    root[FRAME] = list(root[ORIGIN])
+    for item in collection.all_objects:
+        if ROLE in item and item.library is None:
+            if item.parent is None:
+                item.parent = root
+            item[OF_ROAD], item[NAME] = root[ROAD], item[ROLE]
+    return root
 
 
 def rename_inputs(parameters: RoadParameters, objects: Mapping[str, bpy.types.Object]) -> None:

@@ -10,6 +10,7 @@ import bpy
 
 from ..nodes.builder import KEY, remove_unused_groups
 from ..things.model_builder import ROLE
+from .roads import ROAD
 
 STAGING = "synthroads_staging"
 """Custom property of the collection in which a road grows, until it is complete."""
@@ -67,7 +68,7 @@ def new_staging(scene: bpy.types.Scene) -> bpy.types.Collection:
 def remove_staged() -> None:
     """Remove what a build left that could not clean up: of a file saved, or an undo step made, in the midst of it."""
     for collection in [item for item in bpy.data.collections if STAGING in item]:
-        remove_with_meshes([item for item in collection.objects if ROLE in item])
+        remove_with_meshes([item for item in collection.objects if ROLE in item or ROAD in item])
         bpy.data.collections.remove(collection)
         remove_unused_groups()
 
@@ -77,8 +78,3 @@ def remove_with_meshes(objects: list[bpy.types.Object]) -> None:
     meshes = {item.data for item in objects if item.data is not None}
     bpy.data.batch_remove(objects)
     bpy.data.batch_remove([mesh for mesh in meshes if not mesh.users])
-
-
-def in_scene(collection: bpy.types.Collection, scene: bpy.types.Scene) -> bool:
-    """Return whether a collection is anywhere in a scene."""
-    return collection in scene.collection.children_recursive

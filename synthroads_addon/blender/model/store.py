@@ -1,8 +1,9 @@
-"""The road in a scene: what it was built from is kept with its collection, so that it is undone and deleted with it."""
+"""The road in a scene: what it was built from is kept with its root, so that it is undone and deleted with it."""
 
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from typing import Any
 
 import bpy
@@ -10,52 +11,94 @@ import bpy
 from ...base.errors import InputError
 from ...road.parameters import RoadParameters
 from ...scenario.scenario import Scenario
-from ..things.model_builder import ROLE
-from .build import COLLECTION
+from .older_files import PARAMETERS, adopt_older_roads
+from .roads import ROAD, parts_and_copies, renew_ids, road_meant, roots
 
-PARAMETERS = "synthroads_parameters"
 SCENARIO = "synthroads_scenario"
 BUILT_FROM = "synthroads_built_from"
 
 
-def find_road(scene: bpy.types.Scene) -> bpy.types.Collection | None:
-    """Return the collection of the road in a scene, or None if there is no road or nothing is left of it."""
-    for collection in scene.collection.children_recursive:
-        if collection.name == COLLECTION and PARAMETERS in collection:
-            return collection if any(ROLE in item for item in collection.all_objects) else None
-    return None
+def roads(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """Return the roots of all roads of a scene that anything is left of, by name."""
+    return [root for root in roots(scene) if PARAMETERS in root and parts_and_copies(root, scene)[0]]
 
 
-def open_road() -> RoadParameters | None:
-    """Return the parameter set of the road in the open scene, if there is one; raise `InputError` if it is damaged."""
-    collection = find_road(bpy.context.scene)
-    return recall_parameters(collection) if collection else None
+def find_road(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """Return the root of the road that is meant in a scene; None if there is no road or nothing is left of it.
+
+    It is the one that the active object belongs to, else the scene's only one, else the chosen one (`choose_road`).
+    """
+    root = road_meant(scene)
+    if root is None or PARAMETERS not in root:
+        return None
+    return root if parts_and_copies(root, scene)[0] else None
 
 
-def remember(collection: bpy.types.Collection, parameters: RoadParameters, scenario: Scenario, built_from: str) -> None:
+def road_named(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object | None:
+    """Return the root of a scene's road by its root's name; the road that is meant if None.
+
+    Raises:
+        InputError: no road has this name.
+    """
+    adopt_older_roads()
+    renew_ids()
+    if name is None:
+        return find_road(scene)
+    known = {root.name: root for root in roads(scene)}
+    if name not in known:
+        raise InputError("--road", name, f"must be one of {', '.join(known)}" if known else "the scene has no road")
+    return known[name]
+
+
+@dataclass(frozen=True)
+class OpenRoad:
+    """A road in the open scene.
+
+    Attributes:
+        name: of its root.
+        road_id: its id.
+        parameters: what it was built from.
+    """
+
+    name: str
+    road_id: str
+    parameters: RoadParameters
+
+
+def open_road(name: str | None = None) -> OpenRoad | None:
+    """Return a road of the open scene, if there is one: by its root's name, or the one that is meant if None.
+
+    Raises:
+        InputError: no road has this name, or its parameter set is damaged.
+    """
+    root = road_named(bpy.context.scene, name)
+    return OpenRoad(root.name, str(root[ROAD]), recall_parameters(root)) if root else None
+
+
+def remember(root: bpy.types.Object, parameters: RoadParameters, scenario: Scenario, built_from: str) -> None:
     """Keep what a road was built from."""
-    collection[PARAMETERS] = parameters.to_json()
-    collection[SCENARIO] = scenario.to_json()
-    collection[BUILT_FROM] = built_from
+    root[PARAMETERS] = parameters.to_json()
+    root[SCENARIO] = scenario.to_json()
+    root[BUILT_FROM] = built_from
 
 
-def objects_of(collection: bpy.types.Collection) -> dict[str, bpy.types.Object]:
-    """Return the road's objects by role."""
-    return {str(item[ROLE]): item for item in collection.all_objects if ROLE in item}
+def objects_of(root: bpy.types.Object, scene: bpy.types.Scene | None = None) -> dict[str, bpy.types.Object]:
+    """Return a road's objects by role; those of the current scene if None is given."""
+    return parts_and_copies(root, scene or bpy.context.scene)[0]
 
 
-def recall(collection: bpy.types.Collection) -> tuple[RoadParameters, Scenario]:
+def recall(root: bpy.types.Object) -> tuple[RoadParameters, Scenario]:
     """Return what a road was built from; raise `InputError` if that can't be read."""
-    return recall_parameters(collection), Scenario.from_dict(_stored(collection, SCENARIO), "Road")
+    return recall_parameters(root), Scenario.from_dict(_stored(root, SCENARIO), "Road")
 
 
-def recall_parameters(collection: bpy.types.Collection) -> RoadParameters:
+def recall_parameters(root: bpy.types.Object) -> RoadParameters:
     """Return the parameter set of a road; raise `InputError` if it can't be read."""
-    return RoadParameters.from_dict(_stored(collection, PARAMETERS), "Road")
+    return RoadParameters.from_dict(_stored(root, PARAMETERS), "Road")
 
 
-def _stored(collection: bpy.types.Collection, key: str) -> Any:
+def _stored(root: bpy.types.Object, key: str) -> Any:
     try:
-        return json.loads(collection[key])
+        return json.loads(root[key])
     except (KeyError, TypeError, ValueError):
         raise InputError("Road", None, "its parameter set in the file is damaged; build it again") from None

@@ -26,8 +26,8 @@ from ...scanning.scene.motion import (
     lane_motions,
 )
 from ..labels import Label, Labels, velocity_of
-from ..model.build import scene_origin
-from ..things.model_builder import ROLE, SUPPORT
+from ..model.roads import origin_of, parts_and_copies, road_of_id, world_matrix
+from ..things.model_builder import SUPPORT
 from .changes import Changes
 from .reading import MeshCopy, MeshPart, Places, SceneTables, copy_mesh, join_parts, slot_names
 
@@ -46,6 +46,7 @@ def scene_mesh(
     classes: ClassMapping | None = None,
     number_objects: bool = False,
     class_ids: Mapping[str, int] | None = None,
+    road: str = "",
 ) -> SceneMesh:
     """Return the triangles of the evaluated scene: everything that is visible in it and has faces.
 
@@ -61,14 +62,16 @@ def scene_mesh(
         number_objects: each object (one that shows a collection is one) without a number gets one, in the order of
             their names, from 1 on past those that are taken.
         class_ids: ``class_id`` by the names of classes; that of the full table if None, see `ClassScheme.source_ids`.
+        road: id of the road that says where on the map the scene is; that of the one that is meant if empty.
 
     Raises:
         InputError: an object's vertices aren't finite, or a custom property isn't what it must be; names the object.
     """
     depsgraph = _depsgraph(source)
-    reading = _Reading(depsgraph, objects, classes, class_ids)
+    root = road_of_id(depsgraph.scene, road)
+    reading = _Reading(depsgraph, objects, classes, class_ids, root)
     reading.copy_all()
-    tables = reading.tables(_origin(depsgraph.scene), number_objects)
+    tables = reading.tables(_origin(root), number_objects)
     return join_parts(reading.pairs(None), tables)
 
 
@@ -81,6 +84,7 @@ def scanned_scene(
     *,
     number_objects: bool = False,
     class_ids: Mapping[str, int] | None = None,
+    road: str = "",
 ) -> ScannedScene:
     """Return the evaluated scene as `scene_mesh` does, but what moves apart from what stands.
 
@@ -90,7 +94,7 @@ def scanned_scene(
     (vx, vy, vz), m/s; what such an object shows or carries moves with it as one body.
 
     Args:
-        source, objects, classes, number_objects, class_ids: see `scene_mesh`.
+        source, objects, classes, number_objects, class_ids, road: see `scene_mesh`.
         geometry: the road that the scene was built from; if None its vehicles stand.
         speed_factor: share of all speeds that they have in the scan, >= 0; with 0 everything stands.
 
@@ -98,7 +102,7 @@ def scanned_scene(
         InputError: as `scene_mesh`; a velocity isn't three numbers, the factor is negative, or the geometry is that of
             another road.
     """
-    further: dict[str, Any] = {"number_objects": number_objects, "class_ids": class_ids}
+    further: dict[str, Any] = {"number_objects": number_objects, "class_ids": class_ids, "road": road}
     steps = scanned_scene_steps(source, objects, classes, geometry, speed_factor, **further)
     while True:
         try:
@@ -117,6 +121,7 @@ def scanned_scene_steps(
     *,
     number_objects: bool = False,
     class_ids: Mapping[str, int] | None = None,
+    road: str = "",
 ) -> Generator[float, None, CopiedScene]:
     """Read the evaluated scene as `scanned_scene` does, in steps in the main thread between which the window may live.
 
@@ -137,11 +142,12 @@ def scanned_scene_steps(
             attempt += 1
             depsgraph = _depsgraph(source)
             changes.forget()
-            origin = _origin(depsgraph.scene)
+            root = road_of_id(depsgraph.scene, road)
+            origin = _origin(root)
             lanes: dict[str, LaneMotion] = {}
             if geometry is not None:
                 lanes = lane_motions(geometry, speed_factor, origin - np.array(geometry.parameters.transform.translate))
-            reading = _Reading(depsgraph, objects, classes, class_ids, lanes, speed_factor)
+            reading = _Reading(depsgraph, objects, classes, class_ids, root, lanes, speed_factor)
             if attempt == _ATTEMPTS:
                 reading.copy_all()
             for share in reading.copies():
@@ -236,6 +242,7 @@ class _Reading:
         objects: Collection[bpy.types.Object] | None,
         classes: ClassMapping | None,
         class_ids: Mapping[str, int] | None = None,
+        root: bpy.types.Object | None = None,
         lanes: Mapping[str, LaneMotion] | None = None,
         speed_factor: float = 0.0,
     ) -> None:
@@ -253,6 +260,9 @@ class _Reading:
         self._nameless: dict[int, tuple[str, tuple[Hashable, ...]]] = {}
         self._uses: dict[Hashable, dict[tuple[Hashable, ...], Places]] = {}
         self._depsgraph = depsgraph
+        self._root = np.eye(4) if root is None else world_matrix(root)
+        parts = parts_and_copies(root, depsgraph.scene)[0] if root is not None and self._lanes else {}
+        self._drivers = {item: role for role, item in parts.items() if role in self._lanes}
         self._walk(depsgraph)
 
     def copies(self) -> Iterator[float]:
@@ -350,8 +360,8 @@ class _Reading:
         self._labels.append(label)
         if label.instance < 0:
             self._nameless[len(self._labels) - 1] = (shown_by.name_full, part)
-        role = original.get(ROLE, shown_by.get(ROLE))
-        lane = (role, self._lanes[role]) if role in self._lanes else None
+        role = self._drivers.get(original, self._drivers.get(shown_by))
+        lane = (role, self._lanes[role]) if role is not None else None
         return _MeshUse(part, len(self._labels) - 1, lane, self._velocity(original, shown_by))
 
     def _velocity(self, item: bpy.types.Object, owner: bpy.types.Object) -> tuple[Hashable, Float] | None:
@@ -375,7 +385,8 @@ class _Reading:
         key = (role, *matrix)
         if key not in self.motions:
             place = np.array(matrix).reshape(4, 4)
-            if not np.array_equal(place, np.eye(4)):
+            if not np.array_equal(place, self._root):
+                place = place @ np.linalg.inv(self._root)
                 middle = motion.pose(np.zeros(1))[1][0]
                 motion = motion.from_elsewhere(place[:3, :3] @ middle + place[:3, 3])
             self.motions[key] = motion
@@ -397,9 +408,8 @@ class _Reading:
         return labels
 
 
-def _origin(scene: bpy.types.Scene) -> Float:
-    origin = scene_origin(scene)
-    return np.zeros(3) if origin is None else origin
+def _origin(root: bpy.types.Object | None) -> Float:
+    return np.zeros(3) if root is None else origin_of(root)
 
 
 def _depsgraph(source: Source) -> bpy.types.Depsgraph:

@@ -63,6 +63,7 @@ class ModelBuilder:
         detail: float,
         stretch: tuple[float, float] | None = None,
         geometry: RoadGeometry | None = None,
+        root: bpy.types.Object | None = None,
     ) -> None:
         self.geometry = geometry or RoadGeometry(parameters)
         self._given = stretch or (0.0, self.geometry.length)
@@ -77,7 +78,7 @@ class ModelBuilder:
         self.objects: dict[str, bpy.types.Object] = {}
         self.at_once = 1
         self._unseen = 0
-        self._collection = collection
+        self._collection, self._root = collection, root
 
     def lay_out(self) -> None:
         """Find the rows of the surface, and with them what stands on the stretch; comes before everything else."""
@@ -159,7 +160,7 @@ class ModelBuilder:
         mesh = mesh or bpy.data.meshes.new("SR")
         item = bpy.data.objects.new(role, mesh)
         mesh.name = f"SR {role}"
-        item[ROLE] = role
+        item[ROLE], item.parent = role, self._root
         if support or self.hidden:
             item[SUPPORT] = True
             item.hide_viewport = item.hide_render = True
@@ -190,7 +191,7 @@ class ModelBuilder:
     def add_instance(self, role: str, collection: bpy.types.Collection) -> bpy.types.Object:
         """Add an empty that shows a collection."""
         item = bpy.data.objects.new(role, None)
-        item[ROLE] = role
+        item[ROLE], item.parent = role, self._root
         item.instance_type, item.instance_collection = "COLLECTION", collection
         self._collection.objects.link(item)
         self._added(role, item)

@@ -16,7 +16,7 @@ from mathutils import Matrix, Vector
 from numpy.typing import NDArray
 
 from ...cloud.tools.display import ColourBy, DisplayCloud
-from ..model.build import scene_origin
+from ..model.roads import scene_origin
 
 _NEARER = 0.004
 """By which share of their distance points are drawn nearer: at 50 m, 20 cm along the line of sight."""

@@ -14,7 +14,7 @@ from bpy.app.handlers import persistent
 from mathutils import Vector
 
 from ...base.errors import InputError
-from ...blender.model.build import scene_origin
+from ...blender.model.roads import scene_origin
 from ...blender.model.store import find_road
 from ...blender.views.cloud import CloudView
 from ...cloud.formats.registry import ENDINGS

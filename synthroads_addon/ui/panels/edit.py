@@ -13,9 +13,10 @@ from bpy.app.handlers import persistent
 
 from ...base.errors import InputError
 from ...blender.compat import shown_input
-from ...blender.model.older_files import rename_inputs
+from ...blender.model.older_files import PARAMETERS, adopt_older_roads, rename_inputs
 from ...blender.model.read_back import carried_inputs
-from ...blender.model.store import PARAMETERS, find_road, objects_of, recall_parameters
+from ...blender.model.roads import renew_ids
+from ...blender.model.store import find_road, objects_of, recall_parameters, roads
 from ...blender.things.model_builder import ROLE, SUPPORT
 from ...blender.things.road.road import MARKINGS
 from ...road.parameters import RoadParameters
@@ -218,11 +219,13 @@ def _draw_inputs(layout: bpy.types.UILayout, item: bpy.types.Object, inputs: lis
 
 @persistent
 def _name_in_words(*_: Any) -> None:
-    """Have the inputs of roads in a file that was opened or appended named as this version names them."""
+    """Have roads of a file that was opened or appended have a root, their own id, and inputs named as they are now."""
+    adopt_older_roads()
+    renew_ids()
     for scene in bpy.data.scenes:
-        road, parameters = find_road(scene), open_parameters(scene)
-        if road and parameters:
-            rename_inputs(parameters, objects_of(road))
+        for road in roads(scene):
+            if parameters := _parameters(str(road[PARAMETERS])):
+                rename_inputs(parameters, objects_of(road, scene))
 
 
 HANDLERS = dict.fromkeys(("load_post", "blend_import_post"), _name_in_words)

@@ -34,6 +34,7 @@ from ..work.common import Sidebar, column, has_road, is_free
 from ..work.job import PanelJob, Report
 from ..work.long_operator import FileOperator, draw_job
 from .cloud_view import ENDINGS_GLOB, cloud_path, last_cloud
+from .road_choice import draw_shown
 from .rules import road_now, wrap_text
 
 _FORMATS = {
@@ -240,6 +241,7 @@ class SYNTHROADS_PT_export(Sidebar, bpy.types.Panel):
         shown = context.window_manager.synthroads_cloud_view.file
         row.enabled = bool(shown) or last_cloud(context) is not None
         row.operator(SYNTHROADS_OT_export_cloud.bl_idname, icon="EXPORT").source = shown
+        draw_shown(layout, context)
         layout.operator(SYNTHROADS_OT_export_twin.bl_idname, icon="EXPORT")
 
 

@@ -23,6 +23,7 @@ from .presets import (
     device_title,
     scenario_title,
 )
+from .road_choice import draw_choice, draw_shown
 from .road_files import draw_road_files, source_of
 
 _SOLID = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
@@ -60,6 +61,7 @@ class RoadPanel(SheetPanel):
     def draw(self, context: bpy.types.Context) -> None:
         """Show the fields, whether the road is older than they are, and the buttons."""
         layout, settings = column(self), context.scene.synthroads
+        draw_choice(layout, context)
         self.draw_fields(layout, settings)
         if (seed := settings.exact_seed()) != settings.seed:
             layout.label(text=f"Seed of the file: {seed}", icon="INFO")
@@ -121,6 +123,7 @@ def draw_scan(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     if find_road(context.scene) is None:
         layout.label(text="Build a road first", icon="INFO")
     else:
+        draw_shown(layout, context)
         _draw_other_objects(layout, context)
         if settings.needs_saved_file():
             _ask_to_save(layout, settings)

@@ -9,11 +9,12 @@ from pathlib import Path
 import bpy
 
 from ...base.files import output_folder
+from ...blender.model.build import Place
 from ...blender.model.store import BUILT_FROM, find_road, recall_parameters
 from ...jobs.generate import RoadSource
 from ...road.parameters import RoadParameters
 from ...scenario.scenario import Scenario
-from ..work.build import road_work
+from ..work.build import road_work, shown_place
 from ..work.common import has_road, refusing
 from ..work.job import Aside, PanelJob, Work
 from ..work.long_operator import FileOperator
@@ -24,7 +25,7 @@ from .rules import road_now
 _FROM_FILE, _NAME = "file", "parameters.json"
 
 
-def source_of(road: bpy.types.Collection) -> str | None:
+def source_of(road: bpy.types.Object) -> str | None:
     """Return the name of the file that a road was built from; None if the panel's settings made it."""
     try:
         what, name = json.loads(road[BUILT_FROM])
@@ -45,7 +46,7 @@ class _Load(FileOperator):
         """Return the reading and the building."""
         self._first = find_road(context.scene) is None
         path, scenario = Path(bpy.path.abspath(self.filepath)), context.scene.synthroads.scenario()
-        return PanelJob("Build", self._work(path, scenario))
+        return PanelJob("Build", self._work(path, scenario, shown_place(context.scene)))
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[str]) -> str:
         """Show the first road that is built."""
@@ -54,9 +55,9 @@ class _Load(FileOperator):
             look_along(space, recall_parameters(road))
         return str(job.result)
 
-    def _work(self, path: Path, scenario: Scenario) -> Work[str]:
+    def _work(self, path: Path, scenario: Scenario, place: Place) -> Work[str]:
         parameters, message = yield Aside(lambda _: self.read(path, scenario), "Reading", 0.0, 0.02)
-        yield from road_work(parameters, scenario, json.dumps([_FROM_FILE, path.name]))
+        yield from road_work(parameters, scenario, json.dumps([_FROM_FILE, path.name]), place)
         return message
 
     def read(self, path: Path, scenario: Scenario) -> tuple[RoadParameters, str]:

@@ -11,6 +11,7 @@ from bpy.app.handlers import persistent
 
 from ...base.errors import InputError
 from ...blender.model.read_back import edited_parameters
+from ...blender.model.roads import ROAD, road_of_id
 from ...blender.model.store import find_road, objects_of, recall_parameters
 from ...blender.things.model_builder import ROLE
 from ...checking.checker import RULES, Violation, check
@@ -19,6 +20,7 @@ from ...road.parameters import RoadParameters
 from ...road.section import Carriageway, LineMarking
 from ..work.common import Sidebar, has_road, redraw_sidebars, refusing, right_label
 from ..work.view import Marker, look_at_place, redraw_views, view_of
+from .road_choice import draw_shown
 
 _CHARACTER = 6.2
 """Width of a letter in the sidebar, pixels at a resolution scale of 1."""
@@ -35,6 +37,7 @@ class Checked:
 
     Attributes:
         parameters: what was checked; None before.
+        road: id of the road that was checked.
         marker: shows where a rule is broken.
         asked: whether the scene may have changed since it was last compared.
         stale: whether it had, when it was compared.
@@ -44,9 +47,9 @@ class Checked:
         self.marker = Marker()
         self.take(None)
 
-    def take(self, parameters: RoadParameters | None) -> None:
+    def take(self, parameters: RoadParameters | None, road: str = "") -> None:
         """Keep the road that was checked, which the scene's is compared with; None for no road."""
-        self.parameters, self.asked, self.stale = parameters, False, False
+        self.parameters, self.road, self.asked, self.stale = parameters, road, False, False
 
     def forget(self) -> None:
         """Clear the findings."""
@@ -57,7 +60,7 @@ class Checked:
         """Return whether the road has changed; reading it takes long enough to do so after changes only."""
         if self.asked and self.parameters is not None:
             try:
-                self.stale = road_now(scene) != self.parameters
+                self.stale = road_now(scene, self.road) != self.parameters
             except InputError:
                 self.stale = True
             self.asked = False
@@ -67,14 +70,24 @@ class Checked:
 checked = Checked()
 
 
-def road_now(scene: bpy.types.Scene) -> RoadParameters | None:
-    """Return the parameter set of the road as it is edited now; None without a road.
+def road_now(scene: bpy.types.Scene, road: str = "") -> RoadParameters | None:
+    """Return the parameter set of a road as it is edited now; None without a road.
+
+    Args:
+        scene: that it is in.
+        road: its id; the road that the panels show if empty.
 
     Raises:
         InputError: the set kept in the file is damaged, or an edited value is out of its limits.
     """
-    road = find_road(scene)
-    return edited_parameters(recall_parameters(road), objects_of(road)) if road else None
+    root = road_of_id(scene, road) if road else find_road(scene)
+    return edited_parameters(recall_parameters(root), objects_of(root)) if root else None
+
+
+def shown_id(scene: bpy.types.Scene) -> str:
+    """Return the id of the road that the panels show; empty without a road."""
+    root = find_road(scene)
+    return "" if root is None else str(root[ROAD])
 
 
 def offset_of(geometry: RoadGeometry, violation: Violation) -> float:
@@ -146,7 +159,7 @@ class SYNTHROADS_OT_check_rules(bpy.types.Operator):
         assert parameters  # poll() has seen the road
         violations = check(parameters)
         _clear(context.window_manager)
-        checked.take(parameters)
+        checked.take(parameters, shown_id(context.scene))
         _fill(context.window_manager.synthroads_rules, parameters, violations)
         self.report({"INFO"}, _count(len(violations)))
         redraw_views(context)
@@ -228,6 +241,7 @@ class SYNTHROADS_PT_rules(Sidebar, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         """Show the button, the list, and the chosen line in full."""
         layout, rules = self.layout, context.window_manager.synthroads_rules
+        draw_shown(layout, context)
         row = layout.row(align=True)
         row.operator(SYNTHROADS_OT_check_rules.bl_idname, icon="CHECKMARK")
         if checked.parameters is None:

@@ -53,7 +53,7 @@ def _scan(job: dict[str, Any]) -> dict[str, Any]:
     road = RoadGeometry(RoadParameters.from_dict(job["parameters"]))
     timer = StageTimer(_overall_progress(renders_returns(scenario.colour.settings(scenario.fidelity))))
     with bpy.context.temp_override(window=window):
-        counts = RoadScene(scenario, road).scan(Path(job["folder"]), timer)
+        counts = RoadScene(scenario, road, road_id=job["road"]).scan(Path(job["folder"]), timer)
     return {"counts": counts, "stages": timer.stages}
 
 

@@ -1,10 +1,12 @@
-"""The button that builds the road."""
+"""The button that builds the road.
 
-from __future__ import annotations
+Annotations are not postponed here: Blender reads the properties from them.
+"""
 
 import bpy
 
-from ...blender.model.build import RoadModel, build_steps
+from ...blender.model.build import MEANT, Place, RoadModel, build_steps
+from ...blender.model.roads import ROAD, choose_road
 from ...blender.model.store import find_road, recall, remember
 from ...road.parameters import RoadParameters
 from ...sampling.road import sample_road
@@ -15,11 +17,17 @@ from .view import look_along
 
 
 class SYNTHROADS_OT_build(LongOperator, bpy.types.Operator):
-    """Make a road from these settings. It takes the place of the road built before; other objects stay as they are"""
+    """Make a road from these settings. It takes the place of the shown road; all else stays as it is"""
 
     bl_idname = "synthroads.build"
     bl_label = "Build Road"
     bl_options = {"UNDO"}  # noqa: RUF012 (Blender reads a plain set)
+
+    beside: bpy.props.BoolProperty(
+        name="One More",
+        description="Build one more road instead of building the shown one anew",
+        options={"SKIP_SAVE"},
+    )
 
     _first = False
 
@@ -27,36 +35,47 @@ class SYNTHROADS_OT_build(LongOperator, bpy.types.Operator):
         """Return the building of the road that the panel asks for."""
         settings = context.scene.synthroads
         self._first = find_road(context.scene) is None
-        return PanelJob("Build", build_work(settings.scenario(), settings.road_values()))
+        place = Place(beside=True) if self.beside else shown_place(context.scene)
+        return PanelJob("Build", build_work(settings.scenario(), settings.road_values(), place))
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[RoadModel]) -> str:
         """Show the first road that is built."""
         assert job.result
-        parameters = recall(job.result.collection)[0]
+        parameters = recall(job.result.root)[0]
+        choose_road(context.scene, job.result.root)
+        if self.beside:
+            context.view_layer.objects.active = job.result.root
         space = context.space_data
         if self._first and not bpy.app.background and isinstance(space, bpy.types.SpaceView3D):
             look_along(space, parameters)
         return f"Built {parameters.alignment.length:,.0f} m of road"
 
 
-def build_work(scenario: Scenario, built_from: str) -> Work[RoadModel]:
+def shown_place(scene: bpy.types.Scene) -> Place:
+    """Return the place of the road that the panel shows: it stays that one, whatever is clicked during the work."""
+    root = find_road(scene)
+    return MEANT if root is None else Place(str(root[ROAD]))
+
+
+def build_work(scenario: Scenario, built_from: str, place: Place = MEANT) -> Work[RoadModel]:
     """Sample a road and build it in the open scene.
 
     Args:
         scenario: the road's limits, and the model's fidelity.
         built_from: kept with the road, to tell whether the panel's settings have changed since.
+        place: which road it takes the place of.
 
     Raises:
         InputError: a setting is wrong; the scene is as before.
     """
     parameters = yield Aside(lambda _: sample_road(scenario.road, scenario.seed, scenario.title), "Sampling", 0.0, 0.02)
-    return (yield from road_work(parameters, scenario, built_from))
+    return (yield from road_work(parameters, scenario, built_from, place))
 
 
-def road_work(parameters: RoadParameters, scenario: Scenario, built_from: str) -> Work[RoadModel]:
+def road_work(parameters: RoadParameters, scenario: Scenario, built_from: str, place: Place = MEANT) -> Work[RoadModel]:
     """Build a road that is given in the open scene; see `build_work`."""
     fidelity = scenario.settings()
     yield Step(0.02, "Building")
-    model = yield from build_steps(parameters, fidelity.tolerance, fidelity.vegetation_detail)
-    remember(model.collection, parameters, scenario, built_from)
+    model = yield from build_steps(parameters, fidelity.tolerance, fidelity.vegetation_detail, place=place)
+    remember(model.root, parameters, scenario, built_from)
     return model

@@ -142,12 +142,13 @@ def _wait(process: subprocess.Popen[bytes]) -> None:
         return
 
 
-def save_open_scene(scenario: Scenario, parameters: RoadParameters, folder: Path) -> SavedScene:
+def save_open_scene(scenario: Scenario, parameters: RoadParameters, road: str, folder: Path) -> SavedScene:
     """Save a copy of the open file for a scan in the background; the open file keeps its name and state.
 
     Args:
         scenario: what is scanned and rendered, and how.
         parameters: the road that the scene shows.
+        road: its id.
         folder: where the scan's files go; the copy is in a folder inside until it is scanned.
 
     Raises:
@@ -170,6 +171,7 @@ def save_open_scene(scenario: Scenario, parameters: RoadParameters, folder: Path
         "scripts": not bpy.app.autoexec_fail,
         "scenario": json.loads(scenario.to_json()),
         "parameters": json.loads(parameters.to_json()),
+        "road": road,
     }
     path = (place / _JOB).resolve()
     path.write_text(json.dumps(job), encoding="utf-8")

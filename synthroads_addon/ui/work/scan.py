@@ -19,6 +19,7 @@ from ...base.files import output_folder
 from ...base.progress import StageTimer
 from ...blender.files import save_scene
 from ...blender.model.read_back import edited_parameters
+from ...blender.model.roads import ROAD
 from ...blender.model.store import find_road, objects_of, recall
 from ...blender.scene.evaluated import CopiedScene, scanned_scene_steps
 from ...blender.services import SnapshotServices
@@ -44,12 +45,14 @@ class RoadScan:
     Attributes:
         scenario: the road's and the scan's settings.
         parameters: the road that the scene shows.
+        road_id: of that road.
         target: folder for the files.
         overwrite: replace files that are already there.
     """
 
     scenario: Scenario
     parameters: RoadParameters
+    road_id: str
     target: Path
     overwrite: bool
 
@@ -101,7 +104,7 @@ def scan_work(scan: RoadScan) -> Work[Written]:
 def _save_copy(scan: RoadScan, folder: Path, timer: StageTimer) -> Generator[Step, None, _Measure]:
     """Save a copy of the open file; return what has another Blender scan it."""
     with timer.stage("scene copy"):
-        saved = save_open_scene(scan.scenario, scan.parameters, folder)
+        saved = save_open_scene(scan.scenario, scan.parameters, scan.road_id, folder)
     yield Step(_READ)
 
     def measure(report: Report) -> dict[str, Any]:
@@ -116,7 +119,8 @@ def _read_open_scene(scan: RoadScan, folder: Path, timer: StageTimer) -> Generat
     """Read the open scene; return what scans it."""
     speed_factor, class_ids = scan.scenario.scan.traffic_speed_factor, scan.scenario.cloud.scheme().source_ids()
     with timer.stage("scene mesh"):
-        steps = scanned_scene_steps(geometry=scan.road, speed_factor=speed_factor, class_ids=class_ids)
+        geometry, road = scan.road, scan.road_id
+        steps = scanned_scene_steps(geometry=geometry, speed_factor=speed_factor, class_ids=class_ids, road=road)
         copied = yield from _shares(steps)
     services = SnapshotServices(copied.materials)
 
@@ -193,7 +197,7 @@ def requested_scan(context: bpy.types.Context) -> RoadScan:
     # The road and its fidelity are those that it was built with.
     chosen = {name: getattr(shown, name) for name in ("scan", "colour", "cloud", "outputs", "twin", "materials_table")}
     scenario = with_preferences(built.model_copy(update=chosen))
-    return RoadScan(scenario, parameters, settings.folder(), settings.overwrite)
+    return RoadScan(scenario, parameters, str(road[ROAD]), settings.folder(), settings.overwrite)
 
 
 _last: Written | None = None

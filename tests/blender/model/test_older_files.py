@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import bpy
+import numpy as np
+
 from synthroads_addon.blender.compat import modifier_input, set_modifier_input
 from synthroads_addon.blender.model.build import RoadModel, build_road
 from synthroads_addon.blender.model.older_files import rename_inputs
 from synthroads_addon.blender.model.read_back import edited_parameters
+from synthroads_addon.blender.model.store import find_road, objects_of, open_road, recall
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import load_scenario
@@ -62,3 +68,32 @@ def test_a_road_of_this_version_stays_as_it_is() -> None:
     before = [entry.name for entry in interface.items_tree]
     rename_inputs(parameters, model.objects)
     assert [entry.name for entry in interface.items_tree] == before
+
+
+OLDER = Path(__file__).parents[2] / "helpers" / "files" / "older_road.blend"
+"""Saved by the last version without roots, in Blender 4.5: 40 m of road with two guardrails (`small_road`), in a
+collection that was renamed afterwards."""
+
+
+def test_a_file_without_roots_opens_with_its_road_edited_built_and_read_back() -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(OLDER))
+    assert find_road(bpy.context.scene) is None
+    opened = open_road()
+    assert opened is not None
+    root = find_road(bpy.context.scene)
+    assert root is not None
+    parameters, scenario = recall(root)
+    assert parameters == opened.parameters
+    objects = objects_of(root)
+    assert set(objects) == {"Backbone", "Road", "rail-left", "rail-right"}
+    assert edited_parameters(parameters, objects) == parameters
+    before = {role: np.array(item.matrix_world) for role, item in objects.items()}
+    bpy.context.view_layer.update()
+    assert all(np.array_equal(np.array(item.matrix_world), before[role]) for role, item in objects.items())
+    set_modifier_input(objects["rail-left"].modifiers[0], "Offset", 12.5)
+    edited = edited_parameters(parameters, objects)
+    assert edited.objects["rail-left"].offset == 12.5  # type: ignore[union-attr]
+    model = build_road(edited, scenario.settings().tolerance, 0.0, ("road", "guardrails"))
+    assert model.root == root
+    assert "Renamed by the User" in bpy.data.collections
+    assert edited_parameters(edited, objects_of(root)) == edited

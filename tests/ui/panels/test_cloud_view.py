@@ -12,7 +12,7 @@ from mathutils import Matrix
 
 import synthroads_addon
 from synthroads_addon.base.errors import Cancelled
-from synthroads_addon.blender.model.build import scene_origin
+from synthroads_addon.blender.model.roads import scene_origin
 from synthroads_addon.blender.model.store import find_road, recall_parameters
 from synthroads_addon.blender.views.cloud import Pace
 from synthroads_addon.cloud.formats.registry import ENDINGS, open_writer

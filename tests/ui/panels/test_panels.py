@@ -14,7 +14,7 @@ from pydantic import BaseModel
 import synthroads_addon
 from synthroads_addon.base.schema import note_of
 from synthroads_addon.blender.model.build import build_road
-from synthroads_addon.blender.model.store import remember
+from synthroads_addon.blender.model.store import find_road, remember
 from synthroads_addon.road.things.limits import Interval
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.devices.device import DEVICES, device_names
@@ -82,7 +82,7 @@ def test_layout(name: str, library: Path) -> None:
 def test_the_road_panel_says_what_the_road_was_built_from(panel: Any) -> None:
     scenario = load_scenario("rq31-600m", ["road.length=20"])
     parameters = sample_road(scenario.road, 1)
-    road = build_road(parameters, 0.02, 0.0).collection
+    road = build_road(parameters, 0.02, 0.0).root
     for built_from, said in (
         ("", ["label 'Built by a command, not from these settings' <FILE>"]),
         ('["file", "mine.json"]', ["label 'Built from mine.json' <FILE>"]),
@@ -276,7 +276,7 @@ def test_random_road_draws_the_next_seed_and_builds_it(panel: Any) -> None:
     assert bpy.ops.synthroads.random_road() == {"FINISHED"}
     first = panel.seed
     assert first == presets.next_seed(5) != 5
-    road = bpy.data.collections["SynthRoads"]
+    road = find_road(bpy.context.scene)
     scenario = panel.scenario()
     expected = sample_road(scenario.road, first, scenario.title).to_json()
     assert road["synthroads_parameters"] == expected

@@ -176,7 +176,7 @@ def test_another_file_has_its_own_rules(found: Any) -> None:
 
 
 def test_a_damaged_road_is_a_message(found: Any) -> None:
-    bpy.data.collections["SynthRoads"]["synthroads_parameters"] = "{"
+    find_road(bpy.context.scene)["synthroads_parameters"] = "{"
     with pytest.raises(RuntimeError, match="Road: its parameter set in the file is damaged") as caught:
         bpy.ops.synthroads.check_rules()
     assert "Traceback" not in str(caught.value)

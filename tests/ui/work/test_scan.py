@@ -12,6 +12,7 @@ import pytest
 import synthroads_addon
 from synthroads_addon.base.errors import Cancelled
 from synthroads_addon.blender.compat import set_modifier_input
+from synthroads_addon.blender.model.store import find_road
 from synthroads_addon.blender.things.model_builder import ROLE
 from synthroads_addon.jobs.generate import Job as PipelineJob
 from synthroads_addon.jobs.generate import generate
@@ -106,12 +107,12 @@ def _hide_all(road: Any, folder: Path) -> None:  # noqa: F811
 
 
 def _damage(road: Any, folder: Path) -> None:  # noqa: F811
-    bpy.data.collections["SynthRoads"]["synthroads_parameters"] = "{"
+    find_road(bpy.context.scene)["synthroads_parameters"] = "{"
 
 
 def _wrong_seed(road: Any, folder: Path) -> None:  # noqa: F811
-    stored = json.loads(bpy.data.collections["SynthRoads"]["synthroads_scenario"])
-    bpy.data.collections["SynthRoads"]["synthroads_scenario"] = json.dumps(stored | {"seed": -1})
+    stored = json.loads(find_road(bpy.context.scene)["synthroads_scenario"])
+    find_road(bpy.context.scene)["synthroads_scenario"] = json.dumps(stored | {"seed": -1})
 
 
 WRONG = {

@@ -1,0 +1,197 @@
+"""Roads in a file: each is a root object, an empty, that its parts hang on.
+
+A road's root has an id of its own as a custom property, and all that is kept of the road. It may be renamed, moved, put
+into any collection, linked to other scenes, appended from other files; its copy is another road. Collections mean
+nothing. A part hangs on its root as its child, or on something of the user's and says by the id whose part it is.
+"""
+
+from __future__ import annotations
+
+from itertools import count
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ..things.model_builder import ROLE
+
+ROAD = "synthroads_road"
+"""Custom property of a road's root: its id."""
+OF_ROAD = "synthroads_of_road"
+"""Custom property of a road's parts: its id."""
+NAME = "synthroads_name"
+"""Custom property of a road's parts: the name that the object was given, by which it is told from its copies."""
+ORIGIN = "synthroads_origin"
+"""Custom property of a road's root: map coordinates of the scene's own origin, m."""
+FRAME = "synthroads_frame"
+"""Custom property of a road's root: map coordinates of the root's place when the road was built, m."""
+CHOSEN = "synthroads_chosen_road"
+"""Property of a scene: the root of the road that is meant where the active object belongs to none."""
+ROOT_NAME = "SynthRoads Road"
+_SIZE = 5.0
+"""Size of the empty in the view, m."""
+_FARTHEST = 20_000.0
+"""A road is put where it lies on the map if that is at most so far from the scene's origin, m."""
+
+
+def new_id() -> str:
+    """Return an id that no other road of the file has."""
+    taken = {item[ROAD] for item in bpy.data.objects if ROAD in item}
+    return next(name for number in count(1) if (name := f"road-{number}") not in taken)
+
+
+def new_root() -> bpy.types.Object:
+    """Return a new root, in no collection yet."""
+    root = bpy.data.objects.new(ROOT_NAME, None)
+    root.empty_display_type, root.empty_display_size = "ARROWS", _SIZE
+    root[ROAD] = new_id()
+    return root
+
+
+def is_root(item: bpy.types.Object) -> bool:
+    """Return whether an object is a road's root."""
+    return ROAD in item and item.type == "EMPTY"
+
+
+def roots(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """Return the roots of a scene's roads that are complete, by name."""
+    found = [item for item in scene.objects if is_root(item) and FRAME in item]
+    return sorted(found, key=lambda item: item.name_full)
+
+
+def root_above(item: bpy.types.Object | None) -> bpy.types.Object | None:
+    """Return the root that an object hangs on, or is; None if it hangs on none."""
+    while item is not None and not is_root(item):
+        item = item.parent
+    return item
+
+
+def root_of(item: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """Return the root of the road that an object is a part of, or hangs on; None if it belongs to none."""
+    above = root_above(item)
+    if above is not None or OF_ROAD not in item:
+        return above if above is None or FRAME in above else None
+    return next((root for root in roots(scene) if root[ROAD] == item[OF_ROAD]), None)
+
+
+def parts_and_copies(
+    root: bpy.types.Object, scene: bpy.types.Scene
+) -> tuple[dict[str, bpy.types.Object], list[bpy.types.Object]]:
+    """Return a road's parts in a scene by role, in the scene's order, and the copies that the user made of some."""
+    by_role: dict[str, list[bpy.types.Object]] = {}
+    lost = roots(scene)
+    for item in scene.objects:
+        if ROLE in item and OF_ROAD in item and _belongs(item, root, lost):
+            by_role.setdefault(str(item[ROLE]), []).append(item)
+    parts, copies = {}, []
+    for role, items in by_role.items():
+        first, *others = sorted(items, key=_originality)
+        parts[role] = first
+        copies += others
+    return parts, copies
+
+
+def _belongs(item: bpy.types.Object, root: bpy.types.Object, scene_roots: list[bpy.types.Object]) -> bool:
+    above = root_above(item)
+    if above is None:
+        above = next((other for other in scene_roots if other[ROAD] == item[OF_ROAD]), None)
+    return above == root
+
+
+def _originality(item: bpy.types.Object) -> tuple[bool, str]:
+    """Return what sorts an object before its copies: they share all properties, but not the name."""
+    return item.name != item.get(NAME), item.name
+
+
+def road_meant(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """Return the root of the road that is meant in a scene; None if it has none.
+
+    It is the active object's; else the only one; else the chosen one, see `choose_road`; else the first by name.
+    """
+    found = roots(scene)
+    if len(found) < 2:
+        return found[0] if found else None
+    layer = bpy.context.view_layer if scene == bpy.context.scene else scene.view_layers[0]
+    active = layer.objects.active
+    meant = root_of(active, scene) if active is not None else None
+    chosen = scene.get(CHOSEN)
+    return next((root for root in (meant, chosen) if root in found), found[0])
+
+
+def road_of_id(scene: bpy.types.Scene, road: str) -> bpy.types.Object | None:
+    """Return the root of a scene's road by the road's id; that of the road that is meant if the id is empty."""
+    if not road:
+        return road_meant(scene)
+    return next((root for root in roots(scene) if root[ROAD] == road), None)
+
+
+def choose_road(scene: bpy.types.Scene, root: bpy.types.Object) -> None:
+    """Have a road be the one that is meant while no object of another one is active."""
+    scene[CHOSEN] = root
+
+
+def renew_ids() -> None:
+    """Give roads that are copies, or come from another file, ids of their own, and the parts that hang on them."""
+    taken: set[str] = set()
+    for root in sorted((item for item in bpy.data.objects if is_root(item)), key=_originality):
+        if root[ROAD] in taken and root.library is None:
+            root[ROAD] = new_id()
+            for item in root.children_recursive:
+                if OF_ROAD in item and root_above(item) == root and item.library is None:
+                    item[OF_ROAD] = root[ROAD]
+        taken.add(root[ROAD])
+
+
+def origin_of(root: bpy.types.Object) -> NDArray[np.float64]:
+    """Return the map coordinates (3,) of a scene's own origin that a road's root says."""
+    return np.array(root[ORIGIN], dtype=np.float64)
+
+
+def scene_origin(scene: bpy.types.Scene) -> NDArray[np.float64] | None:
+    """Return the map coordinates (3,) of a scene's own origin by the road that is meant; None without a road."""
+    root = road_meant(scene)
+    return None if root is None else origin_of(root)
+
+
+def place_root(root: bpy.types.Object, frame: NDArray[np.float64], scene: bpy.types.Scene, keep: bool = True) -> None:
+    """Put a root where a road's frame lies on the map.
+
+    The scene's origin is that of its other roads, if they are not too far away, else the frame's.
+
+    Args:
+        root: the root.
+        frame: (3,) map coordinates of the frame in which the parts were built, m.
+        scene: that it is in.
+        keep: a displacement by the user stays; else it is taken back.
+    """
+    moved = displacement(root)
+    others = [origin_of(other) for other in roots(scene) if other != root]
+    near = next((origin for origin in others if np.abs(frame - origin).max() <= _FARTHEST), None)
+    origin = frame if near is None else near
+    root[ORIGIN], root[FRAME] = [float(value) for value in origin], [float(value) for value in frame]
+    place = np.eye(4)
+    place[:3, 3] = frame - origin
+    wanted = moved @ place if keep else place
+    if not np.array_equal(wanted, np.array(root.matrix_world)):
+        root.matrix_world = wanted.tolist()
+
+
+def displacement(root: bpy.types.Object) -> NDArray[np.float64]:
+    """Return the matrix (4, 4) that the user has moved a road by since it was built, in the scene's frame."""
+    if FRAME not in root:
+        return np.eye(4)
+    there = np.eye(4)
+    there[:3, 3] = np.float32(np.array(root[FRAME]) - np.array(root[ORIGIN]))
+    now = world_matrix(root)
+    return np.eye(4) if np.array_equal(now, there) else now @ np.linalg.inv(there)
+
+
+def world_matrix(item: bpy.types.Object) -> NDArray[np.float64]:
+    """Return an object's place (4, 4) in the scene, from its properties: it may not have been evaluated yet."""
+    deltas = (*item.delta_location, *item.delta_rotation_euler, *(factor - 1.0 for factor in item.delta_scale))
+    if item.constraints or any(deltas) or (item.parent is not None and item.parent_type != "OBJECT"):
+        return np.array(item.matrix_world, dtype=np.float64)
+    own = np.array(item.matrix_basis, dtype=np.float64)
+    if item.parent is None:
+        return own
+    return world_matrix(item.parent) @ np.array(item.matrix_parent_inverse, dtype=np.float64) @ own

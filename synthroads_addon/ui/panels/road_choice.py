@@ -1,0 +1,72 @@
+"""Which of a scene's roads the panels are about: shown and chosen at the top of the panel "Road".
+
+It is the active object's, else the only one, else the one chosen here; see `blender.model.roads.road_meant`.
+Annotations are not postponed here: Blender reads the properties from them.
+"""
+
+from typing import Any
+
+import bpy
+
+from ...blender.model.roads import choose_road
+from ...blender.model.store import find_road, roads
+from ..work.build import SYNTHROADS_OT_build
+
+_items: list[tuple[str, str, str, str, int]] = []
+"""Texts that Blender shows at present: it doesn't keep them itself."""
+
+
+def _road_items(state: Any, context: Any) -> list[tuple[str, str, str, str, int]]:
+    names = [root.name for root in roads(context.scene)]
+    _items[:] = [(name, name, "", "EMPTY_ARROWS", number) for number, name in enumerate(names)]
+    return _items
+
+
+def _shown_road(state: Any) -> int:
+    scene = bpy.context.scene
+    found, shown = roads(scene), find_road(scene)
+    return found.index(shown) if shown in found else 0
+
+
+def _choose_road(state: Any, number: int) -> None:
+    """Show a road, and make its root the active object, so that it can be moved at once."""
+    context = bpy.context
+    root = roads(context.scene)[number]
+    choose_road(context.scene, root)
+    for other in context.view_layer.objects.selected:
+        other.select_set(False)
+    context.view_layer.objects.active = root
+    if root.visible_get():
+        root.select_set(True)
+
+
+class SYNTHROADS_PG_roads(bpy.types.PropertyGroup):
+    """The road that the panels are about."""
+
+    shown: bpy.props.EnumProperty(
+        name="Road",
+        items=_road_items,
+        get=_shown_road,
+        set=_choose_road,
+        description="Road that the panels are about: the active object's; its root becomes active where one is chosen",
+    )
+
+
+def draw_choice(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw which road it is, and the button that builds one more; nothing without a road."""
+    if find_road(context.scene) is None:
+        return
+    row = layout.row(align=True)
+    row.use_property_split = False
+    row.prop(context.window_manager.synthroads_roads, "shown", text="")
+    row.operator(SYNTHROADS_OT_build.bl_idname, text="", icon="ADD").beside = True
+
+
+def draw_shown(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Say which road a button is about where the scene has several."""
+    found = roads(context.scene)
+    if len(found) > 1 and (shown := find_road(context.scene)):
+        layout.label(text=shown.name, icon="EMPTY_ARROWS")
+
+
+ATTACHED = (bpy.types.WindowManager, "synthroads_roads", SYNTHROADS_PG_roads)
