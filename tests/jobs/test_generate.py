@@ -48,6 +48,7 @@ def command(*arguments: str | Path) -> subprocess.CompletedProcess:
     )
 
 
+@pytest.mark.any_blender
 def test_a_road_that_no_pulse_comes_back_from_is_told(tmp_path: Path) -> None:
     report = generate(job(tmp_path, "road.length=20", "scan.attenuation=1", 'outputs=["cloud"]'))
     assert report["counts"]["points"] == 0
@@ -77,12 +78,14 @@ def test_every_file_is_written_and_agrees(tmp_path: Path, monkeypatch: pytest.Mo
     assert ("scan", 1.0) in seen
 
 
+@pytest.mark.any_blender
 def test_only_what_is_asked_for_is_made(tmp_path: Path) -> None:
     report = generate(job(tmp_path, 'outputs=["parameters"]'))
     assert list(report["stages"]) == ["parameters"]
     assert sorted(p.name for p in tmp_path.iterdir()) == ["parameters.json", "report.json"]
 
 
+@pytest.mark.any_blender
 def test_same_seed_same_bytes_whatever_the_threads(tmp_path: Path) -> None:
     for name, changes in {"a": ["scan.threads=1"], "b": ["scan.threads=3"], "c": ["seed=2"]}.items():
         generate(job(tmp_path / name, 'outputs=["parameters","cloud"]', "road.length=60", *changes))
@@ -92,6 +95,7 @@ def test_same_seed_same_bytes_whatever_the_threads(tmp_path: Path) -> None:
         assert a != c
 
 
+@pytest.mark.any_blender
 def test_a_written_set_gives_the_same_road_again(tmp_path: Path) -> None:
     generate(job(tmp_path / "a", 'outputs=["parameters"]'))
     again = job(tmp_path / "b", 'outputs=["parameters"]', parameters=tmp_path / "a" / "parameters.json")
@@ -125,7 +129,7 @@ def test_a_vehicle_carries_the_scanner_where_the_platform_is_one(demo, name: str
 
 
 @pytest.mark.keep_scene
-@pytest.mark.parametrize(("sigma", "rays"), [(0.0, 1), (0.01, 1)])
+@pytest.mark.parametrize(("sigma", "rays"), [(0.0, 1), pytest.param(0.01, 1, marks=pytest.mark.any_blender)])
 def test_labels_of_the_pavement_agree_with_the_parameters(demo, sigma: float, rays: int) -> None:
     """99.9 % of the pavement's points lie in a strip of their class within 2 cm (+ three sigma with noise)."""
     scenario, geometry, scene = demo
@@ -155,6 +159,7 @@ def test_points_of_the_road_lie_on_the_analytic_surface(demo) -> None:
     assert np.abs(error).max() <= scenario.settings().tolerance
 
 
+@pytest.mark.any_blender
 @pytest.mark.keep_scene
 def test_casters_agree(demo) -> None:
     """Same face for 99.99 % of 10,000 rays with ranges within 0.1 mm; every other ray passes an edge that closely."""
@@ -227,6 +232,7 @@ def test_a_real_axis_is_met_and_scanned(tmp_path: Path) -> None:
     assert np.abs(offset).max() == pytest.approx(fit["worst"], abs=2e-3)
 
 
+@pytest.mark.any_blender
 def test_cancelling_leaves_nothing(tmp_path: Path) -> None:
     def stop(stage: str, share: float) -> None:
         if stage == "scan" and share > 0:
@@ -267,6 +273,7 @@ BAD_INPUTS = {
 """Wrong command lines, {} being a folder of their own, and what their one line must name."""
 
 
+@pytest.mark.any_blender
 @pytest.mark.parametrize("name", BAD_INPUTS)
 def test_wrong_input_is_one_line_and_exit_code_2(tmp_path: Path, name: str, capfd: pytest.CaptureFixture[str]) -> None:
     for file, text in FILES_OF_BAD_INPUTS.items():
@@ -285,6 +292,7 @@ def test_wrong_input_is_one_line_and_exit_code_2(tmp_path: Path, name: str, capf
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.any_blender
 def test_output_already_there_needs_overwrite(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     small = [part for change in [*SMALL, 'outputs=["parameters"]'] for part in ("--set", change)]
     assert commands.command("generate", ["--output", str(tmp_path), *small]) == 0
@@ -304,6 +312,7 @@ def test_no_write_permission(tmp_path: Path) -> None:
     assert "ermission" in result.stderr
 
 
+@pytest.mark.any_blender
 def test_a_device_out_of_its_limits_is_refused_before_work(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"scan\.lines_per_second"):
         generate(job(tmp_path / "out", "scan.lines_per_second=500"))

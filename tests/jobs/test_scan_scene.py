@@ -161,6 +161,7 @@ def test_pictures_come_with_the_cloud_and_colours_are_rendered(
 # Where the scanner is
 
 
+@pytest.mark.any_blender
 def test_one_strip_leads_straight_over_the_middle(scene: Callable[[str], Path], tmp_path: Path) -> None:
     las = scan(scene(".blend"), tmp_path / "out", "--height", "30", "--speed", "5")
     assert set(np.array(las.point_source_id)) == {1}
@@ -173,6 +174,7 @@ def test_one_strip_leads_straight_over_the_middle(scene: Callable[[str], Path], 
     assert counts["intensity_scale"] == pytest.approx(65535 * 15.0**2)
 
 
+@pytest.mark.any_blender
 def test_lateral_offsets_give_their_strips(scene: Callable[[str], Path], tmp_path: Path) -> None:
     offsets = ("--height", "30", "--set", "scan.platform.lateral_offsets=[4,0,-4]")
     las = scan(scene(".blend"), tmp_path / "out", *offsets)
@@ -184,6 +186,7 @@ def epsg_of_file(folder: Path) -> int | None:
         return cloud.header.epsg
 
 
+@pytest.mark.any_blender
 def test_a_path_is_followed_in_map_coordinates(scene: Callable[[str], Path], tmp_path: Path) -> None:
     line = tmp_path / "line.csv"
     line.write_text("x,y,z\n500005,5600090,101\n500005,5600110,101\n")
@@ -196,6 +199,7 @@ def test_a_path_is_followed_in_map_coordinates(scene: Callable[[str], Path], tmp
     assert np.ptp(las.y) == pytest.approx(20.0, abs=0.5)
 
 
+@pytest.mark.any_blender
 def test_a_trajectory_is_flown(scene: Callable[[str], Path], tmp_path: Path) -> None:
     file = tmp_path / "flight.csv"
     file.write_text("time,x,y,z,roll,pitch,heading\n0,-15,2,21,0,0,90\n4,15,2,21,0,0,90\n")
@@ -205,6 +209,7 @@ def test_a_trajectory_is_flown(scene: Callable[[str], Path], tmp_path: Path) -> 
     assert np.abs(las.y[below] - 2.0).max() < 0.3
 
 
+@pytest.mark.any_blender
 def test_tripods_stand_on_the_surface_or_where_they_are_put(scene: Callable[[str], Path], tmp_path: Path) -> None:
     where = ("--tripod=-15,-5", "--tripod", "5,5,2.5", "--set", "scan.platform.turn_seconds=2")
     las = scan(scene(".blend"), tmp_path / "out", *where)
@@ -219,6 +224,7 @@ def test_tripods_stand_on_the_surface_or_where_they_are_put(scene: Callable[[str
     assert np.allclose(usual.positions, [[-15, -5, 2.8], [-15, -5, 1.0 + Tripod.usual["height"]]])
 
 
+@pytest.mark.any_blender
 def test_a_scene_with_a_vertex_astray_is_scanned_where_it_is(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -241,6 +247,7 @@ def test_a_scene_with_a_vertex_astray_is_scanned_where_it_is(
     assert "must lie within 1e+08 m of the scene's origin" in capsys.readouterr().err
 
 
+@pytest.mark.any_blender
 def test_a_scan_larger_than_anyone_can_have_meant_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -258,6 +265,7 @@ def test_a_scan_larger_than_anyone_can_have_meant_is_refused(
     assert command("scan", [*words, *DRAFT, "--allow-large"]) == 0
 
 
+@pytest.mark.any_blender
 def test_a_scan_without_a_point_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """As of a tripod that stands in the plane of the only wall."""
     wall = "v 5 -5 -5\nv 5 5 -5\nv 5 5 5\nv 5 -5 5\nf 1 2 3 4\n"
@@ -445,6 +453,7 @@ def test_wrong_inputs_are_one_line_and_leave_nothing(
     assert sorted(tmp_path.iterdir()) == before
 
 
+@pytest.mark.any_blender
 @pytest.mark.parametrize("given", [["--path", "a", "--trajectory", "b"], ["--tripod", "1,2", "--path", "a"]])
 def test_only_one_way_to_say_where_the_scanner_is(given: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stop:
@@ -455,6 +464,7 @@ def test_only_one_way_to_say_where_the_scanner_is(given: list[str], capsys: pyte
     assert "not allowed with argument" in lines[0]
 
 
+@pytest.mark.any_blender
 @pytest.mark.parametrize("text", ["1", "1,2,3,4", "a,b", "nan,1", "1,1e10"])
 def test_positions_must_be_coordinates(text: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stop:
@@ -465,6 +475,7 @@ def test_positions_must_be_coordinates(text: str, capsys: pytest.CaptureFixture[
     ]
 
 
+@pytest.mark.any_blender
 def test_output_is_not_replaced_unasked(
     scene: Callable[[str], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

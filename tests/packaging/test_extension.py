@@ -22,7 +22,10 @@ from tools.build_extension import EXTENSIONS, BuildError, download
 ROOT = Path(__file__).resolve().parents[2]
 PYTHON_TAGS = {"cp311", "cp313", "cp314"}
 
-pytestmark = pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="Blender's own tool comes with bpy")
+pytestmark = [
+    pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="Blender's own tool comes with bpy"),
+    pytest.mark.first_python,  # one zip for all Pythons
+]
 
 
 def _build(folder: Path) -> Path:
