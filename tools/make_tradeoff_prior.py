@@ -48,8 +48,9 @@ SCENES: dict[str, tuple[str, Sequence[str]]] = {
 CORES = 2
 OCTAVES = (2, 4, 6)
 WANTED = frozenset({"rgb", "roughness", "metallic", "specular"})
-SAMPLE = {"images": 0.7, "returns": 3.7}
-"""Microseconds per point that takes its colour from images, and that is rendered by itself (`synthroads tradeoff`)."""
+SAMPLE = {"images": 0.7, "nodes": 2.2, "returns": 3.7}
+"""Microseconds per point that takes its colour from images, from its material's nodes, and that is rendered by itself
+(`synthroads tradeoff`)."""
 TIMED = 3
 """Images that are timed in full size; all but the first in a quarter of it as well."""
 PREVIEWS = 0.1

@@ -51,6 +51,12 @@ class RaycastNodesCaster:
         # The node gives 0 where nothing is hit, and the target's faces are counted from 1.
         return faces - 1
 
+    def occluded(
+        self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float
+    ) -> NDArray[np.bool_]:
+        """Return whether (N,) something is hit, see `Caster.occluded`."""
+        return self.cast(origins, directions, maximum_range) >= 0
+
     def close(self) -> None:
         """Remove all data of its own from the open file."""
         meshes = [self._rays.data, self._target.data]

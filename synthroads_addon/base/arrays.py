@@ -19,16 +19,21 @@ UInt16 = NDArray[np.uint16]
 
 @dataclass(frozen=True)
 class ArrayRows:
-    """Record of arrays that have a row each for the same things."""
+    """Record of arrays that have a row each for the same things; an array that isn't there is None."""
 
     def select(self, rows: Bool | Index | slice) -> Self:
         """Return the rows chosen by a mask, indices or a slice."""
-        return type(self)(*(getattr(self, field.name)[rows] for field in fields(self)))
+        arrays = (getattr(self, field.name) for field in fields(self))
+        return type(self)(*(None if array is None else array[rows] for array in arrays))
 
     @classmethod
     def join(cls, parts: Sequence[Any]) -> Self:
         """Return the rows of several records of this class, in order; at least one record is needed."""
-        return cls(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(cls)))
+
+        def joined(arrays: list[Any]) -> AnyArray | None:
+            return None if arrays[0] is None else np.concatenate(arrays)
+
+        return cls(*(joined([getattr(part, field.name) for part in parts]) for field in fields(cls)))
 
 
 def otsu(values: Float) -> float:

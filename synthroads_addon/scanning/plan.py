@@ -16,7 +16,8 @@ from ..road.parameters import RoadParameters
 from ..road.surroundings import Environment, MaterialVariation
 from .beam import BeamPattern, beam_pattern
 from .blocks import Block, Blocks
-from .colour.colour import LayerSource
+from .colour.colour import LayerSource, takes_nodes
+from .colour.light import sun_direction
 from .colour.request import LayerRequest
 from .devices.device import ScannerSetting
 from .effects import EchoEffect
@@ -137,6 +138,14 @@ class ScanPlan:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pattern", beam_pattern(self.rings))
+
+    @property
+    def sun(self) -> Float | None:
+        """Return the unit vector (3,) towards the sun where points need to know whether it reaches them."""
+        request = self.request
+        if request is None or not request.lit or not (self.services is None or takes_nodes(request.settings)):
+            return None
+        return sun_direction(request.environment)
 
     @property
     def rays_per_pulse(self) -> int:

@@ -24,6 +24,8 @@ from .trace import Hits, Rays, TracedRays, trace
 
 _MOTION_KNOTS = 0.01
 """Seconds between two poses of a moving vehicle: it turns by less than a milliradian meanwhile."""
+_OFF_SURFACE = 1e-3
+"""How far from its surface a ray towards the sun begins, m."""
 PROVISIONAL_THRESHOLD = 0.25
 """Share of the detector's threshold that keeps an echo while its intensity is still to change: no echo is expected to
 become four times as bright as its material's mean makes it."""
@@ -295,6 +297,7 @@ class BlockScan:
         """
         target, time = self.plan.target, rays.time[ray % len(rays.time)]
         position, scanner = _ray_ends(rays, ray, reach)
+        sunlit = None if self.plan.sun is None else self._sunlit(face, position, normal, time, motions)
         if target.moving:
             begin, offset, normal = target.at_time_zero(face, position, time, motions, (scanner - position, normal))
             position, scanner = begin, begin + offset
@@ -304,7 +307,19 @@ class BlockScan:
             normal=np.ascontiguousarray(normal.T),
             material=target.face_values("material", face),
             time=time,
+            face=face,
+            sunlit=sunlit,
         )
+
+    def _sunlit(self, face: Index, position: Float, normal: Float, time: Float, motions: list[Track]) -> Bool:
+        """Return whether the sun reaches points (N,), seen from the side that their normals (3, N) point to."""
+        sun = self.plan.sun
+        assert sun is not None
+        result = sun @ normal > 0.0
+        towards = np.flatnonzero(result & (face >= 0))
+        begin = position[:, towards] + _OFF_SURFACE * normal[:, towards]
+        result[towards] = self.plan.target.sees(begin, sun, time[towards], motions)
+        return result
 
 
 def _ray_ends(rays: Rays, ray: Index, reach: Float) -> tuple[Float, Float]:

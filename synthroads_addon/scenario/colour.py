@@ -27,13 +27,15 @@ class ColourScenario(ClosedModel):
         json_schema_extra=notes(
             labels={
                 "auto": "Automatic",
+                "nodes": "Materials at the Returns",
                 "images": "Images Along the Path",
                 "returns": "A Pixel per Return",
                 "material": "Material's Mean",
             }
         ),
-        description="Images along the path, a pixel per return (Blender 5.0 and newer), or each material's mean; "
-        "auto takes a pixel per return where Blender has it.",
+        description="Each material's nodes at the very returns, images along the path, a pixel per return (Blender 5.0 "
+        "and newer), or each material's mean; auto takes the nodes, and for whole light paths a pixel per return where "
+        "Blender has it.",
     )
     rgb: bool = Field(
         True,
@@ -43,7 +45,9 @@ class ColourScenario(ClosedModel):
     engine: Engine = Field(
         "cycles",
         description="Renderer of the images.",
-        json_schema_extra=notes(only_with={"source": ("auto", "images", "returns")}, labels={"eevee": "EEVEE"}),
+        json_schema_extra=notes(
+            only_with={"source": ("auto", "nodes", "images", "returns")}, labels={"eevee": "EEVEE"}
+        ),
     )
     mode: ColourMode = Field(
         "lit",
@@ -59,7 +63,7 @@ class ColourScenario(ClosedModel):
         "direct",
         description="Sun with shadows and an open sky, without noise; or whole light paths, which need more samples.",
         json_schema_extra=notes(
-            only_with={"source": ("auto", "images", "returns")}, labels={"path": "Whole Light Paths"}
+            only_with={"source": ("auto", "nodes", "images", "returns")}, labels={"path": "Whole Light Paths"}
         ),
     )
     image_spacing: float | None = quantity(
@@ -92,7 +96,7 @@ class ColourScenario(ClosedModel):
     intensity_from_layers: bool = Field(
         False,
         description="Intensities from each point's own layers, in place of its material's means.",
-        json_schema_extra=notes(only_with={"source": ("auto", "images", "returns")}),
+        json_schema_extra=notes(only_with={"source": ("auto", "nodes", "images", "returns")}),
     )
 
     @model_validator(mode="after")

@@ -10,7 +10,7 @@ import pytest
 from headless.tradeoff_table import TABLES, better_row, markdown, time_noise
 from synthroads_addon.jobs.measure.tradeoff import KNOBS, row_scenario, rows
 from synthroads_addon.scanning.platforms.path import Strip
-from synthroads_addon.scanning.platforms.stretches import middle_stretches, spread_stretches
+from synthroads_addon.scanning.platforms.stretches import spread_stretches
 from synthroads_addon.scenario.scenario import load_scenario
 from tests.helpers.scenes.scan_scenes import Standing
 
@@ -23,7 +23,7 @@ def _row(knob: str, value: Any, **more: Any) -> dict[str, Any]:
 
 def test_every_row_is_named_and_in_a_table() -> None:
     assert len(list(rows(KNOBS))) == sum(len(knob.rows) for knob in KNOBS.values())
-    assert len(list(rows(KNOBS))) == 53
+    assert len(list(rows(KNOBS))) == 54
     assert {knob.table for knob in KNOBS.values()} == TABLES.keys()
 
 
@@ -108,8 +108,3 @@ def test_stretches_are_spread_over_each_strip(count: int, duration: float) -> No
     time = part.strips[-1].start_time + np.arange(3.0)
     for mine, all_of_it in zip(part.pose(part.strips[-1], time), path.pose(path.strips[1], time), strict=True):
         np.testing.assert_array_equal(mine, all_of_it)
-
-
-def test_the_middle_is_in_the_middle() -> None:
-    (strip,) = middle_stretches(Standing(), 0.2).strips
-    assert (strip.start_time, strip.duration) == pytest.approx((30.0, 15.0))

@@ -8,15 +8,27 @@ from contextlib import ExitStack, contextmanager
 import bpy
 
 from ...base.errors import InputError
-from ...scanning.colour.colour import ColourSettings, LayerSource, SurfaceConstants, needed_layers
+from ...scanning.colour.colour import (
+    MATERIAL_LAYERS,
+    ColourSettings,
+    LayerSource,
+    MaterialLayers,
+    SurfaceConstants,
+    needed_layers,
+    takes_nodes,
+)
 from ...scanning.colour.light import SunAndSky
 from ...scanning.colour.request import LayerRequest, material_layers
+from ...scanning.colour.surfaces import SceneSurfaces
 from ...scanning.colour.views import View, scene_sample, views_along
+from ..materials.calculable import material_needs
+from .calculator import calculator
 from .images import RenderedLayers
-from .light import daylight
+from .light import Daylight, daylight
+from .nodes import NodeLayers
 from .returns import ReturnCamera
-from .stage import Passes, stage
-from .surfaces import scene_constants
+from .stage import Passes, RenderStage, stage
+from .surfaces import numbered_materials, scene_constants
 from .versions import HAS_RETURN_CAMERA
 
 __all__ = [
@@ -37,9 +49,13 @@ def check_colour(settings: ColourSettings) -> None:
     """Refuse what this Blender can't do.
 
     Raises:
-        InputError: a pixel per return in a Blender before 5.0 or without OSL, or with EEVEE; EEVEE with whole light
-            paths.
+        InputError: a pixel per return in a Blender before 5.0 or without OSL, or with EEVEE; materials' nodes with
+            EEVEE; EEVEE or materials' nodes with whole light paths.
     """
+    if settings.source == "nodes" and settings.lighting == "path":
+        raise InputError("colour: source", "nodes", "must be images or returns for whole light paths")
+    if settings.source == "nodes" and settings.engine != "cycles":
+        raise InputError("colour: engine", settings.engine, "must be cycles for the materials' nodes")
     if settings.source == "returns" and not HAS_RETURN_CAMERA:
         raise InputError("colour: source", "returns", "needs Blender 5.0 or newer, with OSL; this one has images")
     if settings.source == "returns" and settings.engine != "cycles":
@@ -51,7 +67,7 @@ def check_colour(settings: ColourSettings) -> None:
 def renders_returns(settings: ColourSettings) -> bool:
     """Return whether what is rendered is a pixel per return here, and not images."""
     return settings.source == "returns" or (
-        settings.source == "auto" and settings.engine == "cycles" and HAS_RETURN_CAMERA
+        settings.source == "auto" and not takes_nodes(settings) and settings.engine == "cycles" and HAS_RETURN_CAMERA
     )
 
 
@@ -70,21 +86,22 @@ def layer_source(
     """
     check_colour(request.settings)
     constants = scene_constants(request.mesh.materials)
-    passes = _passes(request, constants)
+    by_nodes = takes_nodes(request.settings)
     with ExitStack() as stack:
-        light, exposure, world = SunAndSky(), 1.0, None
-        lamps: tuple[bpy.types.Object, ...] = ()
+        day, light = None, SunAndSky()
         if request.lit and request.settings.source != "material":
             day = stack.enter_context(daylight(request.environment, request.settings.lighting == "direct"))
-            light, exposure, lamps = day.light, day.exposure, (day.sun,)
-            world = day.world if passes.sky else None
+            light = day.light
         fallback = material_layers(request, constants, light)
+        if by_nodes:
+            yield _node_layers(stack, request, fallback, day, source)
+            return
+        passes = _passes(request, constants)
         if request.settings.source == "material" or not passes.channels:
             yield fallback
             return
-        set_up = stack.enter_context(
-            stage(source or bpy.context.scene, request.mesh.materials, passes, lamps, world, request.settings.engine)
-        )
+        set_up = _lit_stage(stack, request, passes, day, source)
+        exposure = day.exposure if day else 1.0
         if passes.position:
             yield ReturnCamera(set_up, fallback, exposure)
             return
@@ -99,6 +116,45 @@ def layer_source(
             images.close()
 
 
+def _lit_stage(
+    stack: ExitStack, request: LayerRequest, passes: Passes, day: Daylight | None, source: bpy.types.Scene | None
+) -> RenderStage:
+    """Open a stage with the scene in daylight."""
+    lamps = (day.sun,) if day else ()
+    world = day.world if day and passes.sky else None
+    scene = source or bpy.context.scene
+    return stack.enter_context(stage(scene, request.mesh.materials, passes, lamps, world, request.settings.engine))
+
+
+def _node_layers(
+    stack: ExitStack,
+    request: LayerRequest,
+    fallback: MaterialLayers,
+    day: Daylight | None,
+    source: bpy.types.Scene | None,
+) -> LayerSource:
+    """Return layers from materials' nodes; where these ask for what nobody can give them, from a pixel per return."""
+    constants, names = fallback.constants, request.mesh.materials
+    needed = needed_layers(request.wanted, request.settings.mode)
+    if request.lit:
+        needed |= set(MATERIAL_LAYERS)  # the light that they throw back depends on all
+    layers = constants.varying(frozenset(needed))
+    if not layers and not request.lit:
+        return fallback
+    varying = {index for name in layers for index in constants.varies[name].nonzero()[0].tolist()}
+    items = {index: item for index, item in numbered_materials(names) if index in varying}
+    needs = {index: material_needs(item) for index, item in items.items()}
+    obstacles = {index: need.obstacles for index, need in needs.items() if need.obstacles}
+    easy = {index: item for index, item in items.items() if index not in obstacles}
+    rest = None
+    if obstacles and HAS_RETURN_CAMERA:
+        set_up = _lit_stage(stack, request, _passes(request, constants, by_return=True), day, source)
+        rest = ReturnCamera(set_up, fallback, day.exposure if day else 1.0)
+    work = stack.enter_context(calculator(easy, layers)) if easy else None
+    surfaces = SceneSurfaces(request.mesh, request.moving)
+    return NodeLayers(work, surfaces, fallback, rest, obstacles, names, request.frame)
+
+
 def image_views(request: LayerRequest) -> list[View]:
     """Return the cameras of a request's images."""
     settings, points = request.settings, scene_sample(request.mesh)
@@ -106,14 +162,20 @@ def image_views(request: LayerRequest) -> list[View]:
     return views if request.pick is None else request.pick(views)
 
 
-def _passes(request: LayerRequest, constants: SurfaceConstants) -> Passes:
-    """Return what must be rendered: no layer that isn't wanted, and none that is constant on every material."""
+def _passes(request: LayerRequest, constants: SurfaceConstants, by_return: bool = False) -> Passes:
+    """Return what must be rendered: no layer that isn't wanted, and none that is constant on every material.
+
+    Args:
+        request: what is wanted.
+        constants: of the materials.
+        by_return: a pixel per return is rendered, whatever is asked for.
+    """
     settings, lit = request.settings, request.lit
     whole = lit and settings.lighting == "path" and settings.engine == "cycles"
     needed = needed_layers(request.wanted, settings.mode)
     if whole:
         needed -= {"base_color"} - request.wanted
-    returns = renders_returns(settings)
+    returns = by_return or renders_returns(settings)
     return Passes(
         layers=constants.varying(needed),
         lit=lit,

@@ -156,10 +156,31 @@ def stage(
         world: the sky, or None for blackness.
         engine: ``cycles`` or ``eevee``.
     """
-    known = {item.name for item in bpy.data.images}
     with ExitStack() as stack:
         folder = stack.enter_context(scratch_folder())
         stack.enter_context(prepared_materials(materials, passes.layers, engine == "eevee"))
+        result = stack.enter_context(new_stage(passes, folder, (*visible_objects(source), *lights), engine))
+        scene = result.scene
+        scene.world = world
+        scene.frame_set(source.frame_current, subframe=source.frame_subframe)
+        _set_light_groups(scene, passes, lights, world)
+        yield result
+
+
+@contextmanager
+def new_stage(
+    passes: Passes, folder: Path, items: Sequence[bpy.types.Object] = (), engine: str = "cycles"
+) -> Iterator[RenderStage]:
+    """Yield a stage with objects and a camera and nothing else; afterwards the scene and the camera are gone.
+
+    Args:
+        passes: what is rendered.
+        folder: for files.
+        items: the objects.
+        engine: ``cycles`` or ``eevee``.
+    """
+    known = {item.name for item in bpy.data.images}
+    with ExitStack() as stack:
         stack.callback(_forget_images, known)
         scene = bpy.data.scenes.new(NAME)
         stack.callback(_remove_stage, scene)
@@ -167,12 +188,11 @@ def stage(
         stack.callback(lambda: bpy.data.cameras.remove(data))
         camera = bpy.data.objects.new(NAME, data)
         stack.callback(lambda: bpy.data.objects.remove(camera))
-        for item in (*visible_objects(source), *lights, camera):
+        for item in (*items, camera):
             scene.collection.objects.link(item)
-        scene.camera, scene.world = camera, world
-        scene.frame_set(source.frame_current, subframe=source.frame_subframe)
+        scene.camera = camera
         _set_engine(scene, engine, passes)
-        _set_passes(scene, passes, lights, world)
+        _set_passes(scene, passes)
         multilayer_exr(scene.render.image_settings)
         yield RenderStage(scene, camera, passes, folder)
 
@@ -225,9 +245,7 @@ def _set_engine(scene: bpy.types.Scene, engine: str, passes: Passes) -> None:
         cycles.device = "GPU"
 
 
-def _set_passes(
-    scene: bpy.types.Scene, passes: Passes, lights: Sequence[bpy.types.Object], world: bpy.types.World | None
-) -> None:
+def _set_passes(scene: bpy.types.Scene, passes: Passes) -> None:
     layer = scene.view_layers[0]
     layer.use_pass_material_index = scene.render.engine == "CYCLES"
     layer.use_pass_z, layer.use_pass_position = passes.depth, passes.position
@@ -238,8 +256,15 @@ def _set_passes(
         # EEVEE has no such pass. In 5.2 values that are declared before colours come back 0.
         output = layer.aovs.add()
         output.name, output.type = NUMBER, "VALUE"
+
+
+def _set_light_groups(
+    scene: bpy.types.Scene, passes: Passes, lights: Sequence[bpy.types.Object], world: bpy.types.World | None
+) -> None:
+    """Have the light of sun and sky rendered apart where both are."""
     if not passes.sky:
         return
+    layer = scene.view_layers[0]
     for name in (SUN_GROUP, SKY_GROUP):
         layer.lightgroups.add(name=name)
     for item in lights:

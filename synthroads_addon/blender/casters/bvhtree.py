@@ -30,3 +30,9 @@ class BVHTreeCaster:
             if face is not None:
                 faces[i] = face
         return faces
+
+    def occluded(
+        self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float
+    ) -> NDArray[np.bool_]:
+        """Return whether (N,) something is hit, see `Caster.occluded`."""
+        return self.cast(origins, directions, maximum_range) >= 0

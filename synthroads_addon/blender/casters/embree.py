@@ -50,3 +50,12 @@ class EmbreeCaster:
             return np.asarray(self._scene.run(origins, directions, dists=limit))
         hits = self._scene.run(origins, directions, dists=limit, output=1)
         return np.asarray(np.take(self._firsts, hits["geomID"]) + hits["primID"])
+
+    def occluded(
+        self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float
+    ) -> NDArray[np.bool_]:
+        """Return whether (N,) something is hit, see `Caster.occluded`: half the work of finding what is hit first."""
+        if not self._meshes or len(origins) == 0:
+            return np.zeros(len(origins), bool)
+        limit = np.full(len(origins), maximum_range, dtype=np.float32)
+        return np.asarray(self._scene.run(origins, directions, dists=limit, query="OCCLUDED") == 0)

@@ -14,9 +14,8 @@ from ...materials.variation import vary_material
 from ...road.surroundings import Environment, MaterialVariation
 from .looks import vary_color
 from .shading import shade
+from .surface_layers import PROPERTY, layer_expressions, mean_value
 
-PROPERTY = "synthroads_material"
-"""Custom property of a Blender material: its name in the table."""
 MEAN = "synthroads_mean"
 """Custom property of a Blender material: its mean properties on this road, as JSON."""
 
@@ -75,21 +74,20 @@ def _principled(name: str) -> Material:
     item = bpy.data.materials.get(name)
     if item is None:
         return materials()[UNKNOWN]
+    means = {layer: mean_value(found) for layer, found in layer_expressions(item).items()}
     nodes = item.node_tree.nodes if item.node_tree else ()
     node = next((node for node in nodes if node.type == "BSDF_PRINCIPLED"), None)
-    if node is None:
-        colour, rough, metal = item.diffuse_color, item.roughness, item.metallic
-    else:
-        colour, rough, metal = (node.inputs[key].default_value for key in ("Base Color", "Roughness", "Metallic"))
+    red, green, blue = (share(part) for part in means.get("base_color", item.diffuse_color[:3]))
     # A renderer's default specular of 0.5 would drown the contrast of the base colours.
     specular = min(0.2, node.inputs["Specular IOR Level"].default_value) if node else 0.2
-
-    def share(value: float) -> float:
-        return min(1.0, max(0.0, float(value)))
-
     return Material(
-        base_color=(share(colour[0]), share(colour[1]), share(colour[2])),
-        roughness=share(rough),
-        metallic=share(metal),
+        base_color=(red, green, blue),
+        roughness=share(means["roughness"][0] if "roughness" in means else item.roughness),
+        metallic=share(means["metallic"][0] if "metallic" in means else item.metallic),
         specular=share(specular),
     )
+
+
+def share(value: float) -> float:
+    """Return a value between 0 and 1."""
+    return min(1.0, max(0.0, float(value)))

@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 
 from ...scanning.colour.colour import decode_srgb
 
+_SMALL = 64
+"""Largest side of the copy that an image's mean is taken of, px."""
+
 
 def color_image_node(item: bpy.types.Material) -> bpy.types.Node | None:
     """Return the image texture that feeds the Principled BSDF's base colour directly; None if there is none."""
@@ -18,15 +21,32 @@ def color_image_node(item: bpy.types.Material) -> bpy.types.Node | None:
     return node if node is not None and node.type == "TEX_IMAGE" and node.image is not None else None
 
 
+def mean_color(node: bpy.types.Node) -> tuple[float, float, float] | None:
+    """Return the mean linear colour of an image texture's image, of a small copy of it; None of other nodes."""
+    if node.type != "TEX_IMAGE" or node.image is None or not node.image.size[0] * node.image.size[1]:
+        return None
+    small = node.image.copy()
+    try:
+        small.scale(*(min(_SMALL, side) for side in node.image.size))
+        red, green, blue = linear_pixels(small).reshape(-1, 3).mean(axis=0).tolist()
+    except RuntimeError:  # its file is damaged
+        return None
+    finally:
+        bpy.data.images.remove(small)
+    return red, green, blue
+
+
 def base_color_image(item: bpy.types.Material) -> NDArray[np.float64] | None:
     """Return the linear colours (height, width, 3) of that image, 0 to 1, its lowest row first; None without.
 
     Images of whole numbers in sRGB are turned linear; those of floats are linear in Blender already.
     """
     node = color_image_node(item)
-    if node is None or not node.image.size[0] * node.image.size[1]:
-        return None
-    image = node.image
+    return None if node is None or not node.image.size[0] * node.image.size[1] else linear_pixels(node.image)
+
+
+def linear_pixels(image: bpy.types.Image) -> NDArray[np.float64]:
+    """Return an image's linear colours (height, width, 3), 0 to 1, its lowest row first."""
     flat = np.empty(image.size[0] * image.size[1] * image.channels, dtype=np.float32)
     image.pixels.foreach_get(flat)
     pixels = flat.reshape(image.size[1], image.size[0], image.channels)

@@ -30,6 +30,7 @@ from ..model.roads import origin_of, parts_and_copies, road_of_id, world_matrix
 from ..things.model_builder import SUPPORT
 from .changes import Changes
 from .reading import MeshCopy, MeshPart, Places, SceneTables, copy_mesh, join_parts, slot_names
+from .values import ObjectValues, asked_by_material, object_values
 
 Float = NDArray[np.float64]
 Source: TypeAlias = bpy.types.Depsgraph | bpy.types.Scene | None
@@ -201,12 +202,14 @@ class _MeshUse:
         label: number of the label.
         lane: motion of a vehicle of the model, before it was moved.
         velocity: of anything else that moves, m/s, with the key of what moves it.
+        values: what its materials ask of the object; None if that is nothing.
     """
 
     part: tuple[Hashable, ...]
     label: int
     lane: tuple[str, LaneMotion] | None
     velocity: tuple[Hashable, Float] | None
+    values: ObjectValues | None
 
 
 @dataclass(frozen=True)
@@ -217,11 +220,13 @@ class _QueuedMesh:
         name: of the object, for messages.
         item: the object's name and its library's.
         slots: names of its materials.
+        undeformed: whether no modifier has changed it.
     """
 
     name: str
     item: tuple[str, str | None]
     slots: list[str]
+    undeformed: bool
 
 
 class _Reading:
@@ -260,6 +265,7 @@ class _Reading:
         self._nameless: dict[int, tuple[str, tuple[Hashable, ...]]] = {}
         self._uses: dict[Hashable, dict[tuple[Hashable, ...], Places]] = {}
         self._depsgraph = depsgraph
+        self._asked = asked_by_material()
         self._root = np.eye(4) if root is None else world_matrix(root)
         parts = parts_and_copies(root, depsgraph.scene)[0] if root is not None and self._lanes else {}
         self._drivers = {item: role for role, item in parts.items() if role in self._lanes}
@@ -277,7 +283,7 @@ class _Reading:
             mesh = item.evaluated_get(self._depsgraph).data if item is not None else None
             if not isinstance(mesh, bpy.types.Mesh) or mesh.as_pointer() != key[0]:
                 return  # the user has changed it
-            self._copy(key, queued.name, mesh, queued.slots)
+            self._copy(key, queued.name, mesh, queued.slots, queued.undeformed)
             del self._queued[key]
             yield 1.0 - len(self._queued) / total
 
@@ -296,8 +302,11 @@ class _Reading:
         for _ in self.copies():
             pass
 
-    def _copy(self, key: tuple[Hashable, ...], name: str, mesh: bpy.types.Mesh, slots: list[str]) -> None:
-        self._copied[key] = copy_mesh(name, mesh, slots, self._materials, self.labels.by_name)
+    def _copy(
+        self, key: tuple[Hashable, ...], name: str, mesh: bpy.types.Mesh, slots: list[str], undeformed: bool
+    ) -> None:
+        asked = frozenset().union(*(self._asked.get(slot, frozenset()) for slot in slots))
+        self._copied[key] = copy_mesh(name, mesh, slots, self._materials, self.labels.by_name, asked, undeformed)
 
     def pairs(self, carrier: Hashable) -> list[tuple[MeshPart, Places]]:
         """Return the parts that a carrier moves (that stand, for None) and their places; only once for each."""
@@ -336,6 +345,8 @@ class _Reading:
             places = self._uses.setdefault(carrier, {}).setdefault(about.part, Places())
             places.matrices.fromlist(matrix)
             places.labels.append(about.label)
+            if about.values is not None:
+                places.objects.append(about.values.rows(use.random_id, (matrix[3], matrix[7], matrix[11])))
 
     def _look(self, item: bpy.types.Object, owner: bpy.types.Object) -> _MeshUse | None:
         """Return what is known of an evaluated object and its owner; None if they aren't scanned."""
@@ -353,16 +364,17 @@ class _Reading:
             place = (original.name, original.library.filepath if original.library else None)
             is_own_mesh = original.evaluated_get(self._depsgraph).data == item.data
             if is_own_mesh and bpy.data.objects.get(place) == original:
-                self._queued[part] = _QueuedMesh(item.name, place, slots)
+                self._queued[part] = _QueuedMesh(item.name, place, slots, not original.modifiers)
             else:  # of a geometry's instance, or of a curve: only seen in passing
-                self._copy(part, item.name, item.data, slots)
+                self._copy(part, item.name, item.data, slots, False)
         label = self.labels.label_of(original, shown_by)
         self._labels.append(label)
         if label.instance < 0:
             self._nameless[len(self._labels) - 1] = (shown_by.name_full, part)
         role = self._drivers.get(original, self._drivers.get(shown_by))
         lane = (role, self._lanes[role]) if role is not None else None
-        return _MeshUse(part, len(self._labels) - 1, lane, self._velocity(original, shown_by))
+        values = object_values(original, slots, self._asked)
+        return _MeshUse(part, len(self._labels) - 1, lane, self._velocity(original, shown_by), values)
 
     def _velocity(self, item: bpy.types.Object, owner: bpy.types.Object) -> tuple[Hashable, Float] | None:
         """Return the key of what moves an original object, and its velocity; None if nothing does."""

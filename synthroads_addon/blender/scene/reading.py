@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import bpy
@@ -16,8 +16,10 @@ from ...base.class_mapping import NameClasses
 from ...base.classes import UNLABELLED
 from ...base.errors import InputError
 from ...scanning.scene.mesh import SceneMesh, empty_scene_mesh
+from ...scanning.scene.surface_values import MeshValues, PartValues, SurfaceInput, ValuesBuilder
 from ..labels import Label
 from ..materials import table_name
+from .values import OF_FRAME, OF_OBJECT, mesh_values
 
 Float = NDArray[np.float64]
 
@@ -39,6 +41,9 @@ class MeshPart:
         class_id, instance_id: (T,) labels of the faces, or None if the mesh has none.
         material_class: (M,) int16 classes of the scene's materials that a class mapping names, -1 for none; None if it
             names none of this mesh's.
+        asked: inputs that its materials ask for.
+        values: those that the mesh itself has.
+        corners: (T, 3) corners of the triangles; None where nothing is asked for.
     """
 
     vertices: NDArray[np.float32]
@@ -47,14 +52,21 @@ class MeshPart:
     class_id: NDArray[np.uint8] | None
     instance_id: NDArray[np.uint32] | None
     material_class: NDArray[np.int16] | None
+    asked: frozenset[SurfaceInput] = frozenset()
+    values: dict[SurfaceInput, MeshValues] = field(default_factory=dict)
+    corners: NDArray[np.int32] | None = None
 
 
 @dataclass
 class Places:
-    """Where a part stands: per use a matrix of 16 numbers, row by row, and the number of a label."""
+    """Where a part stands: per use a matrix of 16 numbers, row by row, the number of a label, and its object's values.
+
+    The values are there only where materials ask for them.
+    """
 
     matrices: array[float] = field(default_factory=lambda: array("d"))
     labels: array[int] = field(default_factory=lambda: array("l"))
+    objects: list[dict[SurfaceInput, tuple[float, ...]]] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -95,7 +107,8 @@ class MeshCopy:
         face: (T,) int32 face of each triangle; None if all faces are triangles.
         slot, class_id, instance_id: (F,) int32 values of the faces, or None if the mesh has none.
         materials: (S,) uint16 indices of the slots' materials into the scene's.
-        material_class: see `MeshPart`.
+        material_class, asked: see `MeshPart`.
+        values: see there; those of faces are by face here.
     """
 
     name: str
@@ -108,6 +121,8 @@ class MeshCopy:
     instance_id: NDArray[np.int32] | None
     materials: NDArray[np.uint16]
     material_class: NDArray[np.int16] | None
+    asked: frozenset[SurfaceInput] = frozenset()
+    values: dict[SurfaceInput, MeshValues] = field(default_factory=dict)
 
     def part(self) -> MeshPart:
         """Return the mesh's triangles; raise `InputError` if its vertices aren't finite."""
@@ -123,11 +138,26 @@ class MeshCopy:
             labels = _by_triangle(labels, face)
         numbers = None if number is None else _by_triangle(number.view(np.uint32), face)
         triangles = corners.reshape(-1, 3) if self.triangles is None else corners[self.triangles]
-        return MeshPart(self.vertices, triangles, material, labels, numbers, self.material_class)
+        part = MeshPart(self.vertices, triangles, material, labels, numbers, self.material_class, self.asked)
+        if self.asked:
+            values = {
+                what: replace(entry, values=_by_triangle(entry.values, face)) if entry.domain == "face" else entry
+                for what, entry in self.values.items()
+            }
+            part.values, part.corners = values, self.triangles
+            if part.corners is None:
+                part.corners = np.arange(len(corners), dtype=np.int32).reshape(-1, 3)
+        return part
 
 
 def copy_mesh(
-    name: str, mesh: bpy.types.Mesh, slots: Sequence[str], materials: dict[str, int], by_name: NameClasses
+    name: str,
+    mesh: bpy.types.Mesh,
+    slots: Sequence[str],
+    materials: dict[str, int],
+    by_name: NameClasses,
+    asked: frozenset[SurfaceInput] = frozenset(),
+    undeformed: bool = False,
 ) -> MeshCopy:
     """Return what is needed of an evaluated mesh.
 
@@ -137,6 +167,8 @@ def copy_mesh(
         slots: names of its materials.
         materials: indices of all materials so far; new ones are added.
         by_name: classes of materials.
+        asked: inputs that its materials ask for.
+        undeformed: whether no modifier has changed it.
     """
     # Attributes are copied as a block, where `vertices` and `loops` are read one by one.
     vertices = np.empty((len(mesh.vertices), 3), np.float32)
@@ -160,6 +192,8 @@ def copy_mesh(
         _face_values(mesh, "instance_id"),
         np.array([materials.setdefault(entry, len(materials)) for entry in slots], np.uint16),
         _material_classes(slots, materials, by_name),
+        asked,
+        mesh_values(mesh, asked, undeformed),
     )
 
 
@@ -235,8 +269,11 @@ def join_parts(pairs: list[tuple[MeshPart, Places]], tables: SceneTables, frame:
     }
     pairs.reverse()
     vertex = triangle = 0
+    surface = ValuesBuilder()
     while pairs:
         part, places = pairs.pop()
+        if part.asked:
+            surface.parts.append(_part_values(part, places, triangle, frame))
         for matrices, labels in _blocks(part, places):
             last = vertex + len(matrices) * len(part.vertices), triangle + len(matrices) * len(part.triangles)
             mine = {name: arrays[name][triangle : last[1]] for name in ("triangles", *_PER_FACE)}
@@ -249,7 +286,25 @@ def join_parts(pairs: list[tuple[MeshPart, Places]], tables: SceneTables, frame:
     if keep is not None:
         for name in ("triangles", *_PER_FACE):
             arrays[name] = arrays[name][keep]
-    return SceneMesh(**arrays, materials=tables.materials, origin=origin)
+    return SceneMesh(**arrays, materials=tables.materials, origin=origin, surface=surface.table(keep))
+
+
+def _part_values(part: MeshPart, places: Places, first: int, frame: Float | None) -> PartValues:
+    """Return the values of a part at its places, whose first triangle has the number ``first``."""
+    assert part.corners is not None
+    matrices = np.frombuffer(places.matrices).reshape(-1, 4, 4)
+    values = dict(part.values)
+    for what in sorted(part.asked):
+        if what.kind in OF_OBJECT and len(places.objects) == len(matrices):
+            rows = [entry.get(what) for entry in places.objects]
+            if None not in rows:
+                values[what] = MeshValues(np.array(rows, np.float32), "object")
+    framed = any(what.kind in OF_FRAME for what in part.asked)
+    into = matrices if frame is None else frame @ matrices
+    mirrored = np.linalg.det(matrices[:, :3, :3]) < 0.0
+    return PartValues(
+        first, part.corners, part.triangles, len(matrices), mirrored, np.array(into) if framed else None, values
+    )
 
 
 def _blocks(part: MeshPart, places: Places) -> Iterator[tuple[Float, array[int]]]:

@@ -92,6 +92,8 @@ def colour_choices(scenario: Scenario, typical_range: float, returns: bool) -> d
         }
         if changes not in found.values():
             found[name] = changes
+    if colour.engine == "cycles" and colour.lighting == "direct":
+        found["nodes"] = {"colour.source": "nodes"}
     if returns and colour.engine == "cycles" and colour.lighting == "direct":
         found["returns"] = {"colour.source": "returns"}
     if colour.source == "auto":

@@ -25,6 +25,7 @@ from ...scanning.beam import RINGS
 from ...scanning.colour.colour import (
     MATERIAL_LAYERS,
     ColourSettings,
+    ColourSource,
     LayerValues,
     SeenPoints,
     sample_points,
@@ -35,7 +36,6 @@ from ...scanning.colour.request import LayerRequest
 from ...scanning.plan import ScanPlan
 from ...scanning.relief import shift_along_normals
 from ...scanning.scan import BlockResult
-from ...scenario.colour import image_scale
 
 Errors = dict[str, tuple[float, float]]
 """Kind of error -> estimate, and its upper bound with the confidence `base.random_streams.LEVEL`."""
@@ -45,8 +45,6 @@ CONVERGED = max(RINGS)
 """Rays per pulse of the footprint that counts as truth."""
 FINEST = 8
 """Octaves of the micro-relief that counts as truth."""
-DENSEST = {"image_spacing": 7.5, "ground_sampling_distance": 0.03}
-"""Images that count as true where Blender has no pixel per return: for a range of 60 m. Denser than any preset's."""
 
 
 def match_pulses(mine: PointBlock, truth: PointBlock) -> tuple[PointBlock, PointBlock]:
@@ -89,14 +87,10 @@ def relief_errors(mine: Sequence[Float], truth: Sequence[Float]) -> Errors:
 def truest_settings(request: LayerRequest) -> ColourSettings:
     """Return the settings of a request whose colours count as true, under direct light.
 
-    That is a pixel per return where Blender has it, else the densest images, for the points that these show.
+    That is a pixel per return where Blender has it, else the materials' nodes at the returns.
     """
-    true = replace(request.settings, lighting="direct", samples=1)
-    if HAS_RETURN_CAMERA:
-        return replace(true, source="returns")
-    scale = image_scale(request.path.typical_range)
-    lengths = {name: scale * length for name, length in DENSEST.items()}
-    return replace(true, source="images", **lengths)  # type: ignore[arg-type]
+    source: ColourSource = "returns" if HAS_RETURN_CAMERA else "nodes"
+    return replace(request.settings, lighting="direct", samples=1, engine="cycles", source=source)
 
 
 def render_layers(request: LayerRequest, parts: Sequence[SeenPoints]) -> list[LayerValues]:

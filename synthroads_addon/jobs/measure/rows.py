@@ -20,7 +20,7 @@ from ...scanning.beam import RINGS
 from ...scanning.colour.colour import MATERIAL_LAYERS, LayerValues, sample_points, shares_by_source
 from ...scanning.colour.request import LayerRequest
 from ...scanning.plan import ScanPlan
-from ...scanning.platforms.stretches import middle_stretches, spread_stretches
+from ...scanning.platforms.stretches import spread_stretches
 from ...scanning.record import RETURNS_AT_ONCE, record_as_measured, scan_blocks
 from ...scanning.relief import micro_relief
 from ...scanning.scan import BlockResult, join_results
@@ -45,8 +45,6 @@ _STRETCHES, _SECONDS = 16, 0.08
 _QUIET = ("scan.noise.range_sigma=0", 'outputs=["cloud"]')
 _TENTH = 10
 """One in so many points is compared with whole light paths."""
-_MIDDLE = 0.2
-"""Share of each strip that the densest images are rendered of."""
 LAYERS = frozenset({"rgb", *MATERIAL_LAYERS})
 """Colours and all layers, which the rows on colours ask for."""
 _FEW = 64
@@ -213,17 +211,11 @@ def _colour_errors(knob: Knob, sample: Sample) -> tuple[dict[str, float], dict[s
     seen, request = sample.result.seen, sample.request
     assert seen is not None
     assert sample.values is not None
-    settings, chosen, name = truest_settings(request), np.arange(len(seen)), "a pixel per return"
+    settings, chosen = truest_settings(request), np.arange(len(seen))
+    name = "a pixel per return" if HAS_RETURN_CAMERA else "the materials' nodes at the returns"
     if knob.whole_paths:
         settings = replace(settings, lighting="path", samples=TRUE_SAMPLES)
         chosen, name = chosen[::_TENTH], f"a pixel per return with {TRUE_SAMPLES} samples of whole light paths"
-    elif not HAS_RETURN_CAMERA:
-        part = middle_stretches(request.path, _MIDDLE)
-        request = replace(request, path=part)
-        within = [(strip.start_time, strip.start_time + strip.duration) for strip in part.strips]
-        chosen = np.flatnonzero(np.any([(low <= seen.time) & (seen.time <= high) for low, high in within], axis=0))
-        pixel, spacing = settings.ground_sampling_distance, settings.image_spacing
-        name = f"images of {pixel:g} m pixels every {spacing:g} m, of the points that these show"
     (truth,) = render_layers(replace(request, settings=settings, wanted=LAYERS), [seen.select(chosen)])
     mine = {name: array[chosen] for name, array in sample.values.arrays.items()}
     errors, by_source = errors_by_source(LayerValues(mine, sample.values.source[chosen]), truth)

@@ -123,6 +123,7 @@ def plan_scan(
             path=path,
             field_of_view=setting.field_of_view,
             seed=scenario.seed,
+            moving=scene.moving,
         ),
         services=services,
     )

@@ -7,12 +7,12 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.arrays import AnyArray, ArrayRows, Bool, Float, Float32, UInt8, UInt16
+from ...base.arrays import AnyArray, ArrayRows, Bool, Float, Float32, Index, UInt8, UInt16
 from ...cloud.points import NO_MATERIAL
 from ...materials.table import Material
 from .light import CloudShadows, SunAndSky
 
-ColourSource = Literal["auto", "images", "returns", "material"]
+ColourSource = Literal["auto", "nodes", "images", "returns", "material"]
 Engine = Literal["cycles", "eevee"]
 ColourMode = Literal["lit", "unlit", "false_colour"]
 Lighting = Literal["direct", "path"]
@@ -26,7 +26,8 @@ class ColourSettings:
         image_spacing: distance between two images along the path, m.
         ground_sampling_distance: width of a pixel at the usual range, m.
         samples: samples per pixel of the lit colours.
-        source: images, a pixel per return, or each material's mean; auto takes a pixel per return where that is there.
+        source: each material's nodes at the very returns, images, a pixel per return, or each material's mean; auto
+            takes the nodes, and for whole light paths a pixel per return where that is there.
         engine: renderer of the images.
         mode: what RGB shows.
         lighting: sun and open sky without noise, or whole light paths.
@@ -43,11 +44,17 @@ class ColourSettings:
     max_resolution: int = 4096
 
 
+def takes_nodes(settings: ColourSettings) -> bool:
+    """Return whether colours and layers come from the materials' nodes at the very returns."""
+    direct = settings.engine == "cycles" and settings.lighting == "direct"
+    return settings.source == "nodes" or (settings.source == "auto" and direct)
+
+
 MATERIAL_LAYERS: dict[str, int] = {"base_color": 3, "roughness": 1, "metallic": 1, "specular": 1}
 """Layers of the surface itself, and their components."""
-FROM_MATERIAL, NEARBY, FROM_RETURN = 0, 254, 255
-"""`LayerValues.source` of a material's mean, of a place of the same material close by, and of a pixel per return; n in
-between is the n-th best image."""
+FROM_MATERIAL, FROM_NODES, NEARBY, FROM_RETURN = 0, 253, 254, 255
+"""`LayerValues.source` of a material's mean, of its nodes at the very return, of a place of the same material close by,
+and of a pixel per return; n in between is the n-th best image."""
 _FALSE_COLOUR = ("roughness", "metallic", "specular")
 
 
@@ -57,7 +64,7 @@ class LayerValues:
 
     Attributes:
         arrays: by layer: ``rgb`` (N, 3) uint16 sRGB, ``base_color`` (N, 3) float32 linear, the others (N,) float32.
-        source: (N,) uint8: `FROM_MATERIAL`, `NEARBY`, `FROM_RETURN`, or the rank of the image, from 1.
+        source: (N,) uint8: `FROM_MATERIAL`, `FROM_NODES`, `NEARBY`, `FROM_RETURN`, or the rank of the image, from 1.
     """
 
     arrays: dict[str, NDArray[np.generic]]
@@ -66,7 +73,7 @@ class LayerValues:
 
 def source_name(number: int) -> str:
     """Return what a `LayerValues.source` is called in reports."""
-    names = {FROM_MATERIAL: "material", 1: "image", NEARBY: "nearby", FROM_RETURN: "return"}
+    names = {FROM_MATERIAL: "material", 1: "image", FROM_NODES: "nodes", NEARBY: "nearby", FROM_RETURN: "return"}
     return names.get(number, "next image")
 
 
@@ -94,6 +101,8 @@ class SeenPoints(ArrayRows):
         normal: (N, 3) unit normals towards the scanner.
         material: (N,) indices into the scene mesh's materials.
         time: (N,) s since the scan's start.
+        face: (N,) triangle of the scene, those that move after those that stand; None where nobody asks.
+        sunlit: (N,) whether the sun reaches it; None where nobody asks.
     """
 
     position: Float
@@ -101,9 +110,18 @@ class SeenPoints(ArrayRows):
     normal: NDArray[np.floating]
     material: UInt16
     time: Float
+    face: Index | None = None
+    sunlit: Bool | None = None
 
     def __len__(self) -> int:
         return len(self.position)
+
+    @property
+    def towards_scanner(self) -> Float32:
+        """Return unit vectors (N, 3) to where the points were seen from."""
+        towards = (self.scanner - self.position).astype(np.float32)
+        towards /= np.maximum(np.sqrt(np.einsum("ij,ij->i", towards, towards)), 1e-9)[:, None]
+        return np.asarray(towards)
 
 
 class LayerSource(Protocol):

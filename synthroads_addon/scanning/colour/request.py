@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from ...road.surroundings import Environment
 from ..platforms.path import Path
 from ..scene.mesh import SceneMesh
+from ..scene.motion import MovingMesh
 from .colour import ColourSettings, MaterialLayers, SurfaceConstants
 from .light import CloudShadows, SunAndSky
 from .views import View
@@ -19,6 +20,7 @@ class LayerRequest:
         settings: how they are rendered.
         wanted: layers: ``rgb``, ``base_color``, ``roughness``, ``metallic``, ``specular``.
         mesh: what is scanned, without what moves.
+        moving: what moves.
         environment: light and weather.
         path: the scanner's.
         field_of_view: the scanner's, rad.
@@ -36,6 +38,7 @@ class LayerRequest:
     seed: int = 0
     frame: tuple[float, float, float] = (0.0, 0.0, 0.0)
     pick: Callable[[list[View]], list[View]] | None = None
+    moving: tuple[MovingMesh, ...] = ()
 
     @property
     def lit(self) -> bool:

@@ -59,15 +59,6 @@ def spread_stretches(path: Path, count: int, duration: float) -> PathStretches:
     return PathStretches(path, tuple(strips))
 
 
-def middle_stretches(path: Path, share: float) -> PathStretches:
-    """Return the middle part of each strip, which lasts a share of the strip's duration."""
-    strips = (
-        Strip(strip.index, strip.start_time + strip.duration * (1.0 - share) / 2.0, strip.duration * share)
-        for strip in path.strips
-    )
-    return PathStretches(path, tuple(strips))
-
-
 def scatter_stretches(path: Path, count: int, duration: float, phase: float = 0.5, most: float = 0.25) -> PathStretches:
     """Return stretches of a duration (s) scattered evenly over all strips together, however many there are.
 

@@ -5,7 +5,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.arrays import Float, Float32, Index
+from ...base.arrays import Bool, Float, Float32, Index
 from .mesh import SceneMesh
 
 
@@ -28,6 +28,10 @@ class Caster(Protocol):
             directions: (N, 3) C-contiguous unit vectors.
             maximum_range: no hit lies farther away, m.
         """
+        ...
+
+    def occluded(self, origins: Float32, directions: Float32, maximum_range: float) -> Bool:
+        """Return whether (N,) something is hit within ``maximum_range`` (m), whatever it is; arguments as of `cast`."""
         ...
 
 

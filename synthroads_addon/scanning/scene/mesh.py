@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ...base.arrays import AnyArray, Float, Float32, UInt8, UInt16
 from ...base.errors import InputError
 from ...cloud.strays import FARTHEST
+from .surface_values import SurfaceValues
 
 _BLOCK = 1 << 18
 _SHAPES: dict[str, tuple[type, tuple[int | None, ...]]] = {
@@ -32,6 +33,7 @@ class SceneMesh:
         material: (T,) uint16 indices into `materials`.
         materials: names of materials, those of the material table or the scene's own.
         origin: (3,) float64 map coordinates of the local origin, m.
+        surface: what its materials ask of the places on it; None if they ask nothing.
 
     Raises:
         InputError: wrong shape or type, indices out of range, or numbers that aren't finite; names the field.
@@ -44,6 +46,7 @@ class SceneMesh:
     material: UInt16
     materials: tuple[str, ...]
     origin: Float
+    surface: SurfaceValues | None = None
 
     def __post_init__(self) -> None:
         for name, (dtype, shape) in _SHAPES.items():

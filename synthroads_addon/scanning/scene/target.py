@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...base.arrays import AnyArray, Float, Float32, Index
+from ...base.arrays import AnyArray, Bool, Float, Float32, Index
 from ...base.classes import UNLABELLED
 from ...cloud.points import NO_MATERIAL
 from ..knots import PoseCache, Track, track_knots
@@ -15,6 +15,8 @@ from .caster import Caster, FacePlanes
 from .mesh import SceneMesh
 from .motion import MovingMesh, ScannedScene
 
+SUN_REACH = 2000.0
+"""How far away something may stand that throws a shadow, m."""
 CLEARANCE = np.array([2.5, 1.0, 3.0])
 """Room that a vehicle which carries the scanner takes around it: half its length and width, and its height, m."""
 
@@ -155,6 +157,28 @@ class Target:
         to = shape[1:]
         return FirstHits(nearest.face.reshape(to), nearest.distance.reshape(to), nearest.along.reshape(to))
 
+    def sees(
+        self, origins: Float, direction: Float, times: Float, motions: list[Track], reach: float = SUN_REACH
+    ) -> Bool:
+        """Return whether nothing (N,) stands between places and what lies in one direction from all of them.
+
+        Args:
+            origins: (3, N) local, m, a little off the surfaces that they lie on.
+            direction: (3,) unit vector.
+            times: (N,) s.
+            motions: see `motions`.
+            reach: how far is looked, m.
+        """
+        towards = np.broadcast_to(direction[:, None], origins.shape)
+        free = ~self.caster.occluded(_rows(origins), _rows(towards), reach)
+        if not self.moving or not len(times):
+            return free
+        rays = Bundles.gather(origins, towards, times, np.full(len(times), reach))
+        for part, track in zip(self._parts[1:], motions, strict=True):
+            if track.present.any():
+                _hide(part, track, rays, reach, free)
+        return free
+
     def at_time_zero(
         self, faces: Index, places: Float, times: Float, motions: list[Track], vectors: tuple[Float, ...] = ()
     ) -> tuple[Float, ...]:
@@ -256,6 +280,18 @@ def _cast_moving(part: _TargetPart, track: Track, rays: Bundles, maximum_range: 
     closer = np.flatnonzero(met.distance < nearest.distance[near])
     for values, closer_values in zip(nearest, met, strict=True):
         values[near[closer]] = closer_values[closer]
+
+
+def _hide(part: _TargetPart, track: Track, rays: Bundles, reach: float, free: Bool) -> None:
+    """Set rays that a moving part is in the way of as not free."""
+    near = rays.rays_near(track, part.centre, part.radius)
+    near = near[free[near]]
+    if not len(near):
+        return
+    rotation, place, present = track.at(rays.times[near])
+    near, rotation, place = near[present], rotation[:, present], place[:, present]
+    begin, towards = _inverse(rotation, rays.origins[:, near] - place), _inverse(rotation, rays.directions[:, near])
+    free[near[part.caster.occluded(_rows(begin), _rows(towards), reach)]] = False
 
 
 def _inverse(rotation: Float, vectors: Float) -> Float:

@@ -65,6 +65,16 @@ def test_finds_the_reference_casters_faces(name: str, scene: str) -> None:
     assert result.gap < 1e-4
 
 
+@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("name", FAST)
+def test_something_is_in_the_way_where_something_is_hit(name: str, scene: str) -> None:
+    mesh, (origins, directions) = SCENES[scene](), rays(20_000)
+    hit = BVHTreeCaster(mesh).cast(origins, directions, RANGE) >= 0
+    assert 0.3 < hit.mean() < 1.0
+    assert np.mean(FAST[name](mesh).occluded(origins, directions, RANGE) == hit) >= 0.9999
+    assert not FAST[name](mesh).occluded(origins, directions, 5.0).any(), "nothing is as near as that"
+
+
 def _neighbour(mesh: SceneMesh, faces: np.ndarray, ray: int) -> np.ndarray:
     return np.where(np.arange(len(faces)) == ray, (faces + 2) % len(mesh), faces)
 
@@ -151,6 +161,9 @@ def test_threads_and_chunks_change_nothing() -> None:
             faces = caster.cast(origins, directions, maximum_range)
             parts[(origins.__array_interface__["data"][0])] = faces
             return faces
+
+        def occluded(self, origins: np.ndarray, directions: np.ndarray, maximum_range: float) -> np.ndarray:
+            return caster.occluded(origins, directions, maximum_range)
 
     rate = bare_rate(Recorder(), origins, directions, RANGE, threads=3, chunk=7000, repeats=1)
     assert np.array_equal(np.concatenate([parts[key] for key in sorted(parts)]), expected)

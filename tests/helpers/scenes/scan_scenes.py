@@ -46,6 +46,9 @@ class BruteForce:
             best, hit = np.where(inside, t, best), np.where(inside, index, hit).astype(np.int32)
         return hit
 
+    def occluded(self, origins, directions, maximum_range):
+        return self.cast(origins, directions, maximum_range) >= 0
+
 
 def upright(angle: np.ndarray) -> np.ndarray:
     """Return rotations (K, 3, 3) about the vertical by angles (K,), rad."""

@@ -114,11 +114,15 @@ def test_colours_of_images_are_nearer_to_the_truth_than_the_materials(tmp_path: 
     assert images["image_seconds"] > material["image_seconds"]
     for result in (material, images):
         assert result["errors"].keys() == COLOURS
-        truth = "a pixel per return" if HAS_RETURN_CAMERA else "images of 0.03 m"
+        truth = "a pixel per return" if HAS_RETURN_CAMERA else "the materials' nodes"
         assert result["colour_truth"].startswith(truth)
     by_source = images["errors_by_source"]
     assert by_source.keys() == images["shares"].keys() >= {"image", "material"}
     assert by_source["image"]["colour_95"] < by_source["material"]["colour_95"]
+    nodes = row(tmp_path, "colour_source", "nodes", "road.half_width=30")
+    assert nodes["shares"] == {"nodes": 1.0}
+    assert nodes["errors"]["colour_95"] < 0.1 * images["errors"]["colour_95"]
+    assert nodes["errors"]["layers_rmse"] < 0.002
     for name in COLOURS - {"layers_rmse"}:
         assert 0.0 < images["errors"][name] < material["errors"][name]
     # A pixel of 25 cm hardly knows a material's variation better than its mean does: it is no worse, within chance.

@@ -1,0 +1,198 @@
+"""Cycles as a calculator of materials: their nodes at the very returns, read from images of what they ask for.
+
+Each return is a pixel of a plane that a camera looks at straight down. Copies of the materials read their positions,
+normals and attributes from images that have these values at the same pixel, in place of asking the plane.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from ...base.arrays import Float32, Index
+from ...base.scratch.folders import scratch_folder
+from ...scanning.scene.surface_values import SurfaceInput
+from ..materials.inputs import InputSearch, copy_groups, replace_inputs
+from ..materials.surface_layers import LayerNodes, layer_expressions
+from .stage import Passes, RenderStage, new_stage
+
+WIDTH = 1024
+"""Width of the largest plane, px."""
+_NARROWEST = 64
+_ABOVE = 10.0
+"""Height of the camera above the plane: an image of it is one unit wide for each pixel."""
+
+
+@dataclass
+class _Copy:
+    """A copy of a material that reads images.
+
+    Attributes:
+        item: the copy.
+        readers: nodes that read each input.
+    """
+
+    item: bpy.types.Material
+    readers: list[tuple[SurfaceInput, bpy.types.Node]] = field(default_factory=list)
+
+
+class Calculator:
+    """Works out layers of materials at places; must be used on Blender's main thread.
+
+    Attributes:
+        stage: what renders.
+        layers: names of the layers that come back.
+    """
+
+    def __init__(self, stage: RenderStage, copies: dict[int, _Copy], layers: Sequence[str]) -> None:
+        self.stage, self.layers, self._copies = stage, tuple(layers), copies
+        self._images: dict[SurfaceInput, bpy.types.Image] = {}
+        self._size = 0, 0
+
+    @property
+    def inputs(self) -> frozenset[SurfaceInput]:
+        """Return all that the materials ask for."""
+        return frozenset(what for copy in self._copies.values() for what, _ in copy.readers)
+
+    def inputs_of(self, material: int) -> frozenset[SurfaceInput]:
+        """Return what a material asks for, by its index."""
+        return frozenset(what for what, _ in self._copies[material].readers)
+
+    def calculate(self, material: Index, values: dict[SurfaceInput, Float32]) -> dict[str, Float32]:
+        """Return the layers (N, C) of N places.
+
+        Args:
+            material: (N,) of each place, ascending.
+            values: (N, 4) of each input.
+        """
+        numbers, starts, counts = np.unique(material, return_index=True, return_counts=True)
+        width = WIDTH
+        while width > _NARROWEST and width * width > 8 * len(material):
+            width //= 2
+        rows = -(-counts // width)
+        begins = np.cumsum([0, *rows])
+        # Where each place lies among the pixels, row by row from below.
+        pixel = np.repeat(begins[:-1] * width - starts, counts) + np.arange(len(material))
+        height = int(begins[-1])
+        self._fill(values, pixel, width, height)
+        with self._plane(numbers.tolist(), begins, width):
+            camera = self.stage.camera
+            camera.data.type, camera.data.ortho_scale = "ORTHO", float(max(width, height))
+            camera.location = (width / 2.0, height / 2.0, _ABOVE)
+            rendered = self.stage.render(width, height)
+        return {name: image[::-1].reshape(-1, image.shape[2])[pixel] for name, image in rendered.layers.items()}
+
+    def _fill(self, values: dict[SurfaceInput, Float32], pixel: Index, width: int, height: int) -> None:
+        """Write the inputs into images, which are made anew where the size changes."""
+        if self._size != (width, height):
+            self.close()
+            self._size = width, height
+        for what, entry in values.items():
+            if what not in self._images:
+                self._images[what] = _new_image(width, height)
+            flat = np.zeros((width * height, 4), np.float32)
+            flat[pixel] = entry
+            image = self._images[what]
+            image.pixels.foreach_set(flat.ravel())
+            image.update()
+        for copy in self._copies.values():
+            for what, node in copy.readers:
+                node.image = self._images.get(what)
+
+    @contextmanager
+    def _plane(self, numbers: list[int], begins: np.ndarray, width: int) -> Iterator[None]:
+        """Show a plane with a face for each material."""
+        height = float(begins[-1])
+        corners: list[tuple[float, float, float]] = []
+        faces: list[tuple[int, ...]] = []
+        maps: list[float] = []
+        for low, high in zip(begins[:-1].tolist(), begins[1:].tolist(), strict=True):
+            first = len(corners)
+            corners += [(0.0, low, 0.0), (width, low, 0.0), (width, high, 0.0), (0.0, high, 0.0)]
+            faces.append((first, first + 1, first + 2, first + 3))
+            maps += [0.0, low / height, 1.0, low / height, 1.0, high / height, 0.0, high / height]
+        mesh = bpy.data.meshes.new("SR Calculator")
+        try:
+            mesh.from_pydata(corners, [], faces)
+            mesh.uv_layers.new(name="SR Pixels").data.foreach_set("uv", maps)
+            for number in numbers:
+                mesh.materials.append(self._copies[number].item)
+            mesh.polygons.foreach_set("material_index", np.arange(len(faces), dtype=np.int32))
+            item = bpy.data.objects.new("SR Calculator", mesh)
+            self.stage.scene.collection.objects.link(item)
+            try:
+                yield
+            finally:
+                bpy.data.objects.remove(item)
+        finally:
+            bpy.data.meshes.remove(mesh)
+
+    def close(self) -> None:
+        """Remove the images."""
+        for copy in self._copies.values():
+            for _, node in copy.readers:
+                node.image = None
+        for image in self._images.values():
+            bpy.data.images.remove(image)
+        self._images.clear()
+
+
+@contextmanager
+def calculator(items: dict[int, bpy.types.Material], layers: Sequence[str]) -> Iterator[Calculator]:
+    """Yield a calculator of materials by their index; afterwards nothing of it is left.
+
+    Args:
+        items: materials that can be worked out, see `material_needs`.
+        layers: those that are asked for.
+    """
+    with ExitStack() as stack:
+        folder = stack.enter_context(scratch_folder())
+        copies = {number: stack.enter_context(_reading_copy(item, layers)) for number, item in items.items()}
+        set_up = stack.enter_context(new_stage(Passes(layers, lit=False), folder))
+        set_up.scene.render.use_persistent_data = False  # else images that change would be kept
+        result = Calculator(set_up, copies, layers)
+        stack.callback(result.close)
+        yield result
+
+
+@contextmanager
+def _reading_copy(item: bpy.types.Material, layers: Sequence[str]) -> Iterator[_Copy]:
+    """Yield a copy of a material that shows nothing but its layers, and reads images for them."""
+    copied = item.copy()
+    groups: list[bpy.types.NodeTree] = []
+    try:
+        tree = copied.node_tree
+        groups = copy_groups(tree)
+        expressions = layer_expressions(copied)
+        nodes = LayerNodes(tree)
+        kept = {node.aov_name: node for node in tree.nodes if node.type == "OUTPUT_AOV" and node.aov_name in layers}
+        for layer in layers:
+            if layer in expressions and layer not in kept:
+                kept[layer] = nodes.add_output(layer, expressions[layer])
+        for node in [node for node in tree.nodes if node.type in ("OUTPUT_AOV", "OUTPUT_MATERIAL")]:
+            if node not in kept.values():
+                tree.nodes.remove(node)
+        search = InputSearch()
+        for node in kept.values():
+            for entry in node.inputs:
+                for link in entry.links:
+                    search.visit(link.from_socket)
+        readers = list(replace_inputs(search.sites))
+        glow, end = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeOutputMaterial")
+        tree.links.new(glow.outputs[0], end.inputs["Surface"])
+        yield _Copy(copied, readers)
+    finally:
+        bpy.data.materials.remove(copied)
+        for group in reversed(groups):
+            bpy.data.node_groups.remove(group)
+
+
+def _new_image(width: int, height: int) -> bpy.types.Image:
+    """Return an image of four numbers for each pixel, which nothing is done to."""
+    image = bpy.data.images.new("SR Calculator", width, height, alpha=True, float_buffer=True, is_data=True)
+    image.alpha_mode = "CHANNEL_PACKED"
+    return image

@@ -1,0 +1,170 @@
+"""Layers of each return from its material's nodes at the very place; see `calculator`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...base.arrays import AnyArray, Bool, Float32, Index
+from ...scanning.colour.colour import (
+    FROM_NODES,
+    LayerSource,
+    LayerValues,
+    MaterialLayers,
+    SeenPoints,
+)
+from ...scanning.colour.reflection import reflected_sunlight
+from ...scanning.colour.surfaces import SceneSurfaces
+from ...scanning.scene.surface_values import SurfaceInput
+from ..materials.inputs import INCOMING, POSITION, TRUE_NORMAL
+from .calculator import Calculator
+
+_OF_POINT: dict[SurfaceInput, Callable[[SeenPoints], AnyArray]] = {
+    TRUE_NORMAL: lambda points: points.normal,
+    INCOMING: lambda points: points.towards_scanner,
+}
+AT_ONCE = 1 << 20
+"""Returns that are worked out at once."""
+
+
+class NodeLayers:
+    """Layers of each return from its material's nodes. Must be used on Blender's main thread if it renders.
+
+    Args:
+        calculator: of the materials that vary; None where none does.
+        surfaces: what materials ask of the places.
+        fallback: the materials' means.
+        rest: what gives the layers of materials that can't be worked out; None for their means.
+        obstacles: names of nodes that stand in the way, by material.
+        materials: names of the scene's materials.
+        frame: (3,) where the scene's local frame begins in that of the whole road, of which it may be a section, m.
+
+    Attributes:
+        main_thread_only: whether it renders.
+    """
+
+    def __init__(
+        self,
+        calculator: Calculator | None,
+        surfaces: SceneSurfaces,
+        fallback: MaterialLayers,
+        rest: LayerSource | None,
+        obstacles: Mapping[int, tuple[str, ...]],
+        materials: tuple[str, ...],
+        frame: Sequence[float] = (0.0, 0.0, 0.0),
+    ) -> None:
+        self._frame = np.array(frame)
+        self._calculator, self._surfaces, self.material, self._rest = calculator, surfaces, fallback, rest
+        self._obstacles, self._materials = obstacles, materials
+        self._left_out = np.zeros(len(materials), np.int64)
+        known = np.zeros(len(materials), bool)
+        known[list(obstacles)] = True
+        self._hard: Bool = known
+        self._varying = np.zeros(len(materials), bool)
+        for name in calculator.layers if calculator else ():
+            self._varying |= fallback.constants.varies[name]
+        self.main_thread_only = calculator is not None or rest is not None
+
+    @property
+    def report(self) -> dict[str, Any]:
+        """Return what was rendered, and which materials weren't worked out and why, as JSON data."""
+        result: dict[str, Any] = {}
+        if self._calculator is not None:
+            stage = self._calculator.stage
+            result = {"images": stage.images, "pixels": stage.pixels, "layers": list(self._calculator.layers)}
+        if self._obstacles:
+            result["left_out"] = {
+                self._materials[index]: {"because_of": list(names), "points": int(self._left_out[index])}
+                for index, names in self._obstacles.items()
+            }
+        return result
+
+    def sample(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
+        """Return the wanted layers of N points; see `LayerSource.sample`."""
+        hard = self._hard[points.material]
+        if not hard.any():
+            return self._work_out(points, wanted)
+        self._left_out += np.bincount(points.material[hard], minlength=len(self._left_out))
+        easy, other = np.flatnonzero(~hard), np.flatnonzero(hard)
+        rest = self._rest or self.material
+        parts = [
+            (easy, self._work_out(points.select(easy), wanted)),
+            (other, rest.sample(points.select(other), wanted)),
+        ]
+        arrays = {}
+        for name, array in parts[0][1].arrays.items():
+            arrays[name] = np.empty((len(points), *array.shape[1:]), array.dtype)
+        source = np.empty(len(points), np.uint8)
+        for rows, values in parts:
+            source[rows] = values.source
+            for name, array in values.arrays.items():
+                arrays[name][rows] = array
+        return LayerValues(arrays, source)
+
+    def _work_out(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
+        source = np.full(len(points), FROM_NODES, np.uint8)
+        channels: dict[str, Float32] = {}
+        if self._calculator is not None:
+            varying = np.flatnonzero(self._varying[points.material])
+            parts = {name: (len(points), 3 if name == "base_color" else 1) for name in self._calculator.layers}
+            channels = {name: np.zeros(shape, np.float32) for name, shape in parts.items()}
+            for start in range(0, len(varying), AT_ONCE):
+                self._calculate(points, varying[start : start + AT_ONCE], channels, source)
+        if "rgb" in wanted and self.material.mode == "lit":
+            channels["sun"] = self._sunlight(points, channels, source)
+        return self.material.layer_values(points, channels, source, wanted)
+
+    def _calculate(self, points: SeenPoints, rows: Index, channels: dict[str, Float32], source: np.ndarray) -> None:
+        """Fill in rows of the channels."""
+        assert self._calculator is not None
+        rows = rows[np.argsort(points.material[rows], kind="stable")]
+        seen = points.select(rows)
+        values = self._inputs(seen)
+        for name, array in self._calculator.calculate(seen.material.astype(np.intp), values).items():
+            channels[name][rows] = array
+
+    def _inputs(self, points: SeenPoints) -> dict[SurfaceInput, Float32]:
+        """Return all that the materials of points ask for, (N, 4) each."""
+        assert self._calculator is not None
+        asked: dict[SurfaceInput, list[int]] = {}
+        for number in np.unique(points.material).tolist():
+            for what in self._calculator.inputs_of(number):
+                asked.setdefault(what, []).append(number)
+        values = {what: np.zeros((len(points), 4), np.float32) for what in asked}
+        together: dict[tuple[int, ...], list[SurfaceInput]] = {}
+        for what, numbers in asked.items():
+            if what == POSITION:
+                values[what][:, :3] = points.position + self._frame
+            elif what in _OF_POINT:
+                values[what][:, :3] = _OF_POINT[what](points)
+            else:
+                together.setdefault(tuple(numbers), []).append(what)
+        for several, inputs in together.items():
+            mine = np.flatnonzero(np.isin(points.material, several))
+            for what, array in self._surfaces.read(inputs, points.select(mine)).items():
+                values[what][mine] = array
+        return values
+
+    def _sunlight(self, points: SeenPoints, channels: dict[str, Float32], source: np.ndarray) -> Float32:
+        """Return the sun's light (N, 3) that points throw back to the scanner, exposed."""
+        result = np.zeros((len(points), 3), np.float32)
+        light = self.material.light
+        normal = np.asarray(points.normal, np.float32)
+        lit = normal @ light.direction.astype(np.float32) > 0.0
+        if points.sunlit is not None:
+            lit &= points.sunlit
+        rows = np.flatnonzero(lit)
+        chosen = points.select(rows)
+        names = frozenset({"base_color", "roughness", "metallic", "specular"})
+        layers = self.material.layer_values(
+            chosen, {name: array[rows] for name, array in channels.items()}, source[rows], names
+        ).arrays
+        view = chosen.towards_scanner
+        color, roughness, metallic, specular = (
+            np.asarray(layers[name], np.float32) for name in ("base_color", "roughness", "metallic", "specular")
+        )
+        shares = reflected_sunlight(color, roughness, metallic, specular, normal[rows], view, light.direction)
+        result[rows] = shares * light.sun.astype(np.float32)
+        return result

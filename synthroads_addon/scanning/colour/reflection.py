@@ -1,0 +1,210 @@
+"""Sunlight that surfaces throw back to the scanner, as Blender's Principled BSDF has it, without rendering.
+
+The matt part by Lambert; the gloss by GGX microfacets (Walter et al. 2007, "Microfacet Models for Refraction through
+Rough Surfaces") with the light that bounces between them added as by Turquin 2019, "Practical multiple scattering
+compensation for microfacet models". What the gloss throws back the matt part below doesn't get.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.arrays import Float, Float32
+
+_COSINES, _ROUGHNESSES, _LEVELS = 24, 16, 12
+"""Grid of the tables: cosine of the view, roughness, and root of the reflectance at a right angle."""
+_SAMPLES = 24
+"""Microfacets in each of two directions that an entry of the tables is the mean of."""
+_SMOOTHEST = 0.08
+"""Least roughness: smoother surfaces throw the sun into a spot that no return lies in."""
+_MATT_F0 = 0.08
+"""Reflectance at a right angle of a specular of 1; that of 0.5 is glass's, 4 %."""
+
+
+def reflected_sunlight(
+    color: Float32, roughness: Float32, metallic: Float32, specular: Float32, normal: Float32, view: Float32, sun: Float
+) -> Float32:
+    """Return what surfaces throw back of the sun (N, 3), as a share of what a white matt one that faces it does.
+
+    Args:
+        color: (N, 3) linear base colours.
+        roughness, metallic, specular: (N,) of 0 to 1; a specular of 0.5 is a reflectance of 4 %.
+        normal, view: (N, 3) unit vectors: of the surface, and towards the scanner.
+        sun: (3,) unit vector towards the sun.
+    """
+    sun32 = sun.astype(np.float32)
+    towards_sun = np.clip(normal @ sun32, 0.0, None)
+    towards_view = np.clip(np.einsum("ij,ij->i", normal, view), 1e-4, 1.0)
+    half = view + sun32
+    half /= np.maximum(np.sqrt(np.einsum("ij,ij->i", half, half)), 1e-6)[:, None]
+    across, between = np.einsum("ij,ij->i", normal, half), np.einsum("ij,ij->i", view, half)
+    rough = np.maximum(roughness, _SMOOTHEST)
+    gloss = _gloss(rough, towards_sun, towards_view, np.clip(across, 0.0, 1.0))
+    bounced = _bounced_light(rough, towards_view)
+    level = np.minimum(_MATT_F0 * specular, 0.999)
+    albedo, average = _layer_albedo(rough, towards_view, level)
+    again = _compensation(average, bounced)
+    share = (1.0 - metallic) * gloss * _dielectric(level, between) * again
+    matt = ((1.0 - metallic) * (1.0 - albedo) * towards_sun)[:, None]
+    result = color * matt + share[:, None]
+    metal = np.flatnonzero(metallic > 0.0)
+    if len(metal):
+        rise = (1.0 - np.clip(between[metal], 0.0, 1.0)) ** 5
+        base = color[metal]
+        fresnel = base + (1.0 - base) * rise[:, None]
+        mean = base + (1.0 - base) / 21.0
+        inside = bounced[0][metal, None], bounced[1][metal, None]
+        result[metal] += (metallic[metal] * gloss[metal])[:, None] * fresnel * _compensation(mean, inside)
+    return np.asarray(result, np.float32)
+
+
+_Bounced = tuple[Float32, Float32]
+"""Share of light that microfacets throw out at once, and its mean over all directions."""
+
+
+def _gloss(rough: Float32, sun: Float32, view: Float32, across: Float32) -> Float32:
+    """Return pi * D * G2 / (4 * cosine of view) of mirrors: distribution and masking of GGX, times the sun's cosine."""
+    square = rough**4
+    spread = across * across * (square - 1.0) + 1.0
+    distribution = square / (spread * spread)  # times pi
+    shadow = 1.0 / (1.0 + _smith(square, sun) + _smith(square, view))
+    return np.asarray(np.where(sun > 0.0, distribution * shadow / (4.0 * view), 0.0), np.float32)
+
+
+def _smith(square: NDArray[np.floating], cosine: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Return Smith's lambda of GGX with a squared width at a cosine."""
+    squared = np.maximum(cosine * cosine, 1e-9)
+    return 0.5 * (np.sqrt(1.0 + square * (1.0 - squared) / squared) - 1.0)
+
+
+def _dielectric(level: NDArray[np.floating], cosine: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Return Fresnel's reflectance of a surface whose reflectance at a right angle is ``level``."""
+    root = np.sqrt(level)
+    eta = (1.0 + root) / (1.0 - root)
+    c = np.clip(cosine, 0.0, 1.0)
+    g = np.sqrt(np.maximum(eta * eta - 1.0 + c * c, 1e-12))
+    a, b = (g - c) / (g + c), (c * (g + c) - 1.0) / (c * (g - c) + 1.0)
+    return np.asarray(np.where(level > 0.0, 0.5 * a * a * (1.0 + b * b), 0.0))
+
+
+def _compensation(mean: NDArray[np.floating], bounced: _Bounced) -> NDArray[np.floating]:
+    """Return the factor by which light that bounces between microfacets makes a gloss brighter (Turquin 2019).
+
+    Args:
+        mean: reflectance, over all directions.
+        bounced: see `_Bounced`.
+    """
+    once, average = bounced
+    missing = (1.0 - once) / once
+    return np.asarray(1.0 + missing * mean * mean * average / (1.0 - mean * (1.0 - average)))
+
+
+def _bounced_light(rough: Float32, view: Float32) -> _Bounced:
+    """Return the shares that surfaces throw out at once (N,), and their means over all directions (N,)."""
+    tables = _tables()
+    return tables.once(rough, view), tables.average(rough)
+
+
+def _layer_albedo(rough: Float32, view: Float32, level: Float32) -> tuple[Float32, Float32]:
+    """Return what a gloss throws back in all (N,), and its reflectance over all directions (N,)."""
+    root = np.sqrt(level)
+    eta = (1.0 + root) / (1.0 - root)
+    average = np.where(level > 0.0, (eta - 1.0) / (4.08567 + 1.00071 * eta), 0.0)
+    return _tables().albedo(rough, view, root), np.asarray(average, np.float32)
+
+
+class _Tables:
+    """Means over microfacets, on a grid: they are smooth."""
+
+    def __init__(self) -> None:
+        u, v = ((np.arange(_SAMPLES) + 0.5) / _SAMPLES for _ in range(2))
+        cosine = np.linspace(0.02, 1.0, _COSINES)
+        rough = np.linspace(_SMOOTHEST, 1.0, _ROUGHNESSES)
+        root = np.linspace(0.0, np.sqrt(_MATT_F0), _LEVELS)
+        self._once = np.empty((_ROUGHNESSES, _COSINES), np.float32)
+        self._albedo = np.empty((_ROUGHNESSES, _COSINES, _LEVELS), np.float32)
+        for i, width in enumerate(rough**2):
+            for j, mu in enumerate(cosine):
+                weight, between = _visible_facets(width, mu, *np.meshgrid(u, v))
+                once = weight.mean()
+                self._once[i, j] = once
+                for k, level in enumerate(root**2):
+                    self._albedo[i, j, k] = (weight * _dielectric(np.asarray(level), between)).mean() / once
+        over = np.maximum(np.gradient(cosine**2), 0.0)
+        self._average = (self._once * over).sum(axis=1) / over.sum()
+        self._cosine, self._rough, self._root = (
+            (axis[0], (len(axis) - 1) / (axis[-1] - axis[0]), len(axis) - 1) for axis in (cosine, rough, root)
+        )
+
+    def once(self, rough: Float32, view: Float32) -> Float32:
+        """Return the share of light that microfacets throw out at once, (N,)."""
+        return _bilinear(self._once, _place(rough, self._rough), _place(view, self._cosine))
+
+    def average(self, rough: Float32) -> Float32:
+        """Return its mean over all directions, (N,)."""
+        low, share = _place(rough, self._rough)
+        return np.asarray(self._average[low] * (1.0 - share) + self._average[low + 1] * share, np.float32)
+
+    def albedo(self, rough: Float32, view: Float32, root: Float32) -> Float32:
+        """Return the share of light that a gloss throws back, (N,)."""
+        low, share = _place(root, self._root)
+        places = _place(rough, self._rough), _place(view, self._cosine)
+        below = _bilinear(self._albedo, *places, low)
+        above = _bilinear(self._albedo, *places, low + 1)
+        return np.asarray(below * (1.0 - share) + above * share, np.float32)
+
+
+@lru_cache(maxsize=1)
+def _tables() -> _Tables:
+    return _Tables()
+
+
+_Axis = tuple[float, float, int]
+
+
+def _place(values: Float32, axis: _Axis) -> tuple[NDArray[np.intp], Float32]:
+    """Return the steps of a grid's axis below values, and how far values are above them, as a share."""
+    first, scale, last = axis
+    scaled = np.clip((values - np.float32(first)) * np.float32(scale), 0.0, last)
+    low = np.minimum(scaled.astype(np.intp), last - 1)
+    return low, np.asarray(scaled - low, np.float32)
+
+
+def _bilinear(
+    table: Float32,
+    rows: tuple[NDArray[np.intp], Float32],
+    columns: tuple[NDArray[np.intp], Float32],
+    *layer: NDArray[np.intp],
+) -> Float32:
+    (i, u), (j, v) = rows, columns
+    low = table[(i, j, *layer)] * (1.0 - v) + table[(i, j + 1, *layer)] * v
+    high = table[(i + 1, j, *layer)] * (1.0 - v) + table[(i + 1, j + 1, *layer)] * v
+    return np.asarray(low * (1.0 - u) + high * u, np.float32)
+
+
+def _visible_facets(width: float, cosine: float, u: Float, v: Float) -> tuple[Float, Float]:
+    """Return weights and cosines against the view of GGX microfacets that are seen (Heitz 2018).
+
+    The mean of the weights is the share of the light that comes out after one bounce.
+    """
+    view = np.array([np.sqrt(1.0 - cosine * cosine), 0.0, cosine])
+    stretched = np.array([width * view[0], 0.0, view[2]])
+    stretched /= np.linalg.norm(stretched)
+    first = np.array([0.0, 1.0, 0.0])
+    second = np.cross(stretched, first)
+    radius, angle = np.sqrt(u), 2.0 * np.pi * v
+    x, y = radius * np.cos(angle), radius * np.sin(angle)
+    s = 0.5 * (1.0 + stretched[2])
+    y = (1.0 - s) * np.sqrt(np.maximum(1.0 - x * x, 0.0)) + s * y
+    z = np.sqrt(np.maximum(1.0 - x * x - y * y, 0.0))
+    normal = x[..., None] * first + y[..., None] * second + z[..., None] * stretched
+    half = np.stack([width * normal[..., 0], width * normal[..., 1], np.maximum(normal[..., 2], 1e-9)], axis=-1)
+    half /= np.linalg.norm(half, axis=-1, keepdims=True)
+    between = np.clip(half @ view, 0.0, 1.0)
+    out = 2.0 * between * half[..., 2] - cosine
+    square = width * width
+    seen, both = _smith(np.asarray(square), np.asarray(cosine)), _smith(np.asarray(square), np.maximum(out, 1e-6))
+    return np.where(out > 0.0, (1.0 + seen) / (1.0 + seen + both), 0.0), between

@@ -1,0 +1,63 @@
+"""Surfaces of a scene as its materials ask for them: values at the places where points were seen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from ...base.arrays import Float, Float32, Index
+from ..scene.mesh import SceneMesh
+from ..scene.motion import MovingMesh
+from ..scene.surface_values import SurfaceInput, corner_shares
+from .colour import SeenPoints
+
+
+class SceneSurfaces:
+    """The surfaces of a scene, as it stands at the time 0.
+
+    Args:
+        static: what stands.
+        moving: what moves.
+    """
+
+    def __init__(self, static: SceneMesh, moving: Sequence[MovingMesh] = ()) -> None:
+        self._meshes = [static, *(part.mesh for part in moving)]
+        self._poses = [(np.eye(3), np.zeros(3)), *(_begin(part) for part in moving)]
+        self._firsts = np.cumsum([0, *(len(mesh) for mesh in self._meshes)])
+
+    def read(self, inputs: Iterable[SurfaceInput], points: SeenPoints) -> dict[SurfaceInput, Float32]:
+        """Return inputs' values (N, 4) at points; 0 where a surface hasn't such, as renderers have it."""
+        result = {what: np.zeros((len(points), 4), np.float32) for what in sorted(inputs)}
+        if points.face is None or not result:
+            return result
+        for number, mesh in enumerate(self._meshes):
+            low, high = self._firsts[number], self._firsts[number + 1]
+            mine = np.flatnonzero((points.face >= low) & (points.face < high))
+            if len(mine):
+                self._read_mesh(number, mesh, points.select(mine), mine, result)
+        return result
+
+    def _read_mesh(
+        self, number: int, mesh: SceneMesh, points: SeenPoints, rows: Index, result: dict[SurfaceInput, Float32]
+    ) -> None:
+        """Fill in the rows of the points that lie on one of the meshes."""
+        assert points.face is not None
+        faces = points.face - self._firsts[number]
+        rotation, begin = self._poses[number]
+        place, normal = (points.position - begin) @ rotation, np.asarray(points.normal, np.float64) @ rotation
+        shares = corner_shares(mesh.vertices[mesh.triangles[faces]].astype(np.float64), place)
+        for what, values in result.items():
+            found = np.zeros(len(rows), bool)
+            if mesh.surface is not None:
+                values[rows], found = mesh.surface.read(what, faces, shares, place, normal)
+            if what.kind == "normal":
+                # Where the shading isn't smooth it is the face's own.
+                values[rows[found], :3] = values[rows[found], :3] @ rotation.T
+                values[rows[~found], :3] = points.normal[~found]
+
+
+def _begin(part: MovingMesh) -> tuple[Float, Float]:
+    """Return how a part is turned and where it is at the time 0."""
+    rotation, place, _ = part.motion.pose(np.zeros(1))
+    return rotation[0], place[0]

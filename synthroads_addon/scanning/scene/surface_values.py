@@ -1,0 +1,177 @@
+"""Values of a scene's surfaces beside their place: attributes, texture coordinates, and what is the same on an object.
+
+Kept by mesh and not by triangle: a mesh that stands in a thousand places has its values once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from ...base.arrays import AnyArray, Bool, Float, Float32, Index
+
+
+class SurfaceInput(NamedTuple):
+    """Something that a material can ask of the place that it is seen at.
+
+    Attributes:
+        kind: what it is, such as ``attribute`` or ``uv``; see `blender.materials.inputs`.
+        name: of the attribute, the map; empty for the object's active one.
+    """
+
+    kind: str
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class MeshValues:
+    """Values of one input on one mesh.
+
+    Attributes:
+        values: (n, 4) float32: x, y, z or red, green, blue, and alpha.
+        domain: ``corner``, ``point``, ``face`` (of triangles), or ``object``: a row for each place it stands at.
+    """
+
+    values: Float32
+    domain: str
+
+
+@dataclass(frozen=True)
+class PartValues:
+    """Values of one mesh at all its places in a scene's mesh.
+
+    Attributes:
+        first: its first triangle there, before triangles without area were left out.
+        corners: (T, 3) corners of its triangles.
+        points: (T, 3) vertices of its triangles.
+        uses: places that it stands at, one after the other.
+        mirrored: (U,) whether a place mirrors it: its triangles' corners are in reverse order there.
+        frames: (U, 4, 4) from its own frame to the scene mesh's; None where nothing asks for it.
+        values: by input.
+    """
+
+    first: int
+    corners: AnyArray
+    points: AnyArray
+    uses: int
+    mirrored: Bool
+    frames: Float | None
+    values: Mapping[SurfaceInput, MeshValues]
+
+
+_OF_FRAME = ("object", "object_normal")
+"""Kinds of inputs that follow from the place of a part."""
+
+
+@dataclass(frozen=True)
+class SurfaceValues:
+    """Values of the surfaces of a scene's mesh.
+
+    Attributes:
+        parts: those that have any, in the order of their first triangles.
+        kept: (T,) of each triangle its number before those without area were left out; None if all have one.
+    """
+
+    parts: tuple[PartValues, ...] = ()
+    kept: AnyArray | None = None
+
+    def read(
+        self, what: SurfaceInput, faces: Index, shares: Float, place: Float, normal: Float
+    ) -> tuple[Float32, Bool]:
+        """Return an input's values (N, 4) on triangles, and which of these (N,) have it; zeros elsewhere.
+
+        Args:
+            what: the input.
+            faces: (N,) triangles of the scene's mesh.
+            shares: (N, 3) weights of their corners.
+            place, normal: (N, 3) in the mesh's frame, m; the places on the triangles, and unit normals there.
+        """
+        result, found = np.zeros((len(faces), 4), np.float32), np.zeros(len(faces), bool)
+        number = faces if self.kept is None else np.take(self.kept, faces).astype(np.intp)
+        for part in self.parts:
+            mine = np.flatnonzero((number >= part.first) & (number < part.first + len(part.corners) * part.uses))
+            if not len(mine):
+                continue
+            use, triangle = np.divmod(number[mine] - part.first, len(part.corners))
+            if what.kind in _OF_FRAME:
+                values = _in_frame(part, use, place[mine], normal[mine], what.kind)
+            else:
+                values = _interpolate(part, what, use, triangle, shares[mine])
+                if values is not None and what.kind == "normal":
+                    values[:, :3] = _turned(part, use, values[:, :3], normal[mine])
+            if values is not None:
+                result[mine], found[mine] = values, True
+        return result, found
+
+
+def _in_frame(part: PartValues, use: Index, place: Float, normal: Float, kind: str) -> Float32 | None:
+    """Return places, or normals, (H, 3) in the frame of the part itself as (H, 4)."""
+    if part.frames is None:
+        return None
+    result = np.zeros((len(use), 4), np.float32)
+    if kind == "object":
+        inverse = np.linalg.inv(part.frames[:, :3, :3])[use]
+        result[:, :3] = np.einsum("nij,nj->ni", inverse, place - part.frames[use, :3, 3])
+    else:
+        turned = np.einsum("nji,nj->ni", part.frames[use, :3, :3], normal)
+        result[:, :3] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
+    return result
+
+
+def _turned(part: PartValues, use: Index, normal: Float32, towards: Float) -> Float:
+    """Return normals (H, 3) of the part itself in the mesh's frame, on the side that ``towards`` (H, 3) points to."""
+    assert part.frames is not None
+    inverse = np.linalg.inv(part.frames[:, :3, :3])[use]
+    result = np.einsum("nji,nj->ni", inverse, normal)
+    result /= np.maximum(np.linalg.norm(result, axis=1, keepdims=True), 1e-12)
+    return np.asarray(result * np.where(np.einsum("ij,ij->i", result, towards) < 0.0, -1.0, 1.0)[:, None])
+
+
+def _interpolate(part: PartValues, what: SurfaceInput, use: Index, triangle: Index, shares: Float) -> Float32 | None:
+    """Return the values (H, 4) of one of the part's own inputs; None if it has no such."""
+    entry = part.values.get(what)
+    if entry is None:
+        return None
+    if entry.domain in ("object", "face"):
+        return np.asarray(entry.values[use if entry.domain == "object" else triangle])
+    numbers = (part.corners if entry.domain == "corner" else part.points)[triangle]
+    turned = part.mirrored[use]
+    if turned.any():
+        shares = np.where(turned[:, None], shares[:, ::-1], shares)
+    # From the first corner on: what all three have alike stays exactly that.
+    first = entry.values[numbers[:, 0]].astype(np.float64)
+    result = first.copy()
+    for corner in (1, 2):
+        result += shares[:, corner, None] * (entry.values[numbers[:, corner]] - first)
+    return result.astype(np.float32)
+
+
+def corner_shares(corners: Float, place: Float) -> Float:
+    """Return the barycentric weights (N, 3) of places (N, 3) in triangles (N, 3, 3); outside ones are moved inside."""
+    a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
+    u, v, w = b - a, c - a, place - a
+    uu, uv, vv = (np.einsum("ij,ij->i", *pair) for pair in ((u, u), (u, v), (v, v)))
+    wu, wv = np.einsum("ij,ij->i", w, u), np.einsum("ij,ij->i", w, v)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        below = uu * vv - uv * uv
+        second, third = (vv * wu - uv * wv) / below, (uu * wv - uv * wu) / below
+    shares = np.stack([1.0 - second - third, second, third], axis=1)
+    shares = np.clip(np.nan_to_num(shares, nan=1.0 / 3.0), 0.0, None)
+    return np.asarray(shares / np.maximum(shares.sum(axis=1, keepdims=True), 1e-30))
+
+
+@dataclass
+class ValuesBuilder:
+    """Gathers the values of parts while a scene's mesh is put together."""
+
+    parts: list[PartValues] = field(default_factory=list)
+
+    def table(self, kept: Bool | None) -> SurfaceValues | None:
+        """Return the table; None if no part has values."""
+        if not self.parts:
+            return None
+        number = None if kept is None else np.flatnonzero(kept).astype(np.int32)
+        return SurfaceValues(tuple(self.parts), number)
