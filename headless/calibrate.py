@@ -27,7 +27,7 @@ from synthroads_addon.calibration.job import (
     save_fitted,
     steps,
 )
-from synthroads_addon.calibration.pavement import RoadClasses
+from synthroads_addon.cloud.selection.pavement import RoadClasses
 
 _SAME = (
     *("table", "real", "class_field", "device", "incidence_deg", "ranges", "scanner", "reflection", "attenuation"),

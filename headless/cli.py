@@ -15,6 +15,7 @@ COMMANDS = {
     "dataset": "make a data set of many scenes from a recipe",
     "cloud": "describe, thin out, map, convert and draw point cloud files",
     "scan": "scan a scene that is there already: .blend, .glb, .obj and others",
+    "compare": "say how real synthetic clouds are, beside real ones",
     "calibrate": "compare intensities of materials with a real cloud, and fit them",
     "gallery": "render pictures of scenes, objects and materials",
     "tradeoff": "measure error against time for each knob",

@@ -27,7 +27,7 @@ def _missing(error: ModuleNotFoundError) -> str:
     name = (error.name or "").partition(".")[0]
     if name in ("", "headless", "ml", "synthroads_addon"):
         raise error
-    extra = "ml" if name in ("torch", "scipy", "skimage", "matplotlib") else "blender"
+    extra = "ml" if name in ("torch", "scipy", "skimage", "sklearn", "matplotlib") else "blender"
     return (
         f"error: the package {name} is missing: in Blender install and enable the SynthRoads extension, "
         f"elsewhere run pip install 'synthroads[{extra}]'"

@@ -86,7 +86,7 @@ LICENCES = {
 
 LEFT_OUT = shutil.ignore_patterns(
     *("__pycache__", "*.py[co]", ".*", "*.blend[1-9]", "wheels.txt", MANIFEST.name),
-    "reconstruction",  # needs SciPy, and nothing in Blender uses it
+    *("comparison", "reconstruction"),  # need SciPy, and nothing in Blender uses them
 )
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)
 

@@ -23,8 +23,8 @@ sys.path.insert(0, str(ROOT))
 from synthroads_addon.blender.files import empty_file  # noqa: E402
 from synthroads_addon.blender.materials import material  # noqa: E402
 from synthroads_addon.calibration.job import Calibration, CalibrationJob, MaterialTarget, calibrate  # noqa: E402
-from synthroads_addon.calibration.pavement import RoadClasses  # noqa: E402
 from synthroads_addon.calibration.plot import save_plot  # noqa: E402
+from synthroads_addon.cloud.selection.pavement import RoadClasses  # noqa: E402
 from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene  # noqa: E402
 from synthroads_addon.scenario.scenario import Scenario  # noqa: E402
 

@@ -13,10 +13,11 @@ import numpy as np
 from ..base.arrays import Float
 from ..base.errors import InputError, nearest_name
 from ..base.progress import exhaust
+from ..cloud.selection.classes import RealClass, RealCloud, class_by_label, ranges_and_incidences, read_real
+from ..cloud.selection.pavement import RoadClasses, road_classes
 from ..materials.surfaces import Reflection
 from ..materials.table import Material, materials, read_material_table, write_material_table
 from ..scanning.devices.device import load_device
-from .classes import RealClass, RealCloud, class_by_label, ranges_and_incidences, read_real
 from .expected import Expectation, Receiver, Texture, Views, chosen_views, read_texture
 from .fit import (
     FITTED,
@@ -30,7 +31,6 @@ from .fit import (
     fitted_wavelength,
     interquartile_range,
 )
-from .pavement import RoadClasses, road_classes
 
 Part = Literal["spread", "wavelength", "slope"]
 PARTS: tuple[Part, ...] = ("spread", "wavelength", "slope")

@@ -13,7 +13,6 @@ from headless.cli import main
 from synthroads_addon.base.arrays import otsu
 from synthroads_addon.base.errors import InputError, OutputError
 from synthroads_addon.base.noise import noise_field
-from synthroads_addon.calibration.classes import RealClass, class_by_label, ranges_and_incidences, read_real
 from synthroads_addon.calibration.expected import Expectation, Receiver, Views, chosen_views, read_texture, texture_of
 from synthroads_addon.calibration.fit import (
     BRIGHTEST,
@@ -23,8 +22,9 @@ from synthroads_addon.calibration.fit import (
     fitted_wavelength,
 )
 from synthroads_addon.calibration.job import Calibration, CalibrationJob, MaterialTarget, calibrate, save_fitted, steps
-from synthroads_addon.calibration.pavement import RoadClasses, axis_coordinates, road_classes
 from synthroads_addon.calibration.plot import save_plot
+from synthroads_addon.cloud.selection.classes import RealClass, class_by_label, ranges_and_incidences, read_real
+from synthroads_addon.cloud.selection.pavement import RoadClasses, axis_coordinates, road_classes
 from synthroads_addon.materials.reflectance import facet_terms
 from synthroads_addon.materials.table import Material, materials, read_material_table, write_material_table
 from synthroads_addon.scenario.scenario import Scenario
@@ -236,7 +236,7 @@ def test_ranges_and_angles_from_one_place_follow_the_ground() -> None:
     plan = rng.random((4000, 2)) * 30.0
     place = np.column_stack([plan, 0.2 * plan[:, 0]])
     none = np.full(4000, np.nan)
-    real = RealClass("", place, np.ones(4000), 0, none, none)
+    real = RealClass("", place, np.ones(4000), 0, none, none, np.ones(4000, np.uint8))
     distance, incidence = ranges_and_incidences(real, np.array([0.0, 0.0, 50.0]))
     normal = np.array([-0.2, 0.0, 1.0]) / np.hypot(0.2, 1.0)
     towards = np.array([0.0, 0.0, 50.0]) - place

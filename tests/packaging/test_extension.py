@@ -70,7 +70,7 @@ def test_holds_every_module_and_data_file_once(names: list[str]) -> None:
     addon = ROOT / "synthroads_addon"
     files = [path for path in addon.rglob("*") if path.is_file() and "__pycache__" not in path.parts]
     kept = [path.relative_to(addon) for path in files if not path.name.startswith(".")]
-    expected = {path.as_posix() for path in kept if path.parts[0] != "reconstruction"}  # needs SciPy
+    expected = {path.as_posix() for path in kept if path.parts[0] not in ("comparison", "reconstruction")}
     extra = {name for name in names if not name.startswith("wheels/")} - expected
     assert expected <= set(names)
     library = "presets/node_groups/node_groups.blend"

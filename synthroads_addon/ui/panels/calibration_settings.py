@@ -16,7 +16,7 @@ from ...blender.materials import constants, table_name
 from ...blender.materials.image import base_color_image, color_image_node
 from ...calibration.expected import texture_of
 from ...calibration.job import CalibrationJob, MaterialTarget, Part, check
-from ...calibration.pavement import RoadClasses
+from ...cloud.selection.pavement import RoadClasses
 from ...materials.surfaces import Reflection
 from ...materials.table import Material, materials
 from ...scanning.devices.device import device_names, load_device

@@ -6,11 +6,11 @@ from pathlib import Path
 import laspy
 import numpy as np
 
-from ..base.arrays import AnyArray, Bool, Float, Index, Int
-from ..base.classes import ClassScheme
-from ..base.errors import InputError, nearest_name
-from ..cloud.formats.registry import open_cloud
-from ..cloud.points import concatenate
+from ...base.arrays import AnyArray, Bool, Float, Index, Int, UInt8
+from ...base.classes import ClassScheme
+from ...base.errors import InputError, nearest_name
+from ..formats.registry import open_cloud
+from ..points import concatenate
 
 FEWEST = 200
 """Points that a class must have for its quantiles to mean anything."""
@@ -26,6 +26,7 @@ class RealCloud:
         label: numbers that tell the classes apart.
         scheme: what the numbers mean; None for an attribute of the file's own.
         distance, incidence: m and rad; NaN where the file doesn't say.
+        returns: how many returns the pulse of each has.
     """
 
     xyz: Float
@@ -34,6 +35,7 @@ class RealCloud:
     scheme: ClassScheme | None
     distance: Float
     incidence: Float
+    returns: UInt8
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,7 @@ class RealClass:
         intensity: (N,) as stored, above 0.
         zeros: how many more there are whose intensity is 0: left out.
         distance, incidence: (N,) m and rad; NaN where unknown.
+        returns: (N,) how many returns the pulse of each has.
     """
 
     selection: str
@@ -54,6 +57,7 @@ class RealClass:
     zeros: int
     distance: Float
     incidence: Float
+    returns: UInt8
 
 
 def read_real(path: Path, attribute: str | None = None) -> RealCloud:
@@ -80,6 +84,7 @@ def read_real(path: Path, attribute: str | None = None) -> RealCloud:
         scheme=header.scheme if attribute is None else None,
         distance=points.range,
         incidence=np.deg2rad(points.incidence_deg.astype(np.float64)),
+        returns=points.number_of_returns,
     )
 
 
@@ -132,6 +137,7 @@ def select_class(cloud: RealCloud, chosen: Index, selection: str) -> RealClass:
         zeros=len(chosen) - len(bright),
         distance=cloud.distance[bright],
         incidence=cloud.incidence[bright],
+        returns=cloud.returns[bright],
     )
 
 

@@ -17,9 +17,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base.arrays import Float, Index, otsu
-from ..base.errors import InputError
-from ..road.centerline import read_axis
+from ...base.arrays import Float, Index, otsu
+from ...base.errors import InputError
+from ...road.centerline import read_axis
 from .classes import RealClass, RealCloud, select_class
 
 STRETCH = 20.0

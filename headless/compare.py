@@ -1,0 +1,72 @@
+"""Compare synthetic clouds with real ones: statistics side by side, and how surely the two can be told apart.
+
+Each argument is a cloud, a folder of clouds, or a list (.yaml, .json) that says where each cloud's classes are.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless.commands import Outcome, entry
+from headless.messages import progress_bar
+from synthroads_addon.base.files import output_folder
+from synthroads_addon.base.progress import exhaust
+from synthroads_addon.base.schema import canonical_json
+
+REPORT, PICTURE = "comparison.json", "comparison.png"
+_GIVEAWAYS = 5
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments of `synthroads compare`."""
+    parser.add_argument(
+        "synthetic", type=Path, metavar="SYNTHETIC", help="cloud, folder or list of clouds to be judged"
+    )
+    parser.add_argument(
+        "real", type=Path, metavar="REAL", help="cloud, folder or list of real clouds; two for a yardstick"
+    )
+    parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for report and picture")
+    parser.add_argument("--seed", type=int, default=1, metavar="N", help="draws patches and folds (1)")
+    parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
+
+
+def run(arguments: argparse.Namespace) -> Outcome:
+    """Run `synthroads compare`."""
+    from synthroads_addon.comparison.job import compare_steps
+    from synthroads_addon.comparison.picture import save_picture
+
+    with output_folder(arguments.output, [REPORT, PICTURE], arguments.overwrite) as folder:
+        progress = progress_bar(arguments)
+        steps = compare_steps(arguments.synthetic, arguments.real, arguments.seed)
+        result = exhaust(steps, lambda share: progress("compare", share))
+        data = result.to_dict()
+        (folder / REPORT).write_text(canonical_json(data), encoding="utf-8")
+        save_picture(result, folder / PICTURE, overwrite=True)
+    return 0, data, summary(data, arguments.output)
+
+
+def summary(data: dict[str, Any], output: Path) -> str:
+    """Return the result for people."""
+    lines = []
+    for side in ("synthetic", "real"):
+        for row in data[side]:
+            auc = ", ".join(f"{group} {value:.2f}" for group, value in row["auc"].items())
+            lines.append(
+                f"{side} {row['cloud']}: told from {'the' if side == 'synthetic' else 'the other'} real ones by {auc}"
+            )
+    shares = ", ".join(f"{group} {value:.2f}" for group, value in data["realism"].items())
+    lines.append(f"realism, 1 where a real cloud is told apart as surely: {shares}")
+    for name, (told, real) in list(data["giveaways"].items())[:_GIVEAWAYS]:
+        medians = [", ".join(f"{row['medians'][name]:.3g}" for row in data[side]) for side in ("synthetic", "real")]
+        lines.append(f"  {name} gives away {told:.2f} (real {real:.2f}): {medians[0]} against {medians[1]}")
+    return "\n".join([*lines, f"written to {output}"])
+
+
+if __name__ == "__main__":
+    entry("compare")

@@ -1,0 +1,1 @@
+"""Synthetic clouds beside real ones: which statistics differ, and how surely the two can be told apart."""

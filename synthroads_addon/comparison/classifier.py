@@ -1,0 +1,131 @@
+"""How surely synthetic patches can be told from real ones: a two-sample test by a classifier.
+
+A classifier is trained on some of both and asked about the others; the area under its ROC curve (AUC) is 0.5 where it
+can't tell them apart and 1 where it never errs (Lopez-Paz and Oquab, "Revisiting classifier two-sample tests", 2017).
+Beside it the maximum mean discrepancy of the same statistics (Gretton et al., "A kernel two-sample test", 2012), and
+the AUC of each statistic alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial.distance import cdist
+from scipy.stats import rankdata
+from sklearn.ensemble import HistGradientBoostingClassifier
+from sklearn.metrics import roc_auc_score
+from sklearn.model_selection import StratifiedGroupKFold
+
+from ..base.arrays import Bool, Float, Index
+from ..base.errors import InputError
+from .patches import FEATURES, GROUPS, Patches, match_density
+
+FOLDS = 5
+BLOCK = 20.0
+"""Patches of a square of this edge, m, are learned or asked for together: neighbours are alike."""
+MOST = 1500
+"""Patches of each side that are used, at most."""
+FEWEST = 60
+"""Patches of each side that a comparison needs."""
+_MOST_OF_KERNEL = 600
+_TREES = 100
+
+
+@dataclass(frozen=True)
+class Distinction:
+    """How well two sets of patches are told apart.
+
+    Attributes:
+        patches: of each side.
+        auc: by group of `GROUPS`, and ``all``.
+        features: AUC of each statistic alone, 0.5 to 1.
+        mmd: squared maximum mean discrepancy of all statistics.
+    """
+
+    patches: int
+    auc: dict[str, float]
+    features: dict[str, float]
+    mmd: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as JSON data."""
+        shown = {
+            name: {key: round(value, 4) for key, value in getattr(self, name).items()} for name in ("auc", "features")
+        }
+        return {"patches": self.patches, **shown, "mmd": round(self.mmd, 6)}
+
+
+def distinguish(one: Patches, other: Patches, seed: int, name: str) -> Distinction:
+    """Return how well two sets of patches are told apart, at equal densities.
+
+    Args:
+        one, other: the sets.
+        seed: draws the patches and the folds.
+        name: of the first, for errors.
+
+    Raises:
+        InputError: fewer than `FEWEST` patches of each have the same densities.
+    """
+    first, second = match_density(one, other, seed, MOST)
+    if len(first) < FEWEST:
+        low, high = np.quantile(other.density, (0.05, 0.95))
+        raise InputError(
+            name,
+            len(first),
+            f"at least {FEWEST} patches must have densities of the clouds that it is compared with, "
+            f"{low:.0f} to {high:.0f} points/m2",
+        )
+    values = np.concatenate([first.values, second.values])
+    truth = np.arange(len(values)) < len(first)
+    blocks = np.concatenate([_blocks(first, 0), _blocks(second, 1)])
+    columns = {group: [FEATURES.index(feature) for feature in names] for group, names in GROUPS.items()}
+    columns = {"all": list(range(len(FEATURES))), **columns}
+    auc = {group: _auc(values[:, chosen], truth, blocks, seed) for group, chosen in columns.items()}
+    features = {name: _auc_alone(values[:, number], truth) for number, name in enumerate(FEATURES)}
+    return Distinction(len(first), auc, features, squared_discrepancy(values[truth], values[~truth]))
+
+
+def _blocks(patches: Patches, side: int) -> Index:
+    """Return the number of the square of `BLOCK` that each patch lies in; those of the two sides differ."""
+    square = np.floor(patches.place / BLOCK).astype(np.int64)
+    return np.asarray(np.unique(square, axis=0, return_inverse=True)[1].ravel() * 2 + side)
+
+
+def _auc(values: Float, truth: Bool, blocks: Index, seed: int) -> float:
+    """Return the mean AUC of a boosted tree's answers for blocks that it hasn't learned.
+
+    The mean over the folds, not that of all answers together: a fold that learned fewer of one kind would answer lower.
+    """
+    folds = min(FOLDS, *(len(np.unique(blocks[truth == side])) for side in (True, False)))
+    split = StratifiedGroupKFold(max(folds, 2), shuffle=True, random_state=seed)
+    answers = []
+    for learned, asked in split.split(values, truth, blocks):
+        trees = HistGradientBoostingClassifier(max_iter=_TREES, random_state=seed)
+        answer = trees.fit(values[learned], truth[learned]).predict_proba(values[asked])[:, 1]
+        answers.append(roc_auc_score(truth[asked], answer))
+    return float(np.nanmean(answers))
+
+
+def _auc_alone(values: Float, truth: Bool) -> float:
+    """Return the AUC of a single statistic, whichever way it points (Mann and Whitney's U)."""
+    auc = roc_auc_score(truth, values)
+    return float(max(auc, 1.0 - auc))
+
+
+def squared_discrepancy(one: Float, other: Float) -> float:
+    """Return the squared maximum mean discrepancy (unbiased, about 0 for equal distributions) of rows (N, F), (M, F).
+
+    Statistics are replaced by their ranks among both, so that no unit and no outlier counts; the kernel is Gaussian,
+    as wide as the median distance.
+    """
+    one, other = one[:_MOST_OF_KERNEL], other[:_MOST_OF_KERNEL]
+    ranks = rankdata(np.concatenate([one, other]), axis=0) / (len(one) + len(other))
+    squared = cdist(ranks, ranks, "sqeuclidean")
+    kernel = np.exp(-squared / max(float(np.median(squared)), 1e-12))
+    n, m = len(one), len(other)
+    within = [
+        (block.sum() - len(block)) / (len(block) * (len(block) - 1)) for block in (kernel[:n, :n], kernel[n:, n:])
+    ]
+    return float(sum(within) - 2.0 * kernel[:n, n:].sum() / (n * m))

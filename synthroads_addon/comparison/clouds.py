@@ -1,0 +1,118 @@
+"""Clouds to be compared: files, folders of them, or lists that say where each cloud's classes are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ..base.errors import InputError
+from ..base.schema import ClosedModel, Finite, quantity, read_yaml
+from ..cloud.formats.registry import ENDINGS
+from ..cloud.selection.classes import RealClass, RealCloud, class_by_label, read_real
+from ..cloud.selection.pavement import RoadClasses, road_classes
+
+LISTS = (".yaml", ".yml", ".json")
+ROAD = "road"
+CLASSES = (ROAD, "marking", "vegetation")
+"""Classes that are compared; the first is needed."""
+
+
+class ListedCloud(ClosedModel):
+    """A cloud, and where its classes are: by labels, or beside an axis for a cloud without."""
+
+    cloud: str = Field(min_length=1, description="File, from the list's folder.")
+    class_field: str | None = Field(None, description="Extra attribute of a LAS file that holds the classes.")
+    road: str = Field("road", description="Class of the pavement, by number or name.")
+    marking: str | None = Field(None, description="Class of the markings.")
+    vegetation: str | None = Field(None, description="Class of the vegetation.")
+    axis: str | None = Field(None, description="Axis of the road (CSV or GeoJSON), which tells pavement and markings.")
+    paved: tuple[tuple[Finite, Finite], ...] = Field((), description="Offsets between which there is pavement, m.")
+    lines: tuple[Finite, ...] = Field((), description="Offsets of the markings' middles, m.")
+    line_width: float = quantity(0.15, "m", "Width of the markings.", (0.05, 1.0))
+    decibels: float | None = quantity(None, "dB", "The 16 bits of the intensity span this; they are linear.", (1, 200))
+    scanner: tuple[Finite, Finite, Finite] | None = Field(None, description="Where all was seen from, map, m.")
+
+    @model_validator(mode="after")
+    def _offsets_need_an_axis(self) -> ListedCloud:
+        if (self.axis is None) != (not self.paved):
+            raise ValueError("axis and paved tell the pavement together: one of them is missing")
+        return self
+
+
+class CloudList(ClosedModel):
+    """Clouds that are compared as one kind."""
+
+    type: Literal["CloudList"] = "CloudList"
+    version: Literal["1.0"] = "1.0"
+    clouds: tuple[ListedCloud, ...] = Field(min_length=1, max_length=1000, description="The clouds.")
+
+
+@dataclass(frozen=True)
+class ComparedCloud:
+    """A cloud with the classes that are compared.
+
+    Attributes:
+        name: of the file.
+        classes: by name of `CLASSES`: its points, with linear intensities; ``road`` is always there.
+    """
+
+    name: str
+    classes: dict[str, RealClass]
+
+
+def find_clouds(path: Path) -> list[tuple[Path, ListedCloud]]:
+    """Return the clouds that a path stands for: a file, all below a folder, or those of a list.
+
+    Raises:
+        InputError: nothing is there, or a list is wrong.
+    """
+    if path.suffix.lower() in LISTS:
+        rows = CloudList.from_dict(read_yaml(path), str(path)).clouds
+        return [(path.parent / row.cloud, row) for row in rows]
+    files = sorted(file for file in path.rglob("*") if file.suffix.lower() in ENDINGS) if path.is_dir() else [path]
+    if not files:
+        raise InputError(str(path), None, f"holds no cloud ({', '.join(ENDINGS)})")
+    return [(file, ListedCloud(cloud=file.name, marking="road_marking", vegetation="vegetation")) for file in files]
+
+
+def read_compared(path: Path, row: ListedCloud) -> ComparedCloud:
+    """Read a cloud's classes.
+
+    Raises:
+        InputError: the file can't be read, or has too few points of the road.
+    """
+    cloud = read_real(path, row.class_field)
+    if row.axis is not None:
+        beside = road_classes(cloud, RoadClasses(path.parent / row.axis, row.paved, row.lines, row.line_width))
+        found = {ROAD: beside["paved"]} | ({"marking": beside["line"]} if "line" in beside else {})
+    else:
+        found = {ROAD: class_by_label(cloud, row.road)}
+        found |= _other_classes(cloud, row)
+    return ComparedCloud(path.stem, {name: _with_view(points, row) for name, points in found.items()})
+
+
+def _other_classes(cloud: RealCloud, row: ListedCloud) -> dict[str, RealClass]:
+    """Return the classes beside the road that the cloud has enough points of."""
+    found = {}
+    for name in CLASSES[1:]:
+        code = getattr(row, name)
+        if code is not None:
+            try:
+                found[name] = class_by_label(cloud, code)
+            except InputError:  # a cloud may well have none of them
+                continue
+    return found
+
+
+def _with_view(points: RealClass, row: ListedCloud) -> RealClass:
+    """Return points with linear intensities, and with ranges where the list says where they were seen from."""
+    intensity, distance = points.intensity, points.distance
+    if row.decibels is not None:
+        intensity = 10.0 ** (intensity / 65535.0 * row.decibels / 10.0)
+    if row.scanner is not None:
+        distance = np.linalg.norm(points.place - np.asarray(row.scanner), axis=1)
+    return replace(points, intensity=intensity, distance=distance)

@@ -1,0 +1,177 @@
+"""A comparison of synthetic clouds with real ones from its inputs to its result."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..base.arrays import Float
+from ..cloud.selection.classes import RealClass
+from .classifier import Distinction, distinguish
+from .clouds import ROAD, ComparedCloud, find_clouds, read_compared
+from .patches import FEATURES, Patches, join_patches, make_patches
+
+RINGS = (4.0, 6.0, 10.0, 15.0, 20.0, 30.0, 50.0)
+"""Edges of the ranges by which clouds are described whose points say how far they were seen from, m."""
+_FEWEST_OF_RING = 30
+
+
+@dataclass(frozen=True)
+class DescribedCloud:
+    """A cloud, its patches and its figures.
+
+    Attributes:
+        cloud: the cloud.
+        patches: of its pavement.
+    """
+
+    cloud: ComparedCloud
+    patches: Patches
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures as JSON data."""
+        middle = np.median(self.patches.values, axis=0)
+        road = float(np.median(_level(self.cloud.classes[ROAD])))
+        return {
+            "cloud": self.cloud.name,
+            "patches": len(self.patches),
+            "density": round(float(np.median(self.patches.density)), 2),
+            "medians": {name: _short(value) for name, value in zip(FEATURES, middle, strict=True)},
+            "classes": {name: class_figures(points, road) for name, points in self.cloud.classes.items()},
+            "by_range": by_range(self.cloud.classes[ROAD], road),
+        }
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The result.
+
+    Attributes:
+        synthetic, real: the clouds.
+        told: each synthetic cloud against all real ones.
+        yardstick: each real cloud against the other real ones; of a single one, half of its patches against the rest.
+    """
+
+    synthetic: tuple[DescribedCloud, ...]
+    real: tuple[DescribedCloud, ...]
+    told: tuple[Distinction, ...]
+    yardstick: tuple[Distinction, ...]
+
+    def realism(self) -> dict[str, float]:
+        """Return 1 - AUC as a share of the yardstick's, by group: 1 where real clouds are told apart as well."""
+        return {group: _mean(self.told, group) / max(_mean(self.yardstick, group), 1e-9) for group in self.told[0].auc}
+
+    def giveaways(self) -> dict[str, tuple[float, float]]:
+        """Return the mean AUC of each statistic alone, of synthetic clouds and of real ones, the largest first."""
+        means = {
+            name: tuple(float(np.mean([one.features[name] for one in rows])) for rows in (self.told, self.yardstick))
+            for name in FEATURES
+        }
+        return dict(sorted(means.items(), key=lambda item: -item[1][0]))  # type: ignore[arg-type]
+
+    def discrepancy(self) -> float:
+        """Return the mean of the synthetic clouds' squared discrepancies as a multiple of the yardstick's."""
+        told, real = (float(np.mean([max(one.mmd, 0.0) for one in rows])) for rows in (self.told, self.yardstick))
+        return told / max(real, 1e-6)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures as JSON data."""
+        return {
+            "type": "CloudComparison",
+            "realism": {group: round(value, 4) for group, value in self.realism().items()},
+            "discrepancy": round(self.discrepancy(), 3),
+            "giveaways": {name: [round(value, 4) for value in pair] for name, pair in self.giveaways().items()},
+            "synthetic": _joined(self.synthetic, self.told),
+            "real": _joined(self.real, self.yardstick),
+        }
+
+
+def _joined(clouds: tuple[DescribedCloud, ...], distinctions: tuple[Distinction, ...]) -> list[dict[str, Any]]:
+    """Return each cloud's figures together with how well it is told apart."""
+    return [one.to_dict() | told.to_dict() for one, told in zip(clouds, distinctions, strict=True)]
+
+
+def _mean(rows: Sequence[Distinction], group: str) -> float:
+    """Return the mean of 1 - AUC, AUC counted as 0.5 where the answers are worse than chance."""
+    return float(np.mean([1.0 - max(one.auc[group], 0.5) for one in rows]))
+
+
+def compare_steps(synthetic: Path, real: Path, seed: int = 1) -> Generator[float, None, Comparison]:
+    """Compare; yield the share that is done.
+
+    Args:
+        synthetic, real: a cloud, a folder of clouds, or a list of them, see `find_clouds`.
+        seed: draws patches and folds.
+
+    Raises:
+        InputError: a cloud can't be read, has too little pavement, or none of the other side's density.
+    """
+    found = [find_clouds(path) for path in (synthetic, real)]
+    total, done = 2 * sum(map(len, found)), 0
+    described: list[list[DescribedCloud]] = [[], []]
+    for side, rows in zip(described, found, strict=True):
+        for path, row in rows:
+            cloud = read_compared(path, row)
+            side.append(DescribedCloud(cloud, make_patches(cloud.classes[ROAD], cloud.name)))
+            done += 1
+            yield done / total
+    others, yardstick = described[1], []
+    for number, one in enumerate(others):
+        yardstick.append(_against_others(one, others[:number] + others[number + 1 :], seed))
+        done += 1
+        yield done / total
+    told, everything = [], join_patches([one.patches for one in others])
+    for one in described[0]:
+        told.append(distinguish(one.patches, everything, seed, one.cloud.name))
+        done += 1
+        yield done / total
+    return Comparison(tuple(described[0]), tuple(others), tuple(told), tuple(yardstick))
+
+
+def _against_others(one: DescribedCloud, others: list[DescribedCloud], seed: int) -> Distinction:
+    """Return how well a real cloud is told from the others; where there is none, from every other patch of itself."""
+    if others:
+        return distinguish(one.patches, join_patches([other.patches for other in others]), seed, one.cloud.name)
+    dealt = np.random.default_rng(seed).permutation(len(one.patches))
+    halves = [one.patches.select(dealt[start::2]) for start in (0, 1)]
+    return distinguish(halves[0], halves[1], seed, one.cloud.name)
+
+
+def _level(points: RealClass) -> Float:
+    """Return intensities (N,) in dB."""
+    return np.asarray(10.0 * np.log10(points.intensity))
+
+
+def class_figures(points: RealClass, road: float) -> dict[str, float]:
+    """Return the figures of a class as JSON data; ``road`` is the pavement's median, dB."""
+    level = _level(points)
+    low, middle, high = np.quantile(level, (0.25, 0.5, 0.75))
+    total = len(level) + points.zeros
+    return {
+        "points": len(level),
+        "zero_intensities": round(points.zeros / total, 4),
+        "several_returns": round(float(np.mean(points.returns > 1)), 4),
+        "median_over_road_db": round(float(middle - road), 3),
+        "iqr_db": round(float(high - low), 3),
+        "std_db": round(float(level.std()), 3),
+    }
+
+
+def by_range(points: RealClass, road: float) -> list[dict[str, float]]:
+    """Return points and median intensity of each ring of `RINGS` as JSON data; empty where no range is known."""
+    rows = []
+    for low, high in pairwise(RINGS):
+        inside = (points.distance >= low) & (points.distance < high)
+        if inside.sum() >= _FEWEST_OF_RING:
+            middle = float(np.median(_level(points)[inside])) - road
+            rows.append({"from": low, "to": high, "points": int(inside.sum()), "median_over_road_db": round(middle, 3)})
+    return rows
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.5g}")

@@ -1,0 +1,215 @@
+"""Patches of pavement, and the statistics of each that tell what kind of scanner and surface it comes from.
+
+No statistic depends on the road's course, the scanner's gain or the units of the intensity: a patch's points are
+described by how they are spread, how they lie about their plane, and how their intensities differ among each other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..base.arrays import AnyArray, Float, Index
+from ..base.errors import InputError
+from ..cloud.selection.classes import RealClass
+
+EDGE = 1.5
+"""Edge of a patch, m."""
+FEWEST = 20
+"""Points that a patch must have."""
+_PARTS = 3
+"""Each of so many parts of a patch, along each edge, must hold a point: others are cut off by what lies beside."""
+_STEP = 0.1
+"""Width of the bins within which densities count as equal, of their logarithm."""
+_NEIGHBOURS = 8
+_SECTORS = 12
+
+GROUPS: dict[str, tuple[str, ...]] = {
+    "pattern": ("clark_evans", "spacing_variation", "direction_entropy", "second_neighbour", "eighth_neighbour"),
+    "geometry": ("residual_mm", "residual_skew", "residual_kurtosis", "curvature", "residual_roughness"),
+    "intensity": (
+        *("intensity_iqr_db", "intensity_skew", "intensity_kurtosis", "neighbour_noise_db", "short_semivariance"),
+        *("height_correlation", "level_db"),
+    ),
+}
+"""Statistics of a patch by what they are about: how points are spread, how they lie, and how bright they are."""
+FEATURES = tuple(name for names in GROUPS.values() for name in names)
+
+
+@dataclass(frozen=True)
+class Patches:
+    """Statistics of a cloud's patches.
+
+    Attributes:
+        place: (P, 2) corner of each, map, m.
+        density: (P,) points per m2.
+        values: (P, F) in the order of `FEATURES`.
+    """
+
+    place: Float
+    density: Float
+    values: Float
+
+    def __len__(self) -> int:
+        return len(self.place)
+
+    def select(self, rows: Index) -> Patches:
+        """Return the chosen patches."""
+        return Patches(self.place[rows], self.density[rows], self.values[rows])
+
+
+def join_patches(parts: list[Patches]) -> Patches:
+    """Return the patches of several clouds as those of one; their places are kept apart."""
+    shifts = [np.array([1e7 * number, 0.0]) for number in range(len(parts))]
+    return Patches(
+        np.concatenate([part.place + shift for part, shift in zip(parts, shifts, strict=True)]),
+        np.concatenate([part.density for part in parts]),
+        np.concatenate([part.values for part in parts]),
+    )
+
+
+def make_patches(road: RealClass, name: str) -> Patches:
+    """Return the patches of the pavement's points.
+
+    Raises:
+        InputError: no square of `EDGE` has enough points in all of its parts.
+    """
+    points = _Neighbourhood.of(road)
+    cell = np.floor(road.place[:, :2] / EDGE).astype(np.int64)
+    corners, owner, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
+    rows = np.split(np.argsort(owner.ravel(), kind="stable"), np.cumsum(count)[:-1])
+    whole = [
+        number for number in np.flatnonzero(count >= FEWEST) if _is_whole(road.place[rows[number]], corners[number])
+    ]
+    if not whole:
+        raise InputError(name, None, f"has no {EDGE:g} m of pavement with {FEWEST} points or more")
+    values = np.array([points.describe(rows[number]) for number in whole])
+    return Patches(corners[whole] * EDGE, count[whole] / EDGE**2, values)
+
+
+def _is_whole(place: Float, corner: AnyArray) -> bool:
+    """Say whether a patch has points in all of its parts."""
+    part = np.floor((place[:, :2] / EDGE - corner) * _PARTS).astype(np.int64)
+    return len(np.unique(part[:, 0] * _PARTS + part[:, 1])) == _PARTS**2
+
+
+@dataclass(frozen=True)
+class _Neighbourhood:
+    """Points (N,) with their `_NEIGHBOURS` nearest ones in plan.
+
+    Attributes:
+        place: (N, 3) from the first point, m.
+        level: (N,) intensity from the cloud's median, dB.
+        distance: (N, K) of the neighbours, m.
+        neighbour: (N, K) rows of these.
+        sector: (N,) of the direction to the nearest, which has no sign.
+    """
+
+    place: Float
+    level: Float
+    distance: Float
+    neighbour: Index
+    sector: Index
+
+    @classmethod
+    def of(cls, road: RealClass) -> _Neighbourhood:
+        """Find the neighbours of a cloud's points of the road."""
+        place = road.place - road.place[0]
+        distance, neighbour = cKDTree(place[:, :2]).query(place[:, :2], k=_NEIGHBOURS + 1)
+        away = place[neighbour[:, 1], :2] - place[:, :2]
+        angle = np.arctan2(away[:, 1], away[:, 0]) % np.pi
+        sector = np.minimum((angle / np.pi * _SECTORS).astype(np.int64), _SECTORS - 1)
+        level = 10.0 * np.log10(road.intensity)
+        return cls(place, level - np.median(level), distance[:, 1:], neighbour[:, 1:], sector)
+
+    def describe(self, rows: Index) -> list[float]:
+        """Return the `FEATURES` of the points of a patch."""
+        residual, curvature = _fit_surface(self.place[rows])
+        return [*self._pattern(rows), *self._geometry(rows, residual, curvature), *self._intensity(rows, residual)]
+
+    def _pattern(self, rows: Index) -> list[float]:
+        """Return how the points are spread in plan.
+
+        The ratio of Clark and Evans (1954) is 1 where points lie at random, 2 for a square lattice; the entropy of the
+        directions to the nearest neighbours is 1 where all occur alike.
+        """
+        nearest, second, last = (np.maximum(self.distance[rows, k], 1e-4) for k in (0, 1, _NEIGHBOURS - 1))
+        share = np.bincount(self.sector[rows], minlength=_SECTORS) / len(rows)
+        share = share[share > 0.0]
+        return [
+            2.0 * nearest.mean() * np.sqrt(len(rows)) / EDGE,
+            nearest.std() / nearest.mean(),
+            -(share * np.log(share)).sum() / np.log(_SECTORS),
+            np.median(second / nearest),
+            last.std() / last.mean(),
+        ]
+
+    def _geometry(self, rows: Index, residual: Float, curvature: float) -> list[float]:
+        """Return how the points lie about their plane."""
+        skew, kurtosis = _shape(residual)
+        steps = self.place[self.neighbour[rows, 0], 2] - self.place[rows, 2]
+        spread = max(float(residual.std()), 1e-6)
+        return [1e3 * spread, skew, kurtosis, curvature, float(np.sqrt(np.mean(steps**2))) / spread]
+
+    def _intensity(self, rows: Index, residual: Float) -> list[float]:
+        """Return how the intensities differ within the patch, and from the cloud's median."""
+        level = self.level[rows]
+        skew, kurtosis = _shape(level)
+        low, middle, high = np.quantile(level, (0.25, 0.5, 0.75))
+        apart = self.level[self.neighbour[rows, :3]] - level[:, None]
+        variance = float(level.var())
+        return [
+            high - low,
+            skew,
+            kurtosis,
+            float(np.abs(apart[:, 0]).mean()),
+            0.5 * float(np.mean(apart**2)) / max(variance, 1e-9),
+            _correlation(level, residual),
+            middle,
+        ]
+
+
+def _fit_surface(place: Float) -> tuple[Float, float]:
+    """Return the residuals (N,) of points (N, 3) about their plane, m, and the larger curvature of a parabola, 1/m."""
+    x, y, z = (place - place.mean(axis=0)).T
+    plane = np.stack([np.ones_like(x), x, y], axis=1)
+    parabola = np.concatenate([plane, np.stack([x * x, x * y, y * y], axis=1)], axis=1)
+    residual = z - plane @ np.linalg.lstsq(plane, z, rcond=None)[0]
+    xx, xy, yy = np.linalg.lstsq(parabola, z, rcond=None)[0][3:]
+    return residual, float(np.abs(np.linalg.eigvalsh([[2.0 * xx, xy], [xy, 2.0 * yy]])).max())
+
+
+def _shape(values: Float) -> tuple[float, float]:
+    """Return skewness and kurtosis; 0 of values that are all alike."""
+    spread = values.std()
+    if spread < 1e-9:
+        return 0.0, 0.0
+    scaled = (values - values.mean()) / spread
+    return float(np.mean(scaled**3)), float(np.mean(scaled**4))
+
+
+def _correlation(one: Float, other: Float) -> float:
+    """Return the correlation of two arrays (N,); 0 where one of them doesn't vary."""
+    if one.std() < 1e-9 or other.std() < 1e-9:
+        return 0.0
+    return float(np.corrcoef(one, other)[0, 1])
+
+
+def match_density(one: Patches, other: Patches, seed: int, most: int) -> tuple[Patches, Patches]:
+    """Return as many patches of both, at most so many, whose densities are alike.
+
+    A denser cloud has other statistics for that alone. Which ones are taken is drawn by the seed.
+    """
+    random = np.random.default_rng(seed)
+    chosen: tuple[list[AnyArray], list[AnyArray]] = ([], [])
+    bins = [np.floor(np.log(patches.density) / _STEP).astype(np.int64) for patches in (one, other)]
+    for number in np.intersect1d(*bins):
+        rows = [random.permutation(np.flatnonzero(which == number)) for which in bins]
+        fewer = min(map(len, rows))
+        for taken, its_rows in zip(chosen, rows, strict=True):
+            taken.append(its_rows[:fewer])
+    kept = [np.concatenate([*taken, np.zeros(0, np.int64)]) for taken in chosen]
+    use = random.permutation(len(kept[0]))[:most]
+    return one.select(kept[0][use]), other.select(kept[1][use])

@@ -1,0 +1,72 @@
+"""The result of a comparison as a picture: realism by group, and how each statistic is distributed."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..base.arrays import Float
+from ..base.files import write_file
+from .job import Comparison, DescribedCloud
+from .patches import FEATURES, GROUPS
+
+_COLUMNS = 6
+_BINS = 40
+_SYNTHETIC, _REAL = "#d6681a", "#5b7aa3"
+_INCHES = (15.0, 9.0)
+
+
+def save_picture(result: Comparison, path: Path, overwrite: bool = False) -> None:
+    """Write the picture of a result as PNG.
+
+    Raises:
+        InputError: the file is there already or can't be written.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=_INCHES, layout="constrained")
+    rows = -(-(len(FEATURES) + 1) // _COLUMNS)
+    axes = figure.subplots(rows, _COLUMNS).ravel()
+    _draw_groups(axes[0], result)
+    figure.legend(loc="outside upper center", ncols=2)
+    for number, name in enumerate(FEATURES):
+        _draw_feature(axes[number + 1], result, number, name)
+    for empty in axes[len(FEATURES) + 1 :]:
+        empty.set_axis_off()
+    data = io.BytesIO()
+    figure.savefig(data, format="png", dpi=100)
+    write_file(path, data.getvalue(), overwrite=overwrite)
+
+
+def _draw_groups(axes: Any, result: Comparison) -> None:
+    """Draw the AUC of each group, of synthetic clouds and of real ones."""
+    groups = ["all", *GROUPS]
+    for shift, rows, colour, label in (
+        (-0.2, result.told, _SYNTHETIC, "synthetic"),
+        (0.2, result.yardstick, _REAL, "real, each from the others"),
+    ):
+        auc = [[one.auc[group] for one in rows] for group in groups]
+        axes.barh(np.arange(len(groups)) + shift, np.mean(auc, axis=1), 0.38, color=colour, label=label)
+    axes.set(yticks=range(len(groups)), yticklabels=groups, xlim=(0.5, 1.0), title="told apart (AUC)")
+    axes.invert_yaxis()
+
+
+def _draw_feature(axes: Any, result: Comparison, number: int, name: str) -> None:
+    """Draw how one statistic is distributed over the patches of both kinds."""
+    sides = [_values(clouds, number) for clouds in (result.synthetic, result.real)]
+    low, high = np.quantile(np.concatenate(sides), (0.005, 0.995))
+    edges = np.linspace(low, max(high, low + 1e-9), _BINS)
+    for values, colour in zip(sides, (_SYNTHETIC, _REAL), strict=True):
+        axes.hist(np.clip(values, low, high), edges, density=True, color=colour, alpha=0.6)
+    told, real = result.giveaways()[name]
+    axes.set_title(f"{name.replace('_', ' ')}\nAUC {told:.2f}, real {real:.2f}", fontsize=8)
+    axes.set_yticks([])
+    axes.tick_params(labelsize=7)
+
+
+def _values(clouds: tuple[DescribedCloud, ...], number: int) -> Float:
+    """Return a statistic of all patches of some clouds."""
+    return np.concatenate([one.patches.values[:, number] for one in clouds])
