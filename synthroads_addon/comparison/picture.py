@@ -25,7 +25,7 @@ def save_picture(result: Comparison, path: Path, overwrite: bool = False) -> Non
     Raises:
         InputError: the file is there already or can't be written.
     """
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure  # takes half a second to load: nothing else of the comparison needs it
 
     figure = Figure(figsize=_INCHES, layout="constrained")
     rows = -(-(len(FEATURES) + 1) // _COLUMNS)
