@@ -8,6 +8,7 @@ from contextlib import AbstractContextManager, contextmanager
 from ..materials.table import Material
 from ..scanning.colour.colour import LayerSource
 from ..scanning.colour.request import LayerRequest, material_layers
+from ..scanning.finish import OF_INTENSITY
 from ..scanning.scene.caster import Caster
 from ..scanning.scene.mesh import SceneMesh
 from .cameras import layer_source
@@ -26,6 +27,10 @@ class BlenderServices:
     def materials(self, names: Sequence[str]) -> list[Material]:
         """Return the means of materials of the open file."""
         return list(constants(names).values())
+
+    def reflectance_varies(self, names: Sequence[str]) -> bool:
+        """Return whether some of these materials of the open file reflect otherwise at other places."""
+        return bool(scene_constants(names).varying(OF_INTENSITY))
 
     def layers(self, request: LayerRequest, progress: Callable[[float], None]) -> AbstractContextManager[LayerSource]:
         """Open a source of colours and layers, see `layer_source`."""
@@ -49,6 +54,10 @@ class SnapshotServices:
     def materials(self, names: Sequence[str]) -> list[Material]:
         """Return the means that were read."""
         return list(self._means)
+
+    def reflectance_varies(self, names: Sequence[str]) -> bool:
+        """Return that nothing varies: nothing is rendered here."""
+        return False
 
     @contextmanager
     def layers(self, request: LayerRequest, progress: Callable[[float], None]) -> Iterator[LayerSource]:

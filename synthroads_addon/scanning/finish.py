@@ -18,7 +18,8 @@ from .relief import shift_along_normals
 from .returns import number_returns
 from .scan import BlockResult
 
-_OF_INTENSITY = frozenset({"base_color", "metallic", "specular"})
+OF_INTENSITY = frozenset({"base_color", "metallic", "specular"})
+"""Material layers that an intensity follows from."""
 _DARKEST = 1e-9
 OPTIONAL = optional_arrays()
 
@@ -55,7 +56,7 @@ class Finish:
         """Return a block with its points' colours and layers, and with the intensities that follow from these."""
         plan = self.plan
         values = sample_points(
-            self.source, seen, plan.colour_layers | (_OF_INTENSITY if plan.detects_after_layers else set())
+            self.source, seen, plan.colour_layers | (OF_INTENSITY if plan.detects_after_layers else set())
         )
         changes: dict[str, Any] = {name: values.arrays[name] for name in plan.colour_layers}
         changes["color_source"] = values.source

@@ -44,6 +44,10 @@ class SceneServices(Protocol):
         """Return the means of the scene's materials, in the order of the names."""
         ...
 
+    def reflectance_varies(self, names: Sequence[str]) -> bool:
+        """Return whether some of these materials reflect otherwise at other places."""
+        ...
+
     def layers(self, request: LayerRequest, progress: Callable[[float], None]) -> AbstractContextManager[LayerSource]:
         """Open a source of colours and layers; images are rendered first, and progress gets the share of them."""
         ...

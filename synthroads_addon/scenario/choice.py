@@ -31,7 +31,7 @@ def check_choice(scenario: Scenario, foreign: bool = False) -> None:
     relief = "can't be promised for a relief of another strength than the surfaces': scan.relief must be 1"
     none = "nothing has such an error, as points get no"
     refusals = (
-        ("intensity", colour.intensity_from_layers, layers),
+        ("intensity", colour.intensity_from_layers == "always", layers),
         ("relief", scenario.scan.relief != 1.0, relief),
         ("colour", colour.lighting == "path", paths),
         ("layers", colour.lighting == "path", paths),

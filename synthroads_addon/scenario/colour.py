@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from ..base.schema import ClosedModel, notes, quantity
 from ..scanning.colour.colour import ColourMode, ColourSettings, ColourSource, Engine, Lighting
@@ -93,11 +93,19 @@ class ColourScenario(ClosedModel):
     max_resolution: int = quantity(
         4096, "px", "Largest side of an image.", (16, 16384), only_with={"source": ("auto", "images")}
     )
-    intensity_from_layers: bool = Field(
-        False,
-        description="Intensities from each point's own layers, in place of its material's means.",
-        json_schema_extra=notes(only_with={"source": ("auto", "nodes", "images", "returns")}),
+    intensity_from_layers: Literal["auto", "always", "never"] = Field(
+        "auto",
+        description="Intensities from each point's own layers, in place of its material's means; auto: in scenes that "
+        "were built elsewhere, whose materials say how they vary in no other way.",
+        json_schema_extra=notes(
+            only_with={"source": ("auto", "nodes", "images", "returns")}, labels={"auto": "In Scenes Built Elsewhere"}
+        ),
     )
+
+    @field_validator("intensity_from_layers", mode="before")
+    @classmethod
+    def _yes_or_no(cls, value: Any) -> Any:
+        return {True: "always", False: "never"}[value] if isinstance(value, bool) else value
 
     @model_validator(mode="after")
     def _direct_needs_no_samples(self) -> ColourScenario:

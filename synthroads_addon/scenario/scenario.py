@@ -142,7 +142,7 @@ class Scenario(ClosedModel):
     @property
     def may_render(self) -> bool:
         """Return whether a scan may have to render: whether it does depends on the scene's materials as well."""
-        asked = bool(self.coloured_layers) or self.colour.intensity_from_layers
+        asked = bool(self.coloured_layers) or self.colour.intensity_from_layers == "always"
         return bool(set(self.outputs) & set(OF_POINTS)) and asked and self.colour.source != "material"
 
     def own_materials(self) -> dict[str, Material]:

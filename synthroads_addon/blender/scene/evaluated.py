@@ -30,7 +30,7 @@ from ..model.roads import origin_of, parts_and_copies, road_of_id, world_matrix
 from ..things.model_builder import SUPPORT
 from .changes import Changes
 from .reading import MeshCopy, MeshPart, Places, SceneTables, copy_mesh, join_parts, slot_names
-from .values import ObjectValues, asked_by_material, object_values
+from .values import ObjectValues, asked_by_material, object_values, random_number
 
 Float = NDArray[np.float64]
 Source: TypeAlias = bpy.types.Depsgraph | bpy.types.Scene | None
@@ -346,7 +346,7 @@ class _Reading:
             places.matrices.fromlist(matrix)
             places.labels.append(about.label)
             if about.values is not None:
-                places.objects.append(about.values.rows(use.random_id, (matrix[3], matrix[7], matrix[11])))
+                places.objects.append(about.values.rows(random_number(use), (matrix[3], matrix[7], matrix[11])))
 
     def _look(self, item: bpy.types.Object, owner: bpy.types.Object) -> _MeshUse | None:
         """Return what is known of an evaluated object and its owner; None if they aren't scanned."""

@@ -29,6 +29,7 @@ _READ = {
     "BYTE_COLOR": ("color", 4),
 }
 """Property of an attribute's values by its type, and its numbers."""
+_BITS = 0xFFFFFFFF
 _DOMAINS = {"POINT": "point", "CORNER": "corner", "FACE": "face"}
 
 
@@ -71,7 +72,7 @@ def _mesh_value(mesh: bpy.types.Mesh, what: SurfaceInput, undeformed: bool) -> M
         number = colors.render_color_index
         name = what.name or (colors[number].name if 0 <= number < len(colors) else "")
         return _attribute(mesh, name)
-    if what.kind == "normal":
+    if what.kind in ("normal", "object_normal"):
         normals = np.empty((len(mesh.loops), 3), np.float32)
         mesh.corner_normals.foreach_get("vector", normals.ravel())
         return MeshValues(_four(normals), "corner")
@@ -165,6 +166,32 @@ def _property(item: bpy.types.Object, what: SurfaceInput) -> tuple[float, ...] |
                 return (float(np.mean(numbers[:3])),) * 3 + (1.0,)
             return (*numbers, *(0.0, 0.0, 0.0, 1.0)[len(numbers) :])
     return None
+
+
+def random_number(use: bpy.types.DepsgraphObjectInstance) -> int:
+    """Return the number of 32 bits that Cycles takes for an object's chance: an instance's own, else of its name."""
+    if use.is_instance:
+        return int(use.random_id) % 2**32
+    number = 0
+    for byte in use.object.name.encode():
+        number = (number * 37 + byte) & _BITS
+    return _mixed(number)
+
+
+def _mixed(number: int) -> int:
+    """Return a number's hash with 0 by Bob Jenkins' lookup3, as Cycles has it."""
+    c = b = (0xDEADBEEF + (2 << 2) + 13) & _BITS
+    a = (b + number) & _BITS
+    for into, turn in ((2, 14), (0, 11), (1, 25), (2, 16), (0, 4), (1, 14), (2, 24)):
+        last = (c, a, b)[into]
+        turned = ((last << turn) | (last >> (32 - turn))) & _BITS
+        if into == 0:
+            a = ((a ^ c) - turned) & _BITS
+        elif into == 1:
+            b = ((b ^ a) - turned) & _BITS
+        else:
+            c = ((c ^ b) - turned) & _BITS
+    return c
 
 
 def object_values(

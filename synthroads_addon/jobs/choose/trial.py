@@ -73,7 +73,7 @@ class Trial:
     def of(cls, site: Site, scene: ScannedScene) -> Trial:
         """Prepare to scan a scene; builds the casters."""
         quiet = site.scenario.scan.model_copy(update={"noise": Noise(range_sigma=0.0)})
-        colour = site.scenario.colour.model_copy(update={"intensity_from_layers": False})
+        colour = site.scenario.colour.model_copy(update={"intensity_from_layers": "never"})
         scenario = site.scenario.model_copy(update={"scan": quiet, "colour": colour})
         site = replace(site, scenario=scenario, view=None)
         return cls(site, site.plan(scene, BlenderServices()))

@@ -78,13 +78,14 @@ def plan_scan(
     scene = classify_scene(scene, scenario.cloud.scheme(), conditions.road)
     kept, coloured, rings = scenario.kept_layers, scenario.coloured_layers, scenario.beam_rings
     scan, settings, table = scenario.scan, scenario.settings(), scenario.own_materials()
-    by_layers, shifts = scenario.colour.intensity_from_layers, scan.relief > 0.0
+    materials, shifts = scene.static.materials, scan.relief > 0.0
+    by_layers = _intensity_from_layers(scenario, conditions, services, materials)
     colour = scenario.colour.settings(scenario.fidelity, path.typical_range)
     setting, loss = scanner_setting(scan), scan.attenuation
     weather = scan.weather or weather_of(conditions.environment)
     cut = Blocks(setting, path, 1 + sum(rings))
     refuse_large(forecast_scan(cut, len(scene.static), scan.threads), scan.most_pulses)
-    materials, means = scene.static.materials, services.materials(scene.static.materials)
+    means = services.materials(materials)
     target = Target(scene, lambda mesh: services.caster(scan.caster, mesh))
     relief = micro_relief(materials, means) if shifts else None
     scanned = [
@@ -127,6 +128,16 @@ def plan_scan(
         ),
         services=services,
     )
+
+
+def _intensity_from_layers(
+    scenario: Scenario, conditions: ScanConditions, services: SceneServices, materials: tuple[str, ...]
+) -> bool:
+    """Return whether intensities come from the points' own layers: where nothing is said, in scenes of others."""
+    asked = scenario.colour.intensity_from_layers
+    if asked != "auto":
+        return asked == "always"
+    return conditions.road is None and scenario.colour.source != "material" and services.reflectance_varies(materials)
 
 
 @dataclass(frozen=True)

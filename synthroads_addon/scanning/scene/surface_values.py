@@ -62,8 +62,8 @@ class PartValues:
     values: Mapping[SurfaceInput, MeshValues]
 
 
-_OF_FRAME = ("object", "object_normal")
-"""Kinds of inputs that follow from the place of a part."""
+_NORMALS = ("normal", "object_normal")
+"""Kinds of inputs that are normals of the shading: in the scene mesh's frame, and in the part's own."""
 
 
 @dataclass(frozen=True)
@@ -96,38 +96,43 @@ class SurfaceValues:
             if not len(mine):
                 continue
             use, triangle = np.divmod(number[mine] - part.first, len(part.corners))
-            if what.kind in _OF_FRAME:
-                values = _in_frame(part, use, place[mine], normal[mine], what.kind)
+            if what.kind == "object":
+                values = _in_frame(part, use, place[mine])
             else:
                 values = _interpolate(part, what, use, triangle, shares[mine])
-                if values is not None and what.kind == "normal":
-                    values[:, :3] = _turned(part, use, values[:, :3], normal[mine])
+                if values is not None and what.kind in _NORMALS:
+                    values[:, :3] = _turned(part, use, values[:, :3], normal[mine], what.kind == "normal")
             if values is not None:
                 result[mine], found[mine] = values, True
         return result, found
 
 
-def _in_frame(part: PartValues, use: Index, place: Float, normal: Float, kind: str) -> Float32 | None:
-    """Return places, or normals, (H, 3) in the frame of the part itself as (H, 4)."""
+def _in_frame(part: PartValues, use: Index, place: Float) -> Float32 | None:
+    """Return places (H, 3) in the frame of the part itself as (H, 4)."""
     if part.frames is None:
         return None
     result = np.zeros((len(use), 4), np.float32)
-    if kind == "object":
-        inverse = np.linalg.inv(part.frames[:, :3, :3])[use]
-        result[:, :3] = np.einsum("nij,nj->ni", inverse, place - part.frames[use, :3, 3])
-    else:
-        turned = np.einsum("nji,nj->ni", part.frames[use, :3, :3], normal)
-        result[:, :3] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
+    inverse = np.linalg.inv(part.frames[:, :3, :3])[use]
+    result[:, :3] = np.einsum("nij,nj->ni", inverse, place - part.frames[use, :3, 3])
     return result
 
 
-def _turned(part: PartValues, use: Index, normal: Float32, towards: Float) -> Float:
-    """Return normals (H, 3) of the part itself in the mesh's frame, on the side that ``towards`` (H, 3) points to."""
+def _turned(part: PartValues, use: Index, normal: Float32, towards: Float, into_mesh: bool) -> Float:
+    """Return normals (H, 3) of the part on the side that ``towards`` (H, 3), in the mesh's frame, points to.
+
+    Args:
+        part: the part.
+        use: (H,) places of it.
+        normal: (H, 3) in its own frame.
+        towards: (H, 3).
+        into_mesh: return them in the mesh's frame; else in its own.
+    """
     assert part.frames is not None
     inverse = np.linalg.inv(part.frames[:, :3, :3])[use]
-    result = np.einsum("nji,nj->ni", inverse, normal)
-    result /= np.maximum(np.linalg.norm(result, axis=1, keepdims=True), 1e-12)
-    return np.asarray(result * np.where(np.einsum("ij,ij->i", result, towards) < 0.0, -1.0, 1.0)[:, None])
+    turned = np.einsum("nji,nj->ni", inverse, normal)
+    sign = np.where(np.einsum("ij,ij->i", turned, towards) < 0.0, -1.0, 1.0)
+    result = turned if into_mesh else normal.astype(np.float64)
+    return np.asarray(result * (sign / np.maximum(np.linalg.norm(result, axis=1), 1e-12))[:, None])
 
 
 def _interpolate(part: PartValues, what: SurfaceInput, use: Index, triangle: Index, shares: Float) -> Float32 | None:

@@ -44,6 +44,9 @@ class StandIns:
         self.asked.append(("caster", name))
         return BruteForce(mesh)
 
+    def reflectance_varies(self, names: Sequence[str]) -> bool:
+        return False
+
     def materials(self, names: Sequence[str]) -> list[Material]:
         return [materials()[name] for name in names]
 

@@ -1,0 +1,84 @@
+"""Scenes of others with image textures: every point has its own place's colour, and an intensity that follows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+import laspy
+import numpy as np
+import pytest
+
+from synthroads_addon.blender.files import empty_file
+from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
+from synthroads_addon.materials.reflectance import reflectivity
+from synthroads_addon.scenario.scenario import load_scenario
+from tests.helpers.scenes.checkered_scene import build_checkered_scene, expected_colors
+
+SCAN = ["scan.lines_per_second=200", "scan.noise.range_sigma=0", "scan.relief=0"]
+SCAN += ["scan.rays_per_pulse=1", 'outputs=["cloud"]', "colour.mode=unlit", "cloud.intensity=range_corrected"]
+SCAN += ["scan.reflection=lambert", 'cloud.attributes=["incidence","color_source"]']
+
+
+def scanned(folder: Path, scene: Path | None, *changes: str) -> tuple[dict[str, Any], laspy.LasData]:
+    scenario = load_scenario("tripod-200m", [*SCAN, *changes])
+    job = SceneScan(scenario, folder, scene, tripods=((10.0, 0.0, 8.0),))
+    report = scan_scene(job)
+    return report, laspy.read(folder / "cloud.laz")
+
+
+@pytest.mark.parametrize("suffix", [".blend", ".glb"])
+def test_points_have_their_fields_colour_and_its_luminance(tmp_path: Path, suffix: str) -> None:
+    empty_file()
+    build_checkered_scene(tmp_path)
+    path = tmp_path / f"scene{suffix}"
+    if suffix == ".blend":
+        bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    else:
+        bpy.ops.export_scene.gltf(filepath=str(path))
+    report, cloud = scanned(tmp_path / "out", path)
+    place = np.asarray(cloud.xyz)
+    assert len(place) > 3000
+    assert report["counts"]["points_by_colour_source"] == {"nodes": 1.0}
+    expected, edge = expected_colors(place)
+    inside = edge > 0.02
+    stored = np.stack([np.asarray(cloud[name]) for name in ("red", "green", "blue")], axis=1) / 65535.0
+    linear = np.where(stored <= 0.04045, stored / 12.92, ((stored + 0.055) / 1.055) ** 2.4)
+    assert np.abs(linear - expected)[inside].max() < 0.002
+    cosine = np.cos(np.deg2rad(np.asarray(cloud["incidence"], float)))
+    bright = np.asarray(cloud.intensity, float) / cosine
+    wanted = reflectivity(expected.astype(np.float32), np.zeros(len(place)), np.zeros(len(place)))
+    ratio = bright[inside] / wanted[inside]
+    assert ratio.std() < 0.01 * ratio.mean()
+    assert wanted[inside].std() > 0.2 * wanted[inside].mean(), "fields differ"
+
+
+LIT = ["colour.mode=lit", "scan.lines_per_second=800"]
+
+
+def shaded_scene(folder: Path) -> None:
+    """Make the boards with a cube above one of them."""
+    empty_file()
+    build_checkered_scene(folder)
+    bpy.ops.mesh.primitive_cube_add(size=2.0, location=(10.0, 3.0, 2.0))
+
+
+@pytest.mark.any_blender
+def test_threads_change_no_byte(tmp_path: Path) -> None:
+    shaded_scene(tmp_path)
+    one, three = (scanned(tmp_path / name, None, *LIT, f"scan.threads={name}")[1] for name in ("1", "3"))
+    assert one.points.array.tobytes() == three.points.array.tobytes()
+    dark = np.asarray(one.green, float) < 0.75 * np.median(np.asarray(one.green))
+    assert dark.any(), "the cube throws a shadow"
+
+
+@pytest.mark.slow
+def test_casters_give_the_same_colours(tmp_path: Path) -> None:
+    shaded_scene(tmp_path)
+    one, other = (scanned(tmp_path / name, None, *LIT, f"scan.caster={name}")[1] for name in ("embree", "bvhtree"))
+    assert len(other) == len(one)
+    same = np.ones(len(one), bool)
+    for name in ("red", "green", "blue", "intensity"):
+        same &= np.asarray(one[name]) == np.asarray(other[name])
+    assert same.mean() > 0.9995
