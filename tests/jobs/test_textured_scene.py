@@ -54,7 +54,7 @@ def test_points_have_their_fields_colour_and_its_luminance(tmp_path: Path, suffi
     assert wanted[inside].std() > 0.2 * wanted[inside].mean(), "fields differ"
 
 
-LIT = ["colour.mode=lit", "scan.lines_per_second=800"]
+LIT = ["colour.mode=lit", "scan.lines_per_second=420"]
 
 
 def shaded_scene(folder: Path) -> None:
