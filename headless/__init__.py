@@ -8,11 +8,12 @@ import sys
 import threading
 import time
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 from types import FrameType, TracebackType
 
 INTERRUPTED = "interrupted; nothing was left half-written"
+MAPPING_FAILED = "failed to map segment"
+"""Part of what the system says where a library doesn't fit into memory."""
 _stopped = False
 _AGAIN = 0.05
 """Seconds until an interrupt that came inside a callback is tried again."""
@@ -22,7 +23,7 @@ _ended_at = -math.inf
 _OPERATORS = str(Path("modules", "bpy", "ops.py"))
 
 
-_ENDS = ("SIGINT", "SIGTERM", "SIGHUP")
+ENDS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 """Signals by which a command is ended: Ctrl-C; a container, Slurm or `kill`; a terminal or connection that goes."""
 
 
@@ -47,9 +48,9 @@ def _stop(number: int, frame: FrameType | None) -> None:
 
 def finish_in_peace() -> None:
     """Hear no more signals: the process has nothing left to do but to clean up and end."""
-    for name in filter(partial(hasattr, signal), _ENDS):
+    for number in ENDS:
         with suppress(ValueError):  # not in the main thread
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
+            signal.signal(number, signal.SIG_IGN)
 
 
 def _in_callback(frame: FrameType | None) -> bool:
@@ -63,7 +64,11 @@ def _in_callback(frame: FrameType | None) -> bool:
 
 
 def _end_quietly(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-    """End as `headless.commands.leave` does where the user stops a command that is still loading its parts."""
+    """End as `headless.commands` does where a command that is still loading is stopped, or lacks the memory for it."""
+    if not _stopped and (isinstance(error, MemoryError) or MAPPING_FAILED in str(error)):
+        with suppress(OSError):
+            print(f"error: too little memory ({str(error)[-200:] or 'it is full'})", file=sys.stderr, flush=True)
+        os._exit(2)
     if not issubclass(kind, KeyboardInterrupt) and not _stopped:
         sys.__excepthook__(kind, error, trace)
         return
@@ -75,7 +80,7 @@ def _end_quietly(kind: type[BaseException], error: BaseException, trace: Traceba
 _started = Path(sys.argv[0]) if sys.argv else Path()
 if _started.name in ("-m", "synthroads") or _started.parent.name == "headless":  # a command, not a library
     sys.excepthook = _end_quietly
-    for _name in filter(partial(hasattr, signal), _ENDS):
+    for _number in ENDS:
         # One that is ignored stays so: `nohup` and a shell's background jobs ask for that.
-        if signal.getsignal(getattr(signal, _name)) in (signal.default_int_handler, signal.SIG_DFL):
-            signal.signal(getattr(signal, _name), _stop)
+        if signal.getsignal(_number) in (signal.default_int_handler, signal.SIG_DFL):
+            signal.signal(_number, _stop)

@@ -16,9 +16,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from headless import INTERRUPTED, finish_in_peace, was_stopped
+from headless import INTERRUPTED, MAPPING_FAILED, finish_in_peace, was_stopped
 from headless.messages import messages
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.machine import prepare_memory
 from synthroads_addon.base.scratch.folders import remove_scratch_folders, temporary_files_in_scratch
 
 
@@ -265,6 +266,7 @@ def run(action: Callable[[argparse.Namespace], Outcome], arguments: argparse.Nam
     """Run an action and print of its outcome what was asked for; turn errors into one line and an exit code."""
     try:
         with _without_blenders_chatter(), messages(arguments):
+            prepare_memory()
             code, result, text = action(arguments)
         if arguments.json:
             print(canonical_json(result), end="")
@@ -302,7 +304,8 @@ def _line_of(error: Exception) -> str | None:
 def _shortage(error: Exception) -> str | None:
     """Return what to say of an error by which a machine tells that it is too small; None of any other."""
     text = " ".join(str(error).split())
-    if isinstance(error, MemoryError) or any(sign in text for sign in _MEMORY_SIGNS):
+    full = isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM
+    if full or any(sign in text for sign in _MEMORY_SIGNS):
         return f"too little memory ({text[:200] or 'it is full'}); nothing was left half-written"
     if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
         return f"{error.filename or 'a file'} cannot be opened ({error.strerror}); ulimit -n raises the limit"
@@ -312,7 +315,10 @@ def _shortage(error: Exception) -> str | None:
     return None
 
 
-_MEMORY_SIGNS = ("can't allocate memory", "out of memory", "can't start new thread", "bad_alloc")
+_MEMORY_SIGNS = (
+    *("can't allocate memory", "annot allocate memory", "out of memory", "can't start new thread", "bad_alloc"),
+    MAPPING_FAILED,
+)
 """Parts of the errors by which libraries in other languages tell that memory is short."""
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 
@@ -335,8 +341,18 @@ def entry(name: str) -> None:
     leave(lambda: command(name, argv))
 
 
-def leave(action: Callable[[], int]) -> None:
-    """Run an action and end the process with its exit code, without Blender's teardown."""
+def leave(action: Callable[[], int], supervised: bool = True) -> None:
+    """Run an action and end the process with its exit code, without Blender's teardown.
+
+    Args:
+        action: returns the exit code.
+        supervised: whether it is done in a process of its own, where the system has them, so that an end by a signal
+            is one line too; not for what another process of ours waits for.
+    """
+    if supervised and sys.platform == "linux":
+        from headless.supervision import supervise  # only Unix has what it needs
+
+        supervise()
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # names of files may hold what the terminal's encoding doesn't
             stream.reconfigure(errors="backslashreplace")

@@ -352,8 +352,12 @@ class DatasetRun:
             with suppress(FileNotFoundError):  # of a lost worker there is none
                 (outcome.folder / "log.txt").replace(self.folder / "logs" / f"{job.name}.txt")
             logger.error("failed: %s: %s", job.name, outcome.error)
-        append_record(self.folder, entry)
-        self.entries[job.name] = entry
+        self.entries[job.name] = entry  # first: where the run is stopped before the next line, `_abandon` keeps it
+        try:
+            append_record(self.folder, entry)
+        except OSError:
+            del self.entries[job.name]
+            raise
         # Until now `_published_folders` knows what is where.
         work = self.folder / WORK
         shutil.rmtree(work / outcome.folder.relative_to(work).parts[0], ignore_errors=True)
@@ -369,7 +373,7 @@ class DatasetRun:
             for path in self._unknown():
                 remove(path)
             shutil.rmtree(self.folder / WORK, ignore_errors=True)
-            fold_records(self.folder)
+            write_manifest(self.folder, self._manifest())
 
     def _close(self) -> None:
         """Write what describes the whole."""

@@ -5,11 +5,14 @@ The first one is the command's own. It starts the others, which read the same ru
 
 from __future__ import annotations
 
+import os
+import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from datetime import timedelta
 from pathlib import Path
+from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
 import torch
@@ -17,12 +20,16 @@ from torch import Tensor, distributed, multiprocessing
 from torch._C._distributed_c10d import FileStore
 
 from synthroads_addon.base.errors import InputError, SynthRoadsError
+from synthroads_addon.base.scratch.folders import remove_scratch_folders
 
 if TYPE_CHECKING:
     from .runs import Run
 
 _MEETING = timedelta(minutes=10)
 """How long one waits for the others to begin."""
+_GRACE = 60.0
+"""Seconds in which this process has to notice by itself that another one was lost; over NCCL it waits on instead."""
+_LOST = "one was lost: is memory short? --resume goes on"
 _PATIENCE = timedelta(days=2)
 """How long for each later step: the first scores the validation data alone."""
 
@@ -74,6 +81,8 @@ def helpers(run: Run[Any], learn: Callable[[Run[Any]], object], device: torch.de
         ]
         for other in others:
             other.start()
+        done = Event()
+        Thread(target=_end_without, args=(others, done), daemon=True).start()
         try:
             _join(meeting, 0, count, device.type)
             yield
@@ -84,12 +93,34 @@ def helpers(run: Run[Any], learn: Callable[[Run[Any]], object], device: torch.de
                 other.join(1.0)
             if all(other.is_alive() for other in others):
                 raise
-            raise InputError("processes", count, "one was lost: is memory short? --resume goes on") from error
+            raise InputError("processes", count, _LOST) from error
         finally:
+            done.set()
             for other in others:
                 other.kill()
             if distributed.is_initialized():
                 distributed.destroy_process_group()
+
+
+def _end_without(others: Sequence[Any], done: Event) -> None:
+    """End this process, in one line, where another one was lost and it waits for that in a library.
+
+    NCCL does so up to `_PATIENCE`, and nothing that is raised meanwhile reaches it.
+
+    Args:
+        others: processes that train with this one.
+        done: set when this one waits for none of them any more.
+    """
+    while not done.wait(1.0):
+        if any(other.exitcode for other in others):
+            break
+    if not done.wait(_GRACE):
+        sys.stderr.write(f"error: {InputError('processes', len(others) + 1, _LOST)}\n")
+        sys.stderr.flush()
+        for other in others:
+            other.kill()
+        remove_scratch_folders()
+        os._exit(2)
 
 
 def _check_devices(count: int, device: str) -> None:

@@ -8,7 +8,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from .errors import InputError, MissingFileError, OutputError, nearest_name
-from .scratch.folders import ASIDE, NEW, REPORT, names_to_move, scratch_folder
+from .scratch.folders import ASIDE, NEW, REPORT, names_to_move, record_folder, scratch_folder
 
 PRESETS = Path(__file__).parents[1] / "presets"
 """Folder of the shipped data: classes, materials, signs, devices, scenarios, recipes, assets."""
@@ -124,6 +124,7 @@ def output_folder(target: Path, names: Iterable[str], overwrite: bool) -> Iterat
         try:
             target.mkdir(parents=True, exist_ok=True)
             if made:
+                record_folder(target)
                 stack.callback(_remove_if_empty, target)
             scratch = stack.enter_context(scratch_folder(target))
             (work := scratch / NEW).mkdir()

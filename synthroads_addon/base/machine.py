@@ -1,9 +1,15 @@
 """The machine that something was measured on, in words."""
 
+import mmap
 import os
 import platform
 from collections.abc import Mapping
 from pathlib import Path
+
+import numpy as np
+
+LEAST_MEMORY = 128 << 20
+"""Bytes of memory without which no command is begun."""
 
 
 def machine(versions: Mapping[str, str]) -> str:
@@ -23,6 +29,22 @@ def physical_memory() -> int | None:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):
         return None
+
+
+def prepare_memory() -> None:
+    """Refuse to begin where hardly any memory can be had, and have linear algebra take what it needs of it.
+
+    OpenBLAS tries for ever to get its buffer, where it can't, and takes it when it is first needed.
+
+    Raises:
+        MemoryError: less than `LEAST_MEMORY` can be had.
+    """
+    try:
+        mmap.mmap(-1, LEAST_MEMORY).close()
+    except OSError:
+        raise MemoryError(f"less than {LEAST_MEMORY >> 20} MB can be had") from None
+    square = np.ones((256, 256))
+    square @ square
 
 
 def _processor() -> str:

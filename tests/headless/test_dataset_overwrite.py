@@ -28,6 +28,7 @@ from synthroads_addon.dataset import manifest as manifest_module
 from synthroads_addon.dataset.manifest import (
     RECORDS,
     Manifest,
+    SceneEntry,
     append_record,
     faults,
     file_entries,
@@ -270,17 +271,30 @@ def test_a_scene_is_recorded_when_it_is_done_and_what_stands_is_told_at_any_time
     assert content(folder) == whole
 
 
-@pytest.mark.parametrize("fault", [KeyboardInterrupt, OSError])
+@pytest.mark.parametrize(
+    ("fault", "recorded", "stand"), [(KeyboardInterrupt, False, 3), (KeyboardInterrupt, True, 3), (OSError, False, 2)]
+)
 def test_a_run_that_is_stopped_leaves_whole_scenes_and_nothing_else(
-    tmp_path: Path, fault: type[BaseException], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, fault: type[BaseException], recorded: bool, stand: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Before or after it records its third scene, whose folders are in their places; or that can't be recorded."""
     folder = tmp_path / "set"
+
+    def stopped(folder: Path, entry: SceneEntry) -> None:
+        if recorded or entry.name != "a-03":
+            append_record(folder, entry)
+        if entry.name == "a-03":
+            raise fault
+
     with monkeypatch.context() as patched:
-        patched.setattr(dataset_run, "append_record", raising(dataset_run.append_record, 2, fault))
+        patched.setattr(dataset_run, "append_record", stopped)
         with pytest.raises((KeyboardInterrupt, OutputError)):
             make(folder, OLD)
-    assert [scene.name for scene in read_manifest(folder).scenes] == ["a-01", "a-02"]
-    assert {path.name for path in (folder / "scenes").iterdir()} == {"a-01", "a-02"}
+    names = ["a-01", "a-02", "a-03"][:stand]
+    scenes = read_manifest(folder).scenes
+    assert [scene.name for scene in scenes] == names
+    assert not faults(folder, scenes)
+    assert sorted(path.name for path in (folder / "scenes").iterdir()) == names
     assert {path.name for path in folder.glob(".*")} == {".lock"}
     make(folder, OLD, resume=True)
     make(tmp_path / "whole", OLD)

@@ -207,11 +207,16 @@ def test_interrupted_at_any_moment_it_says_so_and_goes_on(kind: str, data: Path,
     assert codes.count(130) >= ROUNDS // 2, codes
 
 
-def workers_of(process: int) -> list[int]:
+def begun_by(process: int) -> list[int]:
     """Return the processes that a process has begun."""
     with suppress(OSError):
         return [int(child) for child in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
     return []
+
+
+def workers_of(process: int) -> list[int]:
+    """Return the processes that a command's work has begun, which is done in a process of its own."""
+    return [worker for work in begun_by(process) for worker in begun_by(work)]
 
 
 def test_a_lost_worker_is_one_line_and_the_training_goes_on_when_resumed(data: Path, tmp_path: Path) -> None:

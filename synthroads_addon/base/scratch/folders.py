@@ -30,6 +30,8 @@ _UNREADABLE = 60.0
 """Age, s, at which a lock file without an owner is one whose process was killed in the moment of writing it."""
 _mine: dict[Path, int] = {}
 """This process's scratch folders that still stand, and the descriptors of their locks."""
+_journal: int | None = None
+"""Descriptor of the file that names the folders which this process makes, for one that outlives it."""
 
 
 @contextmanager
@@ -79,7 +81,7 @@ def _use_for_temporary_files(variables: dict[str, str | None], folder: str | Non
 
 def temporary_folder_error(folder: Path, error: Exception) -> OutputError:
     """Return the error of a temporary folder to which something couldn't be written."""
-    reason, place = getattr(error, "strerror", None) or "is the disk full?", folder
+    reason, place = getattr(error, "strerror", None) or "is the disk or the memory full?", folder
     while _NAME.fullmatch(place.name):
         place = place.parent
     return OutputError("temporary folder", str(place), f"cannot be written ({reason}); TMPDIR names another")
@@ -100,6 +102,29 @@ def remove_scratch_folders() -> None:
         _remove(folder)
 
 
+def record_folders_in(descriptor: int) -> None:
+    """Have each scratch and output folder that this process makes named in an open file."""
+    global _journal
+    _journal = descriptor
+
+
+def record_folder(folder: Path) -> None:
+    """Name a folder that was just made in the file of `record_folders_in`, if there is one."""
+    if _journal is not None:
+        os.write(_journal, os.fsencode(folder.absolute()) + b"\0")
+
+
+def remove_recorded_folders(descriptor: int) -> None:
+    """Remove what a dead process made and named in an open file: scratch folders, and others that are empty."""
+    paths = os.pread(descriptor, os.fstat(descriptor).st_size, 0).split(b"\0")[:-1]
+    for folder in (Path(os.fsdecode(path)) for path in reversed(paths)):
+        with suppress(OSError):
+            if _NAME.fullmatch(folder.name):
+                _remove_leftover(folder)
+            else:
+                folder.rmdir()
+
+
 def _is_ours(folder: Path) -> bool:
     """Return whether this process made a scratch folder, and not the one that it was forked from."""
     return folder.name.split("-")[1] == str(os.getpid())
@@ -109,6 +134,7 @@ def _make_folder(parent: Path, prefix: str) -> Path:
     """Make a scratch folder with its lock file; one that is empty still may be taken for a leftover: then anew."""
     while True:
         folder = Path(tempfile.mkdtemp(prefix=f"{prefix}{os.getpid()}-", dir=parent))
+        record_folder(folder)
         try:
             lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o644)
         except FileNotFoundError:

@@ -50,6 +50,7 @@ class Owner:
         start: when it started, in clock ticks since the boot; 0 where the system doesn't tell. A number that was given
             to another process after the owner's end has another start.
         locked: whether the file that says so is locked as long as the owner lives.
+        space: namespace of the number, which containers have of their own; empty where the system tells none.
     """
 
     host: str
@@ -57,6 +58,7 @@ class Owner:
     pid: int
     start: int
     locked: bool = False
+    space: str = ""
 
     def to_json(self) -> str:
         """Return the owner as one line of JSON."""
@@ -69,14 +71,14 @@ def read_owner(text: str) -> Owner | None:
         owner = Owner(**json.loads(text))
     except (ValueError, TypeError):
         return None
-    kinds = {"host": str, "boot": str, "pid": int, "start": int, "locked": bool}
+    kinds = {"host": str, "boot": str, "pid": int, "start": int, "locked": bool, "space": str}
     return owner if all(isinstance(getattr(owner, name), kind) for name, kind in kinds.items()) else None
 
 
 def this_process(locked: bool = False) -> Owner:
     """Return the calling process as an owner."""
     pid = os.getpid()
-    return Owner(socket.gethostname(), _boot_id(), pid, _start_of(pid) or 0, locked)
+    return Owner(socket.gethostname(), _boot_id(), pid, _start_of(pid) or 0, locked, _space())
 
 
 def is_dead(owner: Owner, lock: bool | None) -> bool:
@@ -95,6 +97,8 @@ def is_dead(owner: Owner, lock: bool | None) -> bool:
         return False
     if owner.boot != _boot_id():
         return True
+    if owner.space and owner.space != _space():  # another container of the same name: its numbers aren't ours
+        return False
     start = _start_of(owner.pid)
     return start is None or start != owner.start
 
@@ -103,6 +107,13 @@ def is_dead(owner: Owner, lock: bool | None) -> bool:
 def _boot_id() -> str:
     try:
         return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
+    except OSError:  # not Linux
+        return ""
+
+
+def _space() -> str:
+    try:
+        return str(Path("/proc/self/ns/pid").readlink())
     except OSError:  # not Linux
         return ""
 

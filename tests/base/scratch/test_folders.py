@@ -96,6 +96,8 @@ def test_what_no_process_of_ours_left_stays(tmp_path: Path) -> None:
         ({"boot": "another"}, True),
         ({"host": "another"}, False),  # it may live: nothing is known of it
         ({"host": "another", "boot": "another"}, False),
+        ({"pid": 2**22 + 5, "space": "pid:[1]"}, False),  # another container's number
+        ({"pid": 2**22 + 5, "space": ""}, True),  # written before there were any
     ],
 )
 def test_an_owner_without_locks_is_known_by_its_number_and_start(

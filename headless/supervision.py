@@ -1,0 +1,135 @@
+"""A command's work in a process of its own: however the system ends that, one line is said and nothing is left.
+
+Where memory is short libraries in other languages abort or crash, and the system kills; no Python code of the process
+itself can answer then. So the command's own process waits, with nothing loaded that could fail, hands signals on, and
+cleans up. On Linux alone; elsewhere the work is done in the process that was begun.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import resource
+import signal
+import sys
+import threading
+from contextlib import suppress
+from typing import NoReturn
+
+from headless import ENDS
+from synthroads_addon.base.scratch.folders import record_folders_in, remove_recorded_folders
+
+LOSSES = ("bad_alloc", "alloc returns null", "annot allocate memory", "emory allocation", "Thread creation failed")
+"""Parts of what libraries write on standard error where memory is short."""
+_BEGINNINGS = ("terminate called", "Fatal Python error", *LOSSES)
+"""Parts of the first line of what they write before they end the process."""
+_DEATH_SIGNAL = 1
+"""Linux's PR_SET_PDEATHSIG."""
+
+
+def supervise() -> None:
+    """Go on in a copy of this process; this one waits for it, cleans up, and ends with its exit code.
+
+    An end by the system is told in a line, as exit code 2 where memory is short and 1 where it isn't. Within Blender,
+    and beside other threads, of which a copy would have none, nothing is done.
+    """
+    if "bpy" in sys.modules or threading.active_count() > 1:
+        return
+    journal = os.memfd_create("synthroads")
+    spoken = _Spoken()
+    handlers = {number: signal.getsignal(number) for number in ENDS}
+    signal.pthread_sigmask(signal.SIG_BLOCK, ENDS)
+    child = os.fork()
+    if child:
+        _wait(child, spoken, journal)
+    _die_with(os.getppid())
+    spoken.speak()
+    record_folders_in(journal)
+    for number, handler in handlers.items():
+        signal.signal(number, handler)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDS)
+
+
+def _die_with(parent: int) -> None:
+    """Have the system kill this process when its parent ends, which may have happened already."""
+    ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
+    if os.getppid() != parent:
+        os._exit(130)
+
+
+def _wait(child: int, spoken: _Spoken, journal: int) -> NoReturn:
+    """Wait for the process that does the work, and end as it did."""
+
+    def hand_on(number: int, _: object) -> None:
+        with suppress(ProcessLookupError):
+            os.kill(child, number)
+
+    for number in ENDS:
+        if signal.getsignal(number) != signal.SIG_IGN:
+            signal.signal(number, hand_on)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDS)
+    listening = threading.Thread(target=spoken.listen, daemon=True)
+    listening.start()
+    _, status = os.waitpid(child, 0)
+    listening.join(1.0)  # a process that the work has begun may still hold the other end
+    code = os.waitstatus_to_exitcode(status)
+    short = code < 0 and _memory_is_short(-code, spoken.held)
+    if code < 0:
+        remove_recorded_folders(journal)
+        _say(_line(-code, short))
+        code = 2 if short else 1
+    elif code != 2:  # else a line says it all
+        _say(spoken.held)
+    os._exit(code)
+
+
+def _memory_is_short(number: int, said: str) -> bool:
+    """Return whether a process that was ended by a signal probably had too little memory."""
+    limits = [resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_DATA)]
+    limited = any(limit != resource.RLIM_INFINITY for limit in limits)
+    return number == signal.SIGKILL or limited or any(sign in said for sign in LOSSES)
+
+
+def _line(number: int, short: bool) -> str:
+    name = signal.Signals(number).name
+    if short:
+        return f"error: too little memory (the work was ended by {name}); nothing was left half-written\n"
+    return f"error: a defect of a library ended the work ({name}); nothing was left half-written\n"
+
+
+def _say(text: str) -> None:
+    with suppress(OSError):  # the terminal is gone
+        os.write(2, text.encode(errors="backslashreplace"))
+
+
+class _Spoken:
+    """A pipe for what libraries write on standard error: handed on, but for what they say of the end that they make.
+
+    Attributes:
+        held: what wasn't handed on.
+    """
+
+    def __init__(self) -> None:
+        self.held = ""
+        self._hear, self._say = os.pipe()
+
+    def speak(self) -> None:
+        """Have libraries in this process write into the pipe, and Python to where standard error was."""
+        os.close(self._hear)
+        with suppress(OSError):  # there is no standard error
+            sys.stderr.flush()
+            terminal = os.dup(2)
+            os.dup2(self._say, 2)
+            sys.stderr = os.fdopen(terminal, "w", buffering=1, encoding=sys.stderr.encoding, errors="backslashreplace")
+        os.close(self._say)
+
+    def listen(self) -> None:
+        """Hand on line by line what the others write until all of them have ended."""
+        os.close(self._say)
+        with os.fdopen(self._hear, encoding="utf-8", errors="backslashreplace") as lines:
+            for line in lines:
+                if self.held or any(sign in line for sign in _BEGINNINGS):
+                    self.held += line
+                else:
+                    _say(line)
+
