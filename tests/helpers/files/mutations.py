@@ -8,7 +8,7 @@ import resource
 import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 import pytest
@@ -188,8 +188,9 @@ def _add(part: Part, key: Any, name: Any, _: object) -> None:
 
 def _scale(part: Part, key: Any, factor: Any, _: object) -> None:
     if isinstance(part[key], int | float):
-        with_factor = part[key] * factor
-        part[key] = with_factor if factor % 1 else type(part[key])(with_factor) if abs(factor) < 1e300 else with_factor
+        with suppress(OverflowError):  # a whole number that no float holds stays as it is
+            scaled = part[key] * factor
+            part[key] = scaled if factor % 1 else type(part[key])(scaled) if abs(factor) < 1e300 else scaled
     else:
         part[key] = factor
 
