@@ -1,7 +1,5 @@
 """Configurations of trainings: one YAML file says everything that a run depends on."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -53,7 +51,7 @@ class Schedule(Part):
     clip: float = quantity(10.0, gt=0, unit="1", description="Largest norm of the gradient.")
 
     @model_validator(mode="after")
-    def _falls(self) -> Schedule:
+    def _falls(self) -> Self:
         if self.final_learning_rate > self.learning_rate:
             raise ValueError(f"final_learning_rate must not exceed learning_rate, {self.learning_rate:g}")
         return self

@@ -1,10 +1,9 @@
 """The roads that a configuration names, and the batches of an epoch."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -33,7 +32,7 @@ class MeasuredRoad(Part):
     last: float = quantity(1e9, gt=0, unit="m", description="Station where it ends.")
 
     @model_validator(mode="after")
-    def _ascending(self) -> MeasuredRoad:
+    def _ascending(self) -> Self:
         if self.last <= self.first:
             raise ValueError(f"last must be larger than first, {self.first:g}")
         return self
@@ -53,7 +52,7 @@ class DataOptions(Part):
     cache: str = Field("", description="Folder for sorted points, so that the next run starts sooner; none if empty.")
 
     @model_validator(mode="after")
-    def _something(self) -> DataOptions:
+    def _something(self) -> Self:
         if not self.data_sets and not (self.measured and self.measured_validation):
             raise ValueError("name data_sets, or measured and measured_validation roads")
         return self
@@ -72,7 +71,7 @@ class BatchOptions(Part):
     )
 
     @model_validator(mode="after")
-    def _whole(self) -> BatchOptions:
+    def _whole(self) -> Self:
         if self.steps % self.passes:
             raise ValueError(f"steps is {self.steps}: must be a multiple of passes, {self.passes}")
         return self

@@ -1,9 +1,8 @@
 """`CloudTile`: the labelled points of a piece of a scene, as training and scoring hold them in memory."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +36,7 @@ class CloudTile:
     def __len__(self) -> int:
         return len(self.coord)
 
-    def select(self, keep: AnyArray | slice) -> CloudTile:
+    def select(self, keep: AnyArray | slice) -> Self:
         """Return the points chosen by a mask or indices."""
         return replace(
             self,

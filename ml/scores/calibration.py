@@ -7,11 +7,9 @@ each share would need by itself (split conformal prediction: quantiles of ``|e| 
 what they say on roads like the validation's whatever the tails are.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -51,7 +49,7 @@ class IntervalCalibration:
         return asdict(self) | {"holds": self.holds}
 
     @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> IntervalCalibration:
+    def from_dict(cls, data: Mapping[str, Any]) -> Self:
         """Return what `to_dict` gave."""
         widths, before, after = (_pair(data[name]) for name in ("widths", "before", "after"))
         return cls(float(data["factor"]), widths, before, after, int(data["count"]))

@@ -1,11 +1,9 @@
 """Metrics: how a figure is made and shown, and its mean over several seeds."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -52,7 +50,7 @@ class Spread:
     count: int
 
     @classmethod
-    def over(cls, values: Iterable[float]) -> Spread:
+    def over(cls, values: Iterable[float]) -> Self:
         """Return the spread of values; NaN without any, and where one of them is NaN."""
         known = np.array([*values], dtype=np.float64)
         std = float(known.std(ddof=1)) if len(known) > 1 else math.nan

@@ -1,9 +1,7 @@
 """`Recipe`: a data set in one file: groups of scenes, each scene with a seed of its own."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
@@ -40,7 +38,7 @@ class SceneGroup(ClosedModel):
     )
 
     @model_validator(mode="after")
-    def _every_scene_in_a_split(self) -> SceneGroup:
+    def _every_scene_in_a_split(self) -> Self:
         if isinstance(self.split, dict) and (sum(self.split.values()) != self.scenes or min(self.split.values()) < 0):
             raise ValueError(f"split counts {dict(self.split)} must add up to scenes, {self.scenes}")
         return self

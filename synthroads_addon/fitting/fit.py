@@ -6,11 +6,9 @@ another alignment, give its elements back. Long axes are fitted in overlapping w
 curvature at which the one before was left, so time and memory stay proportional to the length.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -59,7 +57,7 @@ class Deviations:
     worst_station: float
 
     @classmethod
-    def of(cls, station: Float, distance: Float) -> Deviations:
+    def of(cls, station: Float, distance: Float) -> Self:
         """Return root mean square, 95th percentile and maximum of distances (N,) at stations (N,), m."""
         size = np.abs(distance)
         worst, rms = int(size.argmax()), float(np.sqrt((size**2).mean()))

@@ -1,11 +1,10 @@
 """The points that a road is reconstructed from, sorted by what they can tell. Instance numbers are never read."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
 from pathlib import Path as FilePath
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,7 +106,7 @@ class RoadCloud:
         """Return the indices of the points that lie flat."""
         return np.flatnonzero(self.of(*SURFACE))
 
-    def near(self, path: CloudPath, distance: float) -> RoadCloud:
+    def near(self, path: CloudPath, distance: float) -> Self:
         """Return the points within a distance (m) of a path, roughly."""
         kept = path.within(self.xyz[:, :2], distance)
         return replace(self, xyz=self.xyz[kept], intensity=self.intensity[kept], kind=self.kind[kept])

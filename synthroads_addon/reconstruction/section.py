@@ -1,9 +1,7 @@
 """The cross-section in numbers, each with its standard deviation: lanes, strips, shoulders, median."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import numpy as np
 from scipy import ndimage
@@ -44,7 +42,7 @@ class Estimate:
     std: float
 
     @classmethod
-    def of(cls, values: Float, apart: Float | None = None) -> Estimate:
+    def of(cls, values: Float, apart: Float | None = None) -> Self:
         """Return the robust mean of values (K,) in order along the road, see `mean_with_std`."""
         return cls(*mean_with_std(values, apart))
 

@@ -1,11 +1,9 @@
 """Poses of a platform or a vehicle between knots: exact at these, linear between."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -39,7 +37,7 @@ class Track:
     present: Bool
 
     @classmethod
-    def between(cls, pose: Callable[[Float], Any], begin: float, end: float, spacing: float) -> Track:
+    def between(cls, pose: Callable[[Float], Any], begin: float, end: float, spacing: float) -> Self:
         """Return the track of ``pose(time (K,)) -> (rotation (K, 3, 3), position (K, 3), present (K,))``.
 
         Knots are whole multiples of the spacing, so that no result depends on where a block begins.
@@ -47,7 +45,7 @@ class Track:
         return cls._at_knots(pose, *_knot_numbers(begin, end, spacing), spacing)
 
     @classmethod
-    def _at_knots(cls, pose: Callable[[Float], Any], first: int, last: int, spacing: float) -> Track:
+    def _at_knots(cls, pose: Callable[[Float], Any], first: int, last: int, spacing: float) -> Self:
         """Return the poses at knots ``first`` to ``last``."""
         times = np.arange(first, last + 1) * spacing
         rotation, position, present = pose(times)

@@ -1,11 +1,9 @@
 """`ScanPlan`: everything that a scan was asked for, decided once, and the interfaces of what it is carried out with."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, Self
 
 import numpy as np
 
@@ -70,7 +68,7 @@ class ScanConditions:
     road: RoadParameters | None = None
 
     @classmethod
-    def of(cls, road: RoadParameters | None) -> ScanConditions:
+    def of(cls, road: RoadParameters | None) -> Self:
         """Return the conditions of a road."""
         return cls() if road is None else cls(road.environment, road.materials, road.metadata.epsg, road)
 

@@ -1,11 +1,9 @@
 """Libraries of free assets: objects out of .blend, .glb and .obj files, with their class and where they are placed."""
 
-from __future__ import annotations
-
 import os
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
@@ -41,7 +39,7 @@ class AssetPlacement(ClosedModel):
     rotation_deg: Interval = interval(0.0, 0.0, "deg", "About the vertical; at 0 it faces its side's traffic.")
 
     @model_validator(mode="after")
-    def _can_be_placed(self) -> AssetPlacement:
+    def _can_be_placed(self) -> Self:
         if (self.spacing is None) == (self.per_km is None):
             raise ValueError("either spacing or per_km is needed, and not both")
         for name, (least, most) in _ALLOWED.items():
@@ -77,7 +75,7 @@ class LibraryAsset(ClosedModel):
         return file
 
     @model_validator(mode="after")
-    def _object_in_blend(self) -> LibraryAsset:
+    def _object_in_blend(self) -> Self:
         if self.object is not None and not self.file.lower().endswith(".blend"):
             raise ValueError(f"object is '{self.object}': only a .blend file has named objects to choose from")
         return self

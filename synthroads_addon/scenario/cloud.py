@@ -1,8 +1,6 @@
 """`CloudScenario`: which files the cloud is written to, and what they hold of each point."""
 
-from __future__ import annotations
-
-from typing import Literal, get_args
+from typing import Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
@@ -46,7 +44,7 @@ class CloudScenario(ClosedModel):
     )
 
     @model_validator(mode="after")
-    def _nothing_twice(self) -> CloudScenario:
+    def _nothing_twice(self) -> Self:
         for name in ("formats", "attributes"):
             if (twice := first_repeated(getattr(self, name))) is not None:
                 raise ValueError(f"{name} names {twice} twice")

@@ -1,8 +1,6 @@
 """`ColourScenario`: where the points' colours and material layers come from, and how finely they are rendered."""
 
-from __future__ import annotations
-
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
@@ -108,7 +106,7 @@ class ColourScenario(ClosedModel):
         return {True: "always", False: "never"}[value] if isinstance(value, bool) else value
 
     @model_validator(mode="after")
-    def _direct_needs_no_samples(self) -> ColourScenario:
+    def _direct_needs_no_samples(self) -> Self:
         if self.lighting == "direct" and (self.samples or 1) > 1:
             raise ValueError("samples can't be given for direct lighting, which has no noise")
         return self

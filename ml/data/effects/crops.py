@@ -1,8 +1,6 @@
 """Effects on crops of tiles."""
 
-from __future__ import annotations
-
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -37,7 +35,7 @@ class CropEffects(PointEffects):
         return 0.5 * mirror if isinstance(mirror, bool) else mirror
 
     @model_validator(mode="after")
-    def _limit_is_no_less(self) -> CropEffects:
+    def _limit_is_no_less(self) -> Self:
         if self.jitter_limit < self.jitter:
             raise ValueError(f"jitter_limit must not be less than jitter, {self.jitter:g}")
         return self

@@ -1,9 +1,7 @@
 """Effects on sequences of slices, carried along to the truth."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -39,7 +37,7 @@ class SequenceCrop(Part):
     steady: float = quantity(0.25, ge=0, le=1, unit="1", description="Probability of cuts that all slices share.")
 
     @model_validator(mode="after")
-    def _in_order(self) -> SequenceCrop:
+    def _in_order(self) -> Self:
         for name, least in (("reach", 0.5), ("beyond", 0.0)):
             low, high = getattr(self, name)
             if not least <= low <= high <= 1000.0:
@@ -93,7 +91,7 @@ class SequenceEffects(PointEffects):
     tint: float = quantity(0.2, ge=0, le=1, unit="1", description="Log of the factor on each colour channel.")
 
     @model_validator(mode="after")
-    def _powers(self) -> SequenceEffects:
+    def _powers(self) -> Self:
         if not 0.01 <= self.gamma[0] <= self.gamma[1] <= 10.0:
             low, high = self.gamma
             raise ValueError(f"gamma is {low:g}, {high:g}: must be two ascending numbers from 0.01 to 10")

@@ -1,8 +1,7 @@
 """Pictures of a cloud, gathered block by block: from above by class, intensity and colour, and a cross-section."""
 
-from __future__ import annotations
-
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
@@ -47,7 +46,7 @@ class TopView:
         self._lift[[row.id for row in self.scheme.rows if row.name == "road_marking"]] = 0.3
 
     @classmethod
-    def over_road(cls, geometry: RoadGeometry, scheme: ClassScheme | None = None) -> TopView:
+    def over_road(cls, geometry: RoadGeometry, scheme: ClassScheme | None = None) -> Self:
         """Return a raster that holds the whole swath of a road; see the class."""
         origin = np.array(geometry.parameters.transform.translate)[:2]
         stations = np.linspace(0.0, geometry.length, 50)
@@ -63,7 +62,7 @@ class TopView:
         return cls(plan[0] + origin, plan[-1] + origin, low, high, scheme)
 
     @classmethod
-    def over_box(cls, low: Float, high: Float, scheme: ClassScheme | None = None) -> TopView:
+    def over_box(cls, low: Float, high: Float, scheme: ClassScheme | None = None) -> Self:
         """Return a raster that holds a box, given by its corners in map coordinates, its longer side left to right."""
         start, end = low[:2].copy(), high[:2].copy()
         axis = int(np.argmax(end - start))

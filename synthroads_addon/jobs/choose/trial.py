@@ -4,14 +4,12 @@ Errors are taken of single scan lines scattered over the path, against the same 
 the time of longer stretches that go through the whole job to a file. Noise of the scanner is left out of the errors.
 """
 
-from __future__ import annotations
-
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from ...base.machine import available_cores
 from ...base.progress import StageTimer
@@ -70,7 +68,7 @@ class Trial:
     clock: Callable[[], float] = time.perf_counter
 
     @classmethod
-    def of(cls, site: Site, scene: ScannedScene) -> Trial:
+    def of(cls, site: Site, scene: ScannedScene) -> Self:
         """Prepare to scan a scene; builds the casters."""
         quiet = site.scenario.scan.model_copy(update={"noise": Noise(range_sigma=0.0)})
         colour = site.scenario.colour.model_copy(update={"intensity_from_layers": "never"})

@@ -3,11 +3,9 @@
 `Site`: where a scenario's scan takes place, whoever made the scene; and its scan into files.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from ...base.arrays import Float
 from ...base.errors import InputError
@@ -157,7 +155,7 @@ class Site:
     view: TopView | None = None
 
     @classmethod
-    def of_road(cls, scenario: Scenario, road: RoadGeometry) -> Site:
+    def of_road(cls, scenario: Scenario, road: RoadGeometry) -> Self:
         """Return the site of a road's scan."""
         view = TopView.over_road(road, scenario.cloud.scheme().sources()) if "previews" in scenario.outputs else None
         path = scenario.scan.platform.make_path(RoadGuide(road))

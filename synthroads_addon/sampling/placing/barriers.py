@@ -1,11 +1,9 @@
 """Barriers: in the median, beside the road by the safety rules (RPS) and elsewhere, and noise barriers."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 
@@ -58,7 +56,7 @@ class BarrierSystem:
     post_spacing: float
 
     @classmethod
-    def draw(cls, rng: np.random.Generator, limits: BarrierLimits, concrete_share: float) -> BarrierSystem:
+    def draw(cls, rng: np.random.Generator, limits: BarrierLimits, concrete_share: float) -> Self:
         """Return the system of a side or of the median."""
         profile = pick(rng, CONCRETE_PROFILES)
         concrete = profile if rng.random() < concrete_share else None

@@ -1,10 +1,8 @@
 """Laser scanners: what a device can do, read from its preset, and the one setting that a scan uses."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -116,7 +114,7 @@ class Device(Model):
         return 0.5 * SPEED_OF_LIGHT * self.pulses_in_air * self.pattern.beams / pulse_rate
 
     @model_validator(mode="after")
-    def _consistent(self) -> Device:
+    def _consistent(self) -> Self:
         slowest, fastest = self.lines_per_second
         if slowest > fastest:
             raise ValueError(

@@ -1,8 +1,6 @@
 """Several beams on a head that turns."""
 
-from __future__ import annotations
-
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -34,7 +32,7 @@ class RotatingHead(Pattern):
     )
 
     @model_validator(mode="after")
-    def _a_time_for_each(self) -> RotatingHead:
+    def _a_time_for_each(self) -> Self:
         if self.firing_times_us is not None and len(self.firing_times_us) != len(self.elevations_deg):
             raise ValueError(f"firing_times_us must be {len(self.elevations_deg)} times, one for each beam")
         return self

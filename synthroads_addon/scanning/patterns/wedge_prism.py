@@ -1,9 +1,7 @@
 """Rotating glass wedges."""
 
-from __future__ import annotations
-
 import math
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -21,7 +19,7 @@ class Wedge(Model):
     turns: int = quantity(..., "1", "Turns, to the right, in the time of the other's turns.", (-1_000_000, 1_000_000))
 
     @model_validator(mode="after")
-    def _turning(self) -> Wedge:
+    def _turning(self) -> Self:
         if self.turns == 0:
             raise ValueError("turns must not be 0")
         return self

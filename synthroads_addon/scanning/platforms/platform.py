@@ -1,9 +1,7 @@
 """`Platform`: base of all that carries a scanner."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -57,7 +55,7 @@ class Platform(ClosedModel):
         height = float(self.value("height"))
         return height if self.usual_range is None else max(self.usual_range, height)
 
-    def as_single_strip(self) -> Platform:
+    def as_single_strip(self) -> Self:
         """Return the platform with one strip on its guide, unless offsets are given or it keeps to lanes."""
         return self
 

@@ -1,9 +1,8 @@
 """Any polyline as what a path follows: its corners are rounded, so that heading and curvature are continuous."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -74,7 +73,7 @@ class PolylineGuide(Guide):
     @classmethod
     def read(
         cls, path: str | os.PathLike[str], origin: Sequence[float] | None = None, tolerance: float = MEASURED
-    ) -> PolylineGuide:
+    ) -> Self:
         """Return the guide of a CSV or GeoJSON file, as `read_axis` reads it.
 
         Args:

@@ -1,8 +1,7 @@
 """Which rays come near a body that moves: whole bundles of neighbouring rays are ruled out before single rays are."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -42,7 +41,7 @@ class Bundles:
     farthest: Float
 
     @classmethod
-    def gather(cls, origins: Float, directions: Float, times: Float, reach: Float) -> Bundles:
+    def gather(cls, origins: Float, directions: Float, times: Float, reach: Float) -> Self:
         """Gather rays."""
         starts = np.arange(0, len(times), RAYS)
         time, delay = _box(times[None], starts)

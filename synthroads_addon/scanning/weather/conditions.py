@@ -1,9 +1,7 @@
 """The shipped weathers: clear air, haze, fog and dust by their visibility, rain and snow by that or by their rate."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -68,7 +66,7 @@ class Precipitation(Weather):
     )
 
     @model_validator(mode="after")
-    def _one_measure(self) -> Precipitation:
+    def _one_measure(self) -> Self:
         if self.rate_mm_h is not None and self.visibility is not None:
             raise ValueError("rate_mm_h and visibility can't both be given")
         return self
