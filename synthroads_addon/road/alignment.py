@@ -14,8 +14,6 @@ curvatures, so infinity and nearly equal radii need no branch.
 Beyond its ends an alignment goes on straight along its end tangents.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal

@@ -3,8 +3,6 @@
 Every fault of a file that is read is one line that names the file, the line and the value.
 """
 
-from __future__ import annotations
-
 import csv
 import json
 import math

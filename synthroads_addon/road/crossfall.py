@@ -1,7 +1,5 @@
 """Crossfall along the road: which it must be, and how it runs off from one to the next (RAA)."""
 
-from __future__ import annotations
-
 import math
 
 from ..base.schema import round_value

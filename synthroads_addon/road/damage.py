@@ -1,7 +1,5 @@
 """Damage of a pavement as exact geometry: how deep the surface lies below the undamaged one."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -4,8 +4,6 @@ This is the truth that the mesh, the cloud and the twin are measured against. Th
 is a polyline through the boundaries; between stations it follows the alignment, the profile and the crossfall.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -4,8 +4,6 @@ The limits are those that secondary sources print of the RAA; the crossfall over
 diagram, is derived from the shares of friction at its ends.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

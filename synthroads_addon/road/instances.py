@@ -5,8 +5,6 @@ of free numbers, the lowest ones, in the order of the objects. A block's length 
 road's length only, so that a line's dashes or a stand's density may change without any other number changing.
 """
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_right
 from dataclasses import dataclass

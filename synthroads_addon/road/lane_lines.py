@@ -1,7 +1,5 @@
 """The line that a lane's traffic follows: its centre in plan by the distance driven, and the surface below it."""
 
-from __future__ import annotations
-
 from functools import cached_property
 
 import numpy as np

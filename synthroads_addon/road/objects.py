@@ -1,7 +1,5 @@
 """Base of the objects of a parameter set: instance number, place along the road, width by station."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Literal, TypeVar

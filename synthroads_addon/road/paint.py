@@ -1,7 +1,5 @@
 """Outlines of painted areas (gore hatching, arrows) in stations and offsets."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import pairwise
 

@@ -5,8 +5,6 @@ to either side and has the constant curvature d2z/ds2 = sign(g2 - g1) / H: a sag
 negative. Stations are those of the horizontal alignment, so lengths are horizontal.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

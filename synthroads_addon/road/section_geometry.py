@@ -1,7 +1,5 @@
 """One carriageway's cross-section at any station: its strips and how far from the centreline their boundaries lie."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -5,8 +5,6 @@ rhythm. Only the float32 numbers of Blender's scene depend on the frame, by thei
 near the local origin are the whole road's own.
 """
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

@@ -2,8 +2,6 @@
 the sky: the road, its batter, or that ground.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

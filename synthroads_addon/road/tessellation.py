@@ -1,7 +1,5 @@
 """Where the analytic road is sampled: as few stations as keep the mesh within the geometric tolerance."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..base.arrays import Float

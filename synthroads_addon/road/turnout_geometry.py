@@ -1,7 +1,5 @@
 """How a turnout changes the widths of its carriageway's strips along the road."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Attributes that keep an object's parameters in a format without classes of its own for roads."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from ..road.objects import RoadObject

@@ -1,7 +1,5 @@
 """Surfaces on the road as polygons on its analytic surface: markings, potholes; and where lines need their points."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

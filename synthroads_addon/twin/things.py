@@ -1,7 +1,5 @@
 """Things of a road with their bodies, where they stand: what every format makes its furniture and structures from."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Beacons (Leitbaken) of construction zones."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import ClassVar, Literal
 

@@ -4,8 +4,6 @@ Every shape is a row of sections, one behind the other: outlines of the same num
 corner, the first and the last closed by lids. Outlines that aren't convex begin where corner i faces the last but i.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

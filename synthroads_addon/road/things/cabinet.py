@@ -1,7 +1,5 @@
 """Emergency phones and utility cabinets."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """Concrete barriers."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import ClassVar, Literal
 

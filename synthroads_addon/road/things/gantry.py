@@ -1,9 +1,7 @@
 """Shield gantries and the boards on them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -127,7 +125,7 @@ class Gantry(StandingThing):
     signs: tuple[GantrySign, ...] = Field((), max_length=16, description="Signs and displays on it.")
 
     @model_validator(mode="after")
-    def _spans(self) -> Gantry:
+    def _spans(self) -> Self:
         if self.left_offset <= self.right_offset:
             raise ValueError("left_offset must be greater than right_offset")
         return self

@@ -1,9 +1,7 @@
 """Limits that the things of a sampled road are drawn within, as a scenario has them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -17,7 +15,7 @@ class Interval(ClosedModel):
     maximum: Finite = Field(description="Largest value.")
 
     @model_validator(mode="after")
-    def _in_order(self) -> Interval:
+    def _in_order(self) -> Self:
         if self.maximum < self.minimum:
             raise ValueError(f"maximum {self.maximum} must not be less than minimum {self.minimum}")
         return self

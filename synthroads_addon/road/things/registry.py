@@ -1,7 +1,5 @@
 """All things of a road: those of the files beside this one, and the limits that they are sampled within."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from pydantic import create_model

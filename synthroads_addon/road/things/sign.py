@@ -1,7 +1,5 @@
 """Traffic signs on posts."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import ClassVar, Literal
 

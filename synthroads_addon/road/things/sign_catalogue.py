@@ -1,9 +1,7 @@
 """The catalogue of traffic signs (`presets/signs.json`): what stands on which sign, and in which colours."""
 
-from __future__ import annotations
-
 from functools import cache
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -71,7 +69,7 @@ class SignCatalogue(Model):
     destinations: tuple[str, ...] = Field(min_length=4, description="Names of places for destination boards.")
 
     @model_validator(mode="after")
-    def _colors_known(self) -> SignCatalogue:
+    def _colors_known(self) -> Self:
         for code, sign in self.signs.items():
             for name in (sign.ground, sign.border, sign.writing):
                 if name not in self.colors:

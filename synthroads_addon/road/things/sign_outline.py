@@ -1,7 +1,5 @@
 """Outlines of the faces of signs and boards."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...base.arrays import Float

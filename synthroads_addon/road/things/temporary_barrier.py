@@ -1,7 +1,5 @@
 """Movable barriers of construction zones."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import ClassVar, Literal
 

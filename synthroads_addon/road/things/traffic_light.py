@@ -1,7 +1,5 @@
 """Traffic lights."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import ClassVar, Literal

@@ -1,7 +1,5 @@
 """The types of vehicles: their sizes, where they stand on the road, how often they occur, and in what colours."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """The road as CityJSON's Road objects: centreline, carriageways, median and turnouts with semantic surfaces."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

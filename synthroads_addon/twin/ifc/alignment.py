@@ -4,8 +4,6 @@ The plan is an IfcCompositeCurve of lines, arcs and clothoids, the profile an If
 grades and parabolas. Distances along are stations: horizontal lengths.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ of one IfcCourse per strip, which its part refers to; verge and median are IfcEa
 IfcSurfaceFeatures that adhere to their carriageway's pavement, not contained in any part.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise

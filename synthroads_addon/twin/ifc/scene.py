@@ -1,7 +1,5 @@
 """Scene that the writers of an IFC file share: the road, where its parts are, how an object is put into the file."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field

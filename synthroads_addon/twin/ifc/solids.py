@@ -1,7 +1,5 @@
 """Bodies of products: outlines pushed along an axis as extrusions, others as closed meshes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

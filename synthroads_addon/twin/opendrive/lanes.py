@@ -1,7 +1,5 @@
 """Lane sections with their lanes: widths, links, heights of the verges and road marks."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...road.objects import Side

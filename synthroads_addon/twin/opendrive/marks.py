@@ -1,7 +1,5 @@
 """Line markings as road marks of the lanes whose outer borders they follow."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from ...road.geometry import RoadGeometry

@@ -1,7 +1,5 @@
 """Functions of the station as OpenDRIVE holds them: cubics or straight lines, piece by piece."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 

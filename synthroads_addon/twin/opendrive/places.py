@@ -1,7 +1,5 @@
 """Where objects stand: how high the surface below them lies above the reference line."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which lanes a road has along it: the strips of its carriageways, in sections within which none begins or ends."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 

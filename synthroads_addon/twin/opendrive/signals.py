@@ -1,7 +1,5 @@
 """Signals along a road: faces that things show to drivers, such as signs, boards on gantries, and traffic lights."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Speed limits along a carriageway: those of its traffic signs, each up to the next one that the traffic passes."""
 
-from __future__ import annotations
-
 import re
 
 from ...road.geometry import RoadGeometry

@@ -1,7 +1,5 @@
 """The reference line and the plane of a carriageway through it: plan view, elevation profile, superelevation."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

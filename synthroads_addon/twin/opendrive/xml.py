@@ -1,7 +1,5 @@
 """The XML of OpenDRIVE files: elements with numbers that are short and the same on every machine."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
