@@ -447,13 +447,13 @@ def dask_workers(address: str, patience: float = 1800.0) -> Submit:
     def submit(folders: list[str]) -> Iterator[Outcome]:
         with client:
             futures = client.map(run_on_worker, folders, key=folders, retries=ATTEMPTS, pure=False)
-            for future in _ended(client, futures, Absence(address, patience)):
+            for future in _ended_futures(client, futures, Absence(address, patience)):
                 yield _outcome(future, address)
 
     return submit
 
 
-def _ended(client: Any, futures: list[Any], absence: Absence) -> Iterator[Any]:
+def _ended_futures(client: Any, futures: list[Any], absence: Absence) -> Iterator[Any]:
     """Yield the futures as they end, while somebody works on them."""
     from distributed import as_completed as completed  # an optional package
 

@@ -97,7 +97,7 @@ def _spans_decades(errors: Sequence[float]) -> bool:
 
 
 def _draw_knob(axis: Any, rows_of_knob: Sequence[Row], knob: str, name: str) -> Any:
-    """Draw the rows of a knob, those of a knob of its own joined, and say their values; return the handle."""
+    """Draw the rows of a knob as points with their values beside them, most joined by a line; return its handle."""
     preset = knob == "fidelity"
     style = "*" if preset else "x" if _whole_job(knob) else "o-"
     colour = "black" if preset else "0.55" if _whole_job(knob) else f"C{_ORDER.index(knob) % 10}"

@@ -51,7 +51,7 @@ class Schedule(Part):
     clip: float = quantity(10.0, gt=0, unit="1", description="Largest norm of the gradient.")
 
     @model_validator(mode="after")
-    def _falls(self) -> Self:
+    def _check_rates(self) -> Self:
         if self.final_learning_rate > self.learning_rate:
             raise ValueError(f"final_learning_rate must not exceed learning_rate, {self.learning_rate:g}")
         return self

@@ -96,7 +96,7 @@ class Run(Generic[C]):
         torch.save(dict(state), content)
         write_file(self.folder / CHECKPOINT, content.getvalue(), overwrite=True)
 
-    def saved(self, device: torch.device | str = "cpu") -> dict[str, Any] | None:
+    def last_checkpoint(self, device: torch.device | str = "cpu") -> dict[str, Any] | None:
         """Return the last checkpoint, or None if there is none yet.
 
         Raises:
@@ -130,12 +130,12 @@ class Run(Generic[C]):
         now = self.configuration.to_dict()
         with suppress(InputError):  # fields may be called otherwise by now, or be new
             before = self.configuration.from_dict(before).to_dict()
-        begun, wanted = lasting(before), lasting(now)
+        begun, wanted = lasting_data(before), lasting_data(now)
         different = [name for name in {**begun, **wanted} if begun.get(name) != wanted.get(name)]
         if different:
             name = different[0]
             raise InputError(f"--resume: {name}", now.get(name), f"the run was begun with {before.get(name)!r}")
-        state = self.saved()
+        state = self.last_checkpoint()
         done = 0 if state is None else int(state["epoch"])
         if done:
             self.history = read_json(self.folder / HISTORY)[:done]
@@ -146,7 +146,7 @@ def stream_seed(seed: int, *purpose: str | int) -> int:
     return int(stream(seed, *purpose).integers(2**63))
 
 
-def lasting(configuration: Mapping[str, Any]) -> dict[str, Any]:
+def lasting_data(configuration: Mapping[str, Any]) -> dict[str, Any]:
     """Return a configuration's data without what may differ from call to call of one training."""
     return {name: value for name, value in configuration.items() if name not in FREE_WHEN_RESUMING}
 

@@ -80,7 +80,7 @@ def fit(
     share = slice(number, steps_per_epoch * count, count)
     schedule: Schedule = configuration.schedule
     optimizer = optimizer_of(model, schedule)
-    state = run.saved(next(model.parameters()).device)
+    state = run.last_checkpoint(next(model.parameters()).device)
     first = 0
     if state is not None:
         model.load_state_dict(state["model"])
@@ -106,7 +106,7 @@ def fit(
         run.save({"model": model.state_dict(), "optimizer": optimizer.state_dict(), "epoch": epoch + 1})
 
 
-def moved_to(model: nn.Module, batch: Any) -> Any:
+def move_to_device(model: nn.Module, batch: Any) -> Any:
     """Return a tensor, or those of a batch by name, on the device of a model."""
     device = next(model.parameters()).device
     if isinstance(batch, Tensor):
@@ -145,7 +145,7 @@ def train_step(
     optimizer.zero_grad(set_to_none=True)
     half = configuration.precision == "bfloat16"
     with torch.autocast(next(model.parameters()).device.type, torch.bfloat16, enabled=half):
-        value, figures = loss(model, moved_to(model, batch))
+        value, figures = loss(model, move_to_device(model, batch))
     mean = value.detach().clone()
     average([mean])  # not finite in one process, it is in none: all end
     if not torch.isfinite(mean):

@@ -174,7 +174,7 @@ def road_table(measured: Measured, roads: Mapping[str, str], columns: tables.Col
 class RememberingPredictor(CenterlinePredictor):
     """A predictor that doesn't find twice what it found on the same points in the same frames.
 
-    Those that `calibrated_on` makes of it share its memory.
+    Those that `calibrate` makes of it share its memory.
     """
 
     memory: dict[str, tuple[Float, Float]]
@@ -355,7 +355,7 @@ def recalibrated(
     for name, versions in learned.items():
         for seed, version in zip(seeds, versions, strict=False):
             shown = [case(road, seed, cropping=None, estimated=False) for road in roads]
-            again, _ = version.calibrated_on((one.road, one.frames) for one in shown)  # type: ignore[attr-defined]
+            again, _ = version.calibrate((one.road, one.frames) for one in shown)  # type: ignore[attr-defined]
             found.setdefault(f"{name}, recalibrated", []).append(again)
     return found
 
@@ -386,7 +386,7 @@ def measure_corridor(
             found = corridor_figures(versions[min(index, len(versions) - 1)], shown)
             for target, figures in found.items():
                 title = f"{name}: {tables.TARGETS_SHOWN[target][0]}"
-                rows.setdefault(title, []).append(tables.scaled(target, figures))
+                rows.setdefault(title, []).append(tables.shown_figures(target, figures))
     return {name: {"all": over_seeds(values)} for name, values in rows.items()}
 
 

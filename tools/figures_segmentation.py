@@ -27,7 +27,7 @@ from ml.data.packed import PackReader  # noqa: E402
 from ml.data.sources import Source  # noqa: E402
 from ml.runs import HISTORY, METRICS, PRETRAINING, Run  # noqa: E402
 from ml.scores.confusion import by_class, by_test  # noqa: E402
-from ml.scores.metrics import Spread, defined  # noqa: E402
+from ml.scores.metrics import Spread, finite_values  # noqa: E402
 from ml.scores.pictures import comparison  # noqa: E402
 from ml.segmentation.experiment import RESULTS  # noqa: E402
 from ml.segmentation.scoring import score, trained_model  # noqa: E402
@@ -58,7 +58,7 @@ def experiment(folder: Path) -> str:
     seconds = {
         name: [training_seconds(folder / name / f"seed-{seed}") for seed in seeds] for name, seeds in results.items()
     }
-    cells = " | ".join(Spread.over(defined(values)).text(0, "-") for values in seconds.values() if values)
+    cells = " | ".join(Spread.over(finite_values(values)).text(0, "-") for values in seconds.values() if values)
     return by_test(results, [f"| *training, s* |  | {cells} |"])
 
 

@@ -20,7 +20,7 @@ from ..data.roads import LearningRoad
 from ..data.slices import FrameSlices, SliceSettings, collate
 from ..networks.centerline.models import LINES, TARGETS, CenterlineModel, all_targets, both_ways
 from ..scores.calibration import IntervalCalibration, calibrate_target
-from ..training_loop import moved_to
+from ..training_loop import move_to_device
 
 _NEAR = 2
 """A frame with no point in it nor in this many frames to either side has no prediction."""
@@ -127,7 +127,7 @@ class CenterlinePredictor:
             mean[:, column] = join_line(frames, mean[:, column], raw[:, column], reach)
         return mean, raw
 
-    def calibrated_on(self, shown: Iterable[tuple[LearningRoad, Frames]]) -> tuple[CenterlinePredictor, Float]:
+    def calibrate(self, shown: Iterable[tuple[LearningRoad, Frames]]) -> tuple[CenterlinePredictor, Float]:
         """Return the model with the deviations that are right on some roads, and its errors there (N, T).
 
         Found on a few roads of another scanner, one factor per target makes its deviations right there (see
@@ -157,7 +157,7 @@ class CenterlinePredictor:
         for first in range(0, len(data), self.use.batch):
             some = data.runs[first : first + self.use.batch]
             samples = [data[number] for number in range(first, first + len(some))]
-            batch = moved_to(self.model, collate(samples))
+            batch = move_to_device(self.model, collate(samples))
             with torch.no_grad():
                 output = both_ways(self.model, batch) if self.use.mirror else self.model(batch)
             values, deviations = (

@@ -30,7 +30,7 @@ from ..runs import CALIBRATION, Run, plain, stream_seed
 from ..scores.calibration import DEVIATIONS, IntervalCalibration
 from ..scores.evaluation import Cropping, case
 from ..tasks import Evaluation, Prediction
-from ..training_loop import chosen_device, fit, moved_to
+from ..training_loop import chosen_device, fit, move_to_device
 from .find_road import corridor_json, find_road, geojson
 from .measuring import measure_run
 from .predictor import CenterlinePredictor, UseOptions
@@ -155,7 +155,7 @@ def predictor(run: Run[CenterlineConfiguration]) -> CenterlinePredictor:
     configuration = run.configuration
     device = chosen_device(configuration)
     path = run.folder / CALIBRATION
-    state = run.saved(device)
+    state = run.last_checkpoint(device)
     if state is None or int(state["epoch"]) < configuration.schedule.epochs or not path.is_file():
         raise InputError(str(run.folder), None, "its training isn't finished; `synthroads train --resume` goes on")
     model = _empty_model(configuration).to(device)
@@ -177,7 +177,7 @@ def _first_model(configuration: CenterlineConfiguration) -> CenterlineModel:
     torch.manual_seed(stream_seed(configuration.seed, _FIRST_WEIGHTS))
     model = _empty_model(configuration)
     if configuration.begin_with:
-        state = Run.open(Path(configuration.begin_with)).saved()
+        state = Run.open(Path(configuration.begin_with)).last_checkpoint()
         if state is None:
             raise MissingFileError("begin_with", configuration.begin_with, "holds no weights")
         try:
@@ -222,7 +222,7 @@ def calibrate(run: Run[CenterlineConfiguration], model: CenterlineModel, roads: 
     shown += [
         case(road, seed, cropping=Cropping(), estimated=True, settings=settings) for road in roads.measured_validation
     ]
-    calibrated, error = ready.calibrated_on((one.road, one.frames) for one in shown)
+    calibrated, error = ready.calibrate((one.road, one.frames) for one in shown)
     found = calibrated.calibration
     data = plain({name: one.to_dict() for name, one in found.items()})
     write_file(run.folder / CALIBRATION, canonical_json(data).encode(), overwrite=True)
@@ -243,7 +243,7 @@ def _residuals(model: nn.Module, batches: Sequence[Batch]) -> tuple[Any, Any]:
     model.eval()
     error, std = [], []
     for batch in batches:
-        moved = moved_to(model, batch)
+        moved = move_to_device(model, batch)
         with torch.no_grad():
             output = model(moved)
         error.append((all_targets(output) - all_targets(moved)).flatten(0, 1).cpu().numpy())

@@ -77,7 +77,7 @@ class MeasuredAxis:
         """Return the running length of the last vertex, gaps included, m."""
         return float(self.station[-1])
 
-    def moved(self, by: ArrayLike) -> MeasuredAxis:
+    def translate(self, by: ArrayLike) -> MeasuredAxis:
         """Return the line moved by a vector (3,), m."""
         return MeasuredAxis(self.points + np.asarray(by, dtype=np.float64), self.joined)
 

@@ -32,7 +32,7 @@ class MeasuredRoad(Part):
     last: float = quantity(1e9, gt=0, unit="m", description="Station where it ends.")
 
     @model_validator(mode="after")
-    def _ascending(self) -> Self:
+    def _check_stations(self) -> Self:
         if self.last <= self.first:
             raise ValueError(f"last must be larger than first, {self.first:g}")
         return self
@@ -52,7 +52,7 @@ class DataOptions(Part):
     cache: str = Field("", description="Folder for sorted points, so that the next run starts sooner; none if empty.")
 
     @model_validator(mode="after")
-    def _something(self) -> Self:
+    def _check_roads(self) -> Self:
         if not self.data_sets and not (self.measured and self.measured_validation):
             raise ValueError("name data_sets, or measured and measured_validation roads")
         return self
@@ -71,7 +71,7 @@ class BatchOptions(Part):
     )
 
     @model_validator(mode="after")
-    def _whole(self) -> Self:
+    def _check_passes(self) -> Self:
         if self.steps % self.passes:
             raise ValueError(f"steps is {self.steps}: must be a multiple of passes, {self.passes}")
         return self
@@ -150,7 +150,7 @@ class Batches:
         for turn, place in (divmod(number, each) for number in range(self.options.steps)[share]):
             order = stream(self.seed, "order", epoch, turn).permutation(self.drawn_per_epoch)
             numbers = [int(n) for n in (order if turn else np.arange(len(order)))[place * size : (place + 1) * size]]
-            drawn = {n: kept.get(n) or self.datasets[kind[n]].drawn(epoch, n) for n in numbers}
+            drawn = {n: kept.get(n) or self.datasets[kind[n]].draw_sample(epoch, n) for n in numbers}
             kept |= drawn if self.options.passes > 1 else {}
             batch = collate([drawn[n] for n in numbers])
             yield mirror_batch(batch) if turn % 2 else batch
@@ -169,7 +169,7 @@ def fixed_batches(
         seed: of what is drawn.
     """
     dataset = SliceDataset(roads, settings, count, seed, effects, "validation slices")
-    samples = [dataset.drawn(number) for number in range(count)]
+    samples = [dataset.draw_sample(number) for number in range(count)]
     return [collate(samples[first : first + 32]) for first in range(0, len(samples), 32)]
 
 
@@ -199,4 +199,4 @@ def _read_measured_road(road: MeasuredRoad, truth: TruthKind) -> LearningRoad:
     if np.count_nonzero(inside) < 2:
         raise InputError(f"{road.axis}: first", road.first, f"leaves nothing of an axis of {axis.length:.0f} m")
     part = MeasuredAxis(axis.points[inside], axis.joined[inside[:-1] & inside[1:]])
-    return replace(whole, truth=Truth.measured(part, truth))
+    return replace(whole, truth=Truth.of_axis(part, truth))

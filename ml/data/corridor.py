@@ -59,7 +59,7 @@ class Truth:
     has_height: bool = True
 
     @classmethod
-    def measured(cls, axis: MeasuredAxis, kind: TruthKind) -> Truth:
+    def of_axis(cls, axis: MeasuredAxis, kind: TruthKind) -> Truth:
         """Return a measured centreline of which nothing else is known."""
         unknown = np.full(len(axis.points), np.nan)
         return cls(
@@ -74,13 +74,13 @@ class Truth:
             has_height=bool(np.ptp(axis.points[:, 2]) > 0.0),
         )
 
-    def moved(self, by: ArrayLike) -> Truth:
+    def translate(self, by: ArrayLike) -> Truth:
         """Return the truth moved by a vector (3,), m."""
         return replace(
             self,
-            axis=self.axis.moved(by),
-            left=None if self.left is None else self.left.moved(by),
-            right=None if self.right is None else self.right.moved(by),
+            axis=self.axis.translate(by),
+            left=None if self.left is None else self.left.translate(by),
+            right=None if self.right is None else self.right.translate(by),
         )
 
     def at(self, frames: Frames) -> Crossings:
@@ -107,7 +107,7 @@ class Truth:
         return Crossings(center, station, corridor, lines, room)
 
     def _along(self, values: Float, station: Float) -> Float:
-        """Return values (M,) at stations between the vertices: the lower of both neighbours' where one is infinite."""
+        """Return values (M,) at stations, linear between vertices; that of the vertex before where one is infinite."""
         known = np.nan_to_num(station)
         after = np.clip(np.searchsorted(self.axis.station, known), 1, len(values) - 1)
         before = after - 1
@@ -152,9 +152,9 @@ def truths(parameters: RoadParameters, kind: TruthKind, origin: ArrayLike = (0.0
     geometry = RoadGeometry(parameters)
     by: Float = np.array(parameters.transform.translate) - np.asarray(origin, dtype=np.float64)
     if kind == "road":
-        return [_whole_road(geometry).moved(by)]
+        return [_whole_road(geometry).translate(by)]
     found = (_carriageway(geometry, section) for section in geometry.sections.values())
-    return [truth.moved(by) for truth in found if truth is not None]
+    return [truth.translate(by) for truth in found if truth is not None]
 
 
 def _whole_road(geometry: RoadGeometry) -> Truth:

@@ -61,7 +61,7 @@ class Frames:
         left = np.column_stack([-np.sin(self.direction), np.cos(self.direction)])
         return self.position + np.asarray(y, dtype=np.float64)[:, None] * left
 
-    def turned_round(self) -> Frames:
+    def reverse(self) -> Frames:
         """Return the same places seen against the path, the last one first."""
         return Frames(self.position[::-1], self.direction[::-1] + np.pi, self.station[::-1])
 
@@ -165,7 +165,7 @@ def read_path(file: Path, origin: ArrayLike = (0.0, 0.0, 0.0), tolerance: float 
     Raises:
         MissingFileError, InputError: see `read_axis`.
     """
-    whole = MeasuredAxis.read(file, gap=np.inf).moved(-np.asarray(origin, dtype=np.float64))
+    whole = MeasuredAxis.read(file, gap=np.inf).translate(-np.asarray(origin, dtype=np.float64))
     keep, last = [0], 0.0
     for index, station in enumerate(whole.station[1:], 1):
         if station - last >= tolerance:

@@ -204,8 +204,8 @@ def read_measured(cloud: Path, axis: Path, kind: TruthKind, gap: float | None = 
         MissingFileError, InputError: a file is missing or damaged.
     """
     points = read_ground(cloud)
-    line = MeasuredAxis.read(axis, gap).moved(-points.origin)
-    return LearningRoad.of_points(cloud.stem, points, line, Truth.measured(line, kind))
+    line = MeasuredAxis.read(axis, gap).translate(-points.origin)
+    return LearningRoad.of_points(cloud.stem, points, line, Truth.of_axis(line, kind))
 
 
 def crop_road(road: LearningRoad, share: float, seed: int, length: float = 1.0) -> LearningRoad:

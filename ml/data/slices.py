@@ -111,9 +111,9 @@ class SliceDataset(Dataset[Sample]):
     def __getitem__(self, number: int) -> Sample:
         if not 0 <= number < self.samples:
             raise IndexError(number)
-        return self.drawn(self.epoch, number)
+        return self.draw_sample(self.epoch, number)
 
-    def drawn(self, *key: int) -> Sample:
+    def draw_sample(self, *key: int) -> Sample:
         """Return the sample of some numbers, any of them."""
         rng = stream(self.seed, self.purpose, *key)
         starts = self._starts[rng.integers(len(self._starts))]
@@ -144,7 +144,7 @@ class IterableSlices(IterableDataset[Sample]):
         first, step = (0, 1) if worker is None else (worker.id, worker.num_workers)
         number = first
         while True:
-            yield self.dataset.drawn(*divmod(number, self.dataset.samples))
+            yield self.dataset.draw_sample(*divmod(number, self.dataset.samples))
             number += step
 
 

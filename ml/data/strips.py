@@ -77,7 +77,7 @@ def find_ground(cloud: Path, progress: Progress = silent) -> GroundReading:
 def path_through(ground: GroundReading) -> MeasuredAxis:
     """Return the path along a cloud's ground, in map coordinates."""
     origin = np.floor(ground.cells.min(axis=0))
-    return estimated_path(ground.cells - origin).moved((*origin, 0.0))
+    return estimated_path(ground.cells - origin).translate((*origin, 0.0))
 
 
 def strips(
@@ -106,7 +106,7 @@ def strips(
             seen = (frames.station >= first) & (frames.station < last)
             if number in own:
                 points = points_of(ground.header, [block], ground.largest_color)
-                line = _part(path, first - REACH, last + REACH).moved(-points.origin)
+                line = _part(path, first - REACH, last + REACH).translate(-points.origin)
                 local = Frames(frames.position - points.origin[:2], frames.direction, frames.station).select(seen)
                 yield LearningRoad.of_points(cloud.stem, points, line), local, own[seen] == number
 

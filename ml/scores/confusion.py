@@ -11,7 +11,7 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.text_table import text_table
 
 from ..data.classes import IGNORED
-from .metrics import Metric, Spread, defined, markdown, or_none
+from .metrics import Metric, Spread, finite_values, markdown, or_none
 
 
 class Confusion:
@@ -73,7 +73,7 @@ class Confusion:
 
     def mean(self, metric: str) -> float:
         """Return the mean of one of `METRICS` over the classes for which it is defined; NaN if there is none."""
-        return Spread.over(defined(self.values(metric).tolist())).mean
+        return Spread.over(finite_values(self.values(metric).tolist())).mean
 
     @property
     def accuracy(self) -> float:
@@ -175,4 +175,4 @@ def _class_table(titles: Sequence[str], rows: Sequence[_ClassRow]) -> list[str]:
 
 def percent(values: Sequence[float | None]) -> str:
     """Return shares as ``mean (standard deviation)`` in percent; None is undefined and left out."""
-    return Spread.over([100.0 * value for value in defined(values)]).text(1, "-")
+    return Spread.over([100.0 * value for value in finite_values(values)]).text(1, "-")

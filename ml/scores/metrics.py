@@ -64,7 +64,7 @@ class Spread:
         return mean if math.isnan(self.std) else f"{mean} ({factor * self.std:,.{decimals}f})"
 
 
-def defined(values: Sequence[float | None]) -> list[float]:
+def finite_values(values: Sequence[float | None]) -> list[float]:
     """Return those of some values that are finite numbers."""
     return [float(value) for value in values if value is not None and math.isfinite(value)]
 

@@ -57,7 +57,7 @@ def with_painted_line(road: LearningRoad) -> LearningRoad:
     left = np.column_stack([-np.sin(direction), np.cos(direction)])
     points = axis.position(places[there]) + aside[there, None] * left
     line = MeasuredAxis(np.column_stack([points, axis.elevation(places[there])]), np.diff(places[there]) < 1.5 * STEP)
-    return replace(road, truth=Truth.measured(line, truth.kind))
+    return replace(road, truth=Truth.of_axis(line, truth.kind))
 
 
 def _ridge(offset: Float, logs: Float) -> float:

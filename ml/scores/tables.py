@@ -45,13 +45,13 @@ def report(measured: Measured, corridor: Mapping[str, Mapping[str, float | None]
     if len(roads) > 1:
         parts += ["", f"{model}, by road:", *text_table(*_cells(roads, COLUMNS))]
     targets = {
-        TARGETS_SHOWN[target][0]: {name: Spread.over([figure]) for name, figure in scaled(target, figures).items()}
+        TARGETS_SHOWN[target][0]: {name: Spread.over([value]) for name, value in shown_figures(target, figures).items()}
         for target, figures in corridor.items()
     }
     return "\n".join([*parts, "", f"{model}, the corridor:", *text_table(*_cells(targets, CORRIDOR_COLUMNS))])
 
 
-def scaled(target: str, figures: Mapping[str, float | None]) -> dict[str, float]:
+def shown_figures(target: str, figures: Mapping[str, float | None]) -> dict[str, float]:
     """Return the figures of a target of the corridor in the unit of `TARGETS_SHOWN`; NaN for None."""
     known = {name: math.nan if figure is None else figure for name, figure in figures.items()}
     return known | {"mae": TARGETS_SHOWN[target][1] * known["mae"]}

@@ -19,7 +19,7 @@ from synthroads_addon.scenario.scenario import apply_change, apply_values
 
 from ..configuration import EXPERIMENTS, load_configuration, shipped_file
 from ..data.sources import Source
-from ..runs import CHECKPOINT, CONFIGURATION, HISTORY, METRICS, PRETRAINING, Run, lasting
+from ..runs import CHECKPOINT, CONFIGURATION, HISTORY, METRICS, PRETRAINING, Run, lasting_data
 from ..scores.confusion import by_test
 from .recipes import Data, SegmentationConfiguration
 from .scoring import score_all, trained_model
@@ -157,11 +157,11 @@ def _train_variant(
 
 def _reuse_pretraining(configuration: SegmentationConfiguration, target: Path, output: Path) -> None:
     """Take the first part of fine-tuning from the run that has trained just that, if there is one."""
-    wanted = lasting(configuration.model_copy(update={"set_up": "synthetic"}).to_dict())
+    wanted = lasting_data(configuration.model_copy(update={"set_up": "synthetic"}).to_dict())
     if (target / CONFIGURATION).is_file():
         return
     for file in sorted(output.glob(f"*/*/{CONFIGURATION}")):
-        if lasting(read_json(file)) == wanted and (file.parent / METRICS).is_file():
+        if lasting_data(read_json(file)) == wanted and (file.parent / METRICS).is_file():
             target.mkdir(parents=True, exist_ok=True)
             for name in (CONFIGURATION, CHECKPOINT, HISTORY):
                 shutil.copyfile(file.parent / name, target / name)
@@ -172,7 +172,8 @@ def _test_variant(
     configuration: SegmentationConfiguration, folder: Path, file: Path, progress: Progress
 ) -> dict[str, Any]:
     """Return the scores of a trained run under another configuration, tested unless just that was tested already."""
-    made_from = {"configuration": lasting(configuration.to_dict()), "checkpoint_sha256": checksum(folder / CHECKPOINT)}
+    wanted = lasting_data(configuration.to_dict())
+    made_from = {"configuration": wanted, "checkpoint_sha256": checksum(folder / CHECKPOINT)}
     tests: dict[str, Any]
     if file.is_file() and (kept := read_json(file)).get("made_from") == made_from:
         tests = kept["tests"]

@@ -40,7 +40,7 @@ def forecast(configuration: SegmentationConfiguration, steps: int) -> dict[str, 
     if configuration.set_up == "fine_tuned":
         raise InputError("set_up", configuration.set_up, "has two trainings: forecast each by itself")
     device = chosen_device(configuration)
-    sources = [source for found in configuration.needed().values() for source in found]
+    sources = [source for found in configuration.needed_sources().values() for source in found]
     count = sum(tile_count(source, configuration) for source in sources)
     wall, cpu = timed_steps(configuration, _first_tiles(sources, configuration), steps, device)
     per_epoch = math.ceil(configuration.crops_per_tile * count / configuration.batch) // configuration.processes

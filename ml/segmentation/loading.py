@@ -20,7 +20,7 @@ from ..data.classes import class_names
 from ..data.crops import CropDataset, Draw, Item, Seeds, collate
 from ..data.sources import Source, read_tiles
 from ..data.tiles import CloudTile, scalings
-from .network import laid_over
+from .network import overlay_clouds
 from .recipes import SegmentationConfiguration, mapped_intensities, plan
 
 SMALLEST_SHARE = 0.25
@@ -37,7 +37,7 @@ def read_domains(configuration: SegmentationConfiguration) -> dict[str, list[Clo
         InputError: there are none, or they don't fit the configuration.
     """
     domains: dict[str, list[CloudTile]] = {}
-    for domain, sources in configuration.needed().items():
+    for domain, sources in configuration.needed_sources().items():
         tiles = list(thin_tiles(sources, configuration, domain))
         least = SMALLEST_SHARE * configuration.crop_points
         enough = [tile for tile in tiles if len(tile) >= least]
@@ -93,7 +93,7 @@ class CropBatches:
 
 
 @contextmanager
-def watched_workers(configuration: SegmentationConfiguration) -> Iterator[None]:
+def report_lost_workers(configuration: SegmentationConfiguration) -> Iterator[None]:
     """Tell in one line that a worker was lost; PyTorch raises it wherever the main thread happens to be.
 
     Raises:
@@ -168,7 +168,7 @@ class Collate:
         """Return the batch."""
         batch = collate(items)
         if self.mix3d and self._chance(items[0]) < self.mix3d:
-            batch = laid_over(batch)
+            batch = overlay_clouds(batch)
         return self.configuration.network.prepare(batch)
 
     def _chance(self, first: Item) -> float:

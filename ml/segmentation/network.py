@@ -14,7 +14,7 @@ from synthroads_addon.base.errors import InputError
 
 from ..data.classes import class_names
 from ..data.crops import Item
-from ..training_loop import moved_to
+from ..training_loop import move_to_device
 from .recipes import SegmentationConfiguration
 
 
@@ -36,7 +36,7 @@ def adapt_network(model: nn.Module, batches: Iterable[Item]) -> nn.Module:
         InputError: there are no points.
     """
     other = deepcopy(model)
-    adapt_norms(other, batches, lambda batch: scores_of(other, moved_to(other, batch)))
+    adapt_norms(other, batches, lambda batch: scores_of(other, move_to_device(other, batch)))
     return other
 
 
@@ -128,7 +128,7 @@ class _Pool:
         self.norm.running_var.copy_((self.square / self.weight - mean.square()).clamp_(min=0.0))
 
 
-def laid_over(batch: Batch) -> Batch:
+def overlay_clouds(batch: Batch) -> Batch:
     """Return a batch whose clouds are laid over one another in pairs, a last one without a partner as it is: Mix3D.
 
     Nekrasov et al., "Mix3D: out-of-context data augmentation for 3D scenes" (2021): things then appear where their

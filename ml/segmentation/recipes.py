@@ -83,13 +83,13 @@ class SegmentationConfiguration(Configuration):
 
     @field_validator("features")
     @classmethod
-    def _distinct(cls, features: tuple[Feature, ...]) -> tuple[Feature, ...]:
+    def _refuse_repetitions(cls, features: tuple[Feature, ...]) -> tuple[Feature, ...]:
         if len(set(features)) < len(features):
             raise ValueError("features must differ")
         return features
 
     @model_validator(mode="after")
-    def _data_fit_the_set_up(self) -> SegmentationConfiguration:
+    def _check_data(self) -> SegmentationConfiguration:
         if self.synthetic_share is not None and not self.set_up.startswith("mixed"):
             raise ValueError(f"synthetic_share is for mixed set-ups, not for {self.set_up}")
         if self.synthetic_share is not None and self.balanced:
@@ -104,7 +104,7 @@ class SegmentationConfiguration(Configuration):
         """Return how items are made."""
         return CropSettings(self.crop_points, self.voxel, self.features)
 
-    def needed(self) -> dict[str, tuple[Source, ...]]:
+    def needed_sources(self) -> dict[str, tuple[Source, ...]]:
         """Return the training sources of the set-up by domain.
 
         Raises:

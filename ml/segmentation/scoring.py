@@ -24,8 +24,8 @@ from ..data.sources import Source, read_tiles
 from ..data.tiles import CloudTile, Scaling, scalings
 from ..runs import Run
 from ..scores.confusion import Confusion
-from ..training_loop import chosen_device, moved_to
-from .loading import adaptation_batches, thin_tiles, watched_workers
+from ..training_loop import chosen_device, move_to_device
+from .loading import adaptation_batches, report_lost_workers, thin_tiles
 from .network import adapt_network, build, scores_of
 from .recipes import SegmentationConfiguration
 
@@ -137,7 +137,7 @@ def trained_model(run: Run[SegmentationConfiguration]) -> nn.Module:
         InputError: the checkpoint is damaged or of another network.
     """
     device = chosen_device(run.configuration)
-    state = run.saved(device)
+    state = run.last_checkpoint(device)
     if state is None:
         raise InputError(str(run.folder), None, "holds no checkpoint")
     model = build(run.configuration).to(device)
@@ -154,7 +154,7 @@ def classifier(model: nn.Module, configuration: SegmentationConfiguration) -> Cl
     def scores(batch: Item) -> Tensor:
         model.eval()
         with torch.inference_mode():
-            return scores_of(model, moved_to(model, configuration.network.prepare(batch)))
+            return scores_of(model, move_to_device(model, configuration.network.prepare(batch)))
 
     return scores
 
@@ -200,7 +200,7 @@ def score(
     confusion = Confusion(_targets(sources, scheme))
     if configuration.adaptation.adabn:
         tiles = list(thin_tiles(sources, configuration, "test"))
-        with watched_workers(configuration):
+        with report_lost_workers(configuration):
             model = adapt_network(model, adaptation_batches(tiles, configuration))
     scores = classifier(model, configuration)
     shown = None

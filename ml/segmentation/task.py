@@ -26,7 +26,7 @@ from ..scores.confusion import Confusion, score_table
 from ..scores.pictures import comparison
 from ..tasks import Evaluation, Prediction
 from ..training_loop import Figures, chosen_device, fit
-from .loading import CropBatches, read_domains, thin_tiles, watched_workers
+from .loading import CropBatches, read_domains, report_lost_workers, thin_tiles
 from .network import build, scores_of
 from .prediction import Labelling, predict_file
 from .recipes import SegmentationConfiguration, class_shares, class_weights
@@ -186,7 +186,7 @@ def _fit(
     batches, device = CropBatches(configuration, domains.values()), next(model.parameters()).device
     loss = objective(configuration, batches.tiles, device)
     validate = _validation(configuration, validation) if validation else None
-    with watched_workers(configuration):
+    with report_lost_workers(configuration):
         fit(model, run, batches, len(batches), loss, validate=validate, progress=progress)
 
 

@@ -76,7 +76,7 @@ class NameClasses:
         numbers = [self._find(kind, name) for name in names]
         return next((number for number in numbers if number is not None), None)
 
-    def unmatched(self) -> tuple[str, ...]:
+    def unmatched_patterns(self) -> tuple[str, ...]:
         """Return the patterns that no name fitted so far, each as ``kind: pattern``."""
         rows = ((kind, pattern) for kind in KINDS for pattern, _ in self._rows[kind])
         return tuple(f"{kind}: {pattern}" for kind, pattern in rows if (kind, pattern) not in self._used)

@@ -40,7 +40,7 @@ class ClassSelector(Model):
     asset: str | None = Field(None, description="Name of a free asset in its library.")
 
     @model_validator(mode="after")
-    def _selects(self) -> ClassSelector:
+    def _check_selection(self) -> ClassSelector:
         if not any((self.class_name, self.material, self.thing, self.asset)):
             raise ValueError("must have at least one of class, material, thing, asset")
         if self.where and not self.thing:
@@ -115,7 +115,7 @@ class ClassTable(Model):
     classes: tuple[ClassRow, ...] = Field(min_length=1, max_length=256, description="The classes.")
 
     @model_validator(mode="after")
-    def _distinct(self) -> ClassTable:
+    def _refuse_repetitions(self) -> ClassTable:
         for what in ("id", "name"):
             if (twice := first_repeated([getattr(row, what) for row in self.classes])) is not None:
                 raise ValueError(f"two classes have the {what} {twice!r}")

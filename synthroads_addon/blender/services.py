@@ -30,7 +30,7 @@ class BlenderServices:
 
     def reflectance_varies(self, names: Sequence[str]) -> bool:
         """Return whether some of these materials of the open file reflect otherwise at other places."""
-        return bool(scene_constants(names).varying(OF_INTENSITY))
+        return bool(scene_constants(names).varying_layers(OF_INTENSITY))
 
     def layers(self, request: LayerRequest, progress: Callable[[float], None]) -> AbstractContextManager[LayerSource]:
         """Open a source of colours and layers, see `layer_source`."""

@@ -41,7 +41,7 @@ class Strays:
             self._edge *= 4.0
             parts = [self._keys >> (_BITS * axis) & (2**_BITS - 1) for axis in range(3)]
             numbers = [(part - 2 ** (_BITS - 1)) >> 2 for part in parts]
-            self._merge(_joined(np.stack(numbers, axis=1)), self._counts)
+            self._merge(_cube_keys(np.stack(numbers, axis=1)), self._counts)
         self._body = None
 
     def count(self) -> int:
@@ -53,7 +53,7 @@ class Strays:
         return np.isin(self._keys_of(xyz), self._of_body())
 
     def _keys_of(self, xyz: NDArray[np.floating]) -> Keys:
-        return _joined(np.floor(np.asarray(xyz, dtype=np.float64) / self._edge).astype(np.int64))
+        return _cube_keys(np.floor(np.asarray(xyz, dtype=np.float64) / self._edge).astype(np.int64))
 
     def _merge(self, keys: Keys, counts: Keys) -> None:
         self._keys, owner = np.unique(keys, return_inverse=True)
@@ -71,7 +71,7 @@ class Strays:
     def _parts(self) -> Index:
         """Return the number of the part that each cube belongs to."""
         place = {int(key): number for number, key in enumerate(self._keys)}
-        steps = _joined(np.array(_STEPS)) - _joined(np.zeros((1, 3), dtype=np.int64))
+        steps = _cube_keys(np.array(_STEPS)) - _cube_keys(np.zeros((1, 3), dtype=np.int64))
         part = np.full(len(self._keys), -1, dtype=np.intp)
         for first in range(len(part)):
             if part[first] >= 0:
@@ -86,7 +86,7 @@ class Strays:
         return part
 
 
-def _joined(numbers: Int) -> Keys:
+def _cube_keys(numbers: Int) -> Keys:
     """Return one number (N,) for each cube's three (N, 3)."""
     shifted = numbers + 2 ** (_BITS - 1)
     return np.asarray(shifted[:, 0] | shifted[:, 1] << _BITS | shifted[:, 2] << 2 * _BITS)

@@ -38,7 +38,7 @@ class SceneGroup(ClosedModel):
     )
 
     @model_validator(mode="after")
-    def _every_scene_in_a_split(self) -> Self:
+    def _check_split(self) -> Self:
         if isinstance(self.split, dict) and (sum(self.split.values()) != self.scenes or min(self.split.values()) < 0):
             raise ValueError(f"split counts {dict(self.split)} must add up to scenes, {self.scenes}")
         return self
@@ -71,7 +71,7 @@ class Recipe(ClosedModel):
 
     @field_validator("groups")
     @classmethod
-    def _distinct(cls, groups: tuple[SceneGroup, ...]) -> tuple[SceneGroup, ...]:
+    def _refuse_repetitions(cls, groups: tuple[SceneGroup, ...]) -> tuple[SceneGroup, ...]:
         if (twice := first_repeated([group.name for group in groups])) is not None:
             raise ValueError(f"two groups are named {twice}")
         return groups

@@ -240,7 +240,7 @@ def _whole(band: Band) -> bool:
 
 
 @dataclass(frozen=True)
-class MeasuredAxis:
+class FoundAxis:
     """The axis beside the path, stretch by stretch.
 
     Attributes:
@@ -256,7 +256,7 @@ class MeasuredAxis:
     raw: Float
 
 
-def axis_from_lines(layout: RoadLayout) -> MeasuredAxis:
+def axis_from_lines(layout: RoadLayout) -> FoundAxis:
     """Return the axis of a layout.
 
     Of a dual carriageway it is the middle between its two innermost lines, of a single one the line in its middle; for
@@ -287,7 +287,7 @@ def axis_from_lines(layout: RoadLayout) -> MeasuredAxis:
     level_std = float(np.hypot(level_std if np.isfinite(level_std) else 0.0, _shared_error(guides, smoothed.scatter)))
     known = np.isfinite(raw)
     held = np.interp(stations, stations[known], smoothed.values[known])  # no curve is guessed where nothing was seen
-    return MeasuredAxis(stations, held, np.hypot(smoothed.std, level_std), raw)
+    return FoundAxis(stations, held, np.hypot(smoothed.std, level_std), raw)
 
 
 def axis_guides(layout: RoadLayout) -> tuple[Line, ...]:

@@ -14,7 +14,7 @@ from .assemble import RoadMeasurements, RotationAxis, assemble_parameters
 from .cloud import PointKind, RoadCloud
 from .edges import Surface, paved_edge, surface
 from .judgement import Judgement, judge
-from .layout import MeasuredAxis, RoadKind, RoadLayout, axis_from_lines, find_layout
+from .layout import FoundAxis, RoadKind, RoadLayout, axis_from_lines, find_layout
 from .lines import find_lines
 from .objects import face_guardrails, find_barriers, find_posts, measure_ground, standing_points
 from .path import SPACING, CloudPath, alignment_path, first_path, path_through
@@ -69,7 +69,7 @@ class Reconstruction:
 
     parameters: RoadParameters
     measured: RoadMeasurements
-    centre: MeasuredAxis
+    centre: FoundAxis
     path: CloudPath
     profiles: Profiles
     layout: RoadLayout
@@ -140,14 +140,14 @@ def straighten_path(cloud: RoadCloud, options: Options) -> tuple[CloudPath, floa
 
 def _axis(
     cloud: RoadCloud, path: CloudPath, half: float, options: Options
-) -> tuple[Profiles, RoadLayout, MeasuredAxis]:
+) -> tuple[Profiles, RoadLayout, FoundAxis]:
     """Return profiles along a path, which lines they show, and where the axis lies."""
     profiles = make_profiles(cloud, path, half, exact=True)
     layout = find_layout(profiles, find_lines(profiles), options.road)
     return profiles, layout, _centre(cloud, profiles, layout, options)
 
 
-def _centre(cloud: RoadCloud, profiles: Profiles, layout: RoadLayout, options: Options) -> MeasuredAxis:
+def _centre(cloud: RoadCloud, profiles: Profiles, layout: RoadLayout, options: Options) -> FoundAxis:
     """Return the axis along the path: from the lines, or from a learned predictor."""
     by_lines = axis_from_lines(layout)
     if options.predictor is None:
@@ -163,11 +163,11 @@ def _centre(cloud: RoadCloud, profiles: Profiles, layout: RoadLayout, options: O
     deviation = np.interp(stations, along[known], std[known])
     weights = np.where(inside, 1.0 / np.maximum(deviation, 0.01) ** 2, 0.0)
     smoothed = smooth(np.where(inside, raw, np.nan), weights, STRETCH * SPACING, 60.0)
-    return MeasuredAxis(stations, smoothed.values, smoothed.std, np.where(inside, raw, np.nan))
+    return FoundAxis(stations, smoothed.values, smoothed.std, np.where(inside, raw, np.nan))
 
 
 def fit_axis_and_profile(
-    profiles: Profiles, layout: RoadLayout, centre: MeasuredAxis, tolerance: float
+    profiles: Profiles, layout: RoadLayout, centre: FoundAxis, tolerance: float
 ) -> tuple[AxisFit, RotationAxis]:
     """Return alignment and profile through the axis, and the line about which the crossfall turns.
 
@@ -201,7 +201,7 @@ def _replace_faults(raw: Float, smoothed: Float) -> Float:
     return np.where(np.isfinite(raw) & (apart <= 4.0 * max(usual, 1e-3)), raw, smoothed)
 
 
-def _heights(profiles: Profiles, layout: RoadLayout, centre: MeasuredAxis, rotation: str) -> tuple[Float, Float]:
+def _heights(profiles: Profiles, layout: RoadLayout, centre: FoundAxis, rotation: str) -> tuple[Float, Float]:
     """Return the heights (K,) of the right and left carriageway at the line that the crossfall turns about."""
     result = []
     axis = centre.offsets

@@ -44,7 +44,7 @@ _AROUND = 60.0
 
 
 @dataclass(frozen=True)
-class Section:
+class RoadSection:
     """A part of a road that is built and scanned at once.
 
     Attributes:
@@ -60,7 +60,7 @@ class Section:
     blocks: tuple[Block, ...]
 
 
-def sections(cut: Blocks, geometry: RoadGeometry, length: float, shadows: float = 0.0) -> Iterator[Section]:
+def sections(cut: Blocks, geometry: RoadGeometry, length: float, shadows: float = 0.0) -> Iterator[RoadSection]:
     """Yield the sections of a scan from the road's start to its end; without those that no block is of.
 
     Args:
@@ -80,7 +80,7 @@ def sections(cut: Blocks, geometry: RoadGeometry, length: float, shadows: float 
         if blocks:
             low, high = reached_stations(cut, geometry, blocks)
             start, end = number * length, min((number + 1) * length, geometry.length)
-            yield Section(start, end, max(low - beyond, 0.0), min(high + beyond, geometry.length), tuple(blocks))
+            yield RoadSection(start, end, max(low - beyond, 0.0), min(high + beyond, geometry.length), tuple(blocks))
 
 
 def reached_stations(cut: Blocks, geometry: RoadGeometry, blocks: list[Block]) -> tuple[float, float]:
@@ -107,7 +107,7 @@ def strip_parts(cut: Blocks, blocks: Sequence[Block]) -> tuple[Strip, ...]:
 
 
 def vehicles_through(
-    section: Section, cut: Blocks, motions: Mapping[str, LaneMotion], speed_factor: float
+    section: RoadSection, cut: Blocks, motions: Mapping[str, LaneMotion], speed_factor: float
 ) -> dict[str, LaneMotion]:
     """Return the vehicles that drive through a section while its blocks are scanned.
 

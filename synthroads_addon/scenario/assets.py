@@ -39,7 +39,7 @@ class AssetPlacement(ClosedModel):
     rotation_deg: Interval = interval(0.0, 0.0, "deg", "About the vertical; at 0 it faces its side's traffic.")
 
     @model_validator(mode="after")
-    def _can_be_placed(self) -> Self:
+    def _check_placement(self) -> Self:
         if (self.spacing is None) == (self.per_km is None):
             raise ValueError("either spacing or per_km is needed, and not both")
         for name, (least, most) in _ALLOWED.items():
@@ -66,7 +66,7 @@ class LibraryAsset(ClosedModel):
 
     @field_validator("file")
     @classmethod
-    def _inside(cls, file: str) -> str:
+    def _check_path(cls, file: str) -> str:
         path = PurePosixPath(file)
         if path.suffix.lower() not in SUFFIXES:
             raise ValueError(f"'{file}' must be one of {', '.join(SUFFIXES)}")
@@ -75,7 +75,7 @@ class LibraryAsset(ClosedModel):
         return file
 
     @model_validator(mode="after")
-    def _object_in_blend(self) -> Self:
+    def _check_object(self) -> Self:
         if self.object is not None and not self.file.lower().endswith(".blend"):
             raise ValueError(f"object is '{self.object}': only a .blend file has named objects to choose from")
         return self

@@ -44,7 +44,7 @@ class CloudScenario(ClosedModel):
     )
 
     @model_validator(mode="after")
-    def _nothing_twice(self) -> Self:
+    def _refuse_repetitions(self) -> Self:
         for name in ("formats", "attributes"):
             if (twice := first_repeated(getattr(self, name))) is not None:
                 raise ValueError(f"{name} names {twice} twice")

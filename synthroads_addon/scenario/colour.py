@@ -106,7 +106,7 @@ class ColourScenario(ClosedModel):
         return {True: "always", False: "never"}[value] if isinstance(value, bool) else value
 
     @model_validator(mode="after")
-    def _direct_needs_no_samples(self) -> Self:
+    def _check_samples(self) -> Self:
         if self.lighting == "direct" and (self.samples or 1) > 1:
             raise ValueError("samples can't be given for direct lighting, which has no noise")
         return self

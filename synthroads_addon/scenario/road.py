@@ -232,7 +232,7 @@ class RoadScenario(ClosedModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _what_fits(cls, data: Any) -> Any:
+    def _fill_in_what_fits(cls, data: Any) -> Any:
         """Take, where one of design class and cross-section isn't given, what fits the other."""
         if not isinstance(data, dict):
             return data
@@ -244,7 +244,7 @@ class RoadScenario(ClosedModel):
         return data
 
     @model_validator(mode="after")
-    def _known(self) -> RoadScenario:
+    def _check_cross_section(self) -> RoadScenario:
         if not isinstance(self.cross_section, str):
             return self
         if self.cross_section not in STANDARD_CROSS_SECTIONS:

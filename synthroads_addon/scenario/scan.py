@@ -88,7 +88,7 @@ class ScanScenario(DeviceChoice):
 
     @model_validator(mode="before")
     @classmethod
-    def _one_of_each(cls, data: Any) -> Any:
+    def _refuse_contradictions(cls, data: Any) -> Any:
         if isinstance(data, dict):
             for a, b in (("rays_per_pulse", "beam_rings"), ("attenuation", "weather")):
                 if data.get(a) is not None and data.get(b) is not None:

@@ -109,7 +109,7 @@ class Scenario(ClosedModel):
 
     @field_validator("time_budget", mode="before")
     @classmethod
-    def _with_unit(cls, value: Any) -> Any:
+    def _read_unit(cls, value: Any) -> Any:
         if not isinstance(value, str):
             return value
         try:

@@ -63,7 +63,7 @@ class Tolerance(ClosedModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _with_units(cls, data: Any) -> Any:
+    def _read_units(cls, data: Any) -> Any:
         if isinstance(data, str):
             data = parse_tolerance(data, "tolerance")
         if not isinstance(data, dict):

@@ -45,13 +45,13 @@ def test_classes_are_those_of_a_scheme() -> None:
 def test_a_pattern_that_a_stronger_one_hides_has_matched() -> None:
     names = NameClasses(ClassMapping(objects={"*": "pole", "Tree*": "vegetation", "Car*": "vehicle"}))
     names.find("objects", "Tree")
-    assert names.unmatched() == ("objects: Car*",)
+    assert names.unmatched_patterns() == ("objects: Car*",)
 
 
 def test_without_a_mapping_nothing_is_found() -> None:
     names = NameClasses(None)
     assert names.find("objects", "Tree") is None
-    assert names.unmatched() == ()
+    assert names.unmatched_patterns() == ()
 
 
 @pytest.mark.parametrize(

@@ -122,7 +122,7 @@ def checked(path: Path, body: Callable[[], object], count: int) -> None:
 def test_checkpoints(tmp_path: Path, count: int) -> None:
     run = Run.start(tmp_path, SegmentationConfiguration.from_dict({"task": "segmentation", "data": {"real": []}}))
     run.save({"model": torch.nn.Linear(4, 3).state_dict(), "epoch": 1})
-    checked(tmp_path / CHECKPOINT, run.saved, count)
+    checked(tmp_path / CHECKPOINT, run.last_checkpoint, count)
 
 
 @pytest.fixture(scope="module")

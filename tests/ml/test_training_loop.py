@@ -154,7 +154,7 @@ def test_a_finished_run_opens(tmp_path: Path) -> None:
         Run.open(tmp_path / "nowhere")
     (tmp_path / CHECKPOINT).write_bytes(b"PK\x03\x04 torn")
     with pytest.raises(InputError, match="damaged"):
-        run.saved()
+        run.last_checkpoint()
 
 
 def test_a_loss_that_is_not_finite_ends_the_training(tmp_path: Path) -> None:

@@ -30,12 +30,12 @@ class CropEffects(PointEffects):
 
     @field_validator("mirror", mode="before")
     @classmethod
-    def _every_second(cls, mirror: Any) -> Any:
+    def _read_true(cls, mirror: Any) -> Any:
         """Read true, which was every second crop."""
         return 0.5 * mirror if isinstance(mirror, bool) else mirror
 
     @model_validator(mode="after")
-    def _limit_is_no_less(self) -> Self:
+    def _check_limit(self) -> Self:
         if self.jitter_limit < self.jitter:
             raise ValueError(f"jitter_limit must not be less than jitter, {self.jitter:g}")
         return self

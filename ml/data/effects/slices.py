@@ -37,7 +37,7 @@ class SequenceCrop(Part):
     steady: float = quantity(0.25, ge=0, le=1, unit="1", description="Probability of cuts that all slices share.")
 
     @model_validator(mode="after")
-    def _in_order(self) -> Self:
+    def _check_sides(self) -> Self:
         for name, least in (("reach", 0.5), ("beyond", 0.0)):
             low, high = getattr(self, name)
             if not least <= low <= high <= 1000.0:
@@ -91,7 +91,7 @@ class SequenceEffects(PointEffects):
     tint: float = quantity(0.2, ge=0, le=1, unit="1", description="Log of the factor on each colour channel.")
 
     @model_validator(mode="after")
-    def _powers(self) -> Self:
+    def _check_gamma(self) -> Self:
         if not 0.01 <= self.gamma[0] <= self.gamma[1] <= 10.0:
             low, high = self.gamma
             raise ValueError(f"gamma is {low:g}, {high:g}: must be two ascending numbers from 0.01 to 10")
@@ -195,7 +195,7 @@ def turn_round(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> No
     corridor[:, [LEFT, RIGHT]] = -corridor[:, [RIGHT, LEFT]]
     stretch.corridor = corridor
     stretch.lines, stretch.room = stretch.lines[::-1, ::-1], stretch.room[::-1, ::-1]
-    stretch.frames = stretch.frames.turned_round()
+    stretch.frames = stretch.frames.reverse()
 
 
 @effect("centerline", order=30)

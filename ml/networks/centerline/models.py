@@ -73,7 +73,7 @@ class ModelOptions(Part):
         raise NotImplementedError
 
     @model_validator(mode="after")
-    def _divisible(self) -> ModelOptions:
+    def _check_widths(self) -> ModelOptions:
         for name in ("width", "context"):
             if getattr(self, name) % self.heads or getattr(self, name) % 2:
                 raise ValueError(f"{name} must be even and a multiple of heads, {self.heads}")

@@ -60,7 +60,7 @@ class Grouping:
 
     def __init__(self, index: Tensor, support: Tensor, queries: Tensor) -> None:
         self.index, self.support, self.queries = index, support, queries
-        self._seen: tuple[Tensor, Tensor, Tensor, Tensor] | None = None
+        self._statistics: tuple[Tensor, Tensor, Tensor, Tensor] | None = None
 
     @property
     def pairs(self) -> int:
@@ -72,21 +72,21 @@ class Grouping:
         gathered = self.support.index_select(0, self.index.reshape(-1)).view(*self.index.shape, 3)
         return gathered - self.queries[:, None]
 
-    def seen(self) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Return how support points are seen; computed once, as it depends on the geometry alone.
+    def pair_statistics(self) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """Return the statistics of the pairs that support points are in; computed once, from the geometry alone.
 
         The share of all pairs that each is in (N,); the sum of its relative positions less their overall mean, over the
         number of pairs (N, 3); that mean (3,); the relative positions' covariance (3, 3).
         """
-        if self._seen is None:
+        if self._statistics is None:
             flat = self.index.reshape(-1).long()  # adding at 32-bit indices is slow
             relative = self.relative().reshape(-1, 3)
             mean = relative.mean(dim=0)
             centred = relative - mean
             share = torch.bincount(flat, minlength=len(self.support)).to(relative.dtype) / self.pairs
             sums = torch.zeros_like(self.support).index_add_(0, flat, centred) / self.pairs
-            self._seen = share, sums, mean, centred.T @ centred / self.pairs
-        return self._seen
+            self._statistics = share, sums, mean, centred.T @ centred / self.pairs
+        return self._statistics
 
     def moments(self, features: Tensor, directions: Tensor) -> tuple[Tensor, Tensor]:
         """Return mean and population variance (C,) over all pairs of ``features_j + directions (p_j - p_i) / r``.
@@ -95,7 +95,7 @@ class Grouping:
             features: of the support points (N, C).
             directions: (C, 3).
         """
-        share, sums, mean, covariance = self.seen()
+        share, sums, mean, covariance = self.pair_statistics()
         feature_mean = share @ features
         # About a constant: as `share` and `sums` are centred, its value changes nothing, neither here nor in gradients.
         centred = features - feature_mean.detach()
@@ -202,7 +202,7 @@ def normalised_max_of_two(
     sign = second.scale_sign()
     turned = weights[1] * sign[:, None]
     top, total, product = pairs_max(support, offset, grouping.index, turned, moments=second.training)
-    mean, variance = _running(second, sign)
+    mean, variance = _running_moments(second, sign)
     if second.training and grouping.pairs:
         between = total / grouping.pairs
         mean = turned @ between
@@ -218,13 +218,13 @@ def _statistics(
 ) -> tuple[Tensor, Tensor]:
     """Return mean and variance (C,) that a norm uses for values of channels turned by `sign`."""
     if not norm.training or not grouping.pairs:
-        return _running(norm, sign)
+        return _running_moments(norm, sign)
     mean, variance = grouping.moments(values, directions)
     norm.observe(mean * sign, variance, grouping.pairs)
     return mean, variance
 
 
-def _running(norm: Norm, sign: Tensor) -> tuple[Tensor, Tensor]:
+def _running_moments(norm: Norm, sign: Tensor) -> tuple[Tensor, Tensor]:
     assert norm.running_mean is not None
     assert norm.running_var is not None
     return norm.running_mean * sign, norm.running_var

@@ -91,7 +91,7 @@ def build_neighbours(coord: torch.Tensor, offset: torch.Tensor, neighbourhood: N
         InputError: the offsets don't fit the points, a coordinate is not finite, or a cloud spans more cells of
             its thinnings than 2^62.
     """
-    ends = _checked_ends(coord, offset)
+    ends = _check_ends(coord, offset)
     bounds = list(itertools.pairwise([0, *ends.tolist()])) or [(0, 0)]
     clouds = [_stages_of(coord[begin:end].numpy(), neighbourhood) for begin, end in bounds]
     stages = range(len(neighbourhood.inner) + 1)
@@ -108,7 +108,7 @@ def build_neighbours(coord: torch.Tensor, offset: torch.Tensor, neighbourhood: N
     return packed
 
 
-def _checked_ends(coord: torch.Tensor, offset: torch.Tensor) -> Int:
+def _check_ends(coord: torch.Tensor, offset: torch.Tensor) -> Int:
     if coord.ndim != 2 or coord.shape[1] != 3 or not coord.is_floating_point():
         raise InputError("coord", tuple(coord.shape), "must be floating-point numbers of the shape (N, 3)")
     ends = np.asarray(offset.cpu().numpy(), dtype=np.int64)

@@ -138,7 +138,7 @@ def _node_layers(
     needed = needed_layers(request.wanted, request.settings.mode)
     if request.lit:
         needed |= set(MATERIAL_LAYERS)  # the light that they throw back depends on all
-    layers = constants.varying(frozenset(needed))
+    layers = constants.varying_layers(frozenset(needed))
     if not layers and not request.lit:
         return fallback
     varying = {index for name in layers for index in constants.varies[name].nonzero()[0].tolist()}
@@ -177,7 +177,7 @@ def _passes(request: LayerRequest, constants: SurfaceConstants, by_return: bool 
         needed -= {"base_color"} - request.wanted
     returns = by_return or renders_returns(settings)
     return Passes(
-        layers=constants.varying(needed),
+        layers=constants.varying_layers(needed),
         lit=lit,
         sky=whole,
         depth=not returns,

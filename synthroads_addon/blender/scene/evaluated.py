@@ -162,7 +162,7 @@ def scanned_scene_steps(
 def _put_together(reading: _Reading, origin: Float, number_objects: bool) -> ScannedScene:
     tables = reading.tables(origin, number_objects)
     moving = tuple(_moving(reading, carrier, motion, tables) for carrier, motion in reading.motions.items())
-    return ScannedScene(join_parts(reading.pairs(None), tables), moving, reading.labels.by_name.unmatched())
+    return ScannedScene(join_parts(reading.pairs(None), tables), moving, reading.labels.by_name.unmatched_patterns())
 
 
 @dataclass(frozen=True)

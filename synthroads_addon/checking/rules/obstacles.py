@@ -174,7 +174,7 @@ class Signs:
         """Return by how much (S,) the signs are turned away from a carriageway's traffic, degrees."""
         return self.turned if edges.traffic > 0 else 180.0 - self.turned
 
-    def seen(self, edges: Edges, code: str, room: float) -> NDArray[np.intp]:
+    def seen_by(self, edges: Edges, code: str, room: float) -> NDArray[np.intp]:
         """Return the indices of the signs of a code that a carriageway's traffic sees, turned by `room` at most."""
         seen = self.of[edges.name] & (self.away(edges) <= room)
         return np.array([i for i, sign_code in enumerate(self.codes) if sign_code == code and seen[i]], dtype=np.intp)

@@ -239,7 +239,7 @@ class Vertical:
 
     def __init__(self, alignment: AlignmentObject) -> None:
         points = np.array([(p.station, p.elevation, p.radius) for p in alignment.vertical], dtype=np.float64)
-        self.station, elevation, self.radius = points[increasing(points[:, 0])].T
+        self.station, elevation, self.radius = points[indices_of_increase(points[:, 0])].T
         between = np.diff(elevation) / np.diff(self.station)
         self.grades = np.concatenate((between[:1], between, between[-1:])) if len(between) else np.zeros(2)
         self.tangents = 0.5 * self.radius * np.abs(np.diff(self.grades))
@@ -257,7 +257,7 @@ class Crossfall:
 
     def __init__(self, carriageway: Carriageway, length: float) -> None:
         points = np.array([(p.station, p.crossfall_percent) for p in carriageway.crossfall])
-        station, percent = points[increasing(points[:, 0])].T
+        station, percent = points[indices_of_increase(points[:, 0])].T
         inside = (station > 0.0) & (station < length)
         self.station = np.concatenate(([0.0], station[inside], [length]))
         self.percent = np.interp(self.station, station, percent)
@@ -272,7 +272,7 @@ def same_curvature(a: Float | float, b: Float | float) -> Bool:
     return np.asarray(np.abs(np.subtract(a, b)) <= room)
 
 
-def increasing(station: Float) -> NDArray[np.intp]:
+def indices_of_increase(station: Float) -> NDArray[np.intp]:
     """Return the indices of the stations that lie past all stations before them."""
     before = np.concatenate(([-np.inf], np.maximum.accumulate(station)[:-1]))
     return np.flatnonzero(station > before)

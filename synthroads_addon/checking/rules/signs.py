@@ -53,7 +53,7 @@ def _exit_sign_missing(road: Road) -> Iterator[Finding]:
         for before, code in EXIT_SEQUENCE.items():
             place = begin - edges.traffic * before
             if 0.0 <= place <= road.length:
-                stations = signs.station[signs.seen(edges, code, TURNED)]
+                stations = signs.station[signs.seen_by(edges, code, TURNED)]
                 away = np.abs(stations - place).min(initial=road.length)
                 text = (
                     f"The nearest sign {code} is {away:.0f} m from its place {before:.0f} m before the exit; "
@@ -67,7 +67,7 @@ def _exit_sign_place(road: Road) -> Iterator[Finding]:
     for side in {edges.name: edges for edges, _ in exits}.values():
         begins = np.array([turnout.station(0.0) for edges, turnout in exits if edges is side])
         for before, code in EXIT_SEQUENCE.items():
-            for i in signs.seen(side, code, TURNED):
+            for i in signs.seen_by(side, code, TURNED):
                 ahead = side.traffic * (begins - signs.station[i])
                 away = np.abs(ahead - before).min()
                 if np.any((ahead >= 0.0) & (ahead <= max(EXIT_SEQUENCE) + EXIT_SIGN_ROOM)):

@@ -36,7 +36,7 @@ class Brightness:
     text = "intensity as stored"
 
     def values(self, block: PointBlock) -> Float:
-        """Return a block's values (N,)."""
+        """Return the intensities (N,) of a block as they are drawn."""
         if not len(block) or np.isnan(block.range[0]):
             return block.intensity
         self.text = "intensity x squared range (white target = 1)"

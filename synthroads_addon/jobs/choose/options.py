@@ -18,7 +18,7 @@ _LEAST = 1e-9
 
 @dataclass(frozen=True)
 class Option:
-    """One setting of a knob, or one of every knob, see `combined`.
+    """One setting of a knob, or one of every knob, see `combine`.
 
     Attributes:
         changes: of the scenario: dotted path -> value.
@@ -32,20 +32,20 @@ class Option:
     cost: float
     seconds: float = 0.0
 
-    def bound(self, kind: str) -> float:
+    def upper(self, kind: str) -> float:
         """Return the upper bound of a kind of error."""
         return self.found.get(kind, (0.0, 0.0))[1]
 
     def keeps(self, limits: Mapping[str, float]) -> bool:
         """Return whether all errors are within their limits."""
-        return all(self.bound(kind) <= limit for kind, limit in limits.items())
+        return all(self.upper(kind) <= limit for kind, limit in limits.items())
 
 
 Knobs = Sequence[Sequence[Option]]
 """Options of each knob; what no knob changes is one without a choice."""
 
 
-def combined(options: Iterable[Option]) -> Option:
+def combine(options: Iterable[Option]) -> Option:
     """Return one option of every knob as a whole: their changes and errors together, costs and times added up."""
     several = tuple(options)
     changes = {path: value for option in several for path, value in option.changes.items()}
@@ -68,13 +68,13 @@ def options_within(knobs: Knobs, limits: Mapping[str, float]) -> list[list[Optio
 def _impossible(options: Sequence[Option], limits: Mapping[str, float]) -> InputError:
     """Return the error for a tolerance that no option keeps: the best of each kind, or of all together."""
     for kind, limit in limits.items():
-        best = min(option.bound(kind) for option in options)
+        best = min(option.upper(kind) for option in options)
         if best > limit:
             text = f"can't be kept here: the best to be had is {error_text(kind, best)}"
             return InputError(f"tolerance.{kind}", limit, text)
     kinds = [kind for kind in limits if any(kind in option.found for option in options)]
-    nearest = min(options, key=lambda option: max(option.bound(kind) / max(limits[kind], _LEAST) for kind in kinds))
-    said = ", ".join(f"{kind}={error_text(kind, nearest.bound(kind))}" for kind in kinds)
+    nearest = min(options, key=lambda option: max(option.upper(kind) / max(limits[kind], _LEAST) for kind in kinds))
+    said = ", ".join(f"{kind}={error_text(kind, nearest.upper(kind))}" for kind in kinds)
     return InputError("tolerance", None, f"{' and '.join(kinds)} can't be kept together: the nearest is {said}")
 
 
@@ -84,7 +84,7 @@ def cheapest(knobs: Knobs, limits: Mapping[str, float]) -> Option:
     Raises:
         InputError: there are none; says what is the best to be had.
     """
-    return combined(min(options, key=lambda option: option.cost) for options in options_within(knobs, limits))
+    return combine(min(options, key=lambda option: option.cost) for options in options_within(knobs, limits))
 
 
 def best_in_time(
@@ -103,7 +103,7 @@ def best_in_time(
     Raises:
         InputError: not even the fastest settings fit, or none keeps the tolerance.
     """
-    choices = list(map(combined, itertools.product(*options_within(knobs, limits or {}))))
+    choices = list(map(combine, itertools.product(*options_within(knobs, limits or {}))))
     fitting = [choice for choice in choices if choice.seconds <= seconds]
     if not fitting:
         raise too_short(seconds, min(choice.seconds for choice in choices), bool(limits))

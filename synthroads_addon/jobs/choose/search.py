@@ -125,11 +125,11 @@ class _Search:
             return budget - (time.perf_counter() - self.begun)
 
         fewest, times = min(self.rays), self.times
-        seconds = times.model(0) + times.scan(fewest) + times.fixed(self.scenario)
+        seconds = times.model(0) + times.scan(fewest) + times.other_outputs(self.scenario)
         if seconds > _HOPELESS * left():  # by the shipped table, before anything is built
             raise too_short(left(), seconds)
         times.calibrate(fewest, *self._try(self.models[0]).time_scan(self.rays[fewest]))
-        if (fastest := times.scan(fewest) + times.fixed(self.scenario)) > left():
+        if (fastest := times.scan(fewest) + times.other_outputs(self.scenario)) > left():
             raise too_short(left(), fastest)
         # The error of the height follows from the model, without a measurement.
         found = self._measure() if set(self.limits) - {"height"} else self._look_up()
@@ -184,7 +184,7 @@ class _Search:
             for octaves, errors in found.relief.items()
         ]
         colour = [self._colour_option(name, errors) for name, errors in found.colour.items()]
-        rest = [Option({}, {}, 0.0, self.times.fixed(self.scenario))]
+        rest = [Option({}, {}, 0.0, self.times.other_outputs(self.scenario))]
         return [options for options in (beam, relief, colour, rest) if options]
 
     def _beam_option(self, model: ModelKnobs | None, rays: int, errors: Errors) -> Option:

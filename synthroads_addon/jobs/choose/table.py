@@ -125,7 +125,7 @@ class JobTimes:
             return 1.0 + _IMAGE * images + megapixels
         return 0.0 if source == "material" else _RETURN * 1e-6 * self.pulses
 
-    def fixed(self, scenario: Scenario) -> float:
+    def other_outputs(self, scenario: Scenario) -> float:
         """Return the time of what no knob changes, beyond the scan."""
         seconds = 1e-6 * self.table.scene_file * self.area if "scene" in scenario.outputs else 0.0
         seconds += 1e-6 * self.table.previews * self.points if "previews" in scenario.outputs else 0.0

@@ -17,6 +17,7 @@ import laspy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.arrays import Float32
 from ...base.machine import available_cores
 from ...base.progress import StageTimer, peak_memory_mb
 from ...blender.cameras.benchmark import panel_edit, rendering, seconds_of
@@ -46,7 +47,6 @@ _VIEWS = 4
 """Images that are rendered bare."""
 
 Rate = dict[str, Any]
-Rays = NDArray[np.float32]
 
 
 def measure_demo(scenario: Scenario) -> dict[str, Any]:
@@ -100,10 +100,10 @@ def _cast_beside(plan: ScanPlan) -> Rate:
     """Return casting and radiometry beside the bare caster on the same rays."""
     threads, every = available_cores(), list(plan.blocks())
     blocks = [every[i] for i in np.unique(np.linspace(0, len(every) - 1, _CAST_BLOCKS + 2).astype(int)[1:-1])]
-    part, target, kept = plan.target._parts[0], copy(plan.target), list[tuple[Rays, Rays]]()
+    part, target, kept = plan.target._parts[0], copy(plan.target), list[tuple[Float32, Float32]]()
     caster = part.caster
 
-    def cast_and_keep(origins: Rays, directions: Rays, maximum_range: float) -> NDArray[np.int32]:
+    def cast_and_keep(origins: Float32, directions: Float32, maximum_range: float) -> NDArray[np.int32]:
         kept.append((origins.copy(), directions.copy()))
         return caster.cast(origins, directions, maximum_range)
 

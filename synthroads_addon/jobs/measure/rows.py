@@ -99,7 +99,7 @@ def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class Sample:
+class StretchPoints:
     """Points of stretches of a path, of which a row's errors are taken.
 
     Attributes:
@@ -117,7 +117,7 @@ class Sample:
     written: int
 
 
-def _measure_stretches(site: Site, knob: Knob, plan: ScanPlan) -> tuple[dict[str, Any], Sample]:
+def _measure_stretches(site: Site, knob: Knob, plan: ScanPlan) -> tuple[dict[str, Any], StretchPoints]:
     """Do the job on stretches of the path; return what it costs after the caster is built, and the points.
 
     Returns:
@@ -138,7 +138,7 @@ def _measure_stretches(site: Site, knob: Knob, plan: ScanPlan) -> tuple[dict[str
             sample_points(source, result.seen.select(slice(0, _FEW)), LAYERS)
         prepared, rendered = time.process_time(), dict(source.report)
         files = site.files(Path(folder), part.target.origin)
-        with files.opened():
+        with files.open():
             for block in scan_blocks(part, source):
                 files.write(block)
         done, peak, counts = time.process_time(), peak_memory_mb(), files.counts
@@ -155,7 +155,7 @@ def _measure_stretches(site: Site, knob: Knob, plan: ScanPlan) -> tuple[dict[str
         "megapixels": rendered.get("pixels", 0) / 1e6,
         "shares": shares_by_source(counts.by_source),
     }
-    return costs, Sample(part, request, result, values, counts.points)
+    return costs, StretchPoints(part, request, result, values, counts.points)
 
 
 def _true_plan(shown: RoadScene, part: ScanPlan, plants: float) -> ScanPlan | None:
@@ -180,7 +180,7 @@ def _true_plan(shown: RoadScene, part: ScanPlan, plants: float) -> ScanPlan | No
     return replace(true.plan(), path=part.path, rings=RINGS[CONVERGED])
 
 
-def _beam_errors(sample: Sample, plan: ScanPlan | None) -> dict[str, float]:
+def _beam_errors(sample: StretchPoints, plan: ScanPlan | None) -> dict[str, float]:
     """Compare first returns with those of the converged footprint's plan; points with those in the file."""
     mine = sample.result.points
     truth = mine if plan is None else join_results(record_as_measured(plan)).points
@@ -193,7 +193,7 @@ def _beam_errors(sample: Sample, plan: ScanPlan | None) -> dict[str, float]:
     }
 
 
-def _relief_error(sample: Sample) -> float:
+def _relief_error(sample: StretchPoints) -> float:
     """Return how far the points' micro-relief is from the finest with full strength, m, 95th percentile."""
     plan, materials = sample.plan, sample.plan.target.materials
     relief = plan.relief or micro_relief(materials, BlenderServices().materials(materials))
@@ -202,7 +202,7 @@ def _relief_error(sample: Sample) -> float:
     return relief_errors(mine, truth)["relief"][0]
 
 
-def _colour_errors(knob: Knob, sample: Sample) -> tuple[dict[str, float], dict[str, Any]]:
+def _colour_errors(knob: Knob, sample: StretchPoints) -> tuple[dict[str, float], dict[str, Any]]:
     """Return the errors of colours and layers against those rendered as well as can be, and what to say of them.
 
     That is ``colour_truth``, what they were compared with, and ``errors_by_source``, their errors by what gave them to

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ...base.arrays import Float
 from ...base.progress import StageTimer
 from ...blender.materials import vary
 from ...blender.model.build import build_road, remove_road
@@ -23,11 +23,9 @@ from ...road.geometry import RoadGeometry
 from ...scanning.plan import ScanPlan
 from ...scanning.platforms.stretches import PathStretches
 from ...scanning.scene.motion import ScannedScene, ShiftedMotion, lane_motions
-from ...scanning.sections import Section, sections, shadow_length, strip_parts, vehicles_through
+from ...scanning.sections import RoadSection, sections, shadow_length, strip_parts, vehicles_through
 from .files import record_to_files
 from .plan import Site
-
-Float = NDArray[np.float64]
 
 
 def scan_by_section(site: Site, road: RoadGeometry, folder: Path, timer: StageTimer) -> dict[str, Any]:
@@ -69,7 +67,7 @@ class SectionScan:
         self.scanned = 0
         self._standing = road.parameters.model_copy(update={"objects": standing})
 
-    def sections(self) -> Iterator[Section]:
+    def sections(self) -> Iterator[RoadSection]:
         """Yield the sections from the road's start to its end."""
         shadows = shadow_length(self._road) if self._scenario.may_render else 0.0
         length = self._road.length
@@ -88,10 +86,10 @@ class SectionScan:
             done += len(section.blocks)
             self.scanned += 1
 
-    def plan(self, section: Section, timer: StageTimer) -> ScanPlan:
+    def plan(self, section: RoadSection, timer: StageTimer) -> ScanPlan:
         """Build a section and return the plan of its blocks."""
         with timer.stage("model"):
-            scene, frame = self._built(section)
+            scene, frame = self._build(section)
         path = PathStretches(self.cut.path, self.cut.path.strips, frame)
         with timer.stage("caster"):
             plan = replace(self._site, path=path).plan(scene, BlenderServices())
@@ -100,7 +98,7 @@ class SectionScan:
         request = replace(plan.request, path=seen_from, frame=(frame[0], frame[1], frame[2]))
         return replace(plan, frame_origin=frame, chosen_blocks=section.blocks, request=request)
 
-    def _built(self, section: Section) -> tuple[ScannedScene, Float]:
+    def _build(self, section: RoadSection) -> tuple[ScannedScene, Float]:
         """Return what is scanned of a section, and where its frame begins in the road's."""
         settings, whole, stretch = self._scenario.settings(), self._road.parameters, (section.low, section.high)
         tolerance, detail = settings.tolerance, settings.vegetation_detail

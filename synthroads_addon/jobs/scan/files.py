@@ -86,7 +86,7 @@ class CloudFiles:
         return self.scenario.cloud.intensity_scale or usual
 
     @contextmanager
-    def opened(self) -> Iterator[None]:
+    def open(self) -> Iterator[None]:
         """Open the files; they are complete, and under their names, when the context ends without an exception."""
         cloud = self.scenario.cloud
         with ExitStack() as stack:
@@ -153,7 +153,7 @@ def record_to_files(
     figures: dict[str, Any] = {}
     rendered: dict[str, Any] = {}
     with ExitStack() as stack:
-        stack.enter_context(files.opened())
+        stack.enter_context(files.open())
         for plan in plans:
             if announce and not figures:  # the path is the whole scan's, whatever section the plan is of
                 forecast = plan.forecast()

@@ -159,7 +159,7 @@ class SurfaceConstants:
     values: dict[str, Float32]
     varies: dict[str, Bool]
 
-    def varying(self, wanted: frozenset[str]) -> tuple[str, ...]:
+    def varying_layers(self, wanted: frozenset[str]) -> tuple[str, ...]:
         """Return those of the wanted layers that some material varies, in the order of `MATERIAL_LAYERS`."""
         return tuple(name for name in MATERIAL_LAYERS if name in wanted and bool(self.varies[name].any()))
 

@@ -114,7 +114,7 @@ class Device(Model):
         return 0.5 * SPEED_OF_LIGHT * self.pulses_in_air * self.pattern.beams / pulse_rate
 
     @model_validator(mode="after")
-    def _consistent(self) -> Self:
+    def _check_modes(self) -> Self:
         slowest, fastest = self.lines_per_second
         if slowest > fastest:
             raise ValueError(

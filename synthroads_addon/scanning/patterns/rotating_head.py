@@ -32,7 +32,7 @@ class RotatingHead(Pattern):
     )
 
     @model_validator(mode="after")
-    def _a_time_for_each(self) -> Self:
+    def _check_firing_times(self) -> Self:
         if self.firing_times_us is not None and len(self.firing_times_us) != len(self.elevations_deg):
             raise ValueError(f"firing_times_us must be {len(self.elevations_deg)} times, one for each beam")
         return self

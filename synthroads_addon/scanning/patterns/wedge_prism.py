@@ -19,7 +19,7 @@ class Wedge(Model):
     turns: int = quantity(..., "1", "Turns, to the right, in the time of the other's turns.", (-1_000_000, 1_000_000))
 
     @model_validator(mode="after")
-    def _turning(self) -> Self:
+    def _check_turns(self) -> Self:
         if self.turns == 0:
             raise ValueError("turns must not be 0")
         return self

@@ -129,7 +129,7 @@ class SmoothedGuide(Guide):
         plan = guide.frame(station)[0]
         self._mean = plan.mean(axis=0)
         fit = np.polynomial.chebyshev
-        coefficients = fit.chebfit(self._scaled(station), plan - self._mean, degree)
+        coefficients = fit.chebfit(self._fit_variable(station), plan - self._mean, degree)
         self._derivatives = [coefficients]
         for _ in range(2):
             self._derivatives.append(fit.chebder(self._derivatives[-1]) * (2.0 / self.length))
@@ -140,12 +140,12 @@ class SmoothedGuide(Guide):
                 "scan.platform.polynomial_degree", degree, f"the smoothed path turns back at station {at:.1f} m"
             )
 
-    def _scaled(self, station: Float) -> Float:
+    def _fit_variable(self, station: Float) -> Float:
         return 2.0 * station / self.length - 1.0
 
     def frame(self, station: Float) -> tuple[Float, Float, Float, Float]:
         """Return plan position (K, 2), heading (K,), curvature (K,) 1/m, and plan length per station (K,)."""
-        u = self._scaled(station)
+        u = self._fit_variable(station)
         (x, y), (dx, dy), (ddx, ddy) = (np.polynomial.chebyshev.chebval(u, part) for part in self._derivatives)
         stretch = np.hypot(dx, dy)
         curvature = (dx * ddy - dy * ddx) / np.maximum(stretch, 1e-12) ** 3

@@ -66,7 +66,7 @@ class Precipitation(Weather):
     )
 
     @model_validator(mode="after")
-    def _one_measure(self) -> Self:
+    def _refuse_two_measures(self) -> Self:
         if self.rate_mm_h is not None and self.visibility is not None:
             raise ValueError("rate_mm_h and visibility can't both be given")
         return self

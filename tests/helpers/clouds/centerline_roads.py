@@ -44,4 +44,4 @@ def strip_road(
         class_id=np.where(line, 2, np.where(paved, 1, 0)).astype(np.uint8),
         class_names=NAMES,
     )
-    return LearningRoad.of_points(name, points, axis, Truth.measured(axis, "road"))
+    return LearningRoad.of_points(name, points, axis, Truth.of_axis(axis, "road"))

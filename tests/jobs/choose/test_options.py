@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.jobs.choose.options import Option, best_in_time, cheapest, combined
+from synthroads_addon.jobs.choose.options import Option, best_in_time, cheapest, combine
 
 KINDS = {"beam": ("position", "intensity"), "relief": ("relief",), "colour": ("colour", "layers")}
 Table = list[list[Option]]
@@ -34,7 +34,7 @@ limits_of = st.dictionaries(st.sampled_from(sorted(itertools.chain(*KINDS.values
 
 
 def every(knobs: Table) -> list[Option]:
-    return list(map(combined, itertools.product(*knobs)))
+    return list(map(combine, itertools.product(*knobs)))
 
 
 def keeps(choice: Option, limits: dict[str, float]) -> bool:

@@ -50,7 +50,7 @@ def test_what_was_found_is_remembered_by_points_and_frames(monkeypatch: pytest.M
         found = remembering.regress(known, places)
         np.testing.assert_array_equal(found.value, wanted.value)
         np.testing.assert_array_equal(found.std, wanted.std)
-    again, _ = remembering.calibrated_on([(known, places)])
+    again, _ = remembering.calibrate([(known, places)])
     factors = np.array([again.calibration[name].factor for name in TARGETS])
     np.testing.assert_allclose(again.regress(known, places).std, wanted.raw_std * factors)
     assert len(seen) == 2

@@ -62,7 +62,7 @@ def trained(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Trained:
 
 
 def weights(run: Run[Any]) -> dict[str, torch.Tensor]:
-    state = run.saved()
+    state = run.last_checkpoint()
     assert state is not None
     return state["model"]
 
@@ -91,7 +91,7 @@ def test_resumed_training_ends_with_the_same_bits(trained: Trained, data: Path, 
     broken = Run.start(tmp_path / "broken", configuration(data, name))
     with pytest.raises(Cancelled):
         task.train(broken, Stop(6))
-    assert int((broken.saved() or {})["epoch"]) == 1
+    assert int((broken.last_checkpoint() or {})["epoch"]) == 1
     with pytest.raises(InputError, match="isn't finished"):
         task.predictor(broken)
     resumed = Run.start(tmp_path / "broken", configuration(data, name), resume=True)

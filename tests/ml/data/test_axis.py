@@ -160,7 +160,7 @@ def test_displaced_frames_stay_in_their_window_and_turn_with_their_path() -> Non
 def test_points_of_frames_and_turning_round() -> None:
     frames = Frames(np.array([[1.0, 2.0], [3.0, 4.0]]), np.array([0.0, np.pi / 2]), np.array([0.0, 1.0]))
     np.testing.assert_allclose(frames.at([5.0, 1.0]), [[1.0, 7.0], [2.0, 4.0]], atol=1e-12)
-    back = frames.turned_round()
+    back = frames.reverse()
     np.testing.assert_allclose(back.at([-1.0, -5.0]), [[2.0, 4.0], [1.0, 7.0]], atol=1e-12)
     assert len(frames.select(slice(1))) == 1
 

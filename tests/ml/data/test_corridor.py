@@ -69,7 +69,7 @@ def test_frames_against_the_road_see_it_turned_by_half(kind: str) -> None:
     for truth in truths(parameters(), kind):  # type: ignore[arg-type]
         frames = displace_frames(on_the_axis(truth), np.random.default_rng(3), 12.0, 2.0, 60.0)
         there = truth.at(frames)
-        back = frames.turned_round()
+        back = frames.reverse()
         turned = truth.at(back)
         np.testing.assert_allclose(turned.center[::-1], -there.center, atol=1e-9)
         for name, other in (("left_edge", "right_edge"), ("right_edge", "left_edge")):
@@ -164,7 +164,7 @@ def test_ramps_leave_the_edge_unknown() -> None:
 def test_a_gap_in_the_axis_leaves_everything_unknown() -> None:
     x = np.concatenate([np.arange(0.0, 31.0), np.arange(60.0, 91.0)])
     axis = MeasuredAxis(np.column_stack([x, 0.0 * x, 70.0 + 0.01 * x]), np.diff(x) < 2.0)
-    truth = Truth.measured(axis, "carriageway")
+    truth = Truth.of_axis(axis, "carriageway")
     frames = Frames(np.array([[10.0, 1.0], [45.0, 1.0]]), np.zeros(2), np.array([10.0, 45.0]))
     there = truth.at(frames)
     np.testing.assert_allclose(there.center, [-1.0, np.nan])
@@ -172,11 +172,11 @@ def test_a_gap_in_the_axis_leaves_everything_unknown() -> None:
     assert np.isnan(there.corridor[0, :4]).all()
     np.testing.assert_allclose(there.corridor[0, 4:], [0.0, 70.1], atol=1e-9)
     assert np.isinf(there.room[0]).all()
-    flat = Truth.measured(MeasuredAxis(axis.points[:, :2]), "road")
+    flat = Truth.of_axis(MeasuredAxis(axis.points[:, :2]), "road")
     assert np.isnan(flat.at(frames).corridor[0, COLUMN["height"]])
     edged = replace(truth, left=MeasuredAxis(axis.points + [0.0, 4.0, 0.0]))
     np.testing.assert_allclose(edged.at(frames).corridor[:, 0], [3.0, np.nan])
-    moved = replace(truth, left=axis).moved([0.0, 5.0, 0.0])
+    moved = replace(truth, left=axis).translate([0.0, 5.0, 0.0])
     assert moved.left is not None
     np.testing.assert_allclose(moved.left.points[:, 1], 5.0)
 

@@ -234,7 +234,7 @@ def test_configuration_is_the_recipe_and_refuses_what_does_not_fit() -> None:
     assert (effects.color_drop, effects.smallest_scale, effects.largest_scale) == (0.2, 0.9, 1.1)
     assert found.fine_tuning.epochs == 30
     with pytest.raises(InputError, match=r"data\.synthetic"):
-        found.needed()
+        found.needed_sources()
     for wrong, told in (
         ({"synthetic_share": 0.5, "set_up": "real"}, "mixed"),
         ({"features": ["x", "x"]}, "differ"),

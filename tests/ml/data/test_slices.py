@@ -196,7 +196,7 @@ def test_seeing_the_road_against_its_direction() -> None:
     cut = stretch(road, frames, ALL_POINTS)
     turn_round(cut, SequenceEffects(turn_round=1.0), rng())
     assert (np.diff(cut.number) >= 0).all()
-    other = stretch(road, frames.turned_round(), ALL_POINTS)
+    other = stretch(road, frames.reverse(), ALL_POINTS)
     same(as_sample(cut), as_sample(other), atol=1e-4)
     np.testing.assert_allclose(cut.lines, other.lines, atol=1e-6)
     np.testing.assert_allclose(cut.room, other.room, atol=1e-6)
@@ -335,7 +335,7 @@ def test_sequences_never_begin_where_the_truth_ends_in_them() -> None:
     assert road.truth is not None
     joined = road.truth.axis.joined.copy()
     joined[100:140] = False
-    gap = Truth.measured(MeasuredAxis(road.truth.axis.points, joined), "road")
+    gap = Truth.of_axis(MeasuredAxis(road.truth.axis.points, joined), "road")
     data = SliceDataset([replace(road, truth=gap)], SliceSettings(points_per_slice=8), 60, 2)
     for number in range(60):
         station = data[number]["station"]

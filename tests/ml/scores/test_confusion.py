@@ -10,7 +10,7 @@ import pytest
 from ml.data.classes import IGNORED
 from ml.scores import confusion as confusion_module
 from ml.scores.confusion import METRICS, Confusion, by_class, by_test, score_table
-from ml.scores.metrics import Spread, defined
+from ml.scores.metrics import Spread, finite_values
 from synthroads_addon.base.errors import InputError
 from tests.helpers.page_modules import block_of_page
 from tests.judges import require
@@ -100,7 +100,7 @@ def test_wrong_labels_are_refused() -> None:
 
 
 def test_deviation_over_seeds_is_that_of_a_sample() -> None:
-    found = Spread.over(defined([1.0, 2.0, float("nan"), None, 4.0]))
+    found = Spread.over(finite_values([1.0, 2.0, float("nan"), None, 4.0]))
     assert (found.mean, found.std) == pytest.approx((7 / 3, np.std([1, 2, 4], ddof=1)))
     assert np.isnan(Spread.over([1.0]).std)
     assert np.isnan(Spread.over([]).mean)

@@ -78,7 +78,7 @@ def test_frames_stray_from_the_axis_by_the_seed(road: LearningRoad) -> None:
 
 def test_the_estimated_path_does_not_know_the_axis(road: LearningRoad) -> None:
     """The truth may be anything: frames in use come from the points alone."""
-    other = replace(road, truth=replace(road.known_truth, axis=road.known_truth.axis.moved((3.0, 4.0, 0.0))))
+    other = replace(road, truth=replace(road.known_truth, axis=road.known_truth.axis.translate((3.0, 4.0, 0.0))))
     frames = [case(one, 1, cropping=None, estimated=True).frames for one in (road, other)]
     assert np.array_equal(frames[0].position, frames[1].position)
 

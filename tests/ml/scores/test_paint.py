@@ -33,7 +33,7 @@ def swaying_road(paint: float = 1.5, sway: float = 0.4, bare: tuple[float, float
     )
     x = np.arange(0.0, 200.5, 1.0)
     axis = MeasuredAxis(np.column_stack([x, sway * np.sin(x / 15.0)]))
-    return LearningRoad.of_points("swaying", points, axis, Truth.measured(axis, "carriageway"))
+    return LearningRoad.of_points("swaying", points, axis, Truth.of_axis(axis, "carriageway"))
 
 
 def test_the_line_is_found_where_the_axis_is_not() -> None:
@@ -57,7 +57,7 @@ def test_what_is_bright_farther_away_is_no_line_of_the_axis() -> None:
     far = swaying_road(sway=0.0)
     axis = MeasuredAxis(far.reference.points + np.array([0.0, REACH + 0.1, 0.0]))
     with pytest.raises(InputError, match="painted line"):
-        with_painted_line(replace(far, truth=Truth.measured(axis, "carriageway")))
+        with_painted_line(replace(far, truth=Truth.of_axis(axis, "carriageway")))
 
 
 def test_the_points_stay() -> None:

@@ -13,7 +13,7 @@ from torch import Tensor, nn
 from ml.networks.segmentation.grouping import Norm
 from ml.networks.segmentation.neighbours import Neighbours, build_neighbours
 from ml.networks.segmentation.pointnext import PointNeXtOptions
-from ml.segmentation.network import adapt_norms, laid_over
+from ml.segmentation.network import adapt_norms, overlay_clouds
 from synthroads_addon.base.errors import InputError
 
 OPTIONS = PointNeXtOptions(preset="S", width=8, dropout=0.3)
@@ -138,7 +138,7 @@ def test_a_shifted_domain_is_recognised_again() -> None:
 def test_clouds_are_laid_over_one_another_in_pairs(offset: list[int], expected: list[int]) -> None:
     count = offset[-1] if offset else 0
     batch = {"coord": torch.rand(count, 3), "segment": torch.arange(count), "offset": torch.tensor(offset).long()}
-    mixed = laid_over(batch)
+    mixed = overlay_clouds(batch)
     assert mixed["offset"].tolist() == expected
     assert mixed["coord"] is batch["coord"]
     assert mixed["segment"] is batch["segment"]
@@ -148,7 +148,7 @@ def test_clouds_are_laid_over_one_another_in_pairs(offset: list[int], expected: 
 def test_neighbours_are_found_across_what_was_laid_over() -> None:
     coord = torch.rand(40, 3) - 0.5
     batch = {"coord": coord, "offset": torch.tensor([20, 40])}
-    mixed = laid_over(batch)
+    mixed = overlay_clouds(batch)
     apart, together = (OPTIONS.prepare(each) for each in (batch, mixed))
     first_own = apart["offset1"][0]
     assert bool((apart["group1"][:first_own] < 20).all())
@@ -159,4 +159,4 @@ def test_mixing_comes_before_neighbours() -> None:
     coord, offset = torch.rand(8, 3), torch.tensor([4, 8])
     batch = {"coord": coord, "offset": offset}
     with pytest.raises(InputError, match="before neighbours"):
-        laid_over(batch | build_neighbours(coord, offset, OPTIONS.neighbourhood))
+        overlay_clouds(batch | build_neighbours(coord, offset, OPTIONS.neighbourhood))

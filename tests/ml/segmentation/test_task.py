@@ -329,7 +329,7 @@ def test_shipped_configurations_and_experiments_are_whole() -> None:
         assert list(made) == list(found.variants)
         for configuration in made.values():
             configuration.scheme()
-            configuration.needed()
+            configuration.needed_sources()
             assert configuration.data.tests
         with pytest.raises(InputError, match="real=FOLDER"):
             configurations(found, {"synthetic": "b"})
