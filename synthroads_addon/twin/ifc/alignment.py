@@ -21,6 +21,8 @@ _HORIZONTAL = {"line": "LINE", "arc": "CIRCULARARC", "clothoid": "CLOTHOID"}
 _SHORTEST = 1e-6
 """Pieces of the profile up to this length (m) are left out: roundings that touch."""
 _SAME_GRADE = 1e-9
+_STRAIGHT = 1e-300
+"""Curvature (1/m) that is none: no file holds its radius as a number."""
 _FAR_OUT = 1.0
 """A clothoid that begins where its spiral has turned by more than this (rad) is written with its curvature at the start
 instead of as a piece of the spiral: readers integrate from the spiral's middle, and from 2 rad on they are millimetres
@@ -83,9 +85,9 @@ def plan_segments(alignment: Alignment) -> list[PlanSegment]:
     for element, (x, y), angle in zip(alignment.elements, position.tolist(), heading.tolist(), strict=True):
         kind, mean = element.kind, element.mean_curvature
         first, last = (element.curvature_start, element.curvature_end) if kind == "clothoid" else (mean, mean)
-        if kind == "line":
-            first = last = 0.0
-        segments.append(PlanSegment(_HORIZONTAL[kind], x, y, angle, element.length, first, last))
+        first, last = (0.0 if kind == "line" or abs(k) < _STRAIGHT else k for k in (first, last))
+        name = _HORIZONTAL[kind] if first or last else "LINE"
+        segments.append(PlanSegment(name, x, y, angle, element.length, first, last))
     return segments
 
 

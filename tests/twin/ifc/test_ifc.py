@@ -278,6 +278,16 @@ def test_clothoids_between_nearly_equal_radii(tmp_path) -> None:
     _check_semantics(file, alignment.length)
 
 
+def test_curvatures_whose_radius_is_no_number_are_none(tmp_path) -> None:
+    elements = [(100.0, 0.0, 0.0), (100.0, -2e-313, 1e-3), (50.0, 1e-310, 1e-310), (100.0, 1e-3, 1e-313)]
+    geometry = RoadGeometry(_bent(elements))
+    file = _axis_alone(geometry, tmp_path)
+    designs = file.by_type("IfcAlignmentHorizontalSegment")
+    assert [design.PredefinedType for design in designs] == ["LINE", "CLOTHOID", "LINE", "CLOTHOID", "LINE"]
+    assert [design.StartRadiusOfCurvature for design in designs] == [0.0, 0.0, 0.0, 1000.0, 0.0]
+    _check_semantics(file, geometry.length)
+
+
 def test_the_guidelines_clothoids_are_clothoids() -> None:
     for design_class, section in PAIRS[::2]:
         parameters = sample_road(scenario(design_class=design_class, cross_section=section, length=5000.0), 5)
