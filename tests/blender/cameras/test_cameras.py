@@ -205,6 +205,7 @@ def test_lit_colours_have_sun_sky_and_shadow(source: str, lighting: str, toleran
         assert (shaded > 0.3 * sky[0]).all()
 
 
+@pytest.mark.any_blender
 def test_each_sky_is_rendered_once_and_gives_the_same_light_again(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(light, "_PROBE_SAMPLES", 8)
 
