@@ -53,7 +53,7 @@ Member = str | int | ClassSelector
 
 
 def _form(member: object) -> str | None:
-    """Return the form of what a class stands for: only that form's faults are told."""
+    """Return whether a class's member is a name, a number or a selector, so that errors speak of that form alone."""
     if isinstance(member, str | bool):
         return "name" if isinstance(member, str) else None
     return {int: "number", dict: "selector", ClassSelector: "selector"}.get(type(member))
@@ -143,7 +143,7 @@ class ClassScheme:
         return {row.name: number for number, row in self.fine.items()} | {row.name: row.id for row in classes()}
 
     def sources(self) -> ClassScheme:
-        """Return the full table and the fine classes as the scheme of points that are yet to be handed in."""
+        """Return the scheme of the points as they are scanned: the full table and the fine classes, none merged."""
         full = classes()
         fine = (replace(row, id=number, of=()) for number, row in sorted(self.fine.items()))
         return ClassScheme("17", (*full, *fine), np.arange(256, dtype=np.uint8))

@@ -96,7 +96,7 @@ class RoadScene:
         return self.scene
 
     def rebuild(self, changes: Mapping[str, Any]) -> ScannedScene:
-        """Return the scene of the model with fields of the scenario changed, which is built in place of that before."""
+        """Build the model anew with fields of the scenario changed; return its scene."""
         changed = RoadScene(self.scenario.model_copy(update=changes), self.road)
         self.model, self.scene = changed.build(), changed.read()
         return self.scene

@@ -28,7 +28,7 @@ class FreeCrossSection(ClosedModel):
 
 
 def _form(section: object) -> str | None:
-    """Return whether a cross-section is a standard one's name or a free one: only that form's faults are told."""
+    """Return whether a cross-section is a standard one's name or a free one, so that errors speak of that alone."""
     if isinstance(section, str):
         return "name"
     return "free" if isinstance(section, dict | FreeCrossSection) else None

@@ -187,7 +187,7 @@ class LaneMotion:
         return moved
 
     def _place(self, time: Float) -> tuple[Float, Bool]:
-        """Return stations and presence (K,)."""
+        """Return the vehicle's stations (K,) at times, and whether it is on the road then."""
         if self._way is None or self.speed_factor == 0.0:
             return np.full(time.shape, self.vehicle.station), np.ones(time.shape, dtype=bool)
         along, present = self._way.at(time * self.speed_factor)

@@ -52,7 +52,7 @@ class _Side:
         return width * self.attribute(strip) if strip in self.layout.varying else width
 
 
-class _Surfaces(Inputs):
+class _RoadMaterials(Inputs):
     marking_material = material_of("the lines", "paint_white")
     yellow_marking_material = material_of("temporary lines", "paint_yellow")
     verge_material = material_of("the verges", "verge")
@@ -81,7 +81,7 @@ def _build(tree: Tree, layout: tuple[SideLayout, ...]) -> None:
             words = side.layout.side
             side.lines = [declare_line(tree, line, f"{words} {line.name}") for line in side.layout.markings]
     with tree.panel("Materials"):
-        materials = _Surfaces(tree)
+        materials = _RoadMaterials(tree)
     with tree.frame("Backbone"):
         backbone = road.axis()
     parts: list[Value] = []
@@ -161,7 +161,7 @@ def _turnout_instance(side: _Side) -> Value:
     return result
 
 
-def _markings(tree: Tree, backbone: Value, side: _Side, materials: _Surfaces) -> Value:
+def _markings(tree: Tree, backbone: Value, side: _Side, materials: _RoadMaterials) -> Value:
     layout = side.layout
     turnouts = bool(layout.turnouts)
     names = [f"Boundary {number}" for number in range(len(strips_of(layout.lanes, turnouts)) + 1)]
