@@ -23,7 +23,7 @@ from synthroads_addon.base.machine import prepare_memory
 from synthroads_addon.base.scratch.folders import remove_scratch_folders, temporary_files_in_scratch
 
 
-def _missing(error: ModuleNotFoundError) -> str:
+def _missing_package(error: ModuleNotFoundError) -> str:
     """Return what to say of a package that isn't there; a missing part of our own is a defect and raised again."""
     name = (error.name or "").partition(".")[0]
     if name in ("", "headless", "ml", "synthroads_addon"):
@@ -42,7 +42,7 @@ try:
     from synthroads_addon.scenario.tolerance import KINDS, TIMES, error_text, parse_tolerance, with_unit
     from synthroads_addon.twin.formats import TWIN_FORMATS
 except ModuleNotFoundError as error:  # Blender itself has none of the packages that the extension brings
-    print(_missing(error), file=sys.stderr)
+    print(_missing_package(error), file=sys.stderr)
     raise SystemExit(2) from None
 
 Outcome = tuple[int, dict[str, Any], str | Iterator[str]]
@@ -296,7 +296,7 @@ def _line_of(error: Exception) -> str | None:
     if isinstance(error, InputError):
         return f"error: {error}"
     if isinstance(error, ModuleNotFoundError):
-        return _missing(error)
+        return _missing_package(error)
     reason = _shortage(error)
     return reason and f"error: {reason}"
 

@@ -179,7 +179,7 @@ def read_scene(folder: Path, kind: TruthKind, cache: Path | None = None) -> list
         if not (folder / name).is_file():
             raise MissingFileError(str(folder / name), None, "no such file; a scene of a data set has one")
     parameters = read_parameters(folder / PARAMETERS)
-    whole = _read_cached(folder, cache) if cache else None
+    whole = _read_cache(folder, cache) if cache else None
     if whole is None:
         points = read_points(folder / CLOUD, GROUND_CLASSES)
         reference = truths(parameters, "road", points.origin)[0].axis
@@ -282,7 +282,7 @@ def _keep(road: LearningRoad, folder: Path, cache: Path) -> None:
         raise OutputError("data.cache", str(cache), f"cannot be written ({error.strerror})") from None
 
 
-def _read_cached(folder: Path, cache: Path) -> LearningRoad | None:
+def _read_cache(folder: Path, cache: Path) -> LearningRoad | None:
     """Return a road as it was kept; None if it wasn't, or is damaged."""
     place = _cache_folder(folder, cache)
     try:

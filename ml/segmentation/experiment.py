@@ -95,7 +95,7 @@ def configurations(
 def _fill_sources(data: Data, folders: Mapping[str, str]) -> Data:
     """Return sources with their folders in place of names."""
 
-    def filled(source: Source) -> Source:
+    def fill(source: Source) -> Source:
         try:
             return source.model_copy(update={"path": source.path.format(**folders)})
         except (KeyError, IndexError, ValueError) as missing:
@@ -103,10 +103,10 @@ def _fill_sources(data: Data, folders: Mapping[str, str]) -> Data:
             raise InputError("--data", name, f"must be given: {name}=FOLDER") from None
 
     return Data(
-        real=tuple(map(filled, data.real)),
-        synthetic=tuple(map(filled, data.synthetic)),
-        validation=tuple(map(filled, data.validation)),
-        tests={name: tuple(map(filled, sources)) for name, sources in data.tests.items()},
+        real=tuple(map(fill, data.real)),
+        synthetic=tuple(map(fill, data.synthetic)),
+        validation=tuple(map(fill, data.validation)),
+        tests={name: tuple(map(fill, sources)) for name, sources in data.tests.items()},
     )
 
 

@@ -27,7 +27,7 @@ from .obstacles import Bool
 from .rule import Finding, Road, Rule, above, at_least, below, gaps
 
 
-def _unprotected(road: Road, edges: Edges, protecting: Bool, start: float, end: float) -> Iterator[tuple[float, float]]:
+def _gaps(road: Road, edges: Edges, protecting: Bool, start: float, end: float) -> Iterator[tuple[float, float]]:
     """Yield the stretches (m) between two stations along which none of some barriers (B,) stands.
 
     None is asked for beside a ramp, which a barrier of one offset cannot follow.
@@ -58,7 +58,7 @@ def _embankment_barrier(road: Road) -> Iterator[Finding]:
     if not below(terrain.batter_slope, EMBANKMENT_RUN):
         return
     for name, edges in road.sides.items():
-        for start, end in _unprotected(road, edges, road.beside[name].outer, 0.0, road.length):
+        for start, end in _gaps(road, edges, road.beside[name].outer, 0.0, road.length):
             text = (
                 f"The embankment is {terrain.embankment_height:.1f} m high and 1 : {terrain.batter_slope:g} steep, and "
                 f"{end - start:.1f} m beside it are without barrier (RPS)."
@@ -72,7 +72,7 @@ def _curve_barrier(road: Road) -> Iterator[Finding]:
     for run, (name, edges) in product(curves, road.sides.items()):
         if edges.sign * run.curvature > 0.0:
             continue
-        for start, end in _unprotected(road, edges, road.beside[name].outer, run.start, run.end):
+        for start, end in _gaps(road, edges, road.beside[name].outer, run.start, run.end):
             text = (
                 f"The curve's radius of {run.radius:.0f} m is below {below_radius:.0f} m, and {end - start:.1f} m "
                 "of its outer side are without barrier (RPS)."
@@ -103,7 +103,7 @@ def _missing_barrier(road: Road, edges: Edges, index: int, reach: tuple[float, f
     between = beside.outer & (beside.distance < low) if outside else beside.inner & (beside.distance > high)
     before, behind = reach if edges.traffic > 0 else reach[::-1]
     start, end = max(body.start - before, 0.0), min(body.end + behind, road.length)
-    missing = list(_unprotected(road, edges, between, start, end))
+    missing = list(_gaps(road, edges, between, start, end))
     return (math.fsum(end - start for start, end in missing), missing[0][0]) if missing else None
 
 
@@ -148,7 +148,7 @@ def _tree_distance(road: Road) -> Iterator[Finding]:
             if distance < 0.0 or not below(distance, least):
                 continue
             near = road.beside[edges.name].outer & (road.barriers.clearance < distance)
-            for start, _ in islice(_unprotected(road, edges, near, 0.0, road.length), 1):
+            for start, _ in islice(_gaps(road, edges, near, 0.0, road.length), 1):
                 text = (
                     f"Trees stand {distance:.2f} m from the {edges.carriageway.side} paved edge with no barrier in "
                     f"front; {least} m are needed (RPS)."

@@ -77,7 +77,7 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         # The scene, its caster and the materials are the same for every number of rays.
         bare = replace(plan, records_seen_points=False, measured_layers=frozenset())
         casting = {rays: _cast_beside(replace(bare, rings=RINGS[rays])) for rays in _RAYS}
-        writing = _writing(files)
+        writing = _write_beside(files)
         floors = [*casting.values(), writing]
         assert plan.request is not None
         if scenario.colour.source != "material":
@@ -131,7 +131,7 @@ def _best_of_both(ours: Callable[[], float], floor: Callable[[], float]) -> dict
     return {"ours": max(own for own, _ in rates) / 1e6, "floor": max(bare for _, bare in rates) / 1e6}
 
 
-def _writing(files: CloudFiles) -> Rate:
+def _write_beside(files: CloudFiles) -> Rate:
     """Return the writing of LAZ beside the mere compression of the same records by lazrs through laspy.
 
     The points are the first of the cloud that the job has written.
