@@ -15,7 +15,7 @@ be asked for in any order, at the same cost.
 
 import numpy as np
 
-from ..base.arrays import Float
+from ..base.arrays import Float, Float32
 from ..base.random_streams import stream
 from ..base.rotations import rotation_matrix
 from ..base.schema import ClosedModel, quantity
@@ -51,6 +51,13 @@ class Noise(ClosedModel):
         gt=0,
         le=10_000,
         title="Correlated over",
+    )
+    speckle: float = quantity(
+        0.0,
+        "1",
+        "Relative standard deviation of the intensity: speckle and the detector's noise.",
+        (0, 1),
+        title="Intensity",
     )
     dropout: float = quantity(0.0, "1", "Share of the returns that is lost at random.", (0, 1), title="Lost Returns")
 
@@ -92,6 +99,16 @@ def _process_block(seed: int, strip: Strip, number: int) -> Float:
     streams = ((stream(seed, "trajectory noise", strip.index, part), count) for part, count in parts)
     innovations = np.concatenate([random.standard_normal((count, _AXES)) for random, count in streams])
     return _autoregression(innovations)[-BLOCK - 1 :]
+
+
+def speckle_factors(random: np.random.Generator, sigma: float, shape: tuple[int, ...]) -> Float32:
+    """Return factors on intensities: gamma distributed with mean 1 and standard deviation sigma.
+
+    The light of a rough surface within one pulse is the sum of m = 1 / sigma^2 independent speckles (Goodman 2007,
+    Speckle Phenomena in Optics, chapter 4).
+    """
+    looks = 1.0 / (sigma * sigma)
+    return np.asarray(random.standard_gamma(looks, shape, dtype=np.float32) / np.float32(looks))
 
 
 def measured_pose(position: Float, rotation: Float, errors: tuple[Float, Float]) -> tuple[Float, Float]:

@@ -23,11 +23,13 @@ class Errors:
             sigma; None without. See `range_errors`.
         angle: (2, P) rad; None without.
         lost: (P, returns) bool; None without.
+        speckle: (P, returns) factors on the intensities, 1 on average; None without.
     """
 
     range: Float32 | None
     angle: Float | None
     lost: Bool | None
+    speckle: Float32 | None = None
 
     def range_errors(self, pulse: Index, number: UInt8, most: int) -> Float32:
         """Return (N,) range errors of returns, in units of one sigma.

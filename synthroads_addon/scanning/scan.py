@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.arrays import Bool, Float, Index, Int
+from ..base.arrays import Bool, Float, Float32, Index, Int
 from ..base.random_streams import stream
 from ..cloud.points import PointBlock, concatenate, make_block
 from ..materials.surfaces import brightness_of, spread_factors
@@ -13,7 +13,7 @@ from .colour.colour import SeenPoints
 from .devices.shots import shots
 from .effects import apply_effect
 from .knots import Track
-from .noise import measured_pose, trajectory_errors
+from .noise import measured_pose, speckle_factors, trajectory_errors
 from .plan import ScanPlan
 from .platforms.path import Strip
 from .point_layers import MeasuredPoints, fill_layers, place_points
@@ -26,6 +26,7 @@ _MOTION_KNOTS = 0.01
 """Seconds between two poses of a moving vehicle: it turns by less than a milliradian meanwhile."""
 _OFF_SURFACE = 1e-3
 """How far from its surface a ray towards the sun begins, m."""
+_ALL_RETURNS = 255
 PROVISIONAL_THRESHOLD = 0.25
 """Share of the detector's threshold that keeps an echo while its intensity is still to change: no echo is expected to
 become four times as bright as its material's mean makes it."""
@@ -112,6 +113,8 @@ class BlockScan:
         echoes = group_returns(*signals, traced.pulse, setting.range_resolution)
         if plan.surfaces.varying:
             echoes = self.vary_brightness(traced, echoes, poses.motions)
+        if errors.speckle is not None:
+            echoes = _speckle_echoes(echoes, errors.speckle[number])
         strong = np.flatnonzero(
             echoes.intensity >= setting.threshold * (PROVISIONAL_THRESHOLD if plan.detects_after_layers else 1.0)
         )
@@ -141,6 +144,7 @@ class BlockScan:
             source("range noise").standard_normal((2, max(shape)), dtype=np.float32) if ranges else None,
             source("angle noise").normal(scale=angle, size=(2, count)) if angle else None,
             source("dropouts").random(shape, dtype=np.float32) < dropout if dropout else None,
+            speckle_factors(source("speckle"), plan.noise.speckle, shape) if plan.noise.speckle else None,
         )
 
     def poses_between(self, strip: Strip, begin: float, end: float) -> Poses:
@@ -326,6 +330,13 @@ def _ray_ends(rays: Rays, ray: Index, reach: Float) -> tuple[Float, Float]:
     """Return where rays end after ``reach``, and where they began, (3, N) local, m."""
     scanner = np.take(rays.origin.reshape(3, -1), ray if rays.origin.shape[1] > 1 else ray % len(rays.time), axis=1)
     return scanner + reach * np.take(rays.direction.reshape(3, -1), ray, axis=1), scanner
+
+
+def _speckle_echoes(echoes: Echoes, factors: Float32) -> Echoes:
+    """Return the echoes with their intensities as speckle and detector change them, by their number in the pulse."""
+    _, number, _ = number_returns(echoes.pulse, _ALL_RETURNS)
+    chosen = factors[echoes.pulse, np.minimum(number, factors.shape[1]) - 1]
+    return replace(echoes, intensity=echoes.intensity * chosen)
 
 
 def _drop_lost_echoes(echoes: Echoes, lost: Bool) -> Echoes:

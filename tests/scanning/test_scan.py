@@ -4,10 +4,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.scanning.noise import Noise
 from synthroads_addon.scanning.scene.mesh import empty_scene_mesh
-from tests.helpers.scenes.scan_scenes import ORIGIN, Standing, mesh_of, middle_pulses, plane, scan_block, scan_of
+from tests.helpers.scenes.scan_scenes import (
+    ORIGIN,
+    Standing,
+    mesh_of,
+    middle_pulses,
+    plane,
+    scan_block,
+    scan_of,
+    scan_pulses,
+)
 
 
 def test_flat_ground_is_hit_where_the_beam_points() -> None:
@@ -51,6 +62,33 @@ def test_noise_has_the_stated_sigma_and_its_own_stream() -> None:
     assert abs(error.mean()) < 1e-4
     np.testing.assert_array_equal(first.range, second.range)
     assert not np.array_equal(other.range[:100], first.range[:100])
+
+
+def test_speckle_is_gamma_distributed_with_its_own_stream() -> None:
+    """A chi-square test of twenty equal shares; ranges and everything else are as without."""
+    scan = scan_of(plane(), 7, range_sigma=0.01)
+    speckled = replace(scan, noise=Noise(speckle=0.25))
+    strip = scan.path.strips[0]
+    calm, points = (scan_block(plan, strip, 0).points for plan in (scan, speckled))
+    np.testing.assert_array_equal(points.xyz, calm.xyz)
+    factor = points.intensity / calm.intensity
+    counts = np.bincount((stats.gamma.cdf(factor, 16.0, scale=1.0 / 16.0) * 20).astype(int), minlength=20)
+    assert len(factor) > 5000
+    assert stats.chisquare(counts).pvalue > 0.001
+    assert factor.mean() == pytest.approx(1.0, abs=0.01)
+    again = scan_block(speckled, strip, 0).points
+    np.testing.assert_array_equal(again.intensity, points.intensity)
+
+
+def test_speckle_decides_which_faint_echoes_are_detected() -> None:
+    """Half of the pulses are lost at the threshold: a gamma variable exceeds 0.979 of its mean in half of all cases."""
+    scan = scan_of(plane())
+    usual = middle_pulses(scan, 4).points.intensity[0]
+    at_threshold = replace(scan, setting=replace(scan.setting, threshold=0.979 * usual), noise=Noise(speckle=0.25))
+    found = [
+        len(scan_pulses(at_threshold, scan.path.strips[0], 1000 * line + 495, 10, line).points) for line in range(200)
+    ]
+    assert sum(found) / 2000 == pytest.approx(0.5, abs=0.05)
 
 
 def test_intensity_follows_the_laser_equation_and_the_threshold() -> None:

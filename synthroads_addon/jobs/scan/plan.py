@@ -20,6 +20,7 @@ from ...scanning.colour.request import LayerRequest
 from ...scanning.forecast import forecast_scan, refuse_large
 from ...scanning.plan import ScanConditions, ScanPlan, SceneServices
 from ...scanning.platforms.guides import RoadGuide
+from ...scanning.platforms.motion import with_motion
 from ...scanning.platforms.path import Path as ScanPath
 from ...scanning.relief import micro_relief
 from ...scanning.scene.classify import classify_scene
@@ -73,6 +74,7 @@ def plan_scan(
         InputError: the device can't do what the scenario asks for, or its table of materials can't be read.
     """
     conditions = conditions or ScanConditions()
+    path = with_motion(path, scenario.scan.motion, scenario.seed)
     scene = classify_scene(scene, scenario.cloud.scheme(), conditions.road)
     kept, coloured, rings = scenario.kept_layers, scenario.coloured_layers, scenario.beam_rings
     scan, settings, table = scenario.scan, scenario.settings(), scenario.own_materials()

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from ...base.errors import InputError
 from ...base.files import PRESETS, preset_names, preset_path
-from ...base.schema import ClosedModel, Model, first_repeated, quantity, read_json
+from ...base.schema import ClosedModel, Model, first_repeated, notes, quantity, read_json
 from ..patterns.base import PulseTiming
 from ..patterns.registry import PatternModel
 
@@ -19,6 +19,7 @@ BRIGHTEST = 1000.0
 """Largest effective reflectance looked for: of retro-reflective sheeting at a right angle (a white target: 1)."""
 
 _Divergence = Annotated[float, Field(strict=True, ge=0, le=100)]
+MirrorClock = Literal["locked", "free"]
 _Lines = Annotated[float, Field(strict=True, gt=0, le=10_000)]
 
 
@@ -42,6 +43,12 @@ class DeviceChoice(ClosedModel):
         gt=0,
         le=90,
         inherits="device.angle_step_deg",
+    )
+    mirror_clock: MirrorClock | None = Field(
+        None,
+        description="Whether the mirror turns in step with the pulses, so that lines begin at the same angle, or by "
+        "a clock of its own.",
+        json_schema_extra=notes(inherits="device.mirror_clock", labels={"locked": "In step", "free": "Free"}),
     )
 
 
@@ -95,6 +102,10 @@ class Device(Model):
     pulses_in_air: int = quantity(1, "1", "Pulses of a beam that may be under way without being confused.", (1, 100))
     lines_per_second: tuple[_Lines, _Lines] = Field(
         description="Slowest and fastest scan.", json_schema_extra={"unit": "1/s"}
+    )
+    mirror_clock: MirrorClock = Field(
+        "locked",
+        description="Whether mirror or head turn in step with the pulses (locked), or by a clock of their own (free).",
     )
     finest_angle_deg: float = quantity(..., "deg", "Smallest angle between two pulses.", gt=0, le=10)
     modes: tuple[PulseMode, ...] = Field(
@@ -155,6 +166,7 @@ class ScannerSetting:
             right angle at the mode's maximum range, without attenuation.
         saturation: the intensity above which the receiver saturates: threshold x 10^(dynamic range / 10 dB).
         range_sigma: standard deviation of the range, m.
+        free_mirror: whether mirror and pulses go by clocks of their own.
     """
 
     device: Device
@@ -168,6 +180,7 @@ class ScannerSetting:
     threshold: float
     saturation: float
     range_sigma: float
+    free_mirror: bool = False
 
     @property
     def shot_rate(self) -> float:
@@ -195,7 +208,7 @@ class ScannerSetting:
     def timing(self) -> PulseTiming:
         """Return how fast each head fires and scans."""
         lines, view = self.lines_per_second, self.field_of_view
-        return PulseTiming(self.pulse_rate, lines, view, self.angle_step, self.pulses_per_line)
+        return PulseTiming(self.pulse_rate, lines, view, self.angle_step, self.pulses_per_line, self.free_mirror)
 
 
 def device_names() -> list[str]:
@@ -239,6 +252,7 @@ def setting_of(device: Device, scan: DeviceChoice, range_sigma: float | None = N
         threshold=threshold,
         saturation=threshold * 10.0 ** (device.dynamic_range_db / 10.0),
         range_sigma=device.range_sigma if range_sigma is None else range_sigma,
+        free_mirror=(scan.mirror_clock or device.mirror_clock) == "free",
     )
     _check_step(setting, scan)
     return setting

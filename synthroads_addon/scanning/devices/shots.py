@@ -46,7 +46,7 @@ def shots(setting: ScannerSetting, first: int, count: int, with_frame: bool = Fa
     """
     number = np.arange(first, first + count, dtype=np.int64)
     lines = setting.device.pattern.cycle_lines
-    if lines == 0:
+    if lines == 0 or setting.free_mirror:
         return _shots(setting, number, with_frame)
     length = lines * setting.pulses_per_line * len(setting.device.heads)
     cycle = number // length

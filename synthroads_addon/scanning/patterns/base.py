@@ -31,6 +31,7 @@ class PulseTiming:
         field_of_view: angle within which the head fires.
         angle_step: angle between two pulses, see `Pattern.sweep`.
         pulses_per_line: pulses of a line: a whole number of firing sequences.
+        free_mirror: whether mirror and pulses go by clocks of their own.
     """
 
     pulse_rate: float
@@ -38,6 +39,15 @@ class PulseTiming:
     field_of_view: float
     angle_step: float
     pulses_per_line: int
+    free_mirror: bool = False
+
+    def delays(self, line: Numbers) -> Float | None:
+        """Return how many steps after a line's begin its first pulse is fired (P,), 0 to 1; None if at once.
+
+        Clocks that run free of each other drift by many steps from line to line, so that a line's delay says nothing of
+        the next one's: it is a hash of the line's number.
+        """
+        return hashed_shares(line) if self.free_mirror else None
 
 
 @dataclass(frozen=True)
@@ -62,6 +72,14 @@ class PulseRays:
     in_plane: Float | None = None
     across: Float | None = None
     beam: NDArray[np.integer] | None = None
+
+
+def hashed_shares(number: Numbers) -> Float:
+    """Return numbers (P,) as shares, even over 0 to 1 and without any order (Steele et al. 2014, SplitMix64)."""
+    bits = (np.asarray(number, dtype=np.uint64) + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15)
+    for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
+        bits = (bits ^ (bits >> np.uint64(shift))) * np.uint64(factor)
+    return np.asarray((bits ^ (bits >> np.uint64(31))) * 2.0**-64)
 
 
 class Pattern(Model):

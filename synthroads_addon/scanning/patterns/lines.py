@@ -31,11 +31,16 @@ class LinePattern(Pattern):
         """Return pulses of lines across the forward direction.
 
         Line k begins at k / lines per second, and its N pulses follow at the pulse rate. Pulse j is j - (N - 1) / 2
-        steps from the middle of the field of view.
+        steps from the middle of the field of view; where the mirror goes by a clock of its own, up to half a step to
+        either side of that.
         """
         line, within = np.divmod(pulse, timing.pulses_per_line)
+        place = within - (timing.pulses_per_line - 1) / 2.0
+        delays = timing.delays(line)
+        if delays is not None:
+            within, place = within + delays, place + (delays - 0.5)
         time = line / timing.lines_per_second + within / timing.pulse_rate
-        angle = self.angles(timing, line, within - (timing.pulses_per_line - 1) / 2.0)
+        angle = self.angles(timing, line, place)
         angle += math.radians(self.centre_from_nadir_deg)
         return make_rays(time, angle, self.tilts(line), with_frame)
 

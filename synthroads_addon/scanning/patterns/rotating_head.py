@@ -61,7 +61,8 @@ class RotatingHead(Pattern):
         """Return pulses of a rotating head.
 
         Turn k begins at k / lines per second. Its S firing sequences begin a step apart, from S / 2 steps left of the
-        forward direction on; the head turns on while the beams of a sequence fire.
+        forward direction on; the head turns on while the beams of a sequence fire. A head that goes by a clock of its
+        own begins up to half a step earlier or later in each turn.
         """
         sequence_time = self.beams / timing.pulse_rate
         delays = np.arange(self.beams) * (sequence_time / self.beams)
@@ -73,7 +74,11 @@ class RotatingHead(Pattern):
         beam = order[place]
         since = sequence * sequence_time + delays[beam]
         middle = timing.pulses_per_line / self.beams / 2.0
-        azimuth = (sequence - middle) * timing.angle_step + delays[beam] * (FULL_TURN * timing.lines_per_second)
+        turned = sequence - middle
+        late = timing.delays(turn)
+        if late is not None:
+            since, turned = since + late * sequence_time, turned + (late - 0.5)
+        azimuth = turned * timing.angle_step + delays[beam] * (FULL_TURN * timing.lines_per_second)
         elevation = np.deg2rad(self.elevations_deg)
         up, out = np.sin(elevation)[beam], np.cos(elevation)[beam]
         sine, cosine = np.sin(azimuth), np.cos(azimuth)

@@ -102,6 +102,7 @@ SHEETS = (
     Sheet("beam", "Beam", "scanner", 3, "scan.rays_per_pulse scan.beam_rings scan.beam scan.*"),
     Sheet("air", "Air", "scanner", 4, "scan.weather scan.attenuation"),
     Sheet("noise", "Noise", "scanner", 5, "scan.noise.*"),
+    Sheet("motion", "Motion", "scanner", 5, "scan.motion.*"),
     Sheet("performance", "Performance", "scanner", 6, "scan.caster scan.threads"),
     Sheet("colour", "Colour", "main", 50, "colour.source colour.rgb colour.mode"),
     Sheet("images", "Rendering", "colour", 1, "colour.*"),

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import stats
 
 from synthroads_addon.base.rotations import rotation_matrix
 from synthroads_addon.scanning.devices.device import Device, PulseMode, ScannerSetting, device_names, load_device
@@ -357,3 +358,37 @@ def test_no_drift_after_billions_of_pulses(pulse: int) -> None:
     assert shot.time[0] == pytest.approx(float(exact), rel=4e-16, abs=1e-18)
     angle = (within - Fraction(per_line - 1, 2)) * 60 * Fraction(37.3) / 123_457
     assert math.degrees(shot.scan_angle[0]) == pytest.approx(float(angle), abs=1e-11)
+
+
+@pytest.mark.parametrize("name", ["riegl-vq-780i", "velodyne-hdl-64e", "riegl-minivux-3uav"])
+def test_a_mirror_by_a_clock_of_its_own(name: str) -> None:
+    """Lines begin anywhere within half a step, angles follow the times at the mirror's rate, and stay in the view."""
+    locked, free = preset(name), preset(name, mirror_clock="free")
+    heads, lines = len(free.device.heads), 200
+    line = free.pulses_per_line * heads
+    apart = np.empty((lines, 2))
+    for number in range(lines):
+        usual, shot = (shots(setting, number * line, line) for setting in (locked, free))
+        delay, turn = shot.time - usual.time, shot.scan_angle - usual.scan_angle
+        # The first head's pulses of a line are all late by the same time, and turned by the same angle.
+        assert np.ptp(delay[::heads]) < 1e-9
+        assert np.ptp(turn[::heads]) < 1e-6
+        apart[number] = delay[0], turn[0]
+        assert (np.diff(shot.time) >= 0.0).all()
+    beams = free.device.pattern.beams
+    share = apart[:, 0] * free.pulse_rate / beams
+    assert share.min() >= 0.0
+    assert share.max() < 1.0
+    counts = np.bincount((share * 10).astype(int), minlength=10)
+    assert stats.chisquare(counts).pvalue > 0.001
+    assert abs(np.corrcoef(share[1:], share[:-1])[0, 1]) < 0.25
+    np.testing.assert_allclose(np.abs(apart[:, 1]), np.abs(share - 0.5) * free.angle_step, atol=1e-9)
+    assert np.abs(shot.scan_angle).max() <= np.abs(usual.scan_angle).max() + free.angle_step
+
+
+def test_a_free_mirror_gives_any_slice_the_same() -> None:
+    free = preset("riegl-vq-780i", mirror_clock="free")
+    whole, part = shots(free, 0, 30_000, True), shots(free, 12_345, 100, True)
+    for name in ("time", "scan_angle", "direction", "in_plane", "across"):
+        np.testing.assert_array_equal(getattr(part, name), getattr(whole, name)[..., 12_345:12_445])
+    assert len(np.unique(whole.scan_angle)) > 5 * len(np.unique(shots(preset("riegl-vq-780i"), 0, 30_000).scan_angle))

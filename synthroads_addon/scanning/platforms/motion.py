@@ -1,0 +1,105 @@
+"""How a platform really sways about its planned path: turbulence, steering, bumps.
+
+Each of position x, y, z, roll, pitch and heading is a sum of sines whose periods are drawn evenly on a logarithmic
+scale and whose phases are drawn as well: by the central limit theorem nearly Gaussian, with a known standard deviation,
+smooth, and worked out for any time by itself. It is the truth, not an error: the scanner knows where it is.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from pydantic import model_validator
+
+from ...base.arrays import Float
+from ...base.random_streams import stream
+from ...base.schema import ClosedModel, quantity
+from ..noise import measured_pose
+from .path import KNOT_RANGE, Path, Strip, knot_spacing_for
+
+_SINES = 24
+_AXES = 6
+
+
+class Motion(ClosedModel):
+    """How the platform sways about its path, one sigma each; 0 is not at all."""
+
+    position_sigma: float = quantity(0.0, "m", "Aside and in height, each axis.", (0, 10), title="Position")
+    attitude_sigma_deg: float = quantity(0.0, "deg", "Roll and pitch.", (0, 10), title="Roll, Pitch (°)")
+    heading_sigma_deg: float = quantity(0.0, "deg", "Heading.", (0, 10), title="Heading (°)")
+    shortest_period: float = quantity(
+        1.0, "s", "Shortest period of the swaying.", (0.02, 1000), title="Shortest Period"
+    )
+    longest_period: float = quantity(20.0, "s", "Longest period of the swaying.", (0.02, 1000), title="Longest Period")
+
+    @model_validator(mode="after")
+    def _periods_in_order(self) -> "Motion":
+        if self.shortest_period > self.longest_period:
+            raise ValueError(
+                f"shortest_period {self.shortest_period:g} must be at most longest_period, {self.longest_period:g}"
+            )
+        return self
+
+    @property
+    def sigma(self) -> Float:
+        """Return the standard deviations of x, y, z, m, and of roll, pitch and heading, rad: (6,)."""
+        attitude, heading = np.deg2rad([self.attitude_sigma_deg, self.heading_sigma_deg])
+        return np.array([self.position_sigma] * 3 + [attitude, attitude, heading])
+
+
+@dataclass(frozen=True)
+class SwayingPath:
+    """A path that a platform sways about; see `platforms.path.Path`.
+
+    Attributes:
+        planned: the path.
+        motion: how it sways.
+        seed: of the periods and phases; each strip has its own.
+    """
+
+    planned: Path
+    motion: Motion
+    seed: int
+
+    @property
+    def strips(self) -> tuple[Strip, ...]:
+        """Return the planned path's strips."""
+        return self.planned.strips
+
+    @property
+    def typical_range(self) -> float:
+        """Return the planned path's usual range, m."""
+        return self.planned.typical_range
+
+    @property
+    def knot_spacing(self) -> float:
+        """Return the largest time between two knots, s: the bends of path and swaying add up, and so do 1 / h^2."""
+        # Acceleration of a place at KNOT_RANGE where all sines are at their crests would be sqrt(2 N) sigma; 4 sigma is
+        # what a Gaussian process hardly ever exceeds.
+        reach = np.array([1.0] * 3 + [KNOT_RANGE] * 3)
+        sway = 4.0 * float(np.linalg.norm(self.motion.sigma * reach)) * (2.0 * np.pi / self.motion.shortest_period) ** 2
+        return float((self.planned.knot_spacing**-2 + knot_spacing_for(sway) ** -2) ** -0.5)
+
+    def pose(self, strip: Strip, time: Float) -> tuple[Float, Float]:
+        """Return the poses of the path with the swaying; see `platforms.path.Path.pose`."""
+        return measured_pose(*self.planned.pose(strip, time), swaying(self.motion, self.seed, strip.index, time))
+
+
+def swaying(motion: Motion, seed: int, strip: int, time: Float) -> tuple[Float, Float]:
+    """Return how a platform is off its path at times (K,), s since the first strip's start.
+
+    Returns:
+        position (K, 3), m, along the local axes; roll, pitch and heading (K, 3), rad.
+    """
+    random = stream(seed, "platform motion", strip)
+    low, high = math.log(motion.shortest_period), math.log(motion.longest_period)
+    periods = np.exp(random.uniform(low, high, (_AXES, _SINES)))
+    phases = random.uniform(0.0, 2.0 * np.pi, (_AXES, _SINES))
+    angle = np.asarray(time, dtype=np.float64)[:, None, None] * (2.0 * np.pi / periods) + phases
+    values = np.sin(angle).sum(axis=2) * (np.sqrt(2.0 / _SINES) * motion.sigma)
+    return values[:, :3], values[:, 3:]
+
+
+def with_motion(path: Path, motion: Motion, seed: int) -> Path:
+    """Return a path with a platform's swaying; the path itself where it doesn't sway."""
+    return SwayingPath(path, motion, seed) if motion.sigma.any() else path
