@@ -48,7 +48,7 @@ class DeviceChoice(ClosedModel):
         None,
         description="Whether the mirror turns in step with the pulses, so that lines begin at the same angle, or by "
         "a clock of its own.",
-        json_schema_extra=notes(inherits="device.mirror_clock", labels={"locked": "In step", "free": "Free"}),
+        json_schema_extra=notes(unset="The device's", labels={"locked": "In step", "free": "Free"}),
     )
 
 
