@@ -174,7 +174,7 @@ def near(got: Any, wanted: Any) -> None:
         assert set(got) == set(wanted) - constants
         for key in got:
             near(got[key], wanted[key])
-    elif isinstance(wanted, float) and isinstance(got, float):
+    elif isinstance(wanted, int | float) and isinstance(got, int | float):
         assert np.float32(got) == np.float32(wanted)
     else:
         assert got == wanted or sorted(got) == sorted(wanted)
