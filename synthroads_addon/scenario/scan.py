@@ -7,8 +7,8 @@ from pydantic import Field, model_validator
 from ..base.schema import notes, quantity
 from ..scanning.devices.device import DeviceChoice, ScannerSetting, load_device, setting_of
 from ..scanning.noise import Noise
-from ..scanning.platforms.motion import Motion
 from ..scanning.platforms.registry import PlatformModel, make_platform
+from ..scanning.sway import Motion
 from ..scanning.weather.registry import WeatherModel
 
 MOST_POSSIBLE = 10**15

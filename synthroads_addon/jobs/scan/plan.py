@@ -20,12 +20,12 @@ from ...scanning.colour.request import LayerRequest
 from ...scanning.forecast import forecast_scan, refuse_large
 from ...scanning.plan import ScanConditions, ScanPlan, SceneServices
 from ...scanning.platforms.guides import RoadGuide
-from ...scanning.platforms.motion import with_motion
 from ...scanning.platforms.path import Path as ScanPath
 from ...scanning.relief import micro_relief
 from ...scanning.scene.classify import classify_scene
 from ...scanning.scene.motion import ScannedScene
 from ...scanning.scene.target import Target
+from ...scanning.sway import with_motion
 from ...scanning.weather.registry import weather_of
 from ...scenario.choice import check_choice
 from ...scenario.scan import scanner_setting

@@ -8,8 +8,8 @@ from scipy import stats
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.scanning.knots import Track
-from synthroads_addon.scanning.platforms.motion import Motion, SwayingPath, swaying, with_motion
 from synthroads_addon.scanning.platforms.path import KNOT_ERROR, KNOT_RANGE, Strip
+from synthroads_addon.scanning.sway import Motion, SwayingPath, swaying, with_motion
 
 STRIP = Strip(0, 100.0, 60.0)
 MOTION = Motion(position_sigma=0.4, attitude_sigma_deg=0.3, heading_sigma_deg=0.5, shortest_period=0.5)

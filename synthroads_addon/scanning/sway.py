@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from pydantic import model_validator
 
-from ...base.arrays import Float
-from ...base.random_streams import stream
-from ...base.schema import ClosedModel, quantity
-from ..noise import measured_pose
-from .path import KNOT_RANGE, Path, Strip, knot_spacing_for
+from ..base.arrays import Float
+from ..base.random_streams import stream
+from ..base.schema import ClosedModel, quantity
+from .noise import measured_pose
+from .platforms.path import KNOT_RANGE, Path, Strip, knot_spacing_for
 
 _SINES = 24
 _AXES = 6
