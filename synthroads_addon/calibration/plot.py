@@ -2,48 +2,35 @@
 incidence angle. Drawn with Pillow alone, so that it looks the same in Blender."""
 
 import io
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw
 
 from ..base.arrays import Float
 from ..base.errors import InputError
 from ..base.files import write_file
+from ..cloud.tools.diagram import (
+    INK,
+    LINES,
+    SCALE,
+    SOFT,
+    Color,
+    Frame,
+    draw_grid,
+    draw_levels,
+    draw_picture,
+    draw_text,
+)
 from ..cloud.tools.picture import nice_step
 from ..materials.surfaces import brightness_of, surfaces_of
 from .fit import FITTED
 from .job import Calibration, ClassComparison
 
-Color = tuple[int, int, int]
-Box = tuple[float, float, float, float]
-
-_PAPER, _INK, _GRID, _SOFT = (255, 255, 255), (40, 40, 44), (222, 226, 232), (110, 114, 122)
 _REAL, _REAL_EDGE = (203, 210, 219), (140, 150, 164)
-_LINES: tuple[Color, ...] = ((30, 96, 170), (214, 104, 20), (30, 135, 90), (150, 60, 150))
-_SCALE = 2
-"""The picture is drawn this many times larger than it is saved, which smooths its lines."""
 _WIDTH, _PANEL, _MARGIN = 1200, 250, 16
 _BINS = 70
 _ANGLES = np.linspace(0.0, 89.5, 180)
-
-
-@dataclass(frozen=True)
-class _Frame:
-    """A diagram's box in the picture and the values at its edges."""
-
-    draw: ImageDraw.ImageDraw
-    box: Box
-    low: tuple[float, float]
-    high: tuple[float, float]
-
-    def at(self, x: Float, y: Float) -> list[tuple[float, float]]:
-        """Return pixels of values."""
-        left, top, right, bottom = self.box
-        across = left + (np.asarray(x) - self.low[0]) / (self.high[0] - self.low[0]) * (right - left)
-        up = bottom - (np.asarray(y) - self.low[1]) / (self.high[1] - self.low[1]) * (bottom - top)
-        return list(zip(across.tolist(), np.maximum(up, top).tolist(), strict=True))
 
 
 def save_plot(result: Calibration, path: Path, overwrite: bool = False) -> None:
@@ -62,16 +49,16 @@ def save_plot(result: Calibration, path: Path, overwrite: bool = False) -> None:
 def calibration_picture(result: Calibration) -> Image.Image:
     """Return the picture of a result: a diagram for each material, and one of all by incidence angle below."""
     rows = len(result.compared) + 1
-    size = (_WIDTH * _SCALE, (rows * (_PANEL + 54) + 3 * _MARGIN + 40) * _SCALE)
-    picture = Image.new("RGB", size, _PAPER)
-    draw = ImageDraw.Draw(picture)
-    _text(draw, (_MARGIN, _MARGIN), _title(result), 19)
-    low, high = _limits(result)
-    for number, entry in enumerate(result.compared):
-        top = 2 * _MARGIN + 30 + number * (_PANEL + 54)
-        _draw_class(draw, top, entry, (low, high), _LINES[number % len(_LINES)])
-    _draw_fall_off(draw, 2 * _MARGIN + 30 + (rows - 1) * (_PANEL + 54), result)
-    return picture.resize((size[0] // _SCALE, size[1] // _SCALE), Image.Resampling.LANCZOS)
+
+    def paint(draw: ImageDraw.ImageDraw) -> None:
+        draw_text(draw, (_MARGIN, _MARGIN), _title(result), 19)
+        low, high = _limits(result)
+        for number, entry in enumerate(result.compared):
+            top = 2 * _MARGIN + 30 + number * (_PANEL + 54)
+            _draw_class(draw, top, entry, (low, high), LINES[number % len(LINES)])
+        _draw_fall_off(draw, 2 * _MARGIN + 30 + (rows - 1) * (_PANEL + 54), result)
+
+    return draw_picture((_WIDTH, rows * (_PANEL + 54) + 3 * _MARGIN + 40), paint)
 
 
 def _title(result: Calibration) -> str:
@@ -99,15 +86,15 @@ def _draw_class(
     real = None if entry.real is None else _density(entry.real.intensity, edges)
     peak = 1.12 * max(float(expected.max()), 0.0 if real is None else float(real.max()))
     frame = _frame(draw, top, (limits[0], 0.0), (limits[1], peak))
-    _draw_grid(frame, "intensity")
+    draw_grid(frame, "intensity")
     if real is not None and entry.real is not None:
         draw.polygon(_steps(frame, edges, real), fill=_REAL, outline=_REAL_EDGE)
-        _draw_marks(frame, np.quantile(entry.real.intensity, FITTED), _INK, 0.0)
-    draw.line(_steps(frame, edges, expected)[1:-1], fill=color, width=2 * _SCALE, joint="curve")
+        _draw_marks(frame, np.quantile(entry.real.intensity, FITTED), INK, 0.0)
+    draw.line(_steps(frame, edges, expected)[1:-1], fill=color, width=2 * SCALE, joint="curve")
     _draw_marks(frame, np.quantile(entry.expected, FITTED), color, 1.0)
-    _text(draw, (_MARGIN, top), entry.target.material, 17)
+    draw_text(draw, (_MARGIN, top), entry.target.material, 17)
     for number, line in enumerate(_words(entry)):
-        _text(draw, (_MARGIN, top + 28 + 19 * number), line, 13, _SOFT if number else color)
+        draw_text(draw, (_MARGIN, top + 28 + 19 * number), line, 13, SOFT if number else color)
 
 
 def _words(entry: ClassComparison) -> list[str]:
@@ -134,24 +121,16 @@ def _draw_fall_off(draw: ImageDraw.ImageDraw, top: float, result: Calibration) -
     cosine, same = np.cos(np.deg2rad(_ANGLES)), np.zeros(len(_ANGLES), dtype=np.intp)
     curves = [brightness_of(surfaces, same + number, cosine) for number in range(len(rows))]
     frame = _frame(draw, top, (0.0, 0.0), (90.0, 1.12 * max(float(curve.max()) for curve in curves)))
-    _draw_grid(frame, "incidence angle, degrees")
-    _draw_heights(frame)
-    _text(draw, (_MARGIN, top), "brightness", 17)
+    draw_grid(frame, "incidence angle, degrees")
+    draw_levels(frame, nice_step(frame.high[1] / 3.0))
+    draw_text(draw, (_MARGIN, top), "brightness", 17)
     model = {"lambert": "Lambert", "oren_nayar": "Oren and Nayar"}[result.job.reflection]
     for number, line in enumerate(("a white target struck", "at a right angle: 1", model)):
-        _text(draw, (_MARGIN, top + 28 + 19 * number), line, 13, _SOFT)
+        draw_text(draw, (_MARGIN, top + 28 + 19 * number), line, 13, SOFT)
     for number, (curve, entry) in enumerate(zip(curves, result.compared, strict=True)):
-        color = _LINES[number % len(_LINES)]
-        draw.line(frame.at(_ANGLES, curve), fill=color, width=2 * _SCALE)
-        _text(draw, (_MARGIN, top + 104 + 19 * number), entry.target.material, 13, color)
-
-
-def _draw_heights(frame: _Frame) -> None:
-    step = nice_step(frame.high[1] / 3.0)
-    for value in np.arange(step, frame.high[1], step):
-        (left, y), (right, _) = frame.at(np.array([0.0, frame.high[0]]), np.array([value, value]))
-        frame.draw.line([(left, y), (right, y)], fill=_GRID, width=_SCALE)
-        _text(frame.draw, (left / _SCALE - 6, y / _SCALE), f"{value:.3g}", 13, _SOFT, anchor="rm")
+        color = LINES[number % len(LINES)]
+        draw.line(frame.at(_ANGLES, curve), fill=color, width=2 * SCALE)
+        draw_text(draw, (_MARGIN, top + 104 + 19 * number), entry.target.material, 13, color)
 
 
 def _density(values: Float, edges: Float) -> Float:
@@ -159,39 +138,19 @@ def _density(values: Float, edges: Float) -> Float:
     return np.asarray(count / len(values))
 
 
-def _frame(draw: ImageDraw.ImageDraw, top: float, low: tuple[float, float], high: tuple[float, float]) -> _Frame:
-    box = (265.0 * _SCALE, top * _SCALE, (_WIDTH - _MARGIN) * _SCALE, (top + _PANEL) * _SCALE)
-    return _Frame(draw, box, low, high)
+def _frame(draw: ImageDraw.ImageDraw, top: float, low: tuple[float, float], high: tuple[float, float]) -> Frame:
+    box = (265.0 * SCALE, top * SCALE, (_WIDTH - _MARGIN) * SCALE, (top + _PANEL) * SCALE)
+    return Frame(draw, box, low, high)
 
 
-def _steps(frame: _Frame, edges: Float, values: Float) -> list[tuple[float, float]]:
+def _steps(frame: Frame, edges: Float, values: Float) -> list[tuple[float, float]]:
     """Return the outline of a histogram, from the axis and back to it."""
     x, y = np.repeat(edges, 2), np.concatenate([[0.0], np.repeat(values, 2), [0.0]])
     return frame.at(x, y)
 
 
-def _draw_marks(frame: _Frame, quantiles: Float, color: Color, upper: float) -> None:
+def _draw_marks(frame: Frame, quantiles: Float, color: Color, upper: float) -> None:
     """Draw short bars on the axis at quantiles; the expected ones stand above the real ones."""
     left, right = 0.03 * (frame.high[1]) * upper, 0.03 * frame.high[1] * (upper + 1.0)
     for value in quantiles:
-        frame.draw.line(frame.at(np.array([value, value]), np.array([left, right])), fill=color, width=3 * _SCALE)
-
-
-def _draw_grid(frame: _Frame, text: str) -> None:
-    left, top, right, bottom = frame.box
-    step = nice_step((frame.high[0] - frame.low[0]) / 6.0)
-    first = np.ceil(frame.low[0] / step) * step
-    for value in np.arange(first, frame.high[0], step) + 0.0:
-        (x, _), *_ = frame.at(np.array([value]), np.array([0.0]))
-        frame.draw.line([(x, top), (x, bottom)], fill=_GRID, width=_SCALE)
-        shown = f"{value:,.0f}" if step >= 1 else f"{value:.3g}"
-        _text(frame.draw, (x / _SCALE, bottom / _SCALE + 6), shown, 13, _SOFT, anchor="ma")
-    frame.draw.rectangle([left, top, right, bottom], outline=_SOFT, width=_SCALE)
-    _text(frame.draw, (right / _SCALE, bottom / _SCALE + 24), text, 13, _SOFT, anchor="ra")
-
-
-def _text(
-    draw: ImageDraw.ImageDraw, place: tuple[float, float], text: str, size: int, color: Color = _INK, anchor: str = "la"
-) -> None:
-    font = ImageFont.load_default(size=size * _SCALE)
-    draw.text((place[0] * _SCALE, place[1] * _SCALE), text, fill=color, font=font, anchor=anchor)
+        frame.draw.line(frame.at(np.array([value, value]), np.array([left, right])), fill=color, width=3 * SCALE)

@@ -39,6 +39,9 @@ _NEGLIGIBLE = 0.3  # of the tolerance: residuals below it are worth no element
 _FINER_HELPS = 0.8  # of the rms at most must be left by knots half as far apart: else the rest is noise
 _RELAXED = 1.5  # times what dense knots reach is aimed at where the tolerance cannot be had: less would fit noise
 _FLATTEST = 1e7  # m: a rounding of a larger radius bends by less than 1 mm over 100 m, and is written as a kink
+REFUSED_BEYOND = 40.0
+"""Times the tolerance that a point may be away from the road fitted to an axis: 2 m of the usual 5 cm. Real axes stay
+below 6, a corner of 90 degrees just passes; beyond that it is another line than the one that was measured."""
 _PLAY = 1e-5  # of a radius: roundings that touch must not overlap once stations and elevations are rounded
 
 
@@ -80,6 +83,9 @@ class AxisFit:
         horizontal: of the points' horizontal distances from the alignment.
         height: of their heights above the profile.
         points: how many were used, i.e. without consecutive duplicates.
+        stations, across, above: (N,) of the points: station, offset to the left of the alignment, height above the
+            profile, m.
+        tolerance: that the fit aimed at, m.
     """
 
     alignment: Alignment
@@ -87,6 +93,49 @@ class AxisFit:
     horizontal: Deviations
     height: Deviations
     points: int
+    stations: Float
+    across: Float
+    above: Float
+    tolerance: float
+
+    @property
+    def limit(self) -> float:
+        """Return how far a point may be away, across or in height, m."""
+        return REFUSED_BEYOND * self.tolerance
+
+    def check(self, name: str) -> None:
+        """Refuse a fit that leaves a point farther away than `limit`.
+
+        Args:
+            name: of the file that the points are from.
+
+        Raises:
+            AxisRefusedError: it does.
+        """
+        if max(self.horizontal.worst, self.height.worst) > self.limit:
+            raise AxisRefusedError(name, self)
+
+
+class AxisRefusedError(InputError):
+    """The road that was fitted to an axis leaves its points.
+
+    Attributes:
+        name: of the file that the points are from.
+        fit: what was fitted, for a picture (`fitting.plot`).
+    """
+
+    def __init__(self, name: str, fit: AxisFit, picture: Path | None = None) -> None:
+        self.name, self.fit = name, fit
+        across, up = fit.horizontal, fit.height
+        text = f"no road follows its points within {fit.limit:g} m, which is {REFUSED_BEYOND:g} times the tolerance of "
+        text += f"{100.0 * fit.tolerance:g} cm: the nearest is {across.worst:.2f} m off at station "
+        text += f"{across.worst_station:.1f} m, in height {up.worst:.2f} m at station {up.worst_station:.1f} m. "
+        text += "Look there for corners, jumps or points out of their order"
+        super().__init__(f"axis {name}", None, f"{text}; {picture} shows it" if picture else text)
+
+    def with_picture(self, picture: Path) -> AxisRefusedError:
+        """Return the error with the name of a file that shows the fit."""
+        return AxisRefusedError(self.name, self.fit, picture)
 
 
 def fitted_axis(path: Path, scenario: RoadScenario) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
@@ -97,12 +146,14 @@ def fitted_axis(path: Path, scenario: RoadScenario) -> tuple[AlignmentObject, Ro
         well it fits (m): root mean square, 95th percentile and worst distance, horizontally and in height.
 
     Raises:
+        AxisRefusedError: no road follows the points (`AxisFit.check`).
         InputError: the file is missing or not an axis.
     """
     points = read_axis(path)
     origin = np.round(points.mean(axis=0))
     fit = fit_axis(points - origin)
     alignment = alignment_object(fit)
+    fit.check(path.name)
     road = scenario.model_copy(update={"length": alignment.length, "map_origin": tuple(origin.tolist())})
     report = {
         "file": path.name,
@@ -153,7 +204,7 @@ def fit_axis(points: ArrayLike, tolerance: float = 0.05) -> AxisFit:
         points: (N, 3) map position and elevation, m, in the axis' order; (N, 2) is taken as elevation 0.
         tolerance: m; the fit aims at an rms of the lateral distances up to it and 95 % within twice it (heights: 0.6
             of both) with as few elements as that takes. What is reached is reported: axes that no alignment of
-            elements of a few metres follows (corners, jumps) are not refused.
+            elements of a few metres follows (corners, jumps) are refused by `AxisFit.check` only.
 
     Raises:
         InputError: wrong shape, a value that isn't finite, fewer than two distinct points, a tolerance not above 0.
@@ -165,14 +216,16 @@ def fit_axis(points: ArrayLike, tolerance: float = 0.05) -> AxisFit:
     local, weights = _bridge_gaps(given - origin)
     alignment, near = _fit_plan(local[:, :2], weights, _MARGIN * tolerance)
     reach = max(NEAR, 5.0 * float(np.median(np.diff(near))))
-    station, _ = alignment.project_near(local[:, :2], near, reach)
+    station, offset = alignment.project_near(local[:, :2], near, reach)
     across = np.hypot(*(local[:, :2] - alignment.position(station)).T)
     profile = _fit_heights(station, local[:, 2], weights, alignment.length, _HEIGHT_SHARE * tolerance)
     heading = alignment.start_heading
     placed = Alignment(alignment.elements, alignment.x + origin[0], alignment.y + origin[1], heading)
     real = weights == 1.0
     station, above = station[real], local[real, 2] - profile.elevation(station[real])
-    return AxisFit(placed, profile, Deviations.of(station, across[real]), Deviations.of(station, above), len(given))
+    aside, up = Deviations.of(station, across[real]), Deviations.of(station, above)
+    signed = np.copysign(across, offset)[real]
+    return AxisFit(placed, profile, aside, up, len(given), station, signed, above, tolerance)
 
 
 def _check_points(points: ArrayLike) -> Float:

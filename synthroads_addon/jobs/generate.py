@@ -1,5 +1,6 @@
 """The main job: scenario -> parameters -> model -> scan -> cloud -> files. What no output needs is not made."""
 
+import io
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,9 +8,9 @@ from typing import Any
 
 from ..base.crs import wkt
 from ..base.errors import InputError
-from ..base.files import output_folder
+from ..base.files import output_folder, write_file
 from ..base.progress import Progress, StageTimer, silent
-from ..fitting.fit import fitted_axis
+from ..fitting.fit import AxisRefusedError, fitted_axis
 from ..road.geometry import RoadGeometry
 from ..road.parameters import RoadParameters, read_parameters
 from ..sampling.road import sample_road
@@ -66,10 +67,29 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
     """Run the main job; return the report that is also written to ``report.json``.
 
     Raises:
+        AxisRefusedError: no road follows the axis; a picture of the fit is in the output folder.
         InputError: an input is wrong or the output can't be written; nothing is left half-written.
     """
     begun, timer = job.begun or time.perf_counter(), StageTimer(progress)
     check(job)
+    try:
+        return _generate(job, begun, timer)
+    except AxisRefusedError as error:
+        raise error.with_picture(_save_fit(error, job)) from None
+
+
+def _save_fit(error: AxisRefusedError, job: Job) -> Path:
+    """Write the picture of a fit that was refused, and return its path."""
+    from ..fitting.plot import FILE, axis_picture  # Pillow takes a moment to load
+
+    data = io.BytesIO()
+    axis_picture(error.fit, error.name).save(data, "PNG")
+    write_file(job.output / FILE, data.getvalue(), overwrite=True)
+    return job.output / FILE
+
+
+def _generate(job: Job, begun: float, timer: StageTimer) -> dict[str, Any]:
+    """Run the main job; see `generate`."""
     source, files, scene = RoadSource(job.scenario, job.parameters, job.axis), JobFiles(job.scenario), None
     with output_folder(job.output, files.names, job.overwrite) as folder:
         road, report = make_road(source, timer)

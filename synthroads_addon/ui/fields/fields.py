@@ -26,6 +26,7 @@ from ...scenario.scenario import Scenario
 from .choices import ITEMS
 from .inherited import SOURCES, Value
 from .numbers import exact, fitting, is_share, list_as_text, number_property, numbers_in, push_along
+from .room import draw_text, fits, flag_row, value_row, value_share
 from .wording import label, value_name, written_unit
 
 AUTOMATIC = "AUTOMATIC"
@@ -34,19 +35,6 @@ Hooks = Mapping[str, Callable[[Any, Any], None]]
 """Path -> what Blender calls when that property has changed."""
 ADD_FILE, REMOVE_FILE = "synthroads.add_file", "synthroads.remove_file"
 """Operators that lengthen and shorten a list of files."""
-_NAMES_SHARE = 0.45
-"""Share of a row's width that its name takes."""
-
-
-def value_row(layout: bpy.types.UILayout, label: str) -> bpy.types.UILayout:
-    """Draw a name, and return the place for its value: wide enough for two numbers, the name for three words."""
-    split = layout.split(factor=_NAMES_SHARE)
-    name = split.row()
-    name.alignment = "RIGHT"
-    name.label(text=label)
-    row = split.row(align=True)
-    row.use_property_split = False
-    return row
 
 
 class Field:
@@ -152,10 +140,12 @@ class Field:
         """Draw its name and its value, a property of the owner."""
         value_row(layout, self.label).prop(owner, self.name, text="")
 
-    def _draw_inherited(self, row: bpy.types.UILayout, settings: Any) -> None:
-        greyed = row.row(align=True)
+    def _draw_inherited(
+        self, row: bpy.types.UILayout, settings: Any, share: float = 1.0, beside: int = 0
+    ) -> None:
+        greyed = row.column(align=True)
         greyed.active = False
-        greyed.label(text=self.inherited_text(settings))
+        draw_text(greyed, self.inherited_text(settings), share=share * value_share(self.label), beside=beside)
 
     def _common(self, hooks: Hooks, name: str | None = None) -> dict[str, Any]:
         hook = {"update": hooks[self.path]} if self.path in hooks else {}
@@ -224,7 +214,7 @@ class OptionalField(Field):
         row.prop(owner, self.checkbox_name, text="")
         if getattr(owner, self.checkbox_name):
             return row
-        self._draw_inherited(row, settings)
+        self._draw_inherited(row, settings, beside=1)
         return None
 
     def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
@@ -248,7 +238,7 @@ class FlagField(Field):
 
     def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
         """Draw the checkbox with its name."""
-        value_row(layout, "").prop(owner, self.name, text=self.label)
+        flag_row(layout, self.label).prop(owner, self.name, text=self.label)
 
 
 class NumberField(OptionalField):
@@ -275,7 +265,7 @@ class NumberField(OptionalField):
 
     def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
         """Draw the number; a slider has its name inside."""
-        if not self.is_share or self.optional:
+        if not self.is_share or self.optional or not fits(f"{self.label} 0.000"):
             super().draw_row(layout, settings, owner)
             return
         row = layout.row()
@@ -354,7 +344,7 @@ class ChoiceField(Field):
         row = value_row(layout, self.label)
         row.prop(owner, self.name, text="")
         if self.optional and getattr(owner, self.name) == AUTOMATIC:
-            self._draw_inherited(row, settings)
+            self._draw_inherited(row, settings, share=0.5)
 
 
 class ChoicesField(Field):

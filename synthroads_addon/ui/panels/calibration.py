@@ -8,16 +8,17 @@ Annotations are not postponed here: Blender reads the properties from them.
 from typing import cast
 
 import bpy
-import numpy as np
 
 from ...base.errors import InputError
 from ...base.progress import exhaust
 from ...calibration.fit import FITTED
 from ...calibration.job import Calibration, CalibrationJob, ClassComparison, save_fitted, steps
 from ...calibration.plot import calibration_picture
+from ..fields.room import buttons_row, draw_text
 from ..work.common import Sidebar, column, large_button, refusing
 from ..work.job import PanelJob
 from ..work.long_operator import LongOperator
+from ..work.pictures import ShowPicture, keep_picture
 from .calibration_settings import file_of, textured_materials
 
 PICTURE = "SynthRoads Calibration"
@@ -38,20 +39,6 @@ def fitted_result() -> Calibration | None:
     return latest if latest is not None and latest.job.fit and latest.job.real is not None else None
 
 
-def show_picture(result: Calibration) -> bpy.types.Image:
-    """Return the image that shows a result; made, or drawn anew where the file has it."""
-    drawn = np.asarray(calibration_picture(result).convert("RGBA"), dtype=np.float32)[::-1] / 255.0
-    height, width = drawn.shape[:2]
-    image = bpy.data.images.get(PICTURE)
-    if image is None:
-        image = bpy.data.images.new(PICTURE, width, height)
-    elif tuple(image.size) != (width, height):
-        image.scale(width, height)
-    image.pixels.foreach_set(np.ascontiguousarray(drawn).ravel())
-    image.update()
-    return image
-
-
 class _Calibrates(LongOperator):
     """Base of the two buttons that calibrate."""
 
@@ -62,7 +49,7 @@ class _Calibrates(LongOperator):
         """Object mode, nothing else at work, and something to compare."""
         if not super().poll(context):
             return False
-        settings = context.window_manager.synthroads_calibration
+        settings = context.scene.synthroads_calibration
         if not settings.classes or (cls.fit and not settings.real):
             text = "Choose a real cloud first" if settings.classes else "Add a material first"
             cls.poll_message_set(text)  # type: ignore[attr-defined]
@@ -71,14 +58,14 @@ class _Calibrates(LongOperator):
 
     def job(self, context: bpy.types.Context) -> PanelJob[Calibration]:
         """Return the calibration that the panel asks for."""
-        return panel_job(context.window_manager.synthroads_calibration.job(self.fit))
+        return panel_job(context.scene.synthroads_calibration.job(self.fit))
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[Calibration]) -> str:
         """Draw the diagrams; return the largest errors."""
         global latest
         assert job.result is not None
         latest = job.result
-        show_picture(job.result)
+        keep_picture(PICTURE, calibration_picture(job.result))
         return _sentence(job.result)
 
 
@@ -114,7 +101,7 @@ class SYNTHROADS_OT_save_materials(bpy.types.Operator):
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
         """Write the table; other materials that it holds stay."""
-        result, path = fitted_result(), file_of(context.window_manager.synthroads_calibration.table)
+        result, path = fitted_result(), file_of(context.scene.synthroads_calibration.table)
         if path is None:
             raise InputError("Table", None, "choose the table's file")
         save_fitted(cast(Calibration, result), path, overwrite=True)
@@ -129,7 +116,7 @@ class SYNTHROADS_OT_add_calibration_class(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Add a row: the first two are asphalt and white paint."""
-        settings = context.window_manager.synthroads_calibration
+        settings = context.scene.synthroads_calibration
         usual = (("asphalt", "road"), ("paint_white", "road_marking"))
         row = settings.classes.add()
         row.material, row.told = usual[min(len(settings.classes), 2) - 1]
@@ -147,31 +134,16 @@ class SYNTHROADS_OT_remove_calibration_class(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Remove the row."""
-        context.window_manager.synthroads_calibration.classes.remove(self.index)
+        context.scene.synthroads_calibration.classes.remove(self.index)
         return {"FINISHED"}
 
 
-class SYNTHROADS_OT_show_calibration(bpy.types.Operator):
+class SYNTHROADS_OT_show_calibration(ShowPicture, bpy.types.Operator):
     """Show the diagrams in an image editor"""
 
     bl_idname = "synthroads.show_calibration"
     bl_label = "Show Diagrams"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        """There are diagrams, and a window to show them in."""
-        return PICTURE in bpy.data.images and context.window is not None
-
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        """Show them in an editor that is open, else in a window of their own."""
-        areas = [area for window in context.window_manager.windows for area in window.screen.areas]
-        area = next((area for area in areas if area.type == "IMAGE_EDITOR"), None)
-        if area is None:
-            bpy.ops.wm.window_new()
-            area = context.window_manager.windows[-1].screen.areas[0]
-            area.type = "IMAGE_EDITOR"
-        area.spaces.active.image = bpy.data.images[PICTURE]
-        return {"FINISHED"}
+    picture = PICTURE
 
 
 class SYNTHROADS_PT_calibration(Sidebar, bpy.types.Panel):
@@ -184,12 +156,12 @@ class SYNTHROADS_PT_calibration(Sidebar, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Show materials, cloud, view, buttons and the result."""
-        layout, settings = column(self), context.window_manager.synthroads_calibration
+        layout, settings = column(self), context.scene.synthroads_calibration
         _draw_classes(layout, settings)
         _draw_cloud(layout.column(), settings)
         _draw_view(layout.column(), settings)
         layout.prop(settings, "table")
-        row = large_button(layout).row(align=True)
+        row = buttons_row(large_button(layout), ("Compare", "Fit"), align=True)
         row.operator(SYNTHROADS_OT_compare_intensities.bl_idname, icon="SEQ_HISTOGRAM")
         row.operator(SYNTHROADS_OT_fit_materials.bl_idname, icon="MOD_DATA_TRANSFER")
         if latest is not None:
@@ -236,12 +208,12 @@ def _draw_view(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) ->
 def _draw_result(layout: bpy.types.UILayout, result: Calibration) -> None:
     """Show the figures, and what can be done with them."""
     if result.job.real is not None:
-        layout.label(text=f"Gain {result.gain:.5g}, one for all")
+        draw_text(layout, f"Gain {result.gain:.5g}, one for all")
     for entry in result.compared:
         box = layout.box()
         for number, line in enumerate(lines_of(entry)):
-            box.label(text=line, icon="MATERIAL" if number == 0 else "NONE")
-    row = layout.row(align=True)
+            draw_text(box, line, "MATERIAL" if number == 0 else "NONE", share=0.9)
+    row = buttons_row(layout, ("Show Diagrams", "Save to Table"), align=True)
     row.operator(SYNTHROADS_OT_show_calibration.bl_idname, icon="IMAGE_DATA")
     if result.job.real is not None and result.job.fit:
         row.operator(SYNTHROADS_OT_save_materials.bl_idname, icon="FILE_TICK")

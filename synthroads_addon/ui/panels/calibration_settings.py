@@ -1,6 +1,6 @@
 """Settings of the panel "Calibration": materials with their classes, a real cloud, how it was seen, what is fitted.
 
-It is no part of a job's description: it is kept with the window, not with the file.
+It is no part of a job's description, but kept in the file with the scene.
 
 Annotations are not postponed here: Blender reads the properties from them.
 """
@@ -186,4 +186,4 @@ def _pair(text: str) -> tuple[float, float]:
     return values[0], values[1]
 
 
-ATTACHED = (bpy.types.WindowManager, "synthroads_calibration", SYNTHROADS_PG_calibration)
+ATTACHED = (bpy.types.Scene, "synthroads_calibration", SYNTHROADS_PG_calibration)

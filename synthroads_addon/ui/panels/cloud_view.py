@@ -19,6 +19,7 @@ from ...blender.model.store import find_road
 from ...blender.views.cloud import CloudView
 from ...cloud.formats.registry import ENDINGS
 from ...cloud.tools.display import COLOURINGS, ColourBy, DisplayCloud, height_colors, read_display
+from ..fields.room import NAMES_SHARE, draw_text, fits, is_narrow
 from ..work.common import Sidebar, column, right_label
 from ..work.job import PanelJob, Report
 from ..work.long_operator import LongOperator, draw_job
@@ -122,7 +123,7 @@ class SYNTHROADS_OT_show_cloud(LongOperator, bpy.types.Operator):
 
     def job(self, context: bpy.types.Context) -> PanelJob[DisplayCloud]:
         """Return the reading of the cloud in the scene's frame."""
-        path, points = cloud_path(context, self.filepath), context.window_manager.synthroads_cloud_view.points
+        path, points = cloud_path(context, self.filepath), context.scene.synthroads_cloud_view.points
         origin = scene_origin(context.scene)
         return PanelJob.aside(
             "Loading", lambda report: read_cloud_to_show(path, points, origin, report), "Loading the cloud"
@@ -130,7 +131,7 @@ class SYNTHROADS_OT_show_cloud(LongOperator, bpy.types.Operator):
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[DisplayCloud]) -> str:
         """Draw it; where there is no road to look at, look at it."""
-        cloud, settings = job.result, context.window_manager.synthroads_cloud_view
+        cloud, settings = job.result, context.scene.synthroads_cloud_view
         assert cloud
         first = view.cloud is None and find_road(context.scene) is None
         if settings.by not in cloud.colorings():
@@ -191,7 +192,7 @@ class SYNTHROADS_PT_cloud_view(Sidebar, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         """Show what is shown, how, and what its colours mean."""
-        layout, settings = column(self), context.window_manager.synthroads_cloud_view
+        layout, settings = column(self), context.scene.synthroads_cloud_view
         layout.prop(settings, "file", placeholder="Last scan's cloud")
         layout.prop(settings, "points")
         if not draw_job(layout):
@@ -202,12 +203,12 @@ class SYNTHROADS_PT_cloud_view(Sidebar, bpy.types.Panel):
         row = layout.row(align=True)
         icon = "HIDE_OFF" if settings.visible else "HIDE_ON"
         row.prop(settings, "visible", text="", icon=icon, emboss=False)
-        row.label(text=cloud.header.path.name)
+        draw_text(row, cloud.header.path.name, beside=3)
         row.operator(SYNTHROADS_OT_frame_cloud.bl_idname, text="", icon="VIEWZOOM", emboss=False)
         row.operator(SYNTHROADS_OT_hide_cloud.bl_idname, text="", icon="X", emboss=False)
         for text, icon in notes(cloud, context.scene):
-            layout.label(text=text, icon=icon)
-        row = layout.row(align=True)
+            draw_text(layout, text, icon)
+        row = layout.column(align=True) if is_narrow() else layout.row(align=True)
         row.use_property_split = False
         for by in COLOURINGS:
             choice = row.row(align=True)
@@ -246,7 +247,7 @@ def _legend(layout: bpy.types.UILayout, cloud: DisplayCloud, by: ColourBy) -> No
         row.label(text=form.format(low) + unit)
         right_label(row, form.format(high) + unit)
         if by == "intensity":
-            layout.label(text=cloud.brightness_text.capitalize())
+            draw_text(layout, cloud.brightness_text.capitalize())
 
 
 def _class_legend(layout: bpy.types.UILayout, cloud: DisplayCloud) -> None:
@@ -273,7 +274,7 @@ def _forget(path: str) -> None:
     view.remove()
 
 
-ATTACHED = (bpy.types.WindowManager, "synthroads_cloud_view", SYNTHROADS_PG_cloud_view)
+ATTACHED = (bpy.types.Scene, "synthroads_cloud_view", SYNTHROADS_PG_cloud_view)
 HANDLERS = {"load_pre": _forget}
 
 

@@ -21,7 +21,7 @@ from ...blender.things.model_builder import ROLE, SUPPORT
 from ...blender.things.road.road import MARKINGS
 from ...road.parameters import RoadParameters
 from ...road.surroundings import Vegetation
-from ..fields.fields import value_row
+from ..fields.room import draw_text, value_row
 from ..fields.wording import title_case
 from ..work.common import Sidebar, column
 
@@ -173,7 +173,7 @@ class SYNTHROADS_PT_edit(Sidebar, bpy.types.Panel):
         layout = column(self)
         row = layout.row(align=True)
         row.use_property_split = False
-        row.prop(context.window_manager.synthroads_edit, "part", text="")
+        row.prop(context.scene.synthroads_edit, "part", text="")
         row.operator("view3d.view_selected", text="", icon="VIEWZOOM")
         plants = plants_of(context.scene)
         if plants:
@@ -229,4 +229,4 @@ def _name_in_words(*_: Any) -> None:
 
 
 HANDLERS = dict.fromkeys(("load_post", "blend_import_post"), _name_in_words)
-ATTACHED = (bpy.types.WindowManager, "synthroads_edit", SYNTHROADS_PG_edit)
+ATTACHED = (bpy.types.Scene, "synthroads_edit", SYNTHROADS_PG_edit)

@@ -238,7 +238,7 @@ class SYNTHROADS_PT_export(Sidebar, bpy.types.Panel):
         if draw_job(layout):
             return
         row = layout.row()
-        shown = context.window_manager.synthroads_cloud_view.file
+        shown = context.scene.synthroads_cloud_view.file
         row.enabled = bool(shown) or last_cloud(context) is not None
         row.operator(SYNTHROADS_OT_export_cloud.bl_idname, icon="EXPORT").source = shown
         draw_shown(layout, context)

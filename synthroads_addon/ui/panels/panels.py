@@ -8,8 +8,8 @@ import bpy
 
 from ...blender.model.store import BUILT_FROM, find_road
 from ...blender.things.model_builder import ROLE
-from ..fields.fields import value_row
 from ..fields.preferences import preferences
+from ..fields.room import buttons_row, draw_text, flag_row, value_row
 from ..fields.sheets import SHEETS, Sheet, fields_of
 from ..work.build import SYNTHROADS_OT_build
 from ..work.common import Sidebar, column, large_button
@@ -64,18 +64,19 @@ class RoadPanel(SheetPanel):
         draw_choice(layout, context)
         self.draw_fields(layout, settings)
         if (seed := settings.exact_seed()) != settings.seed:
-            layout.label(text=f"Seed of the file: {seed}", icon="INFO")
+            draw_text(layout, f"Seed of the file: {seed}", "INFO")
         road = find_road(context.scene)
         if road and source_of(road):
-            layout.label(text=f"Built from {source_of(road)}", icon="FILE")
+            draw_text(layout, f"Built from {source_of(road)}", "FILE")
         elif road and not road.get(BUILT_FROM):
-            layout.label(text="Built by a command, not from these settings", icon="FILE")
+            draw_text(layout, "Built by a command, not from these settings", "FILE")
         elif road and road.get(BUILT_FROM) != settings.road_values():
-            layout.label(text="Changed since it was built", icon="INFO")
+            draw_text(layout, "Changed since it was built", "INFO")
         if draw_job(layout):
             return
-        row = large_button(layout)
-        row.operator(SYNTHROADS_OT_build.bl_idname, text="Rebuild Road" if road else "Build Road", icon="MOD_BUILD")
+        text = "Rebuild Road" if road else "Build Road"
+        row = buttons_row(large_button(layout), (text, "Random Road"))
+        row.operator(SYNTHROADS_OT_build.bl_idname, text=text, icon="MOD_BUILD")
         row.operator(SYNTHROADS_OT_random_road.bl_idname, text="Random Road", icon="FILE_REFRESH")
         draw_road_files(layout)
 
@@ -105,7 +106,7 @@ class OutputPanel(SheetPanel):
         """Show the folder and the fields."""
         layout, settings = column(self), context.scene.synthroads
         draw_folder(layout, settings)
-        value_row(layout, "").prop(settings, "overwrite")
+        flag_row(layout, "Replace Files").prop(settings, "overwrite")
         self.draw_fields(layout, settings)
         draw_missing(layout, context)
 
@@ -135,7 +136,7 @@ def draw_scan(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
 def _ask_to_save(layout: bpy.types.UILayout, settings: Any) -> None:
     row = layout.row(align=True)
     row.alert = True
-    row.label(text="Save the file, or choose a folder", icon="ERROR")
+    draw_text(row, "Save the file, or choose a folder", "ERROR", beside=1)
     row.operator("wm.save_mainfile", text="", icon="FILE_TICK")
     draw_folder(layout, settings)
 
@@ -145,7 +146,7 @@ def _draw_other_objects(layout: bpy.types.UILayout, context: bpy.types.Context) 
     count = sum(item.type in _SOLID and ROLE not in item for item in context.visible_objects)
     if count:
         text = "1 other object is scanned too" if count == 1 else f"{count} other objects are scanned too"
-        layout.label(text=text, icon="INFO")
+        draw_text(layout, text, "INFO")
 
 
 def _draw_result(layout: bpy.types.UILayout, settings: Any, written: Written) -> None:
@@ -153,7 +154,7 @@ def _draw_result(layout: bpy.types.UILayout, settings: Any, written: Written) ->
     if settings.needs_saved_file() or not settings.chosen_folder().strip() or settings.folder() != written.target:
         return
     row = layout.row(align=True)
-    row.label(text=f"{written.points:,} points written", icon="CHECKMARK")
+    draw_text(row, f"{written.points:,} points written", "CHECKMARK", beside=1)
     row.operator("wm.path_open", text="", icon="FILE_FOLDER").filepath = str(written.target)
 
 

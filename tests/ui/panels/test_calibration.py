@@ -24,7 +24,7 @@ def settings() -> Iterator[Any]:
     synthroads_addon.register()
     for _ in range(2):
         bpy.ops.synthroads.add_calibration_class()
-    yield bpy.context.window_manager.synthroads_calibration
+    yield bpy.context.scene.synthroads_calibration
     synthroads_addon.unregister()
 
 
@@ -162,7 +162,7 @@ def test_buttons_say_what_they_need(settings: Any) -> None:
 
 
 def test_nothing_is_left_when_unregistered(settings: Any) -> None:
-    assert hasattr(bpy.types.WindowManager, "synthroads_calibration")
+    assert hasattr(bpy.types.Scene, "synthroads_calibration")
     synthroads_addon.unregister()
-    assert not hasattr(bpy.types.WindowManager, "synthroads_calibration")
+    assert not hasattr(bpy.types.Scene, "synthroads_calibration")
     synthroads_addon.register()

@@ -33,7 +33,7 @@ ORIGIN = np.array([294_000.0, 5_628_000.0, 180.0])
 def shown() -> Iterator[Any]:
     """Register the add-on for one test; return what says how clouds are shown."""
     synthroads_addon.register()
-    yield bpy.context.window_manager.synthroads_cloud_view
+    yield bpy.context.scene.synthroads_cloud_view
     synthroads_addon.unregister()
     assert view.cloud is None
 

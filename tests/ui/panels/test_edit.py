@@ -52,7 +52,7 @@ def model(_empty_scene_for_module: None) -> Iterator[None]:
 
 
 def state() -> Any:
-    return bpy.context.window_manager.synthroads_edit
+    return bpy.context.scene.synthroads_edit
 
 
 def road_parts() -> dict[str, bpy.types.Object]:

@@ -1,0 +1,75 @@
+"""Diagrams drawn with Pillow alone, so that they look the same in Blender: frames with a grid, lines, texts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from ...base.arrays import Float
+from .picture import nice_step
+
+Color = tuple[int, int, int]
+Box = tuple[float, float, float, float]
+
+PAPER, INK, GRID, SOFT = (255, 255, 255), (40, 40, 44), (222, 226, 232), (110, 114, 122)
+LINES: tuple[Color, ...] = ((30, 96, 170), (214, 104, 20), (30, 135, 90), (150, 60, 150))
+SCALE = 2
+"""A picture is drawn this many times larger than it is saved, which smooths its lines."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A diagram's box in the picture and the values at its edges."""
+
+    draw: ImageDraw.ImageDraw
+    box: Box
+    low: tuple[float, float]
+    high: tuple[float, float]
+
+    def at(self, x: Float, y: Float) -> list[tuple[float, float]]:
+        """Return pixels of values."""
+        left, top, right, bottom = self.box
+        across = left + (np.asarray(x) - self.low[0]) / (self.high[0] - self.low[0]) * (right - left)
+        up = bottom - (np.asarray(y) - self.low[1]) / (self.high[1] - self.low[1]) * (bottom - top)
+        return list(zip(across.tolist(), np.maximum(up, top).tolist(), strict=True))
+
+
+def draw_picture(size: tuple[int, int], paint: Callable[[ImageDraw.ImageDraw], None]) -> Image.Image:
+    """Return a picture of a size (pixels) that a function has painted on paper `SCALE` times as large."""
+    picture = Image.new("RGB", (size[0] * SCALE, size[1] * SCALE), PAPER)
+    paint(ImageDraw.Draw(picture))
+    return picture.resize(size, Image.Resampling.LANCZOS)
+
+
+def draw_grid(frame: Frame, text: str) -> None:
+    """Draw a frame, its vertical lines with their values, and below it what they are."""
+    left, top, right, bottom = frame.box
+    step = nice_step((frame.high[0] - frame.low[0]) / 6.0)
+    first = np.ceil(frame.low[0] / step) * step
+    for value in np.arange(first, frame.high[0], step) + 0.0:
+        (x, _), *_ = frame.at(np.array([value]), np.array([0.0]))
+        frame.draw.line([(x, top), (x, bottom)], fill=GRID, width=SCALE)
+        shown = f"{value:,.0f}" if step >= 1 else f"{value:.3g}"
+        draw_text(frame.draw, (x / SCALE, bottom / SCALE + 6), shown, 13, SOFT, anchor="ma")
+    frame.draw.rectangle([left, top, right, bottom], outline=SOFT, width=SCALE)
+    draw_text(frame.draw, (right / SCALE, bottom / SCALE + 24), text, 13, SOFT, anchor="ra")
+
+
+def draw_levels(frame: Frame, step: float) -> None:
+    """Draw the horizontal lines of a frame within its edges, one every ``step``, with their values."""
+    first = np.floor(frame.low[1] / step) * step + step
+    for value in np.arange(first, frame.high[1], step) + 0.0:
+        (left, y), (right, _) = frame.at(np.array([frame.low[0], frame.high[0]]), np.array([value, value]))
+        frame.draw.line([(left, y), (right, y)], fill=GRID, width=SCALE)
+        draw_text(frame.draw, (left / SCALE - 6, y / SCALE), f"{value:.3g}", 13, SOFT, anchor="rm")
+
+
+def draw_text(
+    draw: ImageDraw.ImageDraw, place: tuple[float, float], text: str, size: int, color: Color = INK, anchor: str = "la"
+) -> None:
+    """Write a text of a size (pixels) at a place of the picture as it is saved."""
+    font = ImageFont.load_default(size=size * SCALE)
+    draw.text((place[0] * SCALE, place[1] * SCALE), text, fill=color, font=font, anchor=anchor)

@@ -1,0 +1,119 @@
+"""Room in the sidebar: texts are measured, and what doesn't fit stands below each other or in several lines.
+
+Blender cuts a text that is wider than its place. A layout can't say how wide it is, but the sidebar can.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import blf
+import bpy
+
+NAMES_SHARE = 0.45
+"""Share of a row's width that its name takes."""
+_EDGES = 68.0
+"""What tabs, margins and indents take of the sidebar's width, pixels at a resolution scale of 1."""
+_PADDING = 22.0
+"""What a label or a button takes beside its text: margins, and the gap to what stands beside it."""
+_ICON = 20.0
+_USUAL = 300.0
+"""Width where nothing is drawn into a region."""
+_NARROW = 260.0
+"""Width of the sidebar below which values stand below their names."""
+
+
+def sidebar_width() -> float:
+    """Return the width of the region that is drawn, in pixels at a resolution scale of 1."""
+    region, scale = bpy.context.region, bpy.context.preferences.system.ui_scale or 1.0  # 0 without a window
+    return region.width / scale if region and region.width > 1 else _USUAL
+
+
+def row_width() -> float:
+    """Return the width of a row in a panel of the sidebar, in pixels at a resolution scale of 1."""
+    return max(sidebar_width() - _EDGES, 60.0)
+
+
+def is_narrow() -> bool:
+    """Return whether there is too little room for names beside values."""
+    return sidebar_width() < _NARROW
+
+
+def text_width(text: str) -> float:
+    """Return the width of a text in a panel, in pixels at a resolution scale of 1."""
+    blf.size(0, 11.0)
+    return float(blf.dimensions(0, text)[0])
+
+
+def fits(text: str, share: float = 1.0, icons: int = 0) -> bool:
+    """Return whether a text fits into a share of a row, beside icons."""
+    return text_width(text) + _PADDING + icons * _ICON <= share * row_width()
+
+
+def text_lines(text: str, share: float = 1.0, icons: int = 0) -> list[str]:
+    """Return a text in lines that fit into a share of a row, beside icons; words are broken only where one is too long."""
+    lines: list[str] = []
+    for word in text.split():
+        if lines and fits(f"{lines[-1]} {word}", share, icons):
+            lines[-1] += f" {word}"
+            continue
+        while not fits(word, share, icons) and len(word) > 4:
+            count = next(n for n in range(len(word) - 1, 2, -1) if n == 3 or fits(word[:n], share, icons))
+            lines.append(word[:count])
+            word = word[count:]
+        lines.append(word)
+    return lines or [""]
+
+
+def draw_text(layout: bpy.types.UILayout, text: str, icon: str = "NONE", share: float = 1.0, beside: int = 0) -> None:
+    """Draw a text in as many lines as it takes; the icon stands before the first.
+
+    Args:
+        layout: a column.
+        text: what is said.
+        icon: before the text.
+        share: of a row's width that the layout has.
+        beside: icons and icon buttons in the same row.
+    """
+    has_icon = icon != "NONE"
+    lines = text_lines(text, share, has_icon + beside)
+    column = layout if len(lines) == 1 else layout.column(align=True)
+    for number, line in enumerate(lines):
+        column.label(text=line, icon="BLANK1" if has_icon and number else icon)
+
+
+def buttons_row(layout: bpy.types.UILayout, texts: Sequence[str], align: bool = False) -> bpy.types.UILayout:
+    """Return a row for buttons with icons, or a column where their texts don't fit side by side."""
+    side_by_side = all(fits(text, 1.0 / len(texts), 1) for text in texts)
+    return layout.row(align=align) if side_by_side else layout.column(align=align)
+
+
+def value_row(layout: bpy.types.UILayout, label: str) -> bpy.types.UILayout:
+    """Draw a name, and return the place for its value: beside it where there is room for both, else below."""
+    if not is_narrow() and fits(label, NAMES_SHARE):
+        split = layout.split(factor=NAMES_SHARE)
+        name = split.row()
+        name.alignment = "RIGHT"
+        name.label(text=label)
+        row = split.row(align=True)
+    else:
+        column = layout.column(align=True)
+        if label:
+            draw_text(column, label)
+        row = column.row(align=True)
+    row.use_property_split = False
+    return row
+
+
+def value_share(label: str) -> float:
+    """Return the share of a row that `value_row` leaves for the value."""
+    return 1.0 - NAMES_SHARE if not is_narrow() and fits(label, NAMES_SHARE) else 1.0
+
+
+def flag_row(layout: bpy.types.UILayout, text: str) -> bpy.types.UILayout:
+    """Return the place for a checkbox with a text: in line with the values where it fits there."""
+    if not is_narrow() and fits(text, 1.0 - NAMES_SHARE, 1):
+        return value_row(layout, "")
+    row = layout.row()
+    row.use_property_split = False
+    return row

@@ -1,0 +1,47 @@
+"""Diagrams as images of the file, and an editor that shows them."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from PIL import Image
+
+
+def keep_picture(name: str, picture: Image.Image) -> bpy.types.Image:
+    """Return the image of a name that shows a picture; made, or drawn anew where the file has it."""
+    drawn = np.asarray(picture.convert("RGBA"), dtype=np.float32)[::-1] / 255.0
+    height, width = drawn.shape[:2]
+    image = bpy.data.images.get(name)
+    if image is None:
+        image = bpy.data.images.new(name, width, height)
+    elif tuple(image.size) != (width, height):
+        image.scale(width, height)
+    image.pixels.foreach_set(np.ascontiguousarray(drawn).ravel())
+    image.update()
+    return image
+
+
+class ShowPicture:
+    """Base of operators that show an image of the file in an editor.
+
+    Attributes:
+        picture: the image's name.
+    """
+
+    picture = ""
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """There is the image, and a window to show it in."""
+        return cls.picture in bpy.data.images and context.window is not None
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Show it in an editor that is open, else in a window of its own."""
+        areas = [area for window in context.window_manager.windows for area in window.screen.areas]
+        area = next((area for area in areas if area.type == "IMAGE_EDITOR"), None)
+        if area is None:
+            bpy.ops.wm.window_new()
+            area = context.window_manager.windows[-1].screen.areas[0]
+            area.type = "IMAGE_EDITOR"
+        area.spaces.active.image = bpy.data.images[self.picture]
+        return {"FINISHED"}
