@@ -124,7 +124,7 @@ class AxisRefusedError(InputError):
         fit: what was fitted, for a picture (`fitting.plot`).
     """
 
-    def __init__(self, name: str, fit: AxisFit, picture: Path | None = None) -> None:
+    def __init__(self, name: str, fit: AxisFit, picture: Path | str | None = None) -> None:
         self.name, self.fit = name, fit
         across, up = fit.horizontal, fit.height
         text = f"no road follows its points within {fit.limit:g} m, which is {REFUSED_BEYOND:g} times the tolerance of "
@@ -133,8 +133,8 @@ class AxisRefusedError(InputError):
         text += "Look there for corners, jumps or points out of their order"
         super().__init__(f"axis {name}", None, f"{text}; {picture} shows it" if picture else text)
 
-    def with_picture(self, picture: Path) -> AxisRefusedError:
-        """Return the error with the name of a file that shows the fit."""
+    def with_picture(self, picture: Path | str) -> AxisRefusedError:
+        """Return the error with the name of a file, or of what else shows the fit."""
         return AxisRefusedError(self.name, self.fit, picture)
 
 

@@ -17,6 +17,8 @@ _EDGES = 68.0
 _PADDING = 22.0
 """What a label or a button takes beside its text: margins, and the gap to what stands beside it."""
 _ICON = 20.0
+_SHORTEST = 3
+"""Letters that stay together however narrow it is."""
 _USUAL = 300.0
 """Width where nothing is drawn into a region."""
 _NARROW = 260.0
@@ -51,18 +53,24 @@ def fits(text: str, share: float = 1.0, icons: int = 0) -> bool:
 
 
 def text_lines(text: str, share: float = 1.0, icons: int = 0) -> list[str]:
-    """Return a text in lines that fit into a share of a row, beside icons; words are broken only where one is too long."""
+    """Return a text in lines that fit into a share of a row, beside icons; a word is broken only if it is too long."""
     lines: list[str] = []
     for word in text.split():
         if lines and fits(f"{lines[-1]} {word}", share, icons):
             lines[-1] += f" {word}"
-            continue
-        while not fits(word, share, icons) and len(word) > 4:
-            count = next(n for n in range(len(word) - 1, 2, -1) if n == 3 or fits(word[:n], share, icons))
-            lines.append(word[:count])
-            word = word[count:]
-        lines.append(word)
+        else:
+            lines += _pieces(word, share, icons)
     return lines or [""]
+
+
+def _pieces(word: str, share: float, icons: int) -> list[str]:
+    """Return a word, in pieces if it doesn't fit."""
+    pieces = []
+    while not fits(word, share, icons) and len(word) > _SHORTEST:
+        count = next(n for n in range(len(word) - 1, 0, -1) if n <= _SHORTEST or fits(word[:n], share, icons))
+        pieces.append(word[:count])
+        word = word[count:]
+    return [*pieces, word]
 
 
 def draw_text(layout: bpy.types.UILayout, text: str, icon: str = "NONE", share: float = 1.0, beside: int = 0) -> None:

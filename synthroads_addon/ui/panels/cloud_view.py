@@ -19,7 +19,7 @@ from ...blender.model.store import find_road
 from ...blender.views.cloud import CloudView
 from ...cloud.formats.registry import ENDINGS
 from ...cloud.tools.display import COLOURINGS, ColourBy, DisplayCloud, height_colors, read_display
-from ..fields.room import NAMES_SHARE, draw_text, fits, is_narrow
+from ..fields.room import draw_text, is_narrow
 from ..work.common import Sidebar, column, right_label
 from ..work.job import PanelJob, Report
 from ..work.long_operator import LongOperator, draw_job

@@ -21,7 +21,7 @@ from ...blender.things.model_builder import ROLE, SUPPORT
 from ...blender.things.road.road import MARKINGS
 from ...road.parameters import RoadParameters
 from ...road.surroundings import Vegetation
-from ..fields.room import draw_text, value_row
+from ..fields.room import value_row
 from ..fields.wording import title_case
 from ..work.common import Sidebar, column
 

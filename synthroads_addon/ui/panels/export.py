@@ -30,12 +30,13 @@ from ...twin.formats import (
     write_twin,
 )
 from ..fields.numbers import exact
+from ..fields.room import draw_text
 from ..work.common import Sidebar, column, has_road, is_free
 from ..work.job import PanelJob, Report
 from ..work.long_operator import FileOperator, draw_job
 from .cloud_view import ENDINGS_GLOB, cloud_path, last_cloud
 from .road_choice import draw_shown
-from .rules import road_now, wrap_text
+from .rules import road_now
 
 _FORMATS = {
     ".laz": ("LAZ", "LAS 1.4, compressed"),
@@ -196,7 +197,7 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the settings beside the file browser; formats whose package is missing can't be chosen."""
         layout = column(self)
-        _draw_formats(layout, context, self)
+        _draw_formats(layout, self)
         layout.prop(self, "tolerance")
         row = layout.row()
         row.enabled = "ifc" in self.formats
@@ -245,7 +246,7 @@ class SYNTHROADS_PT_export(Sidebar, bpy.types.Panel):
         layout.operator(SYNTHROADS_OT_export_twin.bl_idname, icon="EXPORT")
 
 
-def _draw_formats(layout: bpy.types.UILayout, context: bpy.types.Context, operator: SYNTHROADS_OT_export_twin) -> None:
+def _draw_formats(layout: bpy.types.UILayout, operator: SYNTHROADS_OT_export_twin) -> None:
     rows = layout.column(align=True)
     rows.use_property_split = False
     missing = {name: package for name in TWIN_FORMATS if (package := missing_packages(name))}
@@ -253,7 +254,7 @@ def _draw_formats(layout: bpy.types.UILayout, context: bpy.types.Context, operat
         row = rows.row()
         row.enabled = name not in missing
         row.prop_enum(operator, "formats", name)
-    _draw_missing_packages(rows, context, {FORMATS[name].label: package for name, package in missing.items()})
+    _draw_missing_packages(rows, {FORMATS[name].label: package for name, package in missing.items()})
 
 
 def draw_missing(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -268,5 +269,4 @@ def draw_missing(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
 def _draw_missing_packages(layout: bpy.types.UILayout, context: bpy.types.Context, missing: Mapping[str, str]) -> None:
     for name, package in missing.items():
         text = f"{name} needs the package {package}: pip install {package}, with Blender's Python"
-        for line in wrap_text(text, context):
-            layout.label(text=line)
+        draw_text(layout, text)

@@ -8,21 +8,28 @@ from pathlib import Path
 
 import bpy
 
+from ...base.errors import InputError
 from ...base.files import output_folder
 from ...blender.model.build import Place
 from ...blender.model.store import BUILT_FROM, find_road, recall_parameters
+from ...fitting.fit import AxisRefusedError
+from ...fitting.plot import axis_picture
 from ...jobs.generate import RoadSource
 from ...road.parameters import RoadParameters
 from ...scenario.scenario import Scenario
+from ..fields.room import buttons_row
 from ..work.build import road_work, shown_place
 from ..work.common import has_road, refusing
 from ..work.job import Aside, PanelJob, Work
 from ..work.long_operator import FileOperator
+from ..work.pictures import ShowPicture, keep_picture
 from ..work.view import look_along, view_of
 from .presets import JsonFileChooser
 from .rules import road_now
 
 _FROM_FILE, _NAME = "file", "parameters.json"
+FIT_PICTURE = "SynthRoads Axis Fit"
+"""Name of the image that shows how far an axis was missed."""
 
 
 def source_of(road: bpy.types.Object) -> str | None:
@@ -93,6 +100,21 @@ class SYNTHROADS_OT_load_axis(_Load, bpy.types.Operator):
         deviations = f"{fit['points']:,} points, {fit['elements']} elements, within {across:.3f} m, heights {up:.3f} m"
         return parameters, f"Built {parameters.alignment.length:,.0f} m of road along {path.name}: {deviations}"
 
+    def refuse(self, error: InputError) -> set[str]:
+        """Say what is wrong; of a fit that misses its points, keep a picture."""
+        if not isinstance(error, AxisRefusedError):
+            return super().refuse(error)
+        keep_picture(FIT_PICTURE, axis_picture(error.fit, error.name))
+        return super().refuse(error.with_picture("Show Missed Axis"))
+
+
+class SYNTHROADS_OT_show_fit(ShowPicture, bpy.types.Operator):
+    """Show in an image editor how far the road that was fitted last is from its points, along it"""
+
+    bl_idname = "synthroads.show_fit"
+    bl_label = "Show Missed Axis"
+    picture = FIT_PICTURE
+
 
 class SYNTHROADS_OT_save_road(JsonFileChooser, bpy.types.Operator):
     """Write the parameter set of the road as it is edited now"""
@@ -125,7 +147,9 @@ class SYNTHROADS_OT_save_road(JsonFileChooser, bpy.types.Operator):
 def draw_road_files(layout: bpy.types.UILayout) -> None:
     """Draw the buttons."""
     column = layout.column(align=True)
-    row = column.row(align=True)
+    row = buttons_row(column, ("Load Set", "Save Set"), align=True)
     row.operator(SYNTHROADS_OT_load_road.bl_idname, text="Load Set", icon="IMPORT")
     row.operator(SYNTHROADS_OT_save_road.bl_idname, text="Save Set", icon="EXPORT")
     column.operator(SYNTHROADS_OT_load_axis.bl_idname, icon="CURVE_PATH")
+    if FIT_PICTURE in bpy.data.images:
+        column.operator(SYNTHROADS_OT_show_fit.bl_idname, icon="IMAGE_DATA")

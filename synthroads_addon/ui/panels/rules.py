@@ -3,7 +3,7 @@
 Annotations are not postponed here: Blender reads the properties from them.
 """
 
-import textwrap
+from collections.abc import Sequence
 
 import bpy
 import numpy as np
@@ -18,12 +18,15 @@ from ...checking.checker import RULES, Violation, check
 from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ...road.section import Carriageway, LineMarking
+from ..fields.room import draw_text, fits, text_width
 from ..work.common import Sidebar, has_road, redraw_sidebars, refusing, right_label
 from ..work.view import Marker, look_at_place, redraw_views, view_of
 from .road_choice import draw_shown
 
-_CHARACTER = 6.2
-"""Width of a letter in the sidebar, pixels at a resolution scale of 1."""
+_STATION_SHARE, _NAME_SHARE = 0.2, 0.5
+"""Shares of the list's width that station and rule have where all three columns fit."""
+_BOX_SHARE, _TITLE_SHARE = 0.92, 0.36
+"""Share of a row that is within a box, and that of a title in there."""
 _SURENESS = {
     "confirmed": "printed in secondary sources",
     "derived": "computed from what secondary sources print",
@@ -216,7 +219,8 @@ class SYNTHROADS_UL_violations(bpy.types.UIList):
         active_property: str,
     ) -> None:
         """Draw one line."""
-        _columns(layout, (f"{item.station:,.0f} m", item.name, item.found))
+        names = [row.name for row in data.violations]
+        _columns(layout, (f"{item.station:,.0f} m", item.name, item.found), names)
 
     def filter_items(
         self, context: bpy.types.Context, data: SYNTHROADS_PG_rules, field: str
@@ -248,32 +252,46 @@ class SYNTHROADS_PT_rules(Sidebar, bpy.types.Panel):
             return
         row.operator(SYNTHROADS_OT_clear_rules.bl_idname, text="", icon="X")
         if checked.is_outdated(context.scene):
-            layout.label(text="The road has changed since", icon="INFO")
+            draw_text(layout, "The road has changed since", "INFO")
         count = len(rules.violations)
-        layout.label(text=_count(count), icon="ERROR" if count else "CHECKMARK")
+        draw_text(layout, _count(count), "ERROR" if count else "CHECKMARK")
         if not count:
             return
-        _columns(layout, ("Station", "Rule", "Found / limit"))
+        _columns(layout.row(), ("Station", "Rule", "Found / limit"), [row.name for row in rules.violations])
         layout.template_list("SYNTHROADS_UL_violations", "", rules, "violations", rules, "index", rows=4)
         if 0 <= rules.index < count:
-            _details(layout, context, rules)
+            _details(layout, rules)
 
 
-def _columns(layout: bpy.types.UILayout, texts: tuple[str, str, str]) -> None:
-    """Draw one line of the list, or its head."""
-    split = layout.split(factor=0.17)
+def _columns(layout: bpy.types.UILayout, texts: tuple[str, str, str], names: Sequence[str]) -> None:
+    """Draw one line of the list, or its head: where, which and what was found, or of that as much as fits.
+
+    Args:
+        layout: a row.
+        texts: of the three columns.
+        names: of all lines' rules: as one of them doesn't fit, all are left to the box below.
+    """
+    widest = max(names, key=text_width, default="")
+    all_three, two = fits(widest, _NAME_SHARE), fits(widest, 1.0 - _STATION_SHARE)
+    if not all_three and not two:
+        layout.label(text=texts[0])
+        right_label(layout, texts[2])
+        return
+    split = layout.split(factor=_STATION_SHARE)
     split.label(text=texts[0])
-    rest = split.split(factor=0.62)
+    if not all_three:
+        split.label(text=texts[1])
+        return
+    rest = split.split(factor=_NAME_SHARE / (1.0 - _STATION_SHARE))
     rest.label(text=texts[1])
     right_label(rest, texts[2])
 
 
-def _details(layout: bpy.types.UILayout, context: bpy.types.Context, rules: SYNTHROADS_PG_rules) -> None:
+def _details(layout: bpy.types.UILayout, rules: SYNTHROADS_PG_rules) -> None:
     item = rules.violations[rules.index]
     rule = RULES[item.rule]
     box = layout.box().column(align=True)
-    for line in wrap_text(item.text, context):
-        box.label(text=line)
+    draw_text(box, item.text, share=_BOX_SHARE)
     box.separator()
     for title, value in (
         ("Found", item.value),
@@ -282,21 +300,12 @@ def _details(layout: bpy.types.UILayout, context: bpy.types.Context, rules: SYNT
         ("Object", item.object),
         ("Rule", item.rule),
     ):
-        row = box.split(factor=0.25)
-        row.label(text=title)
-        row.label(text=value)
+        split = box.split(factor=_TITLE_SHARE)
+        split.label(text=title)
+        draw_text(split.column(align=True), value, share=_BOX_SHARE * (1.0 - _TITLE_SHARE))
     source = f"{rule.source}: " if rule.source else ""
-    for line in wrap_text(source + _SURENESS[rule.sure], context):
-        box.label(text=line)
+    draw_text(box, source + _SURENESS[rule.sure], share=_BOX_SHARE)
     box.operator(SYNTHROADS_OT_show_violation.bl_idname, icon="VIEWZOOM").index = rules.index
-
-
-def wrap_text(text: str, context: bpy.types.Context) -> list[str]:
-    """Return a text in lines that the sidebar is wide enough for."""
-    width = context.region.width if context.region else 300
-    scale = context.preferences.system.ui_scale or 1.0  # 0 without a window
-    letters = int((width / scale - 60.0) / _CHARACTER)
-    return textwrap.wrap(text, max(20, letters))
 
 
 def _fill(rules: SYNTHROADS_PG_rules, parameters: RoadParameters, violations: list[Violation]) -> None:

@@ -13,6 +13,7 @@ from ...sampling.road import sample_road
 from ...scenario.scenario import Scenario
 from .job import Aside, PanelJob, Step, Work
 from .long_operator import LongOperator
+from .unseen import build_unseen
 from .view import look_along
 
 
@@ -76,6 +77,7 @@ def road_work(parameters: RoadParameters, scenario: Scenario, built_from: str, p
     """Build a road that is given in the open scene; see `build_work`."""
     fidelity = scenario.settings()
     yield Step(0.02, "Building")
-    model = yield from build_steps(parameters, fidelity.tolerance, fidelity.vegetation_detail, place=place)
+    steps = build_steps(parameters, fidelity.tolerance, fidelity.vegetation_detail, place=place)
+    model = yield from build_unseen(steps)
     remember(model.root, parameters, scenario, built_from)
     return model

@@ -28,7 +28,30 @@ Report: TypeAlias = Callable[[float], None]
 TICK = 0.03
 """Seconds between two turns of a job in the window's thread."""
 BUDGET = 0.05
-"""Seconds of one such turn."""
+"""Seconds of one such turn, where drawing the window takes next to no time."""
+_WORK_FOR_DRAWING, _LONGEST = 4.0, 1.0
+"""So many times as long as the window was drawn a turn lasts, but no longer than this (s)."""
+
+
+class Pace:
+    """How long turns last: where the graphics card draws slowly, most of the time is for the work all the same.
+
+    Args:
+        clock: returns seconds.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
+        self._clock = clock
+        self._left: float | None = None
+
+    def budget(self) -> float:
+        """Return the seconds of the turn that begins now, by how long the window took since the last one."""
+        pause = 0.0 if self._left is None else self._clock() - self._left - TICK
+        return min(max(BUDGET, _WORK_FOR_DRAWING * pause), _LONGEST)
+
+    def leave(self) -> None:
+        """Note that a turn has ended."""
+        self._left = self._clock()
 
 
 @dataclass(frozen=True)

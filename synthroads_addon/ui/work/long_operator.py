@@ -14,7 +14,7 @@ import bpy
 from ...base.errors import Cancelled, InputError
 from ...blender.model.stage import remove_staged
 from .common import is_free, redraw_sidebars, refuse
-from .job import TICK, PanelJob, running_job, stop_job
+from .job import TICK, Pace, PanelJob, running_job, stop_job
 
 
 class LongOperator:
@@ -29,6 +29,7 @@ class LongOperator:
             """Blender's own, of every operator."""
 
     _job: PanelJob[Any] | None = None
+    _pace: Pace
     _timer: bpy.types.Timer | None = None
 
     @classmethod
@@ -48,13 +49,18 @@ class LongOperator:
         """Begin."""
         return self.begin(context)
 
+    def refuse(self, error: InputError) -> set[str]:
+        """Say what is wrong."""
+        return refuse(cast("bpy.types.Operator", self), error)
+
     def begin(self, context: bpy.types.Context) -> set[str]:
         """Do the first step; the window's timer does the rest."""
         try:
             self._job = self.job(context)
             self._job.start()
         except InputError as error:
-            return refuse(self, error)
+            return self.refuse(error)
+        self._pace = Pace()
         self._timer = context.window_manager.event_timer_add(TICK, window=context.window)
         context.window_manager.modal_handler_add(self)
         context.workspace.status_text_set(_draw_status)
@@ -69,9 +75,12 @@ class LongOperator:
             return {"RUNNING_MODAL"}
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
-        if job.tick():
-            context.workspace.status_text_set(_draw_status)
-            redraw_sidebars(context)
+        before = job.state
+        if job.tick(self._pace.budget()):
+            if job.state != before:
+                context.workspace.status_text_set(_draw_status)
+                redraw_sidebars(context)
+            self._pace.leave()
             return {"PASS_THROUGH"}
         self._leave(context)
         return self._end(context, job)
@@ -88,7 +97,7 @@ class LongOperator:
             job = self.job(context)
             job.run()
         except InputError as error:
-            return refuse(self, error)
+            return self.refuse(error)
         return self._say(self.succeed(context, job))
 
     def _end(self, context: bpy.types.Context, job: PanelJob[Any]) -> set[str]:
@@ -98,7 +107,7 @@ class LongOperator:
             self.report({"WARNING"}, f"{job.title} cancelled; {self.nothing_done}")
             return {"CANCELLED"}
         if isinstance(job.error, InputError):
-            return refuse(self, job.error)
+            return self.refuse(job.error)
         traceback.print_exception(job.error)
         self.report({"ERROR"}, f"{job.title} failed, {self.nothing_done}: {job.error!r} (the console says more)")
         return {"CANCELLED"}
