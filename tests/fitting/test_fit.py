@@ -13,10 +13,20 @@ import pytest
 
 from synthroads_addon.base.errors import InputError, MissingFileError
 from synthroads_addon.fitting.chain import FREE, ZERO, Chain, ChainFit, Heights, Plan
-from synthroads_addon.fitting.fit import AxisFit, _is_exact, _trim_ends, fit_axis
+from synthroads_addon.fitting.fit import (
+    REFUSED_BEYOND,
+    AxisFit,
+    AxisRefusedError,
+    _is_exact,
+    _trim_ends,
+    fit_axis,
+    fitted_axis,
+)
+from synthroads_addon.fitting.plot import axis_picture
 from synthroads_addon.road.alignment import Alignment, Element
 from synthroads_addon.road.centerline import read_axis
 from synthroads_addon.road.profile import IntersectionPoint, Profile
+from synthroads_addon.scenario.road import RoadScenario
 
 REAL = sorted((Path(__file__).resolve().parents[2].parent / "shared" / "real").glob("*_axis.csv"))
 
@@ -573,3 +583,29 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
 def test_bad_points_are_refused_by_name(points: object, tolerance: float, message: str) -> None:
     with pytest.raises(InputError, match=message):
         fit_axis(points, tolerance)  # type: ignore[arg-type]
+
+
+def test_a_fit_that_leaves_its_points_is_refused(tmp_path: Path) -> None:
+    """Two legs of a road beside each other, joined by one step: no road goes that way."""
+    along = np.arange(0.0, 200.0, 5.0)
+    there = np.column_stack([along, 0.0 * along, 0.0 * along])
+    back = np.column_stack([along[::-1], 0.0 * along + 40.0, 0.0 * along + 11.0])
+    path = tmp_path / "axis.csv"
+    np.savetxt(path, np.vstack([there, back]), delimiter=",", header="x,y,z", comments="")
+    with pytest.raises(AxisRefusedError, match=r"axis axis\.csv: no road follows its points within 2 m, .* 40 times") as e:
+        fitted_axis(path, RoadScenario())
+    fit = e.value.fit
+    assert max(fit.horizontal.worst, fit.height.worst) > fit.limit == 2.0
+    assert f"at station {fit.horizontal.worst_station:.1f} m" in str(e.value)
+    assert np.abs(fit.across).max() == pytest.approx(fit.horizontal.worst)
+    assert np.abs(fit.above).max() == pytest.approx(fit.height.worst)
+    picture = axis_picture(fit, "axis.csv")
+    red = (np.asarray(picture)[..., :3] == (200, 30, 40)).all(axis=-1)
+    assert red.sum() > 100  # limits, and rings around the worst places
+    picture.save(tmp_path / "fit.png")
+
+
+@pytest.mark.parametrize("path", REAL, ids=lambda path: path.stem)
+def test_real_axes_are_far_from_being_refused(path: Path) -> None:
+    _, _, report = fitted_axis(path, RoadScenario())
+    assert max(report["horizontal"]["worst"], report["height"]["worst"]) < 0.2 * REFUSED_BEYOND * 0.05

@@ -26,7 +26,7 @@ from ...scenario.scenario import Scenario
 from .choices import ITEMS
 from .inherited import SOURCES, Value
 from .numbers import exact, fitting, is_share, list_as_text, number_property, numbers_in, push_along
-from .room import draw_text, fits, flag_row, value_row, value_share
+from .room import draw_flag, draw_text, fits, value_row, value_share
 from .wording import label, value_name, written_unit
 
 AUTOMATIC = "AUTOMATIC"
@@ -236,7 +236,7 @@ class FlagField(Field):
 
     def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
         """Draw the checkbox with its name."""
-        flag_row(layout, self.label).prop(owner, self.name, text=self.label)
+        draw_flag(layout, owner, self.name, self.label)
 
 
 class NumberField(OptionalField):

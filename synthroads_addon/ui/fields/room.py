@@ -118,10 +118,21 @@ def value_share(label: str) -> float:
     return 1.0 - NAMES_SHARE if not is_narrow() and fits(label, NAMES_SHARE) else 1.0
 
 
-def flag_row(layout: bpy.types.UILayout, text: str) -> bpy.types.UILayout:
-    """Return the place for a checkbox with a text: in line with the values where it fits there."""
-    if not is_narrow() and fits(text, 1.0 - NAMES_SHARE, 1):
-        return value_row(layout, "")
+def draw_flag(layout: bpy.types.UILayout, owner: object, name: str, label: str) -> None:
+    """Draw a checkbox with its text: in line with the values where it fits there, else over the whole row.
+
+    Args:
+        layout: a column.
+        owner, name: the property.
+        label: the text.
+    """
+    if not is_narrow() and fits(label, 1.0 - NAMES_SHARE, 1):
+        value_row(layout, "").prop(owner, name, text=label)
+        return
     row = layout.row()
     row.use_property_split = False
-    return row
+    if fits(label, icons=1):
+        row.prop(owner, name, text=label)
+        return
+    row.prop(owner, name, text="")
+    draw_text(row.column(align=True), label, beside=1)

@@ -263,10 +263,10 @@ def draw_missing(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
     clouds = {_FORMATS[f".{name}"][0]: cloud_package(f".{name}") for name in sorted(settings.cloud.formats)}
     twins = {FORMATS[name].label: missing_packages(name) for name in TWIN_FORMATS if name in settings.twin}
     missing = {name: package for name, package in (clouds | twins).items() if package}
-    _draw_missing_packages(layout, context, missing)
+    _draw_missing_packages(layout, missing)
 
 
-def _draw_missing_packages(layout: bpy.types.UILayout, context: bpy.types.Context, missing: Mapping[str, str]) -> None:
+def _draw_missing_packages(layout: bpy.types.UILayout, missing: Mapping[str, str]) -> None:
     for name, package in missing.items():
         text = f"{name} needs the package {package}: pip install {package}, with Blender's Python"
         draw_text(layout, text)

@@ -9,7 +9,7 @@ import bpy
 from ...blender.model.store import BUILT_FROM, find_road
 from ...blender.things.model_builder import ROLE
 from ..fields.preferences import preferences
-from ..fields.room import buttons_row, draw_text, flag_row, value_row
+from ..fields.room import buttons_row, draw_flag, draw_text, value_row
 from ..fields.sheets import SHEETS, Sheet, fields_of
 from ..work.build import SYNTHROADS_OT_build
 from ..work.common import Sidebar, column, large_button
@@ -106,7 +106,7 @@ class OutputPanel(SheetPanel):
         """Show the folder and the fields."""
         layout, settings = column(self), context.scene.synthroads
         draw_folder(layout, settings)
-        flag_row(layout, "Replace Files").prop(settings, "overwrite")
+        draw_flag(layout, settings, "overwrite", "Replace Files")
         self.draw_fields(layout, settings)
         draw_missing(layout, context)
 

@@ -10,6 +10,7 @@ import bpy
 
 from ...blender.model.roads import choose_road
 from ...blender.model.store import find_road, roads
+from ..fields.room import draw_text
 from ..work.build import SYNTHROADS_OT_build
 
 _items: list[tuple[str, str, str, str, int]] = []
@@ -66,7 +67,7 @@ def draw_shown(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Say which road a button is about where the scene has several."""
     found = roads(context.scene)
     if len(found) > 1 and (shown := find_road(context.scene)):
-        layout.label(text=shown.name, icon="EMPTY_ARROWS")
+        draw_text(layout, shown.name, "EMPTY_ARROWS")
 
 
 ATTACHED = (bpy.types.WindowManager, "synthroads_roads", SYNTHROADS_PG_roads)

@@ -18,12 +18,12 @@ from ...checking.checker import RULES, Violation, check
 from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ...road.section import Carriageway, LineMarking
-from ..fields.room import draw_text, fits, text_width
+from ..fields.room import draw_text, fits, is_narrow, text_width
 from ..work.common import Sidebar, has_road, redraw_sidebars, refusing, right_label
 from ..work.view import Marker, look_at_place, redraw_views, view_of
 from .road_choice import draw_shown
 
-_STATION_SHARE, _NAME_SHARE = 0.2, 0.5
+_STATION_SHARE, _NAME_SHARE = 0.25, 0.45
 """Shares of the list's width that station and rule have where all three columns fit."""
 _BOX_SHARE, _TITLE_SHARE = 0.92, 0.36
 """Share of a row that is within a box, and that of a title in there."""
@@ -275,7 +275,8 @@ def _columns(layout: bpy.types.UILayout, texts: tuple[str, str, str], names: Seq
     all_three, two = fits(widest, _NAME_SHARE), fits(widest, 1.0 - _STATION_SHARE)
     if not all_three and not two:
         layout.label(text=texts[0])
-        right_label(layout, texts[2])
+        if fits(texts[2], 0.5):
+            right_label(layout, texts[2])
         return
     split = layout.split(factor=_STATION_SHARE)
     split.label(text=texts[0])
@@ -300,6 +301,9 @@ def _details(layout: bpy.types.UILayout, rules: SYNTHROADS_PG_rules) -> None:
         ("Object", item.object),
         ("Rule", item.rule),
     ):
+        if is_narrow():
+            draw_text(box, f"{title}: {value}", share=_BOX_SHARE)
+            continue
         split = box.split(factor=_TITLE_SHARE)
         split.label(text=title)
         draw_text(split.column(align=True), value, share=_BOX_SHARE * (1.0 - _TITLE_SHARE))

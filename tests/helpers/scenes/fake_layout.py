@@ -7,6 +7,8 @@ from typing import Any
 
 import bpy
 
+from synthroads_addon.ui.fields.room import text_width
+
 
 class FakeLayout:
     """Takes the place of `bpy.types.UILayout`; `lines` is what was drawn, a row in one line.
@@ -15,8 +17,10 @@ class FakeLayout:
         open_panels: whether panels within the layout are drawn as if opened.
     """
 
-    def __init__(self, open_panels: bool = True, what: str = "") -> None:
+    def __init__(self, open_panels: bool = True, what: str = "", factor: float = 0.0) -> None:
         self.used: list[tuple[Any, str]] = []
+        self._factor = factor
+        self._shown: list[tuple[str, int]] = []
         self._items: list[str | FakeLayout] = []
         self._open = open_panels
         self._what = what
@@ -31,14 +35,42 @@ class FakeLayout:
             return [whole, *(line for line in more if line.startswith(" "))]
         return [f"{'  ' if self._what else ''}{line}" for line in inner]
 
-    def _child(self, what: str) -> FakeLayout:
-        child = FakeLayout(self._open, what)
+    def texts(self, width: float) -> list[tuple[str, float, float]]:
+        """Return the texts of labels, buttons and checkboxes in a layout of a width, pixels.
+
+        Each comes with the width of its place and the width that it needs. Blender gives icons alone their own width,
+        and shares the rest of a row evenly.
+        """
+        shown = iter(self._shown)
+        items = [item if isinstance(item, FakeLayout) else next(shown) for item in self._items]
+        found: list[tuple[str, float, float]] = []
+        for item, place in zip(items, self._places(items, width), strict=True):
+            if isinstance(item, FakeLayout):
+                found += item.texts(place)
+            elif item[0]:
+                found.append((item[0], place, text_width(item[0]) + _PADDING + _ICON * item[1]))
+        return found
+
+    def _places(self, items: list[Any], width: float) -> list[float]:
+        if self._what == "box":
+            width *= 0.93
+        if self._what == "split" and len(items) == 2:
+            return [self._factor * width, (1.0 - self._factor) * width]
+        if self._what not in ("row", "split"):
+            return [width] * len(items)
+        icons = [_is_icon(item) for item in items]
+        rest = (width - _ICON * sum(icons)) / max(1, len(items) - sum(icons))
+        return [_ICON if icon else rest for icon in icons]
+
+    def _child(self, what: str, factor: float = 0.0) -> FakeLayout:
+        child = FakeLayout(self._open, what, factor)
         child.used = self.used
         self._items.append(child)
         return child
 
-    def _say(self, text: str) -> None:
+    def _say(self, text: str, shown: str = "", icons: int = 0) -> None:
         self._items.append(text)
+        self._shown.append((shown, icons))
 
     def row(self, align: bool = False, heading: str = "") -> FakeLayout:
         return self._child("row")
@@ -47,7 +79,7 @@ class FakeLayout:
         return self._child("column")
 
     def split(self, factor: float = 0.0, align: bool = False) -> FakeLayout:
-        return self._child("split")
+        return self._child("split", factor)
 
     def box(self) -> FakeLayout:
         return self._child("box")
@@ -56,7 +88,7 @@ class FakeLayout:
         self._say("separator")
 
     def label(self, text: str = "", icon: str = "NONE", icon_value: int | None = None) -> None:
-        self._say(f"label {text!r}{_icon(icon)}{'' if icon_value is None else ' <swatch>'}")
+        self._say(f"label {text!r}{_icon(icon)}{'' if icon_value is None else ' <swatch>'}", text, _has(icon))
 
     def template_list(self, kind: str, idname: str, data: Any, name: str, owner: Any, index: str, rows: int) -> None:
         assert hasattr(bpy.types, kind)
@@ -84,7 +116,7 @@ class FakeLayout:
             return
         known = data.bl_rna.properties[name]
         shown = known.name if text is None else text
-        self._say(f"{known.type.lower()} {name} {shown!r}{hint}{_icon(icon)} = {_value(getattr(data, name))}")
+        self._say(f"{known.type.lower()} {name} {shown!r}{hint}{_icon(icon)} = {_value(getattr(data, name))}", *_beside(known, shown))
 
     def prop_enum(self, data: Any, name: str, value: str) -> None:
         self.used.append((data, name))
@@ -96,7 +128,8 @@ class FakeLayout:
     def operator(self, idname: str, text: str | None = None, icon: str = "NONE", emboss: bool = True) -> Any:
         module, name = idname.split(".")
         known = getattr(getattr(bpy.ops, module), name).get_rna_type()  # KeyError for one that Blender doesn't know
-        self._say(f"button {known.name if text is None else text!r} {idname}{_icon(icon)}")
+        shown = known.name if text is None else text
+        self._say(f"button {known.name if text is None else text!r} {idname}{_icon(icon)}", shown, _has(icon))
         return SimpleNamespace()
 
     def menu(self, idname: str, text: str | None = None, icon: str = "NONE") -> None:
@@ -123,6 +156,24 @@ def _icon(icon: str) -> str:
     known = bpy.types.UILayout.bl_rna.functions["label"].parameters["icon"].enum_items
     assert icon in known, f"there is no icon {icon}"
     return "" if icon == "NONE" else f" <{icon}>"
+
+
+_PADDING, _ICON = 12.0, 20.0
+"""What a text needs beside its own width, and the width of an icon, pixels."""
+
+
+def _has(icon: str) -> int:
+    return int(icon != "NONE")
+
+
+def _beside(known: Any, shown: str) -> tuple[str, int]:
+    """Return the text of a checkbox; other properties show theirs beside, and are drawn with none."""
+    return (shown, 1) if known.type == "BOOLEAN" else ("", 0)
+
+
+def _is_icon(item: Any) -> bool:
+    """Return whether an item of a row is an icon, or a checkbox, without a text."""
+    return not isinstance(item, FakeLayout) and item == ("", 1)
 
 
 def _value(value: Any) -> str:

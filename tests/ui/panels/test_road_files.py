@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
+from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.compat import set_modifier_input
 from synthroads_addon.blender.model.store import find_road, recall
 from synthroads_addon.jobs.generate import Job, RoadSource, generate
@@ -77,6 +78,20 @@ def test_a_fitted_road_is_the_librarys(cheap: Any, tmp_path: Path) -> None:
     assert parameters.metadata.epsg == 25833
     assert parameters.alignment.length == pytest.approx(200.0, abs=0.01)
     assert source_of(find_road(bpy.context.scene)) == "axis.csv"
+
+
+def test_a_fit_that_leaves_its_points_is_refused_with_a_picture(cheap: Any, tmp_path: Path) -> None:
+    along = np.arange(0.0, 200.0, 5.0)
+    points = np.vstack([np.column_stack([along, 0.0 * along]), np.column_stack([along[::-1], 0.0 * along + 40.0])])
+    np.savetxt(tmp_path / "axis.csv", points, delimiter=",", header="x,y", comments="")
+    assert not bpy.ops.synthroads.show_fit.poll()
+    with pytest.raises(RuntimeError, match=r"no road follows its points within 2 m.*Show Missed Axis"):
+        bpy.ops.synthroads.load_axis(filepath=str(tmp_path / "axis.csv"))
+    assert find_road(bpy.context.scene) is None
+    assert tuple(bpy.data.images["SynthRoads Axis Fit"].size) == (1200, 648)
+    with pytest.raises(InputError, match=r"axis-fit\.png shows it"):
+        generate(Job(cheap.scenario(), tmp_path / "out", axis=tmp_path / "axis.csv", new_file=True))
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["axis-fit.png"]
 
 
 def test_a_saved_set_has_the_bytes_of_a_scans(cheap: Any, tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import load_scenario
 from synthroads_addon.ui.work import build
 from synthroads_addon.ui.work.job import PanelJob, running_job
+from synthroads_addon.ui.work.unseen import build_unseen
 from tests.helpers.scenes.kept_groups import KeptGroups
 from tests.helpers.scenes.panel_road import (  # noqa: F401
     SAME,
@@ -287,3 +288,26 @@ def test_a_refused_setting_leaves_the_built_road(cheap: Any, monkeypatch: pytest
     with pytest.raises(RuntimeError, match=r"Error: road\.radius is 1: is too small"):
         bpy.ops.synthroads.build()
     assert digest() == before
+
+
+def test_a_growing_road_is_evaluated_but_not_drawn() -> None:
+    """Drawing each step takes longer than building; what is complete is shown."""
+    bpy.ops.mesh.primitive_cube_add()
+    seen = 0
+    steps = build_unseen(build_steps(parameters(), 0.02, 0.1))
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            model = end.value
+            break
+        growing = [item for item in bpy.context.scene.objects if item.name != "Cube" and item.type == "MESH"]
+        assert not any(item.visible_get() for item in growing)
+        seen += len(growing)
+    assert seen > 5
+    assert bpy.data.objects["Cube"].visible_get()
+    assert all(item.visible_get() for role, item in model.objects.items() if not item.hide_viewport and role != "Backbone")
+    layers = [bpy.context.view_layer.layer_collection, *bpy.context.view_layer.layer_collection.children]
+    assert not any(layer.hide_viewport for layer in layers)
+    road = model.objects["Road"].evaluated_get(bpy.context.evaluated_depsgraph_get())
+    assert len(road.data.polygons) > 100

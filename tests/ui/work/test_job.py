@@ -13,7 +13,18 @@ import synthroads_addon
 from synthroads_addon.base.errors import Cancelled, InputError
 from synthroads_addon.ui.work import job as job_module
 from synthroads_addon.ui.work.common import is_free
-from synthroads_addon.ui.work.job import Aside, PanelJob, Report, Step, Work, running_job, stop_job
+from synthroads_addon.ui.work.job import (
+    BUDGET,
+    TICK,
+    Aside,
+    Pace,
+    PanelJob,
+    Report,
+    Step,
+    Work,
+    running_job,
+    stop_job,
+)
 
 
 @pytest.fixture(autouse=True)
@@ -202,3 +213,14 @@ def test_buttons_wait_for_a_job(monkeypatch: pytest.MonkeyPatch) -> None:
     assert said == ["Scan is still at work"]
     monkeypatch.setattr(job_module, "_running", None)
     synthroads_addon.unregister()
+
+
+def test_slow_drawing_makes_turns_longer() -> None:
+    """Of the time between two drawings four fifths are for the work, up to turns of a second."""
+    now = [0.0]
+    pace = Pace(lambda: now[0])
+    assert pace.budget() == BUDGET
+    for drawing, expected in ((0.001, BUDGET), (0.1, 0.4), (9.0, 1.0)):
+        pace.leave()
+        now[0] += TICK + drawing
+        assert pace.budget() == pytest.approx(expected)

@@ -1,0 +1,86 @@
+"""Texts in the sidebar: at any width none is cut off."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+import pytest
+
+import synthroads_addon
+from synthroads_addon.ui.fields import room
+from synthroads_addon.ui.panels import calibration, cloud_view, edit, panels, rules
+from tests.helpers.scenes.fake_layout import drawn
+from tests.helpers.scenes.panel_road import choose
+
+WIDTHS = (200.0, 300.0, 450.0)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def broken_road(_empty_scene_for_module: None) -> Iterator[None]:
+    """Build a road that breaks rules and check it, once."""
+    synthroads_addon.register()
+    values = {"road.length": 60.0, "road.half_width": 30.0, "seed": 3, "scan.own_weather": True}
+    choose(bpy.context.scene.synthroads, **values)
+    bpy.ops.synthroads.build()
+    road = next(item for item in bpy.data.objects if item.get("synthroads_role") == "Road")
+    from synthroads_addon.blender.compat import set_modifier_input
+
+    set_modifier_input(road.modifiers[0], "Right Lane 1 Width", 2.6)
+    bpy.context.view_layer.update()
+    bpy.ops.synthroads.check_rules()
+    bpy.context.scene.synthroads_calibration.real = "cloud.laz"
+    bpy.ops.synthroads.add_calibration_class()
+    yield
+    synthroads_addon.unregister()
+
+
+def widen(monkeypatch: pytest.MonkeyPatch, width: float) -> None:
+    monkeypatch.setattr(room, "sidebar_width", lambda: width)
+
+
+@pytest.mark.keep_scene
+@pytest.mark.parametrize("width", WIDTHS)
+def test_no_label_is_cut_off(width: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    widen(monkeypatch, width)
+    found = bpy.context.scene
+    assert bpy.context.window_manager.synthroads_rules.violations
+    others = (rules.SYNTHROADS_PT_rules, edit.SYNTHROADS_PT_edit, cloud_view.SYNTHROADS_PT_cloud_view)
+    count = 0
+    for panel in (*panels.CLASSES, *others, calibration.SYNTHROADS_PT_calibration):
+        layout = drawn(panel, bpy.context)
+        count += len(layout.texts(room.row_width()))
+        assert [text for text, place, needed in layout.texts(room.row_width()) if needed > place] == [], panel
+    assert count > 100, found
+
+
+@pytest.mark.keep_scene
+@pytest.mark.parametrize("width", WIDTHS)
+def test_no_label_of_any_part_is_cut_off(width: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    widen(monkeypatch, width)
+    for item in edit.parts(bpy.context.scene).values():
+        bpy.context.view_layer.objects.active = item
+        layout = drawn(edit.SYNTHROADS_PT_edit, bpy.context)
+        assert [text for text, place, needed in layout.texts(room.row_width()) if needed > place] == [], item.name
+
+
+@pytest.mark.keep_scene
+def test_every_broken_rule_is_told_in_full(monkeypatch: pytest.MonkeyPatch) -> None:
+    state: Any = bpy.context.window_manager.synthroads_rules
+    for width in WIDTHS:
+        widen(monkeypatch, width)
+        for number, row in enumerate(state.violations):
+            state["index"] = number
+            layout = drawn(rules.SYNTHROADS_PT_rules, bpy.context)
+            texts = layout.texts(room.row_width())
+            assert [text for text, place, needed in texts if needed > place] == []
+            said = " ".join(text for text, _, _ in texts)
+            assert row.text in said
+
+
+def test_long_words_are_broken_and_none_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    widen(monkeypatch, 150.0)
+    text = "carriageway-right-marking-edge-outer is wider than its lane"
+    lines = room.text_lines(text)
+    assert "".join(lines).replace(" ", "") == text.replace(" ", "")
+    assert len(lines) > 2
+    assert all(room.fits(line) for line in lines)
