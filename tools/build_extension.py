@@ -1,4 +1,4 @@
-"""Build the Blender extensions: the add-on with its wheels, and what elevation models need, each a zip per platform.
+"""Build the Blender extensions: the add-on with its wheels, and one each for what elevation models and IFC need.
 
     python tools/build_extension.py [--platform linux-x64|windows-x64|macos-arm64|all] [--output-dir dist]
 
@@ -54,12 +54,14 @@ class Extension:
 
 _LOCKS = ROOT / "tools" / "locks"
 _ELEVATION = ROOT / "tools" / "elevation_models"
+_IFC = ROOT / "tools" / "ifc_models"
 EXTENSIONS = (
     Extension("synthroads", PACKAGE, MANIFEST, ROOT / "tools" / "extension_wheels.txt", _LOCKS / "extension.txt"),
     Extension(
         "synthroads_elevation_models",
         *(_ELEVATION, _ELEVATION / MANIFEST.name, _ELEVATION / "wheels.txt", _LOCKS / "elevation-models.txt"),
     ),
+    Extension("synthroads_ifc", *(_IFC, _IFC / MANIFEST.name, _IFC / "wheels.txt", _LOCKS / "ifc.txt")),
 )
 
 # Blender 4.5 and 5.0 have Python 3.11, the official 5.1 and 5.2 have 3.13, Debian's 5.2 has 3.14.
@@ -67,11 +69,19 @@ PYTHON_VERSIONS = ("3.11", "3.13", "3.14")
 
 # Blender's name of a platform -> the wheel tags that run on every machine that its Blender runs on.
 PLATFORM_TAGS = {
-    "linux-x64": ("manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux_2_17_x86_64", "manylinux2014_x86_64"),
+    # ifcopenshell has none for older systems than glibc 2.31: on these Blender installs it all the same, and only IFC
+    # can't be written.
+    "linux-x64": (
+        "manylinux_2_31_x86_64",
+        "manylinux_2_28_x86_64",
+        "manylinux_2_27_x86_64",
+        "manylinux_2_17_x86_64",
+        "manylinux2014_x86_64",
+    ),
     "windows-x64": ("win_amd64",),
     # embreex has none for older systems than 13, rasterio for older ones than 14. On 13 Blender installs rasterio all
     # the same; it doesn't load there, and only elevation models can't be read.
-    "macos-arm64": ("macosx_13_0_arm64", "macosx_14_0_arm64"),
+    "macos-arm64": ("macosx_11_0_arm64", "macosx_13_0_arm64", "macosx_14_0_arm64"),
 }
 
 # Dependencies of the wheels that are left out: Blender has NumPy, and tqdm does without colorama.

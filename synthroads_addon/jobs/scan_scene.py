@@ -22,7 +22,7 @@ from ..cloud.tools.previews import TopView
 from ..road.centerline import read_axis
 from ..road.geometry import RoadGeometry
 from ..scanning.plan import ScanConditions
-from ..scanning.platforms.over_scene import as_tripod, path_over
+from ..scanning.platforms.over_scene import SceneRoute, as_tripod, path_over
 from ..scanning.platforms.trajectory import RecordedTrajectory, read_trajectory
 from ..scanning.scene.extent import body_bounds, strays_of
 from ..scanning.scene.mesh import SceneMesh
@@ -86,7 +86,7 @@ def scan_scene(job: SceneScan, progress: Progress = silent) -> dict[str, Any]:
         if job.scenario.chooses:
             scene, report["choice"] = choose_settings(scene, begun, timer)
         counts = scene.scan(folder, timer)
-        report |= {"counts": counts, "warnings": warnings + _warnings_of_counts(counts)}
+        report |= {"counts": counts, "warnings": warnings + warnings_of_counts(counts)}
         return JobFiles(scene.site.scenario, road=False).write_report(folder, report, timer)
 
 
@@ -171,6 +171,16 @@ def scene_site(job: SceneScan, mesh: SceneMesh, road: RoadGeometry | None) -> Si
     return Site(job.scenario, path, conditions, view)
 
 
-def _warnings_of_counts(counts: dict[str, Any]) -> list[str]:
+def route_site(scenario: Scenario, route: SceneRoute, mesh: SceneMesh) -> Site:
+    """Return the site of a scan along a way in a scene without a road."""
+    view = None
+    if "previews" in scenario.outputs:
+        low, high = body_bounds(mesh) + mesh.origin
+        view = TopView.over_box(low, high, scenario.cloud.scheme().sources())
+    return Site(scenario, route.path(scenario.scan.platform, mesh), ScanConditions.of(None), view)
+
+
+def warnings_of_counts(counts: dict[str, Any]) -> list[str]:
+    """Return what a user should know of the counts of a scene's scan, in sentences."""
     unlabelled = int(counts["points_by_class"].get("unlabelled", 0))
     return [*empty_scan_warnings(counts), *([f"{unlabelled:,} points have no class"] if unlabelled else [])]

@@ -19,11 +19,14 @@ from .panels import (
     cloud_view,
     edit,
     export,
+    file_menus,
     panels,
     presets,
     road_choice,
     road_files,
     rules,
+    scene_scan,
+    views,
 )
 from .work import build, long_operator, scan
 
@@ -41,8 +44,10 @@ MODULES = (
         rules,
         edit,
         cloud_view,
+        views,
+        scene_scan,
     ),
-    *(export, calibration_settings, calibration),
+    *(export, file_menus, calibration_settings, calibration),
 )
 
 

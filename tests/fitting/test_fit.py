@@ -586,13 +586,14 @@ def test_bad_points_are_refused_by_name(points: object, tolerance: float, messag
 
 
 def test_a_fit_that_leaves_its_points_is_refused(tmp_path: Path) -> None:
-    """Two legs of a road beside each other, joined by one step: no road goes that way."""
+    """Points out of their order: no road goes that way."""
     along = np.arange(0.0, 200.0, 5.0)
-    there = np.column_stack([along, 0.0 * along, 0.0 * along])
-    back = np.column_stack([along[::-1], 0.0 * along + 40.0, 0.0 * along + 11.0])
+    parts = [np.column_stack([along + begin, 0.0 * along, 0.0 * along]) for begin in (0.0, 400.0, 200.0)]
     path = tmp_path / "axis.csv"
-    np.savetxt(path, np.vstack([there, back]), delimiter=",", header="x,y,z", comments="")
-    with pytest.raises(AxisRefusedError, match=r"axis axis\.csv: no road follows its points within 2 m, .* 40 times") as e:
+    np.savetxt(path, np.vstack(parts), delimiter=",", header="x,y,z", comments="")
+    with pytest.raises(
+        AxisRefusedError, match=r"axis axis\.csv: no road follows its points within 2 m, .* 40 times"
+    ) as e:
         fitted_axis(path, RoadScenario())
     fit = e.value.fit
     assert max(fit.horizontal.worst, fit.height.worst) > fit.limit == 2.0

@@ -68,10 +68,17 @@ class CloudView:
         origin = scene_origin(scene)
         return np.zeros(3) if origin is None or self.cloud is None else self.cloud.origin - origin
 
+    def is_drawn(self, context: bpy.types.Context) -> bool:
+        """Return whether the cloud is drawn in a 3D view: it is an overlay, as *Show Overlays* says."""
+        if self.cloud is None or not self.visible or context.scene.session_uid != self._scene:
+            return False
+        return bool(context.space_data.overlay.show_overlays)
+
     def _draw(self) -> None:
         context = bpy.context
-        if self.cloud is None or not self.visible or context.scene.session_uid != self._scene:
+        if not self.is_drawn(context):
             return
+        assert self.cloud
         shader = gpu.shader.from_builtin("POINT_FLAT_COLOR")
         batch = self._coloured(shader)
         with gpu.matrix.push_pop():

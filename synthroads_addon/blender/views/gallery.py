@@ -11,14 +11,12 @@ from typing import Any
 import bpy
 import numpy as np
 from mathutils import Vector
-from numpy.typing import NDArray
 
 from ...base.files import PRESETS
 from ...base.schema import read_json
 from ...materials.table import materials
 from ...road.geometry import RoadGeometry
 from ...road.parameters import AlignmentObject, RoadParameters
-from ...road.section import Carriageway
 from ...road.surroundings import Environment
 from ...sampling.road import sample_road
 from ...scanning.scene.mesh import SceneMesh
@@ -29,10 +27,9 @@ from ..materials.shading import LAYERS
 from ..model.build import build_road
 from ..scene.evaluated import scene_mesh
 from . import pictures
+from .viewpoints import Viewpoint, aerial_view, driver_view
 
 PRESET = PRESETS / "gallery.json"
-EYE = 1.2
-"""Height of a driver's eyes, m."""
 _TOLERANCE = 0.005
 _NEAR = 5.0
 """Distance from an object's middle within which its parts are shown close up, m."""
@@ -66,7 +63,7 @@ def make_gallery(folder: Path, quality: Quality, only: str, say: Callable[[str],
         if only in name:
             road = {"design_class": design_class, "cross_section": section, "length": 800.0}
             parameters = _build_scene({"road": road, "seed": 2})
-            _aerial(parameters)
+            _look(aerial_view(parameters))
             made.append(_render(folder / f"{name}.png", quality, say))
     made += _material_pictures(folder, quality, only, say)
     return made
@@ -81,14 +78,14 @@ def _scene_pictures(
     say: Callable[[str], None],
     closed_up: set[str],
 ) -> list[Path]:
-    views = {"aerial": _aerial, "driver": _driver}
+    views = {"aerial": aerial_view, "driver": driver_view}
     if only and not only.startswith("object") and not any(only in f"scene-{name}-{view}" for view in views):
         return []
     parameters = _build_scene(scene)
     made = []
-    for view, aim in views.items():
+    for view, seen_from in views.items():
         if only in f"scene-{name}-{view}":
-            aim(parameters)
+            _look(seen_from(parameters))
             made.append(_render(folder / f"scene-{name}-{view}.png", quality, say))
     mesh = scene_mesh()
     for kind, item in _kinds(parameters):
@@ -115,43 +112,8 @@ def _far_ground() -> None:
     bpy.context.object.data.materials.append(material("grass_ground"))
 
 
-def _place(parameters: RoadParameters, station: float, offset: float, height: float) -> NDArray[np.float64]:
-    """Return the place in the scene (3,) above the surface at a station and offset."""
-    geometry = RoadGeometry(parameters)
-    point = geometry.point(station, np.clip(offset, *_edges(geometry, station)))[0]
-    beside = geometry.alignment.frame(np.array([station]))
-    left = np.array([-np.sin(beside[1][0]), np.cos(beside[1][0])])
-    plan = beside[0][0] + offset * left
-    return np.array([*plan, point[2] + height])
-
-
-def _edges(geometry: RoadGeometry, station: float) -> tuple[float, float]:
-    offsets = geometry.offsets(station)[0]
-    return float(offsets[-1]), float(offsets[0])
-
-
-def _aerial(parameters: RoadParameters) -> None:
-    length = parameters.alignment.length
-    pictures.camera(
-        _place(parameters, 0.25 * length, -46.0, 26.0), _place(parameters, 0.25 * length + 95.0, 2.0, 0.0), 28.0
-    )
-
-
-def _driver(parameters: RoadParameters) -> None:
-    length = parameters.alignment.length
-    carriageway = parameters.carriageway("right") or next(iter(parameters.of_type(Carriageway).values()))
-    section = RoadGeometry(parameters).sections[carriageway.side]
-
-    def lane(station: float) -> float:
-        boundaries = section.lane_boundaries(station)[0]
-        return carriageway.sign * float(boundaries[:2].mean())
-
-    here, there = (0.3, 0.3 + 60.0 / length) if carriageway.traffic > 0 else (0.7, 0.7 - 60.0 / length)
-    pictures.camera(
-        _place(parameters, here * length, lane(here * length), EYE),
-        _place(parameters, there * length, lane(there * length), EYE + 0.6),
-        26.0,
-    )
+def _look(view: Viewpoint) -> None:
+    pictures.camera(view.place, view.target, view.lens)
 
 
 def _kinds(parameters: RoadParameters) -> Iterator[tuple[str, str]]:

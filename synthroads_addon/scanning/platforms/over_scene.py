@@ -1,7 +1,11 @@
 """Paths over a scene that nobody prepared: along a line, its road or its middle, or at given places."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path as FilePath
+from typing import Any, Literal
+
+import numpy as np
 
 from ...base.errors import InputError
 from ...road.geometry import RoadGeometry
@@ -10,8 +14,43 @@ from ..scene.mesh import SceneMesh
 from .guides import RoadGuide
 from .path import Path
 from .platform import Platform
-from .polyline import PolylineGuide
+from .polyline import MEASURED, PolylineGuide
+from .trajectory import RecordedTrajectory
 from .tripod import Tripod, TripodPath
+
+
+@dataclass(frozen=True)
+class SceneRoute:
+    """A scanner's way in a scene's own coordinates.
+
+    Attributes:
+        kind: ``extent``, straight over the scene's middle; ``line``, along points that a platform keeps its height
+            above; ``flight``, through places of the scanner itself; ``places``, where a tripod's scanner stands.
+        points: (N, 3) m; empty for the extent.
+    """
+
+    kind: Literal["extent", "line", "flight", "places"]
+    points: list[list[float]] = field(default_factory=list)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as JSON data."""
+        return {"kind": self.kind, "points": self.points}
+
+    def path(self, platform: Platform, mesh: SceneMesh) -> Path:
+        """Return a platform's path.
+
+        Raises:
+            InputError: the platform is no tripod and is to stand at places, or see `Platform.make_path`.
+        """
+        if self.kind == "places":
+            return TripodPath(as_tripod(platform), self.points)
+        if self.kind == "extent" or isinstance(platform, RecordedTrajectory):
+            return path_over(platform, mesh)
+        origin, points = mesh.origin.tolist(), np.array(self.points, dtype=np.float64)
+        if self.kind == "flight":
+            points[:, 2] -= platform.value("height")
+        guide = PolylineGuide(points, origin, MEASURED)
+        return platform.as_single_strip().make_path(guide, origin)
 
 
 def path_over(

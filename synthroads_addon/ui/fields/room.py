@@ -13,9 +13,9 @@ import bpy
 NAMES_SHARE = 0.45
 """Share of a row's width that its name takes."""
 _EDGES = 68.0
-"""What tabs, margins and indents take of the sidebar's width, pixels at a resolution scale of 1."""
+"""Tabs, margins and indents take so much of the sidebar's width, pixels at a resolution scale of 1."""
 _PADDING = 22.0
-"""What a label or a button takes beside its text: margins, and the gap to what stands beside it."""
+"""Margins of a label or a button, and the gap to what stands beside it."""
 _ICON = 20.0
 _SHORTEST = 3
 """Letters that stay together however narrow it is."""

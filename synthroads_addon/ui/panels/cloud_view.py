@@ -17,6 +17,7 @@ from ...base.errors import InputError
 from ...blender.model.roads import scene_origin
 from ...blender.model.store import find_road
 from ...blender.views.cloud import CloudView
+from ...blender.views.cloud_object import add_cloud_object, cloud_objects, color_cloud_object
 from ...cloud.formats.registry import ENDINGS
 from ...cloud.tools.display import COLOURINGS, ColourBy, DisplayCloud, height_colors, read_display
 from ..fields.room import draw_text, is_narrow
@@ -72,6 +73,9 @@ def read_cloud_to_show(path: Path, points: int, origin: Any, report: Report) -> 
 def _redraw(settings: "SYNTHROADS_PG_cloud_view", context: bpy.types.Context) -> None:
     """Draw as it is set now."""
     view.by, view.size, view.visible = settings.by, settings.size, settings.visible
+    if view.cloud is not None and view.by in view.cloud.colorings():
+        for item in cloud_objects(context.scene, view.cloud):
+            color_cloud_object(item, view.cloud, view.by)
     redraw_views(context)
 
 
@@ -163,6 +167,31 @@ class SYNTHROADS_OT_hide_cloud(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class SYNTHROADS_OT_add_cloud(bpy.types.Operator):
+    """Add the shown points to the file as Blender's own point cloud, with class, intensity and colour as attributes"""
+
+    bl_idname = "synthroads.add_cloud"
+    bl_label = "Add to Scene"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads a plain set)
+
+    radius: bpy.props.FloatProperty(
+        name="Radius", description="Of a point where it is rendered", default=0.02, min=0.001, max=1.0, unit="LENGTH"
+    )
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """A cloud must be shown, in object mode."""
+        return view.cloud is not None and context.mode == "OBJECT"
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Add it; what is drawn over the view is hidden, so that each point is seen once."""
+        settings = context.scene.synthroads_cloud_view
+        assert view.cloud
+        add_cloud_object(view.cloud, settings.by, self.radius, view.offset(context.scene))
+        settings.visible = False
+        return {"FINISHED"}
+
+
 class SYNTHROADS_OT_frame_cloud(bpy.types.Operator):
     """Turn the 3D view to the whole cloud"""
 
@@ -215,6 +244,7 @@ class SYNTHROADS_PT_cloud_view(Sidebar, bpy.types.Panel):
             choice.enabled = by in cloud.colorings()
             choice.prop_enum(settings, "by", by)
         layout.prop(settings, "size")
+        layout.operator(SYNTHROADS_OT_add_cloud.bl_idname, icon="OUTLINER_OB_POINTCLOUD")
         _legend(layout, cloud, settings.by)
 
 

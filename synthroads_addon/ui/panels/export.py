@@ -3,6 +3,7 @@
 Annotations are not postponed here: Blender reads the properties from them.
 """
 
+import importlib
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -31,13 +32,18 @@ from ...twin.formats import (
 )
 from ..fields.numbers import exact
 from ..fields.room import draw_text
-from ..work.common import Sidebar, column, has_road, is_free
+from ..work.common import Sidebar, column, has_road, is_free, refusing
 from ..work.job import PanelJob, Report
-from ..work.long_operator import FileOperator, draw_job
+from ..work.long_operator import FileChooser, FileOperator, draw_job
 from .cloud_view import ENDINGS_GLOB, cloud_path, last_cloud
 from .road_choice import draw_shown
 from .rules import road_now
 
+IFC_PACKAGE = "ifcopenshell"
+RUNS_AS_EXTENSION = str(__package__).startswith("bl_ext.")
+"""Whether Blender has installed this as an extension, which brings its packages with it."""
+_REPOSITORY = "user_default"
+"""Blender's name of where extensions from files go."""
 _FORMATS = {
     ".laz": ("LAZ", "LAS 1.4, compressed"),
     ".las": ("LAS", "LAS 1.4"),
@@ -225,6 +231,29 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
         return f"{', '.join(job.result)} written to {bpy.path.abspath(self.directory)}"
 
 
+class SYNTHROADS_OT_install_ifc(FileChooser, bpy.types.Operator):
+    """Install the extension SynthRoads IFC from its file, synthroads_ifc-….zip: it brings what writes IFC"""
+
+    bl_idname = "synthroads.install_ifc"
+    bl_label = "Install SynthRoads IFC"
+
+    filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
+    filter_glob: bpy.props.StringProperty(default="synthroads_ifc*.zip", options={"HIDDEN"})
+
+    @refusing
+    def execute(self, context: bpy.types.Context) -> None:
+        """Have Blender install and enable it; IFC can be written at once."""
+        path = Path(bpy.path.abspath(self.filepath))
+        if not path.name.startswith("synthroads_ifc") or not path.is_file():
+            raise InputError("File", str(path), "choose the zip of SynthRoads IFC: synthroads_ifc-….zip")
+        install = bpy.ops.extensions.package_install_files
+        install(filepath=str(path), repo=_REPOSITORY, enable_on_install=True)
+        importlib.invalidate_caches()
+        if missing_packages("ifc"):
+            raise InputError("File", path.name, "was installed, but Blender can't load it: is it for this platform?")
+        self.report({"INFO"}, "IFC can be written")
+
+
 class SYNTHROADS_PT_export(Sidebar, bpy.types.Panel):
     """Files of other formats."""
 
@@ -268,5 +297,8 @@ def draw_missing(layout: bpy.types.UILayout, context: bpy.types.Context) -> None
 
 def _draw_missing_packages(layout: bpy.types.UILayout, missing: Mapping[str, str]) -> None:
     for name, package in missing.items():
-        text = f"{name} needs the package {package}: pip install {package}, with Blender's Python"
-        draw_text(layout, text)
+        if package == IFC_PACKAGE and RUNS_AS_EXTENSION:
+            draw_text(layout, f"{name} needs the extension SynthRoads IFC, which comes beside this one", "INFO")
+            layout.operator(SYNTHROADS_OT_install_ifc.bl_idname, icon="IMPORT")
+            continue
+        draw_text(layout, f"{name} needs the package {package}: pip install {package}, with Blender's Python")

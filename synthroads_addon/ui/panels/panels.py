@@ -14,7 +14,8 @@ from ..fields.sheets import SHEETS, Sheet, fields_of
 from ..work.build import SYNTHROADS_OT_build
 from ..work.common import Sidebar, column, large_button
 from ..work.long_operator import draw_job
-from ..work.scan import SYNTHROADS_OT_scan, Written, last_written
+from ..work.scan import SYNTHROADS_OT_scan, last_written
+from ..work.scan_steps import Written
 from .export import draw_missing
 from .presets import (
     SYNTHROADS_MT_devices,
@@ -25,6 +26,7 @@ from .presets import (
 )
 from .road_choice import draw_choice, draw_shown
 from .road_files import draw_road_files, source_of
+from .scene_scan import draw_scene_scan
 
 _SOLID = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 
@@ -122,12 +124,12 @@ def draw_scan(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     if draw_job(layout):
         return
     if find_road(context.scene) is None:
-        layout.label(text="Build a road first", icon="INFO")
+        draw_scene_scan(layout, context)
     else:
         draw_shown(layout, context)
         _draw_other_objects(layout, context)
-        if settings.needs_saved_file():
-            _ask_to_save(layout, settings)
+    if settings.needs_saved_file():
+        _ask_to_save(layout, settings)
     large_button(layout).operator(SYNTHROADS_OT_scan.bl_idname, icon="LIGHT_AREA")
     if (written := last_written()) is not None:
         _draw_result(layout, settings, written)

@@ -49,6 +49,10 @@ class _Load(FileOperator):
 
     _first = False
 
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Take the file that was dropped, else ask for one."""
+        return self.begin(context) if self.filepath else super().invoke(context, event)
+
     def job(self, context: bpy.types.Context) -> PanelJob[str]:
         """Return the reading and the building."""
         self._first = find_road(context.scene) is None

@@ -25,6 +25,7 @@ from .road_choice import draw_shown
 
 _STATION_SHARE, _NAME_SHARE = 0.25, 0.45
 """Shares of the list's width that station and rule have where all three columns fit."""
+_FOUND = "Found / limit"
 _BOX_SHARE, _TITLE_SHARE = 0.92, 0.36
 """Share of a row that is within a box, and that of a title in there."""
 _SURENESS = {
@@ -257,7 +258,7 @@ class SYNTHROADS_PT_rules(Sidebar, bpy.types.Panel):
         draw_text(layout, _count(count), "ERROR" if count else "CHECKMARK")
         if not count:
             return
-        _columns(layout.row(), ("Station", "Rule", "Found / limit"), [row.name for row in rules.violations])
+        _columns(layout.row(), ("Station", "Rule", _FOUND), [row.name for row in rules.violations])
         layout.template_list("SYNTHROADS_UL_violations", "", rules, "violations", rules, "index", rows=4)
         if 0 <= rules.index < count:
             _details(layout, rules)
@@ -272,7 +273,8 @@ def _columns(layout: bpy.types.UILayout, texts: tuple[str, str, str], names: Seq
         names: of all lines' rules: as one of them doesn't fit, all are left to the box below.
     """
     widest = max(names, key=text_width, default="")
-    all_three, two = fits(widest, _NAME_SHARE), fits(widest, 1.0 - _STATION_SHARE)
+    all_three = fits(widest, _NAME_SHARE) and fits(_FOUND, 1.0 - _STATION_SHARE - _NAME_SHARE)
+    two = fits(widest, 1.0 - _STATION_SHARE)
     if not all_three and not two:
         layout.label(text=texts[0])
         if fits(texts[2], 0.5):

@@ -15,12 +15,16 @@ from typing import Any, NoReturn
 
 import bpy
 
+from ...base.class_mapping import ClassMapping
 from ...base.errors import InputError
 from ...base.progress import Progress, StageTimer
 from ...blender.cameras import renders_returns
-from ...jobs.open_scene import RoadScene
+from ...blender.scene.evaluated import scanned_scene
+from ...jobs.open_scene import ForeignScene, RoadScene
+from ...jobs.scan_scene import route_site
 from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
+from ...scanning.platforms.over_scene import SceneRoute
 from ...scenario.scenario import Scenario
 
 MARK = "synthroads-scan: "
@@ -50,11 +54,26 @@ def _scan(job: dict[str, Any]) -> dict[str, Any]:
     window = bpy.context.window_manager.windows[0]
     window.scene, window.view_layer = scene, scene.view_layers[job["view_layer"]]
     scenario = Scenario.from_dict(job["scenario"])
-    road = RoadGeometry(RoadParameters.from_dict(job["parameters"]))
     timer = StageTimer(_overall_progress(renders_returns(scenario.colour.settings(scenario.fidelity))))
     with bpy.context.temp_override(window=window):
-        counts = RoadScene(scenario, road, road_id=job["road"]).scan(Path(job["folder"]), timer)
+        counts = (_scan_road if "parameters" in job else _scan_visible)(job, scenario, timer)
     return {"counts": counts, "stages": timer.stages}
+
+
+def _scan_road(job: dict[str, Any], scenario: Scenario, timer: StageTimer) -> dict[str, Any]:
+    road = RoadGeometry(RoadParameters.from_dict(job["parameters"]))
+    return RoadScene(scenario, road, road_id=job["road"]).scan(Path(job["folder"]), timer)
+
+
+def _scan_visible(job: dict[str, Any], scenario: Scenario, timer: StageTimer) -> dict[str, Any]:
+    classes = ClassMapping.from_dict(job["classes"]) if job["classes"] else None
+    factor, class_ids = scenario.scan.traffic_speed_factor, scenario.cloud.scheme().source_ids()
+    with timer.stage("scene mesh"):
+        scene = scanned_scene(classes=classes, speed_factor=factor, number_objects=True, class_ids=class_ids)
+    if not len(scene.static) and not scene.moving:
+        raise InputError("Scene", None, "nothing visible in it has faces that could be scanned")
+    site = route_site(scenario, SceneRoute(**job["route"]), scene.static)
+    return ForeignScene(site, scene).scan(Path(job["folder"]), timer)
 
 
 def _overall_progress(by_return: bool) -> Progress:

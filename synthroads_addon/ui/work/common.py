@@ -12,6 +12,8 @@ from ...base.errors import InputError
 from ...blender.model.store import find_road
 from .job import running_job
 
+_PIP = "pip install 'synthroads[twin]'"
+
 
 class Sidebar:
     """Base of panels: the 3D view's sidebar."""
@@ -84,6 +86,8 @@ def refuse(operator: bpy.types.Operator, error: InputError) -> set[str]:
     """Show what is wrong in the panel's words."""
     message = str(error).replace("--overwrite replaces it", "tick Replace Files, or choose another folder")
     message = message.replace("--allow-large", "the command's --allow-large")
+    if str(__package__).startswith("bl_ext."):  # as an extension there is no pip
+        message = message.replace(_PIP, "install the extension SynthRoads IFC, see Output > Export")
     operator.report({"ERROR"}, message.replace("--output", "Output"))
     return {"CANCELLED"}
 

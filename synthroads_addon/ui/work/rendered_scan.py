@@ -7,7 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,7 +17,6 @@ import bpy
 
 from ...base.errors import InputError, OutputError
 from ...blender.files import save_scene
-from ...road.parameters import RoadParameters
 from ...scenario.scenario import Scenario
 from .background_scan import MARK
 from .job import Report
@@ -142,14 +141,14 @@ def _wait(process: subprocess.Popen[bytes]) -> None:
         return
 
 
-def save_open_scene(scenario: Scenario, parameters: RoadParameters, road: str, folder: Path) -> SavedScene:
+def save_open_scene(scenario: Scenario, folder: Path, scanned: Mapping[str, Any]) -> SavedScene:
     """Save a copy of the open file for a scan in the background; the open file keeps its name and state.
 
     Args:
         scenario: what is scanned and rendered, and how.
-        parameters: the road that the scene shows.
-        road: its id.
         folder: where the scan's files go; the copy is in a folder inside until it is scanned.
+        scanned: what is scanned, as JSON data: a road's ``parameters`` and its id ``road``; or, without a road, the
+            ``route`` and the ``classes`` by name.
 
     Raises:
         OutputError: the copy can't be written.
@@ -170,8 +169,7 @@ def save_open_scene(scenario: Scenario, parameters: RoadParameters, road: str, f
         # The copy lies elsewhere than what the user trusts: its scripts run if those of the open file do.
         "scripts": not bpy.app.autoexec_fail,
         "scenario": json.loads(scenario.to_json()),
-        "parameters": json.loads(parameters.to_json()),
-        "road": road,
+        **scanned,
     }
     path = (place / _JOB).resolve()
     path.write_text(json.dumps(job), encoding="utf-8")

@@ -6,8 +6,8 @@ main thread of a Blender: that is another one, which works on a copy of the file
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Generator
-from contextlib import closing
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -21,21 +21,23 @@ from ...blender.files import save_scene
 from ...blender.model.read_back import edited_parameters
 from ...blender.model.roads import ROAD
 from ...blender.model.store import find_road, objects_of, recall
-from ...blender.scene.evaluated import CopiedScene, scanned_scene_steps
+from ...blender.scene.evaluated import scanned_scene_steps
 from ...blender.services import SnapshotServices
 from ...jobs.generate import Job as PipelineJob
 from ...jobs.generate import check
 from ...jobs.job_files import JobFiles, empty_scan_warnings
 from ...jobs.scan.files import record_to_files
-from ...jobs.scan.plan import Site
+from ...jobs.scan.plan import Site, check_scan
 from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ...scenario.scenario import OF_POINTS, Scenario
 from ..fields.preferences import with_preferences
-from .common import has_road, is_free
+from .common import is_free
 from .job import Aside, PanelJob, Report, Step, Work
 from .long_operator import LongOperator
 from .rendered_scan import save_open_scene
+from .scan_steps import READ, Written, follow_scan, pass_on_reading
+from .scene_scan import VisibleScan, class_mapping, route_of, visible_scan_work
 
 
 @dataclass(frozen=True)
@@ -62,18 +64,6 @@ class RoadScan:
         return RoadGeometry(self.parameters)
 
 
-@dataclass(frozen=True)
-class Written:
-    """Result of a scan: so many points into a folder."""
-
-    points: int
-    target: Path
-
-
-_READ = 0.1
-"""Share of a scan's progress that the reading of the scene takes up."""
-
-
 _Measure: TypeAlias = Callable[[Report], dict[str, Any]]
 """Scans, writes the cloud and the previews, and returns the counts. It touches no data of Blender."""
 
@@ -97,15 +87,17 @@ def scan_work(scan: RoadScan) -> Work[Written]:
         def write(report: Report) -> int:
             return _write_files(scan, folder, timer, lambda: measure(report))
 
-        points = yield Aside(write, "Rendering" if renders else "Scanning", _READ, 1.0)
+        points = yield Aside(write, "Rendering" if renders else "Scanning", READ, 1.0)
     return Written(points, scan.target)
 
 
 def _save_copy(scan: RoadScan, folder: Path, timer: StageTimer) -> Generator[Step, None, _Measure]:
     """Save a copy of the open file; return what has another Blender scan it."""
     with timer.stage("scene copy"):
-        saved = save_open_scene(scan.scenario, scan.parameters, scan.road_id, folder)
-    yield Step(_READ)
+        saved = save_open_scene(
+            scan.scenario, folder, {"parameters": json.loads(scan.parameters.to_json()), "road": scan.road_id}
+        )
+    yield Step(READ)
 
     def measure(report: Report) -> dict[str, Any]:
         done = saved.scan(report)
@@ -121,7 +113,7 @@ def _read_open_scene(scan: RoadScan, folder: Path, timer: StageTimer) -> Generat
     with timer.stage("scene mesh"):
         geometry, road = scan.road, scan.road_id
         steps = scanned_scene_steps(geometry=geometry, speed_factor=speed_factor, class_ids=class_ids, road=road)
-        copied = yield from _shares(steps)
+        copied = yield from pass_on_reading(steps)
     services = SnapshotServices(copied.materials)
 
     def measure(report: Report) -> dict[str, Any]:
@@ -132,22 +124,10 @@ def _read_open_scene(scan: RoadScan, folder: Path, timer: StageTimer) -> Generat
         with timer.stage("caster"):
             plan = site.plan(scene, services)
         del scene
-        shares = {"images": (0.05, 0.05), "scan": (0.05, 1.0), "files": (1.0, 1.0)}
-        timer.progress = lambda stage, share: report(shares[stage][0] * (1.0 - share) + shares[stage][1] * share)
+        follow_scan(timer, report)
         return record_to_files([plan], site.files(folder, plan.target.origin), timer)
 
     return measure
-
-
-def _shares(steps: Generator[float, None, CopiedScene]) -> Generator[Step, None, CopiedScene]:
-    """Pass on the steps of reading as shares of the whole."""
-    with closing(steps):
-        while True:
-            try:
-                share = next(steps)
-            except StopIteration as end:
-                return end.value
-            yield Step(_READ * share)
 
 
 def _write_files(scan: RoadScan, folder: Path, timer: StageTimer, measure: Callable[[], dict[str, Any]]) -> int:
@@ -163,7 +143,7 @@ def _write_files(scan: RoadScan, folder: Path, timer: StageTimer, measure: Calla
 
 
 class SYNTHROADS_OT_scan(LongOperator, bpy.types.Operator):
-    """Scan everything that is visible, and write the labelled point cloud with pictures and the road's parameters"""
+    """Scan everything that is visible, and write the labelled points with pictures; of a road, its parameters"""
 
     bl_idname = "synthroads.scan"
     bl_label = "Scan"
@@ -172,11 +152,13 @@ class SYNTHROADS_OT_scan(LongOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """A road must have been built."""
-        return is_free(cls, context) and has_road(cls, context)
+        """Nothing else must be at work."""
+        return is_free(cls, context)
 
     def job(self, context: bpy.types.Context) -> PanelJob[Written]:
         """Return the scan that the panel asks for: the road as it is edited now, the scanner as it is set now."""
+        if find_road(context.scene) is None:
+            return PanelJob("Scan", visible_scan_work(requested_visible_scan(context)))
         return PanelJob("Scan", scan_work(requested_scan(context)))
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[Written]) -> str:
@@ -190,7 +172,7 @@ class SYNTHROADS_OT_scan(LongOperator, bpy.types.Operator):
 def requested_scan(context: bpy.types.Context) -> RoadScan:
     """Return what the panel's button scans; raise `InputError` if that can't be done."""
     settings, road = context.scene.synthroads, find_road(context.scene)
-    assert road  # poll() has seen it
+    assert road  # the operator has seen it
     parameters, built = recall(road)
     parameters = edited_parameters(parameters, objects_of(road))
     shown = settings.scenario()
@@ -198,6 +180,19 @@ def requested_scan(context: bpy.types.Context) -> RoadScan:
     chosen = {name: getattr(shown, name) for name in ("scan", "colour", "cloud", "outputs", "twin", "materials_table")}
     scenario = with_preferences(built.model_copy(update=chosen))
     return RoadScan(scenario, parameters, str(road[ROAD]), settings.folder(), settings.overwrite)
+
+
+def requested_visible_scan(context: bpy.types.Context) -> VisibleScan:
+    """Return what the panel's button scans where there is no road; raise `InputError` if that can't be done."""
+    settings, choices = context.scene.synthroads, context.scene.synthroads_scene_scan
+    scenario = with_preferences(settings.scenario())
+    check_scan(scenario, foreign=True)
+    platform = scenario.scan.platform
+    follows_file = platform.kind == "trajectory"
+    guide = None if follows_file else choices.guide
+    route = route_of(guide, context.scene, platform.kind == "tripod")
+    classes = class_mapping(choices.classes, scenario)
+    return VisibleScan(scenario, route, classes, settings.folder(), settings.overwrite)
 
 
 _last: Written | None = None

@@ -116,7 +116,10 @@ class FakeLayout:
             return
         known = data.bl_rna.properties[name]
         shown = known.name if text is None else text
-        self._say(f"{known.type.lower()} {name} {shown!r}{hint}{_icon(icon)} = {_value(getattr(data, name))}", *_beside(known, shown))
+        self._say(
+            f"{known.type.lower()} {name} {shown!r}{hint}{_icon(icon)} = {_value(getattr(data, name))}",
+            *_beside(known, shown),
+        )
 
     def prop_enum(self, data: Any, name: str, value: str) -> None:
         self.used.append((data, name))
@@ -159,7 +162,7 @@ def _icon(icon: str) -> str:
 
 
 _PADDING, _ICON = 12.0, 20.0
-"""What a text needs beside its own width, and the width of an icon, pixels."""
+"""Margins of a text, and the width of an icon, pixels."""
 
 
 def _has(icon: str) -> int:

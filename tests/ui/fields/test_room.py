@@ -7,6 +7,7 @@ import bpy
 import pytest
 
 import synthroads_addon
+from synthroads_addon.blender.compat import set_modifier_input
 from synthroads_addon.ui.fields import room
 from synthroads_addon.ui.panels import calibration, cloud_view, edit, panels, rules
 from tests.helpers.scenes.fake_layout import drawn
@@ -23,8 +24,6 @@ def broken_road(_empty_scene_for_module: None) -> Iterator[None]:
     choose(bpy.context.scene.synthroads, **values)
     bpy.ops.synthroads.build()
     road = next(item for item in bpy.data.objects if item.get("synthroads_role") == "Road")
-    from synthroads_addon.blender.compat import set_modifier_input
-
     set_modifier_input(road.modifiers[0], "Right Lane 1 Width", 2.6)
     bpy.context.view_layer.update()
     bpy.ops.synthroads.check_rules()

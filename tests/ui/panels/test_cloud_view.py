@@ -14,6 +14,7 @@ import synthroads_addon
 from synthroads_addon.base.errors import Cancelled
 from synthroads_addon.blender.model.roads import scene_origin
 from synthroads_addon.blender.model.store import find_road, recall_parameters
+from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.blender.views.cloud import Pace
 from synthroads_addon.cloud.formats.registry import ENDINGS, open_writer
 from synthroads_addon.cloud.points import PointBlock
@@ -264,3 +265,65 @@ def test_a_fast_machine_draws_them_all() -> None:
     pace.points(2_000_000, region, Matrix.Identity(4))
     pace.measure(0.001, 2_000_000)
     assert pace.points(2_000_000, region, Matrix.Rotation(0.1, 4, "Z")) == 2_000_000
+
+
+@pytest.mark.parametrize("by", COLOURINGS)
+def test_a_cloud_added_to_the_scene_is_blenders_own(shown: Any, tmp_path: Path, by: str) -> None:
+    """Its attributes are the file's, its colours those of the view; scans leave it out."""
+    bpy.ops.mesh.primitive_cube_add()
+    cube = bpy.context.object
+    block = make_points(1_000)
+    bpy.ops.synthroads.show_cloud(filepath=str(write(tmp_path / "a.laz", block)))
+    assert bpy.ops.synthroads.add_cloud(radius=0.05) == {"FINISHED"}
+    (item,) = (item for item in bpy.context.scene.objects if item.type == "POINTCLOUD")
+    assert (bpy.context.object, list(bpy.context.selected_objects)) == (cube, [cube])
+    assert not shown.visible
+    shown.by = by
+    assert view.cloud
+    read = {
+        a.name: np.empty(len(view.cloud), np.float32 if a.data_type == "FLOAT" else np.int32)
+        for a in item.data.attributes
+        if a.data_type in ("FLOAT", "INT")
+    }
+    for name, values in read.items():
+        item.data.attributes[name].data.foreach_get("value", values)
+    assert (read["class_id"] == view.cloud.class_id).all()
+    assert (read["intensity"] == view.cloud.brightness).all()
+    assert read["radius"] == pytest.approx(0.05)
+    colors = np.empty(4 * len(view.cloud), np.float32)
+    item.data.attributes["shown"].data.foreach_get("color_srgb", colors)
+    assert np.abs(colors.reshape(-1, 4) * 255.0 - view.cloud.colors(by)).max() < 0.6
+    places = np.empty(3 * len(view.cloud), np.float32)
+    item.data.attributes["position"].data.foreach_get("vector", places)
+    assert (places.reshape(-1, 3) == view.cloud.xyz).all()
+    assert len(scene_mesh().triangles) == 12
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
+    assert len(next(item for item in bpy.data.objects if item.type == "POINTCLOUD").data.points) == 1_000
+
+
+def test_the_overlay_follows_show_overlays(shown: Any, tmp_path: Path) -> None:
+    bpy.ops.synthroads.show_cloud(filepath=str(write(tmp_path / "a.laz", make_points(10))))
+    area = next(area for area in bpy.context.screen.areas if area.type == "VIEW_3D")
+    with bpy.context.temp_override(area=area):
+        assert view.is_drawn(bpy.context)
+        area.spaces.active.overlay.show_overlays = False
+        assert not view.is_drawn(bpy.context)
+        area.spaces.active.overlay.show_overlays = True
+
+
+def test_settings_are_kept_in_the_file(shown: Any, tmp_path: Path) -> None:
+    """Calibration, how clouds are shown, and what a scan without a road needs: saved."""
+    scene = bpy.context.scene
+    shown.by, shown.points = "height", 5_000
+    scene.synthroads_calibration.real = "real.laz"
+    scene.synthroads_scene_scan.classes = "classes.json"
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True)
+    scene = bpy.context.scene
+    assert (scene.synthroads_cloud_view.by, scene.synthroads_calibration.real) == ("class", "")
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
+    scene = bpy.context.scene
+    assert (scene.synthroads_cloud_view.by, scene.synthroads_cloud_view.points) == ("height", 5_000)
+    assert scene.synthroads_calibration.real == "real.laz"
+    assert scene.synthroads_scene_scan.classes == "classes.json"

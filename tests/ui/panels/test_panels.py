@@ -21,7 +21,7 @@ from synthroads_addon.scanning.devices.device import DEVICES, device_names
 from synthroads_addon.scanning.platforms.registry import PLATFORMS
 from synthroads_addon.scanning.weather.registry import WEATHERS
 from synthroads_addon.scenario.scenario import Scenario, load_scenario, scenario_names
-from synthroads_addon.ui.fields import preferences
+from synthroads_addon.ui.fields import preferences, room
 from synthroads_addon.ui.fields.choices import BY_HAND
 from synthroads_addon.ui.fields.inherited import SOURCES
 from synthroads_addon.ui.fields.properties import PATHS
@@ -41,8 +41,9 @@ EXCEPTIONS = {
 
 
 @pytest.fixture(autouse=True)
-def panel() -> Iterator[Any]:
-    """Register the add-on for one test; return the panel's settings."""
+def panel(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+    """Register the add-on for one test, in a wide sidebar; return the panel's settings."""
+    monkeypatch.setattr(room, "sidebar_width", lambda: 450.0)
     synthroads_addon.register()
     yield bpy.context.scene.synthroads
     synthroads_addon.unregister()

@@ -82,7 +82,7 @@ def test_a_fitted_road_is_the_librarys(cheap: Any, tmp_path: Path) -> None:
 
 def test_a_fit_that_leaves_its_points_is_refused_with_a_picture(cheap: Any, tmp_path: Path) -> None:
     along = np.arange(0.0, 200.0, 5.0)
-    points = np.vstack([np.column_stack([along, 0.0 * along]), np.column_stack([along[::-1], 0.0 * along + 40.0])])
+    points = np.vstack([np.column_stack([along + begin, 0.0 * along]) for begin in (0.0, 400.0, 200.0)])
     np.savetxt(tmp_path / "axis.csv", points, delimiter=",", header="x,y", comments="")
     assert not bpy.ops.synthroads.show_fit.poll()
     with pytest.raises(RuntimeError, match=r"no road follows its points within 2 m.*Show Missed Axis"):

@@ -306,7 +306,9 @@ def test_a_growing_road_is_evaluated_but_not_drawn() -> None:
         seen += len(growing)
     assert seen > 5
     assert bpy.data.objects["Cube"].visible_get()
-    assert all(item.visible_get() for role, item in model.objects.items() if not item.hide_viewport and role != "Backbone")
+    assert all(
+        item.visible_get() for role, item in model.objects.items() if not item.hide_viewport and role != "Backbone"
+    )
     layers = [bpy.context.view_layer.layer_collection, *bpy.context.view_layer.layer_collection.children]
     assert not any(layer.hide_viewport for layer in layers)
     road = model.objects["Road"].evaluated_get(bpy.context.evaluated_depsgraph_get())

@@ -23,7 +23,8 @@ from synthroads_addon.ui.fields.fields import checkbox_path
 from synthroads_addon.ui.work import rendered_scan, scan
 from synthroads_addon.ui.work.job import PanelJob
 from synthroads_addon.ui.work.rendered_scan import MARK, SavedScene, _Messages
-from synthroads_addon.ui.work.scan import Written, scan_work
+from synthroads_addon.ui.work.scan import scan_work
+from synthroads_addon.ui.work.scan_steps import Written
 from tests.helpers.scenes.panel_road import (  # noqa: F401
     SAME,
     block_counts,

@@ -22,7 +22,8 @@ from synthroads_addon.road.parameters import read_parameters
 from synthroads_addon.scenario.scenario import load_scenario
 from synthroads_addon.ui.work import scan
 from synthroads_addon.ui.work.job import PanelJob, running_job
-from synthroads_addon.ui.work.scan import Written, scan_work
+from synthroads_addon.ui.work.scan import scan_work
+from synthroads_addon.ui.work.scan_steps import Written
 from tests.helpers.scenes.panel_road import (  # noqa: F401
     SAME,
     block_counts,

@@ -1,0 +1,128 @@
+"""Sun, sky, haze and cameras of a road, kept in the file: for the user's own pictures, never for a scan."""
+
+from collections.abc import Iterator
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+from numpy.typing import NDArray
+
+from ...road.parameters import RoadParameters
+from ...road.surroundings import Environment
+from ..sky import fill_sky, new_sun
+from ..things.model_builder import SUPPORT
+from .viewpoints import Viewpoint, aerial_view, driver_view
+
+VIEW = "synthroads_view"
+"""Custom property of what is made here: what it is."""
+SUN, SKY, HAZE, DRIVER, AERIAL = "sun", "sky", "haze", "driver", "aerial"
+_NAMES = {SUN: "SR Sun", SKY: "SR Sky", HAZE: "SR Haze", DRIVER: "SR Driver", AERIAL: "SR Aerial"}
+_VIEWS = {DRIVER: driver_view, AERIAL: aerial_view}
+_CONTRAST = 3.912
+"""Optical depth over the meteorological visibility: -ln 0.02, a contrast of 2 % (Koschmieder)."""
+_HAZE_BELOW = 10_000.0
+"""Visibility (m) from which on a picture shows no haze."""
+_REACH, _HEIGHT = 2500.0, 300.0
+"""Half the width of the body of haze, and its height above the road, m."""
+
+
+def add_views(scene: bpy.types.Scene, parameters: RoadParameters, matrix: Matrix) -> None:
+    """Give a scene a road's sun, sky, haze and cameras; those that it has of an earlier call are replaced.
+
+    Other lights and cameras stay. The driver's camera becomes the scene's if it has none, or one of ours.
+
+    Args:
+        scene: that shows the road.
+        parameters: the road.
+        matrix: from the road's local coordinates to the scene's.
+    """
+    current = scene.camera.get(VIEW, "") if scene.camera else DRIVER
+    remove_views(scene)
+    environment = parameters.environment
+    _mark(SUN, new_sun(_NAMES[SUN], environment), scene)
+    scene.world = _world(scene, environment)
+    if environment.visibility < _HAZE_BELOW:
+        middle = matrix @ Vector(driver_view(parameters).place.tolist())
+        _mark(HAZE, _haze(environment.visibility, middle), scene)
+    for name, view in _VIEWS.items():
+        camera = _mark(name, _camera(_NAMES[name], view(parameters), matrix), scene)
+        if name == current:
+            scene.camera = camera
+
+
+def remove_views(scene: bpy.types.Scene) -> None:
+    """Remove what `add_views` gave a scene, but for the world's data-block."""
+    items = list(views_of(scene).values())
+    data = [item.data for item in items if item.data is not None]
+    bpy.data.batch_remove(items)
+    bpy.data.batch_remove([block for block in data if not block.users])
+
+
+def views_of(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
+    """Return what `add_views` gave a scene, by what it is."""
+    return {str(item[VIEW]): item for item in scene.objects if VIEW in item}
+
+
+def cameras_of(scene: bpy.types.Scene) -> Iterator[tuple[str, bpy.types.Object]]:
+    """Yield the names and the cameras that `add_views` gave a scene."""
+    views = views_of(scene)
+    yield from ((name, views[name]) for name in _VIEWS if name in views)
+
+
+def _mark(kind: str, item: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Object:
+    item[VIEW] = kind
+    scene.collection.objects.link(item)
+    return item
+
+
+def _world(scene: bpy.types.Scene, environment: Environment) -> bpy.types.World:
+    """Return the scene's world if it is one of ours, else a new one: the user's own stays in the file."""
+    world = scene.world
+    if world is None or VIEW not in world:
+        world = bpy.data.worlds.new(_NAMES[SKY])
+        world[VIEW] = SKY
+        if scene.world is not None:
+            scene.world.use_fake_user = True
+    fill_sky(world, environment.sun_elevation_deg, environment.sun_azimuth_deg, environment.sun_strength)
+    return world
+
+
+def _camera(name: str, view: Viewpoint, matrix: Matrix) -> bpy.types.Object:
+    data = bpy.data.cameras.new(name)
+    data.lens, data.clip_start, data.clip_end = view.lens, 0.05, 5000.0
+    item = bpy.data.objects.new(name, data)
+    eye, target = (matrix @ Vector(_list(point)) for point in (view.place, view.target))
+    item.location = eye
+    item.rotation_euler = (target - eye).to_track_quat("-Z", "Y").to_euler()
+    return item
+
+
+def _haze(visibility: float, middle: Vector) -> bpy.types.Object:
+    """Return a wide, flat body of scattering air around a place; it is no part of any scan, and can't be selected."""
+    mesh = bpy.data.meshes.new(_NAMES[HAZE])
+    corners = [(x, y, z) for z in (-60.0, _HEIGHT) for y in (-_REACH, _REACH) for x in (-_REACH, _REACH)]
+    faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    mesh.from_pydata(corners, [], faces)
+    mesh.materials.append(_air(visibility))
+    item = bpy.data.objects.new(_NAMES[HAZE], mesh)
+    item.location = middle
+    item.display_type, item.hide_select, item.visible_shadow = "BOUNDS", True, False
+    item[SUPPORT] = True  # scans leave it out: they have weather of their own
+    return item
+
+
+def _air(visibility: float) -> bpy.types.Material:
+    material = bpy.data.materials.get(_NAMES[HAZE]) or bpy.data.materials.new(_NAMES[HAZE])
+    if material.node_tree is None:
+        material.use_nodes = True
+    nodes = material.node_tree.nodes
+    nodes.clear()
+    volume, output = nodes.new("ShaderNodeVolumeScatter"), nodes.new("ShaderNodeOutputMaterial")
+    volume.inputs["Density"].default_value = _CONTRAST / visibility
+    volume.inputs["Anisotropy"].default_value = 0.6
+    material.node_tree.links.new(volume.outputs[0], output.inputs["Volume"])
+    return material
+
+
+def _list(point: NDArray[np.float64]) -> list[float]:
+    return [float(value) for value in point]

@@ -1,0 +1,64 @@
+"""Places from which a road is looked at: as its drivers see it, and from the air."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...road.geometry import RoadGeometry
+from ...road.parameters import RoadParameters
+from ...road.section import Carriageway
+
+EYE = 1.2
+"""Height of a driver's eyes, m."""
+
+
+@dataclass(frozen=True)
+class Viewpoint:
+    """A place of a camera.
+
+    Attributes:
+        place, target: local coordinates (3,) of the camera and of what it looks at, m.
+        lens: focal length, mm on 36 mm.
+    """
+
+    place: NDArray[np.float64]
+    target: NDArray[np.float64]
+    lens: float
+
+
+def aerial_view(parameters: RoadParameters) -> Viewpoint:
+    """Return a view along a quarter of the road on, from 26 m up on the right."""
+    station = 0.25 * parameters.alignment.length
+    place, target = (station, -46.0, 26.0), (min(station + 95.0, parameters.alignment.length), 2.0, 0.0)
+    return Viewpoint(place_on_road(parameters, *place), place_on_road(parameters, *target), 28.0)
+
+
+def driver_view(parameters: RoadParameters) -> Viewpoint:
+    """Return the view of a driver in the innermost lane, some 60 m ahead; of the right carriageway if there is one."""
+    length = parameters.alignment.length
+    carriageway = parameters.carriageway("right") or next(iter(parameters.of_type(Carriageway).values()))
+    section = RoadGeometry(parameters).sections[carriageway.side]
+
+    def lane(station: float) -> float:
+        boundaries = section.lane_boundaries(station)[0]
+        return carriageway.sign * float(boundaries[:2].mean())
+
+    ahead = 60.0 / length
+    here, there = (0.3, 0.3 + ahead) if carriageway.traffic > 0 else (0.7, 0.7 - ahead)
+    there = float(np.clip(there, 0.0, 1.0))
+    return Viewpoint(
+        place_on_road(parameters, here * length, lane(here * length), EYE),
+        place_on_road(parameters, there * length, lane(there * length), EYE + 0.6),
+        26.0,
+    )
+
+
+def place_on_road(parameters: RoadParameters, station: float, offset: float, height: float) -> NDArray[np.float64]:
+    """Return the local place (3,) above the surface at a station and offset, m; beside the road, above its edge."""
+    geometry = RoadGeometry(parameters)
+    offsets = geometry.offsets(station)[0]
+    point = geometry.point(station, np.clip(offset, float(offsets[-1]), float(offsets[0])))[0]
+    plan, heading, _ = geometry.alignment.frame(np.array([station]))
+    left = np.array([-np.sin(heading[0]), np.cos(heading[0])])
+    return np.array([*(plan[0] + offset * left), point[2] + height])

@@ -1,0 +1,75 @@
+"""File > Import, File > Export, and files dropped onto a 3D view: parameter sets, axes, clouds.
+
+Annotations are not postponed here: Blender reads the properties from them.
+"""
+
+import bpy
+
+from ...cloud.formats.registry import ENDINGS
+from .cloud_view import SYNTHROADS_OT_show_cloud
+from .export import SYNTHROADS_OT_export_cloud, SYNTHROADS_OT_export_twin
+from .road_files import SYNTHROADS_OT_load_axis, SYNTHROADS_OT_load_road, SYNTHROADS_OT_save_road
+
+_AXES = (".csv", ".txt", ".geojson")
+
+
+class _Dropped:
+    """Base of what Blender does with files that are dropped onto a 3D view."""
+
+    @classmethod
+    def poll_drop(cls, context: bpy.types.Context) -> bool:
+        """Only 3D views take them."""
+        return bool(context.area) and context.area.type == "VIEW_3D"
+
+
+class SYNTHROADS_FH_parameters(_Dropped, bpy.types.FileHandler):
+    """Parameter sets."""
+
+    bl_idname = "SYNTHROADS_FH_parameters"
+    bl_label = "SynthRoads Parameter Set"
+    bl_import_operator = SYNTHROADS_OT_load_road.bl_idname
+    bl_export_operator = SYNTHROADS_OT_save_road.bl_idname
+    bl_file_extensions = ".json"
+
+
+class SYNTHROADS_FH_axis(_Dropped, bpy.types.FileHandler):
+    """Measured axes."""
+
+    bl_idname = "SYNTHROADS_FH_axis"
+    bl_label = "SynthRoads Centreline"
+    bl_import_operator = SYNTHROADS_OT_load_axis.bl_idname
+    bl_file_extensions = ";".join(_AXES)
+
+
+class SYNTHROADS_FH_cloud(_Dropped, bpy.types.FileHandler):
+    """Point clouds; PLY is left to Blender's own importer, which may be meant as well."""
+
+    bl_idname = "SYNTHROADS_FH_cloud"
+    bl_label = "SynthRoads Point Cloud"
+    bl_import_operator = SYNTHROADS_OT_show_cloud.bl_idname
+    bl_file_extensions = ";".join(ending for ending in ENDINGS if ending != ".ply")
+
+
+def _draw_import(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
+    layout = menu.layout
+    layout.operator(SYNTHROADS_OT_load_road.bl_idname, text="SynthRoads Parameter Set (.json)")
+    layout.operator(SYNTHROADS_OT_load_axis.bl_idname, text="SynthRoads Centreline (.csv, .geojson)")
+
+
+def _draw_export(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
+    layout = menu.layout
+    layout.operator(SYNTHROADS_OT_save_road.bl_idname, text="SynthRoads Parameter Set (.json)")
+    layout.operator(SYNTHROADS_OT_export_twin.bl_idname, text="SynthRoads Model (CityJSON, IFC, OpenDRIVE)")
+    layout.operator(SYNTHROADS_OT_export_cloud.bl_idname, text="SynthRoads Point Cloud")
+
+
+def register() -> None:
+    """Add the entries to Blender's menus."""
+    bpy.types.TOPBAR_MT_file_import.append(_draw_import)
+    bpy.types.TOPBAR_MT_file_export.append(_draw_export)
+
+
+def unregister() -> None:
+    """Take the entries out of Blender's menus."""
+    bpy.types.TOPBAR_MT_file_import.remove(_draw_import)
+    bpy.types.TOPBAR_MT_file_export.remove(_draw_export)

@@ -1,0 +1,101 @@
+"""Settings of a scan without a road: along what the scanner moves, and which classes things have.
+
+Annotations are not postponed here: Blender reads the properties from them.
+"""
+
+from typing import Any
+
+import bpy
+
+from ...base.classes import classes
+from ...blender.labels import CLASS_PROPERTY
+from ..fields.room import draw_text, value_row
+from ..fields.wording import title_case
+
+_SOLID = ("MESH", "CURVE", "SURFACE", "META", "FONT")
+_items: list[tuple[str, str, str]] = []
+"""Texts that Blender shows at present: it doesn't keep them itself."""
+
+
+def _is_guide(settings: Any, item: bpy.types.Object) -> bool:
+    return item.type in ("CURVE", "CAMERA")
+
+
+def _class_items(settings: Any, context: Any) -> list[tuple[str, str, str]]:
+    _items[:] = [(row.name, title_case(row.name), f"class_id {row.id}") for row in classes()]
+    return _items
+
+
+class SYNTHROADS_PG_scene_scan(bpy.types.PropertyGroup):
+    """How a scene without a road is scanned."""
+
+    guide: bpy.props.PointerProperty(
+        name="Along",
+        type=bpy.types.Object,
+        poll=_is_guide,
+        description="Curve that the platform follows at its height, or camera: a tripod stands at its place, others "
+        "fly through its frames. Straight over the scene's middle if there is none",
+    )
+    classes: bpy.props.StringProperty(
+        name="Classes",
+        subtype="FILE_PATH",
+        description="JSON file with classes by names of objects, materials and collections, as synthroads scan takes",
+        options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+    )
+    point_class: bpy.props.EnumProperty(
+        name="Class", items=_class_items, description="Class that the button gives to the selected objects"
+    )
+
+
+class SYNTHROADS_OT_set_class(bpy.types.Operator):
+    """Give the selected objects this class: it is kept with them as the custom property synthroads_class"""
+
+    bl_idname = "synthroads.set_class"
+    bl_label = "Set Class of Selected"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads a plain set)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """Objects must be selected."""
+        if not context.selected_objects:
+            cls.poll_message_set("Select objects first")
+        return bool(context.selected_objects)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Set the property."""
+        chosen, items = context.scene.synthroads_scene_scan.point_class, context.selected_objects
+        for item in items:
+            item[CLASS_PROPERTY] = chosen
+        self.report({"INFO"}, f"{len(items)} objects are {title_case(chosen)}")
+        return {"FINISHED"}
+
+
+def unclassified(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """Return the visible objects with faces that have no class by a property or by a collection's name."""
+    names = {row.name for row in classes()}
+    collections = [item for item in context.scene.collection.children_recursive if item.name in names]
+    named = {item for collection in collections for item in collection.all_objects}
+    return [
+        item
+        for item in context.visible_objects
+        if item.type in _SOLID and CLASS_PROPERTY not in item and item not in named
+    ]
+
+
+def draw_scene_scan(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw what a scan without a road needs to know."""
+    settings = context.scene.synthroads_scene_scan
+    draw_text(layout, "No road: what is visible is scanned", "INFO")
+    if context.scene.synthroads.scan.platform.kind != "trajectory":
+        value_row(layout, "Along").prop(settings, "guide", text="")
+    value_row(layout, "Classes").prop(settings, "classes", text="")
+    row = value_row(layout, "Class")
+    row.prop(settings, "point_class", text="")
+    layout.operator(SYNTHROADS_OT_set_class.bl_idname, icon="CHECKMARK")
+    missing = unclassified(context)
+    if missing:
+        text = f"{missing[0].name} has no class" if len(missing) == 1 else f"{len(missing)} objects have no class"
+        draw_text(layout, text, "QUESTION")
+
+
+ATTACHED = (bpy.types.Scene, "synthroads_scene_scan", SYNTHROADS_PG_scene_scan)

@@ -1,0 +1,80 @@
+"""The panel "Light and Cameras": sun, sky, haze and cameras of the road, for the user's own pictures.
+
+Annotations are not postponed here: Blender reads the properties from them.
+"""
+
+import bpy
+from mathutils import Matrix
+
+from ...blender.model.store import find_road
+from ...blender.views.daylight import VIEW, add_views, cameras_of
+from ..fields.room import buttons_row, draw_text
+from ..work.common import Sidebar, column, has_road, refusing
+from ..work.view import view_of
+from .rules import road_now
+
+
+class SYNTHROADS_OT_add_views(bpy.types.Operator):
+    """Add the road's sun, sky and haze, and a driver's and an aerial camera; those added before are replaced. Scans leave them out"""  # noqa: E501 (a tooltip is one line)
+
+    bl_idname = "synthroads.add_views"
+    bl_label = "Add Sun, Sky, Cameras"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads a plain set)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """There must be a road."""
+        return has_road(cls, context)
+
+    @refusing
+    def execute(self, context: bpy.types.Context) -> None:
+        """Add them, as the road is edited now."""
+        parameters, root = road_now(context.scene), find_road(context.scene)
+        assert parameters  # poll() has seen the road
+        assert root
+        add_views(context.scene, parameters, Matrix(root.matrix_world))
+
+
+class SYNTHROADS_OT_look_through(bpy.types.Operator):
+    """Look through this camera, which renders take from now on"""
+
+    bl_idname = "synthroads.look_through"
+    bl_label = "Look Through Camera"
+    bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads a plain set)
+
+    camera: bpy.props.StringProperty(name="Camera", options={"SKIP_SAVE"})
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Make it the scene's, and turn the view to it."""
+        found = dict(cameras_of(context.scene)).get(self.camera)
+        if found is None:
+            self.report({"ERROR"}, "Add the cameras first")
+            return {"CANCELLED"}
+        context.scene.camera = found
+        space = view_of(context)
+        if space:
+            space.region_3d.view_perspective = "CAMERA"
+        return {"FINISHED"}
+
+
+class SYNTHROADS_PT_views(Sidebar, bpy.types.Panel):
+    """Sun, sky, haze and cameras."""
+
+    bl_label = "Light and Cameras"
+    bl_parent_id = "SYNTHROADS_PT_environment"
+    bl_order = 10
+    bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """Show the button, and one for each camera."""
+        layout = column(self)
+        if find_road(context.scene) is None:
+            draw_text(layout, "Build a road first", "INFO")
+        cameras = list(cameras_of(context.scene))
+        text = "Renew Sun, Sky" if cameras else "Sun, Sky, Cameras"
+        layout.operator(SYNTHROADS_OT_add_views.bl_idname, text=text, icon="LIGHT_SUN")
+        row = buttons_row(layout, [name.title() for name, _ in cameras] or [""], align=True)
+        for name, camera in cameras:
+            pressed = context.scene.camera == camera
+            icon = "OUTLINER_OB_CAMERA" if pressed else "CAMERA_DATA"
+            row.operator(SYNTHROADS_OT_look_through.bl_idname, text=camera[VIEW].title(), icon=icon).camera = name

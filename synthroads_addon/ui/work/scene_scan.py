@@ -1,0 +1,180 @@
+"""A scan of whatever is visible, where the scene has no road: along a curve, from a camera, or over its extent."""
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ...base.class_mapping import ClassMapping
+from ...base.errors import InputError
+from ...base.files import output_folder
+from ...base.progress import StageTimer
+from ...base.schema import read_json
+from ...blender.scene.evaluated import scanned_scene_steps
+from ...blender.scene.foreign import open_scene_warnings
+from ...blender.services import SnapshotServices
+from ...jobs.job_files import JobFiles
+from ...jobs.scan.files import record_to_files
+from ...jobs.scan_scene import route_site, warnings_of_counts
+from ...scanning.platforms.over_scene import SceneRoute
+from ...scenario.scenario import OF_POINTS, Scenario
+from .job import Aside, Report, Step, Work
+from .rendered_scan import save_open_scene
+from .scan_steps import READ, Written, follow_scan, pass_on_reading
+
+_MOST_POSES = 100
+"""Places that are taken of a moving camera, however many frames it moves."""
+
+
+@dataclass(frozen=True)
+class VisibleScan:
+    """Request for a scan of what is visible, and where the files go.
+
+    Attributes:
+        scenario: scan, colours, files; its road isn't looked at.
+        route: the scanner's way.
+        classes: classes by name; none if None.
+        target: folder for the files.
+        overwrite: replace files that are already there.
+    """
+
+    scenario: Scenario
+    route: SceneRoute
+    classes: ClassMapping | None
+    target: Path
+    overwrite: bool
+
+
+def visible_scan_work(scan: VisibleScan) -> Work[Written]:
+    """Scan what is visible in the open scene; nothing half-written is ever left, and the scene is only read.
+
+    Raises:
+        InputError: a setting is wrong, the folder can't be written, or nothing that could be scanned is visible.
+    """
+    files, timer = JobFiles(scan.scenario, road=False), StageTimer()
+    if not set(files.outputs) & set(OF_POINTS):
+        raise InputError("Outputs", None, f"must name at least one of {', '.join(OF_POINTS)}: the scene has no road")
+    with output_folder(scan.target, files.names, scan.overwrite) as folder:
+        yield Step(0.0, "Reading")
+        warnings = open_scene_warnings()
+        measure = yield from (_save_copy if scan.scenario.may_render else _read)(scan, folder, timer)
+
+        def write(report: Report) -> int:
+            counts = measure(report)
+            told = {"scene": bpy.path.basename(bpy.data.filepath) or None, "counts": counts}
+            told["warnings"] = warnings + warnings_of_counts(counts)
+            files.write_report(folder, told, timer)
+            return int(counts["points"])
+
+        points = yield Aside(write, "Scanning", READ, 1.0)
+    return Written(points, scan.target)
+
+
+def _read(scan: VisibleScan, folder: Path, timer: StageTimer) -> Generator[Step, None, Callable[[Report], Any]]:
+    """Read the open scene; return what scans it."""
+    settings, class_ids = scan.scenario.scan, scan.scenario.cloud.scheme().source_ids()
+    with timer.stage("scene mesh"):
+        factor = settings.traffic_speed_factor
+        steps = scanned_scene_steps(classes=scan.classes, speed_factor=factor, number_objects=True, class_ids=class_ids)
+        copied = yield from pass_on_reading(steps)
+    services = SnapshotServices(copied.materials)
+
+    def measure(report: Report) -> dict[str, Any]:
+        with timer.stage("scene mesh"):
+            scene = copied.put_together()
+        if not len(scene.static) and not scene.moving:
+            raise InputError("Scene", None, "nothing visible in it has faces that could be scanned")
+        site = route_site(scan.scenario, scan.route, scene.static)
+        with timer.stage("caster"):
+            plan = site.plan(scene, services)
+        follow_scan(timer, report)
+        return record_to_files([plan], site.files(folder, plan.target.origin), timer)
+
+    return measure
+
+
+def _save_copy(scan: VisibleScan, folder: Path, timer: StageTimer) -> Generator[Step, None, Callable[[Report], Any]]:
+    """Save a copy of the open file; return what has another Blender scan it."""
+    with timer.stage("scene copy"):
+        classes = scan.classes.to_dict() if scan.classes else None
+        saved = save_open_scene(scan.scenario, folder, {"route": scan.route.to_dict(), "classes": classes})
+    yield Step(READ)
+
+    def measure(report: Report) -> dict[str, Any]:
+        done = saved.scan(report)
+        timer.stages.update(done.stages)
+        return done.counts
+
+    return measure
+
+
+def route_of(guide: bpy.types.Object | None, scene: bpy.types.Scene, tripod: bool) -> SceneRoute:
+    """Return the way that an object stands for: a curve's line, a camera's place or its frames; the extent for none.
+
+    Args:
+        guide: curve or camera of the scene.
+        scene: the open one.
+        tripod: whether the scanner stands still.
+
+    Raises:
+        InputError: the object is neither, its line is too short, or a scanner that moves is to follow a still camera.
+    """
+    if guide is None:
+        return SceneRoute("extent")
+    if guide.type == "CAMERA":
+        return _route_of_camera(guide, scene, tripod)
+    if guide.type != "CURVE":
+        raise InputError("Along", guide.name, "must be a curve or a camera")
+    evaluated = guide.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    mesh = evaluated.to_mesh()
+    try:
+        flat = np.empty(3 * len(mesh.vertices), dtype=np.float32)
+        mesh.vertices.foreach_get("co", flat)
+    finally:
+        evaluated.to_mesh_clear()
+    matrix = np.array(evaluated.matrix_world)
+    points = flat.reshape(-1, 3).astype(np.float64) @ matrix[:3, :3].T + matrix[:3, 3]
+    if len(points) < 2:
+        raise InputError("Along", guide.name, "must have at least two points")
+    return SceneRoute("line", points.tolist())
+
+
+def _route_of_camera(camera: bpy.types.Object, scene: bpy.types.Scene, tripod: bool) -> SceneRoute:
+    if tripod:
+        return SceneRoute("places", [list(camera.matrix_world.translation)])
+    poses = _camera_places(camera, scene)
+    if float(np.linalg.norm(np.diff(poses, axis=0), axis=1).sum()) < 1.0:
+        text = "moves by less than 1 m in the scene's frames: animate it, or choose a tripod as the platform"
+        raise InputError("Along", camera.name, text)
+    return SceneRoute("flight", poses.tolist())
+
+
+def _camera_places(camera: bpy.types.Object, scene: bpy.types.Scene) -> Any:
+    """Return the places (N, 3) of a camera over the scene's frames; the scene is at its frame again afterwards."""
+    frame = scene.frame_current, scene.frame_subframe
+    count = min(scene.frame_end - scene.frame_start + 1, _MOST_POSES)
+    poses = []
+    try:
+        for number in np.linspace(scene.frame_start, scene.frame_end, count).round().astype(int):
+            scene.frame_set(int(number))
+            poses.append(list(camera.matrix_world.translation))
+    finally:
+        scene.frame_set(frame[0], subframe=frame[1])
+    return np.array(poses)
+
+
+def class_mapping(path: str, scenario: Scenario) -> ClassMapping | None:
+    """Return the classes by name of a JSON file; None if none is named.
+
+    Raises:
+        InputError: it can't be read, or names a class that the scheme doesn't have.
+    """
+    if not path.strip():
+        return None
+    place = str(Path(bpy.path.abspath(path)).expanduser())
+    mapping = ClassMapping.from_dict(read_json(Path(place)), source=place)
+    mapping.check(scenario.cloud.scheme().source_ids(), place)
+    return mapping

@@ -1,0 +1,92 @@
+"""Sun, sky, haze and cameras by one button: they are kept in the file, replaced by the next, and never scanned."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from bpy_extras.object_utils import world_to_camera_view
+
+import synthroads_addon
+from synthroads_addon.blender.scene.evaluated import scene_mesh
+from synthroads_addon.blender.things.model_builder import ROLE
+from synthroads_addon.blender.views.daylight import views_of
+from synthroads_addon.scanning.colour.light import sun_direction
+from synthroads_addon.ui.panels import rules, views
+from tests.helpers.scenes.fake_layout import drawn
+from tests.helpers.scenes.panel_road import choose
+
+
+@pytest.fixture(autouse=True)
+def panel() -> Iterator[Any]:
+    """Register the add-on for one test; return the panel's settings of a small road in haze."""
+    synthroads_addon.register()
+    settings = bpy.context.scene.synthroads
+    choose(settings, **{"road.length": 60.0, "seed": 3, "road.half_width": 30.0})
+    yield settings
+    synthroads_addon.unregister()
+
+
+def build(visibility: float) -> Any:
+    bpy.ops.synthroads.build()
+    root = next(item for item in bpy.data.objects if "synthroads_road" in item and item.type == "EMPTY")
+    text = root["synthroads_parameters"]
+    start = text.index('"visibility"')
+    end = text.index("\n", start) if "\n" in text[start:] else len(text)
+    old = text[start:end].rstrip(",}")
+    root["synthroads_parameters"] = text.replace(old, f'"visibility": {visibility}')
+    parameters = rules.road_now(bpy.context.scene)
+    assert parameters
+    assert parameters.environment.visibility == visibility
+    return parameters
+
+
+def test_the_button_lights_the_road_and_looks_along_it(panel: Any, tmp_path: Path) -> None:
+    parameters = build(800.0)
+    before = scene_mesh()
+    own = bpy.data.objects.new("Mine", bpy.data.lights.new("Mine", "SUN"))
+    bpy.context.scene.collection.objects.link(own)
+    assert bpy.ops.synthroads.add_views() == {"FINISHED"}
+    found = views_of(bpy.context.scene)
+    assert sorted(found) == ["aerial", "driver", "haze", "sun"]
+    assert bpy.context.scene.camera == found["driver"]
+    bpy.context.view_layer.update()
+    towards = np.array(found["sun"].matrix_world)[:3, 2]
+    assert towards == pytest.approx(sun_direction(parameters.environment), abs=1e-6)
+    density = found["haze"].data.materials[0].node_tree.nodes["Volume Scatter"].inputs["Density"].default_value
+    assert density == pytest.approx(3.912 / 800.0)
+    road = next(item for item in bpy.data.objects if item.get(ROLE) == "Road")
+    for name in ("driver", "aerial"):
+        corners = [road.matrix_world @ vertex.co for vertex in road.evaluated_get(graph()).data.vertices]
+        seen = np.array([world_to_camera_view(bpy.context.scene, found[name], corner) for corner in corners])
+        inside = (seen[:, 2] > 0.0) & (np.abs(seen[:, :2] - 0.5) < 0.5).all(axis=1)
+        assert inside.mean() > 0.2, name
+    after = scene_mesh()
+    assert (before.vertices == after.vertices).all()
+    panel.seed = 5
+    bpy.ops.synthroads.look_through(camera="aerial")
+    bpy.ops.synthroads.add_views()
+    assert sorted(views_of(bpy.context.scene)) == ["aerial", "driver", "haze", "sun"]
+    assert bpy.context.scene.camera == views_of(bpy.context.scene)["aerial"]
+    assert own.name in bpy.context.scene.objects
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
+    assert sorted(views_of(bpy.context.scene)) == ["aerial", "driver", "haze", "sun"]
+    assert bpy.context.scene.world["synthroads_view"] == "sky"
+    assert "Driver" in "\n".join(drawn(views.SYNTHROADS_PT_views, bpy.context).lines)
+
+
+def graph() -> Any:
+    return bpy.context.evaluated_depsgraph_get()
+
+
+def test_clear_air_has_no_haze_and_the_users_world_stays() -> None:
+    mine = bpy.data.worlds.new("Mine")
+    bpy.context.scene.world = mine
+    build(23_000.0)
+    bpy.ops.synthroads.add_views()
+    assert sorted(views_of(bpy.context.scene)) == ["aerial", "driver", "sun"]
+    assert mine.use_fake_user
+    assert bpy.context.scene.world != mine
