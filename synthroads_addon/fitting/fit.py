@@ -152,8 +152,8 @@ def fitted_axis(path: Path, scenario: RoadScenario) -> tuple[AlignmentObject, Ro
     points = read_axis(path)
     origin = np.round(points.mean(axis=0))
     fit = fit_axis(points - origin)
-    alignment = alignment_object(fit)
     fit.check(path.name)
+    alignment = alignment_object(fit)
     road = scenario.model_copy(update={"length": alignment.length, "map_origin": tuple(origin.tolist())})
     report = {
         "file": path.name,

@@ -107,11 +107,12 @@ def test_nothing_of_the_file_is_touched(shown: Any, tmp_path: Path) -> None:
     bpy.context.scene.render.resolution_x = 333
     space = next(area for area in bpy.context.screen.areas if area.type == "VIEW_3D").spaces.active
     shading = space.shading.type, space.shading.color_type
+    shown.by, shown.visible = COLOURINGS[-1], True
     before = digest()
     bpy.ops.synthroads.show_cloud(filepath=str(write(tmp_path / "a.laz", make_points(1_000))))
     for by in COLOURINGS:
         shown.by = by
-    assert digest() == before
+    assert digest() == before  # but for how clouds are shown, which is kept
     assert (space.shading.type, space.shading.color_type) == shading
     bpy.ops.synthroads.hide_cloud()
     assert digest() == before
