@@ -12,7 +12,7 @@ import bpy
 
 NAMES_SHARE = 0.45
 """Share of a row's width that its name takes."""
-_EDGES = 68.0
+_EDGES = 60.0
 """Tabs, margins and indents take so much of the sidebar's width, pixels at a resolution scale of 1."""
 _PADDING = 22.0
 """Margins of a label or a button, and the gap to what stands beside it."""
