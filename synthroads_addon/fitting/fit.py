@@ -133,9 +133,9 @@ class AxisRefusedError(InputError):
         text += "Look there for corners, jumps or points out of their order"
         super().__init__(f"axis {name}", None, f"{text}; {picture} shows it" if picture else text)
 
-    def with_picture(self, picture: Path | str) -> AxisRefusedError:
+    def with_picture(self, picture: Path | str) -> Self:
         """Return the error with the name of a file, or of what else shows the fit."""
-        return AxisRefusedError(self.name, self.fit, picture)
+        return type(self)(self.name, self.fit, picture)
 
 
 def fitted_axis(path: Path, scenario: RoadScenario) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:

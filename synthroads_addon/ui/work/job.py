@@ -29,7 +29,7 @@ TICK = 0.03
 """Seconds between two turns of a job in the window's thread."""
 BUDGET = 0.05
 """Seconds of one such turn, where drawing the window takes next to no time."""
-_WORK_FOR_DRAWING, _LONGEST = 4.0, 1.0
+_WORK_FOR_DRAWING, _LONGEST = 4.0, 2.0
 """So many times as long as the window was drawn a turn lasts, but no longer than this (s)."""
 
 
