@@ -19,6 +19,10 @@ RETURNS_AT_ONCE = 400_000
 """Points that are rendered together: each rendering takes a tenth of a second whatever their number."""
 
 
+_AHEAD = 12
+"""Blocks that are computed ahead while others are rendered: about as many points as are rendered together."""
+
+
 class Sink(Protocol):
     """Takes the blocks of a scan in their order: files, a view, a measurement."""
 
@@ -108,7 +112,7 @@ def scan_blocks(plan: ScanPlan, source: LayerSource | None = None) -> Iterator[B
     if plan.target.caster.main_thread_only:
         results: Iterator[BlockResult] = map(work, blocks)
     else:
-        results = _map_side_by_side(work, blocks, plan.threads or available_cores())
+        results = _map_side_by_side(work, blocks, plan.threads or available_cores(), _AHEAD if renders else 1)
     if finish is None or not renders:
         yield from results
     else:
@@ -128,12 +132,19 @@ def _join_into_batches(results: Iterator[BlockResult]) -> Iterator[BlockResult]:
 
 
 def _map_side_by_side(
-    work: Callable[[Block], BlockResult], blocks: Iterator[Block], workers: int
+    work: Callable[[Block], BlockResult], blocks: Iterator[Block], workers: int, ahead: int
 ) -> Iterator[BlockResult]:
-    """Yield the results of blocks in their order, of which as many as there are workers are computed at once."""
+    """Yield the results of blocks in their order, of which as many as there are workers are computed at once.
+
+    Args:
+        work: computes a block.
+        blocks: the blocks.
+        workers: threads.
+        ahead: blocks beyond these that may wait until they are taken.
+    """
     pool = ThreadPoolExecutor(workers)
     try:
-        pending: list[Future[BlockResult]] = [pool.submit(work, block) for block in islice(blocks, workers + 1)]
+        pending: list[Future[BlockResult]] = [pool.submit(work, block) for block in islice(blocks, workers + ahead)]
         while pending:
             yield pending.pop(0).result()
             pending += [pool.submit(work, block) for block in islice(blocks, 1)]

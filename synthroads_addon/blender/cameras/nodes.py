@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...base.arrays import AnyArray, Bool, Float32, Index
+from ...base.arrays import AnyArray, Bool, Float32, Index, UInt16
 from ...scanning.colour.colour import (
     FROM_NODES,
     LayerSource,
@@ -111,43 +111,44 @@ class NodeLayers:
             parts = {name: (len(points), 3 if name == "base_color" else 1) for name in self._calculator.layers}
             channels = {name: np.zeros(shape, np.float32) for name, shape in parts.items()}
             for start in range(0, len(varying), AT_ONCE):
-                self._calculate(points, varying[start : start + AT_ONCE], channels, source)
+                self._calculate(points, varying[start : start + AT_ONCE], channels)
         if "rgb" in wanted and self.material.mode == "lit":
-            channels["sun"] = self._sunlight(points, channels, source)
+            channels["sun"] = self._sunlight(points, channels)
         return self.material.layer_values(points, channels, source, wanted)
 
-    def _calculate(self, points: SeenPoints, rows: Index, channels: dict[str, Float32], source: np.ndarray) -> None:
+    def _calculate(self, points: SeenPoints, rows: Index, channels: dict[str, Float32]) -> None:
         """Fill in rows of the channels."""
         assert self._calculator is not None
-        rows = rows[np.argsort(points.material[rows], kind="stable")]
-        seen = points.select(rows)
-        values = self._inputs(seen)
-        for name, array in self._calculator.calculate(seen.material.astype(np.intp), values).items():
+        material = points.material[rows]
+        order = np.argsort(material, kind="stable")
+        rows, material = rows[order], material[order]
+        values = self._inputs(points, rows, material)
+        for name, array in self._calculator.calculate(material.astype(np.intp), values).items():
             channels[name][rows] = array
 
-    def _inputs(self, points: SeenPoints) -> dict[SurfaceInput, Float32]:
-        """Return all that the materials of points ask for, (N, 4) each."""
+    def _inputs(self, points: SeenPoints, rows: Index, material: UInt16) -> dict[SurfaceInput, Float32]:
+        """Return all that the materials of rows of points ask for, (N, 4) each."""
         assert self._calculator is not None
         asked: dict[SurfaceInput, list[int]] = {}
-        for number in np.unique(points.material).tolist():
+        for number in np.unique(material).tolist():
             for what in self._calculator.inputs_of(number):
                 asked.setdefault(what, []).append(number)
-        values = {what: np.zeros((len(points), 4), np.float32) for what in asked}
+        values = {what: np.zeros((len(rows), 4), np.float32) for what in asked}
         together: dict[tuple[int, ...], list[SurfaceInput]] = {}
         for what, numbers in asked.items():
             if what == POSITION:
-                values[what][:, :3] = points.position + self._frame
+                values[what][:, :3] = points.position[rows] + self._frame
             elif what in _OF_POINT:
-                values[what][:, :3] = _OF_POINT[what](points)
+                values[what][:, :3] = _OF_POINT[what](points.select(rows))
             else:
                 together.setdefault(tuple(numbers), []).append(what)
         for several, inputs in together.items():
-            mine = np.flatnonzero(np.isin(points.material, several))
-            for what, array in self._surfaces.read(inputs, points.select(mine)).items():
+            mine = np.flatnonzero(np.isin(material, several))
+            for what, array in self._surfaces.read(inputs, points.select(rows[mine])).items():
                 values[what][mine] = array
         return values
 
-    def _sunlight(self, points: SeenPoints, channels: dict[str, Float32], source: np.ndarray) -> Float32:
+    def _sunlight(self, points: SeenPoints, channels: dict[str, Float32]) -> Float32:
         """Return the sun's light (N, 3) that points throw back to the scanner, exposed."""
         result = np.zeros((len(points), 3), np.float32)
         light = self.material.light
@@ -156,15 +157,19 @@ class NodeLayers:
         if points.sunlit is not None:
             lit &= points.sunlit
         rows = np.flatnonzero(lit)
-        chosen = points.select(rows)
-        names = frozenset({"base_color", "roughness", "metallic", "specular"})
-        layers = self.material.layer_values(
-            chosen, {name: array[rows] for name, array in channels.items()}, source[rows], names
-        ).arrays
-        view = chosen.towards_scanner
-        color, roughness, metallic, specular = (
-            np.asarray(layers[name], np.float32) for name in ("base_color", "roughness", "metallic", "specular")
-        )
+        material = points.material[rows]
+
+        def layer(name: str) -> Float32:
+            """Return a layer of the lit points: what was worked out, else the material's own value."""
+            values = self.material.constants.values[name][material]
+            if name in channels:
+                use = np.flatnonzero(self.material.constants.varies[name][material])
+                values[use] = channels[name][rows[use]].reshape(values[use].shape)
+            return values
+
+        view = (points.scanner[rows] - points.position[rows]).astype(np.float32)
+        view /= np.maximum(np.sqrt(np.einsum("ij,ij->i", view, view)), 1e-9)[:, None]
+        color, roughness, metallic, specular = map(layer, ("base_color", "roughness", "metallic", "specular"))
         shares = reflected_sunlight(color, roughness, metallic, specular, normal[rows], view, light.direction)
         result[rows] = shares * light.sun.astype(np.float32)
         return result
