@@ -31,7 +31,7 @@ _COSTS = {
     "images": ("images", "d"),
     "megapixels": ("Mpx", ".1f"),
 }
-_SHARES = ("image", "next image", "nearby", "material", "return")
+_SHARES = ("image", "next image", "nearby", "material", "nodes", "return")
 
 TABLES: dict[str, tuple[str, ...]] = {
     "model and beam": ("seconds", "model_seconds", "peak_memory_mb", "triangles", "rays_per_second"),

@@ -13,11 +13,15 @@ from ...road.instances import PassNumbers
 from ...road.surroundings import Vehicle
 from ...scanning.scene.mesh import SceneMesh
 from ...scanning.scene.motion import Motion, MovingMesh, ScannedScene
+from ...scanning.scene.surface_values import MeshValues, SurfaceInput
 from ..compat import set_modifier_input
 from ..materials import material
+from ..materials.looks import COLOR
 from ..nodes.builder import usual_materials
 from ..things.vehicle.models import model_group
 from .evaluated import scene_mesh
+
+_COLOR = SurfaceInput("attribute", COLOR)
 
 
 class VehicleMeshes:
@@ -51,7 +55,7 @@ class VehicleMeshes:
         names = tuple(self._materials)
         meshes = {model: _with_materials(mesh, names) for model, mesh in models.items()}
         moving = tuple(
-            MovingMesh(_with_instance(meshes[vehicle.model], vehicle.instance), motions[name], passes[name])
+            MovingMesh(_as_vehicle(meshes[vehicle.model], vehicle), motions[name], passes[name])
             for name, vehicle in vehicles.items()
         )
         return ScannedScene(_with_materials(static, names), moving)
@@ -87,8 +91,14 @@ def _model_mesh(model: str) -> SceneMesh:
     )
 
 
-def _with_instance(mesh: SceneMesh, instance: int) -> SceneMesh:
-    return replace(mesh, instance_id=np.full(len(mesh), instance, np.uint32))
+def _as_vehicle(mesh: SceneMesh, vehicle: Vehicle) -> SceneMesh:
+    """Return a model as a vehicle: with its instance number, and its colour, which in Blender is on its point."""
+    surface = mesh.surface
+    if surface is not None:
+        color = MeshValues(np.array([[*vehicle.color, 1.0]], np.float32), "object")
+        parts = (replace(part, values={**part.values, _COLOR: color}) for part in surface.parts)
+        surface = replace(surface, parts=tuple(parts))
+    return replace(mesh, instance_id=np.full(len(mesh), vehicle.instance, np.uint32), surface=surface)
 
 
 def _with_materials(mesh: SceneMesh, names: Sequence[str]) -> SceneMesh:

@@ -2,6 +2,7 @@
 
 import logging
 from collections.abc import Iterable, Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -23,6 +24,8 @@ from ...scanning.scan import BlockResult
 from ...scenario.scenario import Scenario
 
 _logger = logging.getLogger("synthroads")
+_MOST_PAINTED = 2
+"""Blocks that wait to be painted into the previews: the scan goes on meanwhile, and its memory stays small."""
 _LONG = 300.0
 """Seconds from which on a scan's forecast is told unasked; of a shorter one only where details are asked for."""
 
@@ -73,6 +76,8 @@ class CloudFiles:
     counts: ScanCounts = field(default_factory=ScanCounts)
     _writers: list[CloudWriter] = field(default_factory=list)
     _grid: GridSubsampler | None = None
+    _painter: ThreadPoolExecutor | None = None
+    _painting: list[Future[None]] = field(default_factory=list)
 
     @property
     def intensity_scale(self) -> float:
@@ -92,11 +97,15 @@ class CloudFiles:
         with ExitStack() as stack:
             if "cloud" in self.scenario.outputs:
                 self._writers = [stack.enter_context(self.open_writer(name)) for name in cloud.file_names()]
+            if self.view:
+                # One thread: blocks are painted in their order, whatever the number of cores.
+                self._painter = stack.enter_context(ThreadPoolExecutor(1))
             if cloud.point_spacing:
                 self._grid = stack.enter_context(GridSubsampler(cloud.point_spacing, self.folder))
             yield
             for block in self._grid.blocks() if self._grid else ():
                 self._keep(block)
+            self._wait_for_painter(0)
         if self._writers:
             self.counts.points, self.counts.intensity_clipped = self._writers[0].count, self._writers[0].clipped
         if self.view:
@@ -118,8 +127,14 @@ class CloudFiles:
     def _keep(self, points: PointBlock) -> None:
         for writer in self._writers:
             writer.write(points)
-        if self.view:
-            self.view.add(points)
+        if self.view and self._painter:
+            self._wait_for_painter(_MOST_PAINTED - 1)
+            self._painting.append(self._painter.submit(self.view.add, points))
+
+    def _wait_for_painter(self, most: int) -> None:
+        """Wait until so many blocks at most are still to be painted; raise what went wrong with the others."""
+        while len(self._painting) > most:
+            self._painting.pop(0).result()
 
     def summary(self) -> dict[str, Any]:
         """Return the counts as JSON data."""

@@ -11,6 +11,7 @@ from mathutils import Matrix
 
 from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA, layer_source
 from synthroads_addon.blender.cameras.nodes import NodeLayers
+from synthroads_addon.blender.materials.calculable import asked_inputs, material_needs
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.scanning.colour.colour import FROM_MATERIAL, FROM_NODES, FROM_RETURN, LayerValues, SeenPoints
 from synthroads_addon.scanning.scene.mesh import SceneMesh
@@ -120,6 +121,36 @@ def test_what_stands_in_the_way_is_named_and_left_to_others() -> None:
     assert (values.source[corners] == (FROM_RETURN if HAS_RETURN_CAMERA else FROM_MATERIAL)).all()
     assert (values.source[~corners] == FROM_NODES).all()
     assert 0 < corners.sum() < 300
+
+
+@pytest.mark.any_blender
+@pytest.mark.parametrize(
+    ("kind", "output", "properties"),
+    [
+        ("ShaderNodeBevel", "Normal", {}),
+        ("ShaderNodeNewGeometry", "Pointiness", {}),
+        ("ShaderNodeNewGeometry", "Random Per Island", {}),
+        ("ShaderNodeCameraData", "View Z Depth", {}),
+        ("ShaderNodeLightPath", "Ray Length", {}),
+        ("ShaderNodeTexCoord", "Camera", {}),
+        ("ShaderNodeTexCoord", "Reflection", {}),
+        ("ShaderNodeFresnel", "", {}),
+        ("ShaderNodeNormalMap", "Normal", {}),
+        ("ShaderNodeTexImage", "Color", {"projection": "BOX"}),
+        ("ShaderNodeAttribute", "Color", {"attribute_type": "INSTANCER", "attribute_name": "a"}),
+        ("ShaderNodeUVMap", "UV", {"from_instancer": True}),
+    ],
+)
+def test_what_no_values_can_stand_for_is_told(kind: str, output: str, properties: dict[str, object]) -> None:
+    item, shader = new_material("Asking")
+    node = item.node_tree.nodes.new(kind)
+    for key, value in properties.items():
+        setattr(node, key, value)
+    item.node_tree.links.new(node.outputs[output] if output else node.outputs[0], shader.inputs["Roughness"])
+    needs = material_needs(item)
+    assert len(needs.obstacles) == 1
+    assert node.bl_rna.name in needs.obstacles[0]
+    assert asked_inputs(item) == frozenset()
 
 
 INPUTS: dict[str, tuple[str, str, dict[str, object]]] = {
