@@ -28,10 +28,21 @@ def set_modifier_input(modifier: bpy.types.NodesModifier, name: str, value: Any)
 
 def modifier_input(modifier: bpy.types.NodesModifier, name: str) -> Any:
     """Return the value of the input `name` of a Geometry Nodes modifier."""
-    identifier = _identifier(modifier, name)
+    return identified_input(modifier, _identifier(modifier, name))
+
+
+def identified_input(modifier: bpy.types.NodesModifier, identifier: str) -> Any:
+    """Return the value of the input with an identifier of a Geometry Nodes modifier."""
     if _INPUTS_ARE_PROPERTIES:
         return getattr(modifier.properties.inputs, identifier).value
     return modifier[identifier]
+
+
+def object_inputs(modifier: bpy.types.NodesModifier) -> list[str]:
+    """Return the names of the inputs of a Geometry Nodes modifier that are objects."""
+    items = modifier.node_group.interface.items_tree
+    sockets = (item for item in items if item.item_type == "SOCKET" and item.in_out == "INPUT")
+    return [socket.name for socket in sockets if socket.socket_type == "NodeSocketObject"]
 
 
 def shown_input(modifier: bpy.types.NodesModifier, identifier: str) -> tuple[Any, str]:

@@ -128,7 +128,8 @@ def open_and_read(
     Raises:
         InputError: the file can't be read, there is nothing to scan in it, or it has a road and an origin is given.
     """
-    from ..blender.model.store import open_road  # see `scan_scene`
+    from ..blender.model.settle import settle  # see `scan_scene`
+    from ..blender.model.truth import open_road
     from ..blender.scene.evaluated import scanned_scene
     from ..blender.scene.foreign import open_scene, open_scene_warnings
 
@@ -137,9 +138,13 @@ def open_and_read(
             open_scene(job.scene, job.up)
     with timer.stage("scene mesh"):
         opened = open_road(job.road)
-        parameters = opened.parameters if opened else None
-        report |= {"road": opened.name} if opened else {}
-        if parameters and job.origin is not None:
+        edited = opened.edited if opened else None
+        parameters = edited.parameters if edited and not edited.lost else None
+        if opened and edited:
+            report |= {"road": opened.name} | edited.to_dict()
+            if edited.stale and not edited.lost:
+                settle(opened.road_id, edited)
+        if opened and job.origin is not None:
             raise InputError("--origin", list(job.origin), "can't be given: the road in the scene has one of its own")
         factor, class_ids = job.scenario.scan.traffic_speed_factor, job.scenario.cloud.scheme().source_ids()
         further: dict[str, Any] = {"class_ids": class_ids, "road": opened.road_id if opened else ""}
@@ -151,6 +156,7 @@ def open_and_read(
         if job.origin is not None:
             scene = replace(scene, static=replace(scene.static, origin=np.array(job.origin, dtype=np.float64)))
         warnings = open_scene_warnings()
+        warnings += [f"{edit.name} was edited by hand: {edit.reason}" for edit in edited.by_hand] if edited else []
         warnings += [f"{job.classes}: nothing in the scene is named as in {entry}" for entry in scene.unmatched]
         if strays := strays_of(scene.static) if len(scene.static) else None:
             warnings += [f"{strays.count():,} vertices lie far from all others: path and previews leave them out"]

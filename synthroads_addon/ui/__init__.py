@@ -28,7 +28,7 @@ from .panels import (
     scene_scan,
     views,
 )
-from .work import build, long_operator, scan
+from .work import build, edited, follow, long_operator, scan
 
 MODULES = (
     *(
@@ -37,6 +37,8 @@ MODULES = (
         long_operator,
         build,
         road_choice,
+        follow,
+        edited,
         scan,
         presets,
         road_files,

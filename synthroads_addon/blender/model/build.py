@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import time
-from collections.abc import Collection, Generator
+from collections.abc import Collection, Generator, Mapping
 from dataclasses import dataclass
 
 import bpy
@@ -12,12 +13,29 @@ from numpy.typing import NDArray
 
 from ...base.stepper import Stepper
 from ...road.geometry import RoadGeometry
+from ...road.objects import LineObject, PointObject
 from ...road.parameters import RoadParameters
+from ...road.surroundings import Vehicle
+from ..compat import modifier_input, object_inputs, set_modifier_input
+from ..labels import CLASS_PROPERTY
 from ..materials import vary
 from ..nodes.builder import remove_unused_groups
-from ..things.model_builder import ModelBuilder
+from ..things.model_builder import ROLE, ModelBuilder
 from ..things.registry import model_parts, required_parts
-from .roads import FRAME, NAME, OF_ROAD, ROAD, new_root, parts_and_copies, place_root, renew_ids, road_meant, road_of_id
+from .edits import POSTS, keep_built
+from .roads import (
+    BUILT_PARTS,
+    FRAME,
+    NAME,
+    OF_ROAD,
+    ROAD,
+    new_root,
+    parts_and_copies,
+    place_root,
+    renew_ids,
+    road_meant,
+    road_of_id,
+)
 from .stage import DataBlockLog, new_staging, remove_staged, remove_with_meshes
 
 COLLECTION = "SynthRoads"
@@ -39,11 +57,15 @@ class Place:
         road: the id of its root; the road that is meant in the scene (`roads.road_meant`) if empty.
         beside: it takes no other's place: it is one more road.
         keep_moves: where the user has moved the road before, it stays; else it is put where its parameters say.
+        keeps: names of parts that stay beside the new ones.
+        drops: names of copies of parts that are removed with them.
     """
 
     road: str = ""
     beside: bool = False
     keep_moves: bool = True
+    keeps: frozenset[str] = frozenset()
+    drops: frozenset[str] = frozenset()
 
     def root(self, scene: bpy.types.Scene) -> bpy.types.Object | None:
         """Return the root of the road that is replaced; None if there is none."""
@@ -213,7 +235,9 @@ class _Build:
         root = next(item for item in scene.objects if item.get(ROAD) == self._road)
         collection = self._collection
         if FRAME in root:
-            _remove_parts(root)
+            old = _parts_of(root, self._place)
+            _repoint(old, builder.objects)
+            remove_with_meshes(list(old))
             collection = _home(root, scene)
             for item in builder.objects.values():
                 collection.objects.link(item)
@@ -225,11 +249,34 @@ class _Build:
         for role, item in builder.objects.items():
             item.name = role  # its mesh keeps the name it has: to rename a mesh is to evaluate all that hangs on it
             item[OF_ROAD], item[NAME] = self._road, item.name
+            keep_built(item)
+            _describe(item, role, parameters)
+        root[BUILT_PARTS] = json.dumps(list(builder.objects))
         origin = np.array(parameters.transform.translate) + builder.origin
         place_root(root, origin, scene, self._place.keep_moves)
         remove_unused_groups()
         vary(parameters.materials, parameters.environment)
         return RoadModel(root, collection, builder.objects, origin)
+
+
+_CLASSES = {"Road": "road", "Terrain": "ground", "Painted Areas": "road_marking"} | {
+    role: kind.points_class for role, kind in POSTS.items()
+}
+"""Classes of parts that are no thing of the parameter set by themselves."""
+
+
+def _describe(item: bpy.types.Object, role: str, parameters: RoadParameters) -> None:
+    """Give a part its class, should its faces lose theirs; and lock the place of what lies along the whole road.
+
+    Its shape follows the road, wherever its object is.
+    """
+    thing = parameters.objects.get(role.partition("/")[0])
+    kind = _CLASSES.get(role) or (thing.semantic_class if thing is not None else "")
+    if kind:
+        item[CLASS_PROPERTY] = kind
+    if ("/" not in role and isinstance(thing, PointObject | LineObject | Vehicle)) or role in POSTS:
+        return
+    item.lock_location = item.lock_rotation = item.lock_scale = (True, True, True)
 
 
 def _home(root: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Collection:
@@ -238,13 +285,28 @@ def _home(root: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Collectio
     return next(collection for collection in root.users_collection if collection in inside)
 
 
-def _remove_parts(root: bpy.types.Object) -> None:
-    """Remove the objects that were built for a road, in all scenes; copies that the user made of some stay."""
-    objects = set()
+def _parts_of(root: bpy.types.Object, place: Place = MEANT) -> dict[bpy.types.Object, str]:
+    """Return the objects that were built for a road, in all scenes, and their roles; not the user's copies of some."""
+    objects: dict[bpy.types.Object, str] = {}
     for scene in bpy.data.scenes:
-        if root in scene.objects.values():
-            objects |= set(parts_and_copies(root, scene)[0].values())
-    remove_with_meshes(sorted(objects, key=lambda item: item.name_full))
+        if scene.objects.get(root.name_full) == root:
+            parts, copies = parts_and_copies(root, scene)
+            objects |= {item: role for role, item in parts.items() if item.name not in place.keeps}
+            objects |= {item: str(item[ROLE]) for item in copies if item.name in place.drops}
+    return objects
+
+
+def _repoint(old: Mapping[bpy.types.Object, str], new: Mapping[str, bpy.types.Object]) -> None:
+    """Have modifiers of other objects that use a road's old parts use the new ones of the same role."""
+    for item in bpy.data.objects:
+        if item in old or item.library is not None:
+            continue
+        for modifier in item.modifiers:
+            if modifier.type == "NODES" and modifier.node_group is not None:
+                for name in object_inputs(modifier):
+                    used = modifier_input(modifier, name)
+                    if used in old and old[used] in new:
+                        set_modifier_input(modifier, name, new[old[used]])
 
 
 def remove_road(root: bpy.types.Object | None = None) -> None:
@@ -257,7 +319,7 @@ def remove_road(root: bpy.types.Object | None = None) -> None:
     if root is None:
         return
     homes = [collection for collection in root.users_collection if MADE_COLLECTION in collection]
-    _remove_parts(root)
+    remove_with_meshes(list(_parts_of(root)))
     for child in root.children:  # what the user hung on it keeps its place
         place = child.matrix_world.copy()
         child.parent = None

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Mapping
 
 import bpy
 
 from ...road.parameters import RoadParameters
 from ...road.section import LineMarking, Turnout
+from ...road.things.registry import THINGS
 from ..things.model_builder import ROLE
 from ..things.road.layout import names_in_words, side_of
 from ..things.road.road import MARKINGS
-from .roads import FRAME, NAME, OF_ROAD, ORIGIN, ROAD, new_root
+from .roads import BUILT_PARTS, FRAME, NAME, OF_ROAD, ORIGIN, ROAD, new_root
 
+_SINGLE = {name for name in THINGS if name not in ("Delineator", "ConstructionBeacon")} | {"Vehicle"}
+"""Types in the parameter set of what has an object of its own."""
 PARAMETERS = "synthroads_parameters"
 """Custom property of a road's root, and in older files of its collection: the parameter set as JSON."""
 _RENAMED = {"Dash": "Dash Length", "Gap": "Gap Length"}
@@ -43,7 +47,18 @@ def _adopt(collection: bpy.types.Collection) -> bpy.types.Object:
             if item.parent is None:
                 item.parent = root
             item[OF_ROAD], item[NAME] = root[ROAD], item[ROLE]
+    root[BUILT_PARTS] = json.dumps(sorted(_built_before(root, collection)))
     return root
+
+
+def _built_before(root: bpy.types.Object, collection: bpy.types.Collection) -> set[str]:
+    """Return the roles that an older road had: those that are there, and things that may have been deleted since."""
+    there = {str(item[ROLE]) for item in collection.all_objects if ROLE in item}
+    try:
+        objects = json.loads(root[PARAMETERS])["objects"]
+        return there | {name for name, item in objects.items() if item["type"] in _SINGLE}
+    except (KeyError, TypeError, ValueError):  # it is damaged
+        return there
 
 
 def rename_inputs(parameters: RoadParameters, objects: Mapping[str, bpy.types.Object]) -> None:

@@ -14,6 +14,7 @@ from ...road.parameters import RoadParameters
 from ...road.section import Carriageway, LineMarking, Pavement
 from ...road.section_geometry import CarriagewaySection
 from ...road.things.guardrail import Guardrail
+from ...road.things.thing import Thing
 from ..compat import modifier_input
 from ..nodes.inputs import input_name
 from ..things.model_builder import named_fields
@@ -46,7 +47,7 @@ def edited_parameters(parameters: RoadParameters, objects: Mapping[str, bpy.type
         if role == "Road":
             changed |= dict(_edited_road_objects(parameters, item.modifiers[0]))
         elif name in parameters.objects and item.modifiers:
-            changed[name] = _edited_object(parameters.objects[name], item.modifiers[0])
+            changed[name] = edited_object(parameters.objects[name], item.modifiers[0])
     data = parameters.to_dict()
     for name, item in changed.items():
         data["objects"][name] = item.to_dict()
@@ -61,6 +62,13 @@ def carried_inputs(parameters: RoadParameters, role: str, modifier: bpy.types.No
     if item is None:
         return frozenset()
     return frozenset(_number_fields(item, modifier)) | (_BEAMS if isinstance(item, Guardrail) else frozenset())
+
+
+def read_inputs(parameters: RoadParameters, role: str, modifier: bpy.types.NodesModifier) -> frozenset[str]:
+    """Return the names of the inputs that are read back: those that are carried, and whole numbers that nobody sees."""
+    item = parameters.objects.get(_ROLES.get(role, role))
+    whole = _whole_fields(item, modifier) if item is not None else {}
+    return carried_inputs(parameters, role, modifier) | frozenset(whole)
 
 
 def _road_inputs(parameters: RoadParameters) -> Iterator[str]:
@@ -79,12 +87,23 @@ def _number_fields(item: RoadObject, modifier: bpy.types.NodesModifier) -> dict[
     return {name: field for name, field in fields.items() if isinstance(getattr(item, field), float)}
 
 
-def _edited_object(item: RoadObject, modifier: bpy.types.NodesModifier) -> RoadObject:
+def _whole_fields(item: RoadObject, modifier: bpy.types.NodesModifier) -> dict[str, str]:
+    """Return the inputs that are named as whole numbers and switches of an object, and those fields."""
+    if not isinstance(item, Thing):
+        return {}
+    fields = named_fields(item, modifier.node_group)
+    return {name: field for name, field in fields.items() if isinstance(getattr(item, field), int)}
+
+
+def edited_object(item: RoadObject, modifier: bpy.types.NodesModifier) -> RoadObject:
     """Return an object with the inputs that are named as its fields."""
     update: dict[str, Any] = {
         field: _input_value(getattr(item, field), modifier, name)
         for name, field in _number_fields(item, modifier).items()
     }
+    for name, field in _whole_fields(item, modifier).items():
+        kind, value = type(getattr(item, field)), modifier_input(modifier, name)
+        update[field] = value % 2**32 if field == "instance" else kind(value)
     if isinstance(item, Guardrail):
         left, right = (bool(modifier_input(modifier, name)) for name in _BEAM_OF_SIDE)
         update["faces"] = {(True, False): "left", (False, True): "right"}.get((left, right), "both")

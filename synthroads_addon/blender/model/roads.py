@@ -27,6 +27,8 @@ FRAME = "synthroads_frame"
 """Custom property of a road's root: map coordinates of the root's place when the road was built, m."""
 CHOSEN = "synthroads_chosen_road"
 """Property of a scene: the root of the road that is meant where the active object belongs to none."""
+BUILT_PARTS = "synthroads_built_parts"
+"""Custom property of a road's root: roles of all parts that were built, as JSON."""
 ROOT_NAME = "SynthRoads Road"
 _SIZE = 5.0
 """Size of the empty in the view, m."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from typing import Any
 
 import bpy
@@ -12,7 +11,7 @@ from ...base.errors import InputError
 from ...road.parameters import RoadParameters
 from ...scenario.scenario import Scenario
 from .older_files import PARAMETERS, adopt_older_roads
-from .roads import ROAD, parts_and_copies, renew_ids, road_meant, roots
+from .roads import parts_and_copies, renew_ids, road_meant, roots
 
 SCENARIO = "synthroads_scenario"
 BUILT_FROM = "synthroads_built_from"
@@ -48,31 +47,6 @@ def road_named(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object | N
     if name not in known:
         raise InputError("--road", name, f"must be one of {', '.join(known)}" if known else "the scene has no road")
     return known[name]
-
-
-@dataclass(frozen=True)
-class OpenRoad:
-    """A road in the open scene.
-
-    Attributes:
-        name: of its root.
-        road_id: its id.
-        parameters: what it was built from.
-    """
-
-    name: str
-    road_id: str
-    parameters: RoadParameters
-
-
-def open_road(name: str | None = None) -> OpenRoad | None:
-    """Return a road of the open scene, if there is one: by its root's name, or the one that is meant if None.
-
-    Raises:
-        InputError: no road has this name, or its parameter set is damaged.
-    """
-    root = road_named(bpy.context.scene, name)
-    return OpenRoad(root.name, str(root[ROAD]), recall_parameters(root)) if root else None
 
 
 def remember(root: bpy.types.Object, parameters: RoadParameters, scenario: Scenario, built_from: str) -> None:

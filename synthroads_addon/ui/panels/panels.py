@@ -13,6 +13,7 @@ from ..fields.room import buttons_row, draw_flag, draw_text, value_row
 from ..fields.sheets import SHEETS, Sheet, fields_of
 from ..work.build import SYNTHROADS_OT_build
 from ..work.common import Sidebar, column, large_button
+from ..work.edited import draw_edits
 from ..work.long_operator import draw_job
 from ..work.scan import SYNTHROADS_OT_scan, last_written
 from ..work.scan_steps import Written
@@ -74,6 +75,7 @@ class RoadPanel(SheetPanel):
             draw_text(layout, "Built by a command, not from these settings", "FILE")
         elif road and road.get(BUILT_FROM) != settings.road_values():
             draw_text(layout, "Changed since it was built", "INFO")
+        draw_edits(layout, context)
         if draw_job(layout):
             return
         text = "Rebuild Road" if road else "Build Road"

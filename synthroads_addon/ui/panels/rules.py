@@ -10,9 +10,9 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from ...base.errors import InputError
-from ...blender.model.read_back import edited_parameters
 from ...blender.model.roads import ROAD, road_of_id
-from ...blender.model.store import find_road, objects_of, recall_parameters
+from ...blender.model.store import find_road
+from ...blender.model.truth import read_road
 from ...blender.things.model_builder import ROLE
 from ...checking.checker import RULES, Violation, check
 from ...road.geometry import RoadGeometry
@@ -82,10 +82,11 @@ def road_now(scene: bpy.types.Scene, road: str = "") -> RoadParameters | None:
         road: its id; the road that the panels show if empty.
 
     Raises:
-        InputError: the set kept in the file is damaged, or an edited value is out of its limits.
+        InputError: the set kept in the file is damaged, an edited value is out of its limits, or the road's surface
+            was edited by hand.
     """
     root = road_of_id(scene, road) if road else find_road(scene)
-    return edited_parameters(recall_parameters(root), objects_of(root)) if root else None
+    return read_road(root, scene).known() if root else None
 
 
 def shown_id(scene: bpy.types.Scene) -> str:
@@ -351,8 +352,9 @@ def _brief(value: float) -> str:
 @persistent
 def _look_for_changes(scene: bpy.types.Scene, graph: bpy.types.Depsgraph | None = None) -> None:
     """Notice that the road may have been edited, built again or undone."""
-    changes = [update.id for update in graph.updates if update.is_updated_geometry] if graph else []
-    if graph is None or any(isinstance(item, bpy.types.Object) and ROLE in item for item in changes):
+    updates = graph.updates if graph else []
+    changes = [update.id for update in updates if update.is_updated_geometry or update.is_updated_transform]
+    if graph is None or any(isinstance(item, bpy.types.Object) and (ROLE in item or ROAD in item) for item in changes):
         checked.asked = True
         if checked.parameters is not None:
             redraw_sidebars(bpy.context)

@@ -7,10 +7,13 @@ import bpy
 
 from ...blender.model.build import MEANT, Place, RoadModel, build_steps
 from ...blender.model.roads import ROAD, choose_road
+from ...blender.model.settle import settle_steps
 from ...blender.model.store import find_road, recall, remember
+from ...blender.model.truth import EditedRoad, read_road
 from ...road.parameters import RoadParameters
 from ...sampling.road import sample_road
 from ...scenario.scenario import Scenario
+from .common import has_road, is_free
 from .job import Aside, PanelJob, Step, Work
 from .long_operator import LongOperator
 from .unseen import build_unseen
@@ -50,6 +53,36 @@ class SYNTHROADS_OT_build(LongOperator, bpy.types.Operator):
         if self._first and not bpy.app.background and isinstance(space, bpy.types.SpaceView3D):
             look_along(space, parameters)
         return f"Built {parameters.alignment.length:,.0f} m of road"
+
+
+class SYNTHROADS_OT_build_edited(LongOperator, bpy.types.Operator):
+    """Build the road again as it was edited, along its moved backbone, with copies as parts. Scans do it too"""
+
+    bl_idname = "synthroads.build_edited"
+    bl_label = "Build as Edited"
+    bl_options = {"UNDO"}  # noqa: RUF012 (Blender reads a plain set)
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        """There must be a road."""
+        return is_free(cls, context) and has_road(cls, context)
+
+    def job(self, context: bpy.types.Context) -> PanelJob[RoadModel]:
+        """Return the building of the shown road as it is edited now."""
+        root = find_road(context.scene)
+        assert root  # poll() has seen it
+        return PanelJob("Build", edited_work(str(root[ROAD]), read_road(root, context.scene)))
+
+    def succeed(self, context: bpy.types.Context, job: PanelJob[RoadModel]) -> str:
+        """Return how long the road is."""
+        assert job.result
+        return f"Built {recall(job.result.root)[0].alignment.length:,.0f} m of road as it was edited"
+
+
+def edited_work(road: str, edited: EditedRoad) -> Work[RoadModel]:
+    """Build a road again as it was edited; see `settle_steps`."""
+    yield Step(0.0, "Building")
+    return (yield from settle_steps(road, edited))
 
 
 def shown_place(scene: bpy.types.Scene) -> Place:

@@ -18,9 +18,11 @@ import bpy
 from ...base.files import output_folder
 from ...base.progress import StageTimer
 from ...blender.files import save_scene
-from ...blender.model.read_back import edited_parameters
+from ...blender.model.build import RoadModel
 from ...blender.model.roads import ROAD
-from ...blender.model.store import find_road, objects_of, recall
+from ...blender.model.settle import settle_steps
+from ...blender.model.store import find_road, recall
+from ...blender.model.truth import EditedRoad, read_road
 from ...blender.scene.evaluated import scanned_scene_steps
 from ...blender.services import SnapshotServices
 from ...jobs.generate import Job as PipelineJob
@@ -29,7 +31,6 @@ from ...jobs.job_files import JobFiles, empty_scan_warnings
 from ...jobs.scan.files import record_to_files
 from ...jobs.scan.plan import Site, check_scan
 from ...road.geometry import RoadGeometry
-from ...road.parameters import RoadParameters
 from ...scenario.scenario import OF_POINTS, Scenario
 from ..fields.preferences import with_preferences
 from .common import is_free
@@ -46,14 +47,14 @@ class RoadScan:
 
     Attributes:
         scenario: the road's and the scan's settings.
-        parameters: the road that the scene shows.
+        edited: the road that the scene shows.
         road_id: of that road.
         target: folder for the files.
         overwrite: replace files that are already there.
     """
 
     scenario: Scenario
-    parameters: RoadParameters
+    edited: EditedRoad
     road_id: str
     target: Path
     overwrite: bool
@@ -61,7 +62,7 @@ class RoadScan:
     @cached_property
     def road(self) -> RoadGeometry:
         """The road that the scene shows."""
-        return RoadGeometry(self.parameters)
+        return RoadGeometry(self.edited.parameters)
 
 
 _Measure: TypeAlias = Callable[[Report], dict[str, Any]]
@@ -78,6 +79,9 @@ def scan_work(scan: RoadScan) -> Work[Written]:
     check(PipelineJob(scenario, scan.target, overwrite=scan.overwrite))
     timer, renders = StageTimer(), scenario.may_render
     with output_folder(scan.target, JobFiles(scenario).names, scan.overwrite) as folder:
+        if scan.edited.stale and not scan.edited.lost:
+            yield Step(0.0, "Building")
+            yield from _no_share(settle_steps(scan.road_id, scan.edited))
         yield Step(0.0, "Reading")
         measure = yield from (_save_copy if renders else _read_open_scene)(scan, folder, timer)
         if "scene" in scenario.outputs:
@@ -95,7 +99,7 @@ def _save_copy(scan: RoadScan, folder: Path, timer: StageTimer) -> Generator[Ste
     """Save a copy of the open file; return what has another Blender scan it."""
     with timer.stage("scene copy"):
         saved = save_open_scene(
-            scan.scenario, folder, {"parameters": json.loads(scan.parameters.to_json()), "road": scan.road_id}
+            scan.scenario, folder, {"parameters": json.loads(scan.edited.parameters.to_json()), "road": scan.road_id}
         )
     yield Step(READ)
 
@@ -130,12 +134,19 @@ def _read_open_scene(scan: RoadScan, folder: Path, timer: StageTimer) -> Generat
     return measure
 
 
+def _no_share(steps: Generator[float | None, None, RoadModel]) -> Generator[Step | None, None, None]:
+    """Pass on the steps of building as no share of the whole."""
+    with closing(steps):
+        for share in steps:
+            yield None if share is None else Step(0.0)
+
+
 def _write_files(scan: RoadScan, folder: Path, timer: StageTimer, measure: Callable[[], dict[str, Any]]) -> int:
     """Write all files; return the number of points. Runs in a thread: it touches no data of Blender."""
     files = JobFiles(scan.scenario)
     files.write_road(folder, scan.road, timer)
     told: dict[str, Any] = {"counts": measure()} if set(files.outputs) & set(OF_POINTS) else {}
-    told["instances"] = scan.road.numbers.to_dict()
+    told |= {"instances": scan.road.numbers.to_dict()} | scan.edited.to_dict()
     if warnings := empty_scan_warnings(told.get("counts", {})):
         told["warnings"] = warnings
     files.write_report(folder, told, timer)
@@ -173,13 +184,21 @@ def requested_scan(context: bpy.types.Context) -> RoadScan:
     """Return what the panel's button scans; raise `InputError` if that can't be done."""
     settings, road = context.scene.synthroads, find_road(context.scene)
     assert road  # the operator has seen it
-    parameters, built = recall(road)
-    parameters = edited_parameters(parameters, objects_of(road))
+    _, built = recall(road)
+    edited = read_road(road, context.scene)
     shown = settings.scenario()
     # The road and its fidelity are those that it was built with.
     chosen = {name: getattr(shown, name) for name in ("scan", "colour", "cloud", "outputs", "twin", "materials_table")}
     scenario = with_preferences(built.model_copy(update=chosen))
-    return RoadScan(scenario, parameters, str(road[ROAD]), settings.folder(), settings.overwrite)
+    return RoadScan(_of_known(scenario, edited), edited, str(road[ROAD]), settings.folder(), settings.overwrite)
+
+
+def _of_known(scenario: Scenario, edited: EditedRoad) -> Scenario:
+    """Return what can be written of a road: no file of parameters where its surface was edited by hand."""
+    if not edited.lost:
+        return scenario
+    outputs = tuple(name for name in scenario.outputs if name not in ("parameters", "centerline"))
+    return scenario.model_copy(update={"outputs": outputs, "twin": ()})
 
 
 def requested_visible_scan(context: bpy.types.Context) -> VisibleScan:

@@ -11,7 +11,8 @@ from synthroads_addon.blender.compat import modifier_input, set_modifier_input
 from synthroads_addon.blender.model.build import RoadModel, build_road
 from synthroads_addon.blender.model.older_files import rename_inputs
 from synthroads_addon.blender.model.read_back import edited_parameters
-from synthroads_addon.blender.model.store import find_road, objects_of, open_road, recall
+from synthroads_addon.blender.model.store import find_road, objects_of, recall
+from synthroads_addon.blender.model.truth import open_road
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import load_scenario
@@ -83,7 +84,9 @@ def test_a_file_without_roots_opens_with_its_road_edited_built_and_read_back() -
     root = find_road(bpy.context.scene)
     assert root is not None
     parameters, scenario = recall(root)
-    assert parameters == opened.parameters
+    assert parameters == opened.edited.parameters
+    assert not opened.edited.by_hand
+    assert not opened.edited.stale
     objects = objects_of(root)
     assert set(objects) == {"Backbone", "Road", "rail-left", "rail-right"}
     assert edited_parameters(parameters, objects) == parameters

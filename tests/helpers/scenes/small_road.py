@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import tempfile
+from functools import cache
+from pathlib import Path
 from typing import Any
 
+import bpy
+import numpy as np
+
 from synthroads_addon.blender.model.build import RoadModel, build_road
-from synthroads_addon.blender.model.store import remember
+from synthroads_addon.blender.model.roads import origin_of
+from synthroads_addon.blender.model.store import find_road, objects_of, remember
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.scenario.scenario import load_scenario
 from tests.helpers.roads.furnished_data import road_data
 
 PARTS = ("road", "terrain", "guardrails", "signs", "delineators", "vehicles")
-TOLERANCE = 0.05
+SCENARIO = load_scenario("rq31-600m", ["fidelity=draft"])
+TOLERANCE = SCENARIO.settings().tolerance
 OBJECTS: dict[str, dict[str, Any]] = {
     "rail-left": {"type": "Guardrail", "start_station": 5.0, "end_station": 30.0, "offset": 14.9, "faces": "right"},
     "rail-right": {"type": "Guardrail", "start_station": 10.0, "end_station": 45.0, "offset": -14.9, "faces": "left"},
@@ -32,5 +40,22 @@ def build_small(parameters: RoadParameters | None = None, **further: Any) -> Roa
     """Build a short road in the current scene, and keep what it was built from."""
     parameters = parameters or small_parameters()
     model = build_road(parameters, TOLERANCE, 0.0, further.pop("parts", PARTS), **further)
-    remember(getattr(model, "root", model.collection), parameters, load_scenario("rq31-600m", ["fidelity=draft"]), "")
+    remember(getattr(model, "root", model.collection), parameters, SCENARIO, "")
     return model
+
+
+@cache
+def _small_file() -> Path:
+    """Return a file with a short road, which is built once: to open it is much faster."""
+    file = Path(tempfile.mkdtemp(prefix="synthroads-test-")) / "small.blend"
+    build_small()
+    bpy.ops.wm.save_as_mainfile(filepath=str(file))
+    return file
+
+
+def open_small() -> RoadModel:
+    """Return a short road in a file of its own, whose scene is the current one then."""
+    bpy.ops.wm.open_mainfile(filepath=str(_small_file()))
+    root = find_road(bpy.context.scene)
+    assert root is not None
+    return RoadModel(root, root.users_collection[0], objects_of(root), np.array(origin_of(root)))

@@ -1,0 +1,163 @@
+"""Edits of a road's parts that no parameter says: found by what each part was when it was built.
+
+A part is one modifier with a node group on a mesh that Python made. It can be moved, turned about the vertical, and its
+inputs changed; all else (further or applied modifiers, another mesh, a scale, a tilt, inputs that are no field) makes
+its shape its own: it is *edited by hand*.
+"""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...road.objects import PointObject
+from ...road.things.beacon import ConstructionBeacon
+from ...road.things.delineator import Delineator
+from ..compat import identified_input
+
+Float = NDArray[np.float64]
+
+POSTS: dict[str, type[PointObject]] = {"Delineators": Delineator, "Beacons": ConstructionBeacon}
+"""Roles of parts that hold many things, a vertex each."""
+BUILT = "synthroads_built"
+"""Custom property of a part: what its mesh and its inputs were when it was built, as JSON."""
+UPRIGHT = 1e-5
+"""Largest tilt, scale less 1, or shear that counts as none."""
+_KINDS = ("NodeSocketFloat", "NodeSocketInt", "NodeSocketBool")
+
+
+@dataclass(frozen=True)
+class HandEdit:
+    """A part that was edited by hand: known by its points alone, no longer by parameters.
+
+    Attributes:
+        part: what it was in the road.
+        name: of its object now.
+        reason: what was done to it, in words.
+    """
+
+    part: str
+    name: str
+    reason: str
+
+    def to_dict(self) -> dict[str, str]:
+        """Return it as JSON data."""
+        return {"part": self.part, "object": self.name, "reason": self.reason}
+
+
+def keep_built(item: bpy.types.Object) -> None:
+    """Keep what a part's mesh and inputs are, to find later what was edited."""
+    modifier = own_modifier(item)
+    inputs = {} if modifier is None else dict(_numbers(modifier))
+    item[BUILT] = json.dumps({"mesh": mesh_digest(item), "inputs": inputs})
+
+
+def own_modifier(item: bpy.types.Object) -> bpy.types.NodesModifier | None:
+    """Return the modifier of a part's node group, if it is there and the only one."""
+    if len(item.modifiers) != 1:
+        return None
+    modifier = item.modifiers[0]
+    return modifier if modifier.type == "NODES" and modifier.node_group is not None else None
+
+
+def mesh_digest(item: bpy.types.Object) -> str:
+    """Return a text that tells an object's own mesh from other ones; empty for an object without."""
+    if not isinstance(item.data, bpy.types.Mesh):
+        return ""
+    places = vertices_of(item.data).astype(np.float32)
+    return f"{len(places)}:{len(item.data.polygons)}:{zlib.crc32(places.tobytes())}"
+
+
+def vertices_of(mesh: bpy.types.Mesh) -> Float:
+    """Return a mesh's vertices (V, 3)."""
+    flat = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get("co", flat)
+    return flat.reshape(-1, 3).astype(np.float64)
+
+
+def attribute_of(mesh: bpy.types.Mesh, name: str, default: float = 0.0) -> NDArray[Any]:
+    """Return a number for each vertex (V,); the default where the mesh has no such attribute."""
+    attribute = mesh.attributes.get(name)
+    if attribute is None or attribute.domain != "POINT" or attribute.data_type not in ("FLOAT", "INT"):
+        return np.full(len(mesh.vertices), default)
+    values = np.empty(len(mesh.vertices), np.int32 if attribute.data_type == "INT" else np.float32)
+    attribute.data.foreach_get("value", values)
+    return values
+
+
+def _numbers(modifier: bpy.types.NodesModifier) -> Iterator[tuple[str, float]]:
+    for socket in modifier.node_group.interface.items_tree:
+        if socket.item_type == "SOCKET" and socket.in_out == "INPUT" and socket.socket_type in _KINDS:
+            yield socket.name, identified_input(modifier, socket.identifier)
+
+
+def built_state(item: bpy.types.Object) -> dict[str, Any]:
+    """Return what was kept of a part when it was built; nothing for a part of an older version."""
+    try:
+        state = json.loads(item.get(BUILT, "{}"))
+    except (TypeError, ValueError):
+        return {}
+    return state if isinstance(state, dict) else {}
+
+
+def mesh_edited(item: bpy.types.Object) -> bool:
+    """Return whether a part's own mesh is no longer the one that was built."""
+    return built_state(item).get("mesh", "") not in ("", mesh_digest(item))
+
+
+def shape_reason(item: bpy.types.Object, carried: Collection[str], keeps_mesh: bool, grouped: bool = True) -> str:
+    """Return what was done to a part's shape that no parameter says; empty if nothing.
+
+    Args:
+        item: the part.
+        carried: its inputs that are read back.
+        keeps_mesh: its mesh must be the one that was built.
+        grouped: it has a modifier with a node group.
+    """
+    if not grouped:
+        return "it has modifiers" if item.modifiers else ""
+    if not item.modifiers:
+        return "its modifier was applied or removed"
+    modifier = own_modifier(item)
+    if modifier is None:
+        return "it has other modifiers: " + ", ".join(other.name for other in item.modifiers)
+    if not (modifier.show_viewport and modifier.show_render):
+        return "its modifier is switched off"
+    if keeps_mesh and mesh_edited(item):
+        return "its mesh was edited"
+    before = built_state(item).get("inputs", {})
+    changed = [name for name, value in _numbers(modifier) if name not in carried and before.get(name, value) != value]
+    return f"its inputs {', '.join(changed)} are no fields of the parameter set" if changed else ""
+
+
+def place_reason(place: Float, scalable: bool = False) -> str:
+    """Return what in a part's place (4, 4) no parameter says; empty if nothing.
+
+    Args:
+        place: in its road's frame.
+        scalable: it may be larger or smaller as a whole.
+    """
+    turn = place[:3, :3]
+    size = np.linalg.norm(turn, axis=0)
+    if not np.isfinite(place).all() or size.min() < 1e-6:
+        return "it is scaled to nothing"
+    if scalable:
+        turn, size = turn / size.mean(), size / size.mean()
+    if np.abs(size - 1.0).max() > UPRIGHT or np.abs(turn.T @ turn - np.eye(3)).max() > 2.0 * UPRIGHT:
+        shown = " × ".join(f"{value:.4g}" for value in np.linalg.norm(place[:3, :3], axis=0))
+        return f"it is scaled ({shown})"
+    if abs(turn[2, 2] - 1.0) > UPRIGHT or np.abs(turn[2, :2]).max() > UPRIGHT:
+        return "it is mirrored" if np.linalg.det(turn) < 0.0 else "it is tilted"
+    return "it is mirrored" if np.linalg.det(turn) < 0.0 else ""
+
+
+def turn_of(place: Float) -> float:
+    """Return the turn about the vertical (rad) of an upright place (4, 4)."""
+    return float(np.arctan2(place[1, 0], place[0, 0]))

@@ -1,0 +1,186 @@
+"""Where a road's things are now: from the places of their objects back to station, offset, elevation and rotation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...road.geometry import RoadGeometry
+from ...road.lane_lines import LaneLine
+from ...road.objects import LineObject, PointObject
+from ...road.section import Carriageway
+from ...road.surroundings import Vehicle
+from ...road.terrain import surface_elevation
+from ...road.things.asset import Asset
+from ...road.things.gantry import Gantry
+from ...road.things.overpass import Overpass
+from ..things.meshes import on_plan
+from ..things.vehicle.vehicle import vehicle_place
+from .edits import turn_of, vertices_of
+
+Float = NDArray[np.float64]
+
+PLACED = "synthroads_placed"
+"""Custom property of what runs along the road: how far (x, y) its object's move is in its inputs already, m."""
+STILL = 2e-4
+"""Moves of less are none, m; objects' places have 32 bits."""
+_TURNED = 1e-5
+_LANE = 1.9
+"""So far beside the middle of a lane a vehicle is still put on it, m."""
+
+
+class Lost(Exception):
+    """A part is where no parameter can say it; its text says where."""
+
+
+@dataclass(frozen=True)
+class Axes:
+    """A road's geometry before and after edits of its axis.
+
+    Attributes:
+        before: what it was built from.
+        now: what it is, without other edits.
+    """
+
+    before: RoadGeometry
+    now: RoadGeometry
+
+    def located(self, point: Float) -> tuple[float, float]:
+        """Return station and offset of a local point; raise `Lost` where there is no road."""
+        station, offset = (float(value[0]) for value in self.now.alignment.project(point[None, :2]))
+        if not -1e-6 <= station <= self.now.length + 1e-6:
+            raise Lost("it stands beyond the road's ends")
+        if abs(offset) > 100.0:
+            raise Lost(f"it stands {abs(offset):.0f} m beside the axis")
+        return round(min(max(station, 0.0), self.now.length), 6), round(offset, 6)
+
+    def turned(self, before: float, now: float) -> float:
+        """Return by how much (deg) the heading at a station was more than it is at another one."""
+        was, being = self.before.alignment.heading(before), self.now.alignment.heading(now)
+        return float(np.rad2deg(was - being))
+
+
+def point_update(axes: Axes, item: PointObject, vertex: Float, place: Float) -> dict[str, Any]:
+    """Return what changed of a thing that a vertex stands for; nothing if it wasn't moved.
+
+    It is on the surface wherever it is in plan: its height in the scene says nothing.
+
+    Args:
+        axes: the road's.
+        item: the thing.
+        vertex: (3,) of its mesh.
+        place: (4, 4) of its object in the road's frame; upright.
+    """
+    expected = on_plan(axes.before, [item])[0]
+    point = place[:3, :3] @ vertex + place[:3, 3]
+    turn = turn_of(place)
+    if np.hypot(*(point - expected)[:2]) < STILL and abs(turn) < _TURNED:
+        return {}
+    station, offset = axes.located(point)
+    return {"station": station, "offset": offset, "rotation_deg": _turned(axes, item, station, turn)}
+
+
+def _turned(axes: Axes, item: PointObject, station: float, turn: float) -> float:
+    rotation = item.rotation_deg + float(np.rad2deg(turn)) + axes.turned(item.station, station)
+    return round((rotation + 180.0) % 360.0 - 180.0, 9)
+
+
+def standing_update(axes: Axes, item: Gantry | Overpass, place: Float) -> dict[str, Any]:
+    """Return what changed of a structure whose object stands where it stands, with all that is counted from it."""
+    expected = on_plan(axes.before, [item])[0]
+    rotation = item.rotation_deg if isinstance(item, Gantry) else 0.0
+    heading = float(axes.before.alignment.heading(item.station)) - np.pi / 2.0 + np.deg2rad(rotation)
+    turn = _wrapped(turn_of(place) - heading)
+    if np.hypot(*(place[:3, 3] - expected)[:2]) < STILL and abs(turn) < _TURNED:
+        return {}
+    station, offset = axes.located(place[:3, 3])
+    shift = offset - item.offset
+    update: dict[str, Any] = {"station": station, "offset": offset}
+    update["rotation_deg"] = _turned(axes, item, station, turn)
+    if isinstance(item, Gantry):
+        ends = ("left_offset", "right_offset")
+        signs = [sign.model_copy(update={"offset": round(sign.offset + shift, 6)}) for sign in item.signs]
+        update["signs"] = tuple(signs)
+    else:
+        ends = ("left_abutment", "right_abutment")
+        update["pier_offsets"] = tuple(round(pier + shift, 6) for pier in item.pier_offsets)
+        update["rotation_deg"] = round(item.rotation_deg + float(np.rad2deg(turn)), 9)
+    return update | {name: round(getattr(item, name) + shift, 6) for name in ends}
+
+
+def asset_update(axes: Axes, item: Asset, place: Float) -> dict[str, Any]:
+    """Return what changed of an asset: its place in all three directions, its turn, its size."""
+    expected = on_plan(axes.before, [item])[0]
+    expected[2] = _surface(axes.before, item.station, item.offset) + item.elevation
+    heading = float(axes.before.alignment.heading(item.station)) - np.pi / 2.0 + np.deg2rad(item.rotation_deg)
+    scale = float(np.cbrt(abs(np.linalg.det(place[:3, :3]))))
+    turn = _wrapped(turn_of(place) - heading)
+    update: dict[str, Any] = {}
+    if abs(scale / item.scale - 1.0) > 1e-5:
+        update["scale"] = round(scale, 6)
+    if np.linalg.norm(place[:3, 3] - expected) >= STILL or abs(turn) >= _TURNED:
+        station, offset = axes.located(place[:3, 3])
+        elevation = float(place[2, 3]) - _surface(axes.now, station, offset)
+        update |= {"station": station, "offset": offset, "elevation": round(elevation, 6)}
+        update["rotation_deg"] = _turned(axes, item, station, turn)
+    return update
+
+
+def _surface(geometry: RoadGeometry, station: float, offset: float) -> float:
+    return float(surface_elevation(geometry, np.array([station]), np.array([offset]))[0])
+
+
+def line_update(axes: Axes, item: LineObject, part: bpy.types.Object, place: Float) -> dict[str, Any]:
+    """Return what changed of a thing that runs along the road: its middle's move, along and across the road.
+
+    Its shape follows the road whatever its object's place is. A move over an end of the road stops there.
+
+    Args:
+        axes: the road's.
+        item: the thing, with its inputs.
+        part: its object.
+        place: (4, 4) of that in the road's frame; upright.
+    """
+    shift = place[:2, 3] - np.array(part.get(PLACED, (0.0, 0.0)))
+    if np.hypot(*shift) < STILL:
+        return {}
+    end = min(item.end_station, axes.now.length)
+    middle, offset = (item.start_station + end) / 2.0, item.offset
+    there = axes.now.alignment.place(np.array([middle]), np.array([offset]))[0]
+    found = axes.now.alignment.project((there + shift)[None])
+    along, across = float(found[0][0]) - middle, float(found[1][0]) - offset
+    if abs(offset + across) > 100.0:
+        raise Lost(f"it stands {abs(offset + across):.0f} m beside the axis")
+    along = float(np.clip(along, -item.start_station, max(axes.now.length - end, 0.0)))
+    moved = {"start_station": item.start_station + along, "end_station": end + along, "offset": offset + across}
+    if hasattr(item, "end_offset"):
+        moved["end_offset"] = item.end_offset + across
+    return {name: round(value, 6) for name, value in moved.items()}
+
+
+def vehicle_update(axes: Axes, item: Vehicle, part: bpy.types.Object, place: Float) -> dict[str, Any]:
+    """Return what changed of a vehicle: it is in the middle of the lane that it was put on."""
+    before = axes.before.parameters
+    line = LaneLine(axes.before, before.carriageway_of(item), item.lane)
+    expected = on_plan(axes.before, [vehicle_place(line, item)])[0]
+    point = place[:3, :3] @ vertices_of(part.data)[0] + place[:3, 3]
+    if np.hypot(*(point - expected)[:2]) < STILL and abs(turn_of(place)) < _TURNED:
+        return {}
+    station, offset = axes.located(point)
+    lanes = [
+        (abs(offset - float(LaneLine(axes.now, carriageway, lane).offset(np.array(station)))), name, lane)
+        for name, carriageway in axes.now.parameters.of_type(Carriageway).items()
+        for lane in range(len(carriageway.lanes))
+    ]
+    beside, name, lane = min(lanes)
+    if beside > _LANE:
+        raise Lost(f"it stands {beside:.1f} m beside the next lane's middle")
+    return {"station": station, "carriageway": name, "lane": lane}
+
+
+def _wrapped(angle: float) -> float:
+    return float((angle + np.pi) % (2.0 * np.pi) - np.pi)

@@ -1,0 +1,113 @@
+"""A scene is made to show its edited road: what runs along the road is moved there, or the road is built again."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Generator
+from functools import lru_cache
+
+import bpy
+import numpy as np
+
+from ...base.errors import InputError
+from ...road.geometry import RoadGeometry
+from ...road.objects import LineObject
+from ..compat import set_modifier_input
+from ..nodes.inputs import input_name
+from ..things.model_builder import ROLE
+from .build import Place, RoadModel, build_steps
+from .edits import own_modifier, place_reason
+from .older_files import PARAMETERS
+from .places import PLACED, Axes, Lost, line_update
+from .read_back import edited_object
+from .roads import NAME, OF_ROAD, parts_and_copies, road_of_id, root_of, world_matrix
+from .store import BUILT_FROM, recall, recall_parameters, remember
+from .truth import BY_HAND, EditedRoad
+
+
+def settle_steps(road: str, edited: EditedRoad) -> Generator[float | None, None, RoadModel]:
+    """Build an edited road again in its place, in steps as `build_steps`; return the model.
+
+    Copies become parts of their own. Parts that were edited by hand stay as they are, as bodies of the user's that hang
+    on the road's root.
+
+    Args:
+        road: its id.
+        edited: what was read of it.
+
+    Raises:
+        InputError: the road as a whole isn't known, or can't be built; the scene is as it was.
+    """
+    parameters, scene = edited.known(), bpy.context.scene
+    root = road_of_id(scene, road)
+    assert root is not None
+    _, scenario = recall(root)
+    built_from, settings = str(root.get(BUILT_FROM, "")), scenario.settings()
+    parts, copies = parts_and_copies(root, scene)
+    names = {item.name for item in (*parts.values(), *copies)}
+    kept = {edit.name: edit for edit in edited.by_hand if edit.name in names}
+    copied = frozenset(item.name for item in copies) - set(kept)
+    place = Place(road, keep_moves=False, keeps=frozenset(kept), drops=copied)
+    model = yield from build_steps(parameters, settings.tolerance, settings.vegetation_detail, place=place)
+    for name, edit in kept.items():
+        _release(bpy.data.objects[name], edit.part, edit.reason)
+    remember(model.root, parameters, scenario, built_from)
+    return model
+
+
+def settle(road: str, edited: EditedRoad) -> RoadModel:
+    """Do what `settle_steps` does at once."""
+    steps = settle_steps(road, edited)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as end:
+            model: RoadModel = end.value
+            bpy.context.view_layer.update()
+            return model
+
+
+def _release(item: bpy.types.Object, part: str, reason: str) -> None:
+    """Make a part that was edited by hand a body of the user's; it keeps its class, and loses its number."""
+    modifier = own_modifier(item)
+    if modifier is not None and modifier.node_group.interface.items_tree.get("Instance") is not None:
+        set_modifier_input(modifier, "Instance", 0)
+    item[BY_HAND] = json.dumps([part, reason])
+    for key in (ROLE, OF_ROAD, NAME):
+        if key in item:
+            del item[key]
+
+
+def move_line(item: bpy.types.Object, scene: bpy.types.Scene) -> bool:
+    """Move what runs along a road to where its object was moved; return whether it moved.
+
+    Such a thing's shape follows the road whatever its object's place is, so that a move shows nothing by itself. Only
+    this object changes: an undo of its move undoes this too.
+    """
+    root, modifier = root_of(item, scene), own_modifier(item)
+    if ROLE not in item or root is None or modifier is None or item.library is not None or PARAMETERS not in root:
+        return False
+    axes = _axes(str(root[PARAMETERS]))
+    thing = axes.before.parameters.objects.get(str(item[ROLE])) if axes else None
+    place = np.linalg.inv(world_matrix(root)) @ world_matrix(item)
+    if axes is None or not isinstance(thing, LineObject) or place_reason(place):
+        return False
+    try:
+        update = line_update(axes, edited_object(thing, modifier), item, place)  # type: ignore[arg-type]
+    except Lost:
+        return False
+    for field, value in update.items():
+        set_modifier_input(modifier, input_name(field), value)
+    if update:
+        item[PLACED] = place[:2, 3].tolist()
+    return bool(update)
+
+
+@lru_cache(maxsize=4)
+def _axes(text: str) -> Axes | None:
+    """Return the axes of a road by its kept parameter set; None if that is damaged."""
+    try:
+        geometry = RoadGeometry(recall_parameters({PARAMETERS: text}))  # it reads this key only
+    except InputError:
+        return None
+    return Axes(geometry, geometry)

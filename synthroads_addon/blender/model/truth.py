@@ -1,0 +1,427 @@
+"""The road that a scene shows now: the parameter set that it was built from, with everything read back that was edited.
+
+Parts were moved, turned, deleted, copied, their inputs changed, the backbone's points moved, the whole road moved: all
+that is read back exactly. What no parameter can say makes a part *edited by hand*: it is out of the parameter set, and
+what is scanned of it is a foreign body with its class.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import bpy
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.errors import InputError
+from ...fitting.fit import AxisFit
+from ...road.geometry import RoadGeometry
+from ...road.instances import InstanceNumbers
+from ...road.objects import LineObject, PointObject, RoadObject
+from ...road.parameters import RoadParameters
+from ...road.section import Arrow, Hatching
+from ...road.surroundings import Terrain, Vegetation, Vehicle
+from ...road.things.asset import Asset
+from ...road.things.gantry import Gantry
+from ...road.things.overpass import Overpass
+from ..things.model_builder import ROLE
+from .axis_edits import EditedAxis, edited_axis, moved_alignment
+from .edits import (
+    POSTS,
+    HandEdit,
+    attribute_of,
+    mesh_edited,
+    own_modifier,
+    place_reason,
+    shape_reason,
+    turn_of,
+    vertices_of,
+)
+from .places import Axes, Lost, asset_update, line_update, point_update, standing_update, vehicle_update
+from .read_back import edited_object, edited_parameters, read_inputs
+from .roads import BUILT_PARTS, ROAD, displacement, origin_of, parts_and_copies, root_above, world_matrix
+from .store import recall_parameters, road_named
+
+Float = NDArray[np.float64]
+
+BY_HAND = "synthroads_by_hand"
+"""Custom property of what was a part until it was edited by hand and the road built again: part and reason, as JSON."""
+_PAINT = "Painted Areas"
+_SURFACE = ("Road", "Backbone")
+"""Roles without which there is no road."""
+
+
+@dataclass(frozen=True)
+class EditedRoad:
+    """A road as its scene shows it.
+
+    Attributes:
+        parameters: what is known of it; of a road whose surface was edited by hand, what was known before.
+        by_hand: parts that were edited by hand.
+        lost: why nothing is known of the road as a whole; empty if it is known.
+        stale: why the scene must be built again before it shows the parameters to the millimetre; empty if it does.
+        axis: how the moved points of the backbone lie to the axis that was fitted to them; None if none were moved.
+    """
+
+    parameters: RoadParameters
+    by_hand: tuple[HandEdit, ...] = ()
+    lost: str = ""
+    stale: tuple[str, ...] = ()
+    axis: AxisFit | None = None
+
+    def known(self) -> RoadParameters:
+        """Return the parameter set; raise `InputError` if the road as a whole isn't known."""
+        if self.lost:
+            raise InputError("Road", None, f"its surface was edited by hand ({self.lost}): no parameter set says it")
+        return self.parameters
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what a report says of the edits, as JSON data; nothing if there is nothing to say."""
+        told: dict[str, Any] = {}
+        if self.by_hand:
+            told["edited_by_hand"] = [edit.to_dict() for edit in self.by_hand]
+        if self.axis is not None:
+            told["axis_fit"] = {"horizontal": self.axis.horizontal.to_dict(), "height": self.axis.height.to_dict()}
+        return told
+
+
+def read_road(root: bpy.types.Object, scene: bpy.types.Scene | None = None) -> EditedRoad:
+    """Return a road as a scene shows it now; nothing in the scene changes.
+
+    Args:
+        root: of the road.
+        scene: that it is in; the current one if None.
+
+    Raises:
+        InputError: its kept parameter set is damaged, a value is out of its field's limits, or no road runs through
+            the backbone's points.
+    """
+    reading = _Reading(root, scene or bpy.context.scene)
+    return reading.result()
+
+
+@dataclass(frozen=True)
+class OpenRoad:
+    """A road in the open scene.
+
+    Attributes:
+        name: of its root.
+        road_id: its id.
+        edited: the road as the scene shows it.
+    """
+
+    name: str
+    road_id: str
+    edited: EditedRoad
+
+
+def open_road(name: str | None = None) -> OpenRoad | None:
+    """Return a road of the open scene, if there is one: by its root's name, or the one that is meant if None.
+
+    Raises:
+        InputError: no road has this name; or as `read_road`.
+    """
+    root = road_named(bpy.context.scene, name)
+    return OpenRoad(root.name, str(root[ROAD]), read_road(root)) if root else None
+
+
+@dataclass
+class _Reading:
+    """One reading of a road.
+
+    Attributes:
+        by_hand: parts that were found to be edited by hand.
+        stale: why the scene doesn't show the parameters.
+    """
+
+    root: bpy.types.Object
+    scene: bpy.types.Scene
+    by_hand: list[HandEdit] = field(default_factory=list)
+    stale: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self._base = recall_parameters(self.root)
+        self._parts, self._copies = parts_and_copies(self.root, self.scene)
+        self._into = np.linalg.inv(world_matrix(self.root))
+        self._ids = {"Terrain": next(iter(self._base.of_type(Terrain)), "")}
+
+    def result(self) -> EditedRoad:
+        """Return the road."""
+        self.by_hand += _released(self.root, self.scene)
+        if lost := self._lost():
+            self.by_hand.append(HandEdit("Road", self.root.name, lost))
+            return EditedRoad(self._base, tuple(self.by_hand), lost)
+        shown = {role: item for role, item in self._parts.items() if role not in (*_SURFACE, "Ground")}
+        fine = {role: item for role, item in shown.items() if self._is_fine(role, item)}
+        fine |= {role: self._parts[role] for role in _SURFACE if role in self._parts}
+        parameters = edited_parameters(self._base, fine)
+        before = RoadGeometry(self._base)
+        backbone = self._parts.get("Backbone")
+        axis = edited_axis(before, backbone, self._place(backbone)) if backbone else None
+        if axis is not None:
+            self.stale.append("its axis was changed")
+            parameters = _on_axis(parameters, axis)
+        axes = Axes(before, RoadGeometry(parameters) if axis is not None else before)
+        objects = dict(self._moved(parameters, axes, fine))
+        objects |= self._copied(parameters, objects, axes)
+        data = parameters.to_dict() | {"objects": {name: item.to_dict() for name, item in objects.items()}}
+        whole = self._placed(RoadParameters.from_dict(data))
+        if not self.stale and InstanceNumbers(whole).parts != _kept_numbers(self._base, whole):
+            self.stale.append("numbers of dashes and plants follow from the objects that there are")
+        return EditedRoad(whole, tuple(self.by_hand), "", tuple(self.stale), axis.fit if axis else None)
+
+    def _place(self, item: bpy.types.Object) -> Float:
+        """Return an object's place (4, 4) in the road's frame."""
+        place = self._into @ world_matrix(item)
+        return np.eye(4) if np.allclose(place, np.eye(4), rtol=0.0, atol=1e-9) else place
+
+    def _lost(self) -> str:
+        """Return why the road as a whole isn't known; empty if it is."""
+        if reason := place_reason(displacement(self.root)):
+            return reason
+        for role in _SURFACE:
+            if role in self._parts:
+                if reason := self._reason(role, self._parts[role]):
+                    return f"{role}: {reason}"
+            elif role in self._built():
+                return f"{role} was deleted"
+        details = (role for role in self._built() if role.endswith(" Detail"))
+        for role in details:
+            if role not in self._parts:
+                return f"{role} was deleted"
+            if reason := self._reason(role, self._parts[role]):
+                return f"{role}: {reason}"
+        return ""
+
+    def _built(self) -> list[str]:
+        """Return the roles of all parts that were built."""
+        try:
+            return [str(role) for role in json.loads(self.root.get(BUILT_PARTS, "[]"))]
+        except (TypeError, ValueError):
+            return []
+
+    def _is_fine(self, role: str, item: bpy.types.Object) -> bool:
+        """Return whether a part is what its parameters say; note it if it was edited by hand."""
+        reason = self._reason(role, item)
+        if not reason and role == "Terrain" and "Ground" in self._built():
+            ground = self._parts.get("Ground")
+            reason = "its ground was deleted" if ground is None else self._reason("Ground", ground)
+        if reason:
+            self.by_hand.append(HandEdit(role, item.name, reason))
+        return not reason
+
+    def _reason(self, role: str, item: bpy.types.Object) -> str:
+        """Return what was done to a part that no parameter says; empty if nothing."""
+        thing = self._base.objects.get(role)
+        modifier = own_modifier(item)
+        carried = read_inputs(self._base, role, modifier) if modifier is not None else frozenset()
+        grouped = item.type == "MESH" and role not in ("Backbone", "Ground") and not role.endswith(" Detail")
+        points = role in POSTS or isinstance(thing, Vehicle) or _on_a_vertex(thing)
+        reason = shape_reason(item, carried, not points and role != "Backbone", grouped)
+        if not reason and not grouped and role != "Backbone" and mesh_edited(item):
+            reason = "its mesh was edited"
+        if not reason and points and role not in POSTS and len(item.data.vertices) != 1:
+            reason = "its mesh was edited"
+        return reason or place_reason(self._place(item), isinstance(thing, Asset))
+
+    def _moved(
+        self, parameters: RoadParameters, axes: Axes, fine: dict[str, bpy.types.Object]
+    ) -> Iterator[tuple[str, RoadObject]]:
+        """Yield the objects that are still there and known, where they are now."""
+        gone = self._gone(fine)
+        for name, item in parameters.objects.items():
+            if name in gone:
+                continue
+            role = next((role for role, known in self._ids.items() if known == name), name)
+            if role in fine:
+                updated = self._updated(item, self._base.objects[name], fine[role], axes)
+                if updated is None:
+                    continue
+                yield name, updated
+            else:
+                yield name, item
+        for role, kind in POSTS.items():
+            if role in fine:
+                yield from self._posts(parameters, axes, fine[role], kind)
+
+    def _gone(self, fine: dict[str, bpy.types.Object]) -> set[str]:
+        """Return the ids of what was deleted or edited by hand, and of what can't be without it."""
+        roles = {role for role in (*self._built(), *self._parts) if role not in fine}
+        gone = {self._ids.get(role, role) for role in roles} & set(self._base.objects)
+        if self._ids["Terrain"] in gone:
+            gone |= set(self._base.of_type(Vegetation))
+            self.stale.append("the ground is gone")
+        if _PAINT in roles:
+            gone |= set(self._base.of_type(Hatching)) | set(self._base.of_type(Arrow))
+        for role, kind in POSTS.items():
+            if role in self._built() or role in self._parts:
+                gone |= set(self._base.of_type(kind))  # those that are there come back with their vertices
+        return gone | self._without_face(fine, gone)
+
+    def _without_face(self, fine: dict[str, bpy.types.Object], gone: set[str]) -> set[str]:
+        """Return gantries whose signs have lost their faces; each is noted."""
+        found: set[str] = set()
+        for role in [*self._built(), *self._parts]:
+            owner = role.partition("/")[0]
+            if "/" in role and role not in fine and owner in fine and owner not in gone | found:
+                found.add(owner)
+                done = "edited" if role in self._parts else "deleted"
+                self.by_hand.append(HandEdit(owner, fine[owner].name, f"{role} was {done}"))
+        return found
+
+    def _updated(self, item: RoadObject, before: RoadObject, part: bpy.types.Object, axes: Axes) -> RoadObject | None:
+        """Return an object where its part is now; None, and a note, if no parameter says it."""
+        place = self._place(part)
+        try:
+            update, stale = _update(item, before, part, place, axes)
+        except Lost as lost:
+            self.by_hand.append(HandEdit(role_of(part), part.name, str(lost)))
+            return None
+        if update and stale:
+            self.stale.append(f"{part.name} was moved")
+        return item.model_copy(update=update) if update else item
+
+    def _posts(
+        self, parameters: RoadParameters, axes: Axes, part: bpy.types.Object, kind: type[PointObject]
+    ) -> Iterator[tuple[str, RoadObject]]:
+        """Yield the things that the vertices of one object stand for."""
+        known = {item.instance: name for name, item in self._base.of_type(kind).items()}
+        place, vertices = self._place(part), vertices_of(part.data)
+        numbers = attribute_of(part.data, "instance", -1).astype(np.int64) % 2**32
+        seen: set[str] = set()
+        for vertex, number in zip(vertices, numbers.tolist(), strict=True):
+            name = known.get(number)
+            if name is None or name in seen:
+                self.by_hand.append(HandEdit(name or role_of(part), part.name, "a vertex was added"))
+                continue
+            seen.add(name)
+            item, before = parameters.objects[name], self._base.objects[name]
+            assert isinstance(before, PointObject)
+            try:
+                yield name, item.model_copy(update=point_update(axes, before, vertex, place))
+            except Lost as lost:
+                self.by_hand.append(HandEdit(name, part.name, str(lost)))
+
+    def _copied(self, parameters: RoadParameters, objects: dict[str, RoadObject], axes: Axes) -> dict[str, RoadObject]:
+        """Return what copies of parts stand for, with ids and numbers of their own."""
+        found: dict[str, RoadObject] = {}
+        largest = max(item.instance for item in self._base.objects.values())
+        for copy in sorted(self._copies, key=lambda item: item.name_full):
+            role = role_of(copy)
+            before = self._base.objects.get(role)
+            if before is None or isinstance(before, Vegetation | Terrain):
+                self.by_hand.append(HandEdit(role, copy.name, "it is a copy of a part that there is once"))
+                continue
+            if reason := self._reason(role, copy):
+                self.by_hand.append(HandEdit(role, copy.name, reason))
+                continue
+            item = parameters.objects[role]
+            if (modifier := own_modifier(copy)) is not None:
+                item = edited_object(item, modifier)
+            updated = self._updated(item, before, copy, axes)
+            if updated is None:
+                continue
+            name = _free_name(role, {*self._base.objects, *found})
+            found[name] = updated.model_copy(update={"instance": largest + 1 + len(found)})
+            self.stale.append(f"{copy.name} is a copy")
+        return found
+
+    def _placed(self, parameters: RoadParameters) -> RoadParameters:
+        """Return the road moved and turned as its root was."""
+        moved = displacement(self.root)
+        if np.array_equal(moved, np.eye(4)):
+            return parameters
+        world = world_matrix(self.root)
+        place = np.eye(4)
+        place[:2, :2] = world[:2, :2]
+        update: dict[str, Any] = {}
+        terrain = parameters.terrain
+        if abs(turn_of(place)) > 1e-9:
+            name = next(name for name, item in parameters.objects.items() if item is parameters.alignment)
+            update["objects"] = parameters.objects | {name: moved_alignment(parameters.alignment, place)}
+            if terrain is not None:
+                self.stale.append("it was turned, and the ground doesn't turn with it")
+        if terrain is not None and terrain.elevation_model is not None:
+            self.stale.append("it was moved, and the ground of an elevation model stays where it is")
+        translate = tuple(round(float(value), 6) for value in origin_of(self.root) + world[:3, 3])
+        update["transform"] = parameters.transform.model_copy(update={"translate": translate})
+        return RoadParameters.from_dict(parameters.model_copy(update=update).to_dict())
+
+
+def role_of(part: bpy.types.Object) -> str:
+    """Return what a part is in its road."""
+    return str(part.get(ROLE, ""))
+
+
+def _update(
+    item: RoadObject, before: RoadObject, part: bpy.types.Object, place: Float, axes: Axes
+) -> tuple[dict[str, Any], bool]:
+    """Return what changed of an object by its part's place, and whether the scene must be built again to show it."""
+    if isinstance(before, Asset):
+        return asset_update(axes, before, place), False
+    if isinstance(before, Gantry | Overpass):
+        return standing_update(axes, before, place), True
+    if isinstance(before, LineObject) and isinstance(item, LineObject):
+        return line_update(axes, item, part, place), True
+    if isinstance(before, Vehicle):
+        return vehicle_update(axes, before, part, place), True
+    if isinstance(before, PointObject) and not isinstance(before, Arrow):
+        return point_update(axes, before, vertices_of(part.data)[0], place), False
+    return {}, False
+
+
+def _on_a_vertex(item: RoadObject | None) -> bool:
+    """Return whether a thing's object is one vertex at its place."""
+    return isinstance(item, PointObject) and not isinstance(item, Asset | Gantry | Overpass | Arrow)
+
+
+def _on_axis(parameters: RoadParameters, axis: EditedAxis) -> RoadParameters:
+    """Return a road along another axis: what isn't moved itself goes along with the axis, at its offset."""
+    data = parameters.to_dict()
+    for name, item in data["objects"].items():
+        if item["type"] == "Alignment":
+            data["objects"][name] = axis.alignment.to_dict()
+        else:
+            _carry_stations(item, axis.station, axis.alignment.length)
+    return RoadParameters.from_dict(data)
+
+
+def _carry_stations(data: Any, carried: Callable[[float], float], length: float) -> None:
+    """Carry all stations in JSON data of an object to another axis; none gets negative."""
+    if isinstance(data, list):
+        for entry in data:
+            _carry_stations(entry, carried, length)
+    if not isinstance(data, dict):
+        return
+    for key, value in data.items():
+        if key in ("station", "start_station", "end_station") and isinstance(value, int | float):
+            now = round(carried(float(value)), 6)
+            data[key] = max(now, 0.0) if value >= 0 else now
+        else:
+            _carry_stations(value, carried, length)
+
+
+def _released(root: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[HandEdit]:
+    """Yield what was a part of a road until it was edited by hand and the road built again."""
+    for item in scene.objects:
+        if BY_HAND in item and root_above(item) == root:
+            try:
+                part, reason = json.loads(item[BY_HAND])
+            except (TypeError, ValueError):
+                continue
+            yield HandEdit(str(part), item.name, str(reason))
+
+
+def _kept_numbers(before: RoadParameters, now: RoadParameters) -> dict[str, Any]:
+    """Return the numbers of parts that the scene shows, of the objects that are still there."""
+    return {name: parts for name, parts in InstanceNumbers(before).parts.items() if name in now.objects}
+
+
+def _free_name(role: str, taken: set[str]) -> str:
+    number = 2
+    while f"{role[:60]}-{number}" in taken:
+        number += 1
+    return f"{role[:60]}-{number}"

@@ -1,0 +1,66 @@
+"""Guardrails and all else along a road follow it at once when the user has moved them: see `settle.move_line`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ...blender.model.settle import move_line
+from ...blender.things.model_builder import ROLE
+
+_DELAY = 0.02
+"""Seconds from a move's end to the look at it."""
+_AGAIN = 0.1
+"""Seconds between two looks whether the user has let go."""
+_moved: set[str] = set()
+"""Names of the objects that were moved."""
+
+
+@persistent
+def _note_moves(scene: bpy.types.Scene, graph: bpy.types.Depsgraph) -> None:
+    """Note the parts that are being moved."""
+    for update in graph.updates:
+        item = update.id
+        if update.is_updated_transform and isinstance(item, bpy.types.Object) and ROLE in item:
+            _moved.add(item.name)
+    if _moved and not bpy.app.background and not bpy.app.timers.is_registered(_follow_later):
+        bpy.app.timers.register(_follow_later, first_interval=_DELAY)
+
+
+def _follow_later() -> float | None:
+    """Wait until the user has let go, then have what was moved follow the road."""
+    windows = bpy.context.window_manager.windows
+    running = (operator for window in windows for operator in getattr(window, "modal_operators", ()))
+    if any(operator.bl_idname.startswith("TRANSFORM_OT") for operator in running):
+        return _AGAIN
+    follow(bpy.context.scene)
+    return None
+
+
+def follow(scene: bpy.types.Scene) -> list[str]:
+    """Have the noted parts of a scene follow the road; return the names of those that moved along or across it."""
+    names, moved = sorted(_moved), []
+    _moved.clear()
+    for name in names:
+        item = scene.objects.get(name)
+        if item is not None and move_line(item, scene):
+            moved.append(name)
+    return moved
+
+
+@persistent
+def _forget(*_: Any) -> None:
+    """Forget the moves in a file that was open before."""
+    _moved.clear()
+
+
+HANDLERS = {"depsgraph_update_post": _note_moves, "load_pre": _forget}
+
+
+def unregister() -> None:
+    """Forget what was moved."""
+    _moved.clear()
+    if bpy.app.timers.is_registered(_follow_later):
+        bpy.app.timers.unregister(_follow_later)
