@@ -233,18 +233,19 @@ class _Build:
         """Put the new road in the place of the one built before."""
         parameters, builder, scene = self._builder.parameters, self._builder, bpy.data.scenes[self._scene]
         root = next(item for item in scene.objects if item.get(ROAD) == self._road)
-        collection = self._collection
         if FRAME in root:
             old = _parts_of(root, self._place)
             _repoint(old, builder.objects)
             remove_with_meshes(list(old))
             collection = _home(root, scene)
-            for item in builder.objects.values():
-                collection.objects.link(item)
-            bpy.data.collections.remove(self._collection)
         else:
-            collection.name = COLLECTION
+            collection = bpy.data.collections.new(COLLECTION)
             collection[MADE_COLLECTION] = True
+            scene.collection.children.link(collection)
+            collection.objects.link(root)
+        for item in builder.objects.values():
+            collection.objects.link(item)
+        bpy.data.collections.remove(self._collection)
         self.log.keep(collection)
         for role, item in builder.objects.items():
             item.name = role  # its mesh keeps the name it has: to rename a mesh is to evaluate all that hangs on it

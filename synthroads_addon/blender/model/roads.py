@@ -93,6 +93,12 @@ def parts_and_copies(
     return parts, copies
 
 
+def has_parts(root: bpy.types.Object, scene: bpy.types.Scene) -> bool:
+    """Return whether anything is left of a road in a scene; panels ask so each time that they are drawn."""
+    found = roots(scene)
+    return any(ROLE in item and OF_ROAD in item and _belongs(item, root, found) for item in scene.objects)
+
+
 def _belongs(item: bpy.types.Object, root: bpy.types.Object, scene_roots: list[bpy.types.Object]) -> bool:
     above = root_above(item)
     if above is None:

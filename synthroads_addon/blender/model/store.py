@@ -11,7 +11,7 @@ from ...base.errors import InputError
 from ...road.parameters import RoadParameters
 from ...scenario.scenario import Scenario
 from .older_files import PARAMETERS, adopt_older_roads
-from .roads import parts_and_copies, renew_ids, road_meant, roots
+from .roads import has_parts, parts_and_copies, renew_ids, road_meant, roots
 
 SCENARIO = "synthroads_scenario"
 BUILT_FROM = "synthroads_built_from"
@@ -19,7 +19,7 @@ BUILT_FROM = "synthroads_built_from"
 
 def roads(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     """Return the roots of all roads of a scene that anything is left of, by name."""
-    return [root for root in roots(scene) if PARAMETERS in root and parts_and_copies(root, scene)[0]]
+    return [root for root in roots(scene) if PARAMETERS in root and has_parts(root, scene)]
 
 
 def find_road(scene: bpy.types.Scene) -> bpy.types.Object | None:
@@ -30,7 +30,7 @@ def find_road(scene: bpy.types.Scene) -> bpy.types.Object | None:
     root = road_meant(scene)
     if root is None or PARAMETERS not in root:
         return None
-    return root if parts_and_copies(root, scene)[0] else None
+    return root if has_parts(root, scene) else None
 
 
 def road_named(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object | None:

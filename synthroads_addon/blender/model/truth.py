@@ -165,7 +165,8 @@ class _Reading:
             self.stale.append("its axis was changed")
             parameters = _on_axis(parameters, axis)
         axes = Axes(before, RoadGeometry(parameters) if axis is not None else before)
-        objects = dict(self._moved(parameters, axes, fine))
+        moved = dict(self._moved(parameters, axes, fine))
+        objects = {name: moved[name] for name in parameters.objects if name in moved}
         objects |= self._copied(parameters, objects, axes)
         data = parameters.to_dict() | {"objects": {name: item.to_dict() for name, item in objects.items()}}
         whole = self._placed(RoadParameters.from_dict(data))

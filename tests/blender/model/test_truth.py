@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import bpy
@@ -13,13 +14,14 @@ from mathutils import Matrix
 from synthroads_addon.base.classes import class_id
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.compat import set_modifier_input
-from synthroads_addon.blender.model.build import RoadModel, build_road
+from synthroads_addon.blender.files import empty_file
+from synthroads_addon.blender.model.build import Place, RoadModel, build_road
 from synthroads_addon.blender.model.settle import move_line, settle
-from synthroads_addon.blender.model.truth import EditedRoad, read_road
+from synthroads_addon.blender.model.truth import EditedRoad, open_road, read_road
 from synthroads_addon.blender.scene.evaluated import scanned_scene
 from synthroads_addon.road.geometry import RoadGeometry, alignment_of
 from synthroads_addon.road.parameters import RoadParameters
-from tests.helpers.scenes.small_road import PARTS, TOLERANCE, open_small, small_parameters
+from tests.helpers.scenes.small_road import PARTS, TOLERANCE, build_small, open_small, small_parameters
 
 EXACT = 0.001
 """Allowed difference of a place in the parameters from the one that the scene shows, m."""
@@ -189,6 +191,33 @@ class TestPlaces:
         edited = truth(model)
         assert edited.parameters == small_parameters()
         assert not edited.by_hand
+
+    def test_a_road_in_two_scenes_is_read_by_what_each_shows(self, model: RoadModel) -> None:
+        other = bpy.data.scenes.new("Other")
+        for item in (model.root, *model.objects.values()):
+            if item.name != "sign":
+                other.collection.objects.link(item)
+        assert "sign" not in read_road(model.root, other).parameters.objects
+        assert truth(model).parameters == small_parameters()
+
+    def test_a_linked_road_is_read_and_left_alone(self, model: RoadModel, tmp_path: Path) -> None:
+        file = tmp_path / "linked.blend"
+        model.objects["sign"].location = (1.0, 0.5, 0.0)
+        bpy.context.view_layer.update()
+        edited = truth(model)
+        bpy.data.libraries.write(str(file), {model.collection})
+        empty_file()
+        with bpy.data.libraries.load(str(file), link=True) as (source, wanted):
+            wanted.collections = source.collections
+        bpy.context.scene.collection.children.link(wanted.collections[0])
+        opened = open_road()
+        assert opened is not None
+        assert opened.edited == edited
+        before = shown()
+        here = build_small(small_parameters(40.0), parts=("road",), place=Place(beside=True))
+        bpy.data.objects.remove(here.objects["Road"])
+        assert shown().keys() >= before.keys()
+        assert opened.edited == open_road(opened.name).edited  # type: ignore[union-attr]
 
 
 class TestByHand:
