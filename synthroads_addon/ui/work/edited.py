@@ -12,6 +12,7 @@ from ...blender.model.roads import ROAD, road_of_id
 from ...blender.model.store import find_road
 from ...blender.model.truth import EditedRoad, read_road
 from ...blender.things.model_builder import ROLE
+from ..fields.room import draw_text
 from .build import SYNTHROADS_OT_build_edited
 from .common import redraw_sidebars
 from .job import running_job
@@ -101,19 +102,18 @@ def draw_edits(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     if edited is None:
         return
     if isinstance(edited, str):
-        layout.label(text=edited, icon="ERROR")
+        draw_text(layout, edited, "ERROR")
         return
     if edited.axis is not None:
         across, up = edited.axis.horizontal.worst, edited.axis.height.worst
-        layout.label(text=f"Axis fitted within {across:.3f} m, heights {up:.3f} m", icon="CURVE_PATH")
+        draw_text(layout, f"Axis fitted within {across:.3f} m, heights {up:.3f} m", "CURVE_PATH")
     if edited.stale:
         layout.operator(SYNTHROADS_OT_build_edited.bl_idname, icon="FILE_REFRESH")
     if edited.by_hand:
         box = layout.box().column(align=True)
         box.label(text="Edited by Hand", icon="SCULPTMODE_HLT")
         for edit in edited.by_hand:
-            box.label(text=edit.name, icon="BLANK1")
-            box.label(text=edit.reason, icon="BLANK1")
+            draw_text(box, f"{edit.name}: {edit.reason}", "BLANK1")
 
 
 HANDLERS = dict.fromkeys(("depsgraph_update_post", "undo_post", "redo_post"), _note_changes)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Generator
+from contextlib import closing
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -139,6 +140,8 @@ def _no_share(steps: Generator[float | None, None, RoadModel]) -> Generator[Step
     with closing(steps):
         for share in steps:
             yield None if share is None else Step(0.0)
+    if not bpy.app.background:
+        bpy.ops.ed.undo_push(message="Build as Edited")
 
 
 def _write_files(scan: RoadScan, folder: Path, timer: StageTimer, measure: Callable[[], dict[str, Any]]) -> int:

@@ -183,13 +183,13 @@ def test_the_panel_names_what_was_edited_by_hand_and_offers_to_build() -> None:
     edited.edits.read(bpy.context.scene)
     road = next(c for c in panels.CLASSES if c.bl_idname == "SYNTHROADS_PT_road")
     text = "\n".join(drawn(road, bpy.context).lines)
-    assert "label 'sign'" in text
-    assert "it is scaled (1 × 1 × 1.2)" in text
+    assert "label 'sign: it is" in text
+    assert "1 × 1 × 1.2" in text
     assert "synthroads.build_edited" in text
     assert bpy.ops.synthroads.build_edited() == {"FINISHED"}
     edited.edits.read(bpy.context.scene)
     text = "\n".join(drawn(road, bpy.context).lines)
-    assert "label 'sign'" in text
+    assert "label 'sign: it is" in text
     assert "synthroads.build_edited" not in text
 
 
