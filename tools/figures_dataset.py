@@ -1,7 +1,8 @@
-"""Print the table of docs/dataset.md: scenes, points, classes, time and memory of a data set, by group.
+"""Print the tables of docs/dataset.md: scenes, points, classes, time and memory of a data set, by group; or its cost.
 
 synthroads dataset reference --output out/reference --jobs 2
 python tools/figures_dataset.py out/reference
+python tools/figures_dataset.py out/reference --scenes 10000 --cores 2
 """
 
 from __future__ import annotations
@@ -55,18 +56,56 @@ def _range(values: list[float]) -> str:
     return f"{low:,.0f}" if round(low) == round(high) else f"{low:,.0f} to {high:,.0f}"
 
 
+def costs(folder: Path, scenes: int, cores: int) -> list[tuple[str, str, str]]:
+    """Return what so many scenes like those of a data set cost: rows of what, per scene, and of all together.
+
+    The time is that of the whole run, from its recipe, which is written first, to its manifest, which is last; so the
+    run must not have been stopped in between, and nothing else have used its cores.
+
+    Args:
+        folder: of the finished data set.
+        scenes: how many.
+        cores: that the run had.
+
+    Raises:
+        MissingFileError, InputError: the folder holds no readable data set.
+    """
+    manifest = read_manifest(folder)
+    count = len(manifest.scenes)
+    hours = (_changed(folder / "manifest.json") - _changed(folder / "recipe.json")) / 3600.0 * cores / count
+    files = [(name, entry.bytes) for scene in manifest.scenes for name, entry in (scene.files or {}).items()]
+    table = [("core hours", f"{hours:,.3f}", f"{hours * scenes:,.0f}")]
+    for top in sorted({name.partition("/")[0] for name, _ in files}):
+        size = sum(each for name, each in files if name.startswith(f"{top}/")) / count
+        table.append((f"`{top}/`", f"{size / 1e6:,.0f} MB", f"{size * scenes / 1e9:,.0f} GB"))
+    table.append(("files", f"{len(files) / count:,.0f}", f"{len(files) / count * scenes:,.0f}"))
+    size = (folder / "manifest.json").stat().st_size / count
+    return [*table, ("`manifest.json`", f"{size / 1e3:,.0f} kB", f"{size * scenes / 1e9:,.2f} GB")]
+
+
+def _changed(path: Path) -> float:
+    return path.stat().st_mtime
+
+
 def main() -> None:
     """Command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="finished data set")
+    parser.add_argument("--scenes", type=int, help="print what so many scenes cost instead")
+    parser.add_argument("--cores", type=int, default=2, help="cores that the run had (%(default)s)")
+    arguments = parser.parse_args()
     try:
-        table = rows(parser.parse_args().folder)
+        if arguments.scenes:
+            head: tuple[str, ...] = ("", "a scene", f"{arguments.scenes:,} scenes")
+            table: list[tuple[str, ...]] = [*costs(arguments.folder, arguments.scenes, arguments.cores)]
+        else:
+            head, table = HEAD, rows(arguments.folder)
     except SynthRoadsError as error:
         raise SystemExit(str(error)) from None
-    for number, row in enumerate((HEAD, *table)):
+    for number, row in enumerate((head, *table)):
         print(f"| {' | '.join(row)} |")
         if number == 0:
-            print("|" + "---|" * len(HEAD))
+            print("|" + "---|" * len(head))
 
 
 if __name__ == "__main__":

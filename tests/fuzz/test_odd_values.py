@@ -11,6 +11,7 @@ import pytest
 from hypothesis import strategies as st
 
 from headless.commands import command
+from synthroads_addon.base.arrays import Float
 from tests.helpers.files.mutations import for_all, fuzz, limited
 
 SECONDS = 60.0
@@ -25,6 +26,9 @@ FIELDS = {
     "gps_time": (0.0, -1.0, 1e300, float("nan"), float("inf")),
     "red": (0, 65535),
 }
+NUMBERS = (float("nan"), float("inf"), -float("inf"), 3e38, 1e300, -1.0, 0.0)
+"""Values that formats with floating-point numbers can hold anywhere."""
+ENDINGS = (".las", ".las", ".laz", ".ply", ".npz", ".e57")
 TOOLS = ("info", "subsample", "convert", "map-intensity", "preview", "reconstruct")
 
 
@@ -45,6 +49,8 @@ def values() -> st.SearchStrategy[dict[str, Any]]:
             "fields": odd,
             "share": st.sampled_from([0.0, 0.01, 1.0]),
             "tool": st.sampled_from(TOOLS),
+            "ending": st.sampled_from(ENDINGS),
+            "numbers": st.lists(st.tuples(st.integers(0, 2**31), st.sampled_from(NUMBERS)), max_size=3),
         }
     )
 
@@ -70,8 +76,29 @@ def write(path: Path, case: dict[str, Any]) -> bool:
                 las[name] = old
             except OverflowError:  # older formats have fewer bits
                 return False
-    las.write(path)
+    if path.suffix in (".las", ".laz"):
+        las.write(path)
+    else:
+        write_floats(path, np.column_stack([las.x, las.y, las.z, las.intensity]), case["numbers"])
     return True
+
+
+def write_floats(path: Path, rows: Float, numbers: list[tuple[int, float]]) -> None:
+    """Write x, y, z and intensity (N, 4) as others do, with some of these numbers replaced."""
+    for place, value in numbers if rows.size else ():
+        rows.flat[place % rows.size] = value
+    names = ("x", "y", "z", "intensity")
+    if path.suffix == ".npz":
+        np.savez(path, xyz=rows[:, :3], intensity=rows[:, 3])
+    elif path.suffix == ".ply":
+        lines = ["ply", "format binary_little_endian 1.0", f"element vertex {len(rows)}"]
+        lines += [*(f"property double {name}" for name in names), "end_header\n"]
+        path.write_bytes("\n".join(lines).encode() + rows.astype("<f8").tobytes())
+    else:
+        e57 = pytest.importorskip("pye57").E57(str(path), mode="w")
+        fields = (*(f"cartesian{axis}" for axis in "XYZ"), "intensity")
+        e57.write_scan_raw({name: rows[:, number].copy() for number, name in enumerate(fields)})
+        e57.close()
 
 
 @fuzz(6, 1500)
@@ -79,7 +106,7 @@ def test_each_tool_takes_or_refuses_them(tmp_path: Path, capsys: pytest.CaptureF
     pytest.importorskip("scipy", reason="reconstruction needs SciPy")
     plain = tmp_path / "plain.las"
     sound = {"count": 300, "low": (0, 0, 0), "span": (60, 8, 0.5), "strays": [], "scale": 0.001}
-    write(plain, {**sound, "version": ("1.4", 6), "fields": {}, "share": 0.0})
+    write(plain, {**sound, "version": ("1.4", 6), "fields": {}, "share": 0.0, "numbers": []})
     outputs = {"subsample": "thin.laz", "convert": "other.ply", "map-intensity": "mapped.laz", "preview": "pictures"}
     options = {"subsample": ["--grid=0.1"], "map-intensity": [f"--target={plain}"], "reconstruct": ["--no-picture"]}
 
@@ -88,7 +115,7 @@ def test_each_tool_takes_or_refuses_them(tmp_path: Path, capsys: pytest.CaptureF
         return ([] if tool == "reconstruct" else [tool]) + first + options.get(tool, [])
 
     def body(case: dict[str, Any]) -> None:
-        cloud, tool = tmp_path / "cloud.las", case["tool"]
+        cloud, tool = tmp_path / f"cloud{case['ending']}", case["tool"]
         if not write(cloud, case):
             return
         with limited(SECONDS):

@@ -358,6 +358,21 @@ def test_the_last_quarter_of_a_thousand_scenes_costs_no_more_than_the_first(tmp_
         assert last <= 1.5 * first, name
 
 
+def test_the_cost_of_thousands_of_scenes_is_worked_out_from_a_finished_set(old: Path) -> None:
+    """Three scenes within half an hour on two cores; each has two files of some bytes."""
+    from tools.figures_dataset import costs
+
+    os.utime(old / "recipe.json", (0.0, 1000.0))
+    os.utime(old / "manifest.json", (0.0, 2800.0))
+    table = {name: figures for name, *figures in costs(old, 30_000, 2)}
+    assert table["core hours"] == ["0.333", "10,000"]
+    assert table["files"] == ["2", "60,000"]
+    size = sum(path.stat().st_size for path in old.glob("scenes/*/*")) / 3
+    assert size > 0.0
+    assert table["`scenes/`"] == ["0 MB", f"{size * 30_000 / 1e9:,.0f} GB"]
+    assert table["`manifest.json`"][1] == f"{(old / 'manifest.json').stat().st_size * 1e4 / 1e9:.2f} GB"
+
+
 def test_a_disk_without_locks_still_keeps_another_run_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As Lustre and some NFS mounts are: not every fault of a lock is another run."""
     monkeypatch.setattr(locks, "try_lock", lambda descriptor: None)
