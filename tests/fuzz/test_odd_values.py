@@ -86,7 +86,8 @@ def write(path: Path, case: dict[str, Any]) -> bool:
 def write_floats(path: Path, rows: Float, numbers: list[tuple[int, float]]) -> None:
     """Write x, y, z and intensity (N, 4) as others do, with some of these numbers replaced."""
     for place, value in numbers if rows.size else ():
-        rows.flat[place % rows.size] = value
+        if path.suffix != ".e57" or np.isfinite(value):  # libE57 writes no others
+            rows.flat[place % rows.size] = value
     names = ("x", "y", "z", "intensity")
     if path.suffix == ".npz":
         np.savez(path, xyz=rows[:, :3], intensity=rows[:, 3])
