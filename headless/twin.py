@@ -2,6 +2,7 @@
 
 import argparse
 import sys
+from collections import Counter
 from pathlib import Path
 from typing import get_args
 
@@ -11,13 +12,16 @@ if __name__ == "__main__":
 from headless.commands import Outcome, add_renamed_argument, add_twin_argument, entry
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import output_folder
+from synthroads_addon.base.schema import read_json
 from synthroads_addon.road.parameters import read_parameters
 from synthroads_addon.twin.formats import (
+    FORMATS,
     TOLERANCE,
     TWIN_FORMATS,
     IfcPlacement,
     IfcSettings,
     check_formats,
+    report_file_name,
     twin_file_names,
     write_twin,
 )
@@ -50,9 +54,30 @@ def run(arguments: argparse.Namespace) -> Outcome:
     names = twin_file_names(formats)
     with output_folder(arguments.output, names, arguments.overwrite) as folder:
         write_twin(parameters, folder, formats, deviation, IfcSettings(placement=arguments.ifc_placement))
-    written = [arguments.output / name for name in names]
-    result = {"files": {kind: str(path) for kind, path in zip(formats, written, strict=True)}}
-    return 0, result, "\n".join(f"written {path} ({path.stat().st_size / 1e6:.2f} MB)" for path in written)
+    files = {name: arguments.output / FORMATS[name].file for name in formats}
+    reports = {name: arguments.output / report_file_name(name) for name in formats}
+    lost = {name: _read_losses(path) for name, path in reports.items()}
+    result = {"files": _texts(files), "reports": _texts(reports), "lost": lost}
+    return 0, result, "\n".join(f"{_written(path)}\n{_told(reports[name], lost[name])}" for name, path in files.items())
+
+
+def _texts(paths: dict[str, Path]) -> dict[str, str]:
+    return {name: str(path) for name, path in paths.items()}
+
+
+def _read_losses(report: Path) -> dict[str, int]:
+    """Return for how many instance numbers a file has nothing, by the reasons."""
+    return Counter(row["reason"] for row in read_json(report)["lost"])
+
+
+def _written(path: Path) -> str:
+    return f"written {path} ({path.stat().st_size / 1e6:.2f} MB)"
+
+
+def _told(report: Path, lost: dict[str, int]) -> str:
+    """Return what a report says of a file, in short."""
+    nothing = "; ".join(f"{count} not: {reason}" for reason, count in lost.items())
+    return f"        {report.name}: what became of each instance number{f'; {nothing}' if nothing else ''}"
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ from pydantic import Field, field_validator, model_validator
 from ..base.errors import InputError, MissingFileError
 from ..base.files import PRESETS, stamp
 from ..base.schema import ClosedModel, quantity, read_json
+from ..road.things.asset import AssetTypes
 from ..road.things.limits import Interval, interval
 
 SUFFIXES = (".blend", ".glb", ".obj")
@@ -62,6 +63,9 @@ class LibraryAsset(ClosedModel):
         min_length=1, max_length=64, description="Semantic class of its faces: of the 17, or of a scheme of one's own."
     )
     scale: float = quantity(1.0, "1", "Scale.", gt=0, le=100)
+    twin_types: AssetTypes | None = Field(
+        None, description="Types in the twin formats; those of its class if not given."
+    )
     placement: AssetPlacement
 
     @field_validator("file")

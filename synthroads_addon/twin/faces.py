@@ -14,6 +14,8 @@ Int = NDArray[np.int64]
 FLAT = 0.001
 """A quadrilateral whose corner lies farther than this (m) from the plane of the others becomes two triangles."""
 
+_NO_AREA = 1e-6  # twice the area in plan that a triangle of the ground has at least, m2
+
 
 @dataclass(frozen=True)
 class Faces:
@@ -91,6 +93,19 @@ def grid_corners(rows: int, columns: int) -> Int:
     """
     first = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
     return np.stack([first + 1, first + columns + 1, first + columns, first], axis=1)
+
+
+def halves(corners: Int) -> Int:
+    """Return quadrilaterals (Q, 4) as triangles (2 Q, 3): the first halves, then the second."""
+    return np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
+
+
+def upward_triangles(points: Float, corners: Int) -> Faces:
+    """Return those of the triangles (T, 3) that are seen from above against the clock and have an area in plan."""
+    flat = points[corners][..., :2]
+    one, two = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
+    kept = corners[one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0] > _NO_AREA]
+    return compact(Faces(points, kept.ravel(), np.full(len(kept), 3)))
 
 
 def loft(sections: Float) -> Faces:

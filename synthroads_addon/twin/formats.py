@@ -18,6 +18,7 @@ from pydantic import Field
 from ..base.errors import InputError, nearest_name
 from ..base.schema import ClosedModel
 from ..road.parameters import RoadParameters
+from .trace import Trace
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,7 @@ class FormatEntry:
     Attributes:
         label, description: for people.
         file: name of the file.
-        module: module beside this one with ``write_NAME(parameters, path, tolerance)``.
+        module: module beside this one with ``write_NAME(parameters, path, tolerance)``, which returns a `Trace`.
         package: package that it needs and that not every installation has.
     """
 
@@ -70,8 +71,8 @@ TWIN_FORMATS: tuple[TwinFormat, ...] = tuple(FORMATS)
 TOLERANCE = 0.005
 """Chord error of curved surfaces and lines that isn't asked for otherwise, m."""
 
-_Writer = Callable[..., None]
-"""Parameters, path and tolerance (m) -> nothing; what a format's own settings are is handed to it by their names."""
+_Writer = Callable[..., Trace]
+"""Parameters, path and tolerance (m) -> what became of everything; a format's own settings are handed to it by name."""
 
 IfcPlacement = Literal["linear", "local"]
 
@@ -87,12 +88,17 @@ class IfcSettings(ClosedModel):
 
 
 def twin_file_names(formats: Iterable[str]) -> tuple[str, ...]:
-    """Return the names of the files that formats are written to.
+    """Return the names of the files that formats are written to, each with its report behind it.
 
     Raises:
         InputError: a format is unknown.
     """
-    return tuple(FORMATS[known_format(name)].file for name in formats)
+    return tuple(file for name in formats for file in (FORMATS[known_format(name)].file, report_file_name(name)))
+
+
+def report_file_name(name: str) -> str:
+    """Return the name of the file that says what a format's file lacks, and where in it each instance number is."""
+    return f"twin-{name}-report.json"
 
 
 def known_format(name: str) -> TwinFormat:
@@ -135,7 +141,7 @@ def write_twin(
     tolerance: float = TOLERANCE,
     ifc: IfcSettings | None = None,
 ) -> None:
-    """Write a road's geometric-semantic model into a folder, one file per format (`twin_file_names`).
+    """Write a road's geometric-semantic model into a folder, a file and its report per format (`twin_file_names`).
 
     Args:
         parameters: the road.
@@ -148,7 +154,9 @@ def write_twin(
         InputError: a format is unknown or its package isn't installed, or a road can't be said in it.
     """
     check_formats(formats)
-    for name, file_name in zip(formats, twin_file_names(formats), strict=True):
+    for name in formats:
+        file_name = FORMATS[name].file
         writer: _Writer = getattr(import_module(FORMATS[name].module, __package__), f"write_{name}")
         further = (ifc or IfcSettings()).to_dict() if name == "ifc" else {}
-        writer(parameters, folder / file_name, tolerance, **further)
+        trace = writer(parameters, folder / file_name, tolerance, **further)
+        trace.write(folder / report_file_name(name), name, file_name)

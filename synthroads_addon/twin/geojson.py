@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,10 @@ from ..road.objects import LineObject, PointObject, RoadObject
 from ..road.parameters import RoadParameters
 from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Median, Turnout
 from .attributes import attributes_of
+from .plants import placed_plants
 from .surfaces import dash_stations, line_points, on_ground, painted_surface, road_stations
+from .trace import Trace
+from .vehicles import placed_vehicles
 
 Float = NDArray[np.float64]
 Feature = dict[str, Any]
@@ -25,10 +29,18 @@ DIGITS = 4
 """Decimals of coordinates and of stations and widths beside them: 0.1 mm."""
 _THERE = 1e-6
 """Width above which a lane is there, m."""
+_LEVEL = "lines and places, without bodies"
+_LOST = {
+    "Terrain": "there are no surfaces here but the median's",
+    "strip": "there are no surfaces here but the median's",
+    "rut": "there is no damage here",
+    "pothole": "there is no damage here",
+}
+"""Type of object, or kind of part -> why the file has none."""
 
 
-def write_geojson(parameters: RoadParameters, path: Path, tolerance: float) -> None:
-    """Write a road's lines and places as GeoJSON, one feature per line.
+def write_geojson(parameters: RoadParameters, path: Path, tolerance: float) -> Trace:
+    """Write a road's lines and places as GeoJSON, one feature per line; return what became of its objects.
 
     Coordinates are those of the parameter set's reference system, named by the member ``crs`` (GeoJSON 2008): degrees
     of WGS 84, which RFC 7946 wants, would cost millimetres.
@@ -40,24 +52,28 @@ def write_geojson(parameters: RoadParameters, path: Path, tolerance: float) -> N
     """
     geometry = RoadGeometry(parameters)
     stations = road_stations(geometry, tolerance)
-    collection = centerline_geojson(geometry, stations)
+    trace = Trace(geometry, _LEVEL, ("dash",), _LOST)
+    collection = centerline_geojson(geometry, stations) | {"level_of_detail": _LEVEL}
     features = collection.pop("features")
     for feature in features:
         feature["properties"] = {"feature": "centerline", "object_type": "Alignment"} | feature["properties"]
     with path.open("w", encoding="utf-8", newline="\n") as file:
         file.write(compact_json(collection)[:-1] + ',"features":[')
         before = "\n"
-        for feature in (*features, *_Writer(geometry, stations, tolerance).features()):
+        for number, feature in enumerate((*features, *_Writer(geometry, stations, tolerance, trace).features())):
+            trace.found(feature["properties"]["instance"], feature=number)
             file.write(before + compact_json(feature))
             before = ",\n"
         file.write("\n]}\n")
+    return trace
 
 
 class _Writer:
     """Writer of the features of one road."""
 
-    def __init__(self, geometry: RoadGeometry, stations: Float, tolerance: float) -> None:
+    def __init__(self, geometry: RoadGeometry, stations: Float, tolerance: float, trace: Trace) -> None:
         self.geometry = geometry
+        self.trace = trace
         self.stations = stations
         self.tolerance = tolerance
         self.origin = np.array(geometry.parameters.transform.translate)
@@ -82,6 +98,22 @@ class _Writer:
             elif isinstance(item, LineObject):
                 line = self._map(line_points(self.geometry, item, self.tolerance))
                 yield _feature(self._furniture(name, item), "LineString", line)
+        yield from self._plants()
+        yield from self._vehicles()
+
+    def _plants(self) -> Iterator[Feature]:
+        for plant in placed_plants(self.geometry):
+            self.trace.grow(plant)
+            about = {"id": plant.name, "feature": "plant"} | plant.attributes()
+            yield _feature(about, "Point", self._map(plant.foot[None])[0])
+
+    def _vehicles(self) -> Iterator[Feature]:
+        for placed in placed_vehicles(self.geometry):
+            about = attributes_of(placed.vehicle) | {"id": placed.name, "feature": "vehicle"}
+            about |= self.geometry.numbers.about(placed.vehicle.instance)
+            ahead = placed.rotation[:, 0]
+            about["heading_deg"] = round(math.degrees(math.atan2(ahead[1], ahead[0])), 4)
+            yield _feature(about, "Point", self._map(placed.place[None])[0])
 
     def _furniture(self, name: str, item: RoadObject) -> Feature:
         return attributes_of(item) | {"id": name, "feature": "furniture"}

@@ -183,7 +183,7 @@ def _faces(edges: _Edges, damages: list[_Damage], chosen: Mask) -> Faces:
             parts.append(quads(points.reshape(-1, 3), grid_corners(*points.shape[:2])))
         else:
             points = np.concatenate([edges.points(first, first, shares)[0], edges.points(last, last, others)[0]])
-            parts.append(polygons(points, _zip_rows(shares, others)))
+            parts.append(polygons(points, zip_rows(shares, others)))
     return compact(join_polygons(parts))
 
 
@@ -197,7 +197,7 @@ def _runs(even: Mask, chosen: Mask) -> Iterator[tuple[int, int]]:
     yield from zip(starts.tolist(), ends.tolist(), strict=True)
 
 
-def _zip_rows(here: Float, there: Float) -> list[list[int]]:
+def zip_rows(here: Float, there: Float) -> list[list[int]]:
     """Return triangles between a row of points at shares (C,) and the next one at shares (D,)."""
     rings, i, j, ahead = [], 0, 0, len(here)
     while i < len(here) - 1 or j < len(there) - 1:

@@ -33,7 +33,12 @@ def run(*arguments: object) -> int:
 def test_command_writes_what_is_asked_for(parameters: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
     assert run(parameters, "--output", out, "--twin", "cityjson,geojson,cityjson", "--json") == 0
-    assert sorted(path.name for path in out.iterdir()) == ["twin.city.json", "twin.geojson"]
+    assert sorted(path.name for path in out.iterdir()) == [
+        "twin-cityjson-report.json",
+        "twin-geojson-report.json",
+        "twin.city.json",
+        "twin.geojson",
+    ]
     assert json.loads(capsys.readouterr().out)["files"]["geojson"] == str(out / "twin.geojson")
     assert run(parameters, "--output", out, "--twin", "geojson") == 2
     assert "already holds twin.geojson; --overwrite replaces it" in capsys.readouterr().err
@@ -81,8 +86,9 @@ def test_a_missing_package_is_named_with_its_extra(
 
 def test_every_format_has_a_file_of_its_own() -> None:
     names = twin.twin_file_names(twin.TWIN_FORMATS)
-    assert names[:4] == ("twin.city.json", "twin.ifc", "twin.xodr", "twin.geojson")
-    assert len(set(names)) == len(twin.TWIN_FORMATS)
+    assert names[::2] == ("twin.city.json", "twin.ifc", "twin.xodr", "twin.geojson")
+    assert names[1::2] == tuple(f"twin-{name}-report.json" for name in ("cityjson", "ifc", "opendrive", "geojson"))
+    assert len(set(names)) == 2 * len(twin.TWIN_FORMATS)
     with pytest.raises(InputError, match="did you mean 'opendrive'"):
         twin.twin_file_names(["opendriv"])
 
@@ -100,5 +106,9 @@ def test_generate_writes_the_twin_without_a_scene(tmp_path: Path) -> None:
 
     scenario = load_scenario("rq31-600m", ["outputs=[]", 'twin=["cityjson"]', "road.length=60"])
     report = generate(Job(scenario, tmp_path))
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["report.json", "twin.city.json"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "report.json",
+        "twin-cityjson-report.json",
+        "twin.city.json",
+    ]
     assert "twin" in report["stages"]

@@ -10,9 +10,9 @@ from synthroads_addon.cloud.formats.registry import open_writer
 from synthroads_addon.cloud.points import PointBlock
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
-from synthroads_addon.twin.formats import TWIN_FORMATS, twin_file_names, write_twin
+from synthroads_addon.twin.formats import FORMATS, write_twin
 
-_TWINS = dict(zip(twin_file_names(TWIN_FORMATS), TWIN_FORMATS, strict=True))
+_TWINS = {entry.file: name for name, entry in FORMATS.items()}
 INTENSITY_SCALE = 65535 * 900.0
 
 

@@ -3,13 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from ...base.schema import quantity
+from ...base.files import PRESETS
+from ...base.schema import Model, quantity, read_json
 from .body import Body, Place
 from .thing import Block, StandingThing, TwinTypes
+
+_IFC = r"^Ifc[A-Za-z]+\.[A-Z_]+$"
+_OBJECTS = "none|obstacle|pole|tree|vegetation|barrier|building|patch|trafficIsland|streetLamp|gantry|soundBarrier"
+_OPENDRIVE = rf"^({_OBJECTS})(\.\w+)?$"
+
+
+class AssetTypes(Model):
+    """Types of an asset in the formats of the geometric-semantic model; those of its class where one isn't given."""
+
+    ifc: str | None = Field(
+        None, pattern=_IFC, description="Element and predefined type in IFC 4.3, as IfcFurniture.USERDEFINED."
+    )
+    cityjson: Literal["CityFurniture", "SolitaryVegetationObject", "OtherConstruction", "GenericCityObject"] | None = (
+        Field(None, description="City object in CityJSON.")
+    )
+    opendrive: str | None = Field(
+        None, pattern=_OPENDRIVE, description="Type and subtype of the object in OpenDRIVE, as barrier.fence."
+    )
 
 
 class Asset(StandingThing):
@@ -21,6 +41,7 @@ class Asset(StandingThing):
     name: str = Field(description="Name of the asset in its library.")
     class_name: str = Field(description="Semantic class of its faces.")
     scale: float = quantity(1.0, gt=0, le=100, unit="1", description="Scale of the asset.")
+    twin_types: AssetTypes | None = Field(None, description="What it is in the twin formats, as its library says.")
 
     @property
     def semantic_class(self) -> str:
@@ -28,8 +49,10 @@ class Asset(StandingThing):
         return self.class_name
 
     def twin(self) -> TwinTypes:
-        """Return its types: nothing known."""
-        return TwinTypes(opendrive=f"none.{self.name}", kind=self.name)
+        """Return its types: those that its library gives, else those of its class; nothing known of others."""
+        given = self.twin_types.to_dict() if self.twin_types else {}
+        types = {"opendrive": f"none.{self.name}"} | class_types().get(self.class_name, {})
+        return TwinTypes(kind=self.name, **(types | {key: value for key, value in given.items() if value}))
 
     def bodies(self, place: Place) -> list[Body]:
         """Return nothing: its shape is its library's."""
@@ -38,3 +61,10 @@ class Asset(StandingThing):
     def footprint(self) -> Iterator[Block]:
         """Yield its place: its size is its library's."""
         yield self.upright(0.0, 0.0)
+
+
+@cache
+def class_types() -> dict[str, dict[str, str]]:
+    """Return the types in the twin formats of what has a semantic class, by the class and the format."""
+    types: dict[str, dict[str, str]] = read_json(PRESETS / "twin_types.json")
+    return types

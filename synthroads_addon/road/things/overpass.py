@@ -75,6 +75,7 @@ class Overpass(StandingThing):
     order: ClassVar = 130
     limits: ClassVar = OverpassLimits
     obstacle: ClassVar = "pier"
+    left_out: ClassVar = "its embankments"
     type: Literal["Overpass"] = "Overpass"
     width: float = quantity(10.0, ge=2, le=60, unit="m", description="Width of its deck along the road.")
     left_abutment: float = quantity(ge=5, le=200, unit="m", description="Offset of the left abutment's face.")

@@ -91,11 +91,13 @@ class Thing(RoadObject):
         order: place among the things in lists of them; those without one come last.
         limits: what a scenario says of how it is sampled; None where that has no fields for it.
         obstacle: what its foot is called for people, where a barrier must stand before it; empty if none must.
+        left_out: what of it isn't among its bodies, for people.
     """
 
     order: ClassVar[int] = 1000
     limits: ClassVar[type[Limits] | None] = None
     obstacle: ClassVar[str] = ""
+    left_out: ClassVar[str] = ""
 
     def footprint(self) -> Iterator[Block]:
         """Yield the boxes in which nothing else may stand."""

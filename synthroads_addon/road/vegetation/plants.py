@@ -26,6 +26,8 @@ KIND, HEIGHT, BREADTH = 2, 3, 4
 """Added to a stand's seed: for which of the kinds of its species a plant is, its height and its breadth."""
 KINDS = {"tree": (1.0, 0.86, 1.12), "shrub": (1.0, 0.82, 1.15)}
 """Kind of plant -> factors on the crown's radius of the kinds that each species has."""
+BOTTOMS = {"tree": (1.0, 0.85, 1.2), "shrub": (1.0, 1.0, 1.0)}
+"""Kind of plant -> factors on the height at which the crowns of these kinds begin."""
 BREADTHS = {"tree": (0.9, 1.15), "shrub": (0.85, 1.25)}
 """Kind of plant -> limits of a plant's breadth for its height."""
 PICK = 0.001
@@ -33,7 +35,11 @@ PICK = 0.001
 SEEDS = 2**30
 """A stand's seed is taken modulo this: the nodes have whole numbers of 32 bits with a sign."""
 ROADSIDE_SHARE = 0.8
-"""Grass on verges and median, as a share of the density elsewhere; reed grows on neither."""
+"""Grass on verges and median, as a share of the density elsewhere."""
+ROADSIDE_HEIGHT = 0.5
+"""Height of grass there, as a share of the height elsewhere."""
+WILD_GRASSES = ("reed",)
+"""Grasses that grow on neither verges nor median."""
 _SLOPE = 0.25
 """Half the distance over which the ground's slope is measured, m."""
 
@@ -60,15 +66,20 @@ class Plants:
 
     Attributes:
         number: (N,) of each plant's place.
+        station, offset: (N,) m.
         position: (N, 3) local, of its foot, m.
         height: (N,) m.
-        crown_radius: (N,) m, where the crown is widest.
+        breadth: (N,) by which the shape of a plant of height 1 is scaled across, m.
+        kind: (N,) which of the kinds of its species it is.
     """
 
     number: Int
+    station: Float
+    offset: Float
     position: Float
     height: Float
-    crown_radius: Float
+    breadth: Float
+    kind: Int
 
 
 def random_share(seed: int, number: Int) -> NDArray[np.float32]:
@@ -132,15 +143,14 @@ def _steepness(geometry: RoadGeometry, station: Float, offset: Float, curvature:
     return np.minimum(np.sqrt(1.0 + rise**2 + across**2), 10.0)
 
 
-def grown_plants(geometry: RoadGeometry, plants: Vegetation, terrain: Terrain, crown_radius: float) -> Plants:
-    """Return the trees or shrubs of a stand; `crown_radius` is that of its species for a height of 1."""
+def grown_plants(geometry: RoadGeometry, plants: Vegetation, terrain: Terrain) -> Plants:
+    """Return the trees or shrubs of a stand."""
     places = plant_places(geometry, plants, terrain)
     number, seed = places.number[places.stands], plants.seed % SEEDS
     station, offset = places.station[places.stands], places.offset[places.stands]
     height = plants.height_min + (plants.height_max - plants.height_min) * random_share(seed + HEIGHT, number)
     low, high = BREADTHS[plants.kind]
     broad = low + (high - low) * random_share(seed + BREADTH, number)
-    factors = np.array(KINDS[plants.kind])
-    kind = np.floor(random_share(seed + KIND, number) * (len(factors) - PICK)).astype(np.intp)
+    kind = np.floor(random_share(seed + KIND, number) * (len(KINDS[plants.kind]) - PICK)).astype(np.int64)
     position = np.column_stack([geometry.alignment.place(station, offset), known_elevation(geometry, station, offset)])
-    return Plants(number, position, height, height * broad * factors[kind] * crown_radius)
+    return Plants(number, station, offset, position, height, height * broad, kind)

@@ -37,6 +37,7 @@ def sample_assets(site: PlacementSite) -> Iterator[tuple[str, Asset]]:
                     name=name,
                     class_name=asset.class_name,
                     scale=asset.scale,
+                    twin_types=asset.twin_types,
                 )
                 yield f"asset-{count}", placed
 

@@ -17,6 +17,7 @@ from ...road.instances import PassNumbers
 from ...road.lane_lines import LaneLine, lane_of
 from ...road.surroundings import Vehicle
 from ...road.things.vehicles import CHASSIS, VEHICLE_GAP, VEHICLE_TYPES
+from ...road.vehicle_pose import wheel_pose
 from .mesh import SceneMesh
 
 Pose = tuple[Float, Float, Bool]
@@ -167,8 +168,8 @@ class LaneMotion:
     def pose(self, time: Float) -> Pose:
         """Return the poses at times (K,), see `Motion`."""
         station, present = self._place(np.asarray(time, dtype=np.float64))
-        rotation, translation = self._wheel_pose(station)
-        return rotation, translation, present
+        rotation, place = wheel_pose(self.line, self._chassis, station)
+        return rotation, place - self._origin, present
 
     def passes(self, time: Float) -> Int:
         """Return how often it has come in again before times (K,)."""
@@ -194,36 +195,6 @@ class LaneMotion:
         station = self.line.station(self._low + along if self._traffic > 0 else self._high - along)
         # The way there and back through distances leaves a nanometre: at the time 0 it is where it was put.
         return np.where(time == 0.0, self.vehicle.station, station), present
-
-    def _wheel_pose(self, station: Float) -> tuple[Float, Float]:
-        """Return rotations (K, 3, 3) and places (K, 3) of the vehicle with its middle at stations (K,)."""
-        position, axis, bend = self._alignment.frame(station)
-        offset = self.line.offset(station)
-        middle = np.stack([position[:, 0] - offset * np.sin(axis), position[:, 1] + offset * np.cos(axis)])
-        turn = self.line.turn(station, CHASSIS[self.vehicle.model].wheel_base / 2.0)
-        heading = axis + turn + (0.0 if self._traffic > 0 else np.pi)
-        ahead = np.stack([np.cos(heading), np.sin(heading)])
-        left = np.stack([-ahead[1], ahead[0]])
-        front, rear, track = self._chassis
-        heights = {}
-        per_metre = self._traffic * np.cos(turn) / np.maximum(1.0 - bend * offset, 0.02)
-        for along in (rear, front):
-            for beside in (-track, track):
-                wheel = middle + along * ahead + beside * left
-                heights[along, beside] = self._height(wheel.T, station + along * per_metre)
-        behind, before = (0.5 * (heights[along, -track] + heights[along, track]) for along in (rear, front))
-        rise = (before - behind) / (front - rear)
-        roll = sum(heights[along, track] - heights[along, -track] for along in (rear, front)) / (4.0 * track)
-        forward = _unit(np.stack([*ahead, rise]))
-        side = np.stack([*left, roll])
-        side = _unit(side - (side * forward).sum(axis=0) * forward)
-        up = np.cross(forward, side, axis=0)
-        place = np.stack([*middle, behind - rise * rear]) - self._origin[:, None]
-        return np.moveaxis(np.stack([forward, side, up], axis=1), -1, 0), place.T
-
-    def _height(self, plan: Float, near: Float) -> Float:
-        """Return the road's height (K,) at places in plan (K, 2) whose stations are about those given."""
-        return self.line.height(*self._alignment.project_near(plan, near, 2.0))
 
 
 def lane_motions(
@@ -271,11 +242,6 @@ def _ways(vehicles: list[Vehicle], line: LaneLine) -> list[VehiclePasses]:
     start = middle - low if line.carriageway.traffic > 0 else high - middle
     lengths = [VEHICLE_TYPES[vehicle.model].length for vehicle in vehicles]
     return lane_passes(start.tolist(), [vehicle.speed for vehicle in vehicles], lengths, high - low)
-
-
-def _unit(vectors: Float) -> Float:
-    """Return vectors (3, K) with length 1."""
-    return vectors / np.sqrt((vectors * vectors).sum(axis=0))
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
@@ -13,13 +13,16 @@ from numpy.typing import NDArray
 
 from ...base.schema import compact_json
 from ..faces import Faces, Float, Int, without_collapsed
+from ..trace import Trace
 
 SCALE = 1e-4
 """Step of the vertices' whole numbers, m: rounding moves a vertex by 0.05 mm at most along each axis."""
 
 _LINE = 20_000  # polygons and vertices turned into text at a time
 
-GeometryType = Literal["MultiPoint", "MultiLineString", "MultiSurface", "Solid", "MultiSolid"]
+GeometryType = Literal[
+    "MultiPoint", "MultiLineString", "MultiSurface", "CompositeSurface", "Solid", "MultiSolid", "GeometryInstance"
+]
 
 
 @dataclass(frozen=True)
@@ -29,10 +32,12 @@ class CityGeometry:
     Attributes:
         type: CityJSON's name.
         lod: level of detail.
-        parts: the surfaces of a MultiSurface (one part), the bodies of a Solid (one) or MultiSolid; lines and points
-            are "polygons" of one part.
+        parts: the surfaces of a MultiSurface or CompositeSurface (one part), the bodies of a Solid (one) or MultiSolid;
+            lines and points are "polygons" of one part.
         semantics: what the polygons can be, with their attributes; only a MultiSurface's here.
         values: (F,) index of each polygon into the semantics.
+        template: of a GeometryInstance, whose one part is the point where it stands: number of its template.
+        scale: factors on that.
     """
 
     type: GeometryType
@@ -40,6 +45,8 @@ class CityGeometry:
     parts: tuple[Faces, ...]
     semantics: tuple[dict[str, Any], ...] = ()
     values: Int | None = None
+    template: int = 0
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -75,11 +82,14 @@ class CityModel:
 
     Attributes:
         translate: map coordinates of the local origin, m: what is added to a vertex times `SCALE`.
+        trace: it is told which numbers became which objects and surfaces.
     """
 
     translate: tuple[float, float, float]
+    trace: Trace
 
     def __post_init__(self) -> None:
+        self._templates: dict[Hashable, tuple[int, CityGeometry]] = {}
         self._objects: list[tuple[CityObject, list[list[_Shell]]]] = []
         self._vertices: list[Int] = []
         self._count = 0
@@ -89,6 +99,12 @@ class CityModel:
         shells = [[self._shell(part) for part in shape.parts] for shape in item.geometry]
         bare = tuple(replace(shape, parts=()) for shape in item.geometry)
         self._objects.append((replace(item, geometry=bare), shells))
+
+    def template(self, key: Hashable, make: Callable[[], CityGeometry]) -> int:
+        """Return the number of a template by a key of one's own; it is made if it isn't there yet."""
+        if key not in self._templates:
+            self._templates[key] = (len(self._templates), make())
+        return self._templates[key][0]
 
     def _shell(self, faces: Faces) -> _Shell:
         shell = _Shell(faces.corners + self._count, faces.sizes)
@@ -116,12 +132,16 @@ class CityModel:
             before = "\n"
             for item, shapes in self._objects:
                 file.write(f"{before}{compact_json(item.id)}:")
-                _write_object(file, item, shapes)
+                _write_object(file, item, shapes, self.trace)
                 before = ",\n"
             file.write('},\n"vertices":[')
             for first in range(0, len(vertices), _LINE):
                 file.write("," * bool(first) + "\n" + compact_json(vertices[first : first + _LINE].tolist())[1:-1])
-            file.write("]}\n")
+            file.write("]")
+            if self._templates:
+                file.write(',\n"geometry-templates":')
+                _write_templates(file, [shape for _, shape in self._templates.values()])
+            file.write("}\n")
 
     def _share(self) -> Int:
         """Let equal vertices be one, drop polygons that vanish and vertices that nothing uses; return (V, 3)."""
@@ -166,7 +186,7 @@ def _first_equal(vertices: Int) -> Int:
 # --- text -------------------------------------------------------------------------------------------------------
 
 
-def _write_object(file: TextIO, item: CityObject, shapes: list[list[_Shell]]) -> None:
+def _write_object(file: TextIO, item: CityObject, shapes: list[list[_Shell]], trace: Trace) -> None:
     head: dict[str, Any] = {"type": item.type, "attributes": item.attributes}
     if item.parent:
         head["parents"] = [item.parent]
@@ -177,17 +197,25 @@ def _write_object(file: TextIO, item: CityObject, shapes: list[list[_Shell]]) ->
         for shape, shells in zip(item.geometry, shapes, strict=True)
         if any(len(shell.sizes) for shell in shells)
     ]
+    trace.found(item.attributes["instance"], object=item.id)
     if not there:
         file.write(compact_json(head))
         return
     file.write(compact_json(head)[:-1] + ',"geometry":[')
     for number, (shape, shells) in enumerate(there):
         file.write("," * bool(number))
-        _write_geometry(file, shape, [shell for shell in shells if len(shell.sizes)])
+        surfaces = _write_geometry(file, shape, [shell for shell in shells if len(shell.sizes)])
+        for index, about in enumerate(surfaces):
+            trace.found(about["instance"], object=item.id, surface=index)
     file.write("]}")
 
 
-def _write_geometry(file: TextIO, shape: CityGeometry, shells: list[_Shell]) -> None:
+def _write_geometry(file: TextIO, shape: CityGeometry, shells: list[_Shell]) -> list[dict[str, Any]]:
+    """Write a geometry; return its semantic surfaces."""
+    if shape.type == "GeometryInstance":
+        _write_instance(file, shape, shells[0])
+        return []
+    surfaces: list[dict[str, Any]] = []
     file.write(compact_json({"type": shape.type, "lod": shape.lod})[:-1] + ',"boundaries":')
     if shape.type == "MultiSolid":
         file.write("[")
@@ -199,13 +227,35 @@ def _write_geometry(file: TextIO, shape: CityGeometry, shells: list[_Shell]) -> 
     elif shape.type == "MultiPoint":
         file.write(compact_json(shells[0].corners.tolist()))
     else:
-        _write_many(file, shells[0], shape.type == "MultiSurface")
+        _write_many(file, shells[0], shape.type != "MultiLineString")
     if shape.values is not None:
         values = shape.values[shells[0].kept]
         used, numbers = np.unique(values, return_inverse=True)
         surfaces = [shape.semantics[index] for index in used.tolist()]
         file.write(',"semantics":' + compact_json({"surfaces": surfaces, "values": numbers.tolist()}))
     file.write("}")
+    return surfaces
+
+
+def _write_instance(file: TextIO, shape: CityGeometry, shell: _Shell) -> None:
+    x, y, z = (round(factor, 6) for factor in shape.scale)
+    matrix = [x, 0, 0, 0, 0, y, 0, 0, 0, 0, z, 0, 0, 0, 0, 1]
+    about = {"type": shape.type, "template": shape.template, "boundaries": shell.corners.tolist()}
+    file.write(compact_json(about | {"transformationMatrix": matrix}))
+
+
+def _write_templates(file: TextIO, shapes: Sequence[CityGeometry]) -> None:
+    """Write templates with the vertices that they share."""
+    vertices: list[list[float]] = []
+    file.write('{"templates":[')
+    for number, shape in enumerate(shapes):
+        shells = []
+        for part in shape.parts:
+            shells.append(_Shell(part.corners + len(vertices), part.sizes))
+            vertices += (np.round(part.points, 6) + 0.0).tolist()
+        file.write("," * bool(number))
+        _write_geometry(file, shape, shells)
+    file.write('],"vertices-templates":' + compact_json(vertices) + "}")
 
 
 def _write_many(file: TextIO, shell: _Shell, surfaces: bool) -> None:

@@ -1,4 +1,7 @@
-"""CityJSON 2.0: the road as Roads with their traffic areas and markings, furniture as bodies, overpasses as Bridges."""
+"""CityJSON 2.0: the road as Roads with their traffic areas and markings, furniture as bodies, overpasses as Bridges.
+
+Around it the ground as TINRelief, plants one by one, and vehicles.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +16,14 @@ from ..attributes import attributes_of
 from ..faces import Faces, loft
 from ..surfaces import road_stations
 from ..things import Frame, PlacedThing, placed_things
+from ..trace import Trace
 from .model import CityGeometry, CityModel, CityObject, solids
 from .road import road_objects
+from .surroundings import add_surroundings
 
 
-def write_cityjson(parameters: RoadParameters, path: Path, tolerance: float) -> None:
-    """Write a road as CityJSON 2.0.
+def write_cityjson(parameters: RoadParameters, path: Path, tolerance: float) -> Trace:
+    """Write a road as CityJSON 2.0; return what became of its objects.
 
     Vertices are whole tenths of millimetres from the parameter set's origin, which is the file's ``transform``.
 
@@ -28,30 +33,35 @@ def write_cityjson(parameters: RoadParameters, path: Path, tolerance: float) -> 
         tolerance: largest chord error of curved surfaces, m, > 0.
     """
     geometry = RoadGeometry(parameters)
-    model = CityModel(parameters.transform.translate)
-    for item in road_objects(geometry, road_stations(geometry, tolerance), tolerance):
+    trace = Trace(geometry, within=("rut",))
+    model, stations = CityModel(parameters.transform.translate, trace), road_stations(geometry, tolerance)
+    for item in road_objects(geometry, stations, tolerance):
         model.add(item)
-    for item in furniture_objects(geometry, tolerance):
+    for item in furniture_objects(geometry, tolerance, trace):
         model.add(item)
+    add_surroundings(model, geometry, stations, tolerance)
     about = parameters.metadata
     metadata = {"identifier": about.identifier, "referenceSystem": about.referenceSystem}
     if about.title:
         metadata["title"] = about.title
     model.write(path, metadata)
+    return trace
 
 
 _LOD = "3"
 """Level of detail of furniture and structures: true shapes without fittings."""
 
 
-def furniture_objects(geometry: RoadGeometry, tolerance: float) -> Iterator[CityObject]:
+def furniture_objects(geometry: RoadGeometry, tolerance: float, trace: Trace) -> Iterator[CityObject]:
     """Yield everything that stands on and beside the road, in the order of the parameter set.
 
     Args:
         geometry: the road.
         tolerance: chord error of what runs along the road, m.
+        trace: it is told what is left out.
     """
     for placed in placed_things(geometry, tolerance):
+        trace.leave_out(placed)
         types, parts = placed.thing.twin(), _faces_of_parts(placed)
         attributes = attributes_of(placed.thing)
         if not types.cityjson_part:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ...base.errors import InputError
 from ...base.schema import Model, canonical_json, unit_of
 from ...materials.table import UNKNOWN, materials
+from ..trace import Trace
 
 Float = NDArray[np.float64]
 Entity = Any
@@ -54,12 +55,15 @@ class IfcFile:
     Attributes:
         file: ifcopenshell's file.
         project: the IfcProject, once it is there.
+        trace: it is told which numbers became which entities.
     """
 
-    def __init__(self, namespace: str) -> None:
+    def __init__(self, namespace: str, trace: Trace) -> None:
         """Make an empty file; ``namespace`` (the road's identifier) keeps apart the identifiers of different roads."""
+        self.trace = trace
         ifcopenshell = library()
         self.file = ifcopenshell.file(schema=SCHEMA)
+        self._schema = ifcopenshell.schema_by_name(SCHEMA)
         self._compress = ifcopenshell.guid.compress
         self._namespace = namespace
         self._keys: set[str] = set()
@@ -68,6 +72,7 @@ class IfcFile:
         self._styles: dict[str, Entity] = {}
         self._directions: dict[tuple[float, ...], Entity] = {}
         self._shapes: dict[object, Entity] = {}
+        self._maps: dict[object, Entity] = {}
         self.project: Entity = None
         self.contexts: dict[str, Entity] = {}
         self.origin = self.add("IfcCartesianPoint", [0.0, 0.0, 0.0])
@@ -79,6 +84,23 @@ class IfcFile:
     def add(self, entity: str, *values: Any, **named: Any) -> Entity:
         """Add an entity with its attributes."""
         return self.file.create_entity(entity, *values, **named)
+
+    def knows(self, entity: str, kind: str) -> bool:
+        """Return whether the schema has an element, or a bridge, of a class with a predefined type."""
+        try:
+            declaration = self._schema.declaration_by_name(entity)
+        except RuntimeError:
+            return False
+        classes, above = [], declaration
+        while above:
+            classes.append(above.name())
+            above = above.supertype()
+        if declaration.is_abstract() or not {"IfcElement", "IfcBridge"}.intersection(classes):
+            return False
+        for attribute in declaration.all_attributes():
+            if attribute.name() == "PredefinedType":
+                return kind in attribute.type_of_attribute().declared_type().enumeration_items()
+        return False
 
     def guid(self, key: str) -> str:
         """Return the identifier of a key, which must be new: a hash of the road's identifier and the key."""
@@ -178,6 +200,23 @@ class IfcFile:
         """Return whether a body of this key is there."""
         return key in self._shapes
 
+    def scaled_shape(self, key: object, make: Callable[[], list[Entity]], scale: tuple[float, float, float]) -> Entity:
+        """Add a body that is another one scaled along the axes; the other is made once for its key, from items."""
+        if key not in self._maps:
+            shared = self.add("IfcShapeRepresentation", self.contexts["Body"], "Body", "Tessellation", make())
+            self._maps[key] = self.add("IfcRepresentationMap", self.flat_axes, shared)
+        x, y, z = short(scale)
+        target = self.add(
+            "IfcCartesianTransformationOperator3DnonUniform",
+            LocalOrigin=self.origin,
+            Scale=x,
+            Scale2=y,
+            Scale3=z,
+        )
+        mapped = self.add("IfcMappedItem", self._maps[key], target)
+        body = self.add("IfcShapeRepresentation", self.contexts["Body"], "Body", "MappedRepresentation", [mapped])
+        return self.add("IfcProductDefinitionShape", None, None, [body])
+
     # --- what is said of objects ----------------------------------------------------------------------------------
 
     def gather(self, relation: str, of: Entity, members: Iterable[Entity], group: str = "") -> None:
@@ -197,6 +236,8 @@ class IfcFile:
         made = [self._property(key, value) for key, value in values.items()]
         if not made:
             return
+        if name == "SynthRoads" and "instance" in values:
+            self.trace.found(values["instance"].wrappedValue, entity=item.is_a(), GlobalId=item.GlobalId)
         key = f"{item.GlobalId}/{name}"
         definition = self.rooted("IfcPropertySet", key, Name=name, HasProperties=made)
         self.rooted("IfcRelDefinesByProperties", key, RelatedObjects=[item], RelatingPropertyDefinition=definition)

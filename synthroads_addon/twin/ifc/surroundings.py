@@ -1,34 +1,31 @@
-"""Surroundings of the road in IFC 4.3: terrain, vegetation, vehicles."""
+"""Surroundings of the road in IFC 4.3: ground, trees and shrubs one by one, strips of grass, vehicles."""
 
 from __future__ import annotations
 
-import math
-
-import numpy as np
-
-from ...road.alignment import clip_offset
-from ...road.lane_lines import lane_of
-from ...road.surroundings import Terrain, Vegetation, Vehicle
-from ...road.things.body import box, turned
-from ...road.things.vehicles import CHASSIS, VEHICLE_TYPES
+from ...road.surroundings import Terrain, Vegetation
+from ...road.vegetation.species import PlantShape
+from ..faces import Faces, loft, strip_triangles
+from ..ground import Ground, ground_beside
+from ..plants import GrassStrip, PlacedPlant, grass_strips, placed_plants
+from ..vehicles import PlacedVehicle, placed_vehicles
 from .entities import Entity
-from .scene import Scene, grid_triangles
+from .scene import Scene
 from .solids import give_bodies
 
-_SPACINGS = ((12.0, 1.0), (40.0, 4.0), (math.inf, 10.0))
-"""Up to a distance from the road's edge (m) the terrain has a column every so many metres."""
-_ROW_SPACING = 8.0
+_MEASURES = ("height", "crownDiameter", "crownBottom", "trunkDiameter", "averageHeight")
+"""What is said of plants in metres."""
 
 
 def write_surroundings(scene: Scene) -> None:
-    """Add terrain, vegetation and vehicles."""
-    for name, item in scene.geometry.parameters.objects.items():
-        if isinstance(item, Terrain):
-            _terrain(scene, name, item)
-        elif isinstance(item, Vegetation):
-            made = _geographic(scene, name, "VEGETATION", None, f"{item.kind} {item.species}")
-            scene.describe(made, item)
-    _vehicles(scene)
+    """Add ground, vegetation and vehicles."""
+    for name, item in scene.geometry.parameters.of_type(Terrain).items():
+        ground = ground_beside(scene.geometry, item, scene.stations, scene.tolerance)
+        _write_ground(scene, name, item, ground)
+        _write_plants(scene, ground)
+    vehicles = list(placed_vehicles(scene.geometry))
+    scene.look_up((placed.vehicle.station, placed.offset) for placed in vehicles)
+    for placed in vehicles:
+        _write_vehicle(scene, placed)
 
 
 def _geographic(scene: Scene, name: str, kind: str, shape: Entity | None, about: str | None = None) -> Entity:
@@ -37,53 +34,93 @@ def _geographic(scene: Scene, name: str, kind: str, shape: Entity | None, about:
     return made
 
 
-def _terrain(scene: Scene, name: str, item: Terrain) -> None:
-    """Add the ground beside the road, batter included, as a grid of points on it."""
-    geometry, ifc = scene.geometry, scene.ifc
-    count = max(2, math.ceil(geometry.length / _ROW_SPACING) + 1)
-    station = np.linspace(0.0, geometry.length, count)
-    edges, bend = geometry.offsets(station), geometry.alignment.curvature(station)
-    share = _columns(item.half_width)
-    meshes = []
-    for side, edge in ((1.0, edges[:, 0]), (-1.0, edges[:, -1])):
-        reach = np.maximum(item.half_width - side * edge, 0.0)
-        offset = clip_offset(edge[:, None] + side * reach[:, None] * share, bend[:, None])
-        every = np.repeat(station, len(share))
-        points = scene.points(every, offset.ravel())
-        meshes.append(ifc.mesh(points, grid_triangles(count, len(share), flip=side < 0.0), False))
-    made = _geographic(scene, name, "TERRAIN", ifc.shape(meshes, "Tessellation"))
-    ifc.made_of(made, "grass_ground")
+def _sheet(scene: Scene, faces: Faces) -> Entity | None:
+    """Add triangles that bound no solid."""
+    return scene.ifc.mesh(faces.points, faces.corners.reshape(-1, 3), False)
+
+
+def _write_ground(scene: Scene, name: str, item: Terrain, ground: Ground) -> None:
+    """Add the ground beside the road, batters included."""
+    meshes = [_sheet(scene, faces) for faces in ground.faces if len(faces)]
+    made = _geographic(scene, name, "TERRAIN", scene.ifc.shape(meshes, "Tessellation"))
+    scene.ifc.made_of(made, "grass_ground")
     scene.describe(made, item)
 
 
-def _columns(half_width: float) -> np.ndarray:
-    """Return the shares (K,), from 0 to 1, of the way from the road's edge outwards at which the terrain is sampled."""
-    distance, distances = 0.0, [0.0]
-    while distance < half_width:
-        spacing = next(spacing for limit, spacing in _SPACINGS if distance < limit)
-        distance = min(distance + spacing, half_width)
-        distances.append(distance)
-    return np.array(distances) / half_width
+# --- plants ---------------------------------------------------------------------------------------------------------
 
 
-def _vehicles(scene: Scene) -> None:
-    """Add every vehicle as the box around it, where it is at the time 0: on its lane's line, along it."""
-    vehicles = scene.geometry.parameters.of_type(Vehicle)
-    places = {}
-    for name, item in vehicles.items():
-        line, station = lane_of(scene.geometry, item), np.array([item.station])
-        turn = float(line.turn(station, CHASSIS[item.model].wheel_base / 2.0)[0])
-        facing = turn if line.carriageway.traffic > 0 else math.pi + turn
-        places[name] = (float(line.offset(station)[0]), facing)
-    scene.look_up((item.station, places[name][0]) for name, item in vehicles.items())
-    for name, item in vehicles.items():
-        _vehicle(scene, name, item, *places[name])
+def _write_plants(scene: Scene, ground: Ground) -> None:
+    """Add every stand with its plants, or with its strips of grass, as its parts."""
+    stands = {}
+    for name, item in scene.geometry.parameters.of_type(Vegetation).items():
+        stands[name] = _geographic(scene, name, "VEGETATION", None, f"{item.kind} {item.species}")
+        scene.describe(stands[name], item)
+        grass = "grass is its strips, without its tufts"
+        trees = "a plant is its trunk and its crown's outline, upright, without branches and leaves"
+        scene.ifc.trace.reduce(name, grass if item.kind == "grass" else trees)
+    for plant in placed_plants(scene.geometry):
+        scene.ifc.trace.grow(plant)
+        _write_plant(scene, plant, stands[plant.stand])
+    for strip in grass_strips(scene.geometry, ground):
+        _write_strip(scene, strip, stands[strip.stand])
 
 
-def _vehicle(scene: Scene, name: str, item: Vehicle, offset: float, turn: float) -> None:
-    ifc, kind = scene.ifc, VEHICLE_TYPES[item.model]
-    made = ifc.product("IfcVehicle", name, "VEHICLEWHEELED", item.model, scene.place(item.station, offset).placement)
-    around = box((kind.length, kind.width, kind.height), (0.0, 0.0, kind.height / 2.0))
-    give_bodies(ifc, made, [(turned(around, turn), "car_paint")])
+def _write_plant(scene: Scene, plant: PlacedPlant, stand: Entity) -> None:
+    """Add a tree or shrub: the shape of its kind, scaled."""
+    ifc, about = scene.ifc, plant.about
+    # Readers want parts of a whole to be placed relative to it.
+    axes = ifc.add("IfcAxis2Placement3D", ifc.point(*plant.foot), None, None)
+    placement = ifc.add("IfcLocalPlacement", ifc.local_frame, axes)
+    body = ifc.scaled_shape(
+        (about.kind, about.species, plant.variant),
+        lambda: _plant_items(scene, plant.shape, about.species),
+        plant.scale,
+    )
+    kind = f"{about.kind} {about.species}"
+    made = ifc.product("IfcGeographicElement", plant.name, "VEGETATION", kind, placement, Representation=body)
+    ifc.gather("IfcRelAggregates", stand, [made])
+    _describe(scene, made, plant)
+
+
+def _plant_items(scene: Scene, shape: PlantShape, species: str) -> list[Entity]:
+    """Add trunk and crown of a plant of height 1, painted."""
+    bodies = ((shape.trunk(), f"{species}_bark"), (shape.crown(), f"{species}_leaves"))
+    items = []
+    for sections, material in bodies:
+        if sections is not None:
+            faces = loft(sections)
+            items.append(scene.ifc.mesh(faces.points, strip_triangles(faces), True))
+            scene.ifc.paint(items[-1], material)
+    return items
+
+
+def _write_strip(scene: Scene, strip: GrassStrip, stand: Entity) -> None:
+    """Add a strip of grass as the surface at its mean height."""
+    ifc = scene.ifc
+    shape = ifc.shape([_sheet(scene, strip.faces)], "Tessellation")
+    kind = f"grass {strip.about.species}"
+    made = ifc.product("IfcGeographicElement", strip.name, "VEGETATION", kind, Representation=shape)
+    ifc.gather("IfcRelAggregates", stand, [made])
+    ifc.made_of(made, strip.about.species)
+    _describe(scene, made, strip)
+
+
+def _describe(scene: Scene, made: Entity, plant: PlacedPlant | GrassStrip) -> None:
+    values = {key: scene.ifc.value(value, "m" if key in _MEASURES else "") for key, value in plant.attributes().items()}
+    scene.ifc.properties(made, "SynthRoads", values)
+
+
+# --- vehicles -------------------------------------------------------------------------------------------------------
+
+
+def _write_vehicle(scene: Scene, placed: PlacedVehicle) -> None:
+    """Add a vehicle as the box around it, where it is at the time 0, on its wheels."""
+    ifc, item = scene.ifc, placed.vehicle
+    place = scene.place(item.station, placed.offset)
+    made = ifc.product("IfcVehicle", placed.name, "VEHICLEWHEELED", item.model, place.placement)
+    # The road's surface at a place of its lane: a pothole isn't part of where it stands.
+    give_bodies(ifc, made, [(place.inside(placed.box()), "car_paint")])
     scene.describe(made, item)
-    scene.stand(made, scene.container(item.station, offset))
+    scene.stand(made, scene.container(item.station, placed.offset))
+    ifc.trace.simplify(placed)

@@ -11,8 +11,9 @@ import math
 from typing import Any
 
 from ...base.arrays import Float
+from ...base.errors import InputError
 from ...road.things.body import Body, turned
-from ...road.things.thing import LengthwiseThing, StandingThing, Thing
+from ...road.things.thing import LengthwiseThing, StandingThing, Thing, TwinTypes
 from ..things import PlacedThing, placed_things
 from .entities import Entity, Values
 from .scene import IfcPlace, Scene
@@ -26,6 +27,7 @@ def write_things(scene: Scene) -> None:
     """Add everything that stands on and beside the road."""
     for placed in placed_things(scene.geometry, scene.tolerance):
         _Writer(scene, placed).write()
+        scene.ifc.trace.leave_out(placed)
 
 
 class _Writer:
@@ -42,6 +44,7 @@ class _Writer:
     def write(self) -> None:
         """Add the thing and its parts."""
         entity, kind, *site = self.types.ifc.split(".")
+        self._check(entity, kind)
         bridge = entity == "IfcBridge"
         named = {"AssemblyPlace": site[0]} if site else {"CompositionType": "ELEMENT"} if bridge else {}
         about = self.types.kind or type(self.thing).__name__
@@ -60,6 +63,14 @@ class _Writer:
             if body.ifc:
                 parts.setdefault(body.part, []).append(body)
         self._parts(made, parts, bridge)
+
+    def _check(self, entity: str, kind: str) -> None:
+        """Refuse types of an asset that IFC doesn't have, and note those that say nothing."""
+        if entity == TwinTypes().ifc.partition(".")[0]:
+            self.ifc.trace.reduce(self.name, "a proxy: neither its library nor its class says what it is")
+        if not self.ifc.knows(entity, kind):
+            allowed = "must be an element of IFC 4.3 and one of its predefined types, with a dot between them"
+            raise InputError(f"objects.{self.name}.twin_types.ifc", self.types.ifc, allowed)
 
     def _parts(self, whole: Entity, parts: dict[str, list[Body]], bridge: bool) -> None:
         """Add the elements that a thing is made of; a bridge's belong to its superstructure or its substructure."""
@@ -95,8 +106,9 @@ class _Writer:
         ifc, external = self.ifc, self.ifc.value(True)
         status = ["TEMPORARY" if self.types.temporary else "EXISTING"]
         if entity == "IfcRailing":
-            height = ifc.add("IfcPositiveLengthMeasure", float(getattr(self.thing, "height", 0.0)))
-            return "Pset_RailingCommon", {"Status": status, "Height": height, "IsExternal": external}
+            height = float(getattr(self.thing, "height", 0.0))
+            tall = {"Height": ifc.add("IfcPositiveLengthMeasure", height)} if height > 0.0 else {}
+            return "Pset_RailingCommon", {"Status": status, **tall, "IsExternal": external}
         if entity == "IfcWall":
             return "Pset_WallCommon", {"Status": status, "IsExternal": external}
         if entity != "IfcSign":

@@ -16,6 +16,7 @@ from ...road.geometry import RoadGeometry
 from ...road.objects import PointObject
 from ...road.parameters import RoadParameters
 from ..surfaces import road_stations
+from ..trace import LEVEL, Trace
 from .alignment import write_alignment
 from .entities import Entity, IfcFile
 from .road import write_carriageways, write_markings, write_road
@@ -31,8 +32,8 @@ _SHORTEST = 1e-3
 
 def write_ifc(
     parameters: RoadParameters, path: Path, tolerance: float = 0.005, placement: Literal["linear", "local"] = "linear"
-) -> None:
-    """Write a road as IFC 4.3. The same road gives the same bytes.
+) -> Trace:
+    """Write a road as IFC 4.3; return what became of its objects. The same road gives the same bytes.
 
     Args:
         parameters: the road.
@@ -49,9 +50,9 @@ def write_ifc(
         raise InputError("alignment: length", parameters.alignment.length, "an IFC file holds a millimetre or more")
     if parameters.alignment.length > _LONGEST:
         raise InputError("alignment: length", parameters.alignment.length, "an IFC file holds up to 200 km (200000 m)")
-    ifc = IfcFile(parameters.metadata.identifier)
-    site = write_project(ifc, parameters)
     geometry = RoadGeometry(parameters)
+    ifc = IfcFile(parameters.metadata.identifier, Trace(geometry, within=("dash",)))
+    site = write_project(ifc, parameters)
     scene = Scene(
         ifc=ifc,
         geometry=geometry,
@@ -69,6 +70,7 @@ def write_ifc(
     write_surroundings(scene)
     ifc.relate()
     ifc.write(path, parameters.metadata.identifier, parameters.metadata.generator)
+    return ifc.trace
 
 
 _PRECISION = 1e-6  # m, within which viewers take points as one
@@ -103,6 +105,7 @@ def write_project(ifc: IfcFile, parameters: RoadParameters) -> Entity:
         "seed": ifc.value(metadata.seed),
         "generator": ifc.value(metadata.generator),
         "design_class": ifc.value(parameters.design_class),
+        "level_of_detail": ifc.value(LEVEL),
         "referenceSystem": ifc.value(metadata.referenceSystem),
         "translate": ifc.value(parameters.transform.translate),
     }

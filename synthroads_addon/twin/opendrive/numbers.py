@@ -4,14 +4,24 @@ from __future__ import annotations
 
 from ...road.parameters import RoadParameters
 
+HIGHEST = 2**31 - 1
+"""Largest id that readers with whole numbers of 32 bits can hold."""
+
 
 class Numbers:
-    """Numbers beyond those that the road's objects have."""
+    """Numbers that nothing of the road has, from the highest downwards: those of passes follow all others.
+
+    Args:
+        parameters: the road.
+    """
 
     def __init__(self, parameters: RoadParameters) -> None:
-        self._last = max(item.instance for item in parameters.objects.values())
+        self._taken = {item.instance for item in parameters.objects.values()}
+        self._next = HIGHEST
 
     def next(self) -> int:
         """Return the next number."""
-        self._last += 1
-        return self._last
+        while self._next in self._taken:
+            self._next -= 1
+        self._next -= 1
+        return self._next + 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,10 +14,12 @@ from ...road.paint import arrow_outlines, hatching_outlines
 from ...road.section import Arrow, Hatching, LineMarking
 from ...road.things.body import Body
 from ...road.things.thing import LengthwiseThing, StandingThing, Thing
+from ...road.vegetation.species import NEEDLES
+from ..plants import PlacedPlant
 from ..things import PlacedThing
 from .numbers import Numbers
 from .pieces import CLOSE
-from .places import Ground, side_of
+from .places import Ground, side_at, side_of
 from .surface import RoadFrame
 from .xml import Element, Value, element, notes
 
@@ -115,6 +117,28 @@ class Objects:
                 made = element(self.parent, "tunnel", {**about, "type": "underpass", "daylight": 1.0, "lighting": 0.0})
                 notes(made, name, item.instance)
 
+    # --- plants -----------------------------------------------------------------------------------------------------
+
+    def plants(self, plants: Sequence[PlacedPlant]) -> None:
+        """Add the trees and shrubs on its side of the centreline: upright, as wide as their crowns."""
+        geometry = self.ground.geometry
+        mine = [plant for plant in plants if side_at(geometry, plant.offset) == self.frame.side]
+        if not mine:
+            return
+        station, offset = np.array([(plant.station, plant.offset) for plant in mine]).T
+        heights = np.array([plant.foot[2] for plant in mine]) - geometry.profile.elevation(station)
+        place = self.frame.place(station, offset, heights)
+        for plant, row in zip(mine, np.column_stack([place.s, place.t, place.h]), strict=True):
+            kind: tuple[str, str] = ("vegetation", "bush")
+            if plant.about.kind == "tree":
+                kind = ("tree", "needle" if plant.about.species in NEEDLES else "leaf")
+            attributes: dict[str, Value] = {"type": kind[0], "subtype": kind[1], "hdg": 0.0}
+            attributes |= {"radius": round(plant.breadth * plant.shape.crown_radius, 6)}
+            attributes["height"] = round(plant.height, 6)
+            made = self._placed(plant.name, plant.about, attributes, row, plant.instance)
+            told = plant.attributes()
+            notes(made, plant.name, plant.instance, **{key: told[key] for key in _SAID_OF_PLANTS if key in told})
+
     # --- painted ----------------------------------------------------------------------------------------------------
 
     def painted(self, name: str, item: Hatching | Arrow) -> None:
@@ -195,6 +219,8 @@ def _types(item: Thing) -> tuple[str, str]:
     return kind, subtype
 
 
+_SAID_OF_PLANTS = ("species", "stand", "crownBottom", "trunkDiameter")
+"""What is said of a plant beside its own attributes."""
 _SAID = ("instance", "type", "name", "station", "elevation", "rotation_deg", "start_station", "end_station")
 """Fields that an object's own attributes say."""
 

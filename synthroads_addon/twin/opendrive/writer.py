@@ -15,7 +15,10 @@ from ...road.instances import InstanceNumbers
 from ...road.parameters import AlignmentObject, RoadParameters
 from ...road.section import Carriageway, LineMarking, Median, Turnout
 from ...road.surroundings import Terrain, Vegetation, Vehicle
-from ..things import standing_things
+from ..plants import PlacedPlant, placed_plants
+from ..things import placed_things, standing_things
+from ..trace import LEVEL, Trace
+from .entities import LOST, trace_elements
 from .lanes import lanes
 from .marks import RoadMarks
 from .numbers import Numbers
@@ -32,8 +35,8 @@ _GROUND = 0.001
 """Largest distance (m) of barriers from the ground that they stand on, whatever the tolerance."""
 
 
-def write_opendrive(parameters: RoadParameters, path: Path, tolerance: float) -> None:
-    """Write a road's geometric-semantic model as an OpenDRIVE file.
+def write_opendrive(parameters: RoadParameters, path: Path, tolerance: float) -> Trace:
+    """Write a road's geometric-semantic model as an OpenDRIVE file; return what became of its objects.
 
     Coordinates in it are local; the header's offset adds the map origin, and its ``geoReference`` names the map's
     coordinate system. Each carriageway is a road of its own along the same line, with its own superelevation. Lanes,
@@ -52,22 +55,33 @@ def write_opendrive(parameters: RoadParameters, path: Path, tolerance: float) ->
     _header(root, geometry)
     ground = Ground(geometry, min(tolerance, _GROUND))
     numbers = Numbers(parameters)
+    trace = Trace(geometry, within=("dash",), reasons=LOST)
+    plants = list(placed_plants(geometry))
     standing = {placed.name: placed for placed in standing_things(geometry)}
     faces = faces_of(standing.values(), numbers)
     for name, item in parameters.of_type(Carriageway).items():
         road = element(root, "road", {"name": name, "id": item.instance, **_attributes(geometry)})
         frame = RoadFrame(geometry, item.side)
         objects = Objects(element(None, "objects"), ground, frame, numbers, standing)
-        _road(road, objects, faces)
+        _road(road, objects, faces, plants)
+        trace.found(parameters.alignment.instance, element="planView", road=item.instance)
+    trace_elements(root, trace)
     _list_rest(root, parameters)
     write(root, path)
+    for plant in plants:
+        trace.grow(plant)
+    for name in dict.fromkeys(plant.stand for plant in plants):
+        trace.reduce(name, "a plant is the upright cylinder around it")
+    for placed in placed_things(geometry, tolerance):
+        trace.leave_out(placed)
+    return trace
 
 
 def _attributes(geometry: RoadGeometry) -> dict[str, Value]:
     return {"junction": "-1", "length": geometry.length, "rule": "RHT"}
 
 
-def _road(road: Element, objects: Objects, faces: list[Face]) -> None:
+def _road(road: Element, objects: Objects, faces: list[Face], plants: list[PlacedPlant]) -> None:
     """Fill in the road of one carriageway."""
     frame = objects.frame
     geometry, limits = frame.geometry, SpeedLimits(frame.geometry, frame.side)
@@ -84,6 +98,7 @@ def _road(road: Element, objects: Objects, faces: list[Face]) -> None:
     lanes(road, plan, limits, marks)
     road.append(objects.parent)
     objects.write(marks.loose)
+    objects.plants(plants)
     objects.underpasses()
     write_signals(element(road, "signals"), objects.ground, frame, faces)
     note(road, "instance", frame.section.carriageway.instance)
@@ -106,6 +121,7 @@ def _header(root: Element, geometry: RoadGeometry) -> None:
     element(header, "offset", {"x": float(x), "y": float(y), "z": float(z), "hdg": 0.0})
     note(header, "epsg", metadata.epsg)
     note(header, "title", metadata.title)
+    note(header, "level_of_detail", LEVEL)
 
 
 _PROJ = {

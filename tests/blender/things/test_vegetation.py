@@ -13,13 +13,13 @@ from synthroads_addon.blender.materials import material
 from synthroads_addon.blender.nodes.inputs import input_name
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.blender.things.vegetation import shrub, tree
-from synthroads_addon.blender.things.vegetation.build import species_shapes
 from synthroads_addon.blender.things.vegetation.grass import tuft_group
 from synthroads_addon.materials.table import materials
 from synthroads_addon.road.instances import GRASS_STRIPS
 from synthroads_addon.road.surroundings import SPECIES, Vegetation
-from synthroads_addon.road.vegetation.plants import grown_plants
+from synthroads_addon.road.vegetation.species import species_shapes
 from synthroads_addon.scanning.scene.mesh import SceneMesh
+from synthroads_addon.twin.plants import placed_plants
 from tests.helpers.scenes.furnished_road import Data, Float, FurnishedRoad, normals, of_material, pieces
 
 TREES, SHRUBS, GRASSES = (SPECIES[kind] for kind in ("tree", "shrub", "grass"))
@@ -210,18 +210,16 @@ class TestOnTheRoad:
     def test_each_plant_is_where_the_road_says_and_has_a_number_of_its_own(
         self, road: FurnishedRoad, name: str
     ) -> None:
-        item, terrain, mesh = road.parameters.objects[name], road.parameters.terrain, road.mesh(name)
-        assert isinstance(item, Vegetation)
-        assert terrain is not None
-        known = grown_plants(road.geometry, item, terrain, SHAPES[item.kind][name]["crown_radius"])
-        first = road.geometry.numbers.parts[name].first
-        assert np.unique(mesh.instance_id).tolist() == (first + known.number).tolist()
-        for number, place, height, radius in zip(*vars(known).values(), strict=True):
-            corners = mesh.vertices[mesh.triangles[mesh.instance_id == first + number]].reshape(-1, 3) + road.origin
+        mesh = road.mesh(name)
+        known = {plant.instance: plant for plant in placed_plants(road.geometry) if plant.stand == name}
+        assert np.unique(mesh.instance_id).tolist() == list(known)
+        for number, plant in known.items():
+            height, radius, place = plant.height, plant.breadth * plant.shape.crown_radius, plant.foot
+            corners = mesh.vertices[mesh.triangles[mesh.instance_id == number]].reshape(-1, 3) + road.origin
             assert corners[:, 2].max() - place[2] == pytest.approx(height, rel=MARGIN)
             reach = np.linalg.norm(corners[:, :2] - place[:2], axis=1)
             assert 0.6 * radius < reach.max() < 1.4 * radius + LEANING * height
-            if item.kind == "tree":
+            if plant.about.kind == "tree":
                 foot = corners[corners[:, 2].argmin(), :2]
                 assert np.linalg.norm(foot - place[:2]) < 0.05 * height
 

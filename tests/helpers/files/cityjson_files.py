@@ -45,10 +45,46 @@ class City:
                 if not types or about["type"] in types:
                     yield name, about, found
 
+    def rings(self, entity: dict[str, Any]) -> list[np.ndarray]:
+        """Return the outer rings (K, 3) of what a report tells of an object, or of one of its surfaces."""
+        found: list[np.ndarray] = []
+        for shape in self.objects[entity["object"]].get("geometry", ()):
+            if shape["type"] == "GeometryInstance":
+                found += self._instanced(shape)
+            elif shape["type"] in (*SURFACES, "Solid", "MultiSolid"):
+                boundaries = shape["boundaries"]
+                if "surface" in entity:
+                    values = shape["semantics"]["values"]
+                    boundaries = [b for b, v in zip(boundaries, values, strict=True) if v == entity["surface"]]
+                found += [self.vertices[ring] for ring in _rings_in(boundaries)]
+        return found
+
+    def _instanced(self, shape: dict[str, Any]) -> list[np.ndarray]:
+        templates = self.data["geometry-templates"]
+        vertices = np.column_stack([templates["vertices-templates"], np.ones(len(templates["vertices-templates"]))])
+        moved = vertices @ np.array(shape["transformationMatrix"]).reshape(4, 4).T
+        placed = moved[:, :3] + self.vertices[shape["boundaries"][0]]
+        return [placed[ring] for ring in _rings_in(templates["templates"][shape["template"]]["boundaries"])]
+
     def instances(self) -> set[int]:
         """Return every instance number in the file."""
         found = {item["attributes"]["instance"] for item in self.objects.values()}
         return found | {about["instance"] for _, about, _ in self.surfaces() if "instance" in about}
+
+
+def _rings_in(boundaries: list[Any]) -> Iterator[list[int]]:
+    """Yield the rings of nested boundaries."""
+    if boundaries and isinstance(boundaries[0], int):
+        yield boundaries
+    else:
+        for inner in boundaries:
+            yield from _rings_in(inner)
+
+
+def triangles_of_rings(rings: list[np.ndarray]) -> np.ndarray:
+    """Return triangles (T, 3, 3) of convex rings."""
+    fans = [np.stack([ring[[0] * (len(ring) - 2)], ring[1:-1], ring[2:]], axis=1) for ring in rings]
+    return np.concatenate(fans) if fans else np.empty((0, 3, 3))
 
 
 def read_city(path: Path) -> City:

@@ -18,10 +18,11 @@ from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.instances import InstanceNumbers
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.section import Carriageway, LineMarking
-from synthroads_addon.road.surroundings import Terrain, Vegetation, Vehicle
+from synthroads_addon.road.surroundings import Vegetation
 from synthroads_addon.road.things.overpass import Overpass
 from synthroads_addon.road.turnout_geometry import STEP
 from synthroads_addon.twin.cityjson.writer import write_cityjson
+from synthroads_addon.twin.plants import placed_plants
 from tests.helpers.files.cityjson_files import City, OfficialSchema, faults_of, read_city, thinned, width_at
 from tests.helpers.roads.twin_roads import NUMBER, full_road, one_of_many, road
 from tests.judges import JUDGES, require
@@ -29,7 +30,6 @@ from tests.judges.cityjson import official_schema
 
 TOLERANCE = 0.005
 AREAS = ("TrafficArea", "AuxiliaryTrafficArea")
-NOT_IN_TWIN = (Terrain, Vegetation, Vehicle)
 
 
 def city_of(parameters: RoadParameters, folder: Path, tolerance: float = TOLERANCE) -> City:
@@ -248,7 +248,7 @@ def test_ids_and_instances_are_those_of_the_set_and_the_cloud(
 ) -> None:
     road = full_road() if index is None else one_of_many(index)
     city = full_city if index is None else cities(index)
-    wanted = {name: item.instance for name, item in road.objects.items() if not isinstance(item, NOT_IN_TWIN)}
+    wanted = {name: item.instance for name, item in road.objects.items()}
     found = {name: item["attributes"]["instance"] for name, item in city.objects.items()}
     kinds = ("TransportationMarking", "TransportationHole")
     surfaces = (about for kind in kinds for _, about, _ in city.surfaces(kind))
@@ -267,8 +267,11 @@ def test_ids_and_instances_are_those_of_the_set_and_the_cloud(
     }
     parts = {name: number for name, number in found.items() if "/" in name}
     assert {name: number for name, number in found.items() if name not in parts} | painted == wanted
-    assert {name.split("/")[0] for name in parts} == set(road.of_type(Overpass))
-    assert city.instances() == {*wanted.values(), *fine.values()}
+    assert {name.split("/")[0] for name in parts} == {*road.of_type(Overpass), *road.of_type(Vegetation)}
+    growing = {name: number for name, number in parts.items() if road.objects[name.split("/")[0]].type == "Vegetation"}
+    assert {name: numbers.name_of(number) for name, number in growing.items()} == {name: name for name in growing}
+    assert {plant.name for plant in placed_plants(RoadGeometry(road))} <= set(growing)
+    assert city.instances() == {*wanted.values(), *fine.values(), *growing.values()}
 
 
 def test_classes_are_those_of_the_cloud(full_city: City) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -23,8 +24,9 @@ from synthroads_addon.road.lane_lines import lane_of
 from synthroads_addon.road.objects import LineObject, PointObject, width_at
 from synthroads_addon.road.parameters import AlignmentObject, HorizontalElement, RoadParameters
 from synthroads_addon.road.section import Carriageway, LineMarking, Turnout
-from synthroads_addon.road.surroundings import Vehicle
+from synthroads_addon.road.surroundings import Vegetation, Vehicle
 from synthroads_addon.road.terrain import surface_elevation
+from synthroads_addon.road.things.asset import Asset
 from synthroads_addon.road.things.concrete_barrier import ConcreteBarrier
 from synthroads_addon.road.things.gantry import Gantry
 from synthroads_addon.road.things.guardrail import Guardrail
@@ -35,6 +37,7 @@ from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.twin.ifc.alignment import plan_segments, write_alignment
 from synthroads_addon.twin.ifc.entities import IfcFile
 from synthroads_addon.twin.ifc.writer import write_ifc, write_project
+from synthroads_addon.twin.trace import Trace
 from tests.helpers.files.alignment_segments import gaps
 from tests.helpers.files.ifc_reading import (
     along,
@@ -50,6 +53,7 @@ from tests.helpers.files.ifc_reading import (
     whole_body,
     written,
 )
+from tests.helpers.files.twin_reports import numbers_of
 from tests.helpers.roads.checker_full_road import full
 from tests.helpers.roads.parameter_sets import OBJECTS, road_data
 from tests.helpers.roads.sampled_parts import PAIRS, scenario
@@ -246,7 +250,7 @@ def _bent(elements: list[tuple[float, float, float]], points: list[dict[str, flo
 
 def _axis_alone(geometry: RoadGeometry, folder: Path) -> Any:
     """Write nothing but a road's alignment, and open the file."""
-    ifc = IfcFile("axis")
+    ifc = IfcFile("axis", Trace(geometry))
     write_project(ifc, geometry.parameters)
     write_alignment(ifc, geometry)
     ifc.relate()
@@ -446,8 +450,15 @@ def _check_instances(file: Any, parameters: RoadParameters) -> None:
     for name, item in parameters.of_type(Carriageway).items():
         damage = len(item.pavement.ruts) + len(item.pavement.potholes)
         numbers |= dict(known.part(name, number) for number in range(damage))
-    assert {name: {number} for name, number in numbers.items()}.items() <= found.items()
-    assert set().union(*found.values()) == set(numbers.values())
+    stands = parameters.of_type(Vegetation)
+    numbers |= {name: number for number, name in numbers_of(parameters).items() if name.partition("/")[0] in stands}
+    # Reed grows on neither verges nor median.
+    wanted = {name: {number} for name, number in numbers.items()}
+    assert {name: found.get(name) for name in wanted if name not in found} == {
+        name: None for name in wanted if re.match("grass-reed/(.*-verge|median)", name)
+    }
+    assert {name: number for name, number in wanted.items() if name in found}.items() <= found.items()
+    assert set().union(*found.values()) == set().union(*(wanted[name] for name in wanted if name in found))
 
 
 def test_instances(road) -> None:
@@ -807,11 +818,11 @@ def _clearance(geometry: RoadGeometry, spans: tuple[np.ndarray, np.ndarray]) -> 
 
 
 def test_every_element_has_a_body(road) -> None:
-    _, file = road
-    bare = {"IfcPavement", "IfcBuildingElementProxy"}
+    parameters, file = road
+    bare = {*parameters.of_type(Asset), *parameters.of_type(Vegetation)}
     for item in file.by_type("IfcElement"):
         kind = getattr(item, "PredefinedType", None)
-        if item.is_a() in bare or kind in ("DEFECT", "VEGETATION"):
+        if item.is_a("IfcPavement") or item.Name in bare or kind == "DEFECT":
             continue
         vertices = whole_body(item)
         assert len(vertices) >= 3, item

@@ -28,6 +28,7 @@ from synthroads_addon.road.things.sign import TrafficSign
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.twin.opendrive.pieces import chords, cubics, runs
 from synthroads_addon.twin.opendrive.writer import geo_reference, write_opendrive
+from synthroads_addon.twin.plants import placed_plants
 from tests.helpers.files.opendrive_reader import (
     Lane,
     OpenDrive,
@@ -536,7 +537,9 @@ def all_instances(read: Roads) -> dict[int, set[str]]:
 
 def test_every_object_is_there_by_id_and_instance(road: RoadParameters, read: Roads) -> None:
     found = all_instances(read)
-    assert set(found) == {item.instance for item in road.objects.values()}
+    plants = {plant.instance: plant.name for plant in placed_plants(RoadGeometry(road))}
+    assert set(found) == {*(item.instance for item in road.objects.values()), *plants}
+    assert all(name in found[number] for number, name in plants.items())
     for name, item in road.objects.items():
         if item.type != "Alignment":
             assert name in found[item.instance]

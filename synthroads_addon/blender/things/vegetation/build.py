@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from functools import cache
 from typing import Any
 
 import bpy
 import numpy as np
 
-from ....base.files import PRESETS
-from ....base.schema import read_json
 from ....base.stepper import run_aside
 from ....road.section import Median
 from ....road.surroundings import Terrain, Vegetation
-from ....road.vegetation.plants import ROADSIDE_SHARE, SEEDS, plant_places
+from ....road.vegetation.plants import ROADSIDE_SHARE, SEEDS, WILD_GRASSES, plant_places
+from ....road.vegetation.species import species_shapes
 from ..meshes import attribute, fill
 from ..model_builder import ModelBuilder
 from ..registry import model_part
@@ -23,13 +21,6 @@ from .shrub import shrub_group
 from .tree import tree_group
 
 _GROUPS = {"grass": grass_group, "shrub": shrub_group, "tree": tree_group}
-
-
-@cache
-def species_shapes() -> dict[str, dict[str, dict[str, float]]]:
-    """Return the shapes of the species by kind of plant and name: inputs of its group, for a plant of height 1."""
-    shapes: dict[str, dict[str, dict[str, float]]] = read_json(PRESETS / "plants.json")
-    return shapes
 
 
 @model_part("vegetation", 190)
@@ -72,7 +63,7 @@ def _places_mesh(builder: ModelBuilder, plants: Vegetation, terrain: Terrain) ->
 def _further_inputs(plants: Vegetation, builder: ModelBuilder) -> dict[str, Any]:
     """Return the inputs that only one kind of plant has: materials, and the density on verges and median."""
     if plants.kind == "grass":
-        roadside = plants.density * ROADSIDE_SHARE * (plants.species != "reed")
+        roadside = plants.density * ROADSIDE_SHARE * (plants.species not in WILD_GRASSES)
         median = next((item.instance for item in builder.parameters.of_type(Median).values()), 0)
         reach = {"roadside_reach": builder.widest, "median_instance": median}
         return {"roadside_density": roadside, "material": plants.species, **reach}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ....base.classes import class_id
+from ....road.vegetation.plants import ROADSIDE_HEIGHT
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import INSTANCES, Inputs, integer, material_of, metres, number, share
@@ -20,7 +21,7 @@ _STALK = [(0.0, 0.0, -0.04), (0.10, -0.5, 0.78), (0.10, 0.5, 0.78), (0.2, 0.0, 1
 class _Roadside(Inputs):
     roadside_density = number(1.0, (0.0, 50.0), "Tufts per area of verge and median (1/m2)")
     roadside_reach = metres(30.0, (1.0, 100.0), "Farthest verge from the axis")
-    roadside_height = share(0.5, (0.0, 1.0), "Height there, as a share of the height elsewhere")
+    roadside_height = share(ROADSIDE_HEIGHT, (0.0, 1.0), "Height there, as a share of the height elsewhere")
     median_instance = integer(0, INSTANCES, "Instance number of the median's faces; 0 if it has none of its own")
     material = material_of("the blades", "meadow")
 

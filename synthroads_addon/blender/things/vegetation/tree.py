@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from ....base.classes import class_id
-from ....road.vegetation.plants import KINDS
+from ....road.vegetation.plants import BOTTOMS, KINDS
+from ....road.vegetation.species import TRUNK_FOOT, TRUNK_TAPER, TRUNK_TOP
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import metres
@@ -12,10 +13,8 @@ from .crown import Crown, Plant, PlantMaterials, bend_stems, crown_group
 from .plants import Stand, decided_places, own_numbers, plant_points, points_in_band, sizes
 
 # Kinds of one species: seed, and factors on the crown's bottom and radius.
-_KINDS = tuple(zip((11, 23, 37), (1.0, 0.85, 1.2), KINDS["tree"], strict=True))
+_KINDS = tuple(zip((11, 23, 37), BOTTOMS["tree"], KINDS["tree"], strict=True))
 _SIDES, _ROWS = 7, 5
-_FOOT = 0.02
-"""Depth of the trunk's foot in the ground, so that it shows no gap on a batter."""
 _LEAN = 0.04
 
 
@@ -72,12 +71,12 @@ def _trunk(tree: Tree, radius: Value) -> Value:
         vertices=_SIDES,
         side_segments=_ROWS,
         radius_bottom=radius,
-        radius_top=radius * 0.2,
-        depth=0.93 + _FOOT,
+        radius_top=radius * TRUNK_TAPER,
+        depth=TRUNK_TOP + TRUNK_FOOT,
     ).value
     place = op.position(tree)
     height = op.component(place, "Z")
     wider = 1.0 + 0.45 * op.maximum(1.0 - height * 12.0, 0.0)
     size = op.vector(tree, wider, wider, 1.0)
     place = place * size
-    return op.set_position(trunk, place - (0.0, 0.0, _FOOT))
+    return op.set_position(trunk, place - (0.0, 0.0, TRUNK_FOOT))

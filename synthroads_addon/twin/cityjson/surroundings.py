@@ -1,0 +1,86 @@
+"""Surroundings of the road in CityJSON: ground, trees and shrubs one by one, strips of grass, vehicles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ...road.geometry import RoadGeometry
+from ...road.surroundings import Terrain, Vegetation
+from ...road.vegetation.species import PlantShape
+from ..attributes import attributes_of
+from ..faces import Faces, Float, loft
+from ..ground import Ground, ground_beside
+from ..plants import PlacedPlant, grass_strips, placed_plants
+from ..vehicles import placed_vehicles
+from .model import CityGeometry, CityModel, CityObject, solids
+
+_GROUND, _PLANTS, _BOXES = "2", "2", "1"
+"""Levels of detail: surfaces, plants as trunk and crown, boxes around vehicles."""
+
+
+def add_surroundings(model: CityModel, geometry: RoadGeometry, stations: Float, tolerance: float) -> None:
+    """Add ground, plants and vehicles.
+
+    Args:
+        model: the objects of the file.
+        geometry: the road.
+        stations: (N,) stations at which its surface is sampled.
+        tolerance: chord error of its surface, m.
+    """
+    for name, terrain in geometry.parameters.of_type(Terrain).items():
+        ground = ground_beside(geometry, terrain, stations, tolerance)
+        model.add(_terrain(name, terrain, ground))
+        _add_plants(model, geometry, ground)
+    for item in _vehicles(geometry, model):
+        model.add(item)
+
+
+def _terrain(name: str, terrain: Terrain, ground: Ground) -> CityObject:
+    attributes = attributes_of(terrain) | {"class": terrain.points_class, "deviation": round(ground.deviation, 4)}
+    shapes = (CityGeometry("CompositeSurface", _GROUND, (faces,)) for faces in ground.faces if len(faces))
+    return CityObject(name, "TINRelief", attributes, tuple(shapes))
+
+
+def _add_plants(model: CityModel, geometry: RoadGeometry, ground: Ground) -> None:
+    """Add every plant, every strip of grass, and a group for each stand."""
+    members: dict[str, list[str]] = {name: [] for name in geometry.parameters.of_type(Vegetation)}
+    for plant in placed_plants(geometry):
+        model.trace.grow(plant)
+        members[plant.stand].append(plant.name)
+        model.add(_plant(model, plant))
+    for strip in grass_strips(geometry, ground):
+        members[strip.stand].append(strip.name)
+        shape = CityGeometry("MultiSurface", _GROUND, (strip.faces,))
+        model.add(CityObject(strip.name, "PlantCover", strip.attributes(), (shape,), parent=strip.stand))
+    for name, stand in geometry.parameters.of_type(Vegetation).items():
+        model.trace.reduce(name, "grass is its strips, without its tufts" if stand.kind == "grass" else _SHAPE)
+        attributes = attributes_of(stand) | {"class": stand.points_class}
+        model.add(CityObject(name, "CityObjectGroup", attributes, children=tuple(members[name])))
+
+
+_SHAPE = "a plant is its trunk and its crown's outline, upright, without branches and leaves"
+
+
+def _plant(model: CityModel, plant: PlacedPlant) -> CityObject:
+    key = plant.about.kind, plant.about.species, plant.variant
+    template = model.template(key, partial(_plant_template, plant.shape))
+    foot = Faces(plant.foot[None], np.zeros(1, np.int64), np.ones(1, np.int64))
+    shape = CityGeometry("GeometryInstance", _PLANTS, (foot,), template=template, scale=plant.scale)
+    return CityObject(plant.name, "SolitaryVegetationObject", plant.attributes(), (shape,), parent=plant.stand)
+
+
+def _plant_template(shape: PlantShape) -> CityGeometry:
+    bodies = [loft(sections) for sections in (shape.trunk(), shape.crown()) if sections is not None]
+    return solids(bodies, _PLANTS)[0]
+
+
+def _vehicles(geometry: RoadGeometry, model: CityModel) -> Iterator[CityObject]:
+    for placed in placed_vehicles(geometry):
+        model.trace.simplify(placed)
+        attributes: dict[str, Any] = attributes_of(placed.vehicle) | {"class": placed.vehicle.points_class}
+        attributes |= geometry.numbers.about(placed.vehicle.instance)
+        yield CityObject(placed.name, "GenericCityObject", attributes, solids([loft(placed.box())], _BOXES))

@@ -1,0 +1,166 @@
+"""The ground beside the road as triangles, batters included: as fine as its tolerance asks, joined to the road."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..road.alignment import clip_offset
+from ..road.geometry import RoadGeometry
+from ..road.surroundings import Terrain
+from ..road.terrain import ground_elevation
+from .faces import Faces, Float, grid_corners, halves, upward_triangles
+from .strips import zip_rows
+from .surfaces import on_ground
+
+GROUND_TOLERANCE = 0.03
+"""Largest distance (m) of the ground from its surface, unless a larger one is asked for of everything."""
+_SPACINGS = (8.0, 6.0, 4.0, 3.0, 2.0)
+"""Spacings of rows and columns that are tried, m; the last one is taken where none keeps the tolerance."""
+_LOOKED_AT = 5_000
+"""Triangles at whose middles and edges the distance is measured."""
+_FIRST_LOOK = 1.0  # m, between places at which a batter's toe is looked for
+_HALVINGS = 30
+
+
+@dataclass(frozen=True)
+class GroundSide:
+    """The ground on one side of the road, in rows across the road and columns outwards.
+
+    Attributes:
+        geometry: the road.
+        sign: 1 on the left, -1 on the right.
+        station: (R,) of the rows, m.
+        edge: (R,) offsets of the road's edge, m.
+        distance: (R, K) of the columns from there, m: the edge, the batter's toe, and evenly beyond it.
+    """
+
+    geometry: RoadGeometry
+    sign: float
+    station: Float
+    edge: Float
+    distance: Float
+
+    def points(self, distance: Float) -> Float:
+        """Return the local points (R * K, 3) of the surface at distances (R, K) from the road's edge."""
+        bend = self.geometry.alignment.curvature(self.station)
+        offset = clip_offset(self.edge[:, None] + self.sign * distance, bend[:, None])
+        return on_ground(self.geometry, np.repeat(self.station, distance.shape[1]), offset.ravel())
+
+    def triangles(self, road: Float) -> Faces:
+        """Return the ground's triangles, seen from above against the clock.
+
+        Args:
+            road: (N,) stations at which the road's edge has points: the ground's are the same.
+        """
+        rows, columns = self.distance.shape
+        grid = self.points(self.distance)
+        edge = self.geometry.offsets(road)[:, 0 if self.sign > 0.0 else -1]
+        seam = on_ground(self.geometry, road, edge)
+        inner, toe = len(grid) + np.arange(len(road)), np.arange(rows) * columns + 1
+        first = np.append(inner, toe)[np.array(zip_rows(road, self.station))]
+        cells = grid_corners(rows, columns - 1)
+        beyond = halves(cells + cells // (columns - 1) + 1)
+        # Seen from above the first are against the clock on the left, the others on the right.
+        corners = np.concatenate([first, beyond[:, ::-1]] if self.sign > 0.0 else [first[:, ::-1], beyond])
+        points = np.concatenate([grid, seam])
+        return upward_triangles(points, corners)
+
+    def band(self, start: float, end: float) -> Float:
+        """Return the distances (R, K) of those of the ground's columns that lie within a band, and of its limits, m."""
+        reach = self.distance[:, -1:]
+        return np.clip(self.distance, min(max(start, 0.0), reach.min()), np.clip(end, 0.0, reach))
+
+
+@dataclass(frozen=True)
+class Ground:
+    """The ground beside a road.
+
+    Attributes:
+        sides: left and right.
+        faces: triangles of each.
+        deviation: farthest that they were measured to lie from the surface, m.
+    """
+
+    sides: tuple[GroundSide, GroundSide]
+    faces: tuple[Faces, Faces]
+    deviation: float
+
+
+def ground_beside(geometry: RoadGeometry, terrain: Terrain, road: Float, tolerance: float) -> Ground:
+    """Return the ground beside a road, as coarse as keeps `GROUND_TOLERANCE`, or the tolerance if that is larger.
+
+    Args:
+        geometry: the road.
+        terrain: its terrain.
+        road: (N,) stations at which the road's surface has rows.
+        tolerance: that of the model, m.
+    """
+    made: Ground | None = None
+    for spacing in _SPACINGS:
+        sides = (_side(geometry, terrain, 1.0, spacing), _side(geometry, terrain, -1.0, spacing))
+        faces = (sides[0].triangles(road), sides[1].triangles(road))
+        made = Ground(sides, faces, max(_deviation(geometry, part) for part in faces))
+        if made.deviation <= max(tolerance, GROUND_TOLERANCE):
+            break
+    assert made
+    return made
+
+
+def _side(geometry: RoadGeometry, terrain: Terrain, sign: float, spacing: float) -> GroundSide:
+    even = np.linspace(0.0, geometry.length, max(2, int(np.ceil(geometry.length / spacing)) + 1))
+    kinks = [s for section in geometry.sections.values() for s in section.kinks() if 0.0 < s < geometry.length]
+    station = np.unique(np.concatenate([even, kinks]))
+    edge = geometry.offsets(station)[:, 0 if sign > 0.0 else -1]
+    reach = np.maximum(terrain.half_width - sign * edge, 0.0)
+    toe = _toe(geometry, terrain, station, edge, reach * sign)
+    further = np.arange(1, int(np.ceil(reach.max() / spacing)) + 1) * spacing
+    beyond = np.clip(further[None, :], toe[:, None], reach[:, None])
+    return GroundSide(geometry, sign, station, edge, np.column_stack([np.zeros(len(station)), toe, beyond]))
+
+
+def _toe(geometry: RoadGeometry, terrain: Terrain, station: Float, edge: Float, reach: Float) -> Float:
+    """Return how far (R,) from the road's edge its batter meets the ground, m.
+
+    Args:
+        geometry, terrain: the road and its ground.
+        station, edge: (R,) stations, and offsets of the road's edge.
+        reach: (R,) largest distance, negative on the right.
+    """
+    level, far = geometry.elevation(station, edge), np.abs(reach)
+
+    def outside(distance: Float) -> Float:
+        """Return how far the ground lies beyond the batter's reach at distances (R, D)."""
+        every = np.repeat(station, distance.shape[1])
+        offset = (edge[:, None] + np.sign(reach)[:, None] * distance).ravel()
+        ground = ground_elevation(geometry, terrain, every, offset).reshape(distance.shape)
+        apart = np.abs(ground - level[:, None]) - distance / terrain.batter_slope
+        return np.where(np.isnan(apart), -1.0, apart)
+
+    steps = np.linspace(0.0, 1.0, max(2, int(np.ceil(far.max() / _FIRST_LOOK)) + 1))
+    met = outside(far[:, None] * steps) <= 0.0
+    first = np.where(met.any(axis=1), met.argmax(axis=1), len(steps) - 1)
+    high = far * steps[first]
+    low = far * steps[np.maximum(first - 1, 0)]
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2.0
+        there = outside(middle[:, None])[:, 0] <= 0.0
+        low, high = np.where(there, low, middle), np.where(there, middle, high)
+    return np.where(met.any(axis=1), high, far)
+
+
+def _deviation(geometry: RoadGeometry, faces: Faces) -> float:
+    """Return how far the surface lies above or below triangles, at their middles and those of their edges."""
+    return max((float(np.abs(away).max()) for away in _away(geometry, faces) if len(away)), default=0.0)
+
+
+def _away(geometry: RoadGeometry, faces: Faces) -> Iterator[Float]:
+    corners = faces.corners.reshape(-1, 3)
+    corners = corners[:: max(1, -(-len(corners) // _LOOKED_AT))]
+    a, b, c = (faces.points[corners[:, number]] for number in range(3))
+    for place in ((a + b + c) / 3.0, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0):
+        station, offset = geometry.alignment.project(place[:, :2])
+        within = (station >= 0.0) & (station <= geometry.length)
+        yield (on_ground(geometry, station[within], offset[within]) - place[within])[:, 2]

@@ -1,0 +1,51 @@
+"""Elements of an OpenDRIVE file that bear an instance number as user data."""
+
+from __future__ import annotations
+
+from ..trace import Entity, Trace
+from .xml import Element
+
+LOST = {
+    "Terrain": "OpenDRIVE has no ground beside its lanes",
+    "strip": "OpenDRIVE has no areas of grass",
+    "Vehicle": "OpenDRIVE has no traffic: scenarios are for that (OpenSCENARIO)",
+    "rut": "OpenDRIVE has no damage in its surface: OpenCRG is for that",
+    "pothole": "OpenDRIVE has no damage in its surface: OpenCRG is for that",
+}
+"""Type of object, or kind of part -> why the file has none."""
+
+
+def trace_elements(root: Element, trace: Trace) -> None:
+    """Tell a trace of all elements that bear an instance number.
+
+    An element is told by its tag and its id; lanes and road marks by road, start of the section (m), lane, and number
+    of the mark among the lane's. What is only named at the file's end is no element.
+    """
+    for road in root.findall("road"):
+        _look(road, {}, trace)
+
+
+def _look(element: Element, above: Entity, trace: Trace) -> None:
+    here = _found_with(element, above)
+    for data in element.findall("userData"):
+        if data.get("code") == "instance":
+            trace.found(int(data.get("value", "0")), **here)
+    marks = 0
+    for child in element:
+        if child.tag == "roadMark":
+            _look(child, {**here, "mark": marks}, trace)
+            marks += 1
+        elif child.tag != "userData":
+            _look(child, here, trace)
+
+
+def _found_with(element: Element, above: Entity) -> Entity:
+    """Return what an element is found with, from what that above it is found with."""
+    entity = {**above, "element": element.tag}
+    if element.tag == "laneSection":
+        entity["section"] = float(element.get("s", "0"))
+    elif element.tag in ("road", "lane"):
+        entity[element.tag] = int(element.get("id", "0"))
+    elif "id" in element.attrib and element.tag in ("object", "signal", "tunnel"):
+        entity["id"] = int(element.get("id", "0"))
+    return entity

@@ -1,0 +1,147 @@
+"""Plants of a road one by one, and the strips that grass grows on, as the model has them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from ..base.arrays import Float
+from ..road.geometry import RoadGeometry
+from ..road.instances import GRASS_STRIPS
+from ..road.surroundings import Vegetation
+from ..road.vegetation.plants import ROADSIDE_HEIGHT, WILD_GRASSES, grown_plants
+from ..road.vegetation.species import PlantShape, plant_shape
+from .faces import Faces, grid_corners, halves, join_polygons, upward_triangles
+from .ground import Ground
+from .surfaces import on_ground
+
+
+class PlacedPlant(NamedTuple):
+    """A tree or shrub.
+
+    Attributes:
+        name, instance: its id and its number in the cloud.
+        stand: id of the stand that it belongs to.
+        about: that stand.
+        variant: which of the kinds of its species it is.
+        station, offset: m.
+        foot: (3,) local, m.
+        height: m.
+        breadth: by which the shape of a plant of height 1 is scaled across, m.
+        shape: that shape.
+    """
+
+    name: str
+    instance: int
+    stand: str
+    about: Vegetation
+    variant: int
+    station: float
+    offset: float
+    foot: Float
+    height: float
+    breadth: float
+    shape: PlantShape
+
+    def attributes(self) -> dict[str, str | int | float]:
+        """Return what is said of it: number, class, species and measures (m)."""
+        told: dict[str, str | int | float] = {"instance": self.instance, "class": self.about.points_class}
+        told |= {"function": self.about.kind, "species": self.about.species, "stand": self.stand}
+        told |= {
+            "height": round(self.height, 4),
+            "crownDiameter": round(2.0 * self.breadth * self.shape.crown_radius, 4),
+        }
+        told["crownBottom"] = round(self.height * self.shape.crown_bottom, 4)
+        if self.shape.trunk_radius:
+            told["trunkDiameter"] = round(2.0 * self.breadth * self.shape.trunk_radius, 4)
+        return told
+
+    @property
+    def scale(self) -> tuple[float, float, float]:
+        """Return the factors on the shape of a plant of height 1."""
+        return self.breadth, self.breadth, self.height
+
+
+class GrassStrip(NamedTuple):
+    """A strip that grass of one species grows on.
+
+    Attributes:
+        name, instance: its id and its number in the cloud.
+        stand: id of the stand that it belongs to.
+        about: that stand.
+        mean_height: m.
+        faces: its surface, as high above the ground as the grass is on average.
+    """
+
+    name: str
+    instance: int
+    stand: str
+    about: Vegetation
+    mean_height: float
+    faces: Faces
+
+    def attributes(self) -> dict[str, str | int | float]:
+        """Return what is said of it: number, class, species and mean height (m)."""
+        told: dict[str, str | int | float] = {"instance": self.instance, "class": self.about.points_class}
+        told |= {"function": self.about.kind, "species": self.about.species, "stand": self.stand}
+        return told | {"strip": self.name.rpartition("/")[2], "averageHeight": round(self.mean_height, 4)}
+
+
+def placed_plants(geometry: RoadGeometry) -> Iterator[PlacedPlant]:
+    """Yield all trees and shrubs of a road, stand by stand in the order of the parameter set."""
+    terrain = geometry.parameters.terrain
+    for stand, about in geometry.parameters.of_type(Vegetation).items():
+        if about.kind == "grass" or terrain is None:
+            continue
+        grown = grown_plants(geometry, about, terrain)
+        for number, station, offset, foot, height, breadth, variant in zip(*vars(grown).values(), strict=True):
+            name, instance = geometry.numbers.part(stand, int(number))
+            shape = plant_shape(about.kind, about.species, int(variant))
+            place = int(variant), float(station), float(offset), foot, float(height), float(breadth)
+            yield PlacedPlant(name, instance, stand, about, *place, shape)
+
+
+def grass_strips(geometry: RoadGeometry, ground: Ground) -> Iterator[GrassStrip]:
+    """Yield the strips of all stands of grass that have an area, stand by stand."""
+    for stand, about in geometry.parameters.of_type(Vegetation).items():
+        if about.kind != "grass":
+            continue
+        mean = (about.height_min + about.height_max) / 2.0
+        for number, strip in enumerate(GRASS_STRIPS):
+            band = strip.endswith("band")
+            if not band and about.species in WILD_GRASSES:
+                continue
+            height = mean if band else mean * ROADSIDE_HEIGHT
+            faces = _band(ground, number, about, height) if band else _roadside(geometry, ground, strip, height)
+            if len(faces):
+                name, instance = geometry.numbers.part(stand, number)
+                yield GrassStrip(name, instance, stand, about, height, faces)
+
+
+def _band(ground: Ground, number: int, about: Vegetation, height: float) -> Faces:
+    """Return the surface of a band on one side (0 left, 1 right)."""
+    side = ground.sides[number]
+    distance = side.band(about.band_start, about.band_end)
+    return _sheet(side.points(distance), (len(distance), distance.shape[1]), height, side.sign < 0.0)
+
+
+def _roadside(geometry: RoadGeometry, ground: Ground, strip: str, height: float) -> Faces:
+    """Return the surface of the strips beside the pavement on one side, or of the median."""
+    station = ground.sides[0].station
+    offsets = geometry.offsets(station)
+    parts = []
+    for number, one in enumerate(geometry.strips):
+        if one.class_name == "roadside" and strip == ("median" if one.side is None else f"{one.side}-verge"):
+            # From left to right.
+            points = on_ground(geometry, np.repeat(station, 2), offsets[:, number : number + 2].ravel())
+            parts.append(_sheet(points, (len(station), 2), height, True))
+    return join_polygons(parts)
+
+
+def _sheet(points: Float, shape: tuple[int, int], height: float, rightwards: bool) -> Faces:
+    """Return the triangles between points row by row, raised by a height; those without area are left out."""
+    corners = halves(grid_corners(*shape))
+    raised = points + np.array([0.0, 0.0, height])
+    return upward_triangles(raised, corners if rightwards else corners[:, ::-1])

@@ -1,0 +1,151 @@
+"""`Trace`: what each instance number of the cloud became in a file, and what the file lacks, as a JSON beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from ..base.schema import compact_json
+from ..base.version import generator
+from ..road.geometry import RoadGeometry
+from ..road.instances import Parts
+from ..road.objects import RoadObject
+from ..road.section import LineMarking
+from ..road.surroundings import Vegetation
+from ..road.things.thing import StandingThing
+from .plants import PlacedPlant, placed_plants
+from .things import PlacedThing
+from .vehicles import PlacedVehicle
+
+Entity = dict[str, Any]
+"""Where something stands in a file, in the format's own words: JSON data."""
+FITTINGS = 0.1
+"""Fittings of things that are smaller (m) are left out of all formats."""
+LEVEL = f"true shapes, without fittings that stand out by less than {FITTINGS:g} m"
+
+
+_NOWHERE = dict.fromkeys(
+    ("dash", "strip", "LineMarking", "Hatching", "Arrow", "Turnout", "LengthwiseThing"),
+    "nothing of it is on the road, or it has no area",
+)
+"""Why any file may have no entity for something."""
+
+
+class Trace:
+    """Entities of one file by instance number, and what it lacks.
+
+    Args:
+        geometry: the road.
+        level: level of detail of the file, for people.
+        within: kinds of parts (`InstanceNumbers.parts`) that are within their object's entities and have none of their
+            own.
+        reasons: why the file has no entity for something, by the type of an object or the kind of a part.
+    """
+
+    def __init__(
+        self,
+        geometry: RoadGeometry,
+        level: str = LEVEL,
+        within: Iterable[str] = (),
+        reasons: Mapping[str, str] | None = None,
+    ) -> None:
+        self.level = level
+        self._geometry = geometry
+        self._grown: dict[int, list[int]] = {}
+        self._within, self._reasons = frozenset(within), {**_NOWHERE, **(reasons or {})}
+        self._entities: dict[int, list[Entity]] = {}
+        self._reduced: list[tuple[str, str]] = []
+
+    def found(self, instance: int, **entity: str | int) -> None:
+        """Note an entity of an instance number, by what it is found with."""
+        self._entities.setdefault(instance, []).append(entity)
+
+    def grow(self, plant: PlacedPlant) -> None:
+        """Note that a plant grows."""
+        self._grown.setdefault(self._geometry.numbers.parts[plant.stand].first, []).append(plant.instance)
+
+    def reduce(self, name: str, reason: str) -> None:
+        """Note that the file has less of an object than the parameter set."""
+        self._reduced.append((name, reason))
+
+    def leave_out(self, placed: PlacedThing) -> None:
+        """Note what of a thing all formats leave out: its fittings, a shape that isn't known, what it says itself."""
+        sizes = [body.detail for body in placed.bodies if body.detail]
+        if sizes:
+            few = "a fitting" if len(sizes) == 1 else f"{len(sizes)} fittings"
+            self.reduce(placed.name, f"without {few} of up to {max(sizes):.3g} m")
+        if not placed.bodies and isinstance(placed.thing, StandingThing):
+            self.reduce(placed.name, "its place alone: its shape isn't in the parameter set")
+        if placed.thing.left_out:
+            self.reduce(placed.name, f"without {placed.thing.left_out}")
+
+    def simplify(self, placed: PlacedVehicle) -> None:
+        """Note that a vehicle is a box."""
+        moves = ", where it is at the time 0" if placed.vehicle.speed else ""
+        self.reduce(placed.name, f"the box around it{moves}")
+
+    def write(self, path: Path, name: str, file: str) -> None:
+        """Write what is traced and what is lacking; same road, same bytes.
+
+        Args:
+            path: the JSON file.
+            name: of the format.
+            file: name of its file.
+        """
+        parameters, numbers = self._geometry.parameters, self._geometry.numbers
+        about = {"type": "TwinReport", "version": "1.0", "generator": generator(), "format": name, "file": file}
+        about |= {"identifier": parameters.metadata.identifier, "level_of_detail": self.level}
+        traced, lost = self._sorted()
+        own = {key: item.instance for key, item in parameters.objects.items()}
+        reduced = [{"id": key, "instance": own[key], "reason": reason} for key, reason in self._reduced]
+        passes = [
+            {"id": key, "instance": own[key], "first_pass_instance": one.first, "pass_step": one.step}
+            for key, one in numbers.passes.items()
+        ]
+        text = compact_json(about)[:-1]
+        for key, rows in (("lost", lost), ("reduced", reduced), ("passes", passes), ("instances", traced)):
+            text += f',\n"{key}":[' + ",".join("\n" + compact_json(row) for row in rows) + "]"
+        path.write_text(text + "}\n", encoding="utf-8", newline="\n")
+
+    def _sorted(self) -> tuple[list[Entity], list[Entity]]:
+        """Return what each number became, and the numbers that became nothing with the reasons."""
+        objects = self._geometry.parameters.objects
+        if not self._grown:  # the format has no plants
+            for plant in placed_plants(self._geometry):
+                self.grow(plant)
+        traced, lost = [], []
+        for number, name, kinds in self._numbers():
+            entities = self._entities.get(number)
+            if not entities and self._within.intersection(kinds):
+                entities = self._entities.get(objects[name.partition("/")[0]].instance)
+            if entities:
+                traced.append({"instance": number, "id": name, "entities": entities})
+            elif not self._is_only_parts(objects.get(name)):
+                reason = next((self._reasons[kind] for kind in kinds if kind in self._reasons), "")
+                lost.append({"instance": number, "id": name, "reason": reason})
+        return traced, lost
+
+    def _is_only_parts(self, item: RoadObject | None) -> bool:
+        """Return whether an object consists of parts alone: no point has its own number."""
+        return isinstance(item, Vegetation) or (isinstance(item, LineMarking) and bool(item.dash_length))
+
+    def _numbers(self) -> Iterator[tuple[int, str, tuple[str, ...]]]:
+        """Yield every number that points can have, but those of later passes, its id, and what may give the reason."""
+        numbers, objects = self._geometry.numbers, self._geometry.parameters.objects
+        for name, item in objects.items():
+            yield item.instance, name, tuple(kind.__name__ for kind in type(item).__mro__)
+        for name, parts in numbers.parts.items():
+            for part in self._parts_of(objects[name], parts):
+                text, number = numbers.part(name, part)
+                kinds = [kind.__name__ for kind in type(objects[name]).__mro__]
+                yield number, text, (text.partition("/")[2].partition("-")[0], parts.kind, *kinds)
+
+    def _parts_of(self, item: RoadObject, parts: Parts) -> Iterable[int]:
+        """Return the parts of an object that are there."""
+        if isinstance(item, LineMarking):
+            return range(len(self._geometry.dashes(item)) if item.dash_length else 0)
+        if isinstance(item, Vegetation) and item.kind != "grass":
+            places = self._grown.get(parts.first, ())
+            return [number - parts.first for number in places]
+        return range(parts.count)
