@@ -23,21 +23,21 @@ ALL = (
     "road.pavement.rutted=1",
     "road.pavement.potholes_per_km.minimum=15",
     "road.pavement.potholes_per_km.maximum=20",
-    'road.assets=["roadside"]',
     "road.vehicles.per_km.minimum=20",
     "road.vehicles.per_km.maximum=30",
 )
 WORKS = ("road.furniture.construction_zone=1",)
+ASSETS = ('road.assets=["roadside"]', "road.half_width=60")
 BRIDGE = ("road.furniture.overpass=1", "road.barriers.concrete_median=1")
 TURNOUTS = ("road.turnouts.exits=1", "road.turnouts.emergency_bays=1")
 SETS = {
     "RQ43.5": ("EKA1A", 400, BRIDGE),
     "RQ36": ("EKA1A", 700, WORKS),
     "RQ31": ("EKA1B", 400, BRIDGE),
-    "RQ28": ("EKA2", 300, ()),
+    "RQ28": ("EKA2", 300, ASSETS),
     "RQ38.5": ("EKA3", 700, TURNOUTS),
-    "RQ31.5": ("EKA3", 300, ()),
-    "RQ25": ("EKA3", 300, ()),
+    "RQ31.5": ("EKA3", 200, ()),
+    "RQ25": ("EKA3", 200, ()),
 }
 """Cross-section -> design class, length (m), and what it has besides."""
 
@@ -46,8 +46,8 @@ def scenario(section: str) -> Scenario:
     design, length, further = SETS[section]
     still = ("scan.traffic_speed_factor=0",) if design == "EKA3" else ()
     road = (f"road.design_class={design}", f"road.cross_section={section}", f"road.length={length}")
-    wide = ("road.half_width=60", "seed=2")
-    return load_scenario("mobile-mapping-300m", [*road, *wide, *ALL, *further, *still, *FILES])
+    small = ("road.half_width=35", "seed=2", "scan.platform.speed=40")
+    return load_scenario("mobile-mapping-300m", [*road, *small, *ALL, *further, *still, *FILES])
 
 
 @pytest.fixture(scope="module")
