@@ -77,7 +77,7 @@ def test_lanes_and_boundaries_are_those_of_the_cross_section(features: Features)
     geometry = RoadGeometry(road)
     for feature in features[0]:
         about = feature["properties"]
-        item = road.objects[about["id"]]
+        item = road.objects[about["id"].partition("/")[0]]
         if about["feature"] not in ("lane", "lane_boundary", "paved_edge") or isinstance(item, Turnout):
             continue
         assert isinstance(item, Carriageway)
@@ -101,7 +101,7 @@ def test_lanes_and_boundaries_are_those_of_the_cross_section(features: Features)
 def test_turnouts_have_the_lane_of_their_parameters(features: Features) -> None:
     road = full_road()
     for feature in features[0]:
-        item = road.objects[feature["properties"]["id"]]
+        item = road.objects[feature["properties"]["id"].partition("/")[0]]
         if isinstance(item, Turnout) and item.ramp:
             about = feature["properties"]
             assert item.start_station - 1.0 < min(about["stations"])
@@ -114,7 +114,7 @@ def test_dashes_are_those_of_the_marking(features: Features) -> None:
     geometry = RoadGeometry(road)
     lines = 0
     for feature in features[0]:
-        item = road.objects[feature["properties"]["id"]]
+        item = road.objects[feature["properties"]["id"].partition("/")[0]]
         if isinstance(item, LineMarking):
             lines += 1
             np.testing.assert_allclose(feature["properties"]["dashes"], geometry.dashes(item), rtol=0, atol=6e-5)
