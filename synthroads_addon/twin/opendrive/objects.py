@@ -136,8 +136,7 @@ class Objects:
             attributes |= {"radius": round(plant.breadth * plant.shape.crown_radius, 6)}
             attributes["height"] = round(plant.height, 6)
             made = self._placed(plant.name, plant.about, attributes, row, plant.instance)
-            told = plant.attributes()
-            notes(made, plant.name, plant.instance, **{key: told[key] for key in _SAID_OF_PLANTS if key in told})
+            notes(made, plant.name, plant.instance, species=plant.about.species)
 
     # --- painted ----------------------------------------------------------------------------------------------------
 
@@ -219,8 +218,6 @@ def _types(item: Thing) -> tuple[str, str]:
     return kind, subtype
 
 
-_SAID_OF_PLANTS = ("species", "stand", "crownBottom", "trunkDiameter")
-"""What is said of a plant beside its own attributes."""
 _SAID = ("instance", "type", "name", "station", "elevation", "rotation_deg", "start_station", "end_station")
 """Fields that an object's own attributes say."""
 
