@@ -13,7 +13,7 @@ from .scene import Scene
 from .solids import give_bodies
 
 _MEASURES = ("height", "crownDiameter", "crownBottom", "trunkDiameter", "averageHeight")
-"""What is said of plants in metres."""
+"""Measures of plants, in metres."""
 
 
 def write_surroundings(scene: Scene) -> None:
