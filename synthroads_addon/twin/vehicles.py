@@ -9,11 +9,10 @@ import numpy as np
 
 from ..base.arrays import Float
 from ..road.geometry import RoadGeometry
-from ..road.lane_lines import lane_of
+from ..road.lane_lines import lane_of, wheel_pose
 from ..road.surroundings import Vehicle
 from ..road.things.body import box
 from ..road.things.vehicles import CHASSIS, VEHICLE_TYPES
-from ..road.vehicle_pose import wheel_pose
 
 
 class PlacedVehicle(NamedTuple):

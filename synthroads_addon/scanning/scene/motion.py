@@ -14,10 +14,9 @@ from ...base.errors import InputError
 from ...road.alignment import finite_array
 from ...road.geometry import RoadGeometry
 from ...road.instances import PassNumbers
-from ...road.lane_lines import LaneLine, lane_of
+from ...road.lane_lines import LaneLine, lane_of, wheel_pose
 from ...road.surroundings import Vehicle
 from ...road.things.vehicles import CHASSIS, VEHICLE_GAP, VEHICLE_TYPES
-from ...road.vehicle_pose import wheel_pose
 from .mesh import SceneMesh
 
 Pose = tuple[Float, Float, Bool]
