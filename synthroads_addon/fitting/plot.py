@@ -1,19 +1,41 @@
 """A fitted axis as a picture: how far the points are from the road along it, across and in height."""
 
-from __future__ import annotations
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 from PIL import Image, ImageDraw
 
 from ..base.arrays import Float
+from ..base.files import write_file
 from ..cloud.tools.diagram import INK, LINES, SCALE, SOFT, Color, Frame, draw_grid, draw_levels, draw_picture, draw_text
 from ..cloud.tools.picture import nice_step
-from .fit import REFUSED_BEYOND, AxisFit, Deviations
+from .fit import REFUSED_BEYOND, AxisFit, AxisRefusedError, Deviations
 
 FILE = "axis-fit.png"
 """Name of the picture beside a job's files."""
 _WIDTH, _PANEL, _ROW, _MARGIN, _LEFT = 1200, 200, 290, 16, 90
 _RED: Color = (200, 30, 40)
+
+
+@contextmanager
+def draw_refused_fit(folder: Path | None) -> Iterator[None]:
+    """Write the picture of a fit that is refused meanwhile to a folder, if there is one, so that the error names it.
+
+    Raises:
+        AxisRefusedError: the one that was raised, with the picture's path.
+    """
+    try:
+        yield
+    except AxisRefusedError as error:
+        if folder is None:
+            raise
+        data = io.BytesIO()
+        axis_picture(error.fit, error.name).save(data, "PNG")
+        write_file(folder / FILE, data.getvalue(), overwrite=True)
+        raise error.with_picture(folder / FILE) from None
 
 
 def axis_picture(fit: AxisFit, name: str) -> Image.Image:

@@ -1,6 +1,5 @@
 """The main job: scenario -> parameters -> model -> scan -> cloud -> files. What no output needs is not made."""
 
-import io
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,9 +7,10 @@ from typing import Any
 
 from ..base.crs import wkt
 from ..base.errors import InputError
-from ..base.files import output_folder, write_file
+from ..base.files import output_folder
 from ..base.progress import Progress, StageTimer, silent
-from ..fitting.fit import AxisRefusedError, fitted_axis
+from ..fitting.fit import fitted_axis
+from ..fitting.plot import draw_refused_fit
 from ..road.geometry import RoadGeometry
 from ..road.parameters import RoadParameters, read_parameters
 from ..sampling.road import sample_road
@@ -46,11 +46,16 @@ class Job:
 
 @dataclass(frozen=True)
 class RoadSource:
-    """Where a job's road comes from: its limits alone, a parameter set, or a measured axis; see `Job`."""
+    """Where a job's road comes from: its limits alone, a parameter set, or a measured axis; see `Job`.
+
+    Attributes:
+        pictures: folder for the picture of an axis that no road follows; none is drawn if None.
+    """
 
     scenario: Scenario
     parameters: Path | None = None
     axis: Path | None = None
+    pictures: Path | None = None
 
     def read(self) -> tuple[RoadParameters, dict[str, Any]]:
         """Return the road, and what to report of the axis that it was fitted to."""
@@ -58,7 +63,8 @@ class RoadSource:
         if self.parameters:
             return read_parameters(self.parameters), {}
         if self.axis:
-            axis, limits, fit = fitted_axis(self.axis, scenario.road)
+            with draw_refused_fit(self.pictures):
+                axis, limits, fit = fitted_axis(self.axis, scenario.road)
             return sample_road(limits, scenario.seed, scenario.title, axis), {"axis": fit}
         return sample_road(scenario.road, scenario.seed, scenario.title), {}
 
@@ -72,27 +78,9 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
     """
     begun, timer = job.begun or time.perf_counter(), StageTimer(progress)
     check(job)
-    try:
-        return _generate(job, begun, timer)
-    except AxisRefusedError as error:
-        raise error.with_picture(_save_fit(error, job)) from None
-
-
-def _save_fit(error: AxisRefusedError, job: Job) -> Path:
-    """Write the picture of a fit that was refused, and return its path."""
-    from ..fitting.plot import FILE, axis_picture  # Pillow takes a moment to load
-
-    data = io.BytesIO()
-    axis_picture(error.fit, error.name).save(data, "PNG")
-    write_file(job.output / FILE, data.getvalue(), overwrite=True)
-    return job.output / FILE
-
-
-def _generate(job: Job, begun: float, timer: StageTimer) -> dict[str, Any]:
-    """Run the main job; see `generate`."""
-    source, files, scene = RoadSource(job.scenario, job.parameters, job.axis), JobFiles(job.scenario), None
+    files, scene = JobFiles(job.scenario), None
     with output_folder(job.output, files.names, job.overwrite) as folder:
-        road, report = make_road(source, timer)
+        road, report = make_road(RoadSource(job.scenario, job.parameters, job.axis, pictures=job.output), timer)
         refuse_sections(job.scenario, road.length)
         check_asset_classes(job.scenario.cloud.scheme(), road.parameters)
         if set(job.scenario.outputs) & {"scene", *OF_POINTS}:
