@@ -16,7 +16,7 @@ from ..cloud.tools.diagram import (
     SCALE,
     SOFT,
     Color,
-    Frame,
+    PlotFrame,
     draw_grid,
     draw_levels,
     draw_picture,
@@ -138,18 +138,18 @@ def _density(values: Float, edges: Float) -> Float:
     return np.asarray(count / len(values))
 
 
-def _frame(draw: ImageDraw.ImageDraw, top: float, low: tuple[float, float], high: tuple[float, float]) -> Frame:
+def _frame(draw: ImageDraw.ImageDraw, top: float, low: tuple[float, float], high: tuple[float, float]) -> PlotFrame:
     box = (265.0 * SCALE, top * SCALE, (_WIDTH - _MARGIN) * SCALE, (top + _PANEL) * SCALE)
-    return Frame(draw, box, low, high)
+    return PlotFrame(draw, box, low, high)
 
 
-def _steps(frame: Frame, edges: Float, values: Float) -> list[tuple[float, float]]:
+def _steps(frame: PlotFrame, edges: Float, values: Float) -> list[tuple[float, float]]:
     """Return the outline of a histogram, from the axis and back to it."""
     x, y = np.repeat(edges, 2), np.concatenate([[0.0], np.repeat(values, 2), [0.0]])
     return frame.at(x, y)
 
 
-def _draw_marks(frame: Frame, quantiles: Float, color: Color, upper: float) -> None:
+def _draw_marks(frame: PlotFrame, quantiles: Float, color: Color, upper: float) -> None:
     """Draw short bars on the axis at quantiles; the expected ones stand above the real ones."""
     left, right = 0.03 * (frame.high[1]) * upper, 0.03 * frame.high[1] * (upper + 1.0)
     for value in quantiles:

@@ -10,7 +10,18 @@ from PIL import Image, ImageDraw
 
 from ..base.arrays import Float
 from ..base.files import write_file
-from ..cloud.tools.diagram import INK, LINES, SCALE, SOFT, Color, Frame, draw_grid, draw_levels, draw_picture, draw_text
+from ..cloud.tools.diagram import (
+    INK,
+    LINES,
+    SCALE,
+    SOFT,
+    Color,
+    PlotFrame,
+    draw_grid,
+    draw_levels,
+    draw_picture,
+    draw_text,
+)
 from ..cloud.tools.picture import nice_step
 from .fit import REFUSED_BEYOND, AxisFit, AxisRefusedError, Deviations
 
@@ -62,7 +73,7 @@ def _draw_row(
     reach = 1.15 * max(deviations.worst, 2.0 * fit.tolerance)
     box = (_LEFT * SCALE, top * SCALE, (_WIDTH - _MARGIN) * SCALE, (top + _PANEL) * SCALE)
     first, last = float(min(fit.stations.min(), 0.0)), float(max(fit.stations.max(), fit.alignment.length))
-    frame = Frame(draw, box, (first, -reach), (last, reach))
+    frame = PlotFrame(draw, box, (first, -reach), (last, reach))
     draw_grid(frame, "station, m")
     draw_levels(frame, nice_step(reach / 2.0))
     order = np.argsort(fit.stations, kind="stable")

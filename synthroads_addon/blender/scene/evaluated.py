@@ -17,9 +17,9 @@ from ...road.geometry import RoadGeometry
 from ...road.instances import PassNumbers
 from ...scanning.scene.mesh import SceneMesh
 from ...scanning.scene.motion import (
+    BodyMotion,
     LaneMotion,
     LinearMotion,
-    Motion,
     MovingMesh,
     ScannedScene,
     checked_factor,
@@ -178,7 +178,7 @@ class CopiedScene:
     put_together: Callable[[], ScannedScene]
 
 
-def _moving(reading: _Reading, carrier: Hashable, motion: Motion, tables: SceneTables) -> MovingMesh:
+def _moving(reading: _Reading, carrier: Hashable, motion: BodyMotion, tables: SceneTables) -> MovingMesh:
     """Return what one carrier moves, in the motion's own frame."""
     rotation, translation, _ = motion.pose(np.zeros(1))
     into = np.eye(4)
@@ -252,7 +252,7 @@ class _Reading:
         speed_factor: float = 0.0,
     ) -> None:
         self.labels = Labels(depsgraph.scene, classes, class_ids)
-        self.motions: dict[Hashable, Motion] = {}
+        self.motions: dict[Hashable, BodyMotion] = {}
         self.again: dict[Hashable, PassNumbers] = {}
         self._chosen = None if objects is None else {item.original for item in objects}
         self._lanes = lanes or {}

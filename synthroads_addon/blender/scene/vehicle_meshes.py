@@ -12,7 +12,7 @@ from ...base.classes import class_id
 from ...road.instances import PassNumbers
 from ...road.surroundings import Vehicle
 from ...scanning.scene.mesh import SceneMesh
-from ...scanning.scene.motion import Motion, MovingMesh, ScannedScene
+from ...scanning.scene.motion import BodyMotion, MovingMesh, ScannedScene
 from ...scanning.scene.surface_values import MeshValues, SurfaceInput
 from ..compat import set_modifier_input
 from ..materials import material
@@ -38,7 +38,7 @@ class VehicleMeshes:
         self,
         static: SceneMesh,
         vehicles: Mapping[str, Vehicle],
-        motions: Mapping[str, Motion],
+        motions: Mapping[str, BodyMotion],
         passes: Mapping[str, PassNumbers],
     ) -> ScannedScene:
         """Return what stands together with vehicles that drive.

@@ -21,7 +21,7 @@ SCALE = 2
 
 
 @dataclass(frozen=True)
-class Frame:
+class PlotFrame:
     """A diagram's box in the picture and the values at its edges."""
 
     draw: ImageDraw.ImageDraw
@@ -44,7 +44,7 @@ def draw_picture(size: tuple[int, int], paint: Callable[[ImageDraw.ImageDraw], N
     return picture.resize(size, Image.Resampling.LANCZOS)
 
 
-def draw_grid(frame: Frame, text: str) -> None:
+def draw_grid(frame: PlotFrame, text: str) -> None:
     """Draw a frame, its vertical lines with their values, and below it what they are."""
     left, top, right, bottom = frame.box
     step = nice_step((frame.high[0] - frame.low[0]) / 6.0)
@@ -58,7 +58,7 @@ def draw_grid(frame: Frame, text: str) -> None:
     draw_text(frame.draw, (right / SCALE, bottom / SCALE + 24), text, 13, SOFT, anchor="ra")
 
 
-def draw_levels(frame: Frame, step: float) -> None:
+def draw_levels(frame: PlotFrame, step: float) -> None:
     """Draw the horizontal lines of a frame within its edges, one every ``step``, with their values."""
     first = np.floor(frame.low[1] / step) * step + step
     for value in np.arange(first, frame.high[1], step) + 0.0:

@@ -25,7 +25,7 @@ OVERHANG = 0.25
 centreline by which it was placed."""
 
 
-class Motion(Protocol):
+class BodyMotion(Protocol):
     """Where a rigid body is at any time."""
 
     def pose(self, time: Float) -> Pose:
@@ -50,7 +50,7 @@ class MovingMesh:
     """
 
     mesh: SceneMesh
-    motion: Motion
+    motion: BodyMotion
     again: PassNumbers | None = None
 
 
@@ -82,7 +82,7 @@ class LinearMotion:
         self.place = finite_array("place", place).reshape(3)
 
     def pose(self, time: Float) -> Pose:
-        """Return the poses at times (K,), see `Motion`."""
+        """Return the poses at times (K,), see `BodyMotion`."""
         time = np.asarray(time, dtype=np.float64)
         rotation = np.broadcast_to(np.eye(3), (len(time), 3, 3))
         return rotation, self.place + time[:, None] * self.velocity, np.ones(len(time), dtype=bool)
@@ -94,14 +94,14 @@ class LinearMotion:
 
 @dataclass(frozen=True)
 class ShiftedMotion:
-    """A motion in a frame that begins elsewhere; see `Motion`.
+    """A motion in a frame that begins elsewhere; see `BodyMotion`.
 
     Attributes:
         whole: the motion in the road's local frame.
         origin: (3,) where the frame begins in the road's, m.
     """
 
-    whole: Motion
+    whole: BodyMotion
     origin: Float
 
     def pose(self, time: Float) -> Pose:
@@ -165,7 +165,7 @@ class LaneMotion:
         return self._place(np.asarray(time, dtype=np.float64))[0]
 
     def pose(self, time: Float) -> Pose:
-        """Return the poses at times (K,), see `Motion`."""
+        """Return the poses at times (K,), see `BodyMotion`."""
         station, present = self._place(np.asarray(time, dtype=np.float64))
         rotation, place = wheel_pose(self.line, self._chassis, station)
         return rotation, place - self._origin, present

@@ -33,7 +33,7 @@ _WORK_FOR_DRAWING, _LONGEST = 4.0, 2.0
 """So many times as long as the window was drawn a turn lasts, but no longer than this (s)."""
 
 
-class Pace:
+class WorkPace:
     """How long turns last: where the graphics card draws slowly, most of the time is for the work all the same.
 
     Args:

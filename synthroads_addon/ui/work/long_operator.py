@@ -14,7 +14,7 @@ import bpy
 from ...base.errors import Cancelled, InputError
 from ...blender.model.stage import remove_staged
 from .common import is_free, redraw_sidebars, refuse
-from .job import TICK, Pace, PanelJob, running_job, stop_job
+from .job import TICK, PanelJob, WorkPace, running_job, stop_job
 
 
 class LongOperator:
@@ -29,7 +29,7 @@ class LongOperator:
             """Blender's own, of every operator."""
 
     _job: PanelJob[Any] | None = None
-    _pace: Pace
+    _pace: WorkPace
     _timer: bpy.types.Timer | None = None
 
     @classmethod
@@ -60,7 +60,7 @@ class LongOperator:
             self._job.start()
         except InputError as error:
             return self.refuse(error)
-        self._pace = Pace()
+        self._pace = WorkPace()
         self._timer = context.window_manager.event_timer_add(TICK, window=context.window)
         context.window_manager.modal_handler_add(self)
         context.workspace.status_text_set(_draw_status)

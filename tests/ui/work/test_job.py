@@ -17,11 +17,11 @@ from synthroads_addon.ui.work.job import (
     BUDGET,
     TICK,
     Aside,
-    Pace,
     PanelJob,
     Report,
     Step,
     Work,
+    WorkPace,
     running_job,
     stop_job,
 )
@@ -218,7 +218,7 @@ def test_buttons_wait_for_a_job(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_slow_drawing_makes_turns_longer() -> None:
     """Of the time between two drawings four fifths are for the work, up to turns of a second."""
     now = [0.0]
-    pace = Pace(lambda: now[0])
+    pace = WorkPace(lambda: now[0])
     assert pace.budget() == BUDGET
     for drawing, expected in ((0.001, BUDGET), (0.1, 0.4), (9.0, 1.0)):
         pace.leave()
