@@ -14,6 +14,7 @@ from ...road.parameters import RoadParameters
 from ...road.section import Carriageway, LineMarking, Pavement
 from ...road.section_geometry import CarriagewaySection
 from ...road.things.guardrail import Guardrail
+from ...road.things.overpass import Overpass
 from ...road.things.thing import Thing
 from ..compat import modifier_input
 from ..nodes.inputs import input_name
@@ -87,6 +88,14 @@ def _number_fields(item: RoadObject, modifier: bpy.types.NodesModifier) -> dict[
     return {name: field for name, field in fields.items() if isinstance(getattr(item, field), float)}
 
 
+def _field_value(item: RoadObject, field: str, modifier: bpy.types.NodesModifier, name: str) -> float:
+    """Return a field's value by its input; the faces of a bridge's abutments count from its middle there."""
+    before = float(getattr(item, field))
+    middle = item.offset if isinstance(item, Overpass) and field in ("left_abutment", "right_abutment") else 0.0
+    now = _input_value(before - middle, modifier, name)
+    return before if now == before - middle else round(now + middle, 6)
+
+
 def _whole_fields(item: RoadObject, modifier: bpy.types.NodesModifier) -> dict[str, str]:
     """Return the inputs that are named as whole numbers and switches of an object, and those fields."""
     if not isinstance(item, Thing):
@@ -98,8 +107,7 @@ def _whole_fields(item: RoadObject, modifier: bpy.types.NodesModifier) -> dict[s
 def edited_object(item: RoadObject, modifier: bpy.types.NodesModifier) -> RoadObject:
     """Return an object with the inputs that are named as its fields."""
     update: dict[str, Any] = {
-        field: _input_value(getattr(item, field), modifier, name)
-        for name, field in _number_fields(item, modifier).items()
+        field: _field_value(item, field, modifier, name) for name, field in _number_fields(item, modifier).items()
     }
     for name, field in _whole_fields(item, modifier).items():
         kind, value = type(getattr(item, field)), modifier_input(modifier, name)

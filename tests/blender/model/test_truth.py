@@ -219,6 +219,42 @@ class TestPlaces:
         assert shown().keys() >= before.keys()
         assert opened.edited == open_road(opened.name).edited  # type: ignore[union-attr]
 
+    def test_structures_and_assets_that_were_moved_and_turned(self) -> None:
+        """A gantry with its signs, a bridge with its piers, and an asset that was also raised and enlarged."""
+        more: dict[str, dict[str, Any]] = {
+            "gantry": {"type": "Gantry", "kind": "one_sided", "station": 30.0, "offset": -8.5, "left_offset": -1.0}
+            | {"right_offset": -16.0, "signs": [{"offset": -7.0, "width": 2.0, "height": 1.0, "text": ["A"]}]},
+            "bridge": {"type": "Overpass", "station": 45.0, "offset": 0.0, "left_abutment": 20.0}
+            | {"right_abutment": -20.0, "pier_offsets": [0.0]},
+            "bin": {"type": "Asset", "library": "roadside", "name": "grit_bin", "class_name": "roadside"}
+            | {"station": 12.0, "offset": -17.0},
+        }
+        model = build_small(small_parameters(**more), parts=(*PARTS, "gantries", "overpasses", "assets"))
+        assert truth(model).parameters == small_parameters(**more)
+        model.objects["gantry"].location.x += 2.0
+        model.objects["bridge"].location.y += 1.0
+        asset = model.objects["bin"]
+        asset.location.z += 0.4
+        asset.scale = (1.5, 1.5, 1.5)
+        asset.rotation_euler.z += 0.3
+        edited = truth(model)
+        now: Any = edited.parameters.objects
+        assert not edited.by_hand
+        assert now["bin"].elevation == pytest.approx(0.4, abs=EXACT)
+        assert (now["bin"].scale, now["bin"].station, now["bin"].offset) == pytest.approx((1.5, 12.0, -17.0), abs=EXACT)
+        assert now["bin"].rotation_deg == pytest.approx(np.rad2deg(0.3), abs=0.001)
+        shift = now["gantry"].offset + 8.5
+        assert shift == pytest.approx(-2.0 * np.sin(np.deg2rad(31.4)), abs=0.01)
+        ends = now["gantry"].left_offset, now["gantry"].right_offset, now["gantry"].signs[0].offset
+        assert ends == pytest.approx((-1.0 + shift, -16.0 + shift, -7.0 + shift), abs=1e-5)
+        assert now["bridge"].station == pytest.approx(45.0 + np.sin(np.deg2rad(32.1)), abs=0.01)
+        place, before = np.array(asset.matrix_world), np.array(model.objects["gantry"].location)
+        settle(str(model.root["synthroads_road"]), edited)
+        again = read_road(model.root).parameters.objects
+        assert {name: item for name, item in again.items() if item != now[name]} == {}
+        assert np.allclose(np.array(bpy.data.objects["bin"].matrix_world), place, atol=EXACT)
+        assert np.allclose(np.array(bpy.data.objects["gantry"].location)[:2], before[:2], atol=EXACT)
+
 
 class TestByHand:
     @pytest.mark.parametrize("what", ["scaled", "tilted", "modified", "applied", "sculpted", "off", "input"])
