@@ -78,9 +78,10 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
     """
     begun, timer = job.begun or time.perf_counter(), StageTimer(progress)
     check(job)
+    source = RoadSource(job.scenario, job.parameters, job.axis, pictures=job.output)
     files, scene = JobFiles(job.scenario), None
     with output_folder(job.output, files.names, job.overwrite) as folder:
-        road, report = make_road(RoadSource(job.scenario, job.parameters, job.axis, pictures=job.output), timer)
+        road, report = make_road(source, timer)
         refuse_sections(job.scenario, road.length)
         check_asset_classes(job.scenario.cloud.scheme(), road.parameters)
         if set(job.scenario.outputs) & {"scene", *OF_POINTS}:
