@@ -17,6 +17,8 @@ from synthroads_addon.scenario.scenario import Scenario, load_scenario
 from tests.helpers.scenes.small_road import build_small, small_parameters
 from tests.helpers.scenes.sparse_scanner import sparse_scanner
 
+pytestmark = pytest.mark.any_blender
+
 
 def scenario(folder: Path) -> Scenario:
     """Return a scan with few pulses and without noise."""
