@@ -17,10 +17,13 @@ from tests.helpers.scenes.scan_scenes import plane, scan_block, scan_of
 pytestmark = pytest.mark.any_blender
 
 
-def written_blocks(view: Any, folder: Path, count: int = 6) -> list[PointBlock]:
+BLOCKS = 4
+
+
+def written_blocks(view: Any, folder: Path) -> list[PointBlock]:
     """Write blocks of a scan to a sink with this view of them; return them."""
     scan = scan_of(plane())
-    results = [scan_block(scan, scan.path.strips[0], number) for number in range(count)]
+    results = [scan_block(scan, scan.path.strips[0], number) for number in range(BLOCKS)]
     files = CloudFiles(Scenario.from_dict({"outputs": ["previews"]}), folder, np.zeros(3), 60.0, view=view)
     with files.open():
         for result in results:
@@ -37,9 +40,13 @@ def test_blocks_are_painted_in_their_order_and_all_of_them(tmp_path: Path) -> No
     assert saved == [len(blocks)], "the pictures are saved when all is painted"
 
 
-def test_what_goes_wrong_with_a_picture_ends_the_job(tmp_path: Path) -> None:
+def test_what_goes_wrong_with_the_last_block_ends_the_job(tmp_path: Path) -> None:
+    painted: list[PointBlock] = []
+
     def fail(block: PointBlock) -> None:
-        raise MemoryError("too many cells")
+        painted.append(block)
+        if len(painted) == BLOCKS:
+            raise MemoryError("too many cells")
 
     with pytest.raises(MemoryError, match="too many cells"):
         written_blocks(SimpleNamespace(add=fail, save=lambda folder, epsg: None), tmp_path)
