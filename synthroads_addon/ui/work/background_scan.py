@@ -24,6 +24,7 @@ from ...jobs.open_scene import ForeignScene, RoadScene
 from ...jobs.scan_scene import route_site
 from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
+from ...scanning.colour.colour import takes_nodes
 from ...scanning.platforms.over_scene import SceneRoute
 from ...scenario.scenario import Scenario
 
@@ -54,7 +55,8 @@ def _scan(job: dict[str, Any]) -> dict[str, Any]:
     window = bpy.context.window_manager.windows[0]
     window.scene, window.view_layer = scene, scene.view_layers[job["view_layer"]]
     scenario = Scenario.from_dict(job["scenario"])
-    timer = StageTimer(_overall_progress(renders_returns(scenario.colour.settings(scenario.fidelity))))
+    colour = scenario.colour.settings(scenario.fidelity)
+    timer = StageTimer(_overall_progress(takes_nodes(colour) or renders_returns(colour)))
     with bpy.context.temp_override(window=window):
         counts = (_scan_road if "parameters" in job else _scan_visible)(job, scenario, timer)
     return {"counts": counts, "stages": timer.stages}
@@ -80,7 +82,7 @@ def _overall_progress(by_return: bool) -> Progress:
     """Map stage progress to overall progress.
 
     Args:
-        by_return: whether a pixel per return is rendered, during the scan; images are rendered before.
+        by_return: whether returns are rendered, during the scan; images are rendered before.
     """
     rendered = 0.1 if by_return else 0.6
     spans = {
