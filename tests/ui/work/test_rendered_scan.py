@@ -13,7 +13,6 @@ import bpy
 import pytest
 
 from synthroads_addon.base.errors import Cancelled, InputError
-from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.jobs.generate import Job as PipelineJob
 from synthroads_addon.jobs.generate import generate
@@ -68,9 +67,7 @@ def job_of_the_panel() -> PanelJob[Written]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "source", ["images", pytest.param("auto", marks=pytest.mark.skipif(not HAS_RETURN_CAMERA, reason="Blender 5.0"))]
-)
+@pytest.mark.parametrize("source", ["images", "auto"])
 def test_what_is_rendered_is_the_librarys(cheap: Any, tmp_path: Path, source: str) -> None:  # noqa: F811
     choose(cheap, **RENDERED | {"colour.source": source}, output=str(tmp_path / "panel"))
     assert bpy.ops.synthroads.build() == {"FINISHED"}
