@@ -98,9 +98,13 @@ def _fields_fit(fields: dict[str, Any]) -> dict[str, Any]:
     return {"properties": fields, "required": needed}
 
 
+_FORMER = {"deprecated": True, "description": "Of earlier versions; nothing showed it. It is read and left out."}
+
+
 def _complete_schema(schema: dict[str, Any], model: type[Any]) -> None:
     """Say in a class's JSON Schema what pydantic doesn't: unknown keys and conditions between fields."""
     schema["additionalProperties"] = False
+    schema.get("properties", {}).update(dict.fromkeys(sorted(model.former_fields), _FORMER))
     if model.vendor_keys_allowed:
         schema["patternProperties"] = {f"^\\{VENDOR_PREFIX}": {}}
     conditions = [rule for base in reversed(model.__mro__) for rule in base.__dict__.get("conditions", ())]
@@ -121,11 +125,13 @@ class Model(BaseModel):
 
     Attributes:
         conditions: what the class's validators require of several fields together, in the words of JSON Schema.
+        former_fields: keys that earlier versions wrote and nothing showed: they are read, and left out.
     """
 
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False, json_schema_extra=_complete_schema)
     vendor_keys_allowed: ClassVar[bool] = True
     conditions: ClassVar[Sequence[dict[str, Any]]] = ()
+    former_fields: ClassVar[frozenset[str]] = frozenset()
 
     @model_validator(mode="before")
     @classmethod
@@ -137,6 +143,7 @@ class Model(BaseModel):
         if not isinstance(data, dict):
             return data
         known, whole = _keys(cls)
+        data = {key: value for key, value in data.items() if key not in cls.former_fields}
         for key in data:
             if key in known or (cls.vendor_keys_allowed and str(key).startswith(VENDOR_PREFIX)):
                 continue

@@ -61,8 +61,6 @@ def _age_material(name: str, table: Mapping[str, Material], variation: MaterialV
         return _scale_color(mean, variation.asphalt_brightness * _of_age(variation) / _of_age(_DEFAULT))
     if name == "concrete":
         return _scale_color(mean, variation.concrete_brightness)
-    if name == "soil":
-        return _scale_color(mean, variation.soil_brightness)
     if name in _PAINTS:
         worn = (variation.paint_wear - _DEFAULT.paint_wear) / (1.0 - _DEFAULT.paint_wear)
         return _mix_materials(mean, table["asphalt"], worn)

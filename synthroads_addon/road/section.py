@@ -244,6 +244,8 @@ class Arrow(Marking, PointObject):
     """An arrow on a lane. Its rotation is 0 where it points with the stations."""
 
     points_class: ClassVar = "road_marking"
+    former_fields: ClassVar = frozenset({"elevation"})
+    elevation: ClassVar[float] = 0.0  # type: ignore[misc]  # it lies on the pavement
     type: Literal["Arrow"] = "Arrow"
     carriageway: str = Field(description="Id of the carriageway that it lies on.")
     kind: Literal["straight", "left", "right", "straight_left", "straight_right", "merge_left", "merge_right"] = Field(

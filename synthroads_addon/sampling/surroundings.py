@@ -78,7 +78,7 @@ def sample_materials(scenario: RoadScenario, seed: int) -> MaterialVariation:
     """Return how the materials of a seed differ from the mean."""
     rng = stream(seed, "materials")
     values = {name: draw(rng, getattr(scenario.materials, name)) for name in MaterialLimits.model_fields}
-    return MaterialVariation(seed=_seed(rng), **values)
+    return MaterialVariation(**values)
 
 
 # --- plants ----------------------------------------------------------------------------------------------------------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
@@ -143,6 +143,8 @@ class EnvironmentLimits(ClosedModel):
 class MaterialLimits(ClosedModel):
     """How much roads' materials differ."""
 
+    former_fields: ClassVar = frozenset({"soil_brightness"})
+
     asphalt_age: Interval = interval(0.0, 1.0, "1", "0 new and black, 1 old and bright.")
     asphalt_brightness: Interval = interval(0.85, 1.2, "1", "Factor on the base colour.")
     patch_density: Interval = interval(0.0, 2.0, "1/100 m", "Repaired patches per 100 m.")
@@ -151,7 +153,6 @@ class MaterialLimits(ClosedModel):
     concrete_brightness: Interval = interval(0.85, 1.2, "1", "Factor on the base colour.")
     paint_wear: Interval = interval(0.0, 0.5, "1", "Share of the markings' film worn off.")
     grass_dryness: Interval = interval(0.0, 0.8, "1", "0 green, 1 dry.")
-    soil_brightness: Interval = interval(0.8, 1.25, "1", "Factor on the base colour.")
 
 
 class RoadScenario(ClosedModel):

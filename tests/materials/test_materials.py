@@ -115,7 +115,6 @@ def test_the_default_road_has_the_tables_means() -> None:
         concrete_brightness=st.floats(0.5, 2),
         paint_wear=st.floats(0, 1),
         grass_dryness=st.floats(0, 1),
-        soil_brightness=st.floats(0.5, 2),
     ),
     st.floats(0, 1),
 )

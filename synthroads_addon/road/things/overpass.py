@@ -76,6 +76,8 @@ class Overpass(StandingThing):
     limits: ClassVar = OverpassLimits
     obstacle: ClassVar = "pier"
     left_out: ClassVar = "its embankments"
+    former_fields: ClassVar = frozenset({"elevation"})
+    elevation: ClassVar[float] = 0.0  # type: ignore[misc]  # its height is its clearance
     type: Literal["Overpass"] = "Overpass"
     width: float = quantity(10.0, ge=2, le=60, unit="m", description="Width of its deck along the road.")
     left_abutment: float = quantity(ge=5, le=200, unit="m", description="Offset of the left abutment's face.")

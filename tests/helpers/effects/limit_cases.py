@@ -1,0 +1,80 @@
+"""Limits on which each field of `RoadScenario` matters, and what of it is changed to see that."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from tests.helpers.effects.road_cases import ELEVATIONS
+
+Data = dict[str, Any]
+
+SEEDS = range(30)
+"""Seeds that a limit may show itself with: what has a small share is drawn with few."""
+LIMITS: Data = {
+    "length": 1300.0,
+    "cross_section": "RQ36",
+    "half_width": 40.0,
+    "radius": {"minimum": 1000.0, "maximum": 3000.0},
+    "grade_percent": {"minimum": -3.0, "maximum": 3.0},
+    "lane_changes": {"share": 1.0},
+    "turnouts": {"exits": 1.0, "entries": 1.0, "emergency_bays": 1.0},
+    "pavement": {"rutted": 1.0},
+    "barriers": {"noise_barrier": 1.0},
+    "furniture": {
+        "gantries": 1.0,
+        "lighting": 1.0,
+        "surveillance": 1.0,
+        "traffic_lights": 1.0,
+        "overpass": 1.0,
+        "gantry_spacing": 400.0,
+    },
+    "environment": {"wet": 1.0},
+    "grass_density": 0.01,
+}
+"""Limits of roads on which nearly everything is; as JSON data."""
+PLAIN: Data = {"length": 2500.0, "turnouts": {"exits": 0.0, "entries": 0.0, "emergency_bays": 0.0}}
+"""Limits of roads on which there is room for long things."""
+ZONE = PLAIN | {"furniture": {"construction_zone": 1.0}}
+FREE = {"cross_section": {"lanes": [3.75, 3.75, 3.75], "hard_shoulder": 2.5}}
+
+
+@dataclass(frozen=True)
+class LimitCase:
+    """How a limit is looked at, as far as that doesn't follow from its type.
+
+    Attributes:
+        value: another value; if None what `other_values` takes, and the middle of an interval for either of its ends.
+        given: limits in place of `LIMITS`.
+    """
+
+    value: Any = None
+    given: Data = field(default_factory=lambda: LIMITS)
+
+
+CASES: dict[str, LimitCase] = {
+    "cross_section": LimitCase(value="RQ36", given=PLAIN),
+    **{
+        f"cross_section.{name}": LimitCase(given=FREE)
+        for name in ("lanes", "hard_shoulder", "outer_edge_strip", "inner_edge_strip", "median", "verge")
+    },
+    "design_class": LimitCase(value="EKA2", given=FREE | {"length": 3000.0}),
+    "lanes": LimitCase(value=2, given=PLAIN),
+    "lane_width": LimitCase(value=3.6, given=PLAIN),
+    "median_width": LimitCase(value=3.5, given=PLAIN),
+    "turnouts.lane_length.maximum": LimitCase(value=280.0),
+    "turnouts.lane_length.minimum": LimitCase(value=280.0),
+    "markings.lane_dash": LimitCase(value=4.0),
+    "markings.lane_gap": LimitCase(value=8.0),
+    "furniture.gantries": LimitCase(value=0.0, given=PLAIN | {"furniture": {"gantries": 1.0}}),
+    "furniture.construction_zone": LimitCase(value=0.0, given=ZONE),
+    "furniture.construction_length.minimum": LimitCase(given=ZONE),
+    "furniture.construction_length.maximum": LimitCase(given=ZONE),
+    "elevation_model": LimitCase(value=str(ELEVATIONS), given={"length": 60.0, "half_width": 30.0}),
+    "barriers.noise_barrier_length.maximum": LimitCase(given=PLAIN | {"barriers": {"noise_barrier": 1.0}}),
+    "epsg": LimitCase(value=25833),
+    "assets": LimitCase(value=["roadside"]),
+}
+"""Path of a limit -> how it is looked at; see `LimitCase`."""
+NOT_BUILT = {f"materials.{name}" for name in ("crack_density", "patch_density", "wheel_track_polish")}
+"""Limits of what isn't built."""
+SAYS = {"epsg"}
+"""Limits that only say something: in which coordinates the road stands."""

@@ -1,0 +1,215 @@
+"""Small roads on which each field of a parameter set matters, and what of it is changed to see that."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from synthroads_addon.road.parameters import RoadParameters
+from tests.helpers.effects.field_paths import value_at, with_value
+from tests.helpers.roads.furnished_data import road_data
+from tests.helpers.roads.parameter_sets import OBJECTS
+from tests.helpers.roads.thing_variants import GIVEN
+
+Data = dict[str, Any]
+
+FILES = Path(__file__).parent / "files"
+OTHER_LIBRARY, ELEVATIONS = FILES / "library.json", FILES / "elevations.asc"
+LENGTH = 60.0
+"""Length of the road, m."""
+SIGN = {"shape": "rectangle", "width": 2.0, "height": 1.6, "text": ["Ausfahrt"], "posts": 2}
+OFF = {"carriageway": "right", "start_station": 5.0, "lane_width": 3.5, "lane_length": 12.0, "shoulder_width": 1.0}
+TURNOUTS: Data = {
+    "exit": OFF | {"kind": "exit", "taper_in_length": 10.0, "ramp": {"length": 25.0, "clothoid_parameter": 40.0}},
+    "entry": OFF | {"kind": "entry", "start_station": 5.0, "taper_out_length": 10.0, "ramp": {"length": 25.0}},
+    "bay": {"carriageway": "left", "kind": "emergency_bay", "start_station": 10.0, "lane_length": 10.0}
+    | {"lane_width": 3.0, "taper_in_length": 10.0, "taper_out_length": 10.0},
+}
+LEFT_ENTRY = TURNOUTS["entry"] | {"carriageway": "left"}
+STRAIGHT = {"start_station": 8.0, "end_station": 50.0}
+LINE = {"carriageway": "right", "width": 0.15, "dash_length": 0.0, "gap_length": 0.0, **STRAIGHT}
+OWN: dict[str, dict[str, Data]] = {
+    "Turnout": TURNOUTS,
+    "LineMarking": {
+        "dashes": LINE | {"kind": "lane", "boundary": 1, "dash_length": 6.0, "gap_length": 6.0},
+        "free": LINE | {"kind": "free", "offset": 8.0},
+        "curved": LINE | {"kind": "free", "offset": [{"station": 10.0, "width": 5.0}, {"station": 40.0, "width": 7.0}]},
+        "gore": LINE | {"kind": "gore_edge", "turnout": "exit"},
+    },
+    "Hatching": {"it": {"turnout": "exit"}},
+    "Arrow": {"it": {"carriageway": "right", "kind": "left", "station": 25.0, "offset": -8.0}},
+    "TemporaryBarrier": {"it": {**STRAIGHT, "offset": -6.0, "end_offset": -8.0}},
+    "TrafficSign": {"it": GIVEN["TrafficSign"] | SIGN},
+    "Pole": {"it": {}, "camera": {"kind": "surveillance", "station": 40.0, "offset": -17.0}},
+    "Gantry": {"it": GIVEN["Gantry"] | {"kind": "cantilever", "offset": -8.5}},
+    "Overpass": {"it": GIVEN["Overpass"] | {"offset": 0.0, "pier_offsets": [0.0]}},
+    "Cabinet": {"it": {"kind": "utility"}},
+    "ConstructionBeacon": {"it": {"pass_side": "left"}},
+    "Asset": {"it": GIVEN["Asset"] | {"offset": -18.0}},
+    "Vegetation": {
+        "it": {"kind": "shrub", "species": "hazel", "density": 0.05, "band_start": 1.0, "band_end": 6.0}
+        | {"height_min": 1.0, "height_max": 2.0, "seed": 1}
+    },
+    "Vehicle": {"it": {"model": "car", "carriageway": "right", "lane": 0, "station": 25.0, "speed": 3.0}},
+}
+"""Type of object -> objects of it, by id; of the others one with its usual values, see `PLACE`."""
+PLACE: Data = {"station": 25.0, "offset": -15.0, **STRAIGHT}
+"""Where a thing stands, if nothing else is said; each takes what it has fields for."""
+WITH: dict[str, Data] = {kind: {"exit": TURNOUTS["exit"], "entry": LEFT_ENTRY} for kind in ("Hatching", "LineMarking")}
+"""Type of object -> turnouts that it needs."""
+WIDTHS = {
+    "inner_offset": (2.0, 2.5), "hard_shoulder_width": (3.0, 2.5), "outer_edge_strip_width": (0.75, 0.5),
+    "inner_edge_strip_width": (0.75, 0.5), "verge_width": (1.5, 2.0),
+}  # fmt: skip
+
+
+def points_of(first: float, second: float) -> list[Data]:
+    """Return a width's points, first at 20 m, then at 45 m."""
+    return [{"station": 20.0, "width": first}, {"station": 45.0, "width": second}]
+
+
+@dataclass(frozen=True)
+class RoadScene:
+    """A parameter set in which a field matters.
+
+    Attributes:
+        data: the set, as JSON data.
+        owner: id of the object that has the field; empty if it is one of the set's own.
+    """
+
+    data: Data
+    owner: str
+
+
+@dataclass(frozen=True)
+class Case:
+    """Where a field matters, as far as that doesn't follow from its type.
+
+    Attributes:
+        owner: id of the object that has the field; the first one that has a value there if empty.
+        value: another value of the field; if None what `other_values` takes.
+        given: values of other fields of the set, by path: ``environment.weather``, ``objects.it.kind``.
+        also: values of other fields that change with it, as it can't change alone.
+        at: path of one entry of a list that has the field, where the first one won't do.
+        scan: changes of the scenario that it is looked at with, by path.
+    """
+
+    owner: str = ""
+    value: Any = None
+    given: Data = field(default_factory=dict)
+    also: Data = field(default_factory=dict)
+    at: str = ""
+    scan: Data = field(default_factory=dict)
+
+
+OTHER_ROAD = Case(value="left")
+OTHER_TURNOUT = Case(value="entry")
+BAY = TURNOUTS["bay"]
+CASES: dict[str, Case] = {
+    "environment.visibility": Case(given={"environment.weather": "fog", "environment.visibility": 300.0}),
+    "metadata.identifier": Case(value="another"),
+    "metadata.title": Case(value="Another"),
+    "metadata.generator": Case(value="another hand"),
+    "metadata.referenceSystem": Case(value="https://www.opengis.net/def/crs/EPSG/0/25833"),
+    "Alignment.vertical[].radius": Case(at="Alignment.vertical[1].radius"),
+    "Carriageway.side": Case(owner="right", value="left", also={"objects.left.side": "right"}),
+    **{f"Carriageway.{name}": Case(owner="right") for name in (*WIDTHS, "lanes[].width")},
+    "Carriageway.lanes[].kind": Case(scan={"scan.platform": {"kind": "vehicle", "speed": 10.0}}),
+    "Turnout.carriageway": OTHER_ROAD,
+    "Turnout.kind": Case(
+        value="entry", also={"objects.exit.taper_in_length": 0.0, "objects.exit.taper_out_length": 10.0}
+    ),
+    "Turnout.taper_out_length": Case(owner="bay"),
+    "LineMarking.carriageway": OTHER_ROAD,
+    "Arrow.carriageway": OTHER_ROAD,
+    "Vehicle.carriageway": OTHER_ROAD,
+    "LineMarking.kind": Case(owner="free", value="lane"),
+    "LineMarking.turnout": Case(owner="gore", value="entry"),
+    "LineMarking.dash_length": Case(owner="dashes"),
+    "LineMarking.offset": Case(owner="free"),
+    "Hatching.turnout": OTHER_TURNOUT,
+    "Vegetation.kind": Case(value="tree", also={"objects.it.species": "birch"}),
+    "TrafficSign.code": Case(given={"objects.it.code": "449"}, value="448"),
+    "TrafficSign.text": Case(value=["Abfahrt"]),
+    "KilometreBoard.text": Case(value="124,0"),
+    "Gantry.signs[].text": Case(value=["B"]),
+    "Asset.name": Case(value="grit_bin"),
+    "Asset.class_name": Case(value="barrier"),
+    "Asset.library": Case(value=str(OTHER_LIBRARY)),
+    "Terrain.elevation_model": Case(value=str(ELEVATIONS)),
+    "Carriageway.pavement.ruts": Case(owner="right"),
+    "Carriageway.pavement.potholes": Case(owner="right"),
+    "LineMarking.instance": Case(owner="free"),
+}
+"""Path of a field -> how it is looked at; see `Case`. A field that isn't here is looked at on the usual objects."""
+
+
+def objects_of(kind: str) -> dict[str, Data]:
+    """Return the objects of a type that its fields are looked at on, and what they need, by id."""
+    own = OWN.get(kind, {"it": GIVEN.get(kind, {})})
+    fields = OBJECTS[kind].model_fields
+    place = {name: value for name, value in PLACE.items() if name in fields and kind != "LineMarking"}
+    choices = {"faces": "left"} if "faces" in fields else {}
+    made = {name: {"type": kind} | place | choices | data for name, data in own.items()}
+    return {name: {"type": "Turnout"} | data for name, data in WITH.get(kind, {}).items()} | made
+
+
+def base_road(objects: dict[str, Data]) -> Data:
+    """Return a road with damage, widths that change and a line, and these objects."""
+    line = {"type": "LineMarking", **OWN["LineMarking"]["dashes"]}
+    data = road_data({"line": line} | objects, length=LENGTH)
+    made = data["objects"]
+    made["terrain"]["half_width"] = 30.0
+    falls = [{"station": 5.0, "crossfall_percent": -2.5}, {"station": 40.0, "crossfall_percent": -5.0}]
+    made["left"] |= {name: points_of(*widths) for name, widths in WIDTHS.items()} | {"crossfall": falls}
+    made["left"]["lanes"] = [{"width": points_of(3.5, 3.75)}, {"width": 3.75}]
+    made["left"]["pavement"] = {"kind": "concrete", "slab_length": 5.0}
+    made["right"] |= {"crossfall": falls, "pavement": DAMAGE, "rotation_axis": "carriageway_axis"}
+    made["axis"]["horizontal"] = [
+        {"kind": "clothoid", "length": 30.0, "curvature_start": 0.0005, "curvature_end": 0.001},
+        {"kind": "arc", "length": 30.0, "curvature_start": 0.001, "curvature_end": 0.001},
+    ]
+    made["axis"]["vertical"] = [
+        {"station": 0.0, "elevation": 0.0},
+        {"station": 30.0, "elevation": 0.5, "radius": 300.0},
+        {"station": 60.0, "elevation": 0.2},
+    ]
+    data["environment"] = {"cloud_cover": 0.5, "cloud_size": 20.0, "wetness": 0.2}
+    return data
+
+
+DAMAGE = {
+    "ruts": [{"lane": 0, "start_station": 10.0, "end_station": 50.0, "depth": 0.03}],
+    "potholes": [{"station": 20.0, "offset": -5.0, "length": 1.0, "width": 0.8, "depth": 0.05}],
+}
+
+
+def scene_of(path: str, case: Case) -> RoadScene:
+    """Return the road on which a field matters; LookupError if none has it."""
+    kind, _, rest = path.partition(".")
+    if kind not in OBJECTS:
+        return RoadScene(RoadParameters.from_dict(_given(base_road({}), case)).to_dict(), "")
+    data = _given(base_road({} if kind in STANDARD else objects_of(kind)), case)
+    data = RoadParameters.from_dict(data).to_dict()
+    for name, item in data["objects"].items():
+        if item["type"] == kind and case.owner in ("", name) and _has(item, rest, case):
+            return RoadScene(data, name)
+    raise LookupError(path)
+
+
+STANDARD = {"Alignment", "Carriageway", "Median", "Terrain"}
+"""Types of which every road has one."""
+
+
+def _given(data: Data, case: Case) -> Data:
+    for path, value in case.given.items():
+        data = with_value(data, path, value)
+    return data
+
+
+def _has(item: Data, path: str, case: Case) -> bool:
+    """Return whether an object has a value at a path, in the form that can be changed."""
+    try:
+        value = value_at(item, path)
+    except LookupError:
+        return False
+    return case.value is not None or value is not None

@@ -1,0 +1,139 @@
+"""Scans on which each field of a scenario matters but those of the road, and what of it is changed to see that."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from tests.helpers.effects.road_cases import STRAIGHT, base_road
+from tests.helpers.effects.scans import FILES
+
+Data = dict[str, Any]
+
+PLANTS = {"density": 0.05, "band_start": 1.0, "band_end": 6.0, "height_min": 1.0, "height_max": 2.0, "seed": 1}
+ROAD: Data = base_road(
+    {
+        "sign": {"type": "TrafficSign", "code": "449", "shape": "rectangle", "width": 3.0, "height": 2.0}
+        | {"station": 30.0, "offset": -15.0},
+        "rail": {"type": "Guardrail", "faces": "left", "offset": -14.5, **STRAIGHT},
+        "shrubs": {"type": "Vegetation", "kind": "shrub", "species": "hazel", **PLANTS},
+        "truck": {
+            "type": "Vehicle",
+            "model": "truck",
+            "carriageway": "right",
+            "lane": 0,
+            "station": 10.0,
+            "speed": 6.0,
+        },
+    }
+)
+"""Road of 60 m with something of every kind; as JSON data."""
+
+
+@dataclass(frozen=True)
+class ScanCase:
+    """How a field of a scenario is looked at, as far as that doesn't follow from its type.
+
+    Attributes:
+        value: another value; if None what `other_values` takes.
+        given: changes of `SCAN`, by path; None for what isn't to be given.
+    """
+
+    value: Any = None
+    given: Data = field(default_factory=dict)
+
+
+IMAGES = {"colour.source": "images"}
+PATHS = IMAGES | {"colour.lighting": "path", "colour.max_resolution": 64}
+RAYS = {"scan.rays_per_pulse": 7}
+OPEN = {"scan.rays_per_pulse": None, "vegetation_detail": None, "scan.noise.range_sigma": 0.0}
+"""Nothing is given that a tolerance may choose."""
+DAMPED = {"scan.noise.position_sigma": 0.05}
+BY_RATE = {"scan.weather.visibility": None}
+
+
+def platform(kind: str, **fields: Any) -> Data:
+    """Return the change to a platform of a kind."""
+    return {"scan.platform": {"kind": kind, **fields}}
+
+
+PLATFORMS = {
+    "uav": {"height": 30.0, "speed": 10.0, "lateral_offsets": [3.0, -3.0]},
+    "vehicle": {"height": 2.5, "speed": 10.0, "lateral_offsets": [-6.0], "pitch_deg": 30.0},
+    "airborne": {"height": 100.0, "speed": 30.0, "lateral_offsets": [3.0, -3.0]},
+    "tripod": {"height": 1.8, "lateral_offsets": [-13.0], "station_spacing": 30.0, "turn_seconds": 4.0},
+    "trajectory": {"file": str(FILES / "trajectory.csv")},
+}
+WEATHERS = {"clear": 20000.0, "haze": 3000.0, "fog": 300.0, "rain": 3000.0, "snow": 1000.0, "dust": 1500.0}
+"""Weather -> a visibility of it, m."""
+
+
+def _platform_cases() -> dict[str, ScanCase]:
+    cases = {}
+    for kind, fields in PLATFORMS.items():
+        usual, swaying = platform(kind, **fields), platform(kind, **fields, path="zigzag")
+        names = ("roll_deg", "pitch_deg", "yaw_deg", "height", "speed", "lateral_offsets", "path", "there_and_back")
+        names = (*names, "station_spacing", "turn_seconds", "turn_deg")
+        cases |= {f"scan.platform[{kind}].{name}": ScanCase(given=usual) for name in names}
+        for name in ("zigzag_amplitude", "zigzag_wavelength"):
+            cases[f"scan.platform[{kind}].{name}"] = ScanCase(given=swaying)
+        smooth = platform(kind, **fields, path="smoothed")
+        cases[f"scan.platform[{kind}].polynomial_degree"] = ScanCase(value=1, given=smooth)
+    tripod = platform("tripod", **PLATFORMS["tripod"])
+    cases["scan.platform[tripod].stations"] = ScanCase(value=[20.0], given=tripod)
+    moved = platform("trajectory", **PLATFORMS["trajectory"])
+    cases["scan.platform[trajectory].file"] = ScanCase(value=str(FILES / "other_trajectory.csv"), given=moved)
+    return cases
+
+
+def _weather_cases() -> dict[str, ScanCase]:
+    cases = {}
+    for name, visibility in WEATHERS.items():
+        given = {"scan.weather": {"condition": name, "visibility": visibility}}
+        cases[f"scan.weather[{name}].visibility"] = ScanCase(value=0.5 * visibility, given=given)
+        given = {"scan.weather": {"condition": name, "rate_mm_h": 5.0}}
+        cases[f"scan.weather[{name}].rate_mm_h"] = ScanCase(value=10.0, given=given)
+    return cases
+
+
+def _tolerance_cases() -> dict[str, ScanCase]:
+    pairs = {"height": (0.02, 0.002), "position": (1.0, 0.005), "relief": (1.0, 0.0005), "intensity": (9.0, 0.1)}
+    pairs |= {"labels": (1.0, 0.02), "density": (1.0, 0.01), "colour": (100.0, 0.0), "layers": (1.0, 0.0)}
+    cases = {}
+    for name, (loose, tight) in pairs.items():
+        given = {**OPEN, f"tolerance.{name}": loose}
+        cases[f"tolerance.{name}"] = ScanCase(value=tight, given=given)
+    return cases
+
+
+CASES: dict[str, ScanCase] = {
+    "geometric_tolerance": ScanCase(value=0.001),
+    "time_budget": ScanCase(value=1e6, given=OPEN),
+    "materials_table": ScanCase(value="shifted"),
+    "scan.device": ScanCase(value=str(FILES / "other_scanner.json")),
+    "scan.pulse_rate_khz": ScanCase(value=1.0),
+    "scan.field_of_view_deg": ScanCase(value=40.0),
+    "scan.angle_step_deg": ScanCase(value=1.0, given={"scan.lines_per_second": None}),
+    "scan.lines_per_second": ScanCase(value=10.0),
+    "scan.platform": ScanCase(value={"kind": "tripod", "stations": [30.0], "turn_seconds": 3.0}),
+    "scan.noise.range_sigma": ScanCase(value=0.03),
+    "scan.noise.correlation_time": ScanCase(given=DAMPED),
+    "scan.relief_octaves": ScanCase(value=4),
+    "scan.attenuation": ScanCase(value=0.01),
+    "scan.weather": ScanCase(value={"condition": "fog"}),
+    "scan.beam_rings": ScanCase(value=[5], given={"scan.rays_per_pulse": None}),
+    "scan.beam": ScanCase(given=RAYS),
+    "colour.source": ScanCase(value="images"),
+    "colour.engine": ScanCase(given=IMAGES | {"colour.max_resolution": 16}),
+    "colour.lighting": ScanCase(given=PATHS | {"colour.lighting": "direct"}),
+    "colour.image_spacing": ScanCase(value=20.0, given=IMAGES),
+    "colour.ground_sampling_distance": ScanCase(value=0.5, given=IMAGES),
+    "colour.samples": ScanCase(value=4, given=PATHS),
+    "colour.max_resolution": ScanCase(value=64, given=IMAGES | {"colour.ground_sampling_distance": 0.1}),
+    "colour.intensity_from_layers": ScanCase(given=IMAGES),
+    "cloud.classes": ScanCase(value="5"),
+    "cloud.point_spacing": ScanCase(value=1.0),
+    "cloud.intensity_scale": ScanCase(value=1e6),
+    **_platform_cases(),
+    **_weather_cases(),
+    **_tolerance_cases(),
+}
+"""Path of a field -> how it is looked at; see `ScanCase`. A field that isn't here is looked at on the usual scan."""

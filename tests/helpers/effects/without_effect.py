@@ -1,0 +1,47 @@
+"""Fields that change neither the model nor the points: what isn't built, and what only says something."""
+
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from synthroads_addon.checking.checker import check
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.twin.cityjson.writer import write_cityjson
+
+NOT_BUILT = {
+    "materials.crack_density",
+    "materials.patch_density",
+    "materials.wheel_track_polish",
+    "Carriageway.pavement.slab_length",
+}
+"""Fields of a parameter set that nothing shows yet; the documentation says so."""
+
+
+def set_of(parameters: RoadParameters) -> Any:
+    """Return what the set's own file says."""
+    return parameters.to_json()
+
+
+def findings(parameters: RoadParameters) -> Any:
+    """Return what the checker finds."""
+    return check(parameters)
+
+
+def relations(parameters: RoadParameters) -> Any:
+    """Return which object of the semantic model is part of which."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder, "road.city.json")
+        write_cityjson(parameters, path, 0.02)
+        return path.read_bytes()
+
+
+SAYS: dict[str, Callable[[RoadParameters], Any]] = {
+    **{f"metadata.{name}": set_of for name in ("identifier", "title", "seed", "generator", "referenceSystem")},
+    "design_class": findings,
+    "Arrow.carriageway": relations,
+    "LineMarking.turnout": findings,
+}
+"""Field of a parameter set -> where it is seen, and nowhere in the model or the points."""
+DERIVED = {"Alignment.horizontal[].kind"}
+"""Fields that have no other value: it follows from others beside them, and any other is refused."""

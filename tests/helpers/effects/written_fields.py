@@ -1,0 +1,39 @@
+"""Fields of a scenario that say how a job is done, or what is written, and what alone they may change."""
+
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Written:
+    """A field that changes no point.
+
+    Attributes:
+        value: another value.
+        changes: files that are others then.
+        adds: files that are there then only.
+        removes: files that aren't there then.
+        sorts: whether the points are the same in another order.
+    """
+
+    value: Any
+    changes: frozenset[str] = frozenset()
+    adds: frozenset[str] = frozenset()
+    removes: frozenset[str] = frozenset()
+    sorts: bool = False
+
+
+CLOUD = frozenset({"cloud.laz"})
+WRITTEN: dict[str, Written] = {
+    "title": Written("Another", changes=frozenset({"parameters.json"})),
+    "scan.section_length": Written(25.0, changes=CLOUD, sorts=True),
+    "scan.most_pulses": Written(10**9),
+    "scan.caster": Written("bvhtree"),
+    "scan.threads": Written(2),
+    "cloud.formats": Written(["laz", "npz"], adds=frozenset({"cloud.npz"})),
+    "cloud.attributes": Written(["normal"], changes=CLOUD),
+    "outputs": Written(["cloud", "previews", "parameters"], removes=frozenset({"centerline.geojson"})),
+    "twin": Written(["geojson", "ifc"], adds=frozenset({"road.geojson"})),
+    "ifc.placement": Written("local", changes=frozenset({"road.ifc"})),
+}
+"""Path of a field -> what it says."""

@@ -1,0 +1,143 @@
+"""Every field of a parameter set changes the model or the points, but for those that are listed."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.scenario.scenario import Scenario
+from tests.helpers.effects.field_paths import SchemaField, fields_of, other_values, value_at, with_value
+from tests.helpers.effects.looks import LABEL, Look, changes, look_at
+from tests.helpers.effects.road_cases import CASES, Case, RoadScene, scene_of
+from tests.helpers.effects.scans import SCAN
+from tests.helpers.effects.without_effect import DERIVED, NOT_BUILT, SAYS
+from tests.helpers.page_modules import ROOT
+from tests.helpers.roads.parameter_sets import OBJECTS
+
+pytestmark = [pytest.mark.any_blender, pytest.mark.keep_scene]
+
+
+def _all_fields() -> Iterator[SchemaField]:
+    yield from (field for field in fields_of(RoadParameters) if field.path != "objects")
+    for kind, model in OBJECTS.items():
+        yield from fields_of(model, kind)
+
+
+FIELDS = {field.path: field for field in _all_fields()}
+LABELS = {path for path in FIELDS if path.endswith(".instance")}
+RENDERED = {"colour.source": "images"}
+"""Changes of the scan for what the means of materials don't show."""
+
+
+@cache
+def changed_road(path: str) -> tuple[Case, RoadScene, dict[str, Any]]:
+    """Return how a field is looked at: its case, the road on which it matters, and that road with another value.
+
+    Raises:
+        AssertionError: nobody said on which road it matters, or what other value it may have.
+    """
+    case = CASES.get(path, Case())
+    if path in LABELS and case.value is None:
+        case = replace(case, value=1000)
+    try:
+        scene = scene_of(path, case)
+    except LookupError:
+        raise AssertionError(f"say in tests/helpers/effects/road_cases.py on which road {path} matters") from None
+    place = case.at or path
+    if scene.owner:
+        place = f"objects.{scene.owner}.{place.partition('.')[2]}"
+    values = [case.value] if case.value is not None else other_values(FIELDS[path].info, value_at(scene.data, place))
+    for value in values:
+        data = with_value(scene.data, place, value)
+        for name, further in case.also.items():
+            data = with_value(data, name, further)
+        try:
+            RoadParameters.from_dict(data)
+        except InputError:
+            continue
+        return case, scene, data
+    raise AssertionError(f"say in tests/helpers/effects/road_cases.py which other value {path} may have")
+
+
+@pytest.mark.parametrize("path", sorted(FIELDS.keys() - DERIVED))
+def test_every_field_has_a_road_on_which_it_matters(path: str) -> None:
+    _, scene, data = changed_road(path)
+    assert RoadParameters.from_dict(data) != RoadParameters.from_dict(scene.data)
+
+
+def test_no_list_names_a_field_that_there_is_none_of() -> None:
+    assert {*CASES, *NOT_BUILT, *SAYS, *DERIVED} <= FIELDS.keys()
+    assert not NOT_BUILT & SAYS.keys()
+
+
+@pytest.mark.parametrize("path", sorted(DERIVED))
+def test_a_value_that_follows_from_others_can_t_be_another(path: str) -> None:
+    with pytest.raises(AssertionError, match="which other value"):
+        changed_road(path)
+
+
+@pytest.fixture(scope="module")
+def looks(scanner: Path) -> dict[str, Look]:
+    """What is seen of roads as they are, by road and scan."""
+    return {}
+
+
+def seen(
+    scanner: Path, looks: dict[str, Look], path: str, further: dict[str, Any]
+) -> tuple[set[str], RoadParameters, RoadParameters]:
+    """Return the names of what a field changes, and the road before and after."""
+    case, scene, data = changed_road(path)
+    scan: Any = SCAN
+    for name, value in ({"scan.device": str(scanner)} | further | case.scan).items():
+        scan = with_value(scan, name, value)
+    scenario, before, after = Scenario.from_dict(scan), *map(RoadParameters.from_dict, (scene.data, data))
+    key = scenario.to_json() + before.to_json()
+    if key not in looks:
+        looks[key] = look_at(scenario, before)
+    return changes(looks[key], look_at(scenario, after)), before, after
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", sorted(FIELDS.keys() - DERIVED - SAYS.keys() - LABELS - NOT_BUILT))
+def test_every_field_changes_the_model_or_the_points(scanner: Path, looks: dict[str, Look], path: str) -> None:
+    for further in ({}, RENDERED):
+        changed, _, _ = seen(scanner, looks, path, further)
+        if any(not name.endswith(LABEL) for name in changed):
+            return
+    raise AssertionError(f"nothing shows {path}")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", sorted(LABELS))
+def test_an_instance_number_changes_nothing_but_numbers(scanner: Path, looks: dict[str, Look], path: str) -> None:
+    changed, _, _ = seen(scanner, looks, path, {})
+    assert all(name.endswith(LABEL) for name in changed)
+    assert changed or path == "Alignment.instance"  # which has no faces
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", sorted(NOT_BUILT))
+def test_nothing_shows_what_is_not_built(scanner: Path, looks: dict[str, Look], path: str) -> None:
+    for further in ({}, RENDERED):
+        changed, _, _ = seen(scanner, looks, path, further)
+        assert not changed, f"{path} has an effect: take it from the list of what isn't built, and from the pages"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", sorted(SAYS))
+def test_what_only_says_something_is_seen_there_alone(scanner: Path, looks: dict[str, Look], path: str) -> None:
+    changed, before, after = seen(scanner, looks, path, RENDERED)
+    assert not changed
+    assert SAYS[path](before) != SAYS[path](after)
+
+
+def test_the_pages_say_what_nothing_shows() -> None:
+    for page in ("limits.md", "parameters.md"):
+        text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+        paragraph = next(part for part in text.split("\n\n") if "othing shows the" in part)
+        assert all(f"`{path.rpartition('.')[2]}`" in paragraph for path in NOT_BUILT), page

@@ -1,0 +1,70 @@
+"""Fields that say how a job is done, or what is written, change no point: nothing but the files that they name."""
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import laspy
+import numpy as np
+import pytest
+
+from synthroads_addon.jobs.generate import Job, generate
+from synthroads_addon.scenario.scenario import Scenario
+from tests.helpers.effects.field_paths import with_value
+from tests.helpers.effects.scans import SCAN
+from tests.helpers.effects.written_fields import WRITTEN
+
+pytestmark = [pytest.mark.any_blender, pytest.mark.keep_scene, pytest.mark.slow]
+
+JOB: dict[str, Any] = {
+    "road": {
+        "length": 60.0,
+        "half_width": 30.0,
+        "trees_per_hectare": 0.0,
+        "vehicles": {"per_km": {"minimum": 0.0, "maximum": 0.0}},
+    },
+    "outputs": ["parameters", "cloud", "centerline", "previews"],
+    "twin": ["ifc"],
+    "ifc": {"placement": "linear"},
+}
+"""A job with files of every kind on a road where nothing moves; as JSON data."""
+
+
+def scenario_of(path: str = "") -> Scenario:
+    """Return the job's scenario, with a field changed if one is named."""
+    data: Any = SCAN | JOB
+    return Scenario.from_dict(with_value(data, path, WRITTEN[path].value) if path else data)
+
+
+def digests(folder: Path) -> dict[str, str]:
+    """Return the files of a job but its report, which says how long it took, with a digest of each."""
+    files = [path for path in folder.iterdir() if path.name != "report.json"]
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+
+
+def in_order_of_time(cloud: laspy.LasData) -> dict[str, Any]:
+    """Return every dimension of a cloud's points, by the time at which they were measured."""
+    order = np.lexsort((cloud.return_number, cloud.gps_time))
+    return {name: np.asarray(cloud[name])[order] for name in cloud.point_format.dimension_names}
+
+
+@pytest.fixture(scope="module")
+def usual(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of the job as it is."""
+    folder = tmp_path_factory.mktemp("written") / "usual"
+    generate(Job(scenario_of(), folder))
+    return folder
+
+
+@pytest.mark.parametrize("path", sorted(WRITTEN))
+def test_nothing_changes_but_what_the_field_names(usual: Path, tmp_path: Path, path: str) -> None:
+    generate(Job(scenario_of(path), tmp_path / "out"))
+    before, after, promised = digests(usual), digests(tmp_path / "out"), WRITTEN[path]
+    assert after.keys() - before.keys() == promised.adds
+    assert before.keys() - after.keys() == promised.removes
+    assert {name for name in before.keys() & after.keys() if before[name] != after[name]} == promised.changes
+    if "cloud.laz" in promised.changes:
+        was, now = (in_order_of_time(laspy.read(folder / "cloud.laz")) for folder in (usual, tmp_path / "out"))
+        assert all(np.array_equal(was[name], now[name]) for name in was.keys() & now.keys())
+        assert {"X", "Y", "Z", "intensity", "red", "class_id"} <= was.keys() & now.keys()
+        assert promised.sorts == (was.keys() == now.keys())

@@ -1,0 +1,104 @@
+"""Every limit changes sampled roads in fields that have an effect, but for those that are listed."""
+
+from collections.abc import Iterator
+from functools import cache
+from typing import Any
+
+import pytest
+
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.schema import canonical_json
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scenario.road import RoadScenario
+from tests.helpers.effects import without_effect
+from tests.helpers.effects.field_paths import fields_of, other_values, value_at, with_value
+from tests.helpers.effects.limit_cases import CASES, NOT_BUILT, SAYS, SEEDS, LimitCase
+
+FIELDS = {field.path: field for field in fields_of(RoadScenario)}
+SAY = "say in tests/helpers/effects/limit_cases.py"
+LISTED = {path for path in FIELDS if path in SAYS or path.rpartition(".")[0] in NOT_BUILT}
+
+
+def _end_of_interval(data: Any, path: str) -> Iterator[Any]:
+    """Yield the middle of the interval that a field is an end of."""
+    whole, _, end = path.rpartition(".")
+    if end in ("minimum", "maximum"):
+        yield (value_at(data, f"{whole}.minimum") + value_at(data, f"{whole}.maximum")) / 2.0
+
+
+@cache
+def changed_limits(path: str) -> tuple[RoadScenario, RoadScenario]:
+    """Return limits on which a field matters, before and after it changes.
+
+    Raises:
+        AssertionError: nobody said on which limits it matters, or what other value it may have.
+    """
+    case = CASES.get(path, LimitCase())
+    before = RoadScenario.from_dict(case.given)
+    data: Any = before.to_dict()
+    if case.value is not None:
+        values: Iterator[Any] = iter([case.value])
+    else:
+        try:
+            value = value_at(data, path)
+        except LookupError:
+            raise AssertionError(f"{SAY} on which limits {path} matters") from None
+        values = iter([*_end_of_interval(data, path), *other_values(FIELDS[path].info, value)])
+    for value in values:
+        try:
+            after = RoadScenario.from_dict(with_value(data, path, value))
+            sample_road(after, SEEDS[0])
+        except InputError:
+            continue
+        if after != before:
+            return before, after
+    raise AssertionError(f"{SAY} which other value {path} may have")
+
+
+def with_effect(parameters: RoadParameters) -> str:
+    """Return a parameter set as text, less the fields that have no effect."""
+    data: Any = parameters.to_dict()
+    listed = [*without_effect.NOT_BUILT, *without_effect.SAYS]
+    for path in (path for path in listed if not path[0].isupper()):
+        part, _, name = path.rpartition(".")
+        (data[part] if part else data).pop(name, None)
+    for item in data["objects"].values():
+        item.pop("instance")
+        for path in (path for path in listed if path.partition(".")[0] == item["type"]):
+            *way, name = path.split(".")[1:]
+            (item[way[0]] if way else item).pop(name, None)
+    return canonical_json(data)
+
+
+def seeds_that_show(path: str) -> Iterator[int]:
+    """Yield the seeds with which a limit changes fields that have an effect."""
+    before, after = changed_limits(path)
+    for seed in SEEDS:
+        if with_effect(sample_road(before, seed)) != with_effect(sample_road(after, seed)):
+            yield seed
+
+
+def test_no_list_names_a_limit_that_there_is_none_of() -> None:
+    assert {*CASES, *SAYS} <= FIELDS.keys()
+    assert {path.rpartition(".")[0] for path in LISTED - SAYS} == NOT_BUILT
+    assert {f"{path}" for path in NOT_BUILT} <= without_effect.NOT_BUILT
+
+
+@pytest.mark.slow
+@pytest.mark.any_blender
+@pytest.mark.parametrize("path", sorted(FIELDS))
+def test_every_limit_changes_roads(path: str) -> None:
+    shown = next(seeds_that_show(path), None)
+    if path in LISTED:
+        assert shown is None, f"{path} has an effect: take it from the list of what has none"
+    else:
+        assert shown is not None, f"no road shows {path}"
+
+
+@pytest.mark.slow
+@pytest.mark.any_blender
+@pytest.mark.parametrize("path", sorted(LISTED))
+def test_a_limit_without_effect_is_written(path: str) -> None:
+    before, after = changed_limits(path)
+    assert any(sample_road(before, seed).to_dict() != sample_road(after, seed).to_dict() for seed in SEEDS)
