@@ -1,4 +1,4 @@
-"""What is seen of a road: the evaluated model's triangles, and the points of a sparse scan with their colours."""
+"""Everything that is seen of a road: the evaluated model's triangles, and the points of a sparse scan with their colours."""
 
 import hashlib
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ from synthroads_addon.scenario.scenario import Scenario
 Look = dict[str, str]
 """Name of what is seen -> digest of it."""
 LABEL = "instance_id"
-"""What only says which object something is of."""
+"""Name of numbers that only say which object something is of."""
 
 
 def look_at(scenario: Scenario, parameters: RoadParameters) -> Look:

@@ -96,7 +96,7 @@ def _weather_cases() -> dict[str, ScanCase]:
 
 def _tolerance_cases() -> dict[str, ScanCase]:
     pairs = {"height": (0.02, 0.002), "position": (1.0, 0.005), "relief": (1.0, 0.0005), "intensity": (9.0, 0.1)}
-    pairs |= {"labels": (1.0, 0.02), "density": (1.0, 0.01), "colour": (100.0, 0.0), "layers": (1.0, 0.0)}
+    pairs |= {"labels": (1.0, 0.02), "density": (1.0, 0.01), "colour": (100.0, 2.0), "layers": (1.0, 0.02)}
     cases = {}
     for name, (loose, tight) in pairs.items():
         given = {**OPEN, f"tolerance.{name}": loose}
@@ -111,7 +111,7 @@ CASES: dict[str, ScanCase] = {
     "scan.device": ScanCase(value=str(FILES / "other_scanner.json")),
     "scan.pulse_rate_khz": ScanCase(value=1.0),
     "scan.field_of_view_deg": ScanCase(value=40.0),
-    "scan.angle_step_deg": ScanCase(value=1.0, given={"scan.lines_per_second": None}),
+    "scan.angle_step_deg": ScanCase(value=0.3, given={"scan.lines_per_second": None}),
     "scan.lines_per_second": ScanCase(value=10.0),
     "scan.platform": ScanCase(value={"kind": "tripod", "stations": [30.0], "turn_seconds": 3.0}),
     "scan.noise.range_sigma": ScanCase(value=0.03),
@@ -126,7 +126,7 @@ CASES: dict[str, ScanCase] = {
     "colour.lighting": ScanCase(given=PATHS | {"colour.lighting": "direct"}),
     "colour.image_spacing": ScanCase(value=20.0, given=IMAGES),
     "colour.ground_sampling_distance": ScanCase(value=0.5, given=IMAGES),
-    "colour.samples": ScanCase(value=4, given=PATHS),
+    "colour.samples": ScanCase(value=1, given=PATHS),
     "colour.max_resolution": ScanCase(value=64, given=IMAGES | {"colour.ground_sampling_distance": 0.1}),
     "colour.intensity_from_layers": ScanCase(given=IMAGES),
     "cloud.classes": ScanCase(value="5"),

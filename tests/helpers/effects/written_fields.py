@@ -13,27 +13,28 @@ class Written:
         changes: files that are others then.
         adds: files that are there then only.
         removes: files that aren't there then.
-        sorts: whether the points are the same in another order.
+        same: least share of the points that are the same.
     """
 
     value: Any
     changes: frozenset[str] = frozenset()
     adds: frozenset[str] = frozenset()
     removes: frozenset[str] = frozenset()
-    sorts: bool = False
+    same: float = 1.0
 
 
 CLOUD = frozenset({"cloud.laz"})
 WRITTEN: dict[str, Written] = {
-    "title": Written("Another", changes=frozenset({"parameters.json"})),
-    "scan.section_length": Written(25.0, changes=CLOUD, sorts=True),
+    "title": Written("Another", changes=frozenset({"parameters.json", "twin.ifc"})),
+    "scan.section_length": Written(25.0),
     "scan.most_pulses": Written(10**9),
-    "scan.caster": Written("bvhtree"),
+    # Where a ray passes the edge of two faces, casters may choose either.
+    "scan.caster": Written("bvhtree", changes=CLOUD, same=0.999),
     "scan.threads": Written(2),
     "cloud.formats": Written(["laz", "npz"], adds=frozenset({"cloud.npz"})),
     "cloud.attributes": Written(["normal"], changes=CLOUD),
     "outputs": Written(["cloud", "previews", "parameters"], removes=frozenset({"centerline.geojson"})),
-    "twin": Written(["geojson", "ifc"], adds=frozenset({"road.geojson"})),
-    "ifc.placement": Written("local", changes=frozenset({"road.ifc"})),
+    "twin": Written(["geojson", "ifc"], adds=frozenset({"twin.geojson"})),
+    "ifc.placement": Written("local", changes=frozenset({"twin.ifc"})),
 }
 """Path of a field -> what it says."""
