@@ -12,6 +12,8 @@ import laspy
 import numpy as np
 import pytest
 
+from ml.runs import HISTORY
+from ml.segmentation.prediction import PREDICTED
 from tests.helpers.page_modules import ROOT, block_of_page
 from tests.packaging.docs_pages import commands
 
@@ -53,5 +55,11 @@ def test_the_page_leads_from_a_scheme_to_a_network(tmp_path: Path) -> None:
     by_class = scores["classes"]
     assert {name: by_class[name]["support"] for name in NEW} == {name: counts[name] for name in NEW}
     assert all(by_class[name]["iou"] > 0.05 for name in NEW), "they were learned"
+    losses = [epoch["loss"] for epoch in json.loads((tmp_path / "out" / "fine-net" / HISTORY).read_text())]
+    assert losses[-1] < 0.7 * losses[0], "the loss falls"
     labelled = laspy.read(tmp_path / "out" / "labelled.laz")
     assert len(labelled.points) == len(written.points)
+    for name, (number, code) in NEW.items():
+        predicted = np.asarray(labelled[PREDICTED]) == number
+        assert predicted.any(), name
+        assert set(np.asarray(labelled.classification)[predicted].tolist()) == {code}

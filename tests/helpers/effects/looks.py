@@ -1,4 +1,4 @@
-"""Everything that is seen of a road: the evaluated model's triangles, and the points of a sparse scan with their colours."""
+"""Everything seen of a road: the evaluated model's triangles, and the points of a sparse scan with their colours."""
 
 import hashlib
 from collections.abc import Mapping

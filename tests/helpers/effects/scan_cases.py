@@ -44,8 +44,9 @@ class ScanCase:
 IMAGES = {"colour.source": "images"}
 PATHS = IMAGES | {"colour.lighting": "path", "colour.max_resolution": 64}
 RAYS = {"scan.rays_per_pulse": 7}
-OPEN = {"scan.rays_per_pulse": None, "vegetation_detail": None, "scan.noise.range_sigma": 0.0}
+OPEN = {"scan.rays_per_pulse": None, "scan.noise.range_sigma": 0.0}
 """Nothing is given that a tolerance may choose."""
+CHOSEN_COLOURS = {"colour": {"source": "auto"}, "cloud.attributes": ["roughness"]}
 DAMPED = {"scan.noise.position_sigma": 0.05}
 BY_RATE = {"scan.weather.visibility": None}
 
@@ -94,14 +95,19 @@ def _weather_cases() -> dict[str, ScanCase]:
     return cases
 
 
+LOOSE = {"height": 0.02, "position": 1.0, "relief": 1.0, "intensity": 9.0, "labels": 1.0, "density": 1.0}
+LOOSE_COLOURS = {"colour": 100.0, "layers": 1.0}
+TIGHT = {"height": 0.002, "position": 0.01, "relief": 0.0005, "intensity": 0.3, "labels": 0.05, "density": 0.05}
+TIGHT_COLOURS = {"colour": 2.0, "layers": 0.02}
+"""Tolerances that the cheapest settings keep, and others that they don't."""
+
+
 def _tolerance_cases() -> dict[str, ScanCase]:
-    pairs = {"height": (0.02, 0.002), "position": (1.0, 0.005), "relief": (1.0, 0.0005), "intensity": (9.0, 0.1)}
-    pairs |= {"labels": (1.0, 0.02), "density": (1.0, 0.01), "colour": (100.0, 2.0), "layers": (1.0, 0.02)}
-    cases = {}
-    for name, (loose, tight) in pairs.items():
-        given = {**OPEN, f"tolerance.{name}": loose}
-        cases[f"tolerance.{name}"] = ScanCase(value=tight, given=given)
-    return cases
+    of_beam, of_colour = OPEN | {"tolerance": LOOSE}, OPEN | CHOSEN_COLOURS | {"tolerance": LOOSE_COLOURS}
+    cases = {f"tolerance.{name}": ScanCase(value=value, given=of_beam) for name, value in TIGHT.items()}
+    return cases | {
+        f"tolerance.{name}": ScanCase(value=value, given=of_colour) for name, value in TIGHT_COLOURS.items()
+    }
 
 
 CASES: dict[str, ScanCase] = {

@@ -83,7 +83,7 @@ def test_a_value_that_follows_from_others_can_t_be_another(path: str) -> None:
 
 @pytest.fixture(scope="module")
 def looks(scanner: Path) -> dict[str, Look]:
-    """What is seen of roads as they are, by road and scan."""
+    """Looks at roads as they are, by road and scan."""
     return {}
 
 

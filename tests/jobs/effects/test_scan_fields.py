@@ -71,7 +71,7 @@ def test_no_list_names_a_field_that_there_is_none_of() -> None:
 
 @pytest.fixture(scope="module")
 def looks() -> dict[str, Look]:
-    """What is seen in scans as they are, by scenario."""
+    """Looks at scans as they are, by scenario."""
     return {}
 
 
