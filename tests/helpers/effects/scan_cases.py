@@ -96,9 +96,9 @@ def _weather_cases() -> dict[str, ScanCase]:
 
 
 LOOSE = {"height": 0.02, "position": 1.0, "relief": 1.0, "intensity": 9.0, "labels": 1.0, "density": 1.0}
-LOOSE_COLOURS = {"colour": 100.0, "layers": 1.0}
+LOOSE_COLOURS = {"colour": 100.0}
 TIGHT = {"height": 0.002, "position": 0.01, "relief": 0.005, "intensity": 0.04, "labels": 0.012, "density": 0.01}
-TIGHT_COLOURS = {"colour": 2.0, "layers": 0.02}
+TIGHT_COLOURS = {"colour": 2.0}
 """Tolerances that the cheapest settings keep, and others that they don't."""
 
 

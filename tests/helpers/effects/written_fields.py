@@ -23,6 +23,8 @@ class Written:
     same: float = 1.0
 
 
+OF_OTHER_SCENES = {"tolerance.layers"}
+"""Fields that matter in scenes of others alone: on a road's materials layers but the colour don't vary."""
 CLOUD = frozenset({"cloud.laz"})
 WRITTEN: dict[str, Written] = {
     "title": Written("Another", changes=frozenset({"parameters.json", "twin.ifc"})),

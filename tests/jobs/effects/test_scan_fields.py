@@ -10,6 +10,7 @@ import pytest
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.progress import StageTimer, silent
+from synthroads_addon.jobs.choose.options import Option, cheapest
 from synthroads_addon.jobs.choose.search import choose_settings
 from synthroads_addon.jobs.open_scene import RoadScene
 from synthroads_addon.road.geometry import RoadGeometry
@@ -19,7 +20,7 @@ from tests.helpers.effects.field_paths import fields_of, other_values, value_at,
 from tests.helpers.effects.looks import Look, changes, look_at, look_at_cloud
 from tests.helpers.effects.scan_cases import CASES, ROAD, ScanCase
 from tests.helpers.effects.scans import SCAN
-from tests.helpers.effects.written_fields import WRITTEN
+from tests.helpers.effects.written_fields import OF_OTHER_SCENES, WRITTEN
 
 pytestmark = [pytest.mark.any_blender, pytest.mark.keep_scene]
 
@@ -57,7 +58,7 @@ def changed_scan(path: str) -> tuple[Scenario, Scenario]:
     raise AssertionError(f"{SAY} which other value {path} may have")
 
 
-@pytest.mark.parametrize("path", sorted(FIELDS.keys() - WRITTEN.keys()))
+@pytest.mark.parametrize("path", sorted(FIELDS.keys() - WRITTEN.keys() - OF_OTHER_SCENES))
 def test_every_field_has_a_scan_in_which_it_matters(path: str) -> None:
     before, after = changed_scan(path)
     assert before != after
@@ -67,6 +68,15 @@ def test_no_list_names_a_field_that_there_is_none_of() -> None:
     made = {f"scan.{part}[" for part in ("platform", "weather")}  # fields that not each kind has
     assert {path for path in CASES if not any(map(path.startswith, made))} <= FIELDS.keys()
     assert WRITTEN.keys() <= FIELDS.keys()
+
+
+@pytest.mark.parametrize("path", sorted(OF_OTHER_SCENES))
+def test_a_tolerance_that_matters_in_scenes_of_others_chooses(path: str) -> None:
+    """The cheapest settings that keep it are others where layers vary."""
+    kind = path.rpartition(".")[2]
+    coarse, fine = Option({"a": 1}, {kind: (0.4, 0.5)}, cost=1.0), Option({"a": 2}, {kind: (0.0, 0.1)}, cost=2.0)
+    chosen = [cheapest([[coarse, fine]], {kind: limit}).changes for limit in (1.0, 0.2)]
+    assert chosen == [coarse.changes, fine.changes]
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +97,7 @@ def seen(scenario: Scenario, path: str, folder: Path) -> Look:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", sorted(FIELDS.keys() - WRITTEN.keys()))
+@pytest.mark.parametrize("path", sorted(FIELDS.keys() - WRITTEN.keys() - OF_OTHER_SCENES))
 def test_every_field_changes_the_points(looks: dict[str, Look], path: str, tmp_path: Path) -> None:
     before, after = changed_scan(path)
     key = before.to_json() + str(path in OF_FILES)
