@@ -27,6 +27,7 @@ TURNOUTS: Data = {
 LEFT_ENTRY = TURNOUTS["entry"] | {"carriageway": "left"}
 STRAIGHT = {"start_station": 8.0, "end_station": 50.0}
 LINE = {"carriageway": "right", "width": 0.15, "dash_length": 0.0, "gap_length": 0.0, **STRAIGHT}
+TYPES = {"ifc": "IfcFurniture.USERDEFINED", "cityjson": "CityFurniture", "opendrive": "barrier.fence"}
 OWN: dict[str, dict[str, Data]] = {
     "Turnout": TURNOUTS,
     "LineMarking": {
@@ -44,7 +45,7 @@ OWN: dict[str, dict[str, Data]] = {
     "Overpass": {"it": GIVEN["Overpass"] | {"offset": 0.0, "pier_offsets": [0.0]}},
     "Cabinet": {"it": {"kind": "utility"}},
     "ConstructionBeacon": {"it": {"pass_side": "left"}},
-    "Asset": {"it": GIVEN["Asset"] | {"offset": -18.0}},
+    "Asset": {"it": GIVEN["Asset"] | {"offset": -18.0, "twin_types": TYPES}},
     "Vegetation": {
         "it": {"kind": "shrub", "species": "hazel", "density": 0.05, "band_start": 1.0, "band_end": 6.0}
         | {"height_min": 1.0, "height_max": 2.0, "seed": 1}
@@ -132,6 +133,8 @@ CASES: dict[str, Case] = {
     "TrafficSign.text": Case(value=["Abfahrt"]),
     "KilometreBoard.text": Case(value="124,0"),
     "Gantry.signs[].text": Case(value=["B"]),
+    "Asset.twin_types.ifc": Case(value="IfcSign.MARKER"),
+    "Asset.twin_types.opendrive": Case(value="building.shed"),
     "Asset.name": Case(value="grit_bin"),
     "Asset.class_name": Case(value="barrier"),
     "Asset.library": Case(value=str(OTHER_LIBRARY)),

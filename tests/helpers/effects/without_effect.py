@@ -7,7 +7,7 @@ from typing import Any
 
 from synthroads_addon.checking.checker import check
 from synthroads_addon.road.parameters import RoadParameters
-from synthroads_addon.twin.cityjson.writer import write_cityjson
+from synthroads_addon.twin.formats import write_twin
 
 NOT_BUILT = {
     "materials.crack_density",
@@ -28,18 +28,22 @@ def findings(parameters: RoadParameters) -> Any:
     return check(parameters)
 
 
-def relations(parameters: RoadParameters) -> Any:
-    """Return which object of the semantic model is part of which."""
-    with TemporaryDirectory() as folder:
-        path = Path(folder, "road.city.json")
-        write_cityjson(parameters, path, 0.02)
-        return path.read_bytes()
+def twin(name: str) -> Callable[[RoadParameters], Any]:
+    """Return what gives a road's semantic model in a format."""
+
+    def written(parameters: RoadParameters) -> Any:
+        with TemporaryDirectory() as folder:
+            write_twin(parameters, Path(folder), (name,), 0.02)
+            return [path.read_bytes() for path in sorted(Path(folder).glob("twin.*")) if "report" not in path.name]
+
+    return written
 
 
 SAYS: dict[str, Callable[[RoadParameters], Any]] = {
     **{f"metadata.{name}": set_of for name in ("identifier", "title", "seed", "generator", "referenceSystem")},
     "design_class": findings,
-    "Arrow.carriageway": relations,
+    "Arrow.carriageway": twin("cityjson"),
+    **{f"Asset.twin_types.{name}": twin(name) for name in ("cityjson", "ifc", "opendrive")},
     "LineMarking.turnout": findings,
 }
 """Field of a parameter set -> where it is seen, and nowhere in the model or the points."""

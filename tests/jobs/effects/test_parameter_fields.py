@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -82,18 +81,16 @@ def test_a_value_that_follows_from_others_can_t_be_another(path: str) -> None:
 
 
 @pytest.fixture(scope="module")
-def looks(scanner: Path) -> dict[str, Look]:
+def looks() -> dict[str, Look]:
     """Looks at roads as they are, by road and scan."""
     return {}
 
 
-def seen(
-    scanner: Path, looks: dict[str, Look], path: str, further: dict[str, Any]
-) -> tuple[set[str], RoadParameters, RoadParameters]:
+def seen(looks: dict[str, Look], path: str, further: dict[str, Any]) -> tuple[set[str], RoadParameters, RoadParameters]:
     """Return the names of what a field changes, and the road before and after."""
     case, scene, data = changed_road(path)
     scan: Any = SCAN
-    for name, value in ({"scan.device": str(scanner)} | further | case.scan).items():
+    for name, value in (further | case.scan).items():
         scan = with_value(scan, name, value)
     scenario, before, after = Scenario.from_dict(scan), *map(RoadParameters.from_dict, (scene.data, data))
     key = scenario.to_json() + before.to_json()
@@ -104,9 +101,9 @@ def seen(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", sorted(FIELDS.keys() - DERIVED - SAYS.keys() - LABELS - NOT_BUILT))
-def test_every_field_changes_the_model_or_the_points(scanner: Path, looks: dict[str, Look], path: str) -> None:
+def test_every_field_changes_the_model_or_the_points(looks: dict[str, Look], path: str) -> None:
     for further in ({}, RENDERED):
-        changed, _, _ = seen(scanner, looks, path, further)
+        changed, _, _ = seen(looks, path, further)
         if any(not name.endswith(LABEL) for name in changed):
             return
     raise AssertionError(f"nothing shows {path}")
@@ -114,24 +111,24 @@ def test_every_field_changes_the_model_or_the_points(scanner: Path, looks: dict[
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", sorted(LABELS))
-def test_an_instance_number_changes_nothing_but_numbers(scanner: Path, looks: dict[str, Look], path: str) -> None:
-    changed, _, _ = seen(scanner, looks, path, {})
+def test_an_instance_number_changes_nothing_but_numbers(looks: dict[str, Look], path: str) -> None:
+    changed, _, _ = seen(looks, path, {})
     assert all(name.endswith(LABEL) for name in changed)
     assert changed or path == "Alignment.instance"  # which has no faces
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", sorted(NOT_BUILT))
-def test_nothing_shows_what_is_not_built(scanner: Path, looks: dict[str, Look], path: str) -> None:
+def test_nothing_shows_what_is_not_built(looks: dict[str, Look], path: str) -> None:
     for further in ({}, RENDERED):
-        changed, _, _ = seen(scanner, looks, path, further)
+        changed, _, _ = seen(looks, path, further)
         assert not changed, f"{path} has an effect: take it from the list of what isn't built, and from the pages"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", sorted(SAYS))
-def test_what_only_says_something_is_seen_there_alone(scanner: Path, looks: dict[str, Look], path: str) -> None:
-    changed, before, after = seen(scanner, looks, path, RENDERED)
+def test_what_only_says_something_is_seen_there_alone(looks: dict[str, Look], path: str) -> None:
+    changed, before, after = seen(looks, path, RENDERED)
     assert not changed
     assert SAYS[path](before) != SAYS[path](after)
 
