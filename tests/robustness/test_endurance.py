@@ -77,7 +77,7 @@ def test_scenes_of_a_data_set(tmp_path: Path) -> None:
 
 
 def test_scans_in_one_blender(tmp_path: Path) -> None:
-    """A road that is built, and scanned to a cloud, previews and images again and again."""
+    """A road is scanned to a cloud and previews again and again, each tenth time with images for its colours."""
     pytest.importorskip("bpy", reason="needs Blender")
     from synthroads_addon.blender.model.build import build_road
     from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
@@ -86,12 +86,13 @@ def test_scans_in_one_blender(tmp_path: Path) -> None:
     from tests.helpers.scenes.scene_hash import digest
 
     thin = {"lines_per_second": 20.0, "platform": {"height": 30.0, "speed": 30.0}}
-    scenario = Scenario.from_dict({"fidelity": "draft", "scan": thin, "outputs": ["cloud", "previews"]})
+    plain = {"fidelity": "draft", "scan": thin, "outputs": ["cloud", "previews"]}
+    scenarios = [Scenario.from_dict({**plain, "colour": {"source": kind}}) for kind in ("images", *["material"] * 9)]
     build_road(sample_road(RoadScenario(length=40.0, half_width=20.0), 4), 0.05, 0.1)
     before = digest()
     memory, files = [], []
-    for _ in range(SCANS):
-        scan_scene(SceneScan(scenario, tmp_path / "out", overwrite=True))
+    for number in range(SCANS):
+        scan_scene(SceneScan(scenarios[number % 10], tmp_path / "out", overwrite=True))
         memory.append(resident_mb())
         files.append(open_files())
     assert digest() == before
