@@ -78,6 +78,8 @@ def write(path: Path, case: dict[str, Any]) -> bool:
                 return False
     if path.suffix in (".las", ".laz"):
         las.write(path)
+    elif path.suffix == ".e57" and not len(xyz):  # pye57 writes no empty ones
+        return False
     else:
         write_floats(path, np.column_stack([las.x, las.y, las.z, las.intensity]), case["numbers"])
     return True
@@ -86,7 +88,7 @@ def write(path: Path, case: dict[str, Any]) -> bool:
 def write_floats(path: Path, rows: Float, numbers: list[tuple[int, float]]) -> None:
     """Write x, y, z and intensity (N, 4) as others do, with some of these numbers replaced."""
     for place, value in numbers if rows.size else ():
-        if path.suffix != ".e57" or np.isfinite(value):  # libE57 writes no others
+        if path.suffix != ".e57" or abs(value) <= 1.0:  # libE57 writes no number that is none, nor 1e300
             rows.flat[place % rows.size] = value
     names = ("x", "y", "z", "intensity")
     if path.suffix == ".npz":
