@@ -115,6 +115,17 @@ def test_elevation_models_come_by_an_extension_of_their_own(archive: Path, manif
     assert sorted(own["wheels"]) == sorted(f"./{name}" for name in names if name.endswith(".whl"))
 
 
+def test_ifc_comes_by_an_extension_of_its_own(archive: Path, manifest: dict[str, list[str]]) -> None:
+    (other,) = archive.parent.glob("synthroads_ifc-*.zip")
+    with zipfile.ZipFile(other) as content:
+        names = content.namelist()
+        own = tomllib.loads(content.read("blender_manifest.toml").decode("utf-8"))
+    writers = {Path(name).name.split("-")[2] for name in names if name.startswith("wheels/ifcopenshell-")}
+    assert writers == {tag.replace("cp", "py") for tag in PYTHON_TAGS}
+    assert (own["version"], own["platforms"]) == (manifest["version"], manifest["platforms"])
+    assert other.stat().st_size < 180e6
+
+
 def test_lists_the_licences_of_all_wheels(archive: Path, names: list[str]) -> None:
     with zipfile.ZipFile(archive) as content:
         notice = content.read("THIRD_PARTY.txt").decode("utf-8")

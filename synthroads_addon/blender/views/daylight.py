@@ -22,6 +22,8 @@ _CONTRAST = 3.912
 """Optical depth over the meteorological visibility: -ln 0.02, a contrast of 2 % (Koschmieder)."""
 _HAZE_BELOW = 10_000.0
 """Visibility (m) from which on a picture shows no haze."""
+_LOWEST_SKY = 0.02
+"""Sine of the elevation whose colour goes on below."""
 _REACH, _HEIGHT = 2500.0, 300.0
 """Half the width of the body of haze, and its height above the road, m."""
 
@@ -84,7 +86,24 @@ def _world(scene: bpy.types.Scene, environment: Environment) -> bpy.types.World:
         if scene.world is not None:
             scene.world.use_fake_user = True
     fill_sky(world, environment.sun_elevation_deg, environment.sun_azimuth_deg, environment.sun_strength)
+    _go_on_below_horizon(world)
     return world
+
+
+def _go_on_below_horizon(world: bpy.types.World) -> None:
+    """Have the sky's lowest colour go on below the horizon, where a model's ground ends and the sky would be black."""
+    nodes, links = world.node_tree.nodes, world.node_tree.links
+    kinds = ("TexCoord", "SeparateXYZ", "Math", "CombineXYZ")
+    place, parts, height, joined = (nodes.new(f"ShaderNode{kind}") for kind in kinds)
+    sky = next(node for node in nodes if node.type == "TEX_SKY")
+    height.operation = "MAXIMUM"
+    height.inputs[1].default_value = _LOWEST_SKY
+    links.new(place.outputs["Generated"], parts.inputs[0])
+    for axis in "XY":
+        links.new(parts.outputs[axis], joined.inputs[axis])
+    links.new(parts.outputs["Z"], height.inputs[0])
+    links.new(height.outputs[0], joined.inputs["Z"])
+    links.new(joined.outputs[0], sky.inputs["Vector"])
 
 
 def _camera(name: str, view: Viewpoint, matrix: Matrix) -> bpy.types.Object:

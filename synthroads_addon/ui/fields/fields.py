@@ -141,7 +141,7 @@ class Field:
         value_row(layout, self.label).prop(owner, self.name, text="")
 
     def _draw_inherited(self, row: bpy.types.UILayout, settings: Any, share: float = 1.0, beside: int = 0) -> None:
-        greyed = row.column(align=True)
+        greyed = row.row(align=True)
         greyed.active = False
         draw_text(greyed, self.inherited_text(settings), share=share * value_share(self.label), beside=beside)
 

@@ -238,7 +238,7 @@ class SYNTHROADS_OT_install_ifc(FileChooser, bpy.types.Operator):
     bl_label = "Install SynthRoads IFC"
 
     filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
-    filter_glob: bpy.props.StringProperty(default="synthroads_ifc*.zip", options={"HIDDEN"})
+    filter_glob: bpy.props.StringProperty(default="*.zip", options={"HIDDEN"})
 
     @refusing
     def execute(self, context: bpy.types.Context) -> None:

@@ -25,7 +25,7 @@ from .road_choice import draw_shown
 
 _STATION_SHARE, _NAME_SHARE = 0.25, 0.45
 """Shares of the list's width that station and rule have where all three columns fit."""
-_FOUND = "Found / limit"
+_STATION, _FOUND = "Station", "Found / limit"
 _BOX_SHARE, _TITLE_SHARE = 0.92, 0.36
 """Share of a row that is within a box, and that of a title in there."""
 _SURENESS = {
@@ -259,7 +259,7 @@ class SYNTHROADS_PT_rules(Sidebar, bpy.types.Panel):
         draw_text(layout, _count(count), "ERROR" if count else "CHECKMARK")
         if not count:
             return
-        _columns(layout.row(), ("Station", "Rule", _FOUND), [row.name for row in rules.violations])
+        _columns(layout.row(), (_STATION, "Rule", _FOUND), [row.name for row in rules.violations])
         layout.template_list("SYNTHROADS_UL_violations", "", rules, "violations", rules, "index", rows=4)
         if 0 <= rules.index < count:
             _details(layout, rules)
@@ -275,7 +275,7 @@ def _columns(layout: bpy.types.UILayout, texts: tuple[str, str, str], names: Seq
     """
     widest = max(names, key=text_width, default="")
     all_three = fits(widest, _NAME_SHARE) and fits(_FOUND, 1.0 - _STATION_SHARE - _NAME_SHARE)
-    two = fits(widest, 1.0 - _STATION_SHARE)
+    two = fits(_STATION, _STATION_SHARE) and fits(widest, 1.0 - _STATION_SHARE)
     if not all_three and not two:
         layout.label(text=texts[0])
         if fits(texts[2], 0.5):
@@ -309,7 +309,7 @@ def _details(layout: bpy.types.UILayout, rules: SYNTHROADS_PG_rules) -> None:
             continue
         split = box.split(factor=_TITLE_SHARE)
         split.label(text=title)
-        draw_text(split.column(align=True), value, share=_BOX_SHARE * (1.0 - _TITLE_SHARE))
+        draw_text(split, value, share=_BOX_SHARE * (1.0 - _TITLE_SHARE))
     source = f"{rule.source}: " if rule.source else ""
     draw_text(box, source + _SURENESS[rule.sure], share=_BOX_SHARE)
     box.operator(SYNTHROADS_OT_show_violation.bl_idname, icon="VIEWZOOM").index = rules.index

@@ -21,6 +21,7 @@ from synthroads_addon.cloud.tools.convert import convert, subsample
 from synthroads_addon.twin import formats as twin
 from synthroads_addon.twin import geojson
 from synthroads_addon.twin.formats import twin_file_names, write_twin
+from synthroads_addon.ui.fields import room
 from synthroads_addon.ui.panels import export, panels
 from tests.helpers.clouds.random_points import make_points
 from tests.helpers.scenes.fake_layout import FakeLayout, drawn
@@ -178,7 +179,7 @@ def test_the_panel_has_its_buttons() -> None:
 def test_formats_that_cannot_be_written_say_what_they_need(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(twin.FORMATS, "ifc", replace(twin.FORMATS["ifc"], package="no_such_package"))
     layout, known = FakeLayout(), bpy.ops.synthroads.export_twin.get_rna_type()
-    export._draw_formats(layout, bpy.context, SimpleNamespace(bl_rna=known, formats={"geojson"}))
+    export._draw_formats(layout, SimpleNamespace(bl_rna=known, formats={"geojson"}))
     text = " ".join(layout.lines)
     assert "[x] 'GeoJSON'" in text
     assert "[ ] 'CityJSON'" in text
@@ -191,8 +192,22 @@ def test_the_output_panel_says_what_chosen_formats_need(settings: Any, monkeypat
     monkeypatch.setattr(registry, "_PACKAGES", {".e57": "nor_this"})
     settings.twin, settings.cloud.formats = {"cityjson", "ifc"}, {"laz", "e57"}
     panel = next(one for one in panels.CLASSES if one.bl_idname == "SYNTHROADS_PT_output")
+    monkeypatch.setattr(room, "sidebar_width", lambda: 600.0)
     said = "\n".join(drawn(panel, bpy.context).lines)
     assert "E57 needs the package nor_this:" in said
     assert "IFC needs the package no_such_package:" in said
     settings.twin, settings.cloud.formats = {"cityjson"}, {"laz"}
     assert "needs the package" not in "\n".join(drawn(panel, bpy.context).lines)
+
+
+def test_as_an_extension_ifc_comes_by_one_of_its_own(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Where Blender has installed this as an extension nobody is asked for pip: a button takes SynthRoads IFC's zip."""
+    monkeypatch.setattr(export, "RUNS_AS_EXTENSION", True)
+    layout = FakeLayout()
+    export._draw_missing_packages(layout, {"IFC": "ifcopenshell"})
+    text = " ".join(layout.lines)
+    assert "pip" not in text
+    assert "synthroads.install_ifc" in text
+    (tmp_path / "other.zip").write_bytes(b"zip")
+    with pytest.raises(RuntimeError, match=r"choose the zip of SynthRoads IFC"):
+        bpy.ops.synthroads.install_ifc(filepath=str(tmp_path / "other.zip"))

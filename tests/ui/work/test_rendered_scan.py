@@ -164,7 +164,9 @@ def test_the_other_blender_ends_with_this_one(road: Any, tmp_path: Path) -> None
     choose(road, **NO_PICTURES)
     asked = scan.requested_scan(bpy.context)
     (tmp_path / "files").mkdir()
-    saved = rendered_scan.save_open_scene(asked.scenario, asked.edited.parameters, asked.road_id, tmp_path / "files")
+    saved = rendered_scan.save_open_scene(
+        asked.scenario, tmp_path / "files", {"parameters": asked.edited.parameters.to_dict(), "road": asked.road_id}
+    )
     process = subprocess.Popen(saved.command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL)
     assert process.stdin
     process.stdin.close()
