@@ -130,7 +130,8 @@ def schema_paths(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
                 yield path
                 continue
             for name, child in target["properties"].items():
-                yield from walk(child, f"{path}.{name}" if path else name)
+                if not child.get("deprecated"):  # of earlier versions: read, and left out
+                    yield from walk(child, f"{path}.{name}" if path else name)
 
     yield from walk(schema, prefix)
 
