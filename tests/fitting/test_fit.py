@@ -601,7 +601,8 @@ def test_a_fit_that_leaves_its_points_is_refused(tmp_path: Path) -> None:
     assert np.abs(fit.across).max() == pytest.approx(fit.horizontal.worst)
     assert np.abs(fit.above).max() == pytest.approx(fit.height.worst)
     picture = axis_picture(fit, "axis.csv")
-    red = (np.asarray(picture)[..., :3] == (200, 30, 40)).all(axis=-1)
+    color = np.asarray(picture).astype(int)
+    red = color[..., 0] > color[..., 1:3].max(axis=-1) + 50  # lines are smooth: few pixels have their very colour
     assert red.sum() > 100  # limits, and rings around the worst places
     picture.save(tmp_path / "fit.png")
 

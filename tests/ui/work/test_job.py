@@ -216,11 +216,11 @@ def test_buttons_wait_for_a_job(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_slow_drawing_makes_turns_longer() -> None:
-    """Of the time between two drawings four fifths are for the work, up to turns of a second."""
+    """Of the time between two drawings four fifths are for the work, up to turns of two seconds."""
     now = [0.0]
     pace = WorkPace(lambda: now[0])
     assert pace.budget() == BUDGET
-    for drawing, expected in ((0.001, BUDGET), (0.1, 0.4), (9.0, 1.0)):
+    for drawing, expected in ((0.001, BUDGET), (0.1, 0.4), (9.0, 2.0)):
         pace.leave()
         now[0] += TICK + drawing
         assert pace.budget() == pytest.approx(expected)
