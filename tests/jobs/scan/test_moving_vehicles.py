@@ -15,6 +15,10 @@ from synthroads_addon.base.classes import class_id
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.materials import material
 from synthroads_addon.blender.model.build import build_road
+from synthroads_addon.blender.model.roads import ROAD
+from synthroads_addon.blender.model.settle import settle
+from synthroads_addon.blender.model.store import remember
+from synthroads_addon.blender.model.truth import read_road
 from synthroads_addon.blender.scene.evaluated import scanned_scene, scene_mesh
 from synthroads_addon.blender.services import BlenderServices
 from synthroads_addon.cloud.points import PointBlock, concatenate
@@ -211,14 +215,24 @@ class TestWhatMoves:
                 assert beside == pytest.approx(2.0, abs=0.05)
 
     def test_a_copy_of_a_vehicle_moves_as_well(self) -> None:
-        geometry = build({"a": vehicle("car", "right", 0, 100.0, (0.5, 0.5, 0.5))}, 0.01)
+        """It is one more vehicle of the road as edited: on the lane that it was put on."""
+        parameters = RoadParameters.from_dict(road_data({"a": vehicle("car", "right", 0, 100.0, (0.5, 0.5, 0.5))}))
+        root = build_road(parameters, 0.01, 0.0, {"road", "vehicles"}).root
+        remember(root, parameters, load_scenario("rq31-600m"), "")
         copy = bpy.data.objects["a"].copy()
         bpy.context.scene.collection.objects.link(copy)
-        copy.location.xy = 3.0, -4.0
+        here, ahead = RoadGeometry(parameters).alignment.position(np.array([100.0, 130.0]))
+        copy.location.xy = ahead - here
         bpy.context.view_layer.update()
-        first, second = sorted(scanned_scene(geometry=geometry).moving, key=lambda part: -at(part, 1.0)[:, 1].mean())
-        aside = at(second, 1.0) - at(first, 1.0)
-        assert aside[:, :2].mean(axis=0) == pytest.approx([3.0, -4.0], abs=0.3)
+        edited = read_road(root)
+        settle(root[ROAD], edited)
+        geometry = RoadGeometry(edited.known())
+        first, second = scanned_scene(geometry=geometry).moving
+        assert {part.mesh.instance_id[0] for part in (first, second)} == {
+            item.instance for item in geometry.parameters.of_type(Vehicle).values()
+        }
+        apart = at(second, 1.0).mean(axis=0) - at(first, 1.0).mean(axis=0)
+        assert np.hypot(*apart[:2]) == pytest.approx(30.0, abs=0.1)
 
     def test_the_geometry_of_another_road_is_refused(self) -> None:
         geometry = build({"a": vehicle("car", "right", 0, 100.0, (0.5, 0.5, 0.5))}, 0.01)
