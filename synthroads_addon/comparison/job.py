@@ -48,7 +48,7 @@ class DescribedCloud:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class CloudComparison:
     """The result.
 
     Attributes:
@@ -101,7 +101,7 @@ def _mean(rows: Sequence[Distinction], group: str) -> float:
     return float(np.mean([1.0 - max(one.auc[group], 0.5) for one in rows]))
 
 
-def compare_steps(synthetic: Path, real: Path, seed: int = 1) -> Generator[float, None, Comparison]:
+def compare_steps(synthetic: Path, real: Path, seed: int = 1) -> Generator[float, None, CloudComparison]:
     """Compare; yield the share that is done.
 
     Args:
@@ -130,7 +130,7 @@ def compare_steps(synthetic: Path, real: Path, seed: int = 1) -> Generator[float
         told.append(distinguish(one.patches, everything, seed, one.cloud.name))
         done += 1
         yield done / total
-    return Comparison(tuple(described[0]), tuple(others), tuple(told), tuple(yardstick))
+    return CloudComparison(tuple(described[0]), tuple(others), tuple(told), tuple(yardstick))
 
 
 def _against_others(one: DescribedCloud, others: list[DescribedCloud], seed: int) -> Distinction:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.arrays import Float
 from ..base.files import write_file
-from .job import Comparison, DescribedCloud
+from .job import CloudComparison, DescribedCloud
 from .patches import FEATURES, GROUPS
 
 _COLUMNS = 6
@@ -19,7 +19,7 @@ _SYNTHETIC, _REAL = "#d6681a", "#5b7aa3"
 _INCHES = (15.0, 9.0)
 
 
-def save_picture(result: Comparison, path: Path, overwrite: bool = False) -> None:
+def save_picture(result: CloudComparison, path: Path, overwrite: bool = False) -> None:
     """Write the picture of a result as PNG.
 
     Raises:
@@ -41,7 +41,7 @@ def save_picture(result: Comparison, path: Path, overwrite: bool = False) -> Non
     write_file(path, data.getvalue(), overwrite=overwrite)
 
 
-def _draw_groups(axes: Any, result: Comparison) -> None:
+def _draw_groups(axes: Any, result: CloudComparison) -> None:
     """Draw the AUC of each group, of synthetic clouds and of real ones."""
     groups = ["all", *GROUPS]
     for shift, rows, colour, label in (
@@ -54,7 +54,7 @@ def _draw_groups(axes: Any, result: Comparison) -> None:
     axes.invert_yaxis()
 
 
-def _draw_feature(axes: Any, result: Comparison, number: int, name: str) -> None:
+def _draw_feature(axes: Any, result: CloudComparison, number: int, name: str) -> None:
     """Draw how one statistic is distributed over the patches of both kinds."""
     sides = [_values(clouds, number) for clouds in (result.synthetic, result.real)]
     low, high = np.quantile(np.concatenate(sides), (0.005, 0.995))

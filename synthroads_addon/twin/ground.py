@@ -75,7 +75,7 @@ class GroundSide:
 
 
 @dataclass(frozen=True)
-class Ground:
+class GroundMesh:
     """The ground beside a road.
 
     Attributes:
@@ -89,7 +89,7 @@ class Ground:
     deviation: float
 
 
-def ground_beside(geometry: RoadGeometry, terrain: Terrain, road: Float, tolerance: float) -> Ground:
+def ground_beside(geometry: RoadGeometry, terrain: Terrain, road: Float, tolerance: float) -> GroundMesh:
     """Return the ground beside a road, as coarse as keeps `GROUND_TOLERANCE`, or the tolerance if that is larger.
 
     Args:
@@ -98,11 +98,11 @@ def ground_beside(geometry: RoadGeometry, terrain: Terrain, road: Float, toleran
         road: (N,) stations at which the road's surface has rows.
         tolerance: that of the model, m.
     """
-    made: Ground | None = None
+    made: GroundMesh | None = None
     for spacing in _SPACINGS:
         sides = (_side(geometry, terrain, 1.0, spacing), _side(geometry, terrain, -1.0, spacing))
         faces = (sides[0].triangles(road), sides[1].triangles(road))
-        made = Ground(sides, faces, max(_deviation(geometry, part) for part in faces))
+        made = GroundMesh(sides, faces, max(_deviation(geometry, part) for part in faces))
         if made.deviation <= max(tolerance, GROUND_TOLERANCE):
             break
     assert made

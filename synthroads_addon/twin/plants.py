@@ -14,7 +14,7 @@ from ..road.surroundings import Vegetation
 from ..road.vegetation.plants import ROADSIDE_HEIGHT, WILD_GRASSES, grown_plants
 from ..road.vegetation.species import PlantShape, plant_shape
 from .faces import Faces, grid_corners, halves, join_polygons, upward_triangles
-from .ground import Ground
+from .ground import GroundMesh
 from .surfaces import on_ground
 
 
@@ -103,7 +103,7 @@ def placed_plants(geometry: RoadGeometry) -> Iterator[PlacedPlant]:
             yield PlacedPlant(name, instance, stand, about, *place, shape)
 
 
-def grass_strips(geometry: RoadGeometry, ground: Ground) -> Iterator[GrassStrip]:
+def grass_strips(geometry: RoadGeometry, ground: GroundMesh) -> Iterator[GrassStrip]:
     """Yield the strips of all stands of grass that have an area, stand by stand."""
     for stand, about in geometry.parameters.of_type(Vegetation).items():
         if about.kind != "grass":
@@ -120,14 +120,14 @@ def grass_strips(geometry: RoadGeometry, ground: Ground) -> Iterator[GrassStrip]
                 yield GrassStrip(name, instance, stand, about, height, faces)
 
 
-def _band(ground: Ground, number: int, about: Vegetation, height: float) -> Faces:
+def _band(ground: GroundMesh, number: int, about: Vegetation, height: float) -> Faces:
     """Return the surface of a band on one side (0 left, 1 right)."""
     side = ground.sides[number]
     distance = side.band(about.band_start, about.band_end)
     return _sheet(side.points(distance), (len(distance), distance.shape[1]), height, side.sign < 0.0)
 
 
-def _roadside(geometry: RoadGeometry, ground: Ground, strip: str, height: float) -> Faces:
+def _roadside(geometry: RoadGeometry, ground: GroundMesh, strip: str, height: float) -> Faces:
     """Return the surface of the strips beside the pavement on one side, or of the median."""
     station = ground.sides[0].station
     offsets = geometry.offsets(station)

@@ -38,7 +38,7 @@ class Lost(Exception):
 
 
 @dataclass(frozen=True)
-class Axes:
+class RoadAxes:
     """A road's geometry before and after edits of its axis.
 
     Attributes:
@@ -64,7 +64,7 @@ class Axes:
         return float(np.rad2deg(was - being))
 
 
-def point_update(axes: Axes, item: PointObject, vertex: Float, place: Float) -> dict[str, Any]:
+def point_update(axes: RoadAxes, item: PointObject, vertex: Float, place: Float) -> dict[str, Any]:
     """Return what changed of a thing that a vertex stands for; nothing if it wasn't moved.
 
     It is on the surface wherever it is in plan: its height in the scene says nothing.
@@ -84,12 +84,12 @@ def point_update(axes: Axes, item: PointObject, vertex: Float, place: Float) -> 
     return {"station": station, "offset": offset, "rotation_deg": _turned(axes, item, station, turn)}
 
 
-def _turned(axes: Axes, item: PointObject, station: float, turn: float) -> float:
+def _turned(axes: RoadAxes, item: PointObject, station: float, turn: float) -> float:
     rotation = item.rotation_deg + float(np.rad2deg(turn)) + axes.turned(item.station, station)
     return round((rotation + 180.0) % 360.0 - 180.0, 9)
 
 
-def standing_update(axes: Axes, item: Gantry | Overpass, place: Float) -> dict[str, Any]:
+def standing_update(axes: RoadAxes, item: Gantry | Overpass, place: Float) -> dict[str, Any]:
     """Return what changed of a structure whose object stands where it stands, with all that is counted from it."""
     expected = on_plan(axes.before, [item])[0]
     rotation = item.rotation_deg if isinstance(item, Gantry) else 0.0
@@ -112,7 +112,7 @@ def standing_update(axes: Axes, item: Gantry | Overpass, place: Float) -> dict[s
     return update | {name: round(getattr(item, name) + shift, 6) for name in ends}
 
 
-def asset_update(axes: Axes, item: Asset, place: Float) -> dict[str, Any]:
+def asset_update(axes: RoadAxes, item: Asset, place: Float) -> dict[str, Any]:
     """Return what changed of an asset: its place in all three directions, its turn, its size."""
     expected = on_plan(axes.before, [item])[0]
     expected[2] = _surface(axes.before, item.station, item.offset) + item.elevation
@@ -134,7 +134,7 @@ def _surface(geometry: RoadGeometry, station: float, offset: float) -> float:
     return float(surface_elevation(geometry, np.array([station]), np.array([offset]))[0])
 
 
-def line_update(axes: Axes, item: LineObject, part: bpy.types.Object, place: Float) -> dict[str, Any]:
+def line_update(axes: RoadAxes, item: LineObject, part: bpy.types.Object, place: Float) -> dict[str, Any]:
     """Return what changed of a thing that runs along the road: its middle's move, along and across the road.
 
     Its shape follows the road whatever its object's place is. A move over an end of the road stops there.
@@ -162,7 +162,7 @@ def line_update(axes: Axes, item: LineObject, part: bpy.types.Object, place: Flo
     return {name: round(value, 6) for name, value in moved.items()}
 
 
-def vehicle_update(axes: Axes, item: Vehicle, part: bpy.types.Object, place: Float) -> dict[str, Any]:
+def vehicle_update(axes: RoadAxes, item: Vehicle, part: bpy.types.Object, place: Float) -> dict[str, Any]:
     """Return what changed of a vehicle: it is in the middle of the lane that it was put on."""
     before = axes.before.parameters
     line = LaneLine(axes.before, before.carriageway_of(item), item.lane)

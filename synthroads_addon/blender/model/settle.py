@@ -18,7 +18,7 @@ from ..things.model_builder import ROLE
 from .build import Place, RoadModel, build_steps
 from .edits import own_modifier, place_reason
 from .older_files import PARAMETERS
-from .places import PLACED, Axes, Lost, line_update
+from .places import PLACED, Lost, RoadAxes, line_update
 from .read_back import edited_object
 from .roads import NAME, OF_ROAD, parts_and_copies, road_of_id, root_of, world_matrix
 from .store import BUILT_FROM, recall, recall_parameters, remember
@@ -104,10 +104,10 @@ def move_line(item: bpy.types.Object, scene: bpy.types.Scene) -> bool:
 
 
 @lru_cache(maxsize=4)
-def _axes(text: str) -> Axes | None:
+def _axes(text: str) -> RoadAxes | None:
     """Return the axes of a road by its kept parameter set; None if that is damaged."""
     try:
         geometry = RoadGeometry(recall_parameters({PARAMETERS: text}))  # it reads this key only
     except InputError:
         return None
-    return Axes(geometry, geometry)
+    return RoadAxes(geometry, geometry)

@@ -40,7 +40,7 @@ from .edits import (
     turn_of,
     vertices_of,
 )
-from .places import Axes, Lost, asset_update, line_update, point_update, standing_update, vehicle_update
+from .places import Lost, RoadAxes, asset_update, line_update, point_update, standing_update, vehicle_update
 from .read_back import edited_object, edited_parameters, read_inputs
 from .roads import BUILT_PARTS, ROAD, displacement, origin_of, parts_and_copies, root_above, world_matrix
 from .store import recall_parameters, road_named
@@ -164,7 +164,7 @@ class _Reading:
         if axis is not None:
             self.stale.append("its axis was changed")
             parameters = _on_axis(parameters, axis)
-        axes = Axes(before, RoadGeometry(parameters) if axis is not None else before)
+        axes = RoadAxes(before, RoadGeometry(parameters) if axis is not None else before)
         moved = dict(self._moved(parameters, axes, fine))
         objects = {name: moved[name] for name in parameters.objects if name in moved}
         objects |= self._copied(parameters, objects, axes)
@@ -229,7 +229,7 @@ class _Reading:
         return reason or place_reason(self._place(item), isinstance(thing, Asset))
 
     def _moved(
-        self, parameters: RoadParameters, axes: Axes, fine: dict[str, bpy.types.Object]
+        self, parameters: RoadParameters, axes: RoadAxes, fine: dict[str, bpy.types.Object]
     ) -> Iterator[tuple[str, RoadObject]]:
         """Yield the objects that are still there and known, where they are now."""
         gone = self._gone(fine)
@@ -273,7 +273,9 @@ class _Reading:
                 self.by_hand.append(HandEdit(owner, fine[owner].name, f"{role} was {done}"))
         return found
 
-    def _updated(self, item: RoadObject, before: RoadObject, part: bpy.types.Object, axes: Axes) -> RoadObject | None:
+    def _updated(
+        self, item: RoadObject, before: RoadObject, part: bpy.types.Object, axes: RoadAxes
+    ) -> RoadObject | None:
         """Return an object where its part is now; None, and a note, if no parameter says it."""
         place = self._place(part)
         try:
@@ -286,7 +288,7 @@ class _Reading:
         return item.model_copy(update=update) if update else item
 
     def _posts(
-        self, parameters: RoadParameters, axes: Axes, part: bpy.types.Object, kind: type[PointObject]
+        self, parameters: RoadParameters, axes: RoadAxes, part: bpy.types.Object, kind: type[PointObject]
     ) -> Iterator[tuple[str, RoadObject]]:
         """Yield the things that the vertices of one object stand for."""
         known = {item.instance: name for name, item in self._base.of_type(kind).items()}
@@ -306,7 +308,9 @@ class _Reading:
             except Lost as lost:
                 self.by_hand.append(HandEdit(name, part.name, str(lost)))
 
-    def _copied(self, parameters: RoadParameters, objects: dict[str, RoadObject], axes: Axes) -> dict[str, RoadObject]:
+    def _copied(
+        self, parameters: RoadParameters, objects: dict[str, RoadObject], axes: RoadAxes
+    ) -> dict[str, RoadObject]:
         """Return what copies of parts stand for, with ids and numbers of their own."""
         found: dict[str, RoadObject] = {}
         largest = max(item.instance for item in self._base.objects.values())
@@ -358,7 +362,7 @@ def role_of(part: bpy.types.Object) -> str:
 
 
 def _update(
-    item: RoadObject, before: RoadObject, part: bpy.types.Object, place: Float, axes: Axes
+    item: RoadObject, before: RoadObject, part: bpy.types.Object, place: Float, axes: RoadAxes
 ) -> tuple[dict[str, Any], bool]:
     """Return what changed of an object by its part's place, and whether the scene must be built again to show it."""
     if isinstance(before, Asset):

@@ -13,7 +13,7 @@ from ...road.surroundings import Terrain, Vegetation
 from ...road.vegetation.species import PlantShape
 from ..attributes import attributes_of
 from ..faces import Faces, Float, loft
-from ..ground import Ground, ground_beside
+from ..ground import GroundMesh, ground_beside
 from ..plants import PlacedPlant, grass_strips, placed_plants
 from ..vehicles import placed_vehicles
 from .model import CityGeometry, CityModel, CityObject, solids
@@ -39,13 +39,13 @@ def add_surroundings(model: CityModel, geometry: RoadGeometry, stations: Float, 
         model.add(item)
 
 
-def _terrain(name: str, terrain: Terrain, ground: Ground) -> CityObject:
+def _terrain(name: str, terrain: Terrain, ground: GroundMesh) -> CityObject:
     attributes = attributes_of(terrain) | {"class": terrain.points_class, "deviation": round(ground.deviation, 4)}
     shapes = (CityGeometry("CompositeSurface", _GROUND, (faces,)) for faces in ground.faces if len(faces))
     return CityObject(name, "TINRelief", attributes, tuple(shapes))
 
 
-def _add_plants(model: CityModel, geometry: RoadGeometry, ground: Ground) -> None:
+def _add_plants(model: CityModel, geometry: RoadGeometry, ground: GroundMesh) -> None:
     """Add every plant, every strip of grass, and a group for each stand."""
     members: dict[str, list[str]] = {name: [] for name in geometry.parameters.of_type(Vegetation)}
     for plant in placed_plants(geometry):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...road.surroundings import Terrain, Vegetation
 from ...road.vegetation.species import PlantShape
 from ..faces import Faces, loft, strip_triangles
-from ..ground import Ground, ground_beside
+from ..ground import GroundMesh, ground_beside
 from ..plants import GrassStrip, PlacedPlant, grass_strips, placed_plants
 from ..vehicles import PlacedVehicle, placed_vehicles
 from .entities import Entity
@@ -39,7 +39,7 @@ def _sheet(scene: Scene, faces: Faces) -> Entity | None:
     return scene.ifc.mesh(faces.points, faces.corners.reshape(-1, 3), False)
 
 
-def _write_ground(scene: Scene, name: str, item: Terrain, ground: Ground) -> None:
+def _write_ground(scene: Scene, name: str, item: Terrain, ground: GroundMesh) -> None:
     """Add the ground beside the road, batters included."""
     meshes = [_sheet(scene, faces) for faces in ground.faces if len(faces)]
     made = _geographic(scene, name, "TERRAIN", scene.ifc.shape(meshes, "Tessellation"))
@@ -50,7 +50,7 @@ def _write_ground(scene: Scene, name: str, item: Terrain, ground: Ground) -> Non
 # --- plants ---------------------------------------------------------------------------------------------------------
 
 
-def _write_plants(scene: Scene, ground: Ground) -> None:
+def _write_plants(scene: Scene, ground: GroundMesh) -> None:
     """Add every stand with its plants, or with its strips of grass, as its parts."""
     stands = {}
     for name, item in scene.geometry.parameters.of_type(Vegetation).items():
