@@ -110,7 +110,10 @@ def class_of(rule: Rule) -> str:
 
 
 def fields_of(model: type[BaseModel]) -> Iterator[FieldEntry]:
-    """Yield the fields of a class and of all that lie in them, each before its own; those of one value are left out."""
+    """Yield the fields of a class and of all that lie in them, each before its own.
+
+    Those of one value and those of earlier versions are left out.
+    """
     schema = model.model_json_schema()
     yield from _fields(schema, schema.get("$defs", {}), None)
 
@@ -118,7 +121,7 @@ def fields_of(model: type[BaseModel]) -> Iterator[FieldEntry]:
 def _fields(schema: Rule, parts: Mapping[str, Rule], outer: FieldEntry | None) -> Iterator[FieldEntry]:
     """Yield the fields of a class, which lies in a field or (None) in nothing."""
     for name, rule in schema["properties"].items():
-        if "const" in rule:
+        if "const" in rule or rule.get("deprecated"):
             continue
         inner = [parts[class_of(choice)] for choice in _choices(rule) if "$ref" in choice]
         made = _field(name, rule, schema, inner, outer)

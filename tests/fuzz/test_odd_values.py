@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 from headless.commands import command
 from synthroads_addon.base.arrays import Float
 from tests.helpers.files.mutations import for_all, fuzz, limited
+from tests.judges import require
 
 SECONDS = 60.0
 EDGES = (0.0, 1e-9, -1.0, 0.5, 60.0, 1e3, -1e5, 1e6, 4e8, -4e8, 2e9)
@@ -98,7 +100,8 @@ def write_floats(path: Path, rows: Float, numbers: list[tuple[int, float]]) -> N
         lines += [*(f"property double {name}" for name in names), "end_header\n"]
         path.write_bytes("\n".join(lines).encode() + rows.astype("<f8").tobytes())
     else:
-        e57 = pytest.importorskip("pye57").E57(str(path), mode="w")
+        require("pye57")
+        e57 = importlib.import_module("pye57").E57(str(path), mode="w")
         fields = (*(f"cartesian{axis}" for axis in "XYZ"), "intensity")
         e57.write_scan_raw({name: rows[:, number].copy() for number, name in enumerate(fields)})
         e57.close()

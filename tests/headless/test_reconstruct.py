@@ -55,7 +55,7 @@ def test_it_is_a_road_like_any_other(made: tuple[Path, dict[str, Any]]) -> None:
     names = {path.name for path in (folder / "out").iterdir()}
     assert names == {
         *("parameters.json", "reconstruction.json", "centerline.geojson", "reconstruction.png"),
-        *("twin.city.json", "twin.xodr"),
+        *("twin.city.json", "twin.xodr", "twin-cityjson-report.json", "twin-opendrive-report.json"),
     }
     assert (folder / "out/reconstruction.png").read_bytes().startswith(b"\x89PNG")
 

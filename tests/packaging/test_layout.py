@@ -36,10 +36,14 @@ def test_nothing_lies_loose_in_the_add_on() -> None:
     assert [path.name for path in (ROOT / "synthroads_addon").glob("*.py")] == ["__init__.py"]
 
 
+ABOUT_ALL = ("cluster", "fuzz", "helpers", "judges", "packaging", "robustness")
+"""Folders of tests that are about no folder of the source; those in `jobs` need Blender."""
+
+
 def test_tests_mirror_the_tree() -> None:
     """Each folder of tests has the name of a folder of the source, but for those that are about all of it."""
     for folder in _folders("tests"):
         top, *rest = folder.split("/")[1:] or ["helpers"]
-        if top not in ("cluster", "fuzz", "helpers", "judges", "packaging", "robustness"):
+        if top not in ABOUT_ALL and [top, *rest] != ["jobs", "effects"]:
             place = Path(top, *rest) if top in ("headless", "ml") else Path("synthroads_addon", top, *rest)
             assert (ROOT / place).is_dir(), folder

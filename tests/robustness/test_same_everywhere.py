@@ -12,7 +12,7 @@ from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import load_scenario
 
-CHECKSUM = "70c17b2600b68b7160c60fd76ab76f4c09fc7900403ebb95847fb03c9050f10c"
+CHECKSUM = "35eb380a34a0f5da9ede4dcb7ac8dec7d59d19846e3dd7ecc681b966ac8505a8"
 EVERYTHING = ["exits=1", "entries=1", "emergency_bays=1"]
 
 

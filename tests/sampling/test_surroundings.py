@@ -112,7 +112,6 @@ def test_materials_cover_their_limits() -> None:
     drawn = [sample_materials(scenario, seed) for seed in SEEDS]
     for name in MaterialLimits.model_fields:
         assert_covers((getattr(item, name) for item in drawn), getattr(scenario.materials, name))
-    assert len({item.seed for item in drawn}) == len(SEEDS)
 
 
 def test_environment_covers_its_limits() -> None:

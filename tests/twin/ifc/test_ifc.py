@@ -438,8 +438,11 @@ def test_georeferencing(road) -> None:
 # --- parameters -----------------------------------------------------------------------------------------------------
 
 
-def _check_instances(file: Any, parameters: RoadParameters) -> None:
-    """Every object and its damage is there under its id with its number, and no other numbers are."""
+def _check_instances(file: Any, parameters: RoadParameters, missing: str = "grass-reed/(.*-verge|median)") -> None:
+    """Every object and its damage is there under its id with its number, and no other numbers are.
+
+    Strips of grass whose names match may be missing: reed grows on neither verges nor median.
+    """
     numbers = {name: item.instance for name, item in parameters.objects.items()}
     found: dict[str, set[int]] = {}
     for item in file.by_type("IfcObject"):
@@ -452,10 +455,9 @@ def _check_instances(file: Any, parameters: RoadParameters) -> None:
         numbers |= dict(known.part(name, number) for number in range(damage))
     stands = parameters.of_type(Vegetation)
     numbers |= {name: number for number, name in numbers_of(parameters).items() if name.partition("/")[0] in stands}
-    # Reed grows on neither verges nor median.
     wanted = {name: {number} for name, number in numbers.items()}
     assert {name: found.get(name) for name in wanted if name not in found} == {
-        name: None for name in wanted if re.match("grass-reed/(.*-verge|median)", name)
+        name: None for name in wanted if re.match(missing, name)
     }
     assert {name: number for name, number in wanted.items() if name in found}.items() <= found.items()
     assert set().union(*found.values()) == set().union(*(wanted[name] for name in wanted if name in found))
@@ -872,13 +874,19 @@ def test_whatever_is_a_road_can_be_written(tmp_path_factory: pytest.TempPathFact
         axis["vertical"] = axis["vertical"][:1]
         for element in axis["horizontal"]:
             element["length"] = min(element["length"], 40.0)
+        for item in data["objects"].values():  # nor forests of a million trees
+            if item["type"] == "Vegetation" and item["kind"] != "grass":
+                item["density"] = min(item["density"], 1e-3)
+            elif item["type"] == "Terrain":
+                item["half_width"] = min(item["half_width"], 100.0)
         try:
             parameters = RoadParameters.from_dict(data)
             file = written(parameters, tmp_path_factory.mktemp("any"), 0.5)
         except InputError:
             return
         written_roads += 1
-        _check_instances(file, parameters)
+        # Where coordinates are huge strips of grass have no area left.
+        _check_instances(file, parameters, "a-Vegetation/")
         assert issues(file) == []
 
     check()
