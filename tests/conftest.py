@@ -32,7 +32,7 @@ BLENDER_FOLDER = Path(tempfile.mkdtemp(prefix="synthroads-blender-"))
 os.environ["BLENDER_USER_RESOURCES"] = str(BLENDER_FOLDER)
 
 HAS_TORCH = importlib.util.find_spec("torch") is not None
-LEARNING = ("ml", "fuzz/test_configurations.py", "fuzz/test_learning_data.py")
+LEARNING = ("ml", "fuzz/test_configurations.py", "fuzz/test_learning_data.py", "jobs/test_documented_classes.py")
 collect_ignore = [*(() if HAS_BPY else BLENDER_TESTS), *(() if HAS_TORCH else LEARNING)]
 
 # The same examples in every run, and no time limit for one: the machine may be busy with something else.
