@@ -47,6 +47,7 @@ RAYS = {"scan.rays_per_pulse": 7}
 OPEN = {"scan.rays_per_pulse": None, "scan.noise.range_sigma": 0.0}
 """Nothing is given that a tolerance may choose."""
 CHOSEN_COLOURS = {"colour": {"source": "auto"}, "cloud.attributes": ["roughness"]}
+SWAYING = {"scan.motion.position_sigma": 0.2}
 DAMPED = {"scan.noise.position_sigma": 0.05}
 BY_RATE = {"scan.weather.visibility": None}
 
@@ -122,6 +123,9 @@ CASES: dict[str, ScanCase] = {
     "scan.platform": ScanCase(value={"kind": "tripod", "stations": [30.0], "turn_seconds": 3.0}),
     "scan.noise.range_sigma": ScanCase(value=0.03),
     "scan.noise.correlation_time": ScanCase(given=DAMPED),
+    "scan.mirror_clock": ScanCase(value="free"),
+    "scan.motion.shortest_period": ScanCase(value=3.0, given=SWAYING),
+    "scan.motion.longest_period": ScanCase(value=9.0, given=SWAYING),
     "scan.relief_octaves": ScanCase(value=4),
     "scan.attenuation": ScanCase(value=0.01),
     "scan.weather": ScanCase(value={"condition": "fog"}),

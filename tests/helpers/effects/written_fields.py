@@ -36,7 +36,7 @@ WRITTEN: dict[str, Written] = {
     "cloud.formats": Written(["laz", "npz"], adds=frozenset({"cloud.npz"})),
     "cloud.attributes": Written(["normal"], changes=CLOUD),
     "outputs": Written(["cloud", "previews", "parameters"], removes=frozenset({"centerline.geojson"})),
-    "twin": Written(["geojson", "ifc"], adds=frozenset({"twin.geojson"})),
+    "twin": Written(["geojson", "ifc"], adds=frozenset({"twin.geojson", "twin-geojson-report.json"})),
     "ifc.placement": Written("local", changes=frozenset({"twin.ifc"})),
 }
 """Path of a field -> what it says."""
