@@ -122,7 +122,7 @@ def test_one_real_scan_is_not_told_from_itself(tmp_path: Path, monkeypatch: pyte
     fields = f"axis: {REAL / name}_axis.csv, paved: [[-10.9, -3.6], [3.6, 10.9]], lines: [-10.6, -6.35, 6.65, 10.4]"
     text = f"type: CloudList\nclouds: [{{cloud: {REAL / name}.laz, {fields}, decibels: 30}}]"
     (tmp_path / "real.yaml").write_text(text, encoding="utf-8")
-    result = exhaust(compare_steps(tmp_path / "real.yaml", tmp_path / "real.yaml"))
+    result = exhaust(compare_steps(tmp_path / "real.yaml", tmp_path / "real.yaml"), lambda share: None)
     (dealt,) = result.yardstick
     assert dealt.auc["all"] == pytest.approx(0.5, abs=0.05)
     assert max(dealt.features.values()) < 0.55
