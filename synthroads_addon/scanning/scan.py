@@ -26,7 +26,6 @@ _MOTION_KNOTS = 0.01
 """Seconds between two poses of a moving vehicle: it turns by less than a milliradian meanwhile."""
 _OFF_SURFACE = 1e-3
 """How far from its surface a ray towards the sun begins, m."""
-_ALL_RETURNS = 255
 PROVISIONAL_THRESHOLD = 0.25
 """Share of the detector's threshold that keeps an echo while its intensity is still to change: no echo is expected to
 become four times as bright as its material's mean makes it."""
@@ -333,10 +332,15 @@ def _ray_ends(rays: Rays, ray: Index, reach: Float) -> tuple[Float, Float]:
 
 
 def _speckle_echoes(echoes: Echoes, factors: Float32) -> Echoes:
-    """Return the echoes with their intensities as speckle and detector change them, by their number in the pulse."""
-    _, number, _ = number_returns(echoes.pulse, _ALL_RETURNS)
-    chosen = factors[echoes.pulse, np.minimum(number, factors.shape[1]) - 1]
-    return replace(echoes, intensity=echoes.intensity * chosen)
+    """Return the echoes with their intensities as speckle and detector change them, by their number in the pulse.
+
+    Those beyond the last number that is recorded are left as they are.
+    """
+    keep, number, _ = number_returns(echoes.pulse, factors.shape[1])
+    chosen = np.flatnonzero(keep)
+    intensity = echoes.intensity.copy()
+    intensity[chosen] *= factors[echoes.pulse[chosen], number - 1]
+    return replace(echoes, intensity=intensity)
 
 
 def _drop_lost_echoes(echoes: Echoes, lost: Bool) -> Echoes:
