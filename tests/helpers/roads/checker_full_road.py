@@ -25,7 +25,7 @@ def full() -> Data:
     objects["terrain"] = {"type": "Terrain", "half_width": 80.0, "embankment_height": 1.0, "undulation": 0.2}
     objects["terrain"] |= {"wavelength": 40.0, "seed": 1}
     for kind, species, start in (("tree", "birch", 12.0), ("shrub", "hazel", 3.0), ("grass", "meadow", 0.0)):
-        objects[kind] = {"type": "Vegetation", "kind": kind, "species": species, "density": 0.01, "band_start": start}
+        objects[kind] = {"type": "Vegetation", "kind": kind, "species": species, "density": 5e-4, "band_start": start}
         objects[kind] |= {"band_end": 60.0, "height_min": 0.2, "height_max": 0.5, "seed": 2}
     for side, inner, crossfall_percent in (("left", DROP, -2.5), ("right", 3.5, 2.5)):
         objects[side] = {"type": "Carriageway", "side": side, "inner_offset": 2.0, "hard_shoulder_width": 2.5}
