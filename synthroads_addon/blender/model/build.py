@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.errors import InputError
 from ...base.stepper import Stepper
 from ...road.geometry import RoadGeometry
 from ...road.objects import LineObject, PointObject
@@ -29,6 +30,7 @@ from .roads import (
     NAME,
     OF_ROAD,
     ROAD,
+    library_of,
     new_root,
     parts_and_copies,
     place_root,
@@ -68,8 +70,16 @@ class Place:
     drops: frozenset[str] = frozenset()
 
     def root(self, scene: bpy.types.Scene) -> bpy.types.Object | None:
-        """Return the root of the road that is replaced; None if there is none."""
-        return None if self.beside else road_of_id(scene, self.road)
+        """Return the root of the road that is replaced; None if there is none.
+
+        Raises:
+            InputError: it is linked from another file, where alone it can be built.
+        """
+        root = None if self.beside else road_of_id(scene, self.road)
+        if root is not None and (file := library_of(root)):
+            text = f"is linked from {file}, so it can't be built here: build it there, or make it local with its parts"
+            raise InputError("Road", root.name, text)
+        return root
 
 
 MEANT = Place()

@@ -61,6 +61,13 @@ def roots(scene: bpy.types.Scene) -> list[bpy.types.Object]:
     return sorted(found, key=lambda item: item.name_full)
 
 
+def library_of(root: bpy.types.Object) -> str:
+    """Return the path of the file that a root comes from, linked or overridden; empty for one of this file."""
+    override = root.override_library
+    library = root.library if override is None else override.reference.library
+    return "" if library is None else bpy.path.abspath(library.filepath)
+
+
 def root_above(item: bpy.types.Object | None) -> bpy.types.Object | None:
     """Return the root that an object hangs on, or is; None if it hangs on none."""
     while item is not None and not is_root(item):

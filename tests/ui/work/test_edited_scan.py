@@ -2,78 +2,30 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import bpy
-import laspy
 import numpy as np
 import pytest
-from mathutils import Vector
-from mathutils.bvhtree import BVHTree
 
 from synthroads_addon.base.classes import class_id
 from synthroads_addon.blender.compat import modifier_input
 from synthroads_addon.blender.files import empty_file
-from synthroads_addon.blender.model.build import Place, build_road
+from synthroads_addon.blender.model.build import Place
 from synthroads_addon.blender.model.roads import ROAD
 from synthroads_addon.blender.model.store import objects_of, recall_parameters, roads
-from synthroads_addon.blender.scene.evaluated import scene_mesh
-from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import read_parameters
 from synthroads_addon.ui.panels import panels
 from synthroads_addon.ui.work import edited, follow
 from synthroads_addon.ui.work.scan import requested_scan
+from tests.helpers.scenes.cloud_truth import Written, scan
 from tests.helpers.scenes.fake_layout import drawn
-from tests.helpers.scenes.panel_road import choose, settings, small_pictures  # noqa: F401
+from tests.helpers.scenes.panel_road import settings, small_pictures  # noqa: F401
 from tests.helpers.scenes.scene_hash import lines
-from tests.helpers.scenes.small_road import PARTS, TOLERANCE, build_small, open_small, small_parameters
+from tests.helpers.scenes.small_road import build_small, open_small, small_parameters
 from tests.helpers.scenes.sparse_scanner import sparse_scanner
 
 pytestmark = pytest.mark.usefixtures("small_pictures")
-
-NEAR = 0.0015
-"""From a point to the surface that it is of: half of the 1 mm that coordinates are written in, in three axes, m."""
-
-
-def scan(folder: Path, name: str, scanner: str) -> Path:
-    """Scan the shown road from the panel, without noise; return the folder of the files."""
-    panel = bpy.context.scene.synthroads
-    choose(panel, **{"scan.device": scanner, "scan.relief": 0.0, "scan.traffic_speed_factor": 0.0})
-    choose(panel, **{"scan.own_rays_per_pulse": True, "scan.rays_per_pulse": "1", "colour.source": "material"})
-    choose(panel, **{"scan.platform.lateral_offsets": "0", "scan.platform.speed": 20.0, "overwrite": True})
-    panel.outputs = {"parameters", "cloud"}
-    panel.output = str(folder / name)
-    assert bpy.ops.synthroads.scan() == {"FINISHED"}
-    return folder / name
-
-
-def points_by_instance(folder: Path) -> dict[int, np.ndarray]:
-    """Return the cloud's points (N, 3) by instance number, map coordinates."""
-    cloud = laspy.read(folder / "cloud.laz")
-    numbers = np.asarray(cloud["instance_id"])
-    return {int(number): cloud.xyz[numbers == number] for number in np.unique(numbers)}
-
-
-def foreign(folder: Path) -> set[int]:
-    """Check that the points of everything that the written parameters know lie on it; return the other numbers."""
-    parameters, unknown = read_parameters(folder / "parameters.json"), set()
-    empty_file()
-    build_road(parameters, TOLERANCE, 0.0, PARTS)
-    mesh, numbers = scene_mesh(), RoadGeometry(parameters).numbers
-    known = 0
-    for number, points in points_by_instance(folder).items():
-        if numbers.owner(number) is None:
-            unknown.add(number)
-            continue
-        triangles = mesh.triangles[mesh.instance_id == number]
-        assert len(triangles), numbers.name_of(number)
-        tree = BVHTree.FromPolygons(mesh.vertices.tolist(), triangles.tolist())
-        away = [tree.find_nearest(Vector(point))[3] for point in (points - mesh.origin)[:: 1 + len(points) // 300]]
-        assert max(away) < NEAR, (numbers.name_of(number), max(away))
-        known += 1
-    assert known > 5
-    return unknown
 
 
 def test_edits_of_all_kinds_are_in_the_cloud_and_in_the_truth(tmp_path: Path) -> None:
@@ -93,12 +45,10 @@ def test_edits_of_all_kinds_are_in_the_cloud_and_in_the_truth(tmp_path: Path) ->
     assert set(before.objects) ^ set(written.objects) == {"rail-left", "post-1", "post-2", "sign-2"}
     shift = np.array(written.transform.translate) - np.array(before.transform.translate)
     assert np.allclose(shift, (3.0, -5.0, 2.0), atol=0.001)
-    report = json.loads((files / "report.json").read_text())
-    assert [entry["object"] for entry in report["edited_by_hand"]] == ["rail-left"]
-    assert foreign(files) == {0}
-    cloud = laspy.read(files / "cloud.laz")
-    strange = np.asarray(cloud["instance_id"]) == 0
-    assert set(np.asarray(cloud["class_id"])[strange].tolist()) == {class_id("guardrail")}
+    found = Written.read(files)
+    assert found.by_hand() == {"rail-left"}
+    assert found.foreign() == {0}
+    assert found.classes_of({0}) == {class_id("guardrail")}
 
 
 def other_lines(own: set[str]) -> list[str]:
