@@ -31,6 +31,9 @@ BUDGET = 0.05
 """Seconds of one such turn, where drawing the window takes next to no time."""
 _WORK_FOR_DRAWING, _LONGEST = 4.0, 2.0
 """So many times as long as the window was drawn a turn lasts, but no longer than this (s)."""
+_MOST_PATIENCE = 0.5
+_LOOK_AGAIN = 0.001
+"""Seconds between two looks whether there is something to do in the main thread again."""
 
 
 class WorkPace:
@@ -38,16 +41,27 @@ class WorkPace:
 
     Args:
         clock: returns seconds.
+        drawing: seconds that the window took to be drawn the last time, as far as that is known.
+
+    Attributes:
+        drawing: the same, now.
     """
 
-    def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
+    def __init__(self, clock: Callable[[], float] = time.perf_counter, drawing: float = 0.0) -> None:
         self._clock = clock
         self._left: float | None = None
+        self.drawing = drawing
 
     def budget(self) -> float:
         """Return the seconds of the turn that begins now, by how long the window took since the last one."""
-        pause = 0.0 if self._left is None else self._clock() - self._left - TICK
-        return min(max(BUDGET, _WORK_FOR_DRAWING * pause), _LONGEST)
+        if self._left is not None:
+            self.drawing = max(self._clock() - self._left - TICK, 0.0)
+        return min(max(BUDGET, _WORK_FOR_DRAWING * self.drawing), _LONGEST)
+
+    @property
+    def patience(self) -> float:
+        """Return how long (s) a turn waits for what is computed aside: to have the window drawn takes as long."""
+        return min(self.drawing, _MOST_PATIENCE)
 
     def leave(self) -> None:
         """Note that a turn has ended."""
@@ -104,7 +118,7 @@ class PanelJob(Generic[T]):
         self._work = work
         self._state = ""
         self._stopping = Event()
-        self._ended = self._idle = False
+        self._ended = self._idle = self._is_new = False
         self._thread: _Thread | None = None
         self._answer: Any = None
         self._failure: BaseException | None = None
@@ -156,17 +170,31 @@ class PanelJob(Generic[T]):
             raise self.error
         _running = self
 
-    def tick(self, seconds: float = BUDGET) -> bool:
-        """Go on for about so long in the main thread, by one step at least; return whether the job still runs."""
+    def tick(self, seconds: float = BUDGET, patience: float = 0.0) -> bool:
+        """Go on for about so long in the main thread, by one step at least; return whether the job still runs.
+
+        Args:
+            seconds: how long.
+            patience: how long (s) it waits where there is nothing to do in the main thread; for a thread only once.
+        """
         deadline = time.perf_counter() + seconds
+        idle_until = time.perf_counter() + patience
         while not self._ended:
             if self._thread is not None:
+                if self._is_new:
+                    self._thread.join(patience)
+                    self._is_new = False
                 if self._thread.is_alive():
                     break
                 self._take_over()
             self._advance(self._begin_thread)
-            if self._idle or time.perf_counter() >= deadline:
+            now = time.perf_counter()
+            if now >= deadline or (self._idle and now >= idle_until):
                 break
+            if self._idle:
+                time.sleep(_LOOK_AGAIN)
+            else:
+                idle_until = now + patience
         return not self._ended
 
     def stop(self, wait: bool = False) -> None:
@@ -213,6 +241,7 @@ class PanelJob(Generic[T]):
 
     def _begin_thread(self, aside: Aside) -> None:
         self._thread = _Thread(lambda: aside.work(self._report), f"SynthRoads {self.title}")
+        self._is_new = True
         self._thread.start()
 
     def _take_over(self) -> None:

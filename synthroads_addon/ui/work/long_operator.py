@@ -30,6 +30,8 @@ class LongOperator:
 
     _job: PanelJob[Any] | None = None
     _pace: WorkPace
+    _drawing = 0.0
+    """Seconds that the window took to be drawn the last time that any work was done in it."""
     _timer: bpy.types.Timer | None = None
 
     @classmethod
@@ -54,13 +56,17 @@ class LongOperator:
         return refuse(cast("bpy.types.Operator", self), error)
 
     def begin(self, context: bpy.types.Context) -> set[str]:
-        """Do the first step; the window's timer does the rest."""
+        """Do the first turn; the window's timer does the rest."""
         try:
             self._job = self.job(context)
             self._job.start()
         except InputError as error:
             return self.refuse(error)
-        self._pace = WorkPace()
+        # To have the window drawn first would take as long as a small work.
+        self._pace = WorkPace(drawing=LongOperator._drawing)
+        if not self._job.tick(self._pace.budget(), self._pace.patience):
+            return self._end(context, self._job)
+        self._pace.leave()
         self._timer = context.window_manager.event_timer_add(TICK, window=context.window)
         context.window_manager.modal_handler_add(self)
         context.workspace.status_text_set(_draw_status)
@@ -76,7 +82,9 @@ class LongOperator:
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
         before = job.state
-        if job.tick(self._pace.budget()):
+        budget = self._pace.budget()
+        LongOperator._drawing = self._pace.drawing
+        if job.tick(budget, self._pace.patience):
             if job.state != before:
                 context.workspace.status_text_set(_draw_status)
                 redraw_sidebars(context)

@@ -123,6 +123,27 @@ def test_with_nothing_to_do_a_tick_ends() -> None:
     job.stop(wait=True)
 
 
+@pytest.mark.parametrize("thread", [True, False])
+@pytest.mark.parametrize("patience", [0.0, 2.0])
+def test_a_turn_waits_a_little_for_what_is_computed_aside(thread: bool, patience: float) -> None:
+    """Else the window would be drawn meanwhile, which can take longer than all the work."""
+    ready = time.perf_counter() + 0.05
+
+    def steps() -> Work[str]:
+        yield 0.1
+        if thread:
+            yield Aside(lambda _: time.sleep(0.05))
+        while time.perf_counter() < ready:
+            yield None
+        return "done"
+
+    job = PanelJob("Test", steps())
+    job.start()
+    assert job.tick(5.0, patience) == (not patience)
+    tick_to_the_end(job)
+    assert job.result == "done"
+
+
 @pytest.mark.parametrize("ticks", [0, 1, 2])
 @pytest.mark.parametrize("wait", [False, True])
 def test_stopped_anywhere_it_cleans_up(ticks: int, wait: bool) -> None:
@@ -224,3 +245,5 @@ def test_slow_drawing_makes_turns_longer() -> None:
         pace.leave()
         now[0] += TICK + drawing
         assert pace.budget() == pytest.approx(expected)
+        assert WorkPace(drawing=pace.drawing).budget() == pace.budget()  # a next job begins as this one ended
+        assert pace.patience == pytest.approx(min(drawing, 0.5))
