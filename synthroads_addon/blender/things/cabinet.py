@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from ...base.classes import class_id
 from ...road.things import cabinet as sizes
+from ...road.things.body import BURIED
 from ...road.things.cabinet import Cabinet
 from ..nodes import operations as op
+from ..nodes.backbone import height_on
 from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.inputs import material_of, metres
 from ..nodes.solids import box, paint_faces, put_on_points, row_of_points
-from ..nodes.standing import Standing
+from ..nodes.standing import Standing, put_on
 from .emergency_phone import emergency_phone_group
 from .model_builder import ModelBuilder
 from .registry import model_part
@@ -37,10 +39,11 @@ def cabinet_group(tree: Tree) -> None:
     body, fitting = cabinet.body_material, cabinet.fitting_material
 
     with tree.frame("Plinth, body and lid"):
-        foot = _block(tree, cabinet, 2.0 * sizes.OVERHANG, -sizes.PLINTH_BURIED, sizes.PLINTH)
+        foot = _block(tree, cabinet, 2.0 * sizes.OVERHANG, 0.0, 1.0)
         walls = _block(tree, cabinet, sizes.OVERHANG, sizes.PLINTH, cabinet.height - sizes.LID)
         lid = _block(tree, cabinet, 0.0, cabinet.height - sizes.LID, cabinet.height)
-        parts = [paint_faces(foot, cabinet.plinth_material), paint_faces(op.join(walls, lid), body)]
+        plinth = paint_faces(foot, cabinet.plinth_material)
+        parts = [paint_faces(op.join(walls, lid), body)]
     with tree.frame("Doors"):
         count = op.switch(cabinet.width >= _WIDE, 1, 2)
         pitch = (cabinet.width - 2.0 * sizes.OVERHANG) / count
@@ -64,8 +67,12 @@ def cabinet_group(tree: Tree) -> None:
         slot = box(tree, op.vector(tree, pitch * 0.6, 0.002, 0.007))
         place = op.vector(tree, beside, front - sizes.DOOR * 0.5, level)
         parts.append(paint_faces(put_on_points(row_of_points(tree, count * _SLOTS), slot, place), fitting))
-    with tree.frame("Put onto the points"):
-        mesh = cabinet.put_labelled(parts, class_id(Cabinet.points_class))
+    with tree.frame("Level on the highest ground below, its plinth in the lowest"):
+        places, high, low = _on_highest_ground(tree, cabinet)
+        tall = op.vector(tree, 1.0, 1.0, high - low + (sizes.PLINTH + BURIED))
+        standing = put_on(_raised(places, high), op.join(*parts))
+        mesh = op.join(put_on(_raised(places, low - BURIED), plinth, tall), standing)
+        mesh = cabinet.label(mesh, class_id(Cabinet.points_class))
     tree.output("Mesh", mesh, description="Cabinet")
 
 
@@ -73,6 +80,30 @@ def _block(tree: Tree, cabinet: _Cabinet, inset: float, low: Value | float, high
     """Return a box between two heights, so much smaller than the cabinet all around."""
     size = op.vector(tree, cabinet.width - 2.0 * inset, cabinet.depth - 2.0 * inset, high - low)
     return box(tree, size, op.vector(tree, 0.0, 0.0, (high + low) * 0.5))
+
+
+def _on_highest_ground(tree: Tree, cabinet: _Cabinet) -> tuple[Value, Value, Value]:
+    """Return the points on the surface, and by how much the ground below a cabinet there is higher and lower (m)."""
+    places = cabinet.places()
+    surfaces = op.object_geometry(cabinet.road), op.object_geometry(cabinet.terrain)
+    heading = op.named_attribute(tree, "heading")
+    cosine, sine = op.unary("COSINE", heading), op.unary("SINE", heading)
+    here, elevation = op.position(tree), op.component(op.position(tree), "Z")
+    high = low = elevation * 0.0
+    for beside, ahead in sizes.CORNERS:
+        x, y = cabinet.width * beside, cabinet.depth * ahead
+        corner = here + op.vector(tree, x * cosine - y * sine, x * sine + y * cosine)
+        ground = height_on(*surfaces, corner) - elevation
+        high, low = op.maximum(high, ground), op.minimum(low, ground)
+    for name, value in (("high", high), ("low", low)):
+        places = op.store(places, name, value)
+    return places, op.named_attribute(tree, "high"), op.named_attribute(tree, "low")
+
+
+def _raised(places: Value, by: Value) -> Value:
+    """Return points raised by a height (a field)."""
+    tree = places.tree
+    return op.set_position(places, op.position(tree) + op.vector(tree, 0.0, 0.0, by))
 
 
 @model_part("cabinets", 150)

@@ -12,10 +12,13 @@ from .body import BURIED, Body, Place, box
 from .limits import Interval, Limits, interval
 from .thing import Block, StandingThing, TwinTypes
 
-PLINTH_BURIED = 0.5
-"""Depth of a cabinet's plinth below the surface, m: the ground may fall beside its middle."""
 PLINTH, LID = 0.12, 0.03
-"""Height of a cabinet's plinth above the surface, and of its lid, m."""
+"""Height of a cabinet's plinth above the highest ground below it, and of its lid, m."""
+CORNERS = ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))
+"""Corners of a cabinet as shares of its width and depth: its level plinth reaches from the highest ground below them
+to `BURIED` below the lowest."""
+STEEPEST = 1.5
+"""Run of a usual batter per metre of height: by so much a cabinet stands higher than the ground at its middle."""
 OVERHANG, DOOR = 0.02, 0.012
 """Overhang of the lid beyond the body, and depth by which doors stand out, m."""
 PHONE_CORNER, PHONE_STEPS = 0.16, 4
@@ -56,7 +59,9 @@ class Cabinet(StandingThing):
     kind: Literal["emergency_phone", "utility"] = Field(description="What it is.")
     width: float = quantity(0.3, ge=0.1, le=3, unit="m", description="Width, seen by the traffic beside it.")
     depth: float = quantity(0.3, ge=0.1, le=3, unit="m", description="Depth.")
-    height: float = quantity(1.6, ge=0.4, le=3, unit="m", description="Top above the surface.")
+    height: float = quantity(
+        1.6, ge=0.4, le=3, unit="m", description="Top above the surface, on a slope above its highest ground."
+    )
 
     def twin(self) -> TwinTypes:
         """Return its types, by what it is."""
@@ -66,16 +71,17 @@ class Cabinet(StandingThing):
 
     def bodies(self, place: Place) -> list[Body]:
         """Return body, plinth and lid or band; doors, panel and letters are left out."""
-        return self._phone() if self.kind == "emergency_phone" else self._cabinet()
+        return self._phone() if self.kind == "emergency_phone" else self._cabinet(place)
 
-    def _cabinet(self) -> list[Body]:
-        body = self.height - LID
-        walls = self._block(OVERHANG, PLINTH, body)
-        lid, plinth = (
-            self._block(0.0, body, self.height),
-            self._block(2.0 * OVERHANG, -PLINTH_BURIED, PLINTH),
-        )
-        doors = box((self.width, OVERHANG, body), (0.0, (OVERHANG - self.depth) / 2.0, body / 2.0))
+    def _cabinet(self, place: Place) -> list[Body]:
+        beside, ahead = np.array(CORNERS).T * [[self.width], [self.depth]]
+        ground = np.append(place.ground(beside, ahead), 0.0)
+        foot, low = float(ground.max()), float(ground.min()) - BURIED
+        top, body = foot + self.height, foot + self.height - LID
+        walls = self._block(OVERHANG, foot + PLINTH, body)
+        lid, plinth = self._block(0.0, body, top), self._block(2.0 * OVERHANG, low, foot + PLINTH)
+        tall = body - foot
+        doors = box((self.width, OVERHANG, tall), (0.0, (OVERHANG - self.depth) / 2.0, foot + tall / 2.0))
         return [
             Body(walls, "cabinet_grey"),
             Body(lid, "cabinet_grey"),
@@ -104,5 +110,7 @@ class Cabinet(StandingThing):
         )
 
     def footprint(self) -> Iterator[Block]:
-        """Yield a box that holds it, however it is turned."""
-        yield self.upright(max(self.width, self.depth) / 2.0, self.height)
+        """Yield a box that holds it, however it is turned, on a batter too."""
+        half = max(self.width, self.depth) / 2.0
+        on_slope = half / STEEPEST if self.kind == "utility" else 0.0
+        yield self.upright(half, self.height + on_slope)

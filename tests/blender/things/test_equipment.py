@@ -9,7 +9,8 @@ import pytest
 from synthroads_addon.base.classes import class_id
 from synthroads_addon.road.objects import ObjectT
 from synthroads_addon.road.things import kilometre_board as sizes
-from synthroads_addon.road.things.cabinet import Cabinet
+from synthroads_addon.road.things.body import BURIED
+from synthroads_addon.road.things.cabinet import CORNERS, PLINTH, Cabinet
 from synthroads_addon.road.things.delineator import REFLECTOR, Delineator
 from synthroads_addon.road.things.kilometre_board import KilometreBoard
 from synthroads_addon.road.things.pole import Pole
@@ -88,6 +89,22 @@ def of_type(road: FurnishedRoad, name: str, kind: type[ObjectT]) -> ObjectT:
     return item
 
 
+def ground_below(road: FurnishedRoad, name: str) -> Float:
+    """Return the heights of the built ground at a utility cabinet's corners, m above its foot; none of other things."""
+    item = road.parameters.objects[name]
+    if not isinstance(item, Cabinet) or item.kind != "utility":
+        return np.empty(0)
+    foot = road.point(item.station, item.offset)
+    right, along, _ = axes(road, name)
+    plan = [foot[:2] + x * item.width * right[:2] + y * item.depth * along[:2] for x, y in CORNERS]
+    return road.surface(np.array(plan)) - foot[2] - item.elevation
+
+
+def highest_below(road: FurnishedRoad, name: str) -> float:
+    """Return by how much the ground below a utility cabinet is higher than its foot, m; 0 of other things."""
+    return float(ground_below(road, name).max(initial=0.0))
+
+
 @pytest.mark.keep_scene
 @pytest.mark.parametrize("name", list(KINDS))
 class TestEach:
@@ -102,12 +119,12 @@ class TestEach:
 
     def test_its_top_is_as_high_as_it_says(self, road: FurnishedRoad, name: str) -> None:
         item = road.parameters.objects[name]
-        top = item.height + getattr(item, "lower_edge", 0.0)
+        top = item.height + getattr(item, "lower_edge", 0.0) + highest_below(road, name)
         assert own(road, name)[..., 2].max() == pytest.approx(top, abs=MEASURE)
 
     def test_it_reaches_into_the_ground(self, road: FurnishedRoad, name: str) -> None:
         low = own(road, name)[..., 2].min()
-        assert -0.5 - MEASURE < low < -0.3 + MEASURE
+        assert -0.5 - MEASURE < low - ground_below(road, name).min(initial=0.0) < -0.3 + MEASURE
 
     def test_its_solids_look_outwards(self, road: FurnishedRoad, name: str) -> None:
         written = ("sheeting_white", "sheeting_blue", "board_back")
@@ -222,6 +239,17 @@ class TestCabinet:
         assert high[0] - low[0] == pytest.approx(cabinet.width, abs=MEASURE)
         assert high[1] == pytest.approx(cabinet.depth / 2, abs=MEASURE)
         assert low[1] == pytest.approx(-cabinet.depth / 2, abs=MEASURE)
+
+    @pytest.mark.parametrize("name", ["cabinet", "cabinet-small", "cabinet-turned"])
+    def test_it_stands_level_above_all_ground_below_it(self, road: FurnishedRoad, name: str) -> None:
+        body, plinth = (own(road, name, material)[..., 2] for material in ("cabinet_grey", "concrete"))
+        ground = ground_below(road, name)
+        assert body.min() == pytest.approx(max(ground.max(), 0.0) + PLINTH, abs=MEASURE)
+        assert plinth.max() == pytest.approx(body.min(), abs=MEASURE)
+        assert plinth.min() == pytest.approx(min(ground.min(), 0.0) - BURIED, abs=MEASURE)
+
+    def test_on_a_batter_the_ground_below_one_differs_by_more_than_its_plinth(self, road: FurnishedRoad) -> None:
+        assert np.ptp(ground_below(road, "cabinet-turned")) > PLINTH
 
     def test_wide_ones_have_two_doors(self, road: FurnishedRoad) -> None:
         for name, doors in (("cabinet", 2), ("cabinet-small", 1)):
