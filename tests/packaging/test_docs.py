@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from PIL import Image
 
 from headless.cli import COMMANDS, build_parser
 from synthroads_addon.dataset.recipe import Recipe, scene_jobs
@@ -47,6 +48,10 @@ LAYOUT = DOCS / "extend" / "layout.md"
 ADDON = ROOT / "synthroads_addon"
 IMPORTS = sorted({statement for page in [README, CHANGELOG, *PAGES] for statement in imports(current(page))})
 WITH_PYTORCH = {f"fields-{name}" for name, classes in FILES.items() if any(c.startswith("ml.") for c in classes)}
+
+
+CHARTS = ("centerline-", "segmentation-", "tutorial-")
+"""Pictures that may have a palette: charts of few colours."""
 
 
 def name_of(page: Path) -> str:
@@ -108,6 +113,13 @@ def test_commands_are_understood(page: Path, capsys: pytest.CaptureFixture[str])
         changes = getattr(arguments, "changes", [])
         if words[0] == "generate" and arguments.scenario in scenario_names() and not adds_fields(page):
             load_scenario(arguments.scenario, changes)  # refuses fields that aren't there and values out of limits
+
+
+@pytest.mark.parametrize("picture", sorted((DOCS / "pictures").glob("*.png")), ids=lambda path: path.stem)
+def test_pictures_keep_their_colours(picture: Path) -> None:
+    """A palette of 256 colours takes the red of beacons and the blue of signs."""
+    with Image.open(picture) as image:
+        assert image.mode in ("RGB", "RGBA") or (image.mode == "P" and picture.name.startswith(CHARTS))
 
 
 def test_commands_are_found() -> None:

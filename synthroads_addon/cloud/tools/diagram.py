@@ -48,8 +48,7 @@ def draw_grid(frame: PlotFrame, text: str) -> None:
     """Draw a frame, its vertical lines with their values, and below it what they are."""
     left, top, right, bottom = frame.box
     step = nice_step((frame.high[0] - frame.low[0]) / 6.0)
-    first = np.ceil(frame.low[0] / step) * step
-    for value in np.arange(first, frame.high[0], step) + 0.0:
+    for value in _multiples(np.ceil(frame.low[0] / step), frame.high[0], step):
         (x, _), *_ = frame.at(np.array([value]), np.array([0.0]))
         frame.draw.line([(x, top), (x, bottom)], fill=GRID, width=SCALE)
         shown = f"{value:,.0f}" if step >= 1 else f"{value:.3g}"
@@ -60,11 +59,18 @@ def draw_grid(frame: PlotFrame, text: str) -> None:
 
 def draw_levels(frame: PlotFrame, step: float) -> None:
     """Draw the horizontal lines of a frame within its edges, one every ``step``, with their values."""
-    first = np.floor(frame.low[1] / step) * step + step
-    for value in np.arange(first, frame.high[1], step) + 0.0:
+    for value in _multiples(np.floor(frame.low[1] / step) + 1.0, frame.high[1], step):
         (left, y), (right, _) = frame.at(np.array([frame.low[0], frame.high[0]]), np.array([value, value]))
         frame.draw.line([(left, y), (right, y)], fill=GRID, width=SCALE)
         draw_text(frame.draw, (left / SCALE - 6, y / SCALE), f"{value:.3g}", 13, SOFT, anchor="rm")
+
+
+def _multiples(first: float, end: float, step: float) -> list[float]:
+    """Return the multiples of a step from the `first` one (a whole number) up to an end; 0 is 0 among them.
+
+    Sums of steps would miss it by some 1e-17, which would be written beside its line.
+    """
+    return (np.arange(first, end / step) * step + 0.0).tolist()
 
 
 def draw_text(

@@ -30,6 +30,8 @@ class LongOperator:
 
     _job: PanelJob[Any] | None = None
     _pace: WorkPace
+    _shown = ""
+    """The job's state in the window."""
     _drawing = 0.0
     """Seconds that the window took to be drawn the last time that any work was done in it."""
     _timer: bpy.types.Timer | None = None
@@ -67,6 +69,7 @@ class LongOperator:
         if not self._job.tick(self._pace.budget(), self._pace.patience):
             return self._end(context, self._job)
         self._pace.leave()
+        self._shown = ""
         self._timer = context.window_manager.event_timer_add(TICK, window=context.window)
         context.window_manager.modal_handler_add(self)
         context.workspace.status_text_set(_draw_status)
@@ -81,11 +84,11 @@ class LongOperator:
             return {"RUNNING_MODAL"}
         if event.type != "TIMER":
             return {"PASS_THROUGH"}
-        before = job.state
         budget = self._pace.budget()
         LongOperator._drawing = self._pace.drawing
         if job.tick(budget, self._pace.patience):
-            if job.state != before:
+            if job.state != self._shown:  # what runs aside goes on between two turns
+                self._shown = job.state
                 context.workspace.status_text_set(_draw_status)
                 redraw_sidebars(context)
             self._pace.leave()

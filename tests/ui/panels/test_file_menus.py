@@ -1,6 +1,7 @@
 """Files of roads in Blender's own menus, and dropped onto a 3D view."""
 
 from collections.abc import Iterator
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -8,8 +9,13 @@ import bpy
 import pytest
 
 import synthroads_addon
+from synthroads_addon.blender.model.store import find_road, recall_parameters
+from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.ui.panels import file_menus
+from synthroads_addon.ui.work.job import running_job
+from tests.helpers.roads.furnished_data import road_data
 from tests.helpers.scenes.fake_layout import FakeLayout
+from tests.helpers.scenes.panel_road import wait_for_end
 
 
 @pytest.fixture(autouse=True)
@@ -48,3 +54,17 @@ def test_blender_knows_who_takes_a_dropped_file(handler: str, ending: str) -> No
     area = next(area for area in bpy.context.screen.areas if area.type == "VIEW_3D")
     with bpy.context.temp_override(area=area):
         assert known.poll_drop(bpy.context)
+
+
+def test_a_dropped_parameter_set_is_built_at_once(tmp_path: Path) -> None:
+    """Blender runs this operator of its own for files that are dropped onto a 3D view."""
+    road = RoadParameters.from_dict(road_data({}, 30.0))
+    (tmp_path / "parameters.json").write_text(road.to_json(), encoding="utf-8")
+    area = next(area for area in bpy.context.screen.areas if area.type == "VIEW_3D")
+    with bpy.context.temp_override(area=area):
+        bpy.ops.wm.drop_import_file("INVOKE_DEFAULT", directory=f"{tmp_path}/", files=[{"name": "parameters.json"}])
+    if (job := running_job()) is not None:
+        wait_for_end(job)
+    root = find_road(bpy.context.scene)
+    assert root is not None
+    assert recall_parameters(root) == road
