@@ -84,7 +84,12 @@ class RoadScene:
         settings, parameters = self.scenario.settings(), self.road.parameters
         self.model, self.scene = build_road(parameters, settings.tolerance, settings.vegetation_detail), None
         if self.scenario.materials_table:
-            vary(parameters.materials, parameters.environment, self.scenario.own_materials())
+            vary(
+                parameters.materials,
+                parameters.environment,
+                self.scenario.own_materials(),
+                parameters.metadata.seed,
+            )
         return self.model
 
     def read(self) -> ScannedScene:

@@ -93,10 +93,10 @@ class ColourScenario(ClosedModel):
     )
     intensity_from_layers: Literal["auto", "always", "never"] = Field(
         "auto",
-        description="Intensities from each point's own layers, in place of its material's means; auto: in scenes that "
-        "were built elsewhere, whose materials say how they vary in no other way.",
+        description="Intensities from each point's own layers, in place of its material's means; auto: where these are "
+        "worked out by the materials' nodes, and no table of materials says how the brightness varies.",
         json_schema_extra=notes(
-            only_with={"source": ("auto", "nodes", "images", "returns")}, labels={"auto": "In Scenes Built Elsewhere"}
+            only_with={"source": ("auto", "nodes", "images", "returns")}, labels={"auto": "Where Nodes Give Layers"}
         ),
     )
 

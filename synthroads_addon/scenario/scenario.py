@@ -17,6 +17,7 @@ from ..cloud.layers import optional_arrays
 from ..materials.table import Material, read_material_table
 from ..road.guidelines import SECTIONS_OF_CLASS
 from ..scanning.beam import RINGS
+from ..scanning.colour.colour import takes_nodes
 from ..twin.formats import FORMATS, IfcSettings, TwinFormat
 from .cloud import CloudScenario
 from .colour import ColourScenario
@@ -142,7 +143,9 @@ class Scenario(ClosedModel):
     @property
     def may_render(self) -> bool:
         """Return whether a scan may have to render: whether it does depends on the scene's materials as well."""
-        asked = bool(self.coloured_layers) or self.colour.intensity_from_layers == "always"
+        colour = self.colour
+        by_layers = {"always": True, "never": False, "auto": takes_nodes(colour.settings(self.fidelity))}
+        asked = bool(self.coloured_layers) or by_layers[colour.intensity_from_layers]
         return bool(set(self.outputs) & set(OF_POINTS)) and asked and self.colour.source != "material"
 
     def own_materials(self) -> dict[str, Material]:

@@ -9,15 +9,20 @@ from functools import partial
 import bpy
 
 from ...base.errors import nearest_name
+from ...base.random_streams import stream
 from ...materials.table import UNKNOWN, Material, materials
 from ...materials.variation import vary_material
+from ...road.pavement.field import Wear
 from ...road.surroundings import Environment, MaterialVariation
-from .looks import vary_color
+from .looks import is_worn, vary_color
 from .shading import shade
 from .surface_layers import PROPERTY, layer_expressions, mean_value
 
 MEAN = "synthroads_mean"
 """Custom property of a Blender material: its mean properties on this road, as JSON."""
+WEAR = "synthroads_wear"
+"""Custom property of a pavement's material: the parameters of its field."""
+_USUAL = Wear(MaterialVariation().wheel_track_polish, 0.0)
 
 
 def material(name: str) -> bpy.types.Material:
@@ -29,27 +34,36 @@ def material(name: str) -> bpy.types.Material:
             return existing
     made = bpy.data.materials.new(f"SR {name}")
     made[PROPERTY] = name
-    _shade(made, materials()[name])
+    _shade(made, materials()[name], _USUAL)
     return made
 
 
-def vary(variation: MaterialVariation, environment: Environment, own: Mapping[str, Material] | None = None) -> None:
+def vary(
+    variation: MaterialVariation,
+    environment: Environment,
+    own: Mapping[str, Material] | None = None,
+    seed: int = 0,
+) -> None:
     """Give the materials that the file has their means on a road with this variation and weather.
 
     Args:
         variation, environment: the road's.
         own: materials in place of the shipped table's.
+        seed: the road's, for what is random on its pavement.
     """
+    wear = Wear(variation.wheel_track_polish, float(stream(seed, "pavement look").integers(1 << 16)))
     for item in bpy.data.materials:
         if PROPERTY in item and item[PROPERTY] in materials():
             mean = vary_material(item[PROPERTY], variation, environment, own)
-            if mean.to_json() != item.get(MEAN):
-                _shade(item, mean)
+            if mean.to_json() != item.get(MEAN) or (is_worn(item[PROPERTY]) and tuple(item.get(WEAR, ())) != wear):
+                _shade(item, mean, wear)
 
 
-def _shade(item: bpy.types.Material, mean: Material) -> None:
-    shade(item, mean, partial(vary_color, item[PROPERTY]))
+def _shade(item: bpy.types.Material, mean: Material, wear: Wear) -> None:
+    shade(item, mean, partial(vary_color, item[PROPERTY], wear))
     item[MEAN] = mean.to_json()
+    if is_worn(item[PROPERTY]):
+        item[WEAR] = wear
 
 
 def table_name(item: bpy.types.Material | None) -> str:

@@ -1,12 +1,14 @@
-"""How the base colour of each material varies: noises added up, and what a few materials have beside them."""
+"""How each material varies: noises of the base colour added up, and what a few materials have beside them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import NamedTuple
 
+from ...road.pavement.field import Wear
 from ..nodes import operations as op
 from ..nodes.builder import Value
+from .pavement import pavement_look
 from .shading import Shade
 
 COLOR = "vehicle_color"
@@ -46,9 +48,6 @@ _WORN = (_Noise(0.10, 0.05, 3.0),)
 _SPECIES = ("maple", "birch", "poplar", "spruce", "pine", "hawthorn", "hazel", "blackthorn")
 
 _NOISES: dict[str, tuple[_Noise, ...]] = {
-    "asphalt": (_Noise(0.25, 0.012, 1.0), _Noise(0.12, 0.6, 4.0), _Noise(0.10, 25.0, 2.0)),
-    "concrete": (_Noise(0.10, 0.01, 1.0), _Noise(0.12, 1.5, 4.0)),
-    "paint_white": (_Noise(0.18, 0.05, 3.0),),
     "verge": (_Noise(0.45, 0.03, 2.0), _Noise(0.30, 0.8, 3.0)),
     "median": _TURF,
     "grass_ground": _TURF,
@@ -104,6 +103,16 @@ def _joints(shade: Shade) -> None:
     shade.scale((1.0 - joint * 0.8) / (1.0 - 0.8 * _JOINT / ELEMENT))
 
 
+def _film(shade: Shade) -> None:
+    """Film of a marking: worn and dirty in spots as large as tyres' prints and along stretches; with beads in it."""
+    spots, stretches, beads = shade.noise(0.25, 3.0), shade.noise(2.5, 2.0), shade.noise(0.05, 3.0)
+    film = (spots * 0.9 + 1.0) * (stretches * 0.7 + 1.0)
+    shade.scale(film)
+    shade.vary(0.18, beads)
+    shade.roughness = spots * 0.2 + shade.mean.roughness
+    shade.specular = film * shade.mean.specular
+
+
 def _scars(shade: Shade) -> None:
     """Dark scars across a white bark."""
     scars = shade.noise(0.12, 1.0, (0.35, 0.35, 1.6))
@@ -114,17 +123,62 @@ def _clear(shade: Shade) -> None:
     shade.transparency = 0.8
 
 
+class _Texture(NamedTuple):
+    """Texture of a pavement: noises of its aggregate, of its patches of binder or slurry, and of long stretches.
+
+    Attributes:
+        grain, mottle, wide: amount and wavelength (m) of each on the base colour; no third one if its amount is 0.
+        rough: how much the roughness varies with the mottle.
+        gloss: how much the specular varies with the grain, as a share.
+        relief: height of the grain, m.
+    """
+
+    grain: tuple[float, float]
+    mottle: tuple[float, float]
+    wide: tuple[float, float]
+    rough: float
+    gloss: float
+    relief: float
+
+
+_PAVEMENTS = {
+    "asphalt": _Texture((0.25, 0.012), (0.12, 0.6), (0.10, 25.0), 0.12, 0.6, 0.001),
+    "concrete": _Texture((0.10, 0.01), (0.12, 1.5), (0.0, 25.0), 0.12, 0.4, 0.0005),
+}
+
+
+def _pavement(shade: Shade, kind: str, wear: Wear) -> None:
+    """Pavement: its field of station and offset, and its texture."""
+    texture, look = _PAVEMENTS[kind], pavement_look(shade, kind, wear)
+    grain, mottle = shade.noise(texture.grain[1], 1.0), shade.noise(texture.mottle[1], 4.0)
+    shade.scale(look.brightness)
+    shade.vary(texture.grain[0], grain)
+    shade.vary(texture.mottle[0], mottle)
+    if texture.wide[0]:
+        shade.vary(texture.wide[0], shade.noise(texture.wide[1], 2.0))
+    shade.roughness = look.roughness + mottle * texture.rough + shade.mean.roughness
+    shade.specular = look.brightness * (grain * texture.gloss + 1.0) * shade.mean.specular
+    shade.relief = grain * texture.relief
+
+
 _BEFORE_NOISES: dict[str, Callable[[Shade], None]] = {
     **dict.fromkeys(("noise_aluminium", "noise_concrete", "noise_wood"), _bay),
     "gantry_steel": _gantry_steel,
     "car_paint": _paint,
     "tarpaulin": lambda shade: _paint(shade, _COVER_TINT),
 }
-_AFTER_NOISES = {"barrier_concrete": _joints, "birch_bark": _scars, "acrylic_glass": _clear}
+_AFTER_NOISES = {"paint_white": _film, "paint_yellow": _film, "barrier_concrete": _joints, "birch_bark": _scars, "acrylic_glass": _clear}
 
 
-def vary_color(name: str, shade: Shade) -> None:
-    """Let the base colour vary as that of a material of the table does; others keep their mean."""
+def is_worn(name: str) -> bool:
+    """Return whether the traffic's wear shows on a material of the table."""
+    return name in _PAVEMENTS
+
+
+def vary_color(name: str, wear: Wear, shade: Shade) -> None:
+    """Let the layers vary as those of a material of the table do; others keep their mean."""
+    if name in _PAVEMENTS:
+        _pavement(shade, name, wear)
     if name in _BEFORE_NOISES:
         _BEFORE_NOISES[name](shade)
     for noise in _NOISES.get(name, ()):

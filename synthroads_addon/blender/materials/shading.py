@@ -24,6 +24,8 @@ class Shade:
         mean: the table's entry; the base colour's mean must stay equal to it.
         place: position in the world, m.
         factor: what the base colour is multiplied with; its mean is 1.
+        roughness, specular: what takes the place of the table's values; their means are these.
+        relief: height that the surface stands out by, m; nothing for a smooth one.
         transparency: share of the light that passes straight through.
     """
 
@@ -31,6 +33,9 @@ class Shade:
     mean: Material
     place: Value
     factor: Value | None = None
+    roughness: Value | None = None
+    specular: Value | None = None
+    relief: Value | None = None
     transparency: float = 0.0
 
     def noise(self, wavelength: float, detail: float = 2.0, stretch: tuple[float, float, float] = (1, 1, 1)) -> Value:
@@ -71,6 +76,13 @@ def shade(item: bpy.types.Material, mean: Material, build: Callable[[Shade], Non
         if varied.factor is not None:
             color = tree.node("ShaderNodeVectorMath", mean.base_color, varied.factor, operation="MULTIPLY").value
             tree.group.links.new(color.source(), surface.raw.inputs["Base Color"])
+        values = {name: _varied(varied, name) for name in ("roughness", "metallic", "specular")}
+        for name, entry in (("roughness", "Roughness"), ("specular", "Specular IOR Level")):
+            if isinstance(value := values[name], Value):
+                tree.group.links.new(value.source(), surface.raw.inputs[entry])
+        if varied.relief is not None:
+            bump = tree.node("ShaderNodeBump", distance=1.0, height=varied.relief).value
+            tree.group.links.new(bump.source(), surface.raw.inputs["Normal"])
         seen = surface.value
         if varied.transparency:
             clear = tree.node("ShaderNodeBsdfTransparent").value
@@ -78,11 +90,19 @@ def shade(item: bpy.types.Material, mean: Material, build: Callable[[Shade], Non
         tree.node("ShaderNodeOutputMaterial", seen)
     with tree.frame("Layers"):
         _layer(tree, "base_color", color=color)
-        for name in ("roughness", "metallic", "specular"):
-            _layer(tree, name, value=getattr(mean, name))
+        for name, value in values.items():
+            _layer(tree, name, value=value)
     item.diffuse_color = (*mean.base_color, 1.0)
     item.roughness, item.metallic = mean.roughness, mean.metallic
     arrange(item.node_tree)
+
+
+def _varied(shade: Shade, name: str) -> Operand:
+    """Return a layer of one number: as it varies, kept between 0 and 1, else the table's value."""
+    value: Value | None = getattr(shade, name, None)
+    if value is None:
+        return float(getattr(shade.mean, name))
+    return shade.tree.node("ShaderNodeClamp", value).value
 
 
 def _layer(tree: Tree, name: str, **value: Operand) -> None:

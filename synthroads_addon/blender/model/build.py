@@ -266,7 +266,7 @@ class _Build:
         origin = np.array(parameters.transform.translate) + builder.origin
         place_root(root, origin, scene, self._place.keep_moves)
         remove_unused_groups()
-        vary(parameters.materials, parameters.environment)
+        vary(parameters.materials, parameters.environment, seed=parameters.metadata.seed)
         return RoadModel(root, collection, builder.objects, origin)
 
 

@@ -317,7 +317,8 @@ def _kind(operand: Operand) -> str:
 def _sources() -> bytes:
     """Return a digest of the sources of all node groups: a change to any of them makes new groups."""
     digest, blender = hashlib.sha256(), Path(__file__).parents[1]
-    names = ("nodes/*.py", "things/**/*.py", "materials/looks.py")  # the last has the colour's attribute
+    # Of the materials one has the colour's attribute, one groups of its own, which are written in the road's field.
+    names = ("nodes/*.py", "things/**/*.py", "materials/looks.py", "materials/pavement.py", "../road/pavement/*.py")
     for path in (*sorted(path for name in names for path in blender.glob(name)), PRESETS / "vehicles.json"):
         digest.update(path.read_bytes())
     return digest.digest()
@@ -330,7 +331,13 @@ def remove_unused_groups() -> None:
             bpy.data.node_groups.remove(group)
 
 
-def node_group(name: str, build: Callable[..., None], *arguments: object, description: str = "") -> bpy.types.NodeTree:
+def node_group(
+    name: str,
+    build: Callable[..., None],
+    *arguments: object,
+    description: str = "",
+    kind: str = "GeometryNodeTree",
+) -> bpy.types.NodeTree:
     """Return the node group `name`, from this file if it holds the same version, else built anew.
 
     Args:
@@ -338,6 +345,7 @@ def node_group(name: str, build: Callable[..., None], *arguments: object, descri
         build: declares inputs, adds nodes, declares outputs; is called with the tree and the arguments.
         arguments: what `build` depends on apart from its source (a number of lanes, say).
         description: shown as a tooltip.
+        kind: Blender's name of the tree's class.
     """
     key = hashlib.sha256(_sources() + repr((name, arguments)).encode()).hexdigest()[:16]
     for group in bpy.data.node_groups:
@@ -345,14 +353,15 @@ def node_group(name: str, build: Callable[..., None], *arguments: object, descri
             return group
     if (old := bpy.data.node_groups.get(name)) and KEY in old:
         old.name = f"{name} (older)"
-    group = bpy.data.node_groups.new(name, "GeometryNodeTree")
+    group = bpy.data.node_groups.new(name, kind)
     group[KEY] = key
     group.description = description or (build.__doc__ or "").strip().partition("\n")[0]
     tree = Tree(group)
     build(tree, *arguments)
     if tree.materials:
         group[MATERIALS] = tree.materials
-    group.is_modifier = tree.makes == "GEOMETRY"
+    if kind == "GeometryNodeTree":
+        group.is_modifier = tree.makes == "GEOMETRY"
     group.color_tag = _TAGS.get(tree.makes, "CONVERTER")
     arrange(group)
     return group

@@ -111,5 +111,5 @@ class SectionScan:
         motions = {name: ShiftedMotion(motion, frame) for name, motion in passing.items()}
         scene = self._vehicles.with_traffic(static, vehicles, motions, self._road.numbers.passes)
         # The vehicles' materials may be new.
-        vary(whole.materials, whole.environment, self._scenario.own_materials())
+        vary(whole.materials, whole.environment, self._scenario.own_materials(), whole.metadata.seed)
         return scene, frame

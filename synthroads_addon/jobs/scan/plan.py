@@ -3,6 +3,7 @@
 `Site`: where a scenario's scan takes place, whoever made the scene; and its scan into files.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
@@ -13,10 +14,13 @@ from ...base.progress import StageTimer
 from ...cloud.layers import optional_arrays
 from ...cloud.tools.previews import TopView
 from ...materials.surfaces import surfaces_of
+from ...materials.table import Material
 from ...materials.variation import vary_material
 from ...road.geometry import RoadGeometry
 from ...scanning.blocks import Blocks
+from ...scanning.colour.colour import takes_nodes
 from ...scanning.colour.request import LayerRequest
+from ...scanning.finish import OF_INTENSITY
 from ...scanning.forecast import forecast_scan, refuse_large
 from ...scanning.plan import ScanConditions, ScanPlan, SceneServices
 from ...scanning.platforms.guides import RoadGuide
@@ -79,7 +83,6 @@ def plan_scan(
     kept, coloured, rings = scenario.kept_layers, scenario.coloured_layers, scenario.beam_rings
     scan, settings, table = scenario.scan, scenario.settings(), scenario.own_materials()
     materials, shifts = scene.static.materials, scan.relief > 0.0
-    by_layers = _intensity_from_layers(scenario, conditions, services, materials)
     colour = scenario.colour.settings(scenario.fidelity, path.typical_range)
     setting, loss = scanner_setting(scan), scan.attenuation
     weather = scan.weather or weather_of(conditions.environment)
@@ -92,6 +95,7 @@ def plan_scan(
         vary_material(name, conditions.variation, conditions.environment, table) if name in table else mean
         for name, mean in zip(materials, means, strict=True)
     ]
+    by_layers = _intensity_from_layers(scenario, scanned, services, materials)
     return ScanPlan(
         target=target,
         # The layers of each point have the variation of their own already.
@@ -118,7 +122,7 @@ def plan_scan(
         threads=scan.threads,
         request=LayerRequest(
             settings=colour,
-            wanted=coloured | ({"base_color"} if by_layers else set()),
+            wanted=coloured | (OF_INTENSITY if by_layers else set()),
             mesh=scene.static,
             environment=conditions.environment,
             path=path,
@@ -131,13 +135,18 @@ def plan_scan(
 
 
 def _intensity_from_layers(
-    scenario: Scenario, conditions: ScanConditions, services: SceneServices, materials: tuple[str, ...]
+    scenario: Scenario, scanned: Sequence[Material], services: SceneServices, materials: tuple[str, ...]
 ) -> bool:
-    """Return whether intensities come from the points' own layers: where nothing is said, in scenes of others."""
-    asked = scenario.colour.intensity_from_layers
+    """Return whether intensities come from the points' own layers.
+
+    Where nothing is said they do if nodes give these layers, and no table says how the brightness varies: who fitted
+    such a table to a real cloud wants that.
+    """
+    asked, colour = scenario.colour.intensity_from_layers, scenario.colour.settings(scenario.fidelity)
     if asked != "auto":
         return asked == "always"
-    return conditions.road is None and scenario.colour.source != "material" and services.reflectance_varies(materials)
+    spread = any(row.spread_below or row.spread_above for row in scanned)
+    return takes_nodes(colour) and not spread and services.reflectance_varies(materials)
 
 
 @dataclass(frozen=True)

@@ -35,12 +35,14 @@ class KeptGroups:
             if name.startswith("synthroads_addon.") and vars(module).get("node_group") is self._make:
                 module.node_group = self._node_group  # type: ignore[attr-defined]
 
-    def _node_group(self, name: str, build: Any, *arguments: object, description: str = "") -> bpy.types.NodeTree:
+    def _node_group(
+        self, name: str, build: Any, *arguments: object, description: str = "", kind: str = "GeometryNodeTree"
+    ) -> bpy.types.NodeTree:
         wanted = (builder._sources(), name, repr(arguments))
         key = self._keys.get(wanted) if self.on else None
         if key is not None and all(group.get(builder.KEY) != key for group in bpy.data.node_groups):
             return self._take(key, name)
-        group = self._make(name, build, *arguments, description=description)
+        group = self._make(name, build, *arguments, description=description, kind=kind)
         if self.on and key is None:
             self._keys[wanted] = group[builder.KEY]
             bpy.data.libraries.write(str(self._file(group[builder.KEY])), {group}, fake_user=True)

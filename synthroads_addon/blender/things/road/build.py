@@ -68,6 +68,8 @@ def _road_inputs(
             verge_slope=carriageway.verge_slope_percent / 100.0,
             turns_about_inner_edge=carriageway.rotation_axis == "inner_edge",
             instance=carriageway.instance,
+            first_station=zero,
+            slab_length=carriageway.pavement.slab_length,
         )
     for median in parameters.of_type(Median).values():
         if len(parameters.of_type(Carriageway)) == 2:

@@ -7,6 +7,8 @@ from functools import partial
 import bpy
 
 from ....base.classes import class_id
+from ....road.pavement.field import CODES, HALF_UNIT
+from ....road.pavement.places import strip_lanes
 from ...nodes import operations as op
 from ...nodes.axis import rows_along
 from ...nodes.builder import Operand, Tree, Value, makes_group, node_group, offer_group
@@ -17,6 +19,7 @@ from ...nodes.inputs import (
     boolean,
     inputs_class,
     instance_number,
+    integer,
     material_of,
     metres,
     number,
@@ -88,6 +91,37 @@ def carriageway_strip_group(tree: Tree) -> None:
     tree.output("Mesh", mesh, description="Ribbon whose faces look up")
 
 
+class _PavementPlace(Inputs):
+    strip = socket("Geometry", "A strip of the pavement")
+    backbone = backbone_socket()
+    inner_distance = metres(5.0, _FAR, "Distance from the axis of the inner edge of the lane that it was paved with")
+    outer_distance = metres(9.0, _FAR, "Distance of that lane's outer edge")
+    kind = integer(0, (0, 64), "What the strip is: 1 the outermost lane, 9 the hard shoulder; 32 more on the left")
+    first_station = metres(0.0, (-1e6, 1e6), "Station that the backbone's stations count from")
+    slab_length = metres(5.0, (2.0, 20.0), "Distance of a concrete pavement's joints")
+
+
+@makes_group("SR Pavement Place")
+def pavement_place_group(tree: Tree) -> None:
+    """A strip of pavement whose points know where they lie on it, for the materials.
+
+    The attribute ``pavement`` is the station, the distance from the lane's middle, and a code of strip and lane's width.
+    """
+    lane = _PavementPlace(tree)
+    with tree.frame("Middle and half width of the lane at each row"):
+        number_ = op.named_attribute(tree, "row", "INT")
+        inner, outer = (
+            op.sample_index(lane.backbone, value, number_) for value in (lane.inner_distance, lane.outer_distance)
+        )
+        across = op.unary("ABSOLUTE", op.named_attribute(tree, "offset")) - (inner + outer) * 0.5
+        code = (outer - inner) * (0.5 / HALF_UNIT) + lane.kind
+    with tree.frame("Attributes that the materials read"):
+        station = op.named_attribute(tree, "station") + lane.first_station
+        mesh = op.store(lane.strip, "pavement", op.vector(tree, station, across, code))
+        mesh = op.store(mesh, "slab_length", lane.slab_length)
+    tree.output("Mesh", mesh, description="The strip")
+
+
 def carriageway_group(lanes: int, turnouts: bool = False) -> bpy.types.NodeTree:
     """Return the group SR Carriageway of so many lanes, with the strips that turnouts make if it has any."""
     name = f"SR Carriageway {lanes} Lane{'s' if lanes > 1 else ''}{' and Turnouts' if turnouts else ''}"
@@ -115,6 +149,8 @@ class SideInputs(Inputs):
     )
     instance = instance_number()
     pavement_material = material_of("the pavement", "asphalt")
+    first_station = metres(0.0, (-1e6, 1e6), "Station that the backbone's stations count from")
+    slab_length = metres(5.0, (2.0, 20.0), "Distance of a concrete pavement's joints")
 
 
 class _Place(Inputs):
@@ -147,6 +183,8 @@ def _build(tree: Tree, lanes: int, turnouts: bool) -> None:
     section |= {"paved_edge": plane, "pivot": pivot, "verge_slope": side.verge_slope}
     with tree.frame("Pavement and verge"):
         parts = []
+        on_left = op.switch(place.left_side, 0, CODES)
+        of_lanes = strip_lanes(tuple("lane" if strip.startswith("Lane") else _kind(strip) for strip in strips), lanes)
         for number_, strip in enumerate(strips):
             paved = strip not in _UNPAVED
             mesh = tree.call(
@@ -160,6 +198,18 @@ def _build(tree: Tree, lanes: int, turnouts: bool) -> None:
                 material=side.pavement_material if paved else verge,
                 **{"detail": details.values[detail_field(strip)]} if strip != "Verge" else {},
             ).value
+            if paved:
+                kind, lane = of_lanes[number_]
+                mesh = tree.call(
+                    pavement_place_group(),
+                    strip=mesh,
+                    backbone=backbone,
+                    inner_distance=distances[lane],
+                    outer_distance=distances[lane + 1],
+                    kind=on_left + kind,
+                    first_station=side.first_station,
+                    slab_length=side.slab_length,
+                ).value
             parts.append(mesh)
         at_row = op.sample_index(backbone, distances[-1], op.named_attribute(tree, "row", "INT"))
         beyond = op.unary("ABSOLUTE", op.named_attribute(tree, "offset")) - at_row
@@ -176,6 +226,10 @@ def _build(tree: Tree, lanes: int, turnouts: bool) -> None:
     for name, edge in zip(("Inner", "Outer"), edges, strict=True):
         tree.output(f"{name} Edge Offset", edge["Offset"], description=f"{name} edge, to the left, per row (m)")
         tree.output(f"{name} Edge Height", edge["Height"], description=f"{name} edge above the axis, per row (m)")
+
+
+def _kind(strip: str) -> str:
+    return strip.lower().replace(" ", "_")
 
 
 def _boundaries(

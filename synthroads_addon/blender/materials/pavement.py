@@ -1,0 +1,106 @@
+"""SR Asphalt Look and SR Concrete Look: the pavement's field as a node group, and how materials take it."""
+
+from __future__ import annotations
+
+import bpy
+
+from ...road.pavement.field import Look, Place, Wear, asphalt_look, concrete_look
+from ..nodes import operations as op
+from ..nodes.builder import Operand, Tree, Value, node_group
+from .shading import Shade
+
+ATTRIBUTE, SLABS = "pavement", "slab_length"
+"""Attributes of a pavement's mesh: place and length of the slabs; see SR Pavement Place."""
+
+
+class NodeCalculus:
+    """`road.pavement.field.Calculus` of values in a material's node group.
+
+    Args:
+        tree: the group.
+    """
+
+    def __init__(self, tree: Tree) -> None:
+        self._tree = tree
+
+    def _math(self, operation: str, *operands: Operand) -> Value:
+        return self._tree.node("ShaderNodeMath", *operands, operation=operation).value
+
+    def floor(self, value: Value) -> Value:
+        """Return the largest whole number that isn't larger."""
+        return self._math("FLOOR", value)
+
+    def absolute(self, value: Value) -> Value:
+        """Return the number without sign."""
+        return self._math("ABSOLUTE", value)
+
+    def exponential(self, value: Value) -> Value:
+        """Return e to the power of the number."""
+        return self._math("EXPONENT", value)
+
+    def smaller(self, value: Value, other: Operand) -> Value:
+        """Return the smaller of two."""
+        return self._math("MINIMUM", value, other)
+
+    def larger(self, value: Value, other: Operand) -> Value:
+        """Return the larger of two."""
+        return self._math("MAXIMUM", value, other)
+
+    def below(self, value: Value, limit: float) -> Value:
+        """Return 1 where the number is below a limit, else 0."""
+        return self._math("LESS_THAN", value, limit)
+
+    def hash(self, key: Value, seed: Operand) -> Value:
+        """Return a number from 0 to 1 that follows from whole numbers and looks random."""
+        place = self._tree.node("ShaderNodeCombineXYZ", key, seed).value
+        return self._tree.node("ShaderNodeTexWhiteNoise", place, noise_dimensions="2D")["Value"]
+
+
+def look_group(kind: str) -> bpy.types.NodeTree:
+    """Return the group of a pavement's look: ``asphalt`` or ``concrete``.
+
+    Its inputs are the place, as the attribute has it, and the field's parameters.
+    """
+    about = f"How {kind} differs from its mean by where it lies on the road"
+    return node_group(f"SR {kind.title()} Look", _build, kind, description=about, kind="ShaderNodeTree")
+
+
+def _build(tree: Tree, kind: str) -> None:
+    about = "Station (m), distance from the lane's middle (m), code of strip and lane's width"
+    place = tree.input("Place", "Vector", description=about)
+    wear = Wear(
+        tree.number("Polish", 0.3, (0.0, 1.0), description="Polish of the wheel tracks"),
+        tree.number("Seed", 0.0, (0.0, 65535.0), description="Seed of all that is random"),
+    )
+    calculus = NodeCalculus(tree)
+    if kind == "concrete":
+        # As a vector: a number taken from a colour is its luminance, whose weights don't add up to 1 exactly.
+        slab = tree.input("Slabs", "Vector", description="Distance of joints (m), three times")
+    with tree.frame("Field of station and offset"):
+        parts = Place(*(op.component(place, axis) for axis in "XYZ"))
+        if kind == "concrete":
+            look = concrete_look(calculus, parts, wear, op.component(slab, "X"))
+        else:
+            look = asphalt_look(calculus, parts, wear)
+    tree.output("Brightness", look.brightness, description="Factor on base colour and specular")
+    tree.output("Roughness", look.roughness, description="What is added to the roughness")
+
+
+def pavement_look(shade: Shade, kind: str, wear: Wear) -> Look:
+    """Add the look of a pavement to a material and return it.
+
+    Args:
+        shade: the material.
+        kind: ``asphalt`` or ``concrete``.
+        wear: parameters of the field, as numbers.
+    """
+    tree = shade.tree
+    raw = tree.group.nodes.new("ShaderNodeGroup")
+    raw.node_tree = look_group(kind)
+    place = tree.node("ShaderNodeAttribute", attribute_name=ATTRIBUTE)["Vector"]
+    tree.group.links.new(place.source(), raw.inputs["Place"])
+    raw.inputs["Polish"].default_value, raw.inputs["Seed"].default_value = wear
+    if kind == "concrete":
+        slab = tree.node("ShaderNodeAttribute", attribute_name=SLABS)["Vector"]
+        tree.group.links.new(slab.source(), raw.inputs["Slabs"])
+    return Look(*(Value(tree, raw.outputs[name], "VALUE") for name in ("Brightness", "Roughness")))

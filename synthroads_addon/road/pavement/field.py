@@ -1,0 +1,275 @@
+"""How brightness and roughness of a pavement differ from its material's mean, as a field of station and offset.
+
+Written once for two evaluators: NumPy arrays here, a node group in Blender's materials. Either hands in a `Calculus`.
+
+What is in it, and where its figures come from:
+
+- **Wheel tracks**: traffic's lateral places are about normal, with a standard deviation of 0.2 to 0.3 m (Buiter et al.
+  1989, Transportation Research Record 1227; Blab & Litzka 1995), two tracks 1.8 m apart. Tyres wear the binder off and
+  polish the aggregate: asphalt is brighter and smoother there, concrete darker by rubber. Heavy vehicles keep to the
+  right, so that the tracks fade from lane to lane inwards.
+- **Oil** and dirt drip between the tracks: a darker strip along the lane's middle.
+- **Joints** of asphalt: the paver's lengthwise joint beside each lane's outer boundary, and those at the ends of a day's
+  work, sealed by bitumen; what was paved at once is as bright as itself and differs from its neighbours.
+- **Slabs** of concrete: joints every slab length and between lanes, sealed (ZTV Beton-StB: 8 to 10 mm wide); each slab is
+  of its own pour.
+- **Patches** are new and black, or older; open cracks are dark; sealed ones are a smooth band of bitumen.
+
+Amplitudes: airborne scans of two German dual carriageways have medians of intensity, by offset, that are 0.15 to 0.3 dB
+higher in the tracks than between them, with 0.1 to 0.3 dB from lane to lane, averaged over 300 to 1,100 m.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from ...base.arrays import Float
+
+CODES, HALF_UNIT = 32, 16.0
+"""A place's code is the kind of strip, 32 times the number of what it belongs to, and the half width of its lane as a share
+of 16 m."""
+LANE, SHOULDER, BAY = 1, 9, 10
+"""Kinds of strips: of the outermost lane, those of the others follow; those that no lane's traffic wears. 0 is a place of
+which nothing is known: it has its material's mean."""
+PATCH, OPEN_CRACK, SEALED_CRACK = 24, 25, 26
+"""Kinds of repaired and damaged places; above the strips'."""
+
+_TRACK, _TRACK_WIDTH, _OIL_WIDTH = 1.8, 0.3, 0.35
+"""Distance between a lane's tracks; standard deviations across of a track and of the oil strip, m."""
+_TRACKS_MEAN, _OIL_MEAN = 0.40, 0.23
+"""Means of tracks and oil strip over a lane of 3.75 m: a lane as a whole keeps its material's mean."""
+_LESS_INWARDS = 0.6
+"""By how much the wear of a lane falls behind with each lane outside of it."""
+_DAY = 650.0
+"""Length that is paved in a day, m."""
+_SLOW = 30.0
+"""Distance of the knots of the slow variation along a lane, m."""
+_SEAM, _SEAM_INWARDS, _RAMP = 0.02, 0.13, 0.004
+"""Width of a paver's joint, its distance from the lane's boundary, and over which its edge fades, m."""
+_SLAB_JOINT = 0.010
+"""Width of a sealed joint between slabs, m."""
+_KNOTS = 64.0
+"""Between numbers of two places along the road in a hash's key: more than there are strips."""
+
+
+class Calculus(Protocol):
+    """Functions that operands of the field must know beside sums, products and comparisons with numbers."""
+
+    def floor(self, value: Any) -> Any:
+        """Return the largest whole numbers that aren't larger."""
+
+    def absolute(self, value: Any) -> Any:
+        """Return values without sign."""
+
+    def exponential(self, value: Any) -> Any:
+        """Return e to the power of values."""
+
+    def smaller(self, value: Any, other: Any) -> Any:
+        """Return the smaller of two."""
+
+    def larger(self, value: Any, other: Any) -> Any:
+        """Return the larger of two."""
+
+    def below(self, value: Any, limit: float) -> Any:
+        """Return 1 where values are below a limit, else 0."""
+
+    def hash(self, key: Any, seed: Any) -> Any:
+        """Return numbers from 0 to 1 that follow from whole numbers and look random."""
+
+
+class Wear(NamedTuple):
+    """Parameters of the field.
+
+    Attributes:
+        polish: of the wheel tracks, 0 to 1.
+        seed: 0 to 65535.
+    """
+
+    polish: Any
+    seed: Any
+
+
+class Place(NamedTuple):
+    """Where a place lies on the pavement.
+
+    Attributes:
+        station: m.
+        across: distance from its lane's middle, m, positive outwards.
+        code: what it belongs to, see `place_code`.
+    """
+
+    station: Any
+    across: Any
+    code: Any
+
+
+class Look(NamedTuple):
+    """Difference of a place from its material's mean.
+
+    Attributes:
+        brightness: factor on base colour and specular, with a mean of 1.
+        roughness: what is added.
+    """
+
+    brightness: Any
+    roughness: Any
+
+
+def place_code(kind: Any, number: Any, half_width: Any = 0.0) -> Any:
+    """Return the code of places on what has a kind and a number, in a lane of a half width (m)."""
+    return kind + CODES * number + half_width / HALF_UNIT
+
+
+class _Strip(NamedTuple):
+    """Decoded place: whose it is, the lane's half width (m), the traffic's wear, whether it is a strip, its tracks."""
+
+    owner: Any
+    kind: Any
+    half: Any
+    wear: Any
+    strip: Any
+    track: Any
+    oil: Any
+
+
+def _decode(m: Calculus, place: Place) -> _Strip:
+    owner = m.floor(place.code)
+    kind = owner - m.floor(owner * (1.0 / CODES)) * CODES
+    aside = m.absolute(place.across) - _TRACK / 2.0
+    track = m.exponential(aside * aside * (-0.5 / _TRACK_WIDTH**2))
+    oil = m.exponential(place.across * place.across * (-0.5 / _OIL_WIDTH**2))
+    wear = m.below(kind, SHOULDER - 0.5) / (1.0 + _LESS_INWARDS * m.larger(kind - LANE, 0.0))
+    half = (place.code - owner) * HALF_UNIT
+    return _Strip(owner, kind, half, wear, m.below(kind, PATCH - 0.5), track - _TRACKS_MEAN, oil - _OIL_MEAN)
+
+
+def _signed_hash(m: Calculus, owner: Any, number: Any, seed: Any) -> Any:
+    return m.hash(owner + number * _KNOTS, seed) * 2.0 - 1.0
+
+
+def _line(m: Calculus, distance: Any, width: float) -> Any:
+    """Return 1 on a line of a width (m) at distances (m) from its middle, 0 beside it."""
+    return m.smaller(m.larger((width / 2.0 - distance) * (1.0 / _RAMP) + 0.5, 0.0), 1.0)
+
+
+def _slow(m: Calculus, place: Place, owner: Any, seed: Any) -> Any:
+    """Return a smooth variation along the road from -1 to 1, of each lane for itself."""
+    knots = place.station * (1.0 / _SLOW)
+    knot = m.floor(knots)
+    share = knots - knot
+    weight = share * share * (3.0 - 2.0 * share)
+    first, second = (_signed_hash(m, owner, knot + step, seed + 1.0) for step in (0.0, 1.0))
+    return first + (second - first) * weight
+
+
+def _days(m: Calculus, place: Place, owner: Any, seed: Any) -> tuple[Any, Any]:
+    """Return a brightness from -1 to 1 of each day's work, and 1 on the joints between."""
+    day = m.floor(place.station / _DAY)
+    within = place.station % _DAY
+    edge = m.smaller(within, _DAY - within)
+    return _signed_hash(m, owner, day, seed), _line(m, edge, _SEAM)
+
+
+def _repaired(m: Calculus, strip: _Strip, look: Look, seed: Any) -> Look:
+    """Return the look where patches and cracks have theirs in place of the pavement's."""
+    age = m.hash(strip.owner, seed + 2.0)
+    sealed, cracked = 1.0 - m.below(strip.kind, SEALED_CRACK - 0.5), 1.0 - m.below(strip.kind, OPEN_CRACK - 0.5)
+    brightness = (0.72 + 0.36 * age) * (1.0 - cracked) + cracked * 0.45 - sealed * 0.05
+    roughness = (0.06 - 0.1 * age) * (1.0 - cracked) + cracked * 0.05 - sealed * 0.4
+    share, known = strip.strip, 1.0 - m.below(strip.owner, 0.5)
+    together = look.brightness * share + brightness * (1.0 - share)
+    return Look(
+        (together - 1.0) * known + 1.0,
+        (look.roughness * share + roughness * (1.0 - share)) * known,
+    )
+
+
+def asphalt_look(m: Calculus, place: Place, wear: Wear) -> Look:
+    """Return how asphalt differs from its mean at places.
+
+    Args:
+        m: functions for the operands.
+        place: N places.
+        wear: parameters.
+    """
+    strip = _decode(m, place)
+    own, day_joint = _days(m, place, strip.owner, wear.seed)
+    slow = _slow(m, place, strip.owner, wear.seed)
+    polished = strip.wear * strip.track * wear.polish
+    seam = m.below(strip.kind, SHOULDER - 0.5) * _line(
+        m, m.absolute(place.across + _SEAM_INWARDS - strip.half), _SEAM
+    )
+    joint = m.larger(seam, day_joint)
+    used = 1.0 + 0.55 * polished - 0.14 * strip.wear * strip.oil
+    brightness = (1.0 + 0.09 * own + 0.04 * slow) * used * (1.0 - 0.35 * joint)
+    roughness = 0.05 * own + 0.02 * slow - 0.3 * polished - 0.1 * joint
+    return _repaired(m, strip, Look(brightness, roughness), wear.seed)
+
+
+def concrete_look(m: Calculus, place: Place, wear: Wear, slab_length: Any) -> Look:
+    """Return how concrete differs from its mean at places.
+
+    Args:
+        m: functions for the operands.
+        place: N places.
+        wear: parameters.
+        slab_length: distance of the joints, m.
+    """
+    strip = _decode(m, place)
+    slab = m.floor(place.station / slab_length)
+    within = place.station % slab_length  # exact in float32 as well, which a difference of large quotients isn't
+    across = m.smaller(within, slab_length - within)
+    along = m.absolute(m.absolute(place.across) - strip.half) + (1.0 - m.below(strip.kind, SHOULDER - 0.5))
+    joint = _line(m, m.smaller(across, along), _SLAB_JOINT)
+    own = _signed_hash(m, strip.owner, slab, wear.seed)
+    slow = _slow(m, place, strip.owner, wear.seed)
+    polished = strip.wear * strip.track * wear.polish
+    used = 1.0 - 0.4 * polished - 0.1 * strip.wear * strip.oil
+    brightness = (1.0 + 0.06 * own + 0.03 * slow) * used * (1.0 - 0.6 * joint)
+    roughness = 0.05 * own + 0.02 * slow - 0.25 * polished - 0.25 * joint
+    return _repaired(m, strip, Look(brightness, roughness), wear.seed)
+
+
+class ArrayCalculus:
+    """`Calculus` of NumPy arrays in float64; its hash is that of Blender's White Noise texture in two dimensions."""
+
+    def floor(self, value: Float) -> Float:
+        """Return the largest whole numbers that aren't larger."""
+        return np.floor(value)
+
+    def absolute(self, value: Float) -> Float:
+        """Return values without sign."""
+        return np.abs(value)
+
+    def exponential(self, value: Float) -> Float:
+        """Return e to the power of values."""
+        return np.exp(value)
+
+    def smaller(self, value: Float, other: Float | float) -> Float:
+        """Return the smaller of two."""
+        return np.minimum(value, other)
+
+    def larger(self, value: Float, other: Float | float) -> Float:
+        """Return the larger of two."""
+        return np.maximum(value, other)
+
+    def below(self, value: Float, limit: float) -> Float:
+        """Return 1 where values are below a limit, else 0."""
+        return np.asarray(value < limit, dtype=np.float64)
+
+    def hash(self, key: Float, seed: Float | float) -> Float:
+        """Return numbers from 0 to 1 that follow from whole numbers: Jenkins' lookup3 of their bits as float32."""
+        with np.errstate(over="ignore"):
+            key, seed = np.broadcast_arrays(np.asarray(key, np.float32), np.asarray(seed, np.float32))
+            begin = np.uint32(0xDEADBEEF + (2 << 2) + 13)
+            a = np.ascontiguousarray(key).view(np.uint32) + begin
+            b = np.ascontiguousarray(seed).view(np.uint32) + begin
+            c = np.full(a.shape, begin, np.uint32)
+            for turn, (first, second) in zip((14, 11, 25, 16, 4, 14, 24), ((2, 1), (0, 2), (1, 0)) * 3, strict=False):
+                parts = [a, b, c]
+                changed = parts[first] ^ parts[second]
+                parts[first] = changed - (parts[second] << np.uint32(turn) | parts[second] >> np.uint32(32 - turn))
+                a, b, c = parts
+        return c.astype(np.float64) / float(0xFFFFFFFF)

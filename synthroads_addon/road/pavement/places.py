@@ -1,0 +1,42 @@
+"""Stations and offsets of a carriageway as places on its pavement: in which lane, how far from its middle."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...base.arrays import Float
+from ..section_geometry import CarriagewaySection
+from ..turnout_geometry import TURNOUT_STRIPS
+from .field import BAY, LANE, SHOULDER, Place, place_code
+
+
+def strip_lanes(kinds: tuple[str, ...], lanes: int) -> list[tuple[int, int]]:
+    """Return of each strip the kind that its places have, and the strip that their lane's middle is taken of.
+
+    Edge strips were paved with the lane beside them, and belong to it.
+
+    Args:
+        kinds: of the strips, innermost first, as `CarriagewaySection.kinds` has them.
+        lanes: number of lanes.
+    """
+    first = kinds.index("lane")
+    outermost = first + lanes - 1
+    known = {"hard_shoulder": SHOULDER} | {kind: BAY + number for number, kind in enumerate(TURNOUT_STRIPS)}
+    result = []
+    for number, kind in enumerate(kinds):
+        lane = min(max(number, first), outermost)
+        beside = kind in ("lane", "inner_edge_strip", "outer_edge_strip")
+        result.append((LANE + outermost - lane, lane) if beside else (known.get(kind, SHOULDER), number))
+    return result
+
+
+def pavement_places(section: CarriagewaySection, station: Float, offset: Float) -> Place:
+    """Return the places (N,) of stations and offsets (N,) on a carriageway."""
+    distances = section.distances(station)
+    distance = section.carriageway.sign * offset
+    strip = np.clip((distances[:, 1:] <= distance[:, None]).sum(axis=1), 0, len(section.kinds) - 1)
+    kind, source = np.array(strip_lanes(section.kinds, len(section.carriageway.lanes)))[strip].T
+    rows = np.arange(len(distance))
+    inner, outer = distances[rows, source], distances[rows, source + 1]
+    code = place_code(kind, int(section.carriageway.side == "left"), (outer - inner) / 2.0)
+    return Place(np.asarray(station, np.float64), distance - (inner + outer) / 2.0, code)

@@ -1,0 +1,109 @@
+"""The pavement's field: its two evaluators, and the mesh that tells the materials where they are."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+import pytest
+
+from synthroads_addon.blender.cameras.calculator import calculator
+from synthroads_addon.blender.materials import WEAR, material, vary
+from synthroads_addon.blender.materials.pavement import ATTRIBUTE, SLABS, look_group
+from synthroads_addon.blender.model.build import build_road
+from synthroads_addon.road.geometry import RoadGeometry
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.pavement.field import (
+    ArrayCalculus,
+    Place,
+    Wear,
+    asphalt_look,
+    concrete_look,
+    place_code,
+)
+from synthroads_addon.road.pavement.places import pavement_places
+from synthroads_addon.road.surroundings import Environment, MaterialVariation
+from synthroads_addon.scanning.scene.surface_values import SurfaceInput
+from tests.helpers.effects.road_cases import base_road
+
+PLACES = 100_000
+
+
+@pytest.mark.parametrize("kind", ["asphalt", "concrete"])
+def test_nodes_and_arrays_give_the_same_field(kind: str) -> None:
+    rng, wear, slab = np.random.default_rng(7), Wear(0.5, 4711.0), 4.5
+    code = place_code(rng.integers(0, 27, PLACES), rng.integers(0, 2, PLACES), 1.75)
+    across = rng.uniform(-2.5, 2.5, PLACES)
+    values = np.zeros((PLACES, 4), np.float32)
+    values[:, :3] = np.column_stack([rng.uniform(-20.0, 3000.0, PLACES), across, code])
+    slabs = np.full((PLACES, 4), slab, np.float32)
+    feed = {SurfaceInput("attribute", ATTRIBUTE): values, SurfaceInput("attribute", SLABS): slabs}
+    outputs = {"roughness": "Brightness", "specular": "Roughness"}
+    with calculator({0: _probe(kind, wear, outputs)}, tuple(outputs)) as work:
+        found = work.calculate(np.zeros(PLACES, np.intp), {what: feed[what] for what in work.inputs})
+    calculus, place = ArrayCalculus(), Place(*values[:, :3].T.astype(np.float64))
+    look = (
+        asphalt_look(calculus, place, wear) if kind == "asphalt" else concrete_look(calculus, place, wear, slab)
+    )
+    assert np.ptp(look.brightness) > 0.3 and np.ptp(look.roughness) > 0.1
+    assert found["roughness"][:, 0] == pytest.approx(look.brightness, abs=1e-5)
+    assert found["specular"][:, 0] == pytest.approx(look.roughness, abs=1e-5)
+
+
+def _probe(kind: str, wear: Wear, outputs: dict[str, str]) -> bpy.types.Material:
+    """Return a material whose layers are a field's results."""
+    probe = bpy.data.materials.new("Probe")
+    if probe.node_tree is None:
+        probe.use_nodes = True
+    nodes, links = probe.node_tree.nodes, probe.node_tree.links
+    nodes.clear()
+    group = nodes.new("ShaderNodeGroup")
+    group.node_tree = look_group(kind)
+    group.inputs["Polish"].default_value, group.inputs["Seed"].default_value = wear
+    for name, entry in ((ATTRIBUTE, "Place"), (SLABS, "Slabs")):
+        if entry in group.inputs:
+            attribute = nodes.new("ShaderNodeAttribute")
+            attribute.attribute_name = name
+            links.new(attribute.outputs["Vector"], group.inputs[entry])
+    for layer, output in outputs.items():
+        end = nodes.new("ShaderNodeOutputAOV")
+        end.aov_name = layer
+        links.new(group.outputs[output], end.inputs["Value"])
+    return probe
+
+
+def test_the_mesh_says_where_on_the_pavement_its_points_are() -> None:
+    """Widths change along this road, so that a lane's middle moves."""
+    parameters = RoadParameters.from_dict(base_road({}))
+    geometry = RoadGeometry(parameters)
+    road = build_road(parameters, 0.005, 1.0, {"road"}).objects["Road"]
+    mesh = road.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    columns = {name: np.empty(len(mesh.vertices), np.float32) for name in ("offset", SLABS)}
+    for name, column in columns.items():
+        mesh.attributes[name].data.foreach_get("value", column)
+    place = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.attributes[ATTRIBUTE].data.foreach_get("vector", place)
+    station, across, code = place.reshape(-1, 3).T.astype(np.float64)
+    paved = np.flatnonzero(code > 0.0)
+    assert len(paved) > 100
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        rows = paved[sign * columns["offset"][paved] > 0.0]
+        section = geometry.sections[side]
+        # Points on a boundary belong to the strips on both of its sides: a hair to either one is one of them.
+        found = [
+            pavement_places(section, station[rows], columns["offset"][rows].astype(np.float64) + nudge)
+            for nudge in (-1e-4, 1e-4)
+        ]
+        off = [np.abs(one.across - across[rows]) + np.abs(one.code - code[rows]) for one in found]
+        assert np.minimum(*off).max() < 1e-3, side
+        slab = section.carriageway.pavement.slab_length
+        assert columns[SLABS][rows] == pytest.approx(slab)
+
+
+def test_a_road_has_its_own_polish_and_seed() -> None:
+    item = material("asphalt")
+    before = tuple(item[WEAR])
+    vary(MaterialVariation(wheel_track_polish=0.6), Environment(), seed=3)
+    group = next(node for node in item.node_tree.nodes if node.type == "GROUP")
+    assert tuple(item[WEAR]) != before
+    assert group.inputs["Polish"].default_value == pytest.approx(0.6)
+    assert group.inputs["Seed"].default_value == item[WEAR][1] != 0.0
