@@ -132,4 +132,3 @@ class _Spoken:
                     self.held += line
                 else:
                     _say(line)
-

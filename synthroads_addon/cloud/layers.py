@@ -130,6 +130,11 @@ LAYERS: dict[str, Layer] = {
         _scalar("material", "material", "uint16", None, "1", "index of the material"),
         {"material": "uint16"},
     ),
+    "damage": Layer(
+        "Pavement Damage",
+        _scalar("damage", "damage", "uint8", None, "1", "damage of pavement, 0 none"),
+        {"damage": "uint8"},
+    ),
     "scanner": Layer(
         "Scanner",
         _vector(("scanner_x", "scanner_y", "scanner_z"), "scanner", "int32", 1e-3, "m", "pulse's origin, m,"),

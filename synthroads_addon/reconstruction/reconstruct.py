@@ -138,9 +138,7 @@ def straighten_path(cloud: RoadCloud, options: Options) -> tuple[CloudPath, floa
     return path, half
 
 
-def _axis(
-    cloud: RoadCloud, path: CloudPath, half: float, options: Options
-) -> tuple[Profiles, RoadLayout, FoundAxis]:
+def _axis(cloud: RoadCloud, path: CloudPath, half: float, options: Options) -> tuple[Profiles, RoadLayout, FoundAxis]:
     """Return profiles along a path, which lines they show, and where the axis lies."""
     profiles = make_profiles(cloud, path, half, exact=True)
     layout = find_layout(profiles, find_lines(profiles), options.road)

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..base.arrays import Bool, Float, Int
-from .section import Pothole, Rut
+from .section import Pavement, Pothole, Rut
 from .section_geometry import CarriagewaySection
 
 _SLIVER = 2e-4
@@ -14,6 +14,29 @@ _SLIVER = 2e-4
 
 _SHALLOW = 1e-6
 """Depth (m) up to which a place is undamaged: a cosine is never quite 0."""
+
+
+DAMAGES = (
+    "none",
+    "rut",
+    "pothole",
+    "patch",
+    "longitudinal crack",
+    "transverse crack",
+    "alligator cracks",
+    "sealed longitudinal crack",
+    "sealed transverse crack",
+    "sealed alligator cracks",
+)
+"""Kinds of damage by their number in the per-point layer ``damage``."""
+
+
+def damage_numbers(pavement: Pavement) -> list[int]:
+    """Return the kind of each of a pavement's damages, as `DAMAGES` numbers them, in the order of `instances`."""
+    numbers = [1] * len(pavement.ruts) + [2] * len(pavement.potholes) + [3] * len(pavement.patches)
+    first = DAMAGES.index("longitudinal crack")
+    kinds = ("longitudinal", "transverse", "alligator")
+    return numbers + [first + kinds.index(crack.kind) + len(kinds) * crack.sealed for crack in pavement.cracks]
 
 
 def damage_depth(section: CarriagewaySection, station: Float, offset: Float) -> Float:

@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Bool
 from ..base.errors import InputError
+from .damage import damage_numbers
 from .objects import RoadObject
 from .parameters import RoadParameters
-from .section import Carriageway, LineMarking
+from .section import Carriageway, LineMarking, Pavement
 from .surroundings import Terrain, Vegetation, Vehicle
 
 GRASS_STRIPS = ("left-band", "right-band", "left-verge", "right-verge", "median")
@@ -118,12 +119,20 @@ class InstanceNumbers:
         if kind == "strip":
             return GRASS_STRIPS[part]
         if isinstance(item, Carriageway):
-            return f"{'rut' if part < len(item.pavement.ruts) else 'pothole'}-{part}"
+            return f"{damage_kinds(item.pavement)[part]}-{part}"
         return f"{kind}-{part}"
 
     def part(self, name: str, part: int) -> tuple[str, int]:
         """Return the id and the number of an object's part, counted from 0."""
         return f"{name}/{self.part_name(name, part)}", self.parts[name].first + part
+
+    def damages(self) -> dict[int, int]:
+        """Return the kinds of the damages of all pavements, as `road.damage.DAMAGES` numbers them, by their numbers."""
+        return {
+            self.parts[name].first + part: kind
+            for name, item in self._parameters.of_type(Carriageway).items()
+            for part, kind in enumerate(damage_numbers(item.pavement))
+        }
 
     def owner(self, number: int) -> str | None:
         """Return the id of the object that a number is of, or of a part of; None if it stands for nothing."""
@@ -193,7 +202,7 @@ class _FreeNumbers:
 def _parts_of(item: RoadObject, parameters: RoadParameters, length: int) -> tuple[str, int, int]:
     """Return what an object consists of, of how many parts, and how many numbers are kept for them."""
     if isinstance(item, Carriageway):
-        return "damage", len(item.pavement.ruts) + len(item.pavement.potholes), 0
+        return "damage", len(damage_kinds(item.pavement)), 0
     if isinstance(item, LineMarking):
         return "dash", dash_count(item, parameters.alignment.length), math.ceil(length / _SHORTEST_PERIOD) + 1
     if isinstance(item, Vegetation) and item.kind == "grass":
@@ -201,6 +210,13 @@ def _parts_of(item: RoadObject, parameters: RoadParameters, length: int) -> tupl
     if isinstance(item, Vegetation) and parameters.terrain is not None:
         return item.kind, places_per_metre(item, parameters.terrain) * length, _PLANTS_PER_METRE * length
     return "", 0, 0
+
+
+def damage_kinds(pavement: Pavement) -> list[str]:
+    """Return what each of a pavement's damages is, in the order of their numbers."""
+    names = ("rut", "pothole", "patch", "crack")
+    items = (pavement.ruts, pavement.potholes, pavement.patches, pavement.cracks)
+    return [name for name, of_kind in zip(names, items, strict=True) for _ in of_kind]
 
 
 def places_per_metre(plants: Vegetation, terrain: Terrain) -> int:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from ..base.schema import Model, quantity, when
@@ -51,6 +52,43 @@ class Pothole(Model):
     depth: float = quantity(gt=0, le=0.3, unit="m", description="Depth at the centre.")
 
 
+Corner = tuple[
+    Annotated[float, Field(strict=True, ge=0, le=1e6)],
+    Annotated[float, Field(strict=True, ge=-100, le=100)],
+]
+"""Station and offset of a place on the pavement, m."""
+
+
+class Patch(Model):
+    """A repaired place: asphalt of its own age within a convex outline."""
+
+    outline: tuple[Corner, ...] = Field(
+        min_length=3, max_length=32, description="Stations and offsets (m) of its corners, either way around."
+    )
+    age: float = quantity(0.5, ge=0, le=1, unit="1", description="0 new and black, 1 as old as what is around it.")
+
+    @model_validator(mode="after")
+    def _is_convex(self) -> Patch:
+        corners = np.array(self.outline)
+        edges = np.roll(corners, -1, axis=0) - corners
+        ahead = np.roll(edges, -1, axis=0)
+        turns = edges[:, 0] * ahead[:, 1] - edges[:, 1] * ahead[:, 0]
+        if not (np.all(turns > 0.0) or np.all(turns < 0.0)):
+            raise ValueError("outline must be convex, without corners that lie on its edges")
+        return self
+
+
+class Crack(Model):
+    """A crack, or a net of cracks, as lines with a width; open, or sealed by a band of bitumen."""
+
+    kind: Literal["longitudinal", "transverse", "alligator"] = Field(description="How it runs; alligator is a net.")
+    width: float = quantity(ge=0.001, le=0.2, unit="m", description="Width of the gap, or of the band that seals it.")
+    sealed: bool = Field(False, description="Whether it is sealed.")
+    lines: tuple[Annotated[tuple[Corner, ...], Field(min_length=2, max_length=1000)], ...] = Field(
+        min_length=1, max_length=1000, description="Stations and offsets (m) along each of its lines."
+    )
+
+
 class Pavement(Model):
     """Pavement of a carriageway, and its damage, which is exact geometry."""
 
@@ -58,6 +96,8 @@ class Pavement(Model):
     slab_length: float = quantity(5.0, ge=2, le=20, unit="m", description="Distance of a concrete pavement's joints.")
     ruts: tuple[Rut, ...] = Field((), description="Rutting.")
     potholes: tuple[Pothole, ...] = Field((), description="Spalling and potholes.")
+    patches: tuple[Patch, ...] = Field((), description="Repaired places.")
+    cracks: tuple[Crack, ...] = Field((), description="Cracks.")
 
 
 class Carriageway(RoadObject):

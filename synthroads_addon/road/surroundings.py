@@ -114,12 +114,10 @@ class Environment(Model):
 class MaterialVariation(Model):
     """How this road's materials differ from the mean ones."""
 
-    former_fields: ClassVar = frozenset({"soil_brightness", "seed"})
+    former_fields: ClassVar = frozenset({"soil_brightness", "seed", "patch_density", "crack_density"})
 
     asphalt_age: float = quantity(0.4, ge=0, le=1, unit="1", description="0 new and black, 1 old and bright.")
     asphalt_brightness: float = quantity(1.0, ge=0.5, le=2, unit="1", description="Factor on the base colour.")
-    patch_density: float = quantity(0.0, ge=0, le=20, unit="1/100 m", description="Repaired patches per 100 m of road.")
-    crack_density: float = quantity(0.2, ge=0, le=1, unit="1", description="0 no cracks, 1 cracked all over.")
     wheel_track_polish: float = quantity(0.3, ge=0, le=1, unit="1", description="Polish of the wheel tracks.")
     concrete_brightness: float = quantity(1.0, ge=0.5, le=2, unit="1", description="Factor on the base colour.")
     paint_wear: float = quantity(0.2, ge=0, le=1, unit="1", description="Share of the markings' film worn off.")

@@ -63,12 +63,18 @@ _FIELDS: dict[str, tuple[type[Model], str]] = {
     "vegetation.shrub_height": (Vegetation, "height_min"),
     "vegetation.grass_height": (Vegetation, "height_min"),
     **{f"environment.{n}": (Environment, n) for n in EnvironmentLimits.model_fields if n in Environment.model_fields},
-    **{f"materials.{name}": (MaterialVariation, name) for name in MaterialLimits.model_fields},
+    **{
+        f"materials.{n}": (MaterialVariation, n)
+        for n in MaterialLimits.model_fields
+        if n in MaterialVariation.model_fields
+    },
 }
 """Interval of the scenario -> the field of the parameter set whose limits it must keep to."""
 _PLAIN = {
     "lane_changes.taper_length": (0.0, 1e4),
     "pavement.potholes_per_km": (0.0, 1e4),
+    "materials.patch_density": (0.0, 20.0),
+    "materials.crack_density": (0.0, 1.0),
     "vehicles.per_km": (0.0, 1e3),
     "vehicles.trucks": (0.0, 1.0),
 }

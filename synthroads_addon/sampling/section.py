@@ -34,6 +34,8 @@ from ..road.section import Carriageway, Lane, Pavement, Pothole, Ramp, Rut, Turn
 from ..road.things.limits import Interval
 from ..road.turnout_geometry import BLEND, NOSE_BEFORE_END, NOSE_WIDTH, STEP
 from ..scenario.road import FreeCrossSection, RoadScenario
+from .pavement_damage import PavementDamage
+from .placing.draw import draw_between
 
 FeatureKind = Literal["exit", "entry", "emergency_bay", "lane_change"]
 
@@ -233,7 +235,7 @@ def sample_turnout(
             taper_in_length=place.lengths[0],
             lane_length=place.lengths[1],
             taper_out_length=place.lengths[2],
-            lane_width=draw(rng, bounds(limits.bay_width, EMERGENCY_BAY_WIDTH)),
+            lane_width=draw_between(rng, bounds(limits.bay_width, EMERGENCY_BAY_WIDTH)),
             edge_strip_width=0.0,
         )
     taper, lane, ramp = place.lengths
@@ -243,9 +245,9 @@ def sample_turnout(
         taper_in_length=taper if leaving else 0.0,
         lane_length=lane,
         taper_out_length=0.0 if leaving else taper,
-        lane_width=draw(rng, bounds(limits.lane_width, TURNOUT_LANE_WIDTH)),
+        lane_width=draw_between(rng, bounds(limits.lane_width, TURNOUT_LANE_WIDTH)),
         edge_strip_width=TURNOUT_EDGE_STRIP,
-        shoulder_width=draw(rng, bounds(limits.shoulder_width)),
+        shoulder_width=draw_between(rng, bounds(limits.shoulder_width)),
         ramp=Ramp(
             length=ramp,
             clothoid_parameter=ramps.clothoid(ramp, rng.random()),
@@ -253,11 +255,6 @@ def sample_turnout(
             edge_strip_width=RAMP_EDGE_STRIP,
         ),
     )
-
-
-def draw(rng: np.random.Generator, limits: tuple[float, float]) -> float:
-    """Draw a number between two limits."""
-    return round_value(limits[0] + (limits[1] - limits[0]) * rng.random())
 
 
 def cross_section_of(scenario: RoadScenario) -> StandardCrossSection:
@@ -325,6 +322,7 @@ class CarriagewaySampler:
 
     def _carriageway(self, side: Side, lanes: tuple[Lane, ...], rng: np.random.Generator) -> Carriageway:
         section, axis = self.section, self.axis.horizontal
+        damage = PavementDamage(self.scenario.materials, self.seed, side, self.length, self._lane_edges(lanes))
         return Carriageway(
             instance=1,
             side=side,
@@ -339,23 +337,36 @@ class CarriagewaySampler:
                 kind="concrete" if self.concrete else "asphalt",
                 ruts=self._ruts(lanes, rng),
                 potholes=self._potholes(side, lanes, rng),
+                patches=damage.patches(),
+                cracks=damage.cracks(),
             ),
         )
+
+    def _lane_edges(self, lanes: tuple[Lane, ...]) -> tuple[float, ...]:
+        """Return the distances (m) of the boundaries of those lanes that are there all along, outermost first."""
+        inner = self.section.median / 2.0 + self.section.inner_edge_strip
+        steady = [lane.width if isinstance(lane.width, float) else 0.0 for lane in lanes]
+        first = next(i for i, width in enumerate(steady) if width)
+        steady = steady[first:]
+        # A lane that begins or ends is the outermost or the innermost one: the latter moves nothing outside of it.
+        if not steady[-1]:
+            inner, steady = inner + max(point.width for point in lanes[-1].width), steady[:-1]  # type: ignore[union-attr]
+        return tuple(inner + sum(steady[i:]) for i in range(len(steady) + 1))
 
     def _ruts(self, lanes: tuple[Lane, ...], rng: np.random.Generator) -> tuple[Rut, ...]:
         """Return the ruts of the outermost lane that is there all along, on a part of the road."""
         limits = self.scenario.pavement
         if rng.random() >= limits.rutted:
             return ()
-        length = self.length * draw(rng, (_SHORTEST_RUT, 1.0))
+        length = self.length * draw_between(rng, (_SHORTEST_RUT, 1.0))
         start = round_value((self.length - length) * rng.random())
         lane = next(i for i, lane in enumerate(lanes) if isinstance(lane.width, float))
-        width = draw(rng, bounds(limits.rut_width))
+        width = draw_between(rng, bounds(limits.rut_width))
         rut = Rut(
             lane=lane,
             start_station=start,
             end_station=round_value(min(start + length, self.length)),
-            depth=draw(rng, bounds(limits.rut_depth)),
+            depth=draw_between(rng, bounds(limits.rut_depth)),
             width=width,
             track=round_value(min(_WHEEL_TRACK, self.section.lanes[lane] - width)),
             ramp_length=round_value(min(_RUT_RAMP, length / 3.0)),
@@ -365,17 +376,17 @@ class CarriagewaySampler:
     def _potholes(self, side: Side, lanes: tuple[Lane, ...], rng: np.random.Generator) -> tuple[Pothole, ...]:
         """Return potholes that lie wholly on the pavement, anywhere on it."""
         limits, sign = self.scenario.pavement, 1.0 if side == "left" else -1.0
-        count = int(draw(rng, bounds(limits.potholes_per_km)) * self.length / 1000.0 + rng.random())
+        count = int(draw_between(rng, bounds(limits.potholes_per_km)) * self.length / 1000.0 + rng.random())
         inner, (smallest, largest) = self.section.median / 2.0, bounds(limits.pothole_size)
         potholes = []
         for _ in range(count if smallest <= self.length else 0):
-            length = draw(rng, (smallest, min(largest, self.length)))
-            station = draw(rng, (length / 2.0, self.length - length / 2.0))
+            length = draw_between(rng, (smallest, min(largest, self.length)))
+            station = draw_between(rng, (length / 2.0, self.length - length / 2.0))
             # A lane only grows or only shrinks: one of the ends is the narrowest place.
             paved = min(self._paved_width(lanes, station + half) for half in (-length / 2.0, length / 2.0))
-            width = min(draw(rng, (smallest, largest)), paved)
-            offset = sign * draw(rng, (inner + width / 2.0, inner + paved - width / 2.0))
-            depth = draw(rng, bounds(limits.pothole_depth))
+            width = min(draw_between(rng, (smallest, largest)), paved)
+            offset = sign * draw_between(rng, (inner + width / 2.0, inner + paved - width / 2.0))
+            depth = draw_between(rng, bounds(limits.pothole_depth))
             potholes.append(Pothole(station=station, offset=offset, length=length, width=width, depth=depth))
         return tuple(potholes)
 

@@ -20,7 +20,8 @@ from ..road.things.beacon import ConstructionBeacon
 from ..road.things.limits import Interval
 from ..road.things.temporary_barrier import TemporaryBarrier
 from ..road.things.vehicles import COLORS, HEAVY_SPEED, VEHICLE_GAP, VEHICLE_LANE_WIDTH, VEHICLE_ROOM, VEHICLE_TYPES
-from ..scenario.road import MaterialLimits, RoadScenario
+from ..scenario.road import RoadScenario
+from .pavement_damage import draw_materials
 from .placing.draw import draw
 from .placing.site import PlacementSite
 
@@ -76,9 +77,8 @@ def sample_environment(scenario: RoadScenario, seed: int) -> Environment:
 
 def sample_materials(scenario: RoadScenario, seed: int) -> MaterialVariation:
     """Return how the materials of a seed differ from the mean."""
-    rng = stream(seed, "materials")
-    values = {name: draw(rng, getattr(scenario.materials, name)) for name in MaterialLimits.model_fields}
-    return MaterialVariation(**values)
+    drawn = draw_materials(scenario.materials, seed)
+    return MaterialVariation(**{name: value for name, value in drawn.items() if name in MaterialVariation.model_fields})
 
 
 # --- plants ----------------------------------------------------------------------------------------------------------

@@ -93,3 +93,8 @@ def _true_xyz(points: MeasuredPoints) -> AnyArray:
 @fills("material")
 def _material(points: MeasuredPoints) -> AnyArray:
     return points.target.face_values("material", points.face)
+
+
+@fills("damage")
+def _damage(points: MeasuredPoints) -> AnyArray:
+    return points.target.face_values("damage", points.face)

@@ -147,7 +147,7 @@ class MaterialLimits(ClosedModel):
 
     asphalt_age: Interval = interval(0.0, 1.0, "1", "0 new and black, 1 old and bright.")
     asphalt_brightness: Interval = interval(0.85, 1.2, "1", "Factor on the base colour.")
-    patch_density: Interval = interval(0.0, 2.0, "1/100 m", "Repaired patches per 100 m.")
+    patch_density: Interval = interval(0.0, 2.0, "1/100 m", "Repaired patches per 100 m of each carriageway.")
     crack_density: Interval = interval(0.0, 0.6, "1", "0 no cracks, 1 cracked all over.")
     wheel_track_polish: Interval = interval(0.0, 0.6, "1", "Polish of the wheel tracks.")
     concrete_brightness: Interval = interval(0.85, 1.2, "1", "Factor on the base colour.")

@@ -73,11 +73,13 @@ def test_a_strip_narrower_than_the_footprint_is_mixed_with_what_lies_beside() ->
     wide, narrow = (
         Expectation(views, Receiver((2e-3, 2e-3), range_corrected=True), strip=width) for width in (2.0, 0.05)
     )
-    assert np.median(wide.linear_intensities(PAINT, ASPHALT)) == pytest.approx(PAINT.reflectivity + 1.0)
+    assert np.median(wide.linear_intensities(PAINT, ASPHALT)) == pytest.approx(
+        PAINT.reflectivity + PAINT.retroreflection
+    )
     mixed = narrow.linear_intensities(PAINT, ASPHALT)
-    assert ASPHALT.reflectivity < mixed.mean() < 0.6 * (PAINT.reflectivity + 1.0)
+    assert ASPHALT.reflectivity < mixed.mean() < 0.6 * (PAINT.reflectivity + PAINT.retroreflection)
     # The middle of a Gaussian beam of the radius w on a strip of the width b: erf(b / sqrt 2 / w).
-    assert mixed.max() < 0.45 * (PAINT.reflectivity + 1.0) + ASPHALT.reflectivity
+    assert mixed.max() < 0.45 * (PAINT.reflectivity + PAINT.retroreflection) + ASPHALT.reflectivity
 
 
 def test_receiver_writes_linear_numbers_or_decibels_and_back() -> None:

@@ -73,10 +73,14 @@ def test_sheeting_falls_off_as_the_standard_allows() -> None:
     assert 0.25 < returned(white, 5) / (math.pi * standard[5]) < 1.0
 
 
-def test_beaded_paint_is_one_to_three_from_above_and_seen_by_headlamps() -> None:
-    """EN 1436, class R2: 100 mcd/m2/lx at an entrance angle of 88.76 degrees; pi times that is the effective one."""
+def test_beaded_paint_is_as_bright_from_above_as_in_real_scans_and_seen_by_headlamps() -> None:
+    """EN 1436, class R2: 100 mcd/m2/lx at an entrance angle of 88.76 degrees; pi times that is the effective one.
+
+    Airborne scans have markings 3.9 to 5.1 dB above asphalt, and footprints as wide as a line take 1 to 3 dB of it.
+    """
     for name in PAINTS:
-        assert 1.0 < returned(materials()[name], 0.0) < 3.0
+        over_asphalt = returned(materials()[name], 0.0) / returned(materials()["asphalt"], 0.0)
+        assert 5.5 < 10.0 * math.log10(over_asphalt) < 8.0
         assert returned(materials()[name], 88.76) == pytest.approx(math.pi * 0.1, rel=0.3)
 
 

@@ -13,11 +13,10 @@ from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
 from tests.helpers.effects import without_effect
 from tests.helpers.effects.field_paths import fields_of, other_values, value_at, with_value
-from tests.helpers.effects.limit_cases import CASES, NOT_BUILT, SAYS, SEEDS, LimitCase
+from tests.helpers.effects.limit_cases import CASES, SAYS, SEEDS, LimitCase
 
 FIELDS = {field.path: field for field in fields_of(RoadScenario)}
 SAY = "say in tests/helpers/effects/limit_cases.py"
-LISTED = {path for path in FIELDS if path in SAYS or path.rpartition(".")[0] in NOT_BUILT}
 
 
 def _end_of_interval(data: Any, path: str) -> Iterator[Any]:
@@ -59,7 +58,7 @@ def changed_limits(path: str) -> tuple[RoadScenario, RoadScenario]:
 def with_effect(parameters: RoadParameters) -> str:
     """Return a parameter set as text, less the fields that have no effect."""
     data: Any = parameters.to_dict()
-    listed = [*without_effect.NOT_BUILT, *without_effect.SAYS]
+    listed = without_effect.SAYS
     for path in (path for path in listed if not path[0].isupper()):
         part, _, name = path.rpartition(".")
         (data[part] if part else data).pop(name, None)
@@ -81,8 +80,6 @@ def seeds_that_show(path: str) -> Iterator[int]:
 
 def test_no_list_names_a_limit_that_there_is_none_of() -> None:
     assert {*CASES, *SAYS} <= FIELDS.keys()
-    assert {path.rpartition(".")[0] for path in LISTED - SAYS} == NOT_BUILT
-    assert {f"{path}" for path in NOT_BUILT} <= without_effect.NOT_BUILT
 
 
 @pytest.mark.slow
@@ -90,7 +87,7 @@ def test_no_list_names_a_limit_that_there_is_none_of() -> None:
 @pytest.mark.parametrize("path", sorted(FIELDS))
 def test_every_limit_changes_roads(path: str) -> None:
     shown = next(seeds_that_show(path), None)
-    if path in LISTED:
+    if path in SAYS:
         assert shown is None, f"{path} has an effect: take it from the list of what has none"
     else:
         assert shown is not None, f"no road shows {path}"
@@ -98,7 +95,7 @@ def test_every_limit_changes_roads(path: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.any_blender
-@pytest.mark.parametrize("path", sorted(LISTED))
+@pytest.mark.parametrize("path", sorted(SAYS))
 def test_a_limit_without_effect_is_written(path: str) -> None:
     before, after = changed_limits(path)
     assert any(sample_road(before, seed).to_dict() != sample_road(after, seed).to_dict() for seed in SEEDS)

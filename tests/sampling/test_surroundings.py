@@ -25,7 +25,7 @@ from synthroads_addon.road.parameters import (
     read_parameters,
 )
 from synthroads_addon.road.section import Carriageway
-from synthroads_addon.road.surroundings import SPECIES, Terrain, Vegetation, Vehicle
+from synthroads_addon.road.surroundings import SPECIES, MaterialVariation, Terrain, Vegetation, Vehicle
 from synthroads_addon.road.things.beacon import ConstructionBeacon
 from synthroads_addon.road.things.limits import Interval
 from synthroads_addon.road.things.temporary_barrier import TemporaryBarrier
@@ -39,7 +39,7 @@ from synthroads_addon.sampling.surroundings import (
     sample_vegetation,
     sample_vehicles,
 )
-from synthroads_addon.scenario.road import EnvironmentLimits, MaterialLimits, RoadScenario
+from synthroads_addon.scenario.road import EnvironmentLimits, RoadScenario
 
 SEEDS = range(300)
 
@@ -110,7 +110,7 @@ def test_terrain_names_its_elevation_model() -> None:
 def test_materials_cover_their_limits() -> None:
     scenario = RoadScenario()
     drawn = [sample_materials(scenario, seed) for seed in SEEDS]
-    for name in MaterialLimits.model_fields:
+    for name in MaterialVariation.model_fields:
         assert_covers((getattr(item, name) for item in drawn), getattr(scenario.materials, name))
 
 

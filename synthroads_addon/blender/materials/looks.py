@@ -167,7 +167,13 @@ _BEFORE_NOISES: dict[str, Callable[[Shade], None]] = {
     "car_paint": _paint,
     "tarpaulin": lambda shade: _paint(shade, _COVER_TINT),
 }
-_AFTER_NOISES = {"paint_white": _film, "paint_yellow": _film, "barrier_concrete": _joints, "birch_bark": _scars, "acrylic_glass": _clear}
+_AFTER_NOISES = {
+    "paint_white": _film,
+    "paint_yellow": _film,
+    "barrier_concrete": _joints,
+    "birch_bark": _scars,
+    "acrylic_glass": _clear,
+}
 
 
 def is_worn(name: str) -> bool:

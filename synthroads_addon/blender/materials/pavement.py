@@ -73,15 +73,16 @@ def _build(tree: Tree, kind: str) -> None:
         tree.number("Seed", 0.0, (0.0, 65535.0), description="Seed of all that is random"),
     )
     calculus = NodeCalculus(tree)
-    if kind == "concrete":
-        # As a vector: a number taken from a colour is its luminance, whose weights don't add up to 1 exactly.
-        slab = tree.input("Slabs", "Vector", description="Distance of joints (m), three times")
+    # As a vector: a number taken from a colour is its luminance, whose weights don't add up to 1 exactly.
+    slabs = (
+        tree.input("Slabs", "Vector", description="Distance of joints (m), three times") if kind == "concrete" else None
+    )
     with tree.frame("Field of station and offset"):
         parts = Place(*(op.component(place, axis) for axis in "XYZ"))
-        if kind == "concrete":
-            look = concrete_look(calculus, parts, wear, op.component(slab, "X"))
-        else:
+        if slabs is None:
             look = asphalt_look(calculus, parts, wear)
+        else:
+            look = concrete_look(calculus, parts, wear, op.component(slabs, "X"))
     tree.output("Brightness", look.brightness, description="Factor on base colour and specular")
     tree.output("Roughness", look.roughness, description="What is added to the roughness")
 

@@ -270,7 +270,7 @@ class _Build:
         return RoadModel(root, collection, builder.objects, origin)
 
 
-_CLASSES = {"Road": "road", "Terrain": "ground", "Painted Areas": "road_marking"} | {
+_CLASSES = {"Road": "road", "Terrain": "ground", "Painted Areas": "road_marking", "Damaged Areas": "road"} | {
     role: kind.points_class for role, kind in POSTS.items()
 }
 """Classes of parts that are no thing of the parameter set by themselves."""

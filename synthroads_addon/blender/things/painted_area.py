@@ -1,8 +1,9 @@
-"""Painted areas, hatching and arrows: outlines in stations and offsets, laid on the pavement (SR Painted Area)."""
+"""Areas on the pavement as outlines in stations and offsets: SR Painted Area; SR Damaged Area, patches and cracks."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -11,10 +12,12 @@ from numpy.typing import NDArray
 from ...base.classes import class_id
 from ...base.stepper import run_aside
 from ...road.paint import arrow_outlines, hatching_outlines, pieces
-from ...road.section import Arrow, Hatching
+from ...road.pavement.field import OPEN_CRACK, PATCH, SEALED_CRACK, damage_code
+from ...road.pavement.outlines import crack_outlines, patch_outline
+from ...road.section import Arrow, Carriageway, Hatching
 from ..nodes import operations as op
 from ..nodes.backbone import height_on, look_up, station_ribbon
-from ..nodes.builder import Tree, makes_group
+from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.inputs import Inputs, backbone_socket, material_of, socket
 from ..nodes.solids import paint_faces
 from .meshes import attribute, fill_polygons, signed_instance
@@ -24,11 +27,17 @@ from .registry import model_part
 _LONGEST = 1.0
 """Outlines are cut into pieces no longer than this (m), so that they follow the road's curves and its crossfall."""
 
+CRACK_FILM, PATCH_FILM = 0.0004, 0.0008
+"""Height of the faces of cracks and patches above the pavement, m: below any marking's film, patches over cracks."""
 
-class _PaintedArea(Inputs):
+
+class _Outlines(Inputs):
     outlines = socket("Geometry", "Faces with x = station, y = offset")
     backbone = backbone_socket("Object")
-    road = socket("Object", "Surface that is painted")
+    road = socket("Object", "Surface that they lie on")
+
+
+class _Paint(Inputs):
     material = material_of("the paint", "paint_white")
     yellow_material = material_of("temporary paint", "paint_yellow")
 
@@ -39,8 +48,38 @@ def painted_area_group(tree: Tree) -> None:
 
     Their points carry ``film`` (m), ``instance`` and ``yellow`` (0 or 1).
     """
-    area = _PaintedArea(tree)
+    outlines, paint = _Outlines(tree), _Paint(tree)
+    mesh = _lay(outlines)
+    with tree.frame("Labels"):
+        mesh = op.label(mesh, class_id("road_marking"), op.named_attribute(tree, "instance", "INT"), paint.material)
+        temporary = op.named_attribute(tree, "yellow") > 0.5
+        mesh = paint_faces(mesh, paint.yellow_material, temporary)
+    tree.output("Mesh", mesh, description="Paint whose faces look up")
 
+
+class _Damage(Inputs):
+    material = material_of("cracks in asphalt, and patches", "asphalt")
+    concrete_material = material_of("cracks in concrete", "concrete")
+
+
+@makes_group("SR Damaged Area")
+def damaged_area_group(tree: Tree) -> None:
+    """Patches and cracks given by stations and offsets, laid on the pavement, which is no thicker there.
+
+    Their points carry ``film`` (m), ``instance``, ``concrete`` (0 or 1), and ``pavement``, the place that the materials
+    read.
+    """
+    outlines, damage = _Outlines(tree), _Damage(tree)
+    mesh = _lay(outlines)
+    with tree.frame("Labels"):
+        mesh = op.label(mesh, class_id("road"), op.named_attribute(tree, "instance", "INT"), damage.material)
+        mesh = paint_faces(mesh, damage.concrete_material, op.named_attribute(tree, "concrete") > 0.5)
+    tree.output("Mesh", mesh, description="Pavement whose faces look up")
+
+
+def _lay(area: _Outlines) -> Value:
+    """Return the outlines laid on the road, each point as far above it as its ``film`` says."""
+    tree = area.tree
     with tree.frame("Place in plan"):
         ribbon = station_ribbon(op.object_geometry(area.backbone))
         station, offset = (op.component(op.position(tree), axis) for axis in ("X", "Y"))
@@ -49,12 +88,7 @@ def painted_area_group(tree: Tree) -> None:
         surface = op.object_geometry(area.road)
         height = height_on(surface, surface, plan) + op.named_attribute(tree, "film")
         flat = plan * (1.0, 1.0, 0.0)
-        mesh = op.set_position(area.outlines, flat + op.vector(tree, 0.0, 0.0, height))
-    with tree.frame("Labels"):
-        mesh = op.label(mesh, class_id("road_marking"), op.named_attribute(tree, "instance", "INT"), area.material)
-        temporary = op.named_attribute(tree, "yellow") > 0.5
-        mesh = paint_faces(mesh, area.yellow_material, temporary)
-    tree.output("Mesh", mesh, description="Paint whose faces look up")
+        return op.set_position(area.outlines, flat + op.vector(tree, 0.0, 0.0, height))
 
 
 @model_part("painted_areas", 30, on_the_road=True)
@@ -63,16 +97,64 @@ def build_painted_areas(builder: ModelBuilder) -> None:
     outlines = run_aside(lambda: list(_outlines(builder)))
     if not outlines:
         return
-    polygons = [polygon for polygon, _ in outlines]
-    sizes = [len(polygon) for polygon in polygons]
-    mesh = bpy.data.meshes.new("SR Painted Areas")
-    corners = np.concatenate(polygons)
-    fill_polygons(mesh, np.column_stack([corners - [builder.zero, 0.0], np.zeros(len(corners))]), sizes)
+    mesh, sizes = _polygons_mesh("SR Painted Areas", [polygon for polygon, _ in outlines], builder.zero)
     items = [item for _, item in outlines]
     attribute(mesh, "film", np.repeat([item.film_thickness for item in items], sizes))
     attribute(mesh, "yellow", np.repeat([float(item.color == "yellow") for item in items], sizes))
     attribute(mesh, "instance", np.repeat(signed_instance([item.instance for item in items]), sizes))
     builder.add("Painted Areas", mesh, painted_area_group())
+
+
+@model_part("damaged_areas", 31, on_the_road=True)
+def build_damaged_areas(builder: ModelBuilder) -> None:
+    """Make all patches and cracks as one object."""
+    areas = run_aside(lambda: list(_damaged(builder)))
+    if not areas:
+        return
+    mesh, sizes = _polygons_mesh("SR Damaged Areas", [area.outline for area in areas], builder.zero)
+
+    attribute(mesh, "film", np.repeat([area.film for area in areas], sizes))
+    attribute(mesh, "concrete", np.repeat([float(area.concrete) for area in areas], sizes))
+    attribute(mesh, "instance", np.repeat(signed_instance([area.instance for area in areas]), sizes))
+    attribute(mesh, "pavement", np.repeat([(0.0, 0.0, area.code) for area in areas], sizes, axis=0))
+    builder.add("Damaged Areas", mesh, damaged_area_group())
+
+
+class _Area(NamedTuple):
+    """A face of a patch or crack: its outline (K, 2), height above the pavement (m), and what the materials read."""
+
+    outline: NDArray[np.float64]
+    film: float
+    instance: int
+    code: float
+    concrete: bool
+
+
+def _damaged(builder: ModelBuilder) -> Iterator[_Area]:
+    numbers = builder.geometry.numbers
+    # Of the whole road, as an area may reach over the end of the stretch.
+    for name, carriageway in builder.geometry.parameters.of_type(Carriageway).items():
+        pavement = carriageway.pavement
+        part = len(pavement.ruts) + len(pavement.potholes)
+        for patch in pavement.patches:
+            instance, code = numbers.part(name, part)[1], damage_code(PATCH, patch.age)
+            for piece in _pieces(patch_outline(patch), *builder.stretch):
+                yield _Area(piece, PATCH_FILM, instance, code, False)
+            part += 1
+        for crack in pavement.cracks:
+            instance, code = numbers.part(name, part)[1], damage_code(SEALED_CRACK if crack.sealed else OPEN_CRACK)
+            for outline in crack_outlines(crack):
+                for piece in _pieces(outline, *builder.stretch):
+                    yield _Area(piece, CRACK_FILM, instance, code, pavement.kind == "concrete" and not crack.sealed)
+            part += 1
+
+
+def _polygons_mesh(name: str, polygons: list[NDArray[np.float64]], zero: float) -> tuple[bpy.types.Mesh, list[int]]:
+    """Return a mesh of outlines (K, 2) in stations and offsets, the former from a station (m) on, and their sizes."""
+    sizes, corners = [len(polygon) for polygon in polygons], np.concatenate(polygons)
+    mesh = bpy.data.meshes.new(name)
+    fill_polygons(mesh, np.column_stack([corners - [zero, 0.0], np.zeros(len(corners))]), sizes)
+    return mesh, sizes
 
 
 def _outlines(builder: ModelBuilder) -> Iterator[tuple[NDArray[np.float64], Hatching | Arrow]]:

@@ -17,6 +17,7 @@ from ...materials.surfaces import surfaces_of
 from ...materials.table import Material
 from ...materials.variation import vary_material
 from ...road.geometry import RoadGeometry
+from ...road.instances import InstanceNumbers
 from ...scanning.blocks import Blocks
 from ...scanning.colour.colour import takes_nodes
 from ...scanning.colour.request import LayerRequest
@@ -89,7 +90,9 @@ def plan_scan(
     cut = Blocks(setting, path, 1 + sum(rings))
     refuse_large(forecast_scan(cut, len(scene.static), scan.threads), scan.most_pulses)
     means = services.materials(materials)
-    target = Target(scene, lambda mesh: services.caster(scan.caster, mesh))
+    road = conditions.road
+    damages = InstanceNumbers(road).damages() if road is not None and "damage" in kept else {}
+    target = Target(scene, lambda mesh: services.caster(scan.caster, mesh), damages)
     relief = micro_relief(materials, means) if shifts else None
     scanned = [
         vary_material(name, conditions.variation, conditions.environment, table) if name in table else mean

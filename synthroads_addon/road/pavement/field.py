@@ -9,10 +9,10 @@ What is in it, and where its figures come from:
   polish the aggregate: asphalt is brighter and smoother there, concrete darker by rubber. Heavy vehicles keep to the
   right, so that the tracks fade from lane to lane inwards.
 - **Oil** and dirt drip between the tracks: a darker strip along the lane's middle.
-- **Joints** of asphalt: the paver's lengthwise joint beside each lane's outer boundary, and those at the ends of a day's
-  work, sealed by bitumen; what was paved at once is as bright as itself and differs from its neighbours.
-- **Slabs** of concrete: joints every slab length and between lanes, sealed (ZTV Beton-StB: 8 to 10 mm wide); each slab is
-  of its own pour.
+- **Joints** of asphalt: the paver's lengthwise joint beside each lane's outer boundary, and those at the ends of a
+  day's work, sealed by bitumen; what was paved at once is as bright as itself and differs from its neighbours.
+- **Slabs** of concrete: joints every slab length and between lanes, sealed (ZTV Beton-StB: 8 to 10 mm wide); each slab
+  is of its own pour.
 - **Patches** are new and black, or older; open cracks are dark; sealed ones are a smooth band of bitumen.
 
 Amplitudes: airborne scans of two German dual carriageways have medians of intensity, by offset, that are 0.15 to 0.3 dB
@@ -28,11 +28,11 @@ import numpy as np
 from ...base.arrays import Float
 
 CODES, HALF_UNIT = 32, 16.0
-"""A place's code is the kind of strip, 32 times the number of what it belongs to, and the half width of its lane as a share
-of 16 m."""
+"""A place's code is the kind of strip, 32 times the number of what it belongs to, and the half width of its lane as a
+share of 16 m; of a patch it is the age."""
 LANE, SHOULDER, BAY = 1, 9, 10
-"""Kinds of strips: of the outermost lane, those of the others follow; those that no lane's traffic wears. 0 is a place of
-which nothing is known: it has its material's mean."""
+"""Kinds of strips: of the outermost lane, those of the others follow; those that no lane's traffic wears. 0 is a place
+of which nothing is known: it has its material's mean."""
 PATCH, OPEN_CRACK, SEALED_CRACK = 24, 25, 26
 """Kinds of repaired and damaged places; above the strips'."""
 
@@ -122,6 +122,11 @@ def place_code(kind: Any, number: Any, half_width: Any = 0.0) -> Any:
     return kind + CODES * number + half_width / HALF_UNIT
 
 
+def damage_code(kind: int, age: float = 0.0) -> float:
+    """Return the code of places on a patch of an age (0 to 1), or on a crack."""
+    return kind + min(age, 0.999)
+
+
 class _Strip(NamedTuple):
     """Decoded place: whose it is, the lane's half width (m), the traffic's wear, whether it is a strip, its tracks."""
 
@@ -172,9 +177,9 @@ def _days(m: Calculus, place: Place, owner: Any, seed: Any) -> tuple[Any, Any]:
     return _signed_hash(m, owner, day, seed), _line(m, edge, _SEAM)
 
 
-def _repaired(m: Calculus, strip: _Strip, look: Look, seed: Any) -> Look:
+def _repaired(m: Calculus, strip: _Strip, look: Look) -> Look:
     """Return the look where patches and cracks have theirs in place of the pavement's."""
-    age = m.hash(strip.owner, seed + 2.0)
+    age = strip.half * (1.0 / HALF_UNIT)
     sealed, cracked = 1.0 - m.below(strip.kind, SEALED_CRACK - 0.5), 1.0 - m.below(strip.kind, OPEN_CRACK - 0.5)
     brightness = (0.72 + 0.36 * age) * (1.0 - cracked) + cracked * 0.45 - sealed * 0.05
     roughness = (0.06 - 0.1 * age) * (1.0 - cracked) + cracked * 0.05 - sealed * 0.4
@@ -198,14 +203,12 @@ def asphalt_look(m: Calculus, place: Place, wear: Wear) -> Look:
     own, day_joint = _days(m, place, strip.owner, wear.seed)
     slow = _slow(m, place, strip.owner, wear.seed)
     polished = strip.wear * strip.track * wear.polish
-    seam = m.below(strip.kind, SHOULDER - 0.5) * _line(
-        m, m.absolute(place.across + _SEAM_INWARDS - strip.half), _SEAM
-    )
+    seam = m.below(strip.kind, SHOULDER - 0.5) * _line(m, m.absolute(place.across + _SEAM_INWARDS - strip.half), _SEAM)
     joint = m.larger(seam, day_joint)
     used = 1.0 + 0.55 * polished - 0.14 * strip.wear * strip.oil
     brightness = (1.0 + 0.09 * own + 0.04 * slow) * used * (1.0 - 0.35 * joint)
     roughness = 0.05 * own + 0.02 * slow - 0.3 * polished - 0.1 * joint
-    return _repaired(m, strip, Look(brightness, roughness), wear.seed)
+    return _repaired(m, strip, Look(brightness, roughness))
 
 
 def concrete_look(m: Calculus, place: Place, wear: Wear, slab_length: Any) -> Look:
@@ -229,7 +232,7 @@ def concrete_look(m: Calculus, place: Place, wear: Wear, slab_length: Any) -> Lo
     used = 1.0 - 0.4 * polished - 0.1 * strip.wear * strip.oil
     brightness = (1.0 + 0.06 * own + 0.03 * slow) * used * (1.0 - 0.6 * joint)
     roughness = 0.05 * own + 0.02 * slow - 0.25 * polished - 0.25 * joint
-    return _repaired(m, strip, Look(brightness, roughness), wear.seed)
+    return _repaired(m, strip, Look(brightness, roughness))
 
 
 class ArrayCalculus:

@@ -1,4 +1,4 @@
-"""The two draws of the placement: a number from an interval of the scenario, and one of several choices."""
+"""Draws: a number from an interval of the scenario, or between two others, and one of several choices."""
 
 from collections.abc import Sequence
 from typing import TypeVar
@@ -15,6 +15,11 @@ def draw(rng: np.random.Generator, limits: Interval) -> float:
     """Return a number within limits, each with the same chance."""
     low, high = limits.minimum, limits.maximum
     return min(max(round_value(low + (high - low) * rng.random()), low), high)
+
+
+def draw_between(rng: np.random.Generator, limits: tuple[float, float]) -> float:
+    """Return a number between two limits, each with the same chance."""
+    return round_value(limits[0] + (limits[1] - limits[0]) * rng.random())
 
 
 def pick(rng: np.random.Generator, options: Sequence[T]) -> T:

@@ -1,12 +1,13 @@
 """Target of rays: the static scene and what moves in it, their faces numbered one after the other."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ...base.arrays import AnyArray, Bool, Float, Float32, Index
+from ...base.arrays import AnyArray, Bool, Float, Float32, Index, UInt8
 from ...base.classes import UNLABELLED
 from ...cloud.points import NO_MATERIAL
 from ..knots import PoseCache, Track, track_knots
@@ -20,7 +21,7 @@ SUN_REACH = 2000.0
 CLEARANCE = np.array([2.5, 1.0, 3.0])
 """Room that a vehicle which carries the scanner takes around it: half its length and width, and its height, m."""
 
-_NO_FACE = {"class_id": UNLABELLED, "instance_id": 0, "material": NO_MATERIAL}
+_NO_FACE = {"class_id": UNLABELLED, "instance_id": 0, "material": NO_MATERIAL, "damage": 0}
 
 
 @dataclass(frozen=True)
@@ -62,17 +63,24 @@ class Target:
     Args:
         scene: static mesh and moving ones.
         make_caster: gives a caster of a mesh.
+        damages: what instance numbers are of, as `road.damage.DAMAGES` numbers it; of no other there is damage.
 
     Attributes:
         class_id: (F,) uint8 of all faces.
         instance_id: (F,) uint32.
         material: (F,) uint16 indices into ``materials``.
+        damage: (F,) uint8.
         origin: (3,) float64 map coordinates of the local origin, m.
         caster: the static mesh's.
         bounds: (2, 3) float64 smallest and largest corner of the static mesh, m; None without vertices.
     """
 
-    def __init__(self, scene: ScannedScene, make_caster: Callable[[SceneMesh], Caster]) -> None:
+    def __init__(
+        self,
+        scene: ScannedScene,
+        make_caster: Callable[[SceneMesh], Caster],
+        damages: Mapping[int, int] | None = None,
+    ) -> None:
         static = scene.static
         self.materials = static.materials
         self.origin = static.origin
@@ -82,6 +90,7 @@ class Target:
         self.class_id = _join_arrays([mesh.class_id for mesh in meshes])
         self.instance_id = _join_arrays([mesh.instance_id for mesh in meshes])
         self.material = _join_arrays([mesh.material for mesh in meshes])
+        self.damage = _damage_of(self.instance_id, damages or {})
         self.triangles = len(self.class_id)
         self.vertices = sum(len(mesh.vertices) for mesh in meshes)
         firsts = np.cumsum([0, *(len(mesh.triangles) for mesh in meshes)])
@@ -92,7 +101,7 @@ class Target:
         self.bounds = static.vertex_bounds()
 
     def face_values(self, name: str, faces: Index) -> AnyArray:
-        """Return ``class_id``, ``instance_id`` or ``material`` of faces (H,); of -1 what stands for none."""
+        """Return ``class_id``, ``instance_id``, ``material``, ``damage`` of faces (H,); of -1 what stands for none."""
         values = getattr(self, name)
         if not len(faces) or faces.min() >= 0:
             return np.asarray(values[faces])
@@ -297,3 +306,14 @@ def _hide(part: _TargetPart, track: Track, rays: Bundles, reach: float, free: Bo
 def _inverse(rotation: Float, vectors: Float) -> Float:
     """Return vectors (3, N) turned back by rotations (9, N)."""
     return np.asarray(np.einsum("jin,jn->in", rotation.reshape(3, 3, -1), vectors))
+
+
+def _damage_of(instance: NDArray[np.uint32], damages: Mapping[int, int]) -> UInt8:
+    """Return the damage (F,) of faces by their instance numbers."""
+    result = np.zeros(len(instance), np.uint8)
+    if damages:
+        numbers = np.array(sorted(damages), np.int64)
+        kinds = np.array([damages[number] for number in numbers.tolist()], np.uint8)
+        at = np.minimum(np.searchsorted(numbers, instance), len(numbers) - 1)
+        result = np.where(numbers[at] == instance, kinds[at], result)
+    return result

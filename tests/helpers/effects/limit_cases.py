@@ -74,7 +74,5 @@ CASES: dict[str, LimitCase] = {
     "assets": LimitCase(value=["roadside"]),
 }
 """Path of a limit -> how it is looked at; see `LimitCase`."""
-NOT_BUILT = {f"materials.{name}" for name in ("crack_density", "patch_density", "wheel_track_polish")}
-"""Limits of what isn't built."""
 SAYS = {"epsg"}
 """Limits that only say something: in which coordinates the road stands."""

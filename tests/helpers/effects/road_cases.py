@@ -141,6 +141,15 @@ CASES: dict[str, Case] = {
     "Terrain.elevation_model": Case(value=str(ELEVATIONS)),
     "Carriageway.pavement.ruts": Case(owner="right"),
     "Carriageway.pavement.potholes": Case(owner="right"),
+    "Carriageway.pavement.patches": Case(owner="right", value=[]),
+    "Carriageway.pavement.patches[].outline": Case(
+        owner="right", value=[[5.0, -5.0], [15.0, -5.0], [15.0, -3.5], [5.0, -3.5]]
+    ),
+    "Carriageway.pavement.cracks": Case(owner="right", value=[]),
+    "Carriageway.pavement.cracks[].lines": Case(owner="right", value=[[[8.0, -6.0], [55.0, -7.0]]]),
+    "Carriageway.pavement.cracks[].kind": Case(
+        owner="right", scan={"cloud.attributes": ["range", "incidence", "damage"]}
+    ),
     "LineMarking.instance": Case(owner="free"),
 }
 """Path of a field -> how it is looked at; see `Case`. A field that isn't here is looked at on the usual objects."""
@@ -183,6 +192,8 @@ def base_road(objects: dict[str, Data]) -> Data:
 DAMAGE = {
     "ruts": [{"lane": 0, "start_station": 10.0, "end_station": 50.0, "depth": 0.03}],
     "potholes": [{"station": 20.0, "offset": -5.0, "length": 1.0, "width": 0.8, "depth": 0.05}],
+    "patches": [{"outline": [[5.0, -5.0], [15.0, -5.0], [15.0, -3.0], [5.0, -3.0]], "age": 0.1}],
+    "cracks": [{"kind": "longitudinal", "width": 0.15, "lines": [[[8.0, -6.0], [30.0, -6.2], [55.0, -6.0]]]}],
 }
 
 

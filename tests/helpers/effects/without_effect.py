@@ -1,4 +1,4 @@
-"""Fields that change neither the model nor the points: what isn't built, and what only says something."""
+"""Fields that change neither the model nor the points: they only say something."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -8,14 +8,6 @@ from typing import Any
 from synthroads_addon.checking.checker import check
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.twin.formats import write_twin
-
-NOT_BUILT = {
-    "materials.crack_density",
-    "materials.patch_density",
-    "materials.wheel_track_polish",
-    "Carriageway.pavement.slab_length",
-}
-"""Fields of a parameter set that nothing shows yet; the documentation says so."""
 
 
 def set_of(parameters: RoadParameters) -> Any:

@@ -13,8 +13,10 @@ import numpy as np
 from synthroads_addon.base.schema import ClosedModel, Model
 from synthroads_addon.road.guidelines import LIMITS
 from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.surroundings import MaterialVariation
 from synthroads_addon.road.things.limits import Interval
 from synthroads_addon.road.things.vehicles import VEHICLE_TYPES
+from synthroads_addon.sampling.pavement_damage import CRACKS_PER_KM
 from synthroads_addon.scenario.road import RoadScenario
 
 Objects = dict[str, list[Any]]
@@ -93,10 +95,15 @@ def _lane_tapers(objects: Objects, _: RoadParameters) -> Iterator[float]:
                 yield from (b.station - a.station for a, b in pairwise(lane.width) if a.width != b.width)
 
 
-def _potholes_per_km(objects: Objects, parameters: RoadParameters) -> Iterator[float]:
-    if parameters.alignment.length > LONG:
-        for road in objects["Carriageway"]:
-            yield len(road.pavement.potholes) / parameters.alignment.length * 1000.0
+def _damages(kind: str, length: float) -> Extractor:
+    """Return what gives how many damages of a kind there are in a length (m) of each carriageway."""
+
+    def per_length(objects: Objects, parameters: RoadParameters) -> Iterator[float]:
+        if parameters.alignment.length > LONG:
+            for road in objects["Carriageway"]:
+                yield len(getattr(road.pavement, kind)) / parameters.alignment.length * length
+
+    return per_length
 
 
 def _cabinets_per_km(objects: Objects, parameters: RoadParameters) -> Iterator[float]:
@@ -166,7 +173,7 @@ EXTRACTORS: dict[str, Extractor] = {
     "turnouts.bay_width": _turnout(lambda item: item.lane_width, bay=True),
     "pavement.rut_depth": _damage("ruts", "depth"),
     "pavement.rut_width": _damage("ruts", "width"),
-    "pavement.potholes_per_km": _potholes_per_km,
+    "pavement.potholes_per_km": _damages("potholes", 1000.0),
     "pavement.pothole_size": _damage("potholes", "length", "width"),
     "pavement.pothole_depth": _damage("potholes", "depth"),
     "markings.film_thickness": _field("LineMarking", "film_thickness"),
@@ -195,10 +202,19 @@ EXTRACTORS: dict[str, Extractor] = {
     "environment.sun_elevation_deg": _of_scene("environment", "sun_elevation_deg"),
     "environment.cloud_cover": _of_scene("environment", "cloud_cover"),
     "environment.wetness": _wetness,
-    **{path: _of_scene(*path.split(".")) for path in intervals_of(RoadScenario) if path.startswith("materials.")},
+    **{f"materials.{name}": _of_scene("materials", name) for name in MaterialVariation.model_fields},
+    "materials.patch_density": _damages("patches", 100.0),
+    "materials.crack_density": _damages("cracks", 1000.0 / CRACKS_PER_KM),
 }
 """Path of an interval -> the values of a road that were drawn from it."""
-COUNTED = {"pavement.potholes_per_km", "furniture.cabinets_per_km", "vehicles.per_km", "vehicles.trucks"}
+COUNTED = {
+    "pavement.potholes_per_km",
+    "furniture.cabinets_per_km",
+    "vehicles.per_km",
+    "vehicles.trucks",
+    "materials.patch_density",
+    "materials.crack_density",
+}
 """Intervals whose values only show in how many there are, so not exactly."""
 
 

@@ -14,8 +14,7 @@ from tests.helpers.effects.field_paths import SchemaField, fields_of, other_valu
 from tests.helpers.effects.looks import LABEL, Look, changes, look_at
 from tests.helpers.effects.road_cases import CASES, Case, RoadScene, scene_of
 from tests.helpers.effects.scans import SCAN
-from tests.helpers.effects.without_effect import DERIVED, NOT_BUILT, SAYS
-from tests.helpers.page_modules import ROOT
+from tests.helpers.effects.without_effect import DERIVED, SAYS
 from tests.helpers.roads.parameter_sets import OBJECTS
 
 pytestmark = [pytest.mark.any_blender, pytest.mark.keep_scene]
@@ -70,8 +69,7 @@ def test_every_field_has_a_road_on_which_it_matters(path: str) -> None:
 
 
 def test_no_list_names_a_field_that_there_is_none_of() -> None:
-    assert {*CASES, *NOT_BUILT, *SAYS, *DERIVED} <= FIELDS.keys()
-    assert not NOT_BUILT & SAYS.keys()
+    assert {*CASES, *SAYS, *DERIVED} <= FIELDS.keys()
 
 
 @pytest.mark.parametrize("path", sorted(DERIVED))
@@ -100,7 +98,7 @@ def seen(looks: dict[str, Look], path: str, further: dict[str, Any]) -> tuple[se
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", sorted(FIELDS.keys() - DERIVED - SAYS.keys() - LABELS - NOT_BUILT))
+@pytest.mark.parametrize("path", sorted(FIELDS.keys() - DERIVED - SAYS.keys() - LABELS))
 def test_every_field_changes_the_model_or_the_points(looks: dict[str, Look], path: str) -> None:
     for further in ({}, RENDERED):
         changed, _, _ = seen(looks, path, further)
@@ -118,23 +116,8 @@ def test_an_instance_number_changes_nothing_but_numbers(looks: dict[str, Look], 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("path", sorted(NOT_BUILT))
-def test_nothing_shows_what_is_not_built(looks: dict[str, Look], path: str) -> None:
-    for further in ({}, RENDERED):
-        changed, _, _ = seen(looks, path, further)
-        assert not changed, f"{path} has an effect: take it from the list of what isn't built, and from the pages"
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("path", sorted(SAYS))
 def test_what_only_says_something_is_seen_there_alone(looks: dict[str, Look], path: str) -> None:
     changed, before, after = seen(looks, path, RENDERED)
     assert not changed
     assert SAYS[path](before) != SAYS[path](after)
-
-
-def test_the_pages_say_what_nothing_shows() -> None:
-    for page in ("limits.md", "parameters.md"):
-        text = (ROOT / "docs" / page).read_text(encoding="utf-8")
-        paragraph = next(part for part in text.split("\n\n") if "othing shows the" in part)
-        assert all(f"`{path.rpartition('.')[2]}`" in paragraph for path in NOT_BUILT), page

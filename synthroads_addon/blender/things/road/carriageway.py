@@ -105,7 +105,7 @@ class _PavementPlace(Inputs):
 def pavement_place_group(tree: Tree) -> None:
     """A strip of pavement whose points know where they lie on it, for the materials.
 
-    The attribute ``pavement`` is the station, the distance from the lane's middle, and a code of strip and lane's width.
+    The attribute ``pavement`` is the station, the distance from the lane's middle, a code of strip and lane's width.
     """
     lane = _PavementPlace(tree)
     with tree.frame("Middle and half width of the lane at each row"):

@@ -1,0 +1,135 @@
+"""Patches and cracks of a carriageway from a seed, by the densities that a scenario allows.
+
+Shapes follow the catalogue of distresses of road surveys (ZTV ZEB-StB; SHRP-P-338, Distress Identification Manual):
+longitudinal cracks along wheel tracks and joints, transverse ones across one lane or more, alligator cracks as nets of
+cells of 0.1 to 0.3 m in the wheel tracks; sealed by bands of bitumen about 5 cm wide; patches along the lane.
+"""
+
+import math
+
+import numpy as np
+
+from ..base.random_streams import stream
+from ..base.schema import round_value
+from ..road.objects import Side
+from ..road.section import Corner, Crack, Patch
+from ..scenario.road import MaterialLimits
+from .placing.draw import draw, draw_between
+
+_LONG_PER_KM, _ACROSS_PER_KM, _NETS_PER_KM = 25.0, 80.0, 10.0
+CRACKS_PER_KM = _LONG_PER_KM + _ACROSS_PER_KM + _NETS_PER_KM
+"""Cracks in a km of carriageway that is cracked all over."""
+_LENGTH = {"long": (4.0, 25.0), "net": (1.0, 4.0), "patch": (1.5, 12.0)}
+_GAP, _BAND = (0.003, 0.012), (0.04, 0.06)
+"""Widths of open cracks and of sealing bands, m."""
+_TRACK = 0.9
+"""Distance of a wheel track from the lane's middle, m."""
+_STEP, _CELL = 0.6, 0.2
+"""Distance of a crack's corners along it, and size of an alligator's cells, m."""
+
+
+def draw_materials(limits: MaterialLimits, seed: int) -> dict[str, float]:
+    """Return a value within each of the limits."""
+    rng = stream(seed, "materials")
+    return {name: draw(rng, getattr(limits, name)) for name in MaterialLimits.model_fields}
+
+
+class PavementDamage:
+    """Draws the patches and cracks of a carriageway.
+
+    Args:
+        limits: of materials.
+        seed: of the road.
+        side: of the carriageway.
+        length: of the road, m.
+        edges: distances (m) of the lanes' boundaries from the centreline, outermost first.
+    """
+
+    def __init__(self, limits: MaterialLimits, seed: int, side: Side, length: float, edges: tuple[float, ...]) -> None:
+        drawn = draw_materials(limits, seed)
+        self._patch_density, self._crack_density = drawn["patch_density"], drawn["crack_density"]
+        self._seed, self._side, self._length, self._edges = seed, side, length, edges
+        self._sign = 1.0 if side == "left" else -1.0
+
+    def patches(self) -> tuple[Patch, ...]:
+        """Return patches as long as a lane's part that was taken out, and as wide as it or one of its halves."""
+        rng = stream(self._seed, "patches", self._side)
+        result = []
+        for _ in range(_count(self._patch_density * self._length / 100.0, rng)):
+            outer, inner = self._lane(rng)
+            middle = (outer + inner) / 2.0
+            low, high = [(inner, outer), (inner, middle), (middle, outer)][rng.integers(3)]
+            low, high = low + 0.15, high - 0.15  # beside the markings
+            start, end = self._stretch(_LENGTH["patch"], rng)
+            corners = [(start, low), (end, low), (end, high), (start, high)]
+            result.append(Patch(outline=tuple(map(self._corner, corners)), age=draw_between(rng, (0.0, 1.0))))
+        return tuple(result)
+
+    def cracks(self) -> tuple[Crack, ...]:
+        """Return longitudinal, transverse and alligator cracks."""
+        rng = stream(self._seed, "cracks", self._side)
+        share = self._crack_density * self._length / 1000.0
+        result = [self._along(rng) for _ in range(_count(_LONG_PER_KM * share, rng))]
+        result += [self._across(rng) for _ in range(_count(_ACROSS_PER_KM * share, rng))]
+        return (*result, *(self._net(rng) for _ in range(_count(_NETS_PER_KM * share, rng))))
+
+    def _along(self, rng: np.random.Generator) -> Crack:
+        outer, inner = self._lane(rng)
+        middle = (outer + inner) / 2.0
+        beside = [middle - _TRACK, middle + _TRACK, outer - 0.13][rng.integers(3)]
+        start, end = self._stretch(_LENGTH["long"], rng)
+        stations = np.linspace(start, end, 2 + int((end - start) / _STEP))
+        wander = _wander(len(stations), 0.03, rng)
+        return self._crack("longitudinal", [np.column_stack([stations, beside + wander])], rng, sealed=0.6)
+
+    def _across(self, rng: np.random.Generator) -> Crack:
+        first = int(rng.integers(len(self._edges) - 1))
+        last = int(rng.integers(first + 1, len(self._edges)))
+        outer, inner = self._edges[first], self._edges[last]
+        distances = np.linspace(inner, outer, 2 + int((outer - inner) / _STEP))
+        wander = _wander(len(distances), 0.06, rng)
+        middle = draw_between(rng, (1.0, max(1.0, self._length - 1.0)))
+        stations = np.clip(middle + wander - wander.mean(), 0.0, self._length)
+        return self._crack("transverse", [np.column_stack([stations, distances])], rng, sealed=0.7)
+
+    def _net(self, rng: np.random.Generator) -> Crack:
+        """Return a net of cells: rows and columns of a grid whose nodes were moved."""
+        outer, inner = self._lane(rng)
+        track = (outer + inner) / 2.0 + _TRACK * (1.0 if rng.random() < 0.5 else -1.0)
+        start, end = self._stretch(_LENGTH["net"], rng)
+        rows, columns = 2 + int((end - start) / _CELL), 4
+        along, across = np.meshgrid(np.linspace(start, end, rows), track + _CELL * (np.arange(columns) - 1.5))
+        grid = np.stack([along, across], axis=-1).swapaxes(0, 1)
+        grid = grid + rng.uniform(-0.35, 0.35, grid.shape) * _CELL
+        grid[..., 0] = np.clip(grid[..., 0], 0.0, self._length)
+        lines = [*grid, *grid.swapaxes(0, 1)]
+        return self._crack("alligator", lines, rng, sealed=0.0)
+
+    def _crack(self, kind: str, lines: list[np.ndarray], rng: np.random.Generator, sealed: float) -> Crack:
+        closed = bool(rng.random() < sealed)
+        corners = tuple(tuple(self._corner((float(s), float(d))) for s, d in line) for line in lines)
+        return Crack(kind=kind, width=draw_between(rng, _BAND if closed else _GAP), sealed=closed, lines=corners)
+
+    def _lane(self, rng: np.random.Generator) -> tuple[float, float]:
+        """Return the outer and inner edge of a lane, the outer lanes more often: they carry the heavy vehicles."""
+        lanes = len(self._edges) - 1
+        number = min(int(lanes * rng.random() ** 1.5), lanes - 1)
+        return self._edges[number], self._edges[number + 1]
+
+    def _stretch(self, lengths: tuple[float, float], rng: np.random.Generator) -> tuple[float, float]:
+        length = min(draw_between(rng, lengths), self._length)
+        start = (self._length - length) * rng.random()
+        return start, start + length
+
+    def _corner(self, place: tuple[float, float]) -> Corner:
+        return round_value(min(place[0], self._length)), round_value(self._sign * place[1])
+
+
+def _count(expected: float, rng: np.random.Generator) -> int:
+    return math.floor(expected + rng.random()) if expected > 0.0 else 0
+
+
+def _wander(count: int, amplitude: float, rng: np.random.Generator) -> np.ndarray:
+    """Return a random walk (count,) whose steps have an amplitude (m) and which comes back to 0."""
+    walk = np.cumsum(rng.normal(0.0, amplitude, count))
+    return np.asarray(walk - np.linspace(walk[0], walk[-1], count))
