@@ -6,10 +6,14 @@ import bpy
 import numpy as np
 import pytest
 
+from synthroads_addon.base.arrays import Float
 from synthroads_addon.blender.cameras.calculator import calculator
+from synthroads_addon.blender.casters.embree import EmbreeCaster
 from synthroads_addon.blender.materials import WEAR, material, vary
 from synthroads_addon.blender.materials.pavement import ATTRIBUTE, SLABS, look_group
 from synthroads_addon.blender.model.build import build_road
+from synthroads_addon.blender.scene.evaluated import scene_mesh
+from synthroads_addon.road.damage import DAMAGES
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.pavement.field import (
@@ -20,9 +24,13 @@ from synthroads_addon.road.pavement.field import (
     concrete_look,
     place_code,
 )
+from synthroads_addon.road.pavement.outlines import crack_outlines, patch_outline
 from synthroads_addon.road.pavement.places import pavement_places
+from synthroads_addon.road.section import Patch
 from synthroads_addon.road.surroundings import Environment, MaterialVariation
+from synthroads_addon.scanning.scene.motion import ScannedScene
 from synthroads_addon.scanning.scene.surface_values import SurfaceInput
+from synthroads_addon.scanning.scene.target import Target
 from tests.helpers.effects.road_cases import base_road
 
 PLACES = 100_000
@@ -106,3 +114,38 @@ def test_a_road_has_its_own_polish_and_seed() -> None:
     assert tuple(item[WEAR]) != before
     assert group.inputs["Polish"].default_value == pytest.approx(0.6)
     assert group.inputs["Seed"].default_value == item[WEAR][1] != 0.0
+
+
+def test_patches_and_cracks_lie_where_the_parameters_say() -> None:
+    """Faces cover the polygons, within 2 cm, less than a millimetre above the pavement; their points know the kind."""
+    parameters = RoadParameters.from_dict(base_road({}))
+    geometry = RoadGeometry(parameters)
+    model = build_road(parameters, 0.005, 1.0, {"road", "damaged_areas"})
+    mesh = scene_mesh(objects=list(model.objects.values()))
+    corners = mesh.vertices[mesh.triangles].astype(np.float64) + (model.origin - np.array(parameters.transform.translate))
+    pavement = parameters.carriageway("right").pavement
+    damages, rng = geometry.numbers.damages(), np.random.default_rng(3)
+    for kind, item in (("patch", pavement.patches[0]), ("longitudinal crack", pavement.cracks[0])):
+        outlines = [patch_outline(item)] if isinstance(item, Patch) else list(crack_outlines(item))
+        mine = [number for number, damage in damages.items() if DAMAGES[damage] == kind]
+        faces = np.isin(mesh.instance_id, mine)
+        station, offset = geometry.alignment.project(corners[faces, :, :2].reshape(-1, 2))
+        triangles = list(np.stack([station, offset], axis=-1).reshape(-1, 3, 2))
+        assert len(mine) == 1
+        for these, others in ((outlines, triangles), (triangles, outlines)):
+            places = np.concatenate([_inside(shape, rng) for shape in these])
+            assert np.min([_outside(places, other) for other in others], axis=0).max() < 0.02, kind
+    target = Target(ScannedScene(mesh), EmbreeCaster, damages)
+    assert set(np.unique(target.damage)) >= {DAMAGES.index(kind) for kind in ("none", "patch", "longitudinal crack")}
+
+
+def _inside(shape: Float, rng: np.random.Generator) -> Float:
+    """Return places within a convex shape (K, 2)."""
+    return np.asarray(rng.dirichlet(np.ones(len(shape)), 50) @ shape)
+
+
+def _outside(places: Float, shape: Float) -> Float:
+    """Return how far places (N, 2) lie outside of the farthest edge of a convex shape (K, 2), against the clock, m."""
+    edges = np.roll(shape, -1, axis=0) - shape
+    outwards = np.column_stack([edges[:, 1], -edges[:, 0]]) / np.linalg.norm(edges, axis=1)[:, None]
+    return np.asarray(np.einsum("nkj,kj->nk", places[:, None] - shape, outwards).max(axis=1))
