@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar, Literal
 
-import numpy as np
 from pydantic import Field, model_validator
 
 from ..base.schema import Model, quantity, when
@@ -60,22 +59,12 @@ Corner = tuple[
 
 
 class Patch(Model):
-    """A repaired place: asphalt of its own age within a convex outline."""
+    """A repaired place: asphalt of its own age all between its corners, which is their convex hull."""
 
     outline: tuple[Corner, ...] = Field(
-        min_length=3, max_length=32, description="Stations and offsets (m) of its corners, either way around."
+        min_length=3, max_length=32, description="Stations and offsets (m) of its corners; it is convex."
     )
     age: float = quantity(0.5, ge=0, le=1, unit="1", description="0 new and black, 1 as old as what is around it.")
-
-    @model_validator(mode="after")
-    def _is_convex(self) -> Patch:
-        corners = np.array(self.outline)
-        edges = np.roll(corners, -1, axis=0) - corners
-        ahead = np.roll(edges, -1, axis=0)
-        turns = edges[:, 0] * ahead[:, 1] - edges[:, 1] * ahead[:, 0]
-        if not (np.all(turns > 0.0) or np.all(turns < 0.0)):
-            raise ValueError("outline must be convex, without corners that lie on its edges")
-        return self
 
 
 class Crack(Model):

@@ -170,6 +170,8 @@ def _outlines(builder: ModelBuilder) -> Iterator[tuple[NDArray[np.float64], Hatc
 
 def _pieces(outline: NDArray[np.float64], start: float, end: float) -> Iterator[NDArray[np.float64]]:
     """Cut a convex outline (K, 2) into pieces that are short along the road; yield what of them is on a stretch."""
+    if len(outline) < 3:  # a patch whose corners lie on one line
+        return
     low, high = outline[:, 0].min(), outline[:, 0].max()
     if low < high and low < end and high > start:
         borders = np.linspace(low, high, int(np.ceil((high - low) / _LONGEST)) + 1)

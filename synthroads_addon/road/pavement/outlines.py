@@ -5,16 +5,36 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...base.arrays import Float
-from ..section import Crack, Patch
+from ..section import Corner, Crack, Patch
 
 _SHARPEST = 0.5
 """Cosine of half the turn beyond which a line's corner is not mitred any further."""
 
 
 def patch_outline(patch: Patch) -> Float:
-    """Return the convex outline (K, 2) of a patch, counter-clockwise from above."""
-    corners = np.array(patch.outline)
-    return corners if _area(corners) > 0.0 else corners[::-1]
+    """Return the outline (K, 2) of a patch, the convex hull of its corners, counter-clockwise from above.
+
+    Corners on one line have none: K is less than 3. Andrew's monotone chain (1979).
+    """
+    corners = sorted(set(patch.outline))
+    lower, upper = _chain(corners), _chain(corners[::-1])
+    return np.array(lower[:-1] + upper[:-1]).reshape(-1, 2)
+
+
+def _chain(corners: list[Corner]) -> list[Corner]:
+    """Return those of sorted corners that are on the right of all others."""
+    chain: list[Corner] = []
+    for corner in corners:
+        while len(chain) > 1 and _turn(chain[-2], chain[-1], corner) <= 0.0:
+            chain.pop()
+        chain.append(corner)
+    return chain
+
+
+def _turn(first: Corner, second: Corner, third: Corner) -> float:
+    """Return twice the area of a triangle, positive against the clock."""
+    along, across = second[0] - first[0], second[1] - first[1]
+    return along * (third[1] - first[1]) - across * (third[0] - first[0])
 
 
 def crack_outlines(crack: Crack) -> Iterator[Float]:
@@ -37,8 +57,3 @@ def crack_outlines(crack: Crack) -> Iterator[Float]:
         one, other = corners + middle * reach[:, None], corners - middle * reach[:, None]
         for number in range(len(legs)):
             yield np.array([other[number], other[number + 1], one[number + 1], one[number]])
-
-
-def _area(corners: Float) -> float:
-    x, y = corners.T
-    return float(np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)) / 2.0

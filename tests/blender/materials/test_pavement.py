@@ -122,7 +122,9 @@ def test_patches_and_cracks_lie_where_the_parameters_say() -> None:
     geometry = RoadGeometry(parameters)
     model = build_road(parameters, 0.005, 1.0, {"road", "damaged_areas"})
     mesh = scene_mesh(objects=list(model.objects.values()))
-    corners = mesh.vertices[mesh.triangles].astype(np.float64) + (model.origin - np.array(parameters.transform.translate))
+    corners = mesh.vertices[mesh.triangles].astype(np.float64) + (
+        model.origin - np.array(parameters.transform.translate)
+    )
     pavement = parameters.carriageway("right").pavement
     damages, rng = geometry.numbers.damages(), np.random.default_rng(3)
     for kind, item in (("patch", pavement.patches[0]), ("longitudinal crack", pavement.cracks[0])):
