@@ -50,7 +50,8 @@ def test_what_is_wanted_is_rendered_and_nothing_else(tmp_path: Path) -> None:
     counts, _ = made(tmp_path / "a", "colour.rgb=false", "colour.intensity_from_layers=true")
     assert counts["rendered"]["layers"] == ["base_color", "specular"]
     counts, cloud = made(tmp_path / "b", LAYERS)
-    assert counts["rendered"]["layers"] == ["base_color", "roughness", "specular"], "what reaches a point of the sun isn't rendered"
+    # What reaches a point of the sun isn't rendered.
+    assert counts["rendered"]["layers"] == ["base_color", "roughness", "specular"]
     assert counts["points_by_colour_source"] == {"nodes": 1.0}
     counts, cloud = made(tmp_path / "c", LAYERS, "colour.source=images")
     assert "sun" in counts["rendered"]["layers"]
