@@ -35,6 +35,8 @@ _LOST = {
     "strip": "there are no surfaces here but the median's",
     "rut": "there is no damage here",
     "pothole": "there is no damage here",
+    "patch": "there is no damage here",
+    "crack": "there is no damage here",
 }
 """Type of object, or kind of part -> why the file has none."""
 

@@ -1,5 +1,7 @@
 """Surfaces on the road as polygons on its analytic surface: markings, potholes; and where lines need their points."""
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,7 +9,8 @@ from ..road.alignment import left_vectors
 from ..road.geometry import RoadGeometry
 from ..road.objects import LineObject
 from ..road.paint import arrow_outlines, hatching_outlines, pieces
-from ..road.section import Arrow, Hatching, LineMarking, Pothole
+from ..road.pavement.outlines import CRACK_FILM, PATCH_FILM, crack_outlines, patch_outline
+from ..road.section import Arrow, Crack, Hatching, LineMarking, Patch, Pothole
 from ..road.terrain import known_elevation
 from ..road.tessellation import sample_stations
 from .faces import FLAT, Faces, Int, compact, grid_corners, join_polygons, quads, twist
@@ -72,12 +75,25 @@ def dash_surfaces(geometry: RoadGeometry, line: LineMarking, stations: Float) ->
 def painted_surface(geometry: RoadGeometry, item: Hatching | Arrow, stations: Float) -> Faces:
     """Return the polygons of a hatched area or an arrow, cut at the stations at which the road is sampled."""
     outlines = hatching_outlines(geometry, item) if isinstance(item, Hatching) else arrow_outlines(item)
+    return _laid(geometry, outlines, stations, item.film_thickness)
+
+
+def damaged_surface(geometry: RoadGeometry, item: Patch | Crack, stations: Float) -> Faces:
+    """Return the polygons of a patch or a crack, cut at the stations at which the road is sampled."""
+    if isinstance(item, Patch):
+        outline = patch_outline(item)
+        return _laid(geometry, [outline] if len(outline) > 2 else [], stations, PATCH_FILM)
+    return _laid(geometry, crack_outlines(item), stations, CRACK_FILM)
+
+
+def _laid(geometry: RoadGeometry, outlines: Iterable[Float], stations: Float, film: float) -> Faces:
+    """Return convex outlines (K, 2) as polygons that lie a film (m) above the road."""
     parts = [piece for outline in outlines for piece in pieces(outline, _inside(stations, outline))]
     if not parts:
         return join_polygons([])
     places = np.concatenate(parts)
     points = on_ground(geometry, places[:, 0], places[:, 1])
-    points[:, 2] += item.film_thickness
+    points[:, 2] += film
     sizes = np.array([len(piece) for piece in parts], dtype=np.int64)
     return cut_into_triangles(Faces(points, np.arange(len(points)), sizes))
 

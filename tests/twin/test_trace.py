@@ -16,8 +16,8 @@ from tests.helpers.roads.twin_roads import one_of_many
 LOST = {
     "cityjson": set(),
     "ifc": set(),
-    "opendrive": {"Terrain", "Vehicle", "strip", "rut", "pothole"},
-    "geojson": {"Terrain", "strip", "rut", "pothole"},
+    "opendrive": {"Terrain", "Vehicle", "strip", "rut", "pothole", "patch", "crack"},
+    "geojson": {"Terrain", "strip", "rut", "pothole", "patch", "crack"},
 }
 """Kinds of objects and parts that a format has nothing of."""
 NOT_ON_THE_ROAD = "nothing of it is on the road, or it has no area"

@@ -13,7 +13,7 @@ from ...base.classes import class_id
 from ...base.stepper import run_aside
 from ...road.paint import arrow_outlines, hatching_outlines, pieces
 from ...road.pavement.field import OPEN_CRACK, PATCH, SEALED_CRACK, damage_code
-from ...road.pavement.outlines import crack_outlines, patch_outline
+from ...road.pavement.outlines import CRACK_FILM, PATCH_FILM, crack_outlines, patch_outline
 from ...road.section import Arrow, Carriageway, Hatching
 from ..nodes import operations as op
 from ..nodes.backbone import height_on, look_up, station_ribbon
@@ -26,9 +26,6 @@ from .registry import model_part
 
 _LONGEST = 1.0
 """Outlines are cut into pieces no longer than this (m), so that they follow the road's curves and its crossfall."""
-
-CRACK_FILM, PATCH_FILM = 0.0004, 0.0008
-"""Height of the faces of cracks and patches above the pavement, m: below any marking's film, patches over cracks."""
 
 
 class _Outlines(Inputs):

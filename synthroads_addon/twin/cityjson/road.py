@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from ...road.geometry import RoadGeometry
 from ...road.objects import RoadObject
-from ...road.section import Arrow, Carriageway, Hatching, LineMarking, Median, Turnout
+from ...road.section import Arrow, Carriageway, Crack, Hatching, LineMarking, Median, Patch, Turnout
 from ..attributes import attributes_of
 from ..faces import Faces, Int, join_polygons
 from ..strips import StripSurface, strip_surfaces
-from ..surfaces import dash_surfaces, painted_surface, pothole_surface
+from ..surfaces import damaged_surface, dash_surfaces, painted_surface, pothole_surface
 from .model import CityGeometry, CityObject, lines
 
 Float = NDArray[np.float64]
@@ -84,7 +84,7 @@ def _road(geometry: RoadGeometry, name: str, item: RoadObject, surfaces: list[Su
 
 
 def _surfaces(geometry: RoadGeometry, stations: Float, tolerance: float) -> dict[int, list[Surface]]:
-    """Return the surfaces of every Road by its instance number: strips, then markings, then potholes."""
+    """Return the surfaces of every Road by its instance number: strips, then markings, then damage."""
     by_road: dict[int, list[Surface]] = {}
     for surface in strip_surfaces(geometry, stations, tolerance):
         by_road.setdefault(surface.instance, []).append((_area(geometry, surface), surface.faces))
@@ -99,6 +99,14 @@ def _surfaces(geometry: RoadGeometry, stations: Float, tolerance: float) -> dict
             about = {"type": "TransportationHole", "function": "pothole", "id": part, "instance": instance}
             about |= pothole.model_dump()
             surfaces.append((about, pothole_surface(geometry, pothole, tolerance)))
+        pavement = carriageway.pavement
+        first = len(pavement.ruts) + len(pavement.potholes)
+        laid: list[Patch | Crack] = [*pavement.patches, *pavement.cracks]
+        for number, damage in enumerate(laid, first):
+            part, instance = geometry.numbers.part(name, number)
+            about = {"type": "+PavementDamage", "function": type(damage).__name__.lower(), "id": part}
+            about |= {"instance": instance} | damage.model_dump(exclude={"outline", "lines"})
+            surfaces.append((about, damaged_surface(geometry, damage, stations)))
     return {instance: [pair for pair in pairs if len(pair[1])] for instance, pairs in by_road.items()}
 
 

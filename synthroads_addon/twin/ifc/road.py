@@ -18,11 +18,11 @@ from ...road.geometry import SurfaceStrip
 from ...road.guidelines import LIMITS
 from ...road.objects import AnyWidth
 from ...road.parameters import RoadParameters
-from ...road.section import Arrow, Carriageway, Hatching, LineMarking, Median, Pothole, Rut, Turnout
+from ...road.section import Arrow, Carriageway, Crack, Hatching, LineMarking, Median, Patch, Pothole, Rut, Turnout
 from ...road.section_geometry import CarriagewaySection
 from ...road.turnout_geometry import TURNOUT_STRIPS, TurnoutShape
 from ..faces import Faces
-from ..surfaces import dash_surfaces, painted_surface
+from ..surfaces import damaged_surface, dash_surfaces, painted_surface
 from .entities import Entity, Float, IfcFile, short
 from .scene import Scene, grid_triangles
 
@@ -257,7 +257,7 @@ class _Direction:
             yield first, last, bool(damage[:, first].any())
 
     def _write_damage(self) -> None:
-        """Add a DEFECT for every rut and pothole; their shapes are in the courses' surfaces."""
+        """Add a DEFECT for all damage; the shapes of ruts and potholes are in the courses' surfaces."""
         ifc, pavement = self.ifc, self.carriageway.pavement
         damages: list[tuple[str, Rut | Pothole, float, float]] = [
             ("rut", rut, rut.start_station, self._rut_offset(rut)) for rut in pavement.ruts
@@ -268,6 +268,15 @@ class _Direction:
             placement = self.scene.place(station, offset).placement
             defect = ifc.product("IfcSurfaceFeature", name, "DEFECT", kind, placement)
             ifc.label(defect, instance, self.carriageway.points_class, damage)
+            ifc.gather("IfcRelAdheresToElement", self.pavement, [defect])
+        laid: list[Patch | Crack] = [*pavement.patches, *pavement.cracks]
+        for number, item in enumerate(laid, len(damages)):
+            name, instance = self.scene.geometry.numbers.part(self.name, number)
+            mesh = _triangles(damaged_surface(self.scene.geometry, item, self.scene.stations))
+            shape = ifc.shape([ifc.mesh(*mesh, False)], "Tessellation") if mesh else None
+            kind = "patch" if isinstance(item, Patch) else f"{item.kind} crack"
+            defect = ifc.product("IfcSurfaceFeature", name, "DEFECT", kind, Representation=shape)
+            ifc.label(defect, instance, self.carriageway.points_class)
             ifc.gather("IfcRelAdheresToElement", self.pavement, [defect])
 
     def _rut_offset(self, rut: Rut) -> float:

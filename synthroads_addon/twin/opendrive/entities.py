@@ -11,6 +11,8 @@ LOST = {
     "Vehicle": "OpenDRIVE has no traffic: scenarios are for that (OpenSCENARIO)",
     "rut": "OpenDRIVE has no damage in its surface: OpenCRG is for that",
     "pothole": "OpenDRIVE has no damage in its surface: OpenCRG is for that",
+    "patch": "OpenDRIVE has no damage on its surface",
+    "crack": "OpenDRIVE has no damage on its surface",
 }
 """Type of object, or kind of part -> why the file has none."""
 

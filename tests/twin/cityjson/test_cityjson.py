@@ -250,7 +250,7 @@ def test_ids_and_instances_are_those_of_the_set_and_the_cloud(
     city = full_city if index is None else cities(index)
     wanted = {name: item.instance for name, item in road.objects.items()}
     found = {name: item["attributes"]["instance"] for name, item in city.objects.items()}
-    kinds = ("TransportationMarking", "TransportationHole")
+    kinds = ("TransportationMarking", "TransportationHole", "+PavementDamage")
     surfaces = (about for kind in kinds for _, about, _ in city.surfaces(kind))
     painted = {about["id"]: about["instance"] for about in surfaces}
     fine = {name: painted.pop(name) for name in list(painted) if "/" in name}
@@ -258,7 +258,11 @@ def test_ids_and_instances_are_those_of_the_set_and_the_cloud(
     assert {name: numbers.name_of(number) for name, number in fine.items()} == {name: name for name in fine}
     assert {name.partition("/")[0] for name in fine} == {
         *(name for name, line in road.of_type(LineMarking).items() if line.dash_length),
-        *(name for name, item in road.of_type(Carriageway).items() if item.pavement.potholes),
+        *(
+            name
+            for name, item in road.of_type(Carriageway).items()
+            if item.pavement.potholes or item.pavement.patches or item.pavement.cracks
+        ),
     }
     wanted = {
         name: number

@@ -18,6 +18,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import unit_of
 from synthroads_addon.road.alignment import Alignment, Element
+from synthroads_addon.road.damage import damage_numbers
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.instances import InstanceNumbers
 from synthroads_addon.road.lane_lines import lane_of
@@ -451,8 +452,8 @@ def _check_instances(file: Any, parameters: RoadParameters, may_miss: str = "") 
     assert {name: {number} for name, number in numbers.items()}.items() <= found.items()
     known = InstanceNumbers(parameters)
     for name, item in parameters.of_type(Carriageway).items():
-        damage = len(item.pavement.ruts) + len(item.pavement.potholes)
-        numbers |= dict(known.part(name, number) for number in range(damage))
+        damages = damage_numbers(item.pavement)
+        numbers |= dict(known.part(name, number) for number in range(len(damages)))
     stands = parameters.of_type(Vegetation)
     numbers |= {name: number for number, name in numbers_of(parameters).items() if name.partition("/")[0] in stands}
     wanted = {name: {number} for name, number in numbers.items()}
@@ -641,9 +642,7 @@ def test_damage_is_in_the_surface_and_named(road) -> None:
     parameters, file = road
     geometry = RoadGeometry(parameters)
     defects = [item for item in file.by_type("IfcSurfaceFeature") if item.PredefinedType == "DEFECT"]
-    wanted = sum(
-        len(item.pavement.ruts) + len(item.pavement.potholes) for item in parameters.of_type(Carriageway).values()
-    )
+    wanted = len(geometry.numbers.damages())
     assert len(defects) == wanted > 0
     for name, carriageway in parameters.of_type(Carriageway).items():
         for hole in carriageway.pavement.potholes:
