@@ -167,7 +167,7 @@ def test_too_little_memory_at_any_moment(
     (temporary := tmp_path / "temporary").mkdir()
     monkeypatch.setenv("TMPDIR", str(temporary))
     codes = []
-    for megabytes in (150, 250, 500, 800, 1100, 1300, 1400, 1500, 1600, 1700, 1800, 1900):
+    for megabytes in (150, 180, 210, 250, 500, 800, 1100, 1300, 1400, 1500, 1600, 1700, 1800, 1900):
 
         def limit() -> None:
             size = megabytes << 20  # noqa: B023

@@ -50,7 +50,7 @@ class Asset(StandingThing):
 
     def twin(self) -> TwinTypes:
         """Return its types: those that its library gives, else those of its class; nothing known of others."""
-        given = self.twin_types.to_dict() if self.twin_types else {}
+        given = {name: getattr(self.twin_types, name) for name in AssetTypes.model_fields} if self.twin_types else {}
         types = {"opendrive": f"none.{self.name}"} | class_types().get(self.class_name, {})
         return TwinTypes(kind=self.name, **(types | {key: value for key, value in given.items() if value}))
 

@@ -190,7 +190,7 @@ def _write_object(file: TextIO, item: CityObject, shapes: list[list[_Shell]], tr
     head: dict[str, Any] = {"type": item.type, "attributes": item.attributes}
     if item.parent:
         head["parents"] = [item.parent]
-    if item.children:
+    if item.children or item.type == "CityObjectGroup":  # a group must say its members, also where it has none
         head["children"] = list(item.children)
     there = [
         (shape, shells)

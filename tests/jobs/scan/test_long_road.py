@@ -128,7 +128,7 @@ def errors_of_a_section(work: SectionScan, road: RoadGeometry, section: Any, mon
     monkeypatch.setattr(Site, "plan", keep)
     with build_section(work, section) as scan:
         MESH[id(scan)] = meshes[-1]
-        triangles = exact_triangles(road, section.low, section.high, scan, scan.frame)
+        triangles = exact_triangles(road, section.low, section.high, scan, scan.frame_origin)
         strip, block = section.blocks[len(section.blocks) // 2]
         first, _ = work.cut.pulses_of(strip, block)
         result = scan_pulses(scan, strip, first, PULSES, block).points
@@ -138,7 +138,7 @@ def errors_of_a_section(work: SectionScan, road: RoadGeometry, section: Any, mon
     paved = result.select(np.flatnonzero(result.class_id == class_id("road")))
     rows = np.searchsorted(pulses.time, paved.gps_time)
     assert np.array_equal(pulses.time[rows], paved.gps_time)
-    origin, direction = pulses.origin.T[rows] + scan.frame, pulses.direction.T[rows]
+    origin, direction = pulses.origin.T[rows] + scan.frame_origin, pulses.direction.T[rows]
     exact = np.array(list(met(triangles, origin, direction)))
     place = origin + exact[:, None] * direction + np.array(road.parameters.transform.translate)
     return np.linalg.norm(paved.xyz - place, axis=1)
