@@ -12,7 +12,7 @@ from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import load_scenario
 
-CHECKSUM = "35eb380a34a0f5da9ede4dcb7ac8dec7d59d19846e3dd7ecc681b966ac8505a8"
+CHECKSUM = "5b25c765546f2cf66720fee259eea97d0d79eac2a65900f2290eab1f11a24653"
 EVERYTHING = ["exits=1", "entries=1", "emergency_bays=1"]
 
 

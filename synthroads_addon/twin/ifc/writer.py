@@ -28,6 +28,8 @@ _LONGEST = 200_000.0
 """Longest road that is written as one file, m: as long as scenarios can be."""
 _SHORTEST = 1e-3
 """Shortest road, m: lengths have six decimals."""
+_SHORTEST_ELEMENT = 1e-6
+"""Shortest element of an axis, m."""
 
 
 def write_ifc(
@@ -44,12 +46,16 @@ def write_ifc(
 
     Raises:
         InputError: ifcopenshell isn't installed, the map coordinate system is unknown, or the road is too long or too
-            short.
+            short, or an element of its axis is.
     """
     if parameters.alignment.length < _SHORTEST:
         raise InputError("alignment: length", parameters.alignment.length, "an IFC file holds a millimetre or more")
     if parameters.alignment.length > _LONGEST:
         raise InputError("alignment: length", parameters.alignment.length, "an IFC file holds up to 200 km (200000 m)")
+    for number, element in enumerate(parameters.alignment.horizontal):
+        if element.length < _SHORTEST_ELEMENT:  # whose curvature's rate may be no finite number
+            field = f"alignment: horizontal {number}: length"
+            raise InputError(field, element.length, "an element in an IFC file has a micrometre or more")
     geometry = RoadGeometry(parameters)
     ifc = IfcFile(parameters.metadata.identifier, Trace(geometry, within=("dash",)))
     site = write_project(ifc, parameters)

@@ -856,6 +856,8 @@ def test_the_same_road_gives_the_same_bytes(tmp_path) -> None:
 def test_roads_that_no_file_could_hold_are_refused(tmp_path) -> None:
     with pytest.raises(InputError, match="up to 200 km"):
         write_ifc(_bent([(200_001.0, 0.0, 0.0)]), tmp_path / "twin.ifc")
+    with pytest.raises(InputError, match=r"horizontal 1: length is 2.2e-313: .* a micrometre or more"):
+        write_ifc(_bent([(20.0, 0.0, 0.0), (2.2e-313, 0.03, 0.0)]), tmp_path / "twin.ifc")
     assert not list(tmp_path.iterdir())
 
 
@@ -877,7 +879,7 @@ def test_whatever_is_a_road_can_be_written(tmp_path_factory: pytest.TempPathFact
         data["metadata"]["referenceSystem"] = "https://www.opengis.net/def/crs/EPSG/0/25832"
         axis["vertical"] = axis["vertical"][:1]
         for element in axis["horizontal"]:
-            element["length"] = min(element["length"], 40.0)
+            element["length"] = min(max(element["length"], 1e-3), 40.0)
         for item in data["objects"].values():  # nor forests of a million trees
             if item["type"] == "Vegetation" and item["kind"] != "grass":
                 item["density"] = min(item["density"], 1e-3)
