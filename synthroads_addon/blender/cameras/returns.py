@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
+import bpy
 import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
@@ -92,7 +95,8 @@ class ReturnCamera:
         middle = self._aim(points, width, height)
         if self._blocks % RENDERINGS_KEPT == 0:
             self._stage.forget()
-        rendered = self._stage.render(width, height)
+        with _without_bumps():
+            rendered = self._stage.render(width, height)
         assert rendered.position is not None
         # Blender versions differ in the order of the rows.
         error = [
@@ -149,6 +153,23 @@ class ReturnCamera:
     def _remove_old(self) -> None:
         for name in ("coarse", "fine", "direction"):
             (self._stage.folder / f"{name}-{self._blocks - 1}.exr").unlink(missing_ok=True)
+
+
+@contextmanager
+def _without_bumps() -> Iterator[None]:
+    """Leave normals as the surfaces have them while something is rendered.
+
+    A bump is worked out from what neighbouring pixels see, and here they see places that are far apart.
+    """
+    trees = [item.node_tree for item in bpy.data.materials if item.node_tree] + list(bpy.data.node_groups)
+    bumps = [node for tree in trees for node in tree.nodes if node.bl_idname == "ShaderNodeBump" and not node.mute]
+    for node in bumps:
+        node.mute = True
+    try:
+        yield
+    finally:
+        for node in bumps:
+            node.mute = False
 
 
 def _fill_image(values: Float, width: int, height: int, columns: int) -> NDArray[np.float32]:
