@@ -109,7 +109,6 @@ def build_damaged_areas(builder: ModelBuilder) -> None:
     if not areas:
         return
     mesh, sizes = _polygons_mesh("SR Damaged Areas", [area.outline for area in areas], builder.zero)
-
     attribute(mesh, "film", np.repeat([area.film for area in areas], sizes))
     attribute(mesh, "concrete", np.repeat([float(area.concrete) for area in areas], sizes))
     attribute(mesh, "instance", np.repeat(signed_instance([area.instance for area in areas]), sizes))

@@ -45,8 +45,8 @@ def write_ifc(
             or coordinates (``local``).
 
     Raises:
-        InputError: ifcopenshell isn't installed, the map coordinate system is unknown, or the road is too long or too
-            short, or an element of its axis is.
+        InputError: ifcopenshell isn't installed, the map coordinate system is unknown, the road is too long or too
+            short, or an element of its axis is shorter than a micrometre.
     """
     if parameters.alignment.length < _SHORTEST:
         raise InputError("alignment: length", parameters.alignment.length, "an IFC file holds a millimetre or more")

@@ -32,6 +32,7 @@ BUDGET = 0.05
 _WORK_FOR_DRAWING, _LONGEST = 4.0, 2.0
 """So many times as long as the window was drawn a turn lasts, but no longer than this (s)."""
 _MOST_PATIENCE = 0.5
+"""Longest time (s) that a turn waits for what is computed aside."""
 _LOOK_AGAIN = 0.001
 """Seconds between two looks whether there is something to do in the main thread again."""
 
