@@ -30,11 +30,15 @@ EXTRAS = {
 BLENDER_TESTS = ("tests/blender", "tests/jobs", "tests/ui")
 PARTS = {"blender": [*BLENDER_TESTS], "others": ["tests", *(f"--ignore={folder}" for folder in BLENDER_TESTS)]}
 """The tests in two processes: once ifcopenshell has worked in one, Blender 5.2's OBJ exporter aborts there."""
+ALONE = ["-n", "0", "-m", "alone", *BLENDER_TESTS]
+"""What the tests that measure the clock are called with, after the others: they are slow ones, all of Blender."""
 ONLY = {("3.13", "blender"): "smoke or not any_blender", ("3.13", "others"): "smoke"}
 """Marker expressions by Python and part, where not all of a part's tests are run on that Python."""
 
 QUICK = "not slow and not fuzz and not cluster"
 """Marker expression of the tests of `make test`."""
+SLOW = "slow"
+"""That of `make test-slow`."""
 
 nox.needs_version = ">=2026.10"
 nox.options.sessions = ["lint", "tests", "summary"]
@@ -126,7 +130,10 @@ def pytest_runs(version: str, markers: str, arguments: list[str]) -> list[list[s
     if any(argument.startswith("tests") for argument in arguments):
         return [arguments]
     only = {part: f"({ONLY[version, part]}) and " if (version, part) in ONLY else "" for part in PARTS}
-    return [["-m", f"{only[part]}({markers})", *arguments, *paths] for part, paths in PARTS.items()]
+    runs = [["-m", f"{only[part]}({markers}) and not alone", *arguments, *paths] for part, paths in PARTS.items()]
+    if markers == SLOW and version == min(BLENDER):
+        runs.append([*arguments, *ALONE])
+    return runs
 
 
 def passed(codes: list[int], *, everything: bool) -> bool:

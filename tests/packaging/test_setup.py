@@ -130,11 +130,21 @@ def test_files_that_take_longest_are_there() -> None:
 def test_blender_and_the_other_tests_have_processes_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(noxfile, "ONLY", {("3.13", "others"): "smoke or ui"})
     assert noxfile.pytest_runs("3.13", "not slow", ["-x"]) == [
-        ["-m", "(not slow)", "-x", *noxfile.BLENDER_TESTS],
-        ["-m", "(smoke or ui) and (not slow)", "-x", "tests", *(f"--ignore={name}" for name in noxfile.BLENDER_TESTS)],
+        ["-m", "(not slow) and not alone", "-x", *noxfile.BLENDER_TESTS],
+        [
+            *("-m", "(smoke or ui) and (not slow) and not alone", "-x", "tests"),
+            *(f"--ignore={name}" for name in noxfile.BLENDER_TESTS),
+        ],
     ]
     named = ["tests/road/test_alignment.py", "-q"]
     assert noxfile.pytest_runs("3.11", "not slow", named) == [named]
+
+
+def test_tests_of_the_clock_are_run_after_the_others_without_a_neighbour() -> None:
+    *_, last = noxfile.pytest_runs("3.11", noxfile.SLOW, ["-x"])
+    assert last == ["-x", "-n", "0", "-m", "alone", *noxfile.BLENDER_TESTS]
+    assert all("alone" not in run for run in noxfile.pytest_runs("3.13", noxfile.SLOW, []))
+    assert all("alone" not in run for run in noxfile.pytest_runs("3.11", noxfile.QUICK, []))
 
 
 def test_a_part_without_tests_is_a_failure_unless_some_tests_were_chosen() -> None:

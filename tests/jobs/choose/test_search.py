@@ -222,6 +222,7 @@ def errors_afterwards(scenario: Scenario) -> dict[str, float]:
     return errors | {"height": float(abs(mesh_height_errors(scanned_scene(geometry=geometry).static, geometry)).max())}
 
 
+@pytest.mark.alone
 @pytest.mark.slow
 def test_no_tolerance_is_broken_in_scenes_that_the_table_was_not_made_with(within_tolerance: list[Done]) -> None:
     for done in within_tolerance:
@@ -232,17 +233,17 @@ def test_no_tolerance_is_broken_in_scenes_that_the_table_was_not_made_with(withi
         assert all(found[kind] <= limit for kind, limit in limits.items()), done.asked.title
 
 
+@pytest.mark.alone
 @pytest.mark.slow
 def test_the_time_of_a_tolerance_is_foreseen(within_tolerance: list[Done]) -> None:
-    """On a machine with other work this says nothing."""
     for done in within_tolerance:
         print(done)
     assert [str(done) for done in within_tolerance if abs(done.deviation()) > NEAR] == []
 
 
+@pytest.mark.alone
 @pytest.mark.slow
 def test_a_time_is_kept_and_foreseen(tmp_path: Path) -> None:
-    """On a machine with other work this says nothing."""
     jobs = [Done.of(name, number, tmp_path, f"time_budget={BUDGET}") for number, name in enumerate(scenes())]
     for done in jobs:
         print(done)

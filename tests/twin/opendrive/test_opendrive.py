@@ -191,35 +191,38 @@ def strips_of(geometry: RoadGeometry, read: OpenDrive, section: Section) -> dict
 def worst_border(road: RoadParameters, read: Roads, apart: float = 1.0) -> float:
     """Return the largest distance (m) of a lane's border from its strip's boundary, beside it or in height.
 
-    A place of a tilted road that climbs lies up to 7 cm farther along it than its s says: where a border runs obliquely
-    it may be as far beside its strip's.
+    A place of a tilted road that climbs lies up to 10 cm farther along it than its s says: where a border runs obliquely
+    it may be as much beside its strip's as that makes.
     """
     geometry = RoadGeometry(road)
     where = away_from_steps(geometry, stations(read.length, apart))
-    places, boundaries = [], []
+    places, boundaries, said = [], [], []
     for part in read.roads:
-        for section, _, points in part.border_points(where):
+        for section, own, points in part.border_points(where):
             for lane, strip in strips_of(geometry, part, section).items():
                 # From left to right: a lane on the right has its inner border to its left.
                 borders = (lane, lane - 1) if lane > 0 else (lane + 1, lane)
                 for border, boundary in zip(borders, (strip, strip + 1), strict=True):
                     places.append(points[border])
                     boundaries += len(points[border]) * [boundary]
-    return _off(geometry, np.concatenate(places), np.array(boundaries))
+                    said.append(own)
+    return _off(geometry, np.concatenate(places), np.array(boundaries), np.concatenate(said))
 
 
-def _off(geometry: RoadGeometry, points: np.ndarray, boundaries: np.ndarray) -> float:
-    """Return how far points (N, 3) lie from the strips' boundaries (N,) that they stand for."""
+def _off(geometry: RoadGeometry, points: np.ndarray, boundaries: np.ndarray, said: np.ndarray) -> float:
+    """Return how far points (N, 3), said to be at stations (N,), lie from the strips' boundaries (N,)."""
     local = points - geometry.parameters.transform.translate
     s, t = geometry.alignment.project(local[:, :2])
-    inside = (s > 0.05) & (s < geometry.length - 0.05)
-    s, t, z, boundaries = s[inside], t[inside], local[inside, 2], boundaries[inside]
+    inside = (s > 0.1) & (s < geometry.length - 0.1)
+    s, t, z, boundaries, said = s[inside], t[inside], local[inside, 2], boundaries[inside], said[inside]
+    farther = np.abs(s - said)
+    assert farther.max() < 0.1
     each = np.arange(len(s)), boundaries
-    wanted = geometry.offsets(s)[each]
-    oblique = np.abs(geometry.offsets(s + 0.02)[each] - geometry.offsets(s - 0.02)[each]) / 0.04
-    beside = np.abs(t - wanted) - 0.07 * oblique
-    above = np.abs(z - geometry.boundary_elevations(s)[each]) - 0.02 * oblique
-    return float(np.maximum(beside, above).max())
+    beside = np.abs(t - geometry.offsets(s)[each])
+    above = np.abs(z - geometry.boundary_elevations(s)[each])
+    as_said = np.abs(t - geometry.offsets(said)[each])
+    level = 0.02 * np.abs(geometry.offsets(s + 0.02)[each] - geometry.offsets(s - 0.02)[each]) / 0.04
+    return float(np.maximum(np.minimum(beside, as_said), above - level).max())
 
 
 def test_lanes_lie_where_the_strips_do(road: RoadParameters, read: Roads) -> None:
