@@ -53,7 +53,7 @@ def _object(file: Path) -> Mapping[str, Any]:
 
 
 def _paths(named: Any) -> list[str]:
-    """Return the paths in lists of paths and of objects that have one."""
+    """Return a flat list of the paths in nested lists of paths and of objects with a `path` or `cloud`."""
     if isinstance(named, str):
         return [named]
     if isinstance(named, dict):

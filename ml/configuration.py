@@ -38,7 +38,7 @@ class Part(Model):
 
 
 class Schedule(Part):
-    """How the weights are learned: AdamW whose rate rises linearly, then falls as a cosine.
+    """Options of the optimiser: AdamW whose learning rate warms up linearly, then decays as a cosine.
 
     Loshchilov and Hutter, "Decoupled weight decay regularization" (2019) and "SGDR" (2017).
     """
@@ -73,18 +73,18 @@ class Configuration(Part):
 
 
 def configuration_kind(task: str) -> type[Configuration]:
-    """Return the class of the configurations of one of `TASKS`."""
+    """Return the configuration class of one of `TASKS`, importing the task's module."""
     kind: type[Configuration] = import_module(TASKS[task]).CONFIGURATION
     return kind
 
 
 def names_in(folder: Path) -> list[str]:
-    """Return the names of the files in a folder of what comes with the package."""
+    """Return the names of a folder's files without their endings, sorted."""
     return sorted(path.stem for path in folder.glob("*.*"))
 
 
 def shipped_file(what: str, folder: Path, name_or_file: str, endings: Sequence[str] = (".yaml", ".json")) -> Path:
-    """Return the file of a name out of `names_in`, or the file itself that is named.
+    """Return the path of the folder's file of that name, or the given path if it has an allowed ending (may not exist).
 
     Raises:
         InputError: there is no such name, and a file would end in one of the endings (or in .yml).
@@ -120,7 +120,7 @@ def load_configuration(name_or_file: str, changes: Sequence[str] = (), tasks: Se
 
 
 def from_data(data: Any, source: str, tasks: Sequence[str] = ()) -> Any:
-    """Return the configuration that plain data hold.
+    """Return the task's configuration validated from plain data (as read from YAML).
 
     Raises:
         InputError: they name no task that is possible, or a field is unknown or wrong.

@@ -35,12 +35,12 @@ _PATIENCE = timedelta(days=2)
 
 
 def process_number() -> int:
-    """Return which of the processes this is, from 0."""
+    """Return this training process's rank from 0; 0 outside distributed training."""
     return distributed.get_rank() if distributed.is_initialized() else 0
 
 
 def process_count() -> int:
-    """Return how many processes train together."""
+    """Return the number of processes that train together; 1 outside distributed training."""
     return distributed.get_world_size() if distributed.is_initialized() else 1
 
 
@@ -57,7 +57,7 @@ def average(tensors: Sequence[Tensor]) -> None:
 
 @contextmanager
 def helpers(run: Run[Any], learn: Callable[[Run[Any]], object], device: torch.device) -> Iterator[None]:
-    """Have further processes call ``learn(run)`` while this one does, as many as the configuration asks for.
+    """Context in which the configuration's further processes run ``learn(run)``, joined by torch.distributed.
 
     Args:
         run: its ``processes`` says how many take part, this one included.
@@ -103,9 +103,9 @@ def helpers(run: Run[Any], learn: Callable[[Run[Any]], object], device: torch.de
 
 
 def _end_without(others: Sequence[Any], done: Event) -> None:
-    """End this process, in one line, where another one was lost and it waits for that in a library.
+    """Watch the other processes (in a thread); 60 s after one has failed, exit this one with code 2 if it hangs.
 
-    NCCL does so up to `_PATIENCE`, and nothing that is raised meanwhile reaches it.
+    NCCL waits for a lost process up to `_PATIENCE`, and nothing that is raised meanwhile reaches it.
 
     Args:
         others: processes that train with this one.
@@ -124,7 +124,7 @@ def _end_without(others: Sequence[Any], done: Event) -> None:
 
 
 def _check_devices(count: int, device: str) -> None:
-    """Refuse more processes than CUDA devices, and a device that all would share."""
+    """Raise `InputError` if there are more processes than CUDA devices, or one device is named for all."""
     if count > torch.cuda.device_count():
         raise InputError("processes", count, f"must not exceed the CUDA devices, {torch.cuda.device_count()}")
     if device not in ("auto", "cuda"):
@@ -139,7 +139,7 @@ def _join(meeting: Path, number: int, count: int, device: str) -> None:
 
 
 def _help(learn: Callable[[Run[Any]], object], run: Run[Any], meeting: Path, number: int, device: str) -> None:
-    """Do in another process what the first does; what goes wrong in all of them, the first one says."""
+    """Join the training and call ``learn(run)`` in a helper process; the first process reports the project's errors."""
     with suppress(SynthRoadsError, KeyboardInterrupt):
         _join(meeting, number, run.configuration.processes, device)
         learn(run)

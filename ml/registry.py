@@ -30,7 +30,7 @@ F = TypeVar("F", bound=Change)
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect on the samples of a training.
+    """A registered augmentation of training samples.
 
     Attributes:
         change: what it does.
@@ -44,7 +44,7 @@ class Effect:
 
 
 def network(task: str) -> Callable[[type[P]], type[P]]:
-    """Register a network's options, which know how to build it, under the one value of their field ``name``.
+    """Return a class decorator that registers a network's options for a task, by the default of their ``name``.
 
     Args:
         task: that it learns, out of `FOLDERS`.
@@ -61,19 +61,19 @@ def network(task: str) -> Callable[[type[P]], type[P]]:
 
 
 def networks(task: str) -> dict[str, type[Part]]:
-    """Return the options of all networks of a task by name, those of its folder's files included."""
+    """Return the options classes of all networks of a task by name, importing the files of its folder."""
     _import_files(FOLDERS[task])
     return dict(sorted(_NETWORKS[task].items()))
 
 
 def network_union(task: str, usual: str) -> Any:
-    """Return the type of a configuration's field ``network``: any of a task's; the usual one where it has no name."""
+    """Return the type annotation of a field ``network``: any options of a task, `usual` where no name is given."""
     models = networks(task)
     return discriminated_union({usual: models[usual], **models}, "name")
 
 
 def effect(*tasks: str, order: int = 100, **fields: Any) -> Callable[[F], F]:
-    """Register a function as an effect under its name.
+    """Return a decorator that registers a function as an augmentation of some tasks, under the function's name.
 
     Args:
         tasks: on whose samples it acts, out of `FOLDERS`.
@@ -94,7 +94,7 @@ def effect(*tasks: str, order: int = 100, **fields: Any) -> Callable[[F], F]:
 
 
 def effect_options(task: str, base: type[P]) -> type[P]:
-    """Return a class of options with the fields that the effects of a task add."""
+    """Return a subclass of `base`'s options with the fields that registered effects of a task add."""
     _import_files(EFFECTS)
     added = {name: field for one in _EFFECTS[task].values() for name, field in one.fields.items()}
     fields: Any = {name: (type(field.default), field) for name, field in added.items()}
@@ -104,7 +104,7 @@ def effect_options(task: str, base: type[P]) -> type[P]:
 def apply_effects(
     task: str, sample: Any, options: Part, random: np.random.Generator, *, before_thinning: bool = False
 ) -> None:
-    """Apply the effects of a task to a sample, in place: those below order 0, or all others."""
+    """Apply a task's effects to a sample in order, in place: of order below 0 if `before_thinning`, else the others."""
     for one in sorted(_EFFECTS[task].values(), key=lambda one: one.order):
         if (one.order < 0) == before_thinning:
             one.change(sample, options, random)

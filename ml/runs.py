@@ -37,7 +37,7 @@ C = TypeVar("C", bound=Configuration)
 
 @dataclass
 class Run(Generic[C]):
-    """One training.
+    """One training: its folder, configuration and history.
 
     Attributes:
         folder: of its files.
@@ -51,7 +51,7 @@ class Run(Generic[C]):
 
     @classmethod
     def start(cls, folder: Path, configuration: C, *, resume: bool = False, overwrite: bool = False) -> Run[C]:
-        """Make a run's folder, or go on with one that was interrupted.
+        """Return a new run whose folder is made, or with `resume` the interrupted run in it.
 
         Raises:
             OutputError: the folder holds a run already and neither ``resume`` nor ``overwrite`` says what to do.
@@ -78,7 +78,7 @@ class Run(Generic[C]):
 
     @classmethod
     def open(cls, folder: Path) -> Run[Any]:
-        """Open a run that was trained, if only in part.
+        """Open the run in a folder that holds at least one checkpoint.
 
         Raises:
             MissingFileError: the folder holds no run.
@@ -91,13 +91,13 @@ class Run(Generic[C]):
         return run
 
     def save(self, state: Mapping[str, Any]) -> None:
-        """Write a checkpoint; the one before stays until the new one is whole."""
+        """Write `state` as the run's checkpoint, replacing the last one atomically."""
         content = io.BytesIO()
         torch.save(dict(state), content)
         write_file(self.folder / CHECKPOINT, content.getvalue(), overwrite=True)
 
     def last_checkpoint(self, device: torch.device | str = "cpu") -> dict[str, Any] | None:
-        """Return the last checkpoint, or None if there is none yet.
+        """Load the last checkpoint (model, optimizer, epoch) onto a device; None if there is none yet.
 
         Raises:
             InputError: the file is damaged.
@@ -114,12 +114,12 @@ class Run(Generic[C]):
         return state
 
     def record(self, figures: Mapping[str, float]) -> None:
-        """Add an epoch to the history."""
+        """Append an epoch's figures to the history, and write the history's file."""
         self.history.append({name: float(value) for name, value in figures.items()})
         write_file(self.folder / HISTORY, canonical_json(plain(self.history)).encode(), overwrite=True)
 
     def write_metrics(self, metrics: Mapping[str, Any]) -> None:
-        """Write the figures that the trained model reached, and the curves of its training as a picture."""
+        """Write the trained model's metrics as JSON, and the history's curves as a PNG."""
         write_file(self.folder / METRICS, canonical_json(plain(dict(metrics))).encode(), overwrite=True)
         if self.history:
             write_file(self.folder / CURVES, _curves(self.history), overwrite=True)
@@ -142,17 +142,17 @@ class Run(Generic[C]):
 
 
 def stream_seed(seed: int, *purpose: str | int) -> int:
-    """Return the 63-bit seed of one purpose."""
+    """Return a 63-bit seed derived from a seed and a purpose, e.g. for PyTorch."""
     return int(stream(seed, *purpose).integers(2**63))
 
 
 def lasting_data(configuration: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a configuration's data without what may differ from call to call of one training."""
+    """Return a configuration's data without the fields that may change on resuming (threads, device, workers)."""
     return {name: value for name, value in configuration.items() if name not in FREE_WHEN_RESUMING}
 
 
 def plain(value: Any) -> Any:
-    """Return what JSON can hold: numbers that aren't finite become None, tuples lists."""
+    """Return a copy of nested data as JSON can hold it: NaN and infinity become None, tuples lists, keys strings."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
@@ -161,7 +161,7 @@ def plain(value: Any) -> Any:
 
 
 def _curves(history: list[dict[str, float]]) -> bytes:
-    """Return a PNG with one small plot per figure of the history."""
+    """Return a PNG with one small plot per figure of the history, over the epochs."""
     from matplotlib.figure import Figure  # takes half a second, which only pictures need
 
     names = [name for name in history[-1] if name not in ("epoch", "seconds")]

@@ -13,7 +13,7 @@ from .configuration import TASKS, Configuration
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Data that a trained run is measured on.
+    """Request to measure a trained run: data, output folder and class mapping.
 
     Attributes:
         data: folders of data sets, or cloud files with what they need beside them.
@@ -30,7 +30,7 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class Prediction:
-    """Cloud that a trained run is used on.
+    """Request to use a trained run on a cloud: input, output and options.
 
     Attributes:
         cloud: file to be read.
@@ -48,20 +48,20 @@ class Prediction:
 
 
 class Task(Protocol):
-    """A module of `TASKS`, with the class of its configurations. Results are JSON data, but for tables."""
+    """Protocol of the modules of `TASKS`: train, evaluate, predict; results are JSON data, tables are text."""
 
     CONFIGURATION: type[Configuration]
 
     def train(self, run: Any, progress: Progress = silent) -> dict[str, Any]:
-        """Train a `Run`, save it and return its metrics."""
+        """Train a `Run`, save the model and the metrics in its folder; return the metrics as JSON data."""
 
     def evaluate(self, run: Any, evaluation: Evaluation, progress: Progress = silent) -> tuple[dict[str, Any], str]:
-        """Measure a trained `Run`; ``files`` are the names of what was written to the output. And tables for people."""
+        """Measure a trained `Run`, write tables and pictures; return figures (``files``: their names) and a text."""
 
     def predict(self, run: Any, prediction: Prediction, progress: Progress = silent) -> dict[str, Any]:
-        """Use a trained `Run` on a cloud and write what it says."""
+        """Apply a trained `Run` to a cloud, write the prediction's files; return a summary as JSON data."""
 
 
 def task(name: str) -> Task:
-    """Return the module of a task out of `TASKS`."""
+    """Import and return the module of a task of `TASKS`."""
     return cast(Task, import_module(TASKS[name]))

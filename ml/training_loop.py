@@ -25,7 +25,7 @@ Loss = Callable[[M, Any], tuple[Tensor, Figures]]
 
 
 def chosen_device(configuration: Configuration) -> torch.device:
-    """Return the device that a configuration asks for, and set the number of threads.
+    """Return the device that a configuration asks for; also sets PyTorch's number of threads.
 
     Raises:
         InputError: there is no such device.
@@ -107,7 +107,7 @@ def fit(
 
 
 def move_to_device(model: nn.Module, batch: Any) -> Any:
-    """Return a tensor, or those of a batch by name, on the device of a model."""
+    """Return a tensor, or a dictionary of tensors, moved to the model's device."""
     device = next(model.parameters()).device
     if isinstance(batch, Tensor):
         return batch.to(device)
@@ -115,7 +115,7 @@ def move_to_device(model: nn.Module, batch: Any) -> Any:
 
 
 def learning_rate(schedule: Schedule, step: int, steps: int) -> float:
-    """Return the rate of a step counted from 0: linear up to ``learning_rate``, then a cosine to the final one."""
+    """Return the learning rate of a step from 0: linear warm-up to the largest, then a cosine to the final one."""
     rising = schedule.warmup * steps
     if step < rising:
         return schedule.learning_rate * (step + 1) / (rising + 1)
@@ -125,7 +125,7 @@ def learning_rate(schedule: Schedule, step: int, steps: int) -> float:
 
 
 def optimizer_of(model: nn.Module, schedule: Schedule) -> torch.optim.AdamW:
-    """Return the optimiser of all weights; biases and the scales of norms don't decay."""
+    """Return an AdamW optimiser of all weights; biases and norms' scales have no weight decay."""
     matrices = [weight for weight in model.parameters() if weight.ndim > 1]
     vectors = [weight for weight in model.parameters() if weight.ndim <= 1]
     groups = [{"params": matrices, "weight_decay": schedule.weight_decay}, {"params": vectors, "weight_decay": 0.0}]
@@ -135,7 +135,7 @@ def optimizer_of(model: nn.Module, schedule: Schedule) -> torch.optim.AdamW:
 def train_step(
     model: M, optimizer: torch.optim.Optimizer, rate: float, configuration: Configuration, loss: Loss[M], batch: Any
 ) -> Figures:
-    """Change the weights by one batch of each process; return the mean loss and this process's further figures.
+    """Do one optimiser step, gradients averaged over processes; return mean loss and this process's other figures.
 
     Raises:
         InputError: the loss is no longer finite.

@@ -22,7 +22,7 @@ _HEIGHT = TARGETS.index("height")
 def find_road(
     predictor: CenterlinePredictor, cloud: Path, line: MeasuredAxis | None = None, progress: Progress = silent
 ) -> Regression:
-    """Find centreline and corridor along a cloud's road, in map coordinates and bounded memory however long it is.
+    """Return centreline and corridor regressed frame by frame along a cloud's road, in map coordinates, bounded memory.
 
     Args:
         predictor: a trained model.
@@ -52,7 +52,7 @@ def find_road(
 
 
 def _span(center: Float) -> slice:
-    """Return the frames from the first to the last in which something was found; all if nothing was."""
+    """Return the slice from the first to the last frame whose `center` isn't NaN; of all frames if all are NaN."""
     there = np.flatnonzero(np.isfinite(center))
     return slice(int(there[0]), int(there[-1]) + 1) if len(there) else slice(None)
 
@@ -64,7 +64,7 @@ UNITS = {"lanes": "1", "heading": "rad"}
 
 
 def geojson(found: Regression, name: str, spacing: float) -> dict[str, Any]:
-    """Return a FeatureCollection with centreline and edges, one feature per stretch without a gap.
+    """Return centreline and pavement edges as a GeoJSON FeatureCollection, one LineString per stretch without a gap.
 
     Each has, per vertex, its station along the path, its standard deviation across the road and the half-widths of the
     intervals that cover 68 % and 95 %, m.
@@ -101,7 +101,7 @@ def geojson(found: Regression, name: str, spacing: float) -> dict[str, Any]:
 
 
 def corridor_json(found: Regression, calibration: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the corridor as JSON data: a list of M numbers per column, null where nothing was found.
+    """Return the corridor as JSON data: per column a list of one number per frame, None where nothing was found.
 
     Args:
         found: by the model.

@@ -20,7 +20,7 @@ _GAP = 5.0  # m between points of a line across which nothing is told
 
 
 def learned_axis(folder: FilePath, cloud_file: FilePath, scratch: FilePath) -> Predictor:
-    """Return a predictor of the axis by a trained run.
+    """Return a function (cloud, path) -> (offset, std) of the axis along the path, m, by a trained centreline model.
 
     Args:
         folder: of the run.
@@ -47,7 +47,7 @@ def learned_axis(folder: FilePath, cloud_file: FilePath, scratch: FilePath) -> P
 
 
 def axis_beside(document: object, origin: Float, path: CloudPath) -> tuple[Float, Float]:
-    """Return offset and standard deviation (M,) of predicted centrelines at each point of a path; NaN beside none.
+    """Return offset and standard deviation (M,), m, of GeoJSON centrelines at each point of a path; NaN beside none.
 
     Args:
         document: GeoJSON with features whose ``feature`` is ``centerline``, and ``std`` per vertex.

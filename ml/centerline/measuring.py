@@ -83,7 +83,7 @@ def measure_run(
 def read_cases(
     configuration: CenterlineConfiguration, evaluation: Evaluation, progress: Progress = silent
 ) -> list[Case]:
-    """Read the roads that are named, as the configuration's seed shows them.
+    """Return the evaluation's roads, each with frames along a path drawn by the configuration's seed.
 
     Raises:
         MissingFileError: there is no such data set or cloud, or no axis beside a cloud.
@@ -108,7 +108,7 @@ def read_cases(
 
 
 def corridor_figures(predictor: CenterlinePredictor, shown: Sequence[Case]) -> dict[str, dict[str, float | None]]:
-    """Return mean error and coverage of each target over all roads; None where the truth isn't known anywhere."""
+    """Return mean absolute error, coverage, ... of each target over all roads' frames; None without known truth."""
     error, std, wide = [], [], []
     for one in shown:
         found = predictor.regress(one.road, one.frames)
@@ -137,7 +137,7 @@ def _measure_case(cloud: Path, truth: TruthKind) -> LearningRoad:
 
 
 def _draw(folder: Path, one: Case, predictor: CenterlinePredictor, name: str) -> list[str]:
-    """Draw a road; return the names of the pictures."""
+    """Write two PNG pictures of a road, its centrelines and its corridor, to a folder; return their file names."""
     length = one.road.known_truth.axis.length
     view = PictureView(max(0.0, 0.5 * (length - _VIEW)), min(length, 0.5 * (length + _VIEW)))
     prediction = predictor(one.road, one.frames)

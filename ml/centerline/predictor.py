@@ -37,7 +37,7 @@ class UseOptions(Part):
 
 @dataclass(frozen=True)
 class Regression:
-    """Predictions in M frames; T are the `TARGETS`, the centre first.
+    """Centreline and corridor that a model regressed in M frames, with deviations; T are the `TARGETS`, centre first.
 
     Attributes:
         frames: where.
@@ -57,19 +57,19 @@ class Regression:
     epsg: int | None = None
 
     def points(self, name: str) -> Float:
-        """Return the points (M, 3) of one of the lines; z is the centre's elevation."""
+        """Return the points (M, 3) of `center`, `left_edge` or `right_edge`, m; z is always the centre's elevation."""
         y, height = (self.value[:, TARGETS.index(each)] for each in (name, "height"))
         return np.column_stack([self.frames.at(y), height])
 
     @property
     def center(self) -> Float:
-        """Return y of the centre (M,) in the frames, m."""
+        """Return the centreline's y (M,) in each frame, m, left positive; NaN where nothing was found."""
         return self.value[:, 0]
 
 
 @dataclass(eq=False)
 class CenterlinePredictor:
-    """A model with its calibration; called with a road and frames it is a predictor for `scores.evaluation`.
+    """A trained centreline model with its deviations' calibration; callable as a predictor of `scores.evaluation`.
 
     Args:
         model: trained.
@@ -84,17 +84,17 @@ class CenterlinePredictor:
     calibration: Mapping[str, IntervalCalibration] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Complete the calibration."""
+        """Give every target without a calibration the identity."""
         self.calibration = {name: self.calibration.get(name, IntervalCalibration()) for name in TARGETS}
 
     def __call__(self, road: LearningRoad, frames: Frames) -> Float:
-        """Return (M, 4 + 2 K), `evaluation.CORRIDOR_COLUMNS`; the height is an elevation."""
+        """Return (M, 4 + 2 K) numbers, columns `evaluation.CORRIDOR_COLUMNS`, NaN where nothing is found."""
         found = self.regress(road, frames)
         center, corridor = (found.value[:, :1], found.std[:, :1]), (found.value[:, 1:], found.std[:, 1:])
         return np.column_stack([*center, *corridor, found.widths[:, 0]])
 
     def regress(self, road: LearningRoad, frames: Frames) -> Regression:
-        """Return what the model finds.
+        """Return centreline and corridor in M frames with calibrated deviations; NaN where no points are near.
 
         A frame in several sequences has the mean of what they say, weighted by the inverse variances. Its variance is
         their mean as well, since errors of the same points don't average out. Where sequences are interleaved, lines
@@ -128,7 +128,7 @@ class CenterlinePredictor:
         return mean, raw
 
     def calibrate(self, shown: Iterable[tuple[LearningRoad, Frames]]) -> tuple[CenterlinePredictor, Float]:
-        """Return the model with the deviations that are right on some roads, and its errors there (N, T).
+        """Return a copy calibrated so that its deviations fit its errors on some roads, and these errors (N, T).
 
         Found on a few roads of another scanner, one factor per target makes its deviations right there (see
         `calibration`); what the model says stays the same.
@@ -151,7 +151,7 @@ class CenterlinePredictor:
         return other, every
 
     def _sequences(self, road: LearningRoad, frames: Frames) -> Iterator[tuple[Index, Float, Bool, Float, Float]]:
-        """Yield of all slices of some sequences: frame, z origin, whether there are points, values and deviations."""
+        """Yield per batch, for its N slices: frame index, z origin (m), has points, values and deviations (N, T)."""
         data = FrameSlices(road, frames, self.settings, self.use.step)
         self.model.eval()
         for first in range(0, len(data), self.use.batch):
@@ -168,7 +168,7 @@ class CenterlinePredictor:
 
 
 def join_line(frames: Frames, y: Float, std: Float, reach: int) -> Float:
-    """Return y of a line in M frames, those of neighbours joined that come from different sequences.
+    """Return y (M,) of a line, m, smoothed by weighted local lines where neighbouring frames come from other sequences.
 
     Each is that of the straight line through the places in fewer than ``reach`` frames to either side, weighted by the
     inverse variances and the nearer the more: 5 mm off a circle of 280 m with a reach of 4 m.
@@ -197,14 +197,14 @@ def join_line(frames: Frames, y: Float, std: Float, reach: int) -> Float:
 
 
 def _crossing_of(one: Float, x: Float, y: Float, xx: Float, xy: Float) -> Float:
-    """Return where the straight lines of least squares cross x = 0, from sums of weights times what the names say."""
+    """Return y at x = 0 of weighted least-squares lines, from weighted sums of 1, x, y, x^2, xy; NaN without weight."""
     spread = one * xx - x * x
     slope = np.divide(one * xy - x * y, spread, out=np.zeros_like(one), where=spread > 1e-6 * one * one)
     return np.divide(y - slope * x, one, out=np.full_like(one, np.nan), where=one > 0.0)
 
 
 def errors(found: Regression, truth: Truth) -> Float:
-    """Return what was found minus the truth (M, T), NaN where either is missing."""
+    """Return the regressed targets minus the truth (M, T), in the targets' units; NaN where either is missing."""
     there = truth.at(found.frames)
     return found.value - np.column_stack([there.center, there.corridor])
 

@@ -44,7 +44,7 @@ _FIRST_WEIGHTS = "first weights"
 
 
 class CenterlineConfiguration(Configuration):
-    """Everything that a centreline model depends on."""
+    """Configuration of a centreline training: data, slices, augmentation, network, loss, batches and use."""
 
     renamed: ClassVar[Mapping[str, str]] = {"model": "network"}
 
@@ -65,7 +65,7 @@ CONFIGURATION = CenterlineConfiguration
 
 
 def train(run: Run[CenterlineConfiguration], progress: Progress = silent) -> dict[str, Any]:
-    """Train a model, calibrate its deviations on the validation roads, save both and return the figures."""
+    """Train a model, calibrate its deviations on the validation roads, save both in the run; return the metrics."""
     with helpers(run, train_network, chosen_device(run.configuration)):
         model, roads = train_network(run, progress)
     progress("calibrating", 0.0)
@@ -75,7 +75,7 @@ def train(run: Run[CenterlineConfiguration], progress: Progress = silent) -> dic
 
 
 def train_network(run: Run[CenterlineConfiguration], progress: Progress = silent) -> tuple[CenterlineModel, Roads]:
-    """Train a run; return the model with its last weights, and the roads.
+    """Train the network of a run's configuration; return it with the weights of the last epoch, and the roads read.
 
     Raises:
         InputError: data are missing, or don't fit the configuration.
@@ -107,7 +107,7 @@ def train_network(run: Run[CenterlineConfiguration], progress: Progress = silent
 def evaluate(
     run: Run[CenterlineConfiguration], evaluation: Evaluation, progress: Progress = silent
 ) -> tuple[dict[str, Any], str]:
-    """Measure a trained model beside predictors that learn nothing; write tables and pictures.
+    """Measure a trained model and untrained baselines, write tables and pictures; return figures and a report as text.
 
     Raises:
         InputError: the run isn't finished, or the data hold no road with a known centreline.
@@ -116,7 +116,7 @@ def evaluate(
 
 
 def predict(run: Run[CenterlineConfiguration], prediction: Prediction, progress: Progress = silent) -> dict[str, Any]:
-    """Find the centreline and the corridor in a cloud; write GeoJSON, and beside it the corridor as JSON.
+    """Regress a cloud's centreline, write it as GeoJSON and the corridor as JSON beside it; return a summary.
 
     Raises:
         InputError: the run isn't finished, the output isn't a .geojson file, or the cloud has no ground.
@@ -147,7 +147,7 @@ def predict(run: Run[CenterlineConfiguration], prediction: Prediction, progress:
 
 
 def predictor(run: Run[CenterlineConfiguration]) -> CenterlinePredictor:
-    """Return a trained run's model, ready to be used.
+    """Load a run's trained and calibrated centreline model.
 
     Raises:
         InputError: the training isn't finished.
@@ -169,7 +169,7 @@ def _empty_model(configuration: CenterlineConfiguration) -> CenterlineModel:
 
 
 def _first_model(configuration: CenterlineConfiguration) -> CenterlineModel:
-    """Return the model as its training begins: random, or with the weights of another run.
+    """Return the model before its first step: weights seeded at random, or those of the run `begin_with`.
 
     Raises:
         MissingFileError, InputError: there is no such run, or its model is another.
@@ -190,7 +190,7 @@ def _first_model(configuration: CenterlineConfiguration) -> CenterlineModel:
 
 
 def _validation(configuration: CenterlineConfiguration, roads: Roads) -> Any:
-    """Return what `fit` calls after each epoch: errors and coverage on sequences that stay the same."""
+    """Return a function (model, epoch) -> mean absolute error (m) and coverage of the centre on fixed sequences."""
     crop = quiet(configuration.effects.crop)
     count = configuration.batches.validation
     known = [*roads.validation, *roads.measured_validation]
@@ -210,7 +210,7 @@ def _validation(configuration: CenterlineConfiguration, roads: Roads) -> Any:
 
 
 def calibrate(run: Run[CenterlineConfiguration], model: CenterlineModel, roads: Roads) -> dict[str, Any]:
-    """Find the calibration, write it to the run's folder, and return the metrics of the validation roads.
+    """Calibrate the model's deviations on the validation roads, write them to the run; return the validation's metrics.
 
     These are gone along from end to end, as in use: joined lines are better than those of single sequences.
     """
@@ -239,7 +239,7 @@ def calibrate(run: Run[CenterlineConfiguration], model: CenterlineModel, roads: 
 
 
 def _residuals(model: nn.Module, batches: Sequence[Batch]) -> tuple[Any, Any]:
-    """Return errors and deviations (N, T) of all slices of some batches; errors are NaN where the truth is."""
+    """Return errors and predicted deviations (N, T) of all slices of some batches; errors are NaN without truth."""
     model.eval()
     error, std = [], []
     for batch in batches:

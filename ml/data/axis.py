@@ -23,7 +23,7 @@ _PAIRS = 4_000_000
 
 
 class MeasuredAxis:
-    """A polyline in 3D. Stations are the running length in plan, across gaps as well.
+    """A 3D polyline with gaps, parametrised by station: running length in plan, m, counted across gaps as well.
 
     Attributes:
         points: (N, 3) float64 vertices, m.
@@ -65,7 +65,7 @@ class MeasuredAxis:
 
     @classmethod
     def of_road(cls, geometry: RoadGeometry, step: float = 0.5) -> MeasuredAxis:
-        """Return a road's centreline in the road's local coordinates.
+        """Return the centreline of a road's exact geometry as a polyline in the road's local coordinates.
 
         Vertices lie ``step`` apart at most; chords of 0.5 m are 0.1 mm off a radius of 280 m.
         """
@@ -74,7 +74,7 @@ class MeasuredAxis:
 
     @property
     def length(self) -> float:
-        """Return the running length of the last vertex, gaps included, m."""
+        """Return the line's length in plan, gaps included, m."""
         return float(self.station[-1])
 
     def translate(self, by: ArrayLike) -> MeasuredAxis:
@@ -83,14 +83,14 @@ class MeasuredAxis:
 
     @cached_property
     def parts(self) -> Float:
-        """First and last station (K, 2) of every stretch without a gap; single vertices between gaps are none."""
+        """First and last station (K, 2), m, of every stretch without a gap; lone vertices between gaps are left out."""
         ends = np.flatnonzero(~self.joined)
         first, last = np.concatenate([[0], ends + 1]), np.concatenate([ends, [len(self.points) - 1]])
         long = last > first
         return np.column_stack([self.station[first[long]], self.station[last[long]]])
 
     def stations(self, spacing: float = 1.0) -> Float:
-        """Return the multiples of a spacing (m) at which there is a line."""
+        """Return the stations (K,), m, that are multiples of `spacing` (m) and lie in no gap."""
         every = spacing * np.arange(int(np.floor(self.length / spacing)) + 1)
         return every[self.inside(every)]
 
@@ -103,19 +103,19 @@ class MeasuredAxis:
         return (after | before) & (at >= 0.0) & (at <= self.length)
 
     def position(self, station: ArrayLike) -> Float:
-        """Return points (M, 2) in plan; NaN where there is no line."""
+        """Return the points (M, 2) in plan at stations (M,), m; NaN in gaps and beyond the ends."""
         at = np.asarray(station, dtype=np.float64)
         found = np.column_stack([np.interp(at, self.station, self.points[:, column]) for column in (0, 1)])
         found[~self.inside(at)] = np.nan
         return found
 
     def elevation(self, station: ArrayLike) -> Float:
-        """Return elevations (M,), m; NaN where there is no line."""
+        """Return the line's elevations (M,) at stations (M,), m; NaN in gaps and beyond the ends."""
         at = np.asarray(station, dtype=np.float64)
         return np.where(self.inside(at), np.interp(at, self.station, self.points[:, 2]), np.nan)
 
     def direction(self, station: ArrayLike, reach: float = 2.0) -> Float:
-        """Return the line's direction (M,), rad counter-clockwise from x; NaN where there is no line.
+        """Return the line's direction (M,), rad counter-clockwise from x; NaN in gaps and beyond the ends.
 
         It is that of the chord from ``reach`` before to ``reach`` behind, cut at gaps and ends, so that measured points
         that jump by centimetres don't turn it.
@@ -150,7 +150,7 @@ class MeasuredAxis:
         return station, offset
 
     def crossing(self, origin: ArrayLike, direction: ArrayLike, reach: float = 60.0) -> tuple[Float, Float]:
-        """Return where lines square to frames cross this one.
+        """Return y (m) and station (m) where the y axis of each of M frames crosses the line; NaN where it doesn't.
 
         Args:
             origin: (M, 2) origins of the frames.
@@ -186,7 +186,7 @@ class MeasuredAxis:
         return found, station
 
     def _part_around(self, at: Float) -> tuple[Float, Float]:
-        """Return the ends of the stretch that each station lies on."""
+        """Return the first and the last station of the gapless stretch that each station lies on, m."""
         if not len(self.parts):
             return at, at
         index = np.clip(np.searchsorted(self.parts[:, 0], at, "right") - 1, 0, len(self.parts) - 1)
@@ -194,7 +194,7 @@ class MeasuredAxis:
 
     @cached_property
     def _samples(self) -> tuple[cKDTree, Index]:
-        """Return a tree of places along the line and the segment that each lies on."""
+        """Return a k-d tree of samples along the line (gaps too) and the segment that each lies on, cached."""
         counts = np.maximum(1, np.ceil(np.diff(self.station) / _SAMPLE).astype(int))
         owner = np.repeat(np.arange(len(counts)), counts)
         share = (np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts) + 0.5) / counts[owner]
@@ -202,7 +202,7 @@ class MeasuredAxis:
         return cKDTree(start + share[:, None] * (end - start)), owner
 
     def _foot(self, points: Float, segment: Index) -> tuple[Float, Float, Float]:
-        """Return station, offset and distance of points (M, 2) on one segment each; the outermost have no end."""
+        """Return station, signed offset and distance (m) of points (M, 2) from one segment each; the ends go on."""
         start = self.points[segment, :2]
         length = self.station[segment + 1] - self.station[segment]
         unit = (self.points[segment + 1, :2] - start) / length[:, None]

@@ -59,7 +59,7 @@ class DataOptions(Part):
 
 
 class BatchOptions(Part):
-    """How much of it an epoch sees."""
+    """How many sequences make a batch and an epoch."""
 
     size: int = quantity(16, ge=1, le=100_000, unit="1", description="Sequences of a batch.")
     steps: int = quantity(100, ge=1, le=1_000_000, unit="1", description="Batches of an epoch.")
@@ -79,7 +79,7 @@ class BatchOptions(Part):
 
 @dataclass(frozen=True)
 class Roads:
-    """Roads to learn from and roads to validate with; of both the synthetic and the real ones apart."""
+    """Synthetic and measured roads to train on (`train`, `measured`), and to validate with."""
 
     train: list[LearningRoad]
     measured: list[LearningRoad]
@@ -88,7 +88,7 @@ class Roads:
 
 
 def read_roads(data: DataOptions, truth: TruthKind, progress: Progress = silent) -> Roads:
-    """Read all roads of a configuration.
+    """Read the synthetic and the measured roads that a configuration trains on and validates with.
 
     Raises:
         MissingFileError, InputError: a file or folder is missing or damaged, or holds nothing of use.
@@ -106,7 +106,7 @@ def read_roads(data: DataOptions, truth: TruthKind, progress: Progress = silent)
 
 
 class Batches:
-    """The batches of an epoch: called with its number, gives them one by one. They hang on seed and epoch alone.
+    """Random training batches: called with an epoch's number it yields them, determined by seed and epoch alone.
 
     Args:
         roads: to learn from.
@@ -138,12 +138,12 @@ class Batches:
         self.datasets = [SliceDataset(group, settings, self.drawn_per_epoch, seed, effects) for group, _ in there]
 
     def kinds(self, epoch: int) -> Index:
-        """Return for each sample that an epoch draws which of `datasets` it comes from."""
+        """Return the index in `datasets` of each sample that an epoch draws, (drawn_per_epoch,), random by shares."""
         random = stream(self.seed, "kinds of road", epoch)
         return random.choice(len(self.shares), self.drawn_per_epoch, p=self.shares)
 
     def __call__(self, epoch: int, share: slice = slice(None)) -> Iterator[Batch]:
-        """Yield those batches of an epoch, counted from 0, whose numbers a slice names."""
+        """Yield the batches of an epoch whose numbers, from 0, `share` selects; every second pass is mirrored."""
         kept: dict[int, Sample] = {}
         kind = self.kinds(epoch)
         size, each = self.options.size, self.options.steps // self.options.passes
@@ -159,7 +159,7 @@ class Batches:
 def fixed_batches(
     roads: Sequence[LearningRoad], settings: SliceSettings, effects: SequenceEffects | None, count: int, seed: int
 ) -> list[Batch]:
-    """Return batches that are the same every time.
+    """Return `count` validation sequences in batches of up to 32, drawn from the seed: always the same.
 
     Args:
         roads: with a truth.
@@ -174,7 +174,7 @@ def fixed_batches(
 
 
 def quiet(crop: SequenceCrop) -> SequenceEffects:
-    """Return effects that do nothing but cut off sides."""
+    """Return effects that crop the slices' sides as `crop` says and are off otherwise."""
     strengths = [name for name, field in SequenceEffects.model_fields.items() if field.annotation is float]
     return SequenceEffects(crop=crop, gamma=(1.0, 1.0), **dict.fromkeys(strengths, 0.0))
 
@@ -191,7 +191,7 @@ def _scenes(
 
 
 def _read_measured_road(road: MeasuredRoad, truth: TruthKind) -> LearningRoad:
-    """Read a real road whose axis is only known between two stations."""
+    """Read a measured road, its true axis clipped to the stations `first` to `last`."""
     whole = read_measured(Path(road.cloud), Path(road.axis), truth)
     assert whole.truth is not None
     axis = whole.truth.axis

@@ -20,7 +20,7 @@ IGNORED = -1
 
 
 class LabelMapping(Model):
-    """Which numbers in a file of others stand for which class, as JSON; numbers that aren't named are ignored."""
+    """Mapping from the class numbers of another data set's files to class names; numbers not named are ignored."""
 
     vendor_keys_allowed: ClassVar[bool] = False
 
@@ -33,7 +33,7 @@ class LabelMapping(Model):
     ignore_zero_intensity: bool = Field(False, description="Ignore points whose intensity is 0: none was measured.")
 
     def targets(self, names: tuple[str, ...]) -> tuple[str, ...]:
-        """Return what the truth tells apart, in order: the scheme's classes, or the groups.
+        """Return the names that the mapped truth distinguishes, in order: its groups if it has any, else `names`.
 
         Args:
             names: of the scheme's classes.
@@ -57,7 +57,7 @@ class LabelMapping(Model):
         return known
 
     def label(self, numbers: NDArray[np.integer], names: tuple[str, ...]) -> NDArray[np.int16]:
-        """Return for numbers of the file (N,) the places in `targets`, or `IGNORED`."""
+        """Return the index in `targets(names)` of each number (N,) of a file; `IGNORED` (-1) where it isn't mapped."""
         places = {name: place for place, name in enumerate(self.targets(names))}
         table = {int(number): places[name] for number, name in self.classes.items()}
         known, inverse = np.unique(numbers, return_inverse=True)
@@ -65,7 +65,7 @@ class LabelMapping(Model):
         return found[inverse.reshape(-1)] if len(known) else np.zeros(0, dtype=np.int16)
 
     def group_of(self, names: tuple[str, ...]) -> NDArray[np.int16]:
-        """Return the place in `targets` of each class (C,) that is predicted; `IGNORED` where no group has it."""
+        """Return the index in `targets(names)` of each predicted class (C,); `IGNORED` (-1) where no group has it."""
         targets = self.targets(names)
         if not self.groups:
             return np.arange(len(names), dtype=np.int16)
@@ -92,7 +92,7 @@ def class_names(scheme: ClassScheme) -> tuple[str, ...]:
 
 
 def table_between(source: Mapping[int, str], scheme: ClassScheme, where: str) -> NDArray[np.int16]:
-    """Return a (256,) table from a source's ids to places in a scheme, by names; unlabelled is `IGNORED`.
+    """Return a (256,) table from a source's class ids to indices of the scheme's classes, by name; else `IGNORED` (-1).
 
     A source's class counts as the scheme's class of the same name, else as the one that it is merged into: 17 classes
     become 5, and the 5 never 17.

@@ -34,7 +34,7 @@ _NO_LANE = 0.01
 
 @dataclass(frozen=True)
 class Truth:
-    """A centreline, and where it is known the corridor around it. Arrays stand at the axis' N vertices.
+    """Ground truth of a road: its centreline, and the corridor around it where known, at the axis' N vertices.
 
     Attributes:
         kind: ``road``, the middle of the whole road; ``carriageway``, the line between a carriageway's two lanes.
@@ -60,7 +60,7 @@ class Truth:
 
     @classmethod
     def of_axis(cls, axis: MeasuredAxis, kind: TruthKind) -> Truth:
-        """Return a measured centreline of which nothing else is known."""
+        """Return the truth of a measured centreline alone: corridor unknown (NaN), height only if z varies."""
         unknown = np.full(len(axis.points), np.nan)
         return cls(
             kind=kind,
@@ -84,14 +84,14 @@ class Truth:
         )
 
     def at(self, frames: Frames) -> Crossings:
-        """Return the truth in M frames; the road may run against them. Heights are those of the axis itself, m."""
+        """Return the truth where M frames' y axes cross it, signed as the frames see it; heights are elevations, m."""
         center, station = self.axis.crossing(frames.position, frames.direction)
         turn = self.axis.direction(station) - frames.direction
         against = np.cos(turn) < 0.0
         unknown = np.full(len(center), np.nan)
 
         def as_seen(left: Float, right: Float) -> Float:
-            """Return what is to the frames' left and right (M, 2) of what is to the road's."""
+            """Return the road's left and right values as the frames' (M, 2): swapped where it runs against them."""
             return np.column_stack([np.where(against, right, left), np.where(against, left, right)])
 
         edges = [
@@ -107,7 +107,7 @@ class Truth:
         return Crossings(center, station, corridor, lines, room)
 
     def _along(self, values: Float, station: Float) -> Float:
-        """Return values (M,) at stations, linear between vertices; that of the vertex before where one is infinite."""
+        """Return values (M,) interpolated at stations, NaN at NaN; the vertex before counts where one is infinite."""
         known = np.nan_to_num(station)
         after = np.clip(np.searchsorted(self.axis.station, known), 1, len(values) - 1)
         before = after - 1
@@ -120,7 +120,7 @@ class Truth:
 
 @dataclass(frozen=True)
 class Crossings:
-    """The truth in M frames.
+    """Ground truth of a road sampled in M frames.
 
     Attributes:
         center: (M,) y of the centreline, m; NaN where it has a gap.
@@ -181,7 +181,7 @@ def _whole_road(geometry: RoadGeometry) -> Truth:
 
 
 def _carriageway(geometry: RoadGeometry, section: CarriagewaySection) -> Truth | None:
-    """Return the truth of one carriageway where it has two full lanes; None if it never has."""
+    """Return the truth of one carriageway where it has exactly two full lanes; None if it nowhere has."""
     station = _vertices(geometry)
     number, width = _lanes(section, station)
     boundaries = section.lane_boundaries(station)
@@ -217,7 +217,7 @@ def _vertices(geometry: RoadGeometry) -> Float:
 
 
 def _lanes(section: CarriagewaySection, station: Float) -> tuple[Float, Float]:
-    """Return number and summed width (N,) of a carriageway's lanes, NaN where one begins or ends."""
+    """Return number and summed width (m) of a carriageway's full lanes, (N,); NaN where a lane begins or ends."""
     widths = np.abs(np.diff(section.lane_boundaries(station), axis=1))
     full, none = widths >= _FULL_LANE, widths <= _NO_LANE
     clear = (full | none).all(axis=1)
@@ -226,7 +226,7 @@ def _lanes(section: CarriagewaySection, station: Float) -> tuple[Float, Float]:
 
 
 def _paved_edge(section: CarriagewaySection, station: Float) -> Float:
-    """Return distances (N,) of the pavement's outer edge, NaN where a ramp leaves the road."""
+    """Return distances (N,) of the pavement's outer edge from the road's axis, m; NaN beside a ramp."""
     edge = section.paved_edge(station)
     ramp = np.zeros(len(station), dtype=bool)
     for kind in ("island", "gore"):
@@ -237,7 +237,7 @@ def _paved_edge(section: CarriagewaySection, station: Float) -> Float:
 
 
 def _points(geometry: RoadGeometry, station: Float, offset: Float) -> Float:
-    """Return points (N, 3) of the undamaged surface at offsets; z is the centreline's where it isn't known."""
+    """Return points (N, 3) of the undamaged surface at offsets, m; z is the centreline's where the surface has none."""
     position, heading, _ = geometry.alignment.frame(station)
     plan = position + offset[:, None] * np.stack([-np.sin(heading), np.cos(heading)], axis=1)
     height = geometry.elevation(station, np.nan_to_num(offset))

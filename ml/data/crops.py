@@ -39,7 +39,7 @@ COORDINATE_SPAN = 10.0
 
 @dataclass(frozen=True)
 class CropSettings:
-    """How items are made.
+    """Size, voxel and features of the items that crops become.
 
     Attributes:
         points: largest number of points of a crop.
@@ -54,14 +54,14 @@ class CropSettings:
 
 @dataclass(frozen=True)
 class Draw:
-    """One crop of an epoch: which tile, and what makes it differ from the tile's others."""
+    """One planned crop of an epoch: the tile, and a number that seeds it unlike the tile's other crops."""
 
     tile: int
     number: int
 
 
 class Seeds:
-    """Where crops are cut out: around any point of a tile, or around each class as often.
+    """Sampler of crop centres: any point of the given tile, or points balanced over the classes.
 
     Args:
         tiles: of all scenes.
@@ -75,7 +75,7 @@ class Seeds:
         self._counts = np.array([tile.class_counts(classes) for tile in tiles]) if balanced else None
 
     def draw(self, tile: int, random: np.random.Generator) -> tuple[int, int]:
-        """Return tile and point; a balanced draw chooses its tile itself."""
+        """Return the indices of a tile and of a random point in it; a balanced draw chooses its own tile."""
         if self._counts is None:
             return tile, int(random.integers(len(self._tiles[tile])))
         per_class = self._counts.sum(axis=0)
@@ -86,7 +86,7 @@ class Seeds:
 
 @dataclass(eq=False)
 class CropDataset(Dataset[Item]):
-    """Map-style: the crops of one epoch, each drawn from its own stream.
+    """Map-style data set of the planned crops of one epoch, each augmented and drawn from a random stream of its own.
 
     The same seed, epoch and place give the same item, in whichever worker and order.
 
@@ -120,7 +120,7 @@ class CropDataset(Dataset[Item]):
 
 @dataclass(eq=False)
 class CropStream(IterableDataset[Item]):
-    """Iterable and endless: crops of random tiles with effects on the fly; each worker has a stream of its own.
+    """Endless iterable data set of augmented crops of random tiles, a random stream per worker.
 
     Args: see `CropDataset`.
     """
@@ -140,7 +140,7 @@ class CropStream(IterableDataset[Item]):
 
 
 def cut_crop(tile: CloudTile, middle: Float32, points: int, scaling: Scaling) -> Crop:
-    """Return the points of a tile nearest a place (3,) by horizontal distance, at most as many as given.
+    """Return the `points` points of a tile nearest to a place (3,) in plan, or all of a smaller tile, as a crop.
 
     Columns rather than balls: a gantry stays with its posts and a crown with its trunk.
     """
@@ -152,13 +152,13 @@ def cut_crop(tile: CloudTile, middle: Float32, points: int, scaling: Scaling) ->
 
 
 def crop_of(tile: CloudTile, scaling: Scaling) -> Crop:
-    """Return a whole tile as a crop, with intensities as a feature."""
+    """Return a whole tile as a crop, with colours from 0 to 1 and intensities scaled."""
     color = None if tile.color is None else (tile.color / np.float32(255.0)).astype(np.float32)
     return Crop(tile.coord, None if tile.strength is None else scaling.apply(tile.strength), color, tile.segment)
 
 
 def item(crop: Crop, settings: CropSettings, random: np.random.Generator) -> Item:
-    """Return a crop as an item.
+    """Return a crop as a dictionary of tensors (see the module), centred; noise stands for missing features.
 
     It is centred on the mean of x and y and the median of z. What is missing is small noise from ``random``.
 
@@ -188,7 +188,7 @@ def item(crop: Crop, settings: CropSettings, random: np.random.Generator) -> Ite
 
 
 def _draw_crop(crops: CropDataset | CropStream, place: int, random: np.random.Generator) -> Item:
-    """Return a crop around a seed of a planned tile, or of the tile that the seeds have chosen in its place."""
+    """Return an augmented crop as an item, around a random point of the tile, or of the tile that the seeds choose."""
     number, point = crops.seeds.draw(place, random)
     tile = crops.tiles[number]
     crop = cut_crop(tile, tile.coord[point], crops.settings.points, crops.scalings[tile.scene])
@@ -197,7 +197,7 @@ def _draw_crop(crops: CropDataset | CropStream, place: int, random: np.random.Ge
 
 
 def collate(items: Sequence[Item]) -> Item:
-    """Return a batch: the items' points one after another; ``offset`` (B,) says where each item ends."""
+    """Concatenate the points of B items into a batch; its ``offset`` (B,) holds where each item ends."""
     batch = {name: torch.cat([entry[name] for entry in items]) for name in items[0]}
     return batch | {"offset": torch.cumsum(batch["offset"], dim=0)}
 

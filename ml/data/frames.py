@@ -37,7 +37,7 @@ _WAVES = 12
 
 @dataclass(frozen=True)
 class Frames:
-    """M frames: x along the path, y to its left, z up.
+    """M local frames along a path: x along it, y to its left, z up.
 
     Attributes:
         position: (M, 2) float64 origins in plan, m.
@@ -62,7 +62,7 @@ class Frames:
         return self.position + np.asarray(y, dtype=np.float64)[:, None] * left
 
     def reverse(self) -> Frames:
-        """Return the same places seen against the path, the last one first."""
+        """Return the frames in reverse order, turned by pi: the path travelled the other way."""
         return Frames(self.position[::-1], self.direction[::-1] + np.pi, self.station[::-1])
 
 
@@ -98,7 +98,7 @@ def displace_frames(
 
 
 def wander(station: Float, rng: np.random.Generator, length: float) -> tuple[Float, Float]:
-    """Return a smooth random function of the station (M,), uniform in -0.5 to 0.5, and its slope (1/m).
+    """Return smooth random values (M,) along stations (m), uniform in -0.5 to 0.5, and their slope (M,), 1/m.
 
     A Gaussian process of cosines with random wavelengths (Rahimi and Recht, "Random features", 2007; correlation length
     ``length``, m) passed through the normal distribution function.
@@ -139,12 +139,12 @@ def sequences(frames: Frames, length: int, step: int | None = None, spacing: flo
 
 
 def interleave_count(frames: Frames, spacing: float) -> int:
-    """Return how many of the frames there are to each of a spacing, m."""
+    """Return the ratio, rounded and at least 1, of a sequence's spacing (m) to the frames' own: every n-th is taken."""
     return max(1, round(spacing / _own_spacing(frames, spacing)))
 
 
 def stretches(frames: Frames, spacing: float = SPACING) -> list[Index]:
-    """Return the indices of the frames of every stretch without a gap; of equal spacing, at most the given one, m."""
+    """Return the frames' indices per gapless stretch; a gap is more than 1.5 times their spacing, `spacing` at most."""
     gaps = np.abs(np.diff(frames.station)) > 1.5 * _own_spacing(frames, spacing)
     return [part for part in np.split(np.arange(len(frames)), np.flatnonzero(gaps) + 1) if len(part)]
 
@@ -154,7 +154,7 @@ def _own_spacing(frames: Frames, most: float) -> float:
 
 
 def read_path(file: Path, origin: ArrayLike = (0.0, 0.0, 0.0), tolerance: float = 0.3) -> MeasuredAxis:
-    """Read a path along the road: a drawn line, or the trajectory of the scanner's platform.
+    """Read a path along the road from CSV or GeoJSON, a drawn line or a trajectory, thinned to `tolerance` (m).
 
     Args:
         file: CSV with columns x and y (trajectories have more) or GeoJSON, in the cloud's map coordinates.
@@ -177,7 +177,7 @@ def read_path(file: Path, origin: ArrayLike = (0.0, 0.0, 0.0), tolerance: float 
 
 
 def estimated_path(xyz: Float, cell: float = 4.0, window: float = 60.0, half_width: float = 40.0) -> MeasuredAxis:
-    """Find the line along the middle of a strip of points, whatever way the strip bends.
+    """Return the line along the middle of a strip of points, found from the points alone, however the strip bends.
 
     The two ends of the strip are the cells of a grid that lie farthest apart along it. The shortest way between them is
     smoothed, then three times over drawn to the middle of the points' extent across it and smoothed.
@@ -201,7 +201,7 @@ def estimated_path(xyz: Float, cell: float = 4.0, window: float = 60.0, half_wid
 
 
 def _cells(plan: Float, cell: float) -> Float:
-    """Return the mean place (C, 2) of the points in every cell of a grid."""
+    """Return the mean (C, 2) of the points in every occupied cell of a grid of edge `cell`, m."""
     at = np.floor((plan - plan.min(axis=0)) / cell).astype(np.int64)
     _, owner, counts = np.unique(at @ np.array([1 << 32, 1]), return_inverse=True, return_counts=True)
     if len(counts) < 2:
@@ -210,7 +210,7 @@ def _cells(plan: Float, cell: float) -> Float:
 
 
 def _way_through(cells: Float, cell: float) -> Index:
-    """Return the cells on the shortest way between the two that lie farthest apart along the strip."""
+    """Return the indices of the cells on the shortest path between the two farthest apart along the strip."""
     pairs = cKDTree(cells).query_pairs(2.1 * cell, output_type="ndarray")
     pairs = _bridge_cells(cells, pairs)
     graph = _graph(len(cells), pairs, np.hypot(*(cells[pairs[:, 0]] - cells[pairs[:, 1]]).T))
@@ -226,7 +226,7 @@ def _way_through(cells: Float, cell: float) -> Index:
 
 
 def _bridge_cells(cells: Float, pairs: Index) -> Index:
-    """Return the pairs of cells (P, 2) and those of the shortest ways that join what they leave apart."""
+    """Return the pairs of neighbouring cells (P, 2), with the shortest links added that make the graph connected."""
     while True:
         count, part = connected_components(_graph(len(cells), pairs, np.ones(len(pairs))), directed=False)
         if count == 1:
@@ -242,7 +242,7 @@ def _graph(count: int, pairs: Index, weights: Float) -> Any:
 
 
 def _centre_path(path: MeasuredAxis, plan: Float, window: float, half_width: float) -> MeasuredAxis:
-    """Return a path drawn to the middle of the points' extent across it and smoothed."""
+    """Return a path moved to the middle of the points' extent across it and smoothed over `window`, m."""
     station, offset = path.project(plan)
     near = np.abs(offset) <= half_width
     station, offset = station[near], offset[near]
@@ -269,6 +269,6 @@ def _on_path(path: MeasuredAxis, station: Float) -> Frames:
 
 
 def _smooth_line(points: Float, window: float) -> MeasuredAxis:
-    """Return the line through points (N, 2), `SPACING` apart, each moved on the parabola through those around it."""
+    """Return the line through points (N, 2), `SPACING` apart, smoothed by a Savitzky-Golay filter over `window`, m."""
     size = min(int(window / SPACING), len(points) - 1) // 2 * 2 + 1
     return MeasuredAxis(savgol_filter(points, size, polyorder=min(2, size - 1), axis=0, mode="interp"))

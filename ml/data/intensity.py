@@ -25,7 +25,7 @@ _SMALLEST = 1e-3
 
 
 def logarithms(intensity: Float) -> Float:
-    """Return the natural logarithms (K,) of intensities (K,) >= 0, those next to nothing raised to `DARKEST`."""
+    """Return natural logarithms (K,) of intensities (K,) >= 0, floored at `DARKEST` times their positive median."""
     positive = intensity[intensity > 0.0]
     floor = DARKEST * float(np.median(positive)) if len(positive) else 1.0
     result: Float = np.log(np.maximum(intensity, floor))
@@ -33,7 +33,7 @@ def logarithms(intensity: Float) -> Float:
 
 
 def level(logs: Float) -> Float:
-    """Return logarithms (K,) less their median, by the distance of their 10th and 90th percentiles."""
+    """Return logarithms (K,) minus their median, divided by their spread from the 10th to the 90th percentile."""
     return (logs - float(np.median(logs))) / max(_decile_spread(logs), _SMALLEST)
 
 
@@ -43,7 +43,7 @@ def _decile_spread(logs: Float) -> float:
 
 
 def contrast(logs: Float, y: Float) -> Float:
-    """Return logarithms (K,) less what is usual around their place across the road, by their usual noise.
+    """Return logarithms (K,) minus the local median across the road, divided by a robust estimate of their noise.
 
     The noise is that of a Gaussian with the same 20th and 80th percentiles: lines are too few to matter. It counts as
     `QUIETEST` where there is less.

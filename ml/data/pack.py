@@ -34,7 +34,7 @@ _SMALLEST = 2_000
 def corridor_tiles(
     scene: Path, scheme: ClassScheme, voxel: float, corridor: float, length: float = 60.0
 ) -> Iterator[CloudTile]:
-    """Yield the corridor of one scene of a data set, a tile per ``length`` of its road.
+    """Yield a scene's labelled points within `corridor` (m) of its centreline, thinned, a tile per `length` (m).
 
     The thinned corridor of one scene is held in memory: about 100 MB per km.
 
@@ -68,7 +68,7 @@ def corridor_tiles(
 
 
 def _lean(block: PointBlock) -> PointBlock:
-    """Return a block without what isn't packed."""
+    """Return a copy of the block without the layers that packed files don't hold (normals, materials, ...)."""
     block = replace(block, normal=None, material=None, scanner=None, true_range=None, true_xyz=None)
     return replace(block, roughness=None, metallic=None, specular=None, color_source=None)
 
@@ -76,7 +76,7 @@ def _lean(block: PointBlock) -> PointBlock:
 def packed_tiles(
     folder: Path, split: str | None, scheme: ClassScheme, voxel: float, corridor: float
 ) -> Iterator[Packed]:
-    """Yield all tiles of a data set (its corridors), or of any other source of labelled points as it is."""
+    """Yield the packed tiles of a data set's corridors, or of another source's whole clouds, tiny tiles left out."""
     if (folder / MANIFEST).is_file():
         for scene in scene_folders(folder, split):
             for tile in corridor_tiles(scene, scheme, voxel, corridor):
@@ -88,7 +88,7 @@ def packed_tiles(
 
 
 def within(tiles: Iterable[Packed], limit: int, seed: int) -> list[Packed]:
-    """Return as many tiles as fit into a number of bytes: of each scene as many, drawn at random, in their order.
+    """Return a random choice of tiles that fits into `limit` bytes, equally many per scene, in the given order.
 
     Args:
         tiles: of all scenes.
@@ -113,7 +113,7 @@ def within(tiles: Iterable[Packed], limit: int, seed: int) -> list[Packed]:
 
 
 def summary(notes: Sequence[Mapping[str, Any]], size: int) -> dict[str, Any]:
-    """Return what a packed file holds, as JSON data; ``crops`` is how many of the recipe's its points make up.
+    """Return a packed file's counts as JSON data: bytes, tiles, scenes, points, bytes per point and crops' worth.
 
     Args:
         notes: of each tile.

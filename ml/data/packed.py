@@ -39,7 +39,7 @@ _TIME = (1980, 1, 1, 0, 0, 0)
 
 @dataclass(frozen=True)
 class Packed:
-    """One tile as it is stored.
+    """One tile of training data as it is stored: compressed points and notes.
 
     Attributes:
         notes: scene, origin, number of points, what is missing.
@@ -51,7 +51,7 @@ class Packed:
 
 
 def words_of(tile: CloudTile) -> tuple[NDArray[np.uint64], NDArray[np.int32], Int]:
-    """Return a tile's points as words (N,), the cubes' places (B, 3) and how many points each cube has (B,).
+    """Return a tile's points as 64-bit words (N,) sorted by cube, the cubes' indices (B, 3) and point counts (B,).
 
     Raises:
         InputError: a class has no room in 5 bits.
@@ -85,7 +85,7 @@ def _fields(tile: CloudTile, inside: Int) -> Iterator[tuple[AnyArray, int]]:
 
 
 def pack_tile(tile: CloudTile) -> Packed:
-    """Return a tile as it is stored; it must hold points."""
+    """Return a non-empty tile quantised to 8 bytes per point and compressed."""
     word, cubes, counts = words_of(tile)
     planes = np.ascontiguousarray(word.astype("<u8").view(np.uint8).reshape(-1, 8).T)
     content = cubes.astype("<i4").tobytes() + counts.astype("<i4").tobytes() + planes.tobytes()
@@ -101,7 +101,7 @@ def pack_tile(tile: CloudTile) -> Packed:
 
 
 def unpack_tile(packed: Packed) -> CloudTile:
-    """Return the tile; coordinates within half a step of those packed, colours and intensities to their bits."""
+    """Return the decompressed tile: coordinates to half a step (5 mm), colours and intensities to their stored bits."""
     notes = packed.notes
     points, cubes = int(notes["points"]), int(notes["cubes"])
     content = zlib.decompress(packed.content)
@@ -129,7 +129,7 @@ def unpack_tile(packed: Packed) -> CloudTile:
 
 
 def write_pack(path: Path, tiles: list[Packed], scheme: ClassScheme, voxel: float, overwrite: bool = False) -> int:
-    """Write tiles to one file; return its size in bytes.
+    """Write packed tiles, their class scheme and voxel size to one NPZ file; return its size in bytes.
 
     Raises:
         OutputError: the file is there already or can't be written.
@@ -151,7 +151,7 @@ def write_pack(path: Path, tiles: list[Packed], scheme: ClassScheme, voxel: floa
 
 
 class PackReader:
-    """An open file of packed tiles.
+    """Reader of a file of packed tiles, tile by tile.
 
     Attributes:
         scheme: classes that the tiles' ``segment`` counts.
@@ -180,7 +180,7 @@ class PackReader:
         return len(self.notes)
 
     def tile(self, place: int) -> CloudTile:
-        """Return one tile; raise `InputError` if the file is damaged there."""
+        """Return the tile of an index, decompressed; raise `InputError` if the file is damaged there."""
         try:
             return unpack_tile(Packed(self.notes[place], self._archive.read(f"{place:06d}")))
         except (*ARCHIVE_FAULTS, TypeError):

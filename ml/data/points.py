@@ -25,7 +25,7 @@ _EIGHT_BITS = 255.0
 
 @dataclass(frozen=True)
 class Points:
-    """N points of one cloud.
+    """N points of one cloud in memory: local coordinates, intensities, colours and classes.
 
     Attributes:
         origin: (3,) float64 map coordinates that were subtracted, whole metres.
@@ -56,7 +56,7 @@ class Points:
         return replace(self, **{name: getattr(self, name)[keep] for name in self.per_point})
 
     def class_table(self, names: Collection[str]) -> Bool:
-        """Return for each id (256,) whether its class has one of the names."""
+        """Return a lookup table (256,) by class id: whether the class has one of the names."""
         return np.array([self.class_names.get(number) in names for number in range(256)])
 
     def of_class(self, names: Collection[str]) -> Bool:
@@ -65,7 +65,7 @@ class Points:
 
 
 def read_points(path: Path, classes: Collection[str] | None = None) -> Points:
-    """Read a cloud of any format.
+    """Read a cloud of any format into memory, or only its points of some classes.
 
     Args:
         path: the cloud.
@@ -104,12 +104,12 @@ def read_ground(path: Path) -> Points:
 
 
 def full_color(largest: int) -> float:
-    """Return the value of full brightness in a cloud whose largest is given: some store 8 bits in the fields of 16."""
+    """Return the stored value of full brightness, 65535 or 255, from the cloud's largest: some files store 8 bits."""
     return SIXTEEN_BITS if largest > _EIGHT_BITS else _EIGHT_BITS
 
 
 def points_of(header: CloudHeader, blocks: Sequence[PointBlock], largest: int | None = None) -> Points:
-    """Return blocks of a cloud as points.
+    """Return blocks of a cloud concatenated as `Points`: shifted to a local origin, intensities and colours as shares.
 
     Args:
         header: of the cloud.
@@ -134,9 +134,9 @@ def points_of(header: CloudHeader, blocks: Sequence[PointBlock], largest: int | 
 
 
 def thin(coord: NDArray[np.floating[Any]], cell: float) -> Index:
-    """Return the indices of the points that stay, one per occupied cell of a cubic grid, in order.
+    """Return the ascending indices of one point per occupied cell of a cubic grid: the nearest to the cell's centre.
 
-    The point nearest the cell's centre stays, of equally near ones the first.
+    Of equally near points the first counts.
 
     Args:
         coord: (N, 3) m, counted from a cell's corner.
@@ -156,7 +156,7 @@ def thin(coord: NDArray[np.floating[Any]], cell: float) -> Index:
 
 
 def cell_keys(cells: Float) -> Int:
-    """Return one number per cell (N, 3) of whole numbers, unique within the array.
+    """Return an integer key (N,) per cell of integer coordinates (N, 3), equal for equal cells, within this array only.
 
     Raises:
         InputError: the cells span more than 64 bits can tell apart.

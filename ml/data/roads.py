@@ -44,9 +44,9 @@ _CACHE_VERSION = 1
 
 @dataclass(frozen=True, kw_only=True)
 class LearningRoad(Points):
-    """N points of the road and the ground beside it. Arrays may be mapped from files.
+    """N points of a road and the ground beside it, sorted by station along a line, with the truth where known.
 
-    Coordinates are float32 here (0.25 mm at 4 km), colours 8 bits of sRGB.
+    Arrays may be mapped from files. Coordinates are float32 here (0.25 mm at 4 km), colours 8 bits of sRGB.
 
     Attributes:
         name: of the road.
@@ -63,7 +63,7 @@ class LearningRoad(Points):
 
     @property
     def known_truth(self) -> Truth:
-        """Return the truth.
+        """Return the road's truth, never None.
 
         Raises:
             InputError: it isn't known.
@@ -76,7 +76,7 @@ class LearningRoad(Points):
     def of_points(
         cls, name: str, points: Points, reference: MeasuredAxis, truth: Truth | None = None, reach: float = REACH
     ) -> LearningRoad:
-        """Sort points along a line. Points farther than ``reach`` (m) from it are left out."""
+        """Return the points within ``reach`` (m) of a line, sorted by station along it, as a road."""
         station, offset = reference.project(points.xyz)
         near = np.flatnonzero(np.abs(offset) <= reach)
         order = near[np.argsort(station[near], kind="stable")]
@@ -96,7 +96,7 @@ class LearningRoad(Points):
 
     @cached_property
     def belonging(self) -> Bool:
-        """Which points (N,) belong to the road: of a carriageway those up to the middle of the median."""
+        """Mask (N,) of the points within the truth's `room`: of a carriageway up to the median's middle; cached."""
         if self.truth is None or not np.isfinite(self.truth.room).any():
             return np.ones(len(self), dtype=bool)
         station, offset = self.truth.axis.project(self.xyz)
@@ -105,7 +105,7 @@ class LearningRoad(Points):
         return np.asarray((offset <= room[:, 0]) & (-offset <= room[:, 1]))
 
     def slices(self, frames: Frames, half_width: float, thickness: float = 1.0) -> Slices:
-        """Return the points in the slice of each of M frames.
+        """Return which points lie in the slice across the road at each of M frames, and where in it.
 
         A point is in a slice where it lies within half the thickness before or behind the frame's origin and within
         half_width (both m) beside it.
@@ -135,7 +135,7 @@ class LearningRoad(Points):
 
 @dataclass(frozen=True)
 class Slices:
-    """K points in slices; one point may be in several.
+    """Membership of points in slices, K pairs; one point may be in several slices.
 
     Attributes:
         index: (K,) of the point in its road.
@@ -149,7 +149,7 @@ class Slices:
 
 
 def scene_folders(data_set: Path, split: str | None) -> list[Path]:
-    """Return the folders of a data set's scenes that are done, of one split or of all.
+    """Return the folders of a data set's finished scenes, of one split or of all (None).
 
     Raises:
         MissingFileError: there is no manifest.
@@ -164,7 +164,7 @@ def scene_folders(data_set: Path, split: str | None) -> list[Path]:
 
 
 def read_scene(folder: Path, kind: TruthKind, cache: Path | None = None) -> list[LearningRoad]:
-    """Read a scene of a data set: its ground points and their truth from its parameters.
+    """Read a data set's scene as roads: its ground points, with the truth of each road or carriageway of `kind`.
 
     Args:
         folder: with ``cloud.laz`` and ``parameters.json``.
@@ -192,13 +192,13 @@ def read_scene(folder: Path, kind: TruthKind, cache: Path | None = None) -> list
 
 
 def read_measured(cloud: Path, axis: Path, kind: TruthKind, gap: float | None = None) -> LearningRoad:
-    """Read the ground of a real cloud and a measured axis, in the same map coordinates.
+    """Read a real cloud's ground points as a road whose truth is a measured axis in the same map coordinates.
 
     Args:
         cloud: the cloud.
         axis: CSV with columns x, y, z (``s`` and others aren't used) or GeoJSON.
         kind: what the axis is the middle of.
-        gap: see `Axis.read`.
+        gap: see `MeasuredAxis.read`.
 
     Raises:
         MissingFileError, InputError: a file is missing or damaged.
@@ -209,7 +209,7 @@ def read_measured(cloud: Path, axis: Path, kind: TruthKind, gap: float | None = 
 
 
 def crop_road(road: LearningRoad, share: float, seed: int, length: float = 1.0) -> LearningRoad:
-    """Cut off both sides of every slice of a road with a truth, each at random and by itself.
+    """Return a road with both sides of every slice cropped at random, each by itself, around the true axis.
 
     Slices are each metre (``length``) of the station along the truth's axis. On either side of the axis a slice reaches
     to the point farthest from it, at the distance R; points farther than R (1 - ``share`` u) are left out, u uniform
@@ -239,9 +239,9 @@ def crop_road(road: LearningRoad, share: float, seed: int, length: float = 1.0) 
 
 
 def cut_beside_median(road: LearningRoad, error: float, rng: np.random.Generator) -> LearningRoad:
-    """Return a road of which the other carriageway is cut off somewhere beside the middle of the median.
+    """Return the road with its truth's `room` shifted by a random distance up to `error` (m); points stay.
 
-    The cut is as far from it everywhere, and nobody knows how far: so it doesn't tell where the carriageway lies.
+    So where the other carriageway is cut off later, beside the median's middle, doesn't tell where this one lies.
 
     Args:
         road: with a truth; a road that is no carriageway stays as it is.
@@ -253,13 +253,13 @@ def cut_beside_median(road: LearningRoad, error: float, rng: np.random.Generator
 
 
 def _cache_folder(folder: Path, cache: Path) -> Path:
-    """Return the folder of a scene's sorted points: a name that says what they were made from."""
+    """Return the cache folder of a scene's sorted points, named by a hash of the files they were made from."""
     made_from = f"{_CACHE_VERSION} {REACH} {checksum(folder / CLOUD)} {checksum(folder / PARAMETERS)}"
     return cache / f"{folder.name}-{hashlib.sha256(made_from.encode()).hexdigest()[:16]}"
 
 
 def _keep(road: LearningRoad, folder: Path, cache: Path) -> None:
-    """Write a road's arrays, in place of damaged ones; they appear when all of them are whole.
+    """Write a road's arrays to its folder in the cache, replacing damaged ones, atomically.
 
     Raises:
         OutputError: the cache can't be written.
@@ -283,7 +283,7 @@ def _keep(road: LearningRoad, folder: Path, cache: Path) -> None:
 
 
 def _read_cache(folder: Path, cache: Path) -> LearningRoad | None:
-    """Return a road as it was kept; None if it wasn't, or is damaged."""
+    """Return a scene's road from the cache, arrays memory-mapped; None if it isn't there or damaged."""
     place = _cache_folder(folder, cache)
     try:
         notes = json.loads((place / "notes.json").read_text(encoding="utf-8"))

@@ -18,7 +18,7 @@ _NO_SHOULDER = 1.2
 
 @dataclass
 class Sample:
-    """N points. Effects put other arrays in place of these, which may be a tile's own.
+    """N points that augmentation changes: by assigning new arrays, never within these, which may be a tile's own.
 
     Attributes:
         coord: (N, 3) m.
@@ -35,7 +35,7 @@ class Sample:
         return len(self.coord)
 
     def keep(self, points: Bool | Index) -> None:
-        """Leave out all points but those of a mask or of ascending indices."""
+        """Drop all points but those of a mask or of ascending indices, in place."""
         for name in self.per_point:
             if (values := getattr(self, name)) is not None:
                 setattr(self, name, values[points])
@@ -43,7 +43,7 @@ class Sample:
 
 @dataclass
 class Crop(Sample):
-    """A piece of a tile; coordinates are relative to the tile, intensities scaled, all float32.
+    """A crop of a tile, to be augmented; coordinates are relative to the tile, intensities scaled, all float32.
 
     Attributes:
         segment: (N,) int16 places of classes, or -1.
@@ -55,7 +55,7 @@ class Crop(Sample):
 
 @dataclass
 class Stretch(Sample):
-    """A sequence of S slices; coordinates are in the slices' frames but for z, still that of the cloud; all float64.
+    """A sequence of S slices, to be augmented; x and y are in the slices' frames, z is the cloud's; all float64.
 
     Attributes:
         number: (N,) slice of each point, ascending.
@@ -80,19 +80,19 @@ class Stretch(Sample):
     per_point: ClassVar[tuple[str, ...]] = (*Sample.per_point, "number", "paved", "marked")
 
     def along(self) -> Float:
-        """Return how far along the path each slice lies from the first (S,), m."""
+        """Return each slice's distance from the first along the path (S,), m."""
         return np.abs(self.frames.station - self.frames.station[0])
 
     def points_along(self) -> Float:
-        """Return how far along the path each point lies from the first slice (N,), m."""
+        """Return each point's distance from the first slice along the path (N,), m."""
         return np.asarray(self.coord[:, 0] + self.along()[self.number])
 
     def paved_sides(self) -> Float:
-        """Return how far the pavement reaches to the left and to the right of the centre (S, 2), m, or NaN."""
+        """Return the pavement's extent to the left and to the right of the true centre (S, 2), m; NaN if unknown."""
         return np.column_stack([self.corridor[:, LEFT] - self.center, self.center - self.corridor[:, RIGHT]])
 
     def without_shoulders(self) -> bool:
-        """Return whether it is a carriageway whose pavement ends near its edge lines, as that of rural roads."""
+        """Return whether it is a carriageway whose pavement ends within 1.2 m of its edge lines, in all slices."""
         beyond = self.paved_sides() - self.lines
         beyond = beyond[np.isfinite(beyond)]
         return self.carriageway and bool(len(beyond)) and float(beyond.max()) <= _NO_SHOULDER

@@ -46,7 +46,7 @@ MISSING_NOISE = 0.01
 
 
 class SliceSettings(Part):
-    """How slices are cut."""
+    """Options for cutting sequences of slices, and for how their path strays in training."""
 
     truth: TruthKind = Field("road", description="road: the middle of all; carriageway: between its two lanes.")
     slices: int = quantity(10, ge=1, le=1000, unit="1", description="Slices of a sequence.")
@@ -63,13 +63,13 @@ class SliceSettings(Part):
 
     @property
     def frame_spacing(self) -> float:
-        """Distance of the frames along a path in use, m: sequences of slices farther apart are interleaved."""
+        """Spacing of the frames along a path at prediction, m, `SPACING` at most: wider sequences are interleaved."""
         return min(SPACING, self.spacing)
 
 
 @dataclass(eq=False)
 class SliceDataset(Dataset[Sample]):
-    """Sequences drawn at random from roads, each road as often, with a path and effects drawn for each.
+    """Map-style data set of random sequences of slices, each road equally often, with random path and effects.
 
     The n-th sample of an epoch depends on the seed, the epoch and n alone.
 
@@ -93,7 +93,7 @@ class SliceDataset(Dataset[Sample]):
     purpose: str = "slices"
 
     def __post_init__(self) -> None:
-        """Find where sequences can begin."""
+        """Find the stations at which sequences can begin."""
         self.epoch = 0
         places = (_starts(road, number, self.settings) for number, road in enumerate(self.roads))
         self._starts = [starts for starts in places if starts]
@@ -105,7 +105,7 @@ class SliceDataset(Dataset[Sample]):
         return self.samples
 
     def set_epoch(self, epoch: int) -> None:
-        """Choose the epoch whose samples are given from now on."""
+        """Set the epoch whose samples indexing returns from now on."""
         self.epoch = epoch
 
     def __getitem__(self, number: int) -> Sample:
@@ -114,7 +114,7 @@ class SliceDataset(Dataset[Sample]):
         return self.draw_sample(self.epoch, number)
 
     def draw_sample(self, *key: int) -> Sample:
-        """Return the sample of some numbers, any of them."""
+        """Return the random sample that a key of any integers (epoch, number, ...) determines."""
         rng = stream(self.seed, self.purpose, *key)
         starts = self._starts[rng.integers(len(self._starts))]
         lengths = np.array([high - low + 1e-3 for _, low, high in starts])
@@ -135,7 +135,7 @@ class SliceDataset(Dataset[Sample]):
 
 @dataclass(eq=False)
 class IterableSlices(IterableDataset[Sample]):
-    """The samples of a `SliceDataset` without end, the epochs one after another, shared out to the workers."""
+    """Endless iterable data set of a `SliceDataset`'s samples, epoch after epoch, divided among the workers."""
 
     dataset: SliceDataset
 
@@ -150,9 +150,9 @@ class IterableSlices(IterableDataset[Sample]):
 
 @dataclass(eq=False)
 class FrameSlices(Dataset[Sample]):
-    """All frames of a path along one road, as sequences in order; the last of a stretch overlaps the one before.
+    """Map-style data set of the sequences that cover all frames along one road, in order, without effects.
 
-    Which points are left out where a slice has too many hangs on the place alone, so that cutting a road into parts
+    Which points are left out where a slice has too many depends on the place alone, so that cutting a road into parts
     changes nothing.
 
     Args:
@@ -168,7 +168,7 @@ class FrameSlices(Dataset[Sample]):
     step: int | None = None
 
     def __post_init__(self) -> None:
-        """Find the sequences."""
+        """Divide the frames into sequences."""
         length = self.settings.slices
         self.runs = sequences(self.frames, length, self.step and min(self.step, length), self.settings.spacing)
 
@@ -184,7 +184,7 @@ class FrameSlices(Dataset[Sample]):
 
 
 def stretch(road: LearningRoad, frames: Frames, settings: SliceSettings) -> Stretch:
-    """Return the points and the truth in the slices of some frames.
+    """Return the sequence of slices at some frames: the road's points in them, in frame coordinates, and the truth.
 
     Where the truth is a carriageway's, points beyond the middle of the median are left out, see `Truth.room`.
     """
@@ -217,7 +217,7 @@ def stretch(road: LearningRoad, frames: Frames, settings: SliceSettings) -> Stre
 
 
 def sample(cut: Stretch, settings: SliceSettings, rng: np.random.Generator, road: int, number: Index) -> Sample:
-    """Return a sequence as tensors, with at most ``points_per_slice`` points of each slice drawn at random."""
+    """Return a sequence as a dictionary of tensors (see the module); thins `cut` to `points_per_slice`, in place."""
     thin(cut, settings.points_per_slice, rng)
     ends = np.searchsorted(cut.number, np.arange(len(cut.center)), side="right")
     height = _medians(cut.coord[:, 2], ends)
@@ -263,7 +263,7 @@ def collate(samples: Sequence[Mapping[str, Tensor]]) -> Batch:
 
 
 def _starts(road: LearningRoad, number: int, settings: SliceSettings) -> list[tuple[int, float, float]]:
-    """Return where sequences can begin: the road's number, and from which to which station, on each of its parts."""
+    """Return (road's number, first, last station, m) per part of the true axis: where a sequence can begin."""
     if road.truth is None:
         return []
     length = settings.spacing * (settings.slices - 1)
@@ -272,7 +272,7 @@ def _starts(road: LearningRoad, number: int, settings: SliceSettings) -> list[tu
 
 
 def thin(cut: Stretch, most: int, rng: np.random.Generator) -> None:
-    """Leave at most ``most`` points of each slice, each point as likely as any other."""
+    """Drop random points so that each slice keeps at most ``most``, in place."""
     counts = np.bincount(cut.number, minlength=len(cut.center))
     if counts.max() <= most:
         return
@@ -284,14 +284,14 @@ def thin(cut: Stretch, most: int, rng: np.random.Generator) -> None:
 
 
 def _medians(z: Float, ends: Index) -> Float:
-    """Return the median height (S,) of each slice's points; of all points where a slice has none, 0 without any."""
+    """Return the median z (S,) of each slice's points, m; of all points for an empty slice, 0 if there are none."""
     whole = float(np.median(z)) if len(z) else 0.0
     starts = np.concatenate([[0], ends[:-1]])
     return np.array([np.median(z[a:b]) if b > a else whole for a, b in zip(starts, ends, strict=True)])
 
 
 def _features(cut: Stretch, rng: np.random.Generator) -> Float:
-    """Return the features (K, 6), see the module's description."""
+    """Return the points' input features (K, 6), columns `FEATURES`; noise stands for missing intensities, colours."""
     count = len(cut.number)
     if cut.strength.any():
         logs = intensity.logarithms(cut.strength)
@@ -309,7 +309,7 @@ _TURNED = ("left_edge", "right_edge", "heading")
 
 
 def mirror_batch(batch: Batch) -> Batch:
-    """Return a batch with left and right swapped, truth and frames included."""
+    """Return a copy of the batch mirrored left to right, truth and frames included."""
     flip = batch["coord"].new_tensor([1.0, -1.0, 1.0])
     other = dict(batch, coord=batch["coord"] * flip)
     other["frame"] = batch["frame"] * batch["frame"].new_tensor([1.0, -1.0, -1.0, 1.0])
@@ -321,11 +321,11 @@ def mirror_batch(batch: Batch) -> Batch:
 
 
 def mirrored_corridor(corridor: Tensor) -> Tensor:
-    """Return the corridor (..., K) of the mirrored road."""
+    """Return a corridor (..., K) mirrored left to right: edges exchanged, signs of edges and heading changed."""
     signs = corridor.new_tensor([-1.0 if name in _TURNED else 1.0 for name in CORRIDOR])
     return with_sides_swapped(corridor) * signs
 
 
 def with_sides_swapped(corridor: Tensor) -> Tensor:
-    """Return values (..., K) by column of the corridor, those of the left and the right edge exchanged."""
+    """Return values (..., K), one per corridor column, with the left and the right edge's columns exchanged."""
     return corridor[..., [CORRIDOR.index(_OTHER_SIDE.get(name, name)) for name in CORRIDOR]]

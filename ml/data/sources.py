@@ -34,7 +34,7 @@ FULL = 65535.0
 
 
 class Source(Part):
-    """Labelled points."""
+    """Where labelled points are read from, with their class mapping and tiling."""
 
     path: str = Field(min_length=1, description="A packed file, a data set, a folder of tiles or clouds, or a cloud.")
     split: str | None = Field(None, description="Split of a data set, or sub-folder; all points if not given.")
@@ -42,17 +42,17 @@ class Source(Part):
     tile: float = quantity(60.0, ge=5, le=1000, unit="m", description="Edge of the tiles that clouds are cut into.")
 
     def label_mapping(self) -> LabelMapping | None:
-        """Return the mapping, or None where the source names its classes itself."""
+        """Load the source's class mapping; None where its files name their classes themselves."""
         return load_mapping(self.mapping) if self.mapping else None
 
     def targets(self, scheme: ClassScheme) -> tuple[str, ...]:
-        """Return what the source's truth tells apart, in order; see `LabelMapping.targets`."""
+        """Return the names of the classes, or the mapping's groups, that the source's truth distinguishes, in order."""
         mapping, names = self.label_mapping(), class_names(scheme)
         return mapping.targets(names) if mapping else names
 
 
 def read_tiles(source: Source, scheme: ClassScheme, voxel: float | None) -> Iterator[CloudTile]:
-    """Yield the tiles of a source, ordered by name.
+    """Yield the tiles of a source of labelled points, thinned to one point per voxel, ordered by name.
 
     Args:
         source: where they are.
@@ -101,7 +101,7 @@ def _packed_tiles(path: Path, scheme: ClassScheme, voxel: float | None) -> Itera
 
 
 def _places(numbers: AnyArray, known: Bool, table: NDArray[np.int16]) -> NDArray[np.int16]:
-    """Return the places in a scheme of a source's numbers (N,), ignored where they aren't known."""
+    """Return the scheme's class indices (N,) of a source's numbers by a table; `IGNORED` where `known` is False."""
     return np.where(known, table[np.where(known, numbers, 0)], IGNORED).astype(np.int16)
 
 
@@ -119,7 +119,7 @@ def _folder_tiles(path: Path, scheme: ClassScheme, source: Source) -> Iterator[C
 
 
 def pointcept_root(path: Path) -> Path | None:
-    """Return the folder with ``classes.json``: this one, or the only one of a data set."""
+    """Return the folder with ``classes.json``, this one or the data set's only one; None if there is none."""
     if (path / "classes.json").is_file():
         return path
     roots = sorted(file.parent for file in path.glob("pointcept/*/classes.json"))
@@ -130,7 +130,7 @@ def pointcept_root(path: Path) -> Path | None:
 
 
 def pointcept_tiles(root: Path, scheme: ClassScheme, split: str | None) -> Iterator[CloudTile]:
-    """Yield the tiles of a folder in Pointcept's layout: ``SPLIT/TILE/coord.npy`` and so on.
+    """Yield the tiles of a folder in Pointcept's layout (``SPLIT/TILE/coord.npy`` ...), of one split or all, unthinned.
 
     Raises:
         MissingFileError: there is no such split, or it is empty.
@@ -185,7 +185,7 @@ def _pointcept_tile(folder: Path, table: NDArray[np.int16]) -> CloudTile:
 
 
 def _array(folder: Path, name: str, entry: tuple[int, ...], kind: str) -> AnyArray:
-    """Return an array (N, *entry) of a folder; what its header claims is held against the file's size."""
+    """Read the array `name`.npy of a folder as (N, *entry) of dtype `kind`; raise `InputError` unless all is finite."""
     path = folder / f"{name}.npy"
     try:
         with np.errstate(invalid="ignore", over="ignore"):
@@ -198,7 +198,7 @@ def _array(folder: Path, name: str, entry: tuple[int, ...], kind: str) -> AnyArr
 
 
 def cloud_tiles(path: Path, scheme: ClassScheme, source: Source, scene: str | None = None) -> Iterator[CloudTile]:
-    """Yield the square tiles of one cloud; memory holds one of them.
+    """Yield one cloud's labelled points as square tiles of edge `source.tile`, in bounded memory.
 
     The classes are those of the project's own clouds, or of another's attribute by the source's mapping.
 
@@ -224,10 +224,10 @@ def cloud_tiles(path: Path, scheme: ClassScheme, source: Source, scene: str | No
 
 
 def tile_of(points: PointBlock, scene: str, origin: Float, scale: float) -> CloudTile:
-    """Return points whose ``class_id`` is the place in the scheme (255: ignored) as a tile.
+    """Return a block as a tile: local float32 coordinates, 8-bit colours, intensities as shares of 16 bits.
 
     Args:
-        points: N of them.
+        points: N of them; ``class_id`` is the class's index in the scheme, 255: ignored.
         scene: name of the scene.
         origin: (3,) map coordinates that the tile's count from, m.
         scale: 16-bit steps per unit of intensity.
@@ -244,7 +244,7 @@ def tile_of(points: PointBlock, scene: str, origin: Float, scale: float) -> Clou
 
 
 def labelled_blocks(cloud: CloudReader, scheme: ClassScheme, source: Source) -> Iterator[PointBlock]:
-    """Yield a cloud's points with the places of their classes in the scheme as ``class_id``; 255 is ignored."""
+    """Yield a cloud's blocks with ``class_id`` replaced by the class's index in the scheme; 255: ignored."""
     mapping, names = source.label_mapping(), class_names(scheme)
     if mapping is None:
         if not cloud.header.labelled:
@@ -266,7 +266,7 @@ def _with_places(block: PointBlock, places: NDArray[np.int16]) -> PointBlock:
 
 
 def _numbers(cloud: CloudReader, field: str) -> Iterator[AnyArray]:
-    """Yield an attribute of a LAS file block by block, as `CloudReader.blocks` yields points."""
+    """Yield the attribute `field` of a LAS or LAZ cloud, in blocks of the size of `CloudReader.blocks`."""
     path = cloud.header.path
     if not cloud.header.kind.startswith("LAS"):
         raise InputError(str(path), None, "a mapping of classes is for LAS and LAZ files")

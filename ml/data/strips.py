@@ -29,7 +29,7 @@ _CELL = 1.0
 
 @dataclass(frozen=True)
 class GroundReading:
-    """Findings of a first reading of a cloud.
+    """Ground classes, largest colour and occupied cells of a cloud, from a first pass through it.
 
     Attributes:
         header: of the cloud.
@@ -45,7 +45,7 @@ class GroundReading:
 
 
 def find_ground(cloud: Path, progress: Progress = silent) -> GroundReading:
-    """Read a cloud once and say where its ground is: as `points.read_ground` chooses it, in bounded memory.
+    """Read a cloud once, in bounded memory; return its ground's classes and the square metres that they occupy.
 
     Raises:
         MissingFileError, InputError: there is no such cloud, it is damaged, or it has classes but no ground.
@@ -75,7 +75,7 @@ def find_ground(cloud: Path, progress: Progress = silent) -> GroundReading:
 
 
 def path_through(ground: GroundReading) -> MeasuredAxis:
-    """Return the path along a cloud's ground, in map coordinates."""
+    """Return the line along the middle of a cloud's ground, found from its occupied cells, in map coordinates."""
     origin = np.floor(ground.cells.min(axis=0))
     return estimated_path(ground.cells - origin).translate((*origin, 0.0))
 
@@ -83,7 +83,7 @@ def path_through(ground: GroundReading) -> MeasuredAxis:
 def strips(
     cloud: Path, ground: GroundReading, path: MeasuredAxis, frames: Frames, progress: Progress = silent
 ) -> Iterator[tuple[LearningRoad, Frames, Bool]]:
-    """Yield a road strip by strip, from first to last.
+    """Yield a long road in overlapping strips along its path: ground points, local frames, mask of its own frames.
 
     The points lie in a temporary folder meanwhile, and in memory only those of one strip.
 
@@ -112,7 +112,7 @@ def strips(
 
 
 def _sort_points(files: TileFiles, cloud: Path, ground: GroundReading, path: MeasuredAxis, progress: Progress) -> None:
-    """Write the points near the path to a file per strip, margins included."""
+    """Write the cloud's ground points near the path to a file per strip, margins included."""
     done = 0
     with open_cloud(cloud) as reader:
         for block in reader.blocks():
@@ -129,7 +129,7 @@ def _sort_points(files: TileFiles, cloud: Path, ground: GroundReading, path: Mea
 
 
 def _part(path: MeasuredAxis, first: float, last: float) -> MeasuredAxis:
-    """Return the part of a path around some stations: its vertices there, and one beyond on either side."""
+    """Return the part of a path from station `first` to `last` (m), with one vertex beyond on either side."""
     low = max(0, int(np.searchsorted(path.station, first, "right")) - 1)
     high = min(len(path.points), int(np.searchsorted(path.station, last, "left")) + 1)
     low = min(low, high - 2) if high >= 2 else 0

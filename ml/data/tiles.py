@@ -15,7 +15,7 @@ from .points import full_color, thin
 
 @dataclass(frozen=True)
 class CloudTile:
-    """N points of one scene.
+    """N labelled points of a tile of one scene.
 
     Attributes:
         scene: name of the scene; intensities are scaled scene by scene.
@@ -37,7 +37,7 @@ class CloudTile:
         return len(self.coord)
 
     def select(self, keep: AnyArray | slice) -> Self:
-        """Return the points chosen by a mask or indices."""
+        """Return the points chosen by a mask, indices or a slice."""
         return replace(
             self,
             coord=self.coord[keep],
@@ -52,7 +52,7 @@ class CloudTile:
 
 
 def eight_bits(rgb: AnyArray, largest: int) -> UInt8:
-    """Return colours (N, 3) of LAS as 8 bits each.
+    """Return LAS colours (N, 3), stored in 8 or 16 bits, as 8 bits each.
 
     Args:
         rgb: as they are stored.
@@ -63,18 +63,18 @@ def eight_bits(rgb: AnyArray, largest: int) -> UInt8:
 
 @dataclass(frozen=True)
 class Scaling:
-    """How a scene's intensities become a feature: ``(share - shift) / span``."""
+    """Linear scaling of a scene's intensities to a feature: ``(intensity - shift) / span``."""
 
     shift: float = 0.0
     span: float = 1.0
 
     def apply(self, strength: Float32) -> Float32:
-        """Return the feature (N,) of intensities (N,); a few retro-reflectors are cut at 5 spans."""
+        """Return scaled intensities (N,) float32, clipped to -5 to 5."""
         return np.clip((strength - self.shift) / self.span, -5.0, 5.0).astype(np.float32)
 
 
 def robust_scaling(strengths: Sequence[Float32]) -> Scaling:
-    """Return the scaling that gives a scene the median 0 and the span 1 between its 10th and 90th percentile.
+    """Return the scaling to median 0 and 10th-to-90th-percentile span 1 of a scene's intensities.
 
     Args:
         strengths: intensities of the scene's tiles; without any, or where all are alike, the scaling changes nothing
@@ -88,7 +88,7 @@ def robust_scaling(strengths: Sequence[Float32]) -> Scaling:
 
 
 def scalings(tiles: Sequence[CloudTile], kind: str, voxel: float | None = None) -> dict[str, Scaling]:
-    """Return the scaling of each scene by name.
+    """Return the intensity scaling of each scene, by the scene's name.
 
     Args:
         tiles: of all scenes.

@@ -15,7 +15,7 @@ R = TypeVar("R")
 
 
 def full_precision(function: Callable[P, R]) -> Callable[P, R]:
-    """Make a function of tensors compute in float32 where bfloat16 is chosen: places of 60 m would be 0.25 m wrong."""
+    """Wrap a function of tensors to run in float32 even under bfloat16 autocast, in which 60 m would be 0.25 m off."""
 
     @wraps(function)
     def exact(*given: P.args, **named: P.kwargs) -> R:
@@ -30,7 +30,7 @@ def full_precision(function: Callable[P, R]) -> Callable[P, R]:
 
 
 class SegmentationNetwork(Part):
-    """Base of a segmentation network's options: its name, its sizes, and how it is built."""
+    """Base of a segmentation network's options: name and sizes; builds the network."""
 
     name: str
 
@@ -42,5 +42,5 @@ class SegmentationNetwork(Part):
         raise NotImplementedError
 
     def prepare(self, batch: Batch) -> Batch:
-        """Return a batch with all that the network needs beside its points; called on the CPU, in workers."""
+        """Return the batch with what the network needs precomputed on the CPU, in workers; here unchanged."""
         return batch

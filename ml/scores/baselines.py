@@ -40,24 +40,24 @@ _TAIL = 0.05
 
 
 def centroid(y: Float, intensity: Float) -> float:
-    """Return the mean."""
+    """Return the points' mean y, m."""
     return float(y.mean())
 
 
 def extent_middle(y: Float, intensity: Float) -> float:
-    """Return the middle between the outermost points."""
+    """Return the middle between the smallest and the largest y, m."""
     return float(y.min() + y.max()) / 2.0
 
 
 def bright_middle(y: Float, intensity: Float) -> float:
-    """Return the middle between the outermost bright points."""
+    """Return the middle between the 5 % and the 95 % quantile of the bright points' y, m."""
     low, high = np.quantile(intensity, [_TAIL, 1.0 - _TAIL])
     bright = y[intensity >= (low + high) / 2.0]
     return float(np.quantile(bright, [_TAIL, 1.0 - _TAIL]).mean())
 
 
 def between_brightest(y: Float, intensity: Float) -> float:
-    """Return the middle between the brightest strip left and right of the extent's middle."""
+    """Return the middle between the brightest strips left and right of the extent's middle, m; NaN without either."""
     middle = extent_middle(y, intensity)
     number = np.floor((y - middle) / STRIP).astype(np.intp)
     first = int(number.min())
@@ -86,7 +86,7 @@ SPANNED = ("middle of the extent", "middle of the bright")
 
 
 def slice_centers(rule: Rule, number: Index, y: Float, intensity: Float, count: int) -> Float:
-    """Return the centres' y (M,), m; NaN where a slice has too few points.
+    """Return each slice's centre y (M,), m, by a rule; NaN where a slice has fewer than `FEWEST` points.
 
     Args:
         rule: one of `RULES`.
@@ -116,7 +116,7 @@ _AROUND = np.ones((3, 3), dtype=bool)
 
 @dataclass(frozen=True)
 class SkeletonSettings:
-    """Settings that a grid search chooses.
+    """Settings of the skeleton baseline, as a grid search chooses them.
 
     Attributes:
         raster: width of a pixel, m.
@@ -134,7 +134,7 @@ class SkeletonSettings:
 def skeleton_centers(
     xy: Float, intensity: Float | None, origin: Float, direction: Float, settings: SkeletonSettings = SkeletonSettings()
 ) -> Float:
-    """Return where the baseline's line crosses each slice's orthogonal: y in its frame (M,), m; NaN where it doesn't.
+    """Return y (M,), m, where the road's morphological skeleton crosses each frame's y axis; NaN where it doesn't.
 
     Args:
         xy: (N, 2) the road's points, m.
@@ -147,7 +147,7 @@ def skeleton_centers(
 
 
 def skeletons(xy: Float, intensity: Float | None, origin: Float, settings: SkeletonSettings) -> list[Float]:
-    """Return the pruned skeleton's points (K, 2) of each window; arguments as of `skeleton_centers`."""
+    """Return per window of 100 slices the points (K, 2), m, of the pruned skeleton of the road's raster."""
     place = cKDTree(origin)
     slice_of = place.query(xy)[1]
     order = np.argsort(slice_of, kind="stable")
@@ -166,7 +166,7 @@ def skeletons(xy: Float, intensity: Float | None, origin: Float, settings: Skele
 
 
 def centers_on(lines: Sequence[Float], origin: Float, direction: Float, width: float) -> Float:
-    """Return `skeleton_centers` of the windows' skeletons (K, 2), averaged in bins of a width, m."""
+    """Return y (M,), m, where windows' skeletons (K, 2), averaged in bins of `width` (m), cross the frames; or NaN."""
     result = np.full(len(origin), np.nan)
     parts = [slice(first, first + WINDOW) for first in range(0, len(origin), WINDOW)]
     chains = [average_along(line, width, direction[part]) for line, part in zip(lines, parts, strict=True)]
@@ -178,7 +178,7 @@ def centers_on(lines: Sequence[Float], origin: Float, direction: Float, width: f
 
 
 def skeleton_points(xy: Float, intensity: Float | None, settings: SkeletonSettings) -> Float:
-    """Return the middles (K, 2) of the pixels of the pruned skeleton of points (N, 2), m."""
+    """Return the centres (K, 2), m, of the pixels of the pruned morphological skeleton of points (N, 2)."""
     corner = np.floor(xy.min(axis=0) / settings.raster) - 1.0
     cell = (np.floor(xy / settings.raster) - corner).astype(np.intp)
     shape = tuple(cell.max(axis=0) + 2)
@@ -191,7 +191,7 @@ def skeleton_points(xy: Float, intensity: Float | None, settings: SkeletonSettin
 
 
 def _in_dark_pixels(cell: Index, shape: tuple[int, ...], intensity: Float) -> Bool:
-    """Return which points (N,) lie in pixels whose median intensity is below Otsu's threshold of the pixels."""
+    """Return a mask (N,) of the points in pixels whose median intensity is at most Otsu's threshold of the medians."""
     number = np.ravel_multi_index((cell[:, 0], cell[:, 1]), shape)
     used, owner = np.unique(number, return_inverse=True)
     median = ndimage.median(intensity, owner, np.arange(len(used)))
@@ -199,7 +199,7 @@ def _in_dark_pixels(cell: Index, shape: tuple[int, ...], intensity: Float) -> Bo
 
 
 def prune_skeleton(skeleton: Bool, shortest: float) -> Bool:
-    """Return a skeleton without branches shorter than ``shortest`` pixels, thinned again after each round of cuts.
+    """Return a skeleton mask without free branches shorter than ``shortest`` pixels, thinned again after each cut.
 
     Args:
         skeleton: (rows, columns), one pixel wide.
@@ -214,7 +214,7 @@ def prune_skeleton(skeleton: Bool, shortest: float) -> Bool:
 
 
 def _branches(skeleton: Bool) -> tuple[NDArray[np.int32], list[int]]:
-    """Return the skeleton's pixels numbered by the line that they belong to, and the numbers of those that end freely.
+    """Return an image of the skeleton's lines labelled 1, 2, ..., 0 elsewhere, and the labels that have a free end.
 
     Lines meet at junctions: connected pixels with three or more neighbours that three or more lines touch. Pixels of a
     step in a line have three neighbours as well, but only two lines: they join them.
@@ -235,7 +235,7 @@ def _branches(skeleton: Bool) -> tuple[NDArray[np.int32], list[int]]:
 
 
 def _lengths(number: NDArray[np.int32], chosen: list[int]) -> Iterator[tuple[int, float]]:
-    """Yield number and length in pixels of each of the chosen lines: its pixels, diagonal steps counting more."""
+    """Yield label and length in pixels of each of the chosen lines, a diagonal step counting the root of two."""
     boxes = ndimage.find_objects(number)
     for label in chosen:
         own = number[boxes[label - 1]] == label
@@ -244,7 +244,7 @@ def _lengths(number: NDArray[np.int32], chosen: list[int]) -> Iterator[tuple[int
 
 
 def average_along(points: Float, width: float, direction: Float) -> Float:
-    """Return points (K, 2) averaged per bin of their principal axis, (J, 2) in the order along the path, m.
+    """Return the means (J, 2), m, of points (K, 2) in bins along their principal axis, ordered along the path.
 
     Args:
         points: of a window's skeleton.
@@ -265,7 +265,7 @@ def average_along(points: Float, width: float, direction: Float) -> Float:
 
 
 def crossings(chain: Float, origin: Float, direction: Float, reach: float = REACH) -> Float:
-    """Return where a chain of points (J, 2) crosses each frame's orthogonal, y (M,), m; NaN where it doesn't.
+    """Return y (M,), m, where a chain of points (J, 2) crosses each frame's y axis; NaN where it doesn't.
 
     Points farther than ``reach`` (m) apart are not joined; of several crossings the one nearest to the frame counts.
     """

@@ -24,7 +24,7 @@ TOLERANCES = (0.05, 0.03)
 
 @dataclass(frozen=True)
 class IntervalCalibration:
-    """How the deviations of one target are corrected.
+    """Correction of one target's standard deviations: a factor, and interval widths for 68 % and 95 %.
 
     Attributes:
         factor: on the model's standard deviation.
@@ -45,18 +45,18 @@ class IntervalCalibration:
         return all(abs(share - level) <= by for share, level, by in zip(self.after, LEVELS, TOLERANCES, strict=True))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return JSON data."""
+        """Return the calibration as JSON data, with `holds`."""
         return asdict(self) | {"holds": self.holds}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
-        """Return what `to_dict` gave."""
+        """Return the calibration from `to_dict`'s data; None in pairs becomes NaN."""
         widths, before, after = (_pair(data[name]) for name in ("widths", "before", "after"))
         return cls(float(data["factor"]), widths, before, after, int(data["count"]))
 
 
 def calibrate_target(error: Float, std: Float) -> IntervalCalibration:
-    """Return the calibration of one target.
+    """Return the calibration that makes one target's deviations fit its errors; the identity without any known error.
 
     Args:
         error: (N,) errors; those that aren't finite don't count.
@@ -82,7 +82,7 @@ def _pair(values: Sequence[float | None]) -> tuple[float, float]:
 
 
 def _conformal(ratio: Float, level: float) -> float:
-    """Return the ratio below which a new one lies with at least the probability `level` (Vovk et al. 2005)."""
+    """Return the split conformal quantile of ascending ratios: a new one is at most it with probability >= `level`."""
     rank = int(np.ceil(level * (len(ratio) + 1)))
     return float(ratio[min(rank, len(ratio)) - 1])
 
@@ -93,7 +93,7 @@ def _covered_share(ratio: Float, factor: float) -> tuple[float, float]:
 
 
 def _share_error(ratio: Float, factors: Float) -> Float:
-    """Return for each factor the larger of the two shares' errors in units of their tolerances."""
+    """Return for each factor (F,) the larger of the two levels' coverage errors, in units of `TOLERANCES`."""
     missed = [
         np.abs(np.searchsorted(ratio, factors * deviation, side="right") / len(ratio) - level) / tolerance
         for deviation, level, tolerance in zip(DEVIATIONS, LEVELS, TOLERANCES, strict=True)

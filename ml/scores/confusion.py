@@ -15,7 +15,7 @@ from .metrics import Metric, Spread, finite_values, markdown, or_none
 
 
 class Confusion:
-    """Counts of points by true and predicted class.
+    """Confusion matrix of points by true and predicted class, and the scores that follow from it.
 
     With tp, fp and fn the points rightly, wrongly and not given to a class, precision is tp / (tp + fp), recall is
     tp / (tp + fn) and IoU is tp / (tp + fp + fn). What would be 0 / 0 is NaN and left out of means: the recall of a
@@ -35,7 +35,7 @@ class Confusion:
         self.ignored = 0
 
     def add(self, truth: NDArray[np.integer[Any]], predicted: NDArray[np.integer[Any]]) -> None:
-        """Count points (N,); those whose truth is `IGNORED` are left out whatever was predicted for them.
+        """Add points' true and predicted classes (N,) to the matrix, in place; those with `IGNORED` truth don't count.
 
         Raises:
             InputError: the lengths differ, or a class is out of range.
@@ -54,12 +54,12 @@ class Confusion:
 
     @property
     def right(self) -> Int:
-        """Return the number of points rightly given to each class (C,)."""
+        """Return the true positives of each class (C,)."""
         return self.counts.diagonal()
 
     @property
     def found(self) -> Int:
-        """Return the number of points given to each class (C,)."""
+        """Return the number of points predicted as each class (C,)."""
         return self.counts.sum(axis=0)
 
     @property
@@ -68,7 +68,7 @@ class Confusion:
         return self.counts.sum(axis=1)
 
     def values(self, metric: str) -> Float:
-        """Return one of `METRICS` of each class (C,)."""
+        """Return one of `METRICS` per class (C,), as a share; NaN where undefined."""
         return np.asarray(METRICS[metric].value(self), dtype=np.float64)
 
     def mean(self, metric: str) -> float:
@@ -77,11 +77,11 @@ class Confusion:
 
     @property
     def accuracy(self) -> float:
-        """Return the share of all points that are right; NaN without any."""
+        """Return the overall accuracy, the share of points with the right class; NaN without points."""
         return float(_ratio(self.counts.trace(), self.counts.sum()))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything as JSON data; NaN becomes None."""
+        """Return per-class scores, means, accuracy, counts and the matrix as JSON data; NaN becomes None."""
         columns = {metric: self.values(metric) for metric in METRICS}
         rows = {
             name: {metric: or_none(values[place]) for metric, values in columns.items()} | {"support": int(support)}
@@ -114,7 +114,7 @@ NOTE = "mean (standard deviation, ddof = 1) over seeds; - where undefined"
 
 
 def score_table(scores: Scores) -> str:
-    """Return scores as a table for people, in percent."""
+    """Return a test's scores as an aligned text table of classes, in percent, with the accuracy below."""
     rows = [
         [label, *cells, f"{points:,}"] for label, points, cells in _class_rows([([scores], name) for name in METRICS])
     ]
@@ -124,7 +124,7 @@ def score_table(scores: Scores) -> str:
 
 
 def by_test(results: Mapping[str, Mapping[str, Mapping[str, Scores]]], rows: Sequence[str] = ()) -> str:
-    """Return for each test of an experiment a table: the IoU of each class and variant in percent.
+    """Return Markdown with one table per test of an experiment: IoU by class and variant, %, mean (std) over seeds.
 
     Args:
         results: variant -> seed -> test -> scores; variants without a seed are left out.
@@ -140,7 +140,7 @@ def by_test(results: Mapping[str, Mapping[str, Mapping[str, Scores]]], rows: Seq
 
 
 def by_class(runs: Sequence[Scores]) -> str:
-    """Return a table of precision, recall and IoU of each class that has points, in percent.
+    """Return a Markdown table of precision, recall and IoU by class, %, mean (std) over seeds; classes with points.
 
     Means stand below them where every class has points: what is predicted without occurring would count as 0.
 
@@ -158,7 +158,7 @@ _ClassRow = tuple[str, int, list[str]]
 
 
 def _class_rows(columns: Sequence[tuple[Sequence[Scores], str]]) -> list[_ClassRow]:
-    """Return a row for each class and one for their mean; of each column the runs and the metric are given."""
+    """Return a row for each class and one for their mean, with a cell per column: a metric over some runs, %."""
     first = columns[0][0][0]
     rows = [
         (label, row["support"], [percent([run["classes"][label][metric] for run in runs]) for runs, metric in columns])
@@ -174,5 +174,5 @@ def _class_table(titles: Sequence[str], rows: Sequence[_ClassRow]) -> list[str]:
 
 
 def percent(values: Sequence[float | None]) -> str:
-    """Return shares as ``mean (standard deviation)`` in percent; None is undefined and left out."""
+    """Return shares (0 to 1) as the text ``mean (standard deviation)`` in percent; None and NaN are left out."""
     return Spread.over([100.0 * value for value in finite_values(values)]).text(1, "-")

@@ -79,32 +79,32 @@ class Comparison:
 
     @cached_property
     def known(self) -> Bool:
-        """Which slices (M,) have a truth."""
+        """Mask (M,) of the slices with a known true centre; cached."""
         return np.isfinite(self.true).all(axis=1)
 
     @cached_property
     def both(self) -> Bool:
-        """Which slices (M,) have a truth and a prediction."""
+        """Mask (M,) of the slices with both a true and a predicted centre; cached."""
         return self.known & np.isfinite(self.predicted).all(axis=1)
 
     @cached_property
     def distance(self) -> Float:
-        """Distances in the plane (N,) of the centres that have both, m."""
+        """Plane distances (N,), m, between predicted and true centres of the slices that have both; cached."""
         return np.hypot(*(self.predicted - self.true)[self.both].T)
 
     @cached_property
     def offset(self) -> Float:
-        """Offsets (N,) from the true line, m, positive to the left; without those beside its gaps."""
+        """Signed offsets (N,) of predicted centres from the true line, m, left positive; gaps left out; cached."""
         offset = lateral_errors(self.predicted[self.both], self.true, self.station)
         return offset[np.isfinite(offset)]
 
     @cached_property
     def chamfer(self) -> Chamfer:
-        """Chamfer distances."""
+        """Chamfer distances between polynomials of the predicted and the true line, m; cached."""
         return chamfer(self.predicted, self.true, self.station)
 
     def coverage(self, place: int) -> float | None:
-        """Return the share of distances within the interval of one of `LEVELS`; None without deviations."""
+        """Return the share of distances within the predicted interval of `LEVELS[place]`; None without deviations."""
         if self.std is None:
             return None
         if self.intervals is None:
@@ -146,10 +146,10 @@ METRICS = {
 
 @dataclass(frozen=True)
 class TargetErrors:
-    """Predictions of one target of the corridor in N slices in which it is known.
+    """Errors of one corridor target in the N slices in which it is known, with predicted deviations.
 
     Attributes:
-        size: (N,) of the errors, in the target's unit.
+        size: (N,) absolute errors, in the target's unit.
         std: (N,) predicted standard deviations.
         widths: (N, 2) half-widths of the intervals of `LEVELS`.
         whole: whether the target is a whole number.
@@ -161,7 +161,7 @@ class TargetErrors:
     whole: bool
 
     def inside(self, place: int) -> float:
-        """Return the share of errors within the predicted interval of one of `LEVELS`."""
+        """Return the share of errors within the predicted interval of `LEVELS[place]`; NaN without slices."""
         return _mean((self.size <= self.widths[:, place]).astype(np.float64))
 
 
@@ -183,7 +183,7 @@ TARGET_METRICS = {
 
 
 def lateral_errors(points: Float, true: Float, station: Float) -> Float:
-    """Return the offsets (N,) of points (N, 2) from the true line, m, positive to its left; NaN beside its gaps.
+    """Return the signed offsets (N,) of points (N, 2) from the true line, m, left positive; NaN beside its gaps.
 
     The line runs through the true centres (M, 2) in the order of their stations (M,) and is broken at gaps.
     """
@@ -210,7 +210,7 @@ def lateral_errors(points: Float, true: Float, station: Float) -> Float:
 
 
 def coverage(error: Float, std: Float, level: float) -> float:
-    """Return the share of errors (N,) within the Gaussian interval of a level (0 to 1) about the prediction.
+    """Return the share (0 to 1) of errors (N,) within the Gaussian interval of a level; NaN without finite ones.
 
     Errors and standard deviations (N,) are in m; those that aren't finite are left out.
     """
@@ -219,7 +219,7 @@ def coverage(error: Float, std: Float, level: float) -> float:
 
 
 def chamfer(predicted: Float, true: Float, station: Float, window: float = WINDOW) -> Chamfer:
-    """Return the Chamfer distances between polynomials of predicted and true centres (M, 2), window by window.
+    """Return Chamfer distances (m) between cubics fitted to predicted and true centres, averaged over windows.
 
     Args:
         predicted: (M, 2) m, NaN where there is none.
@@ -245,7 +245,7 @@ def chamfer(predicted: Float, true: Float, station: Float, window: float = WINDO
 
 
 def windows(station: Float, known: Bool, window: float = WINDOW) -> list[Index]:
-    """Return the indices of the slices of each window; see the module's text.
+    """Return an index array of slices for each window of about `window` (m) of gapless truth, short pieces left out.
 
     Args:
         station: (M,) m, growing.
@@ -266,7 +266,7 @@ def windows(station: Float, known: Bool, window: float = WINDOW) -> list[Index]:
 
 
 def _window_chamfer(predicted: Float, true: Float) -> tuple[float, float] | None:
-    """Return the distances over full and common extent of one window; None if too little was predicted."""
+    """Return one window's Chamfer distances over full and common extent, m; None if too little was predicted."""
     if len(predicted) < _FEWEST or len(true) < _FEWEST:
         return None
     origin = true.mean(axis=0)
@@ -284,18 +284,18 @@ def _window_chamfer(predicted: Float, true: Float) -> tuple[float, float] | None
 
 
 def _sample_polynomial(fit: np.polynomial.Polynomial, scale: float, extent: tuple[float, float]) -> Float:
-    """Return the polynomial's points (N, 2), m, at the whole metres within an extent."""
+    """Return a scaled polynomial's points (N, 2), m, at the whole metres within an extent (m)."""
     along = np.arange(np.ceil(extent[0] - 1e-9), np.floor(extent[1] + 1e-9) + 1.0)
     return np.column_stack([along, scale * fit(along / scale)])
 
 
 def _both_ways(one: Float, other: Float) -> float:
-    """Return the sum of both directed means of the distances to the nearest point of the other set."""
+    """Return the Chamfer distance of two point sets: both directed mean nearest distances added, m."""
     return float(cKDTree(other).query(one)[0].mean() + cKDTree(one).query(other)[0].mean())
 
 
 def over_roads(rows: Iterable[Mapping[str, float]]) -> dict[str, float]:
-    """Return the figures of several roads as one: means weighted by the number of slices; ``slices`` are summed.
+    """Return the figures of several roads combined: means weighted by slices, and sums of counts.
 
     Roads too short for a window say nothing of Chamfer distances.
     """

@@ -47,7 +47,7 @@ HALF_WIDTH = SliceSettings().half_width
 
 @dataclass(frozen=True)
 class Cropping:
-    """How the sides of slices are cut off, see `roads.cropped`.
+    """Options for cutting off the sides of a measured road's slices at random, see `roads.crop_road`.
 
     Attributes:
         share: the largest part of the distance from the axis to the outermost point that is cut off; uniform from 0.
@@ -61,7 +61,7 @@ class Cropping:
 
 @dataclass(frozen=True)
 class Case:
-    """A road as one seed shows it: its points, cropped perhaps, and the frames in which it is looked at."""
+    """A road to evaluate on: its points, perhaps cropped, and the frames of a randomly displaced path."""
 
     road: LearningRoad
     frames: Frames
@@ -70,7 +70,7 @@ class Case:
 def case(
     road: LearningRoad, seed: int, *, cropping: Cropping | None, estimated: bool, settings: SliceSettings | None = None
 ) -> Case:
-    """Return a road as a seed shows it.
+    """Return a road, cropped if asked, with frames along its axis or an estimated path, displaced by the seed.
 
     Args:
         road: with a known truth.
@@ -92,7 +92,7 @@ def case(
 
 
 def evaluate(predictor: Predictor, shown: Case) -> dict[str, float]:
-    """Return the figures of one predictor on one road, see `distances.METRICS`."""
+    """Return one predictor's metrics (`distances.METRICS`) on one road, by name; undefined ones are NaN or missing."""
     frames = shown.frames
     predicted = predictor(shown.road, frames)
     true, _ = shown.road.known_truth.axis.crossing(frames.position, frames.direction)
@@ -105,7 +105,7 @@ def evaluate(predictor: Predictor, shown: Case) -> dict[str, float]:
 def measure(
     predictors: Mapping[str, Sequence[Predictor]], cases: Callable[[int], Sequence[Case]], seeds: Sequence[int]
 ) -> dict[str, dict[str, dict[str, Spread]]]:
-    """Return figures by predictor and road (`all` being all together), over seeds.
+    """Return each metric's mean and deviation over seeds, by predictor, road (`all`: combined) and metric.
 
     Args:
         predictors: by name; one per seed, as models that were trained with it, or one for all seeds.
@@ -135,7 +135,7 @@ def measure(
 
 
 def trivial_predictor(name: str, cut: Cut | None = None) -> Predictor:
-    """Return one of `baselines.RULES`, which sees what is cut out: its own, or what several predictors share."""
+    """Return the untrained predictor of a rule's name in `baselines.RULES`; `cut` shares slices between predictors."""
     rule, length = baselines.RULES[name]
     cut = cut or Cut()
 
@@ -149,7 +149,7 @@ def trivial_predictor(name: str, cut: Cut | None = None) -> Predictor:
 
 
 class Cut:
-    """Slices of one road at a time, of each thickness cut out once.
+    """Cache of the slices of the last road and frames, per thickness.
 
     Args:
         half_width: points up to this are seen beside a frame, m.
@@ -161,7 +161,7 @@ class Cut:
         self._slices: dict[float, Slices] = {}
 
     def __call__(self, road: LearningRoad, frames: Frames, thickness: float) -> Slices:
-        """Return the points in each slice of so many metres."""
+        """Return the road's points in the slices of `thickness` (m) at the frames, from the cache if the same again."""
         if self._last is None or self._last[0] is not road or self._last[1] is not frames:
             self._last, self._slices = (road, frames), {}
         if thickness not in self._slices:
@@ -170,7 +170,7 @@ class Cut:
 
 
 def skeleton_predictor(settings: baselines.SkeletonSettings) -> Predictor:
-    """Return the skeleton baseline; the mask ``classes`` takes the points of the road's classes where there are any."""
+    """Return the untrained predictor of centres (M, 1), m, by the road's morphological skeleton."""
 
     def predict(road: LearningRoad, frames: Frames) -> Float:
         xy, intensity = mask_points(road, settings.mask)
@@ -180,19 +180,19 @@ def skeleton_predictor(settings: baselines.SkeletonSettings) -> Predictor:
 
 
 def mask_points(road: LearningRoad, mask: str) -> tuple[Float, Float]:
-    """Return places (N, 2) and intensities (N,) of the points that the skeleton's mask is made of."""
+    """Return xy (N, 2), m, and intensities (N,) of the skeleton's points: the road classes' for "classes", else all."""
     paved = road.of_class(ROAD_CLASSES)
     own = road.belonging & paved if mask == "classes" and paved.any() else road.belonging
     return road.xyz[own, :2].astype(np.float64), road.intensity[own].astype(np.float64)
 
 
 def path_itself(road: LearningRoad, frames: Frames) -> Float:
-    """Predict the frames' own origins: what the displaced path alone would be worth."""
+    """Predict the centre at each frame's origin: zeros (M, 1); what the displaced path alone is worth."""
     return np.zeros((len(frames), 1))
 
 
 def trivial_predictors(half_width: float = HALF_WIDTH) -> dict[str, list[Predictor]]:
-    """Return all predictors that learn nothing, by name, for `measure`; see `trivial_predictor`."""
+    """Return all untrained baseline predictors by name, one each, for `measure`; they share the slices cut out."""
     found: dict[str, list[Predictor]] = {"the displaced path": [path_itself]}
     cut = Cut(half_width)
     found |= {name: [trivial_predictor(name, cut)] for name in baselines.RULES}
@@ -203,7 +203,7 @@ def trivial_predictors(half_width: float = HALF_WIDTH) -> dict[str, list[Predict
 
 
 def along_parabolas(predictor: Predictor, length: float) -> Predictor:
-    """Return what predicts, of each frame, the parabola through a predictor's centres that far along the path, m."""
+    """Return a predictor that smooths another's centres by a parabola fitted over `length` (m) around each frame."""
 
     def predict(road: LearningRoad, frames: Frames) -> Float:
         y = predictor(road, frames)[:, 0]

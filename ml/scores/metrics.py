@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Metric:
-    """A figure of predictions.
+    """A named figure of predictions: how it is computed, and how tables show it.
 
     Attributes:
         value: makes it of what was compared; None: there is none.
@@ -30,13 +30,13 @@ class Metric:
 
 
 def in_tables(metrics: Mapping[str, Metric]) -> dict[str, Metric]:
-    """Return the metrics that tables show, in the order of the columns."""
+    """Return the metrics that have a title, in the order of the tables' columns."""
     shown = {name: metric for name, metric in metrics.items() if metric.title}
     return dict(sorted(shown.items(), key=lambda item: item[1].place))
 
 
 def figures(metrics: Mapping[str, Metric], compared: object) -> dict[str, float]:
-    """Return all metrics of what was compared by name, without those that there are none of."""
+    """Return the values of all metrics of a comparison by name, without those that are None."""
     values = {name: metric.value(compared) for name, metric in metrics.items()}
     return {name: float(value) for name, value in values.items() if value is not None}
 
@@ -51,13 +51,13 @@ class Spread:
 
     @classmethod
     def over(cls, values: Iterable[float]) -> Self:
-        """Return the spread of values; NaN without any, and where one of them is NaN."""
+        """Return mean, deviation and count of values; the mean is NaN without any or where one is NaN."""
         known = np.array([*values], dtype=np.float64)
         std = float(known.std(ddof=1)) if len(known) > 1 else math.nan
         return cls(float(known.mean()) if len(known) else math.nan, std, len(known))
 
     def text(self, decimals: int, missing: str, factor: float = 1.0) -> str:
-        """Return ``mean (std)`` times a factor; the mean alone where there is no deviation, else what is missing."""
+        """Return the text ``mean (std)``, times a factor; the mean alone if std is NaN, `missing` if the mean is."""
         if math.isnan(self.mean):
             return missing
         mean = f"{factor * self.mean:,.{decimals}f}"
@@ -65,12 +65,12 @@ class Spread:
 
 
 def finite_values(values: Sequence[float | None]) -> list[float]:
-    """Return those of some values that are finite numbers."""
+    """Return the finite numbers among some values, without None, NaN and infinity."""
     return [float(value) for value in values if value is not None and math.isfinite(value)]
 
 
 def over_seeds(rows: Sequence[Mapping[str, float]]) -> dict[str, Spread]:
-    """Return mean and standard deviation (ddof 1) of each figure over runs with several seeds.
+    """Return mean and standard deviation (ddof 1) of each figure over runs with several seeds, by name.
 
     A figure that is NaN or missing in one of them has a NaN mean: nothing is left out silently.
     """
@@ -79,14 +79,14 @@ def over_seeds(rows: Sequence[Mapping[str, float]]) -> dict[str, Spread]:
 
 
 def or_none(value: float | None, digits: int | None = None) -> float | None:
-    """Return a number as JSON has it, perhaps rounded: None for NaN."""
+    """Return a number for JSON, perhaps rounded to `digits`; None for NaN and None."""
     if value is None or math.isnan(value):
         return None
     return float(value) if digits is None else round(value, digits)
 
 
 def markdown(head: Sequence[str], body: Iterable[Sequence[str]], rule: Sequence[str] | None = None) -> str:
-    """Return the lines of a Markdown table, each with its end.
+    """Return a Markdown table as text that ends with a line break.
 
     Args:
         head: titles of the columns.

@@ -34,7 +34,7 @@ FEWEST = 100
 
 
 def with_painted_line(road: LearningRoad) -> LearningRoad:
-    """Return a road whose truth is the painted line next to its measured axis, with gaps where none is found.
+    """Return a copy of the road whose true axis is the painted line found beside the measured one, with gaps.
 
     Raises:
         InputError: the road has no truth, or no two neighbouring places with a line.
@@ -61,7 +61,7 @@ def with_painted_line(road: LearningRoad) -> LearningRoad:
 
 
 def _ridge(offset: Float, logs: Float) -> float:
-    """Return where points are brightest across a road, m; NaN where nothing is brighter than the rest."""
+    """Return the offset of the brightest line across a road, m; NaN where none stands out of the median."""
     if len(offset) < FEWEST:
         return float("nan")
     middles = np.arange(-REACH, REACH + 0.5 * CELL, CELL)

@@ -38,7 +38,7 @@ _APART = 4.0
 
 
 def small_png(figure: Any, dpi: float | None = None) -> bytes:
-    """Return a Matplotlib figure as a PNG of at most 256 colours; with all of them points make it four times as large.
+    """Draw a Matplotlib figure; return it as a PNG of at most 256 colours, a fourth as large as with all.
 
     Args:
         figure: is drawn.
@@ -53,7 +53,7 @@ def small_png(figure: Any, dpi: float | None = None) -> bytes:
 
 @dataclass(frozen=True)
 class PictureView:
-    """The part of a road that is drawn: stations along its true axis, m."""
+    """Stations along a road's true axis from which to which it is drawn, m."""
 
     first: float
     last: float
@@ -62,7 +62,7 @@ class PictureView:
 def lines_picture(
     shown: Case, lines: Mapping[str, Float], view: PictureView, title: str, height: float = 12.0
 ) -> bytes:
-    """Return a PNG: centrelines over the cloud, and how far each is from the true axis.
+    """Return a PNG of a road straightened: predicted centrelines over the cloud, and their offsets from the true axis.
 
     Args:
         shown: road and frames.
@@ -91,7 +91,7 @@ def lines_picture(
 
 
 def corridor_picture(shown: Case, prediction: Float, view: PictureView, title: str, height: float = 16.0) -> bytes:
-    """Return a PNG: centre and edges with their 95 % bands over the cloud, the centre's error, the lanes.
+    """Return a PNG of a corridor: centre and edges with 95 % bands over the cloud, the centre's error, the lanes.
 
     Args:
         shown: road and frames.
@@ -129,7 +129,7 @@ def _panels(title: str, heights: Sequence[float], view: PictureView, height: flo
 
 
 def _cloud(axes: Axes, shown: Case, view: PictureView, height: float) -> None:
-    """Draw the points by intensity, straightened along the true axis.
+    """Draw a road's points by intensity rank, straightened along the true axis, into the axes.
 
     Where only an axis is known, as of real scans that may not be passed on, means of cells are drawn and no points.
     """
@@ -166,7 +166,7 @@ def _true(axes: Axes, shown: Case, view: PictureView, edges: bool = False) -> No
 
 
 def _beside(shown: Case, points: Float, view: PictureView) -> tuple[Float, Float]:
-    """Return station and offset of those points (M, 2) that lie in the view, by station; NaN between stretches."""
+    """Return ascending stations and offsets (m) of the points (M, 2) in the view; NaN rows separate stretches."""
     truth = shown.road.known_truth
     there = np.isfinite(points).all(axis=1)
     station, offset = truth.axis.project(points[there])
@@ -175,7 +175,7 @@ def _beside(shown: Case, points: Float, view: PictureView) -> tuple[Float, Float
 
 
 def _by_station(station: Float, offset: Float) -> tuple[Float, Float]:
-    """Return stations and offsets of points ordered, with NaN where they aren't joined."""
+    """Return stations and offsets sorted by station, with NaN inserted between those over `_APART` (m) apart."""
     order = np.argsort(station)
     station, offset = station[order], offset[order]
     breaks = np.flatnonzero(np.diff(station) > _APART) + 1
@@ -183,7 +183,7 @@ def _by_station(station: Float, offset: Float) -> tuple[Float, Float]:
 
 
 def _half_width(column: Mapping[str, Float], name: str, level: int) -> Float:
-    """Return half-widths (M,) of an interval, m: as the prediction says, else by its standard deviation, else 0."""
+    """Return half-widths (M,) of a column's `level` % interval: predicted, else by its standard deviation, else 0."""
     if f"{name}_{level}" in column:
         width = column[f"{name}_{level}"]
     else:
@@ -192,7 +192,7 @@ def _half_width(column: Mapping[str, Float], name: str, level: int) -> Float:
 
 
 def _band(axes: Axes, shown: Case, view: PictureView, y: Float, width: Float, color: str, label: str | None) -> None:
-    """Draw a line with an interval of 95 %."""
+    """Draw a predicted line and the band of its 95 % interval into the axes."""
     station, offset = _beside(shown, shown.frames.at(y), view)
     _, low = _across(shown, y - width, view)
     at, high = _across(shown, y + width, view)
@@ -201,7 +201,7 @@ def _band(axes: Axes, shown: Case, view: PictureView, y: Float, width: Float, co
 
 
 def _across(shown: Case, y: Float, view: PictureView) -> tuple[Float, Float]:
-    """Return the frames' stations on the true axis (K,) and the offsets of their points, in the frames' order."""
+    """Return ascending stations where frames cross the true axis and the offsets of their points y (m), NaN at gaps."""
     axis, frames = shown.road.known_truth.axis, shown.frames
     _, station = axis.crossing(frames.position, frames.direction)
     inside = (station >= view.first) & (station <= view.last) & np.isfinite(y)
@@ -251,7 +251,7 @@ _WRONG = np.array([[0.75, 0.75, 0.75], [0.9, 0.1, 0.1]])
 def comparison(
     tile: CloudTile, predicted: NDArray[np.int16], names: Sequence[str], scheme: ClassScheme | None = None
 ) -> bytes:
-    """Return a PNG: a tile from above by its truth, by the classes predicted, and where the two differ.
+    """Return a PNG with three top views of a tile: true classes, predicted classes, and where they differ.
 
     Args:
         tile: with its truth.
@@ -278,14 +278,14 @@ def comparison(
 
 
 def class_colors(names: Sequence[str], scheme: ClassScheme | None = None) -> Float:
-    """Return the previews' colours of classes (C, 3), from 0 to 1; a group's that isn't a class is grey."""
+    """Return the display colours (C, 3), 0 to 1, of class names; grey for a name that no scheme has."""
     schemes = (class_scheme("17"), class_scheme("5"), *([scheme] if scheme else []))
     known = {row.name: row.color for one in schemes for row in one.rows}
     return np.array([known.get(name, (150, 150, 150)) for name in names]) / 255.0
 
 
 def top_view(coord: Float32, labels: NDArray[np.int16], colors: Float, extent: NDArray[np.floating]) -> Float:
-    """Return an image (H, W, 3), north up in row order: of each pixel the highest point's colour.
+    """Return a top-view image (H, W, 3), row 0 in the south: each pixel has its highest point's class colour.
 
     Args:
         coord: (N, 3) m.

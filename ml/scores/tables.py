@@ -32,12 +32,12 @@ TARGETS_SHOWN = {
 
 
 def table(measured: Measured, road: str = "all", columns: Columns = COLUMNS) -> str:
-    """Return a Markdown table of all predictors on one road, or on all; columns that nobody fills are left out."""
+    """Return a Markdown table of all predictors on one road, or on `all` combined; empty columns are left out."""
     return markdown(*_cells({name: rows.get(road, {}) for name, rows in measured.items()}, columns))
 
 
 def report(measured: Measured, corridor: Mapping[str, Mapping[str, float | None]]) -> str:
-    """Return tables for people: all predictors, each road, and the errors of the first one's corridor by target."""
+    """Return text tables: all predictors, the first one road by road, and its corridor errors by target."""
     model = next(iter(measured))
     roads = {road: rows for road, rows in measured[model].items() if road != "all"}
     together = {name: rows.get("all", {}) for name, rows in measured.items()}
@@ -52,27 +52,27 @@ def report(measured: Measured, corridor: Mapping[str, Mapping[str, float | None]
 
 
 def shown_figures(target: str, figures: Mapping[str, float | None]) -> dict[str, float]:
-    """Return the figures of a target of the corridor in the unit of `TARGETS_SHOWN`; NaN for None."""
+    """Return a corridor target's figures with the mean error in the unit of `TARGETS_SHOWN`; NaN for None."""
     known = {name: math.nan if figure is None else figure for name, figure in figures.items()}
     return known | {"mae": TARGETS_SHOWN[target][1] * known["mae"]}
 
 
 def _cells(rows: Mapping[str, Mapping[str, Spread]], columns: Columns) -> tuple[list[str], list[list[str]]]:
-    """Return head and body of a table with a row of figures for each name; columns that nobody fills are left out."""
+    """Return head and body of a table with a row of figures per name; columns that no row has are left out."""
     used = {figure: metric for figure, metric in columns.items() if any(figure in row for row in rows.values())}
     body = [[name, *(cell(row.get(figure), metric) for figure, metric in used.items())] for name, row in rows.items()]
     return ["", *(metric.title for metric in used.values())], body
 
 
 def cell(spread: Spread | None, metric: Metric) -> str:
-    """Return ``mean (std)``; the mean alone where there is one seed or nothing differs, a dash where there is none."""
+    """Return a table cell ``mean (std)``; the mean alone where std is 0 or NaN, a dash for None or NaN."""
     if spread is None:
         return "–"
     return replace(spread, std=spread.std or math.nan).text(metric.decimals, "–", metric.factor)
 
 
 def as_data(measured: Measured) -> dict[str, Any]:
-    """Return figures as JSON data: mean, std and number of seeds, None for what is undefined."""
+    """Return measured figures as JSON data (mean, std, seeds), rounded to 6 decimals; None where undefined."""
     return {
         name: {
             road: {
@@ -86,10 +86,7 @@ def as_data(measured: Measured) -> dict[str, Any]:
 
 
 def write_tables(folder: Path, name: str, measured: Measured) -> list[str]:
-    """Write ``NAME.json`` and ``NAME.md``, the latter with one table for all roads together and one for each.
-
-    Returns:
-        the names of the files.
+    """Write figures as ``NAME.json`` and as tables in ``NAME.md``, overwriting; return the two files' names.
 
     Raises:
         OutputError: the folder can't be written.

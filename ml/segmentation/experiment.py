@@ -30,7 +30,7 @@ RESULTS, TABLE = "results.json", "table.md"
 
 
 class Variant(Model):
-    """One column of the table."""
+    """One variant of an experiment: changes of its configuration, and whose network it tests."""
 
     vendor_keys_allowed: ClassVar[bool] = False
 
@@ -39,7 +39,7 @@ class Variant(Model):
 
 
 class Experiment(Model):
-    """Trainings to be compared. Paths of data may begin with {NAME}, which the command's --data fills in."""
+    """Trainings to be compared, as read from YAML; paths of data may begin with {NAME}, filled in by --data."""
 
     vendor_keys_allowed: ClassVar[bool] = False
 
@@ -52,7 +52,7 @@ class Experiment(Model):
 
 
 def load_experiment(name_or_file: str) -> Experiment:
-    """Return a shipped experiment or one from a YAML file.
+    """Load a shipped experiment by name, or one from a YAML file.
 
     Raises:
         MissingFileError: there is no such file.
@@ -69,7 +69,7 @@ def load_experiment(name_or_file: str) -> Experiment:
 def configurations(
     experiment: Experiment, folders: Mapping[str, str], changes: Sequence[str] = ()
 ) -> dict[str, SegmentationConfiguration]:
-    """Return the configuration of each variant, with the first seed.
+    """Return each variant's training configuration by name, with the first seed and paths filled in.
 
     Args:
         experiment: what is compared.
@@ -93,7 +93,7 @@ def configurations(
 
 
 def _fill_sources(data: Data, folders: Mapping[str, str]) -> Data:
-    """Return sources with their folders in place of names."""
+    """Return a copy of the data with {NAME} in all paths replaced by its folder."""
 
     def fill(source: Source) -> Source:
         try:
@@ -117,7 +117,7 @@ def run_experiment(
     seeds: Sequence[int],
     progress: Progress = silent,
 ) -> dict[str, Any]:
-    """Train and test all variants with all seeds; return the scores and write them after each.
+    """Train (unless done) and test all variants with the given seeds; return the scores, written after each.
 
     Args:
         experiment: what is compared.
@@ -144,7 +144,7 @@ def run_experiment(
 def _train_variant(
     configuration: SegmentationConfiguration, folder: Path, output: Path, progress: Progress
 ) -> dict[str, Any]:
-    """Return the scores of a run, trained unless it is already."""
+    """Return a run's test scores by test, training it first unless it is already."""
     begun = (folder / CONFIGURATION).is_file()
     run = Run.start(folder, configuration, resume=begun)
     if not (folder / METRICS).is_file():
@@ -156,7 +156,7 @@ def _train_variant(
 
 
 def _reuse_pretraining(configuration: SegmentationConfiguration, target: Path, output: Path) -> None:
-    """Take the first part of fine-tuning from the run that has trained just that, if there is one."""
+    """Copy a run of the experiment that trained just the first part of fine-tuning to `target`, if there is one."""
     wanted = lasting_data(configuration.model_copy(update={"set_up": "synthetic"}).to_dict())
     if (target / CONFIGURATION).is_file():
         return
@@ -171,7 +171,7 @@ def _reuse_pretraining(configuration: SegmentationConfiguration, target: Path, o
 def _test_variant(
     configuration: SegmentationConfiguration, folder: Path, file: Path, progress: Progress
 ) -> dict[str, Any]:
-    """Return the scores of a trained run under another configuration, tested unless just that was tested already."""
+    """Return a trained run's test scores under another configuration, cached in `file` by configuration and weights."""
     wanted = lasting_data(configuration.to_dict())
     made_from = {"configuration": wanted, "checkpoint_sha256": checksum(folder / CHECKPOINT)}
     tests: dict[str, Any]
@@ -184,7 +184,7 @@ def _test_variant(
 
 
 def table(title: str, results: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return Markdown: for each test the IoU of each class and variant in percent, mean (standard deviation).
+    """Return a Markdown page with a table per test: IoU of each class and variant, %, mean (standard deviation).
 
     Args:
         title: above the tables.

@@ -29,7 +29,7 @@ _TILES = 8
 
 
 def forecast(configuration: SegmentationConfiguration, steps: int) -> dict[str, Any]:
-    """Return seconds per step, the number of steps and the hours of a whole training, as JSON data.
+    """Time some training steps; return seconds per step, the steps and hours of the whole training, ..., as JSON data.
 
     A step is all that a training does for a batch: crops cut out, neighbours found, loss, gradients, weights changed.
     One more step goes first and isn't counted.
@@ -62,7 +62,7 @@ def forecast(configuration: SegmentationConfiguration, steps: int) -> dict[str, 
 
 
 def tile_count(source: Source, configuration: SegmentationConfiguration) -> int:
-    """Return how many tiles a source has; those in Pointcept's layout are counted without being read."""
+    """Return the number of a source's tiles, reading them unless they are in Pointcept's layout."""
     path = Path(source.path)
     root = pointcept_root(path) if path.is_dir() else None
     if root is not None:
@@ -71,7 +71,7 @@ def tile_count(source: Source, configuration: SegmentationConfiguration) -> int:
 
 
 def _first_tiles(sources: list[Source], configuration: SegmentationConfiguration) -> list[CloudTile]:
-    """Return the first tiles with as many points as a crop has."""
+    """Return up to 8 tiles of at least a crop's points; raise `InputError` if there are none."""
     found: list[CloudTile] = []
     for tile in thin_tiles(sources, configuration, "first"):
         if len(tile) >= configuration.crop_points:
@@ -86,7 +86,7 @@ def _first_tiles(sources: list[Source], configuration: SegmentationConfiguration
 def timed_steps(
     configuration: SegmentationConfiguration, tiles: list[CloudTile], steps: int, device: torch.device
 ) -> tuple[float, float]:
-    """Return the median seconds of a step, and those of the processor."""
+    """Run training steps on random weights; return the median wall-clock and processor seconds of a step."""
     model = build(configuration).to(device).train()
     optimizer = optimizer_of(model, configuration.schedule)
     loss = objective(configuration, tiles, device)

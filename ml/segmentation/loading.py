@@ -28,7 +28,7 @@ SMALLEST_SHARE = 0.25
 
 
 def read_domains(configuration: SegmentationConfiguration) -> dict[str, list[CloudTile]]:
-    """Return the training tiles by domain, thinned out; intensities mapped where the set-up says so.
+    """Read the thinned training tiles by domain (synthetic, real); intensities are mapped for `mixed_mapped`.
 
     A grid of tiles cuts slivers off at a road's ends. As every tile has as many crops, they would take up half of a
     training on short roads.
@@ -48,7 +48,7 @@ def read_domains(configuration: SegmentationConfiguration) -> dict[str, list[Clo
 
 
 def thin_tiles(sources: Sequence[Source], configuration: SegmentationConfiguration, title: str) -> Iterator[CloudTile]:
-    """Yield the tiles of sources with one point per training voxel.
+    """Yield the sources' tiles thinned to one point per training voxel, scenes renamed to ``TITLE/PLACE/SCENE``.
 
     Scenes of two sources may have one name: here they have others, so that their intensities are scaled apart.
     """
@@ -58,7 +58,7 @@ def thin_tiles(sources: Sequence[Source], configuration: SegmentationConfigurati
 
 
 class CropBatches:
-    """The batches of an epoch: called with its number, gives those that a slice names. They hang on both and the seed.
+    """Training batches of crops: called with an epoch and a slice it yields them, determined by seed and epoch alone.
 
     Args:
         configuration: of the training.
@@ -76,7 +76,7 @@ class CropBatches:
         return math.ceil(self.configuration.crops_per_tile * len(self.tiles) / self.configuration.batch)
 
     def __call__(self, epoch: int, share: slice = slice(None)) -> Iterator[Item]:
-        """Yield those batches of an epoch whose numbers a slice names."""
+        """Yield the batches of an epoch whose numbers, from 0, `share` selects."""
         given, sizes = self.configuration, [len(tiles) for tiles in self.domains]
         draws = plan(sizes, given.crops_per_tile, given.synthetic_share, given.seed, epoch)
         crops = CropDataset(
@@ -94,7 +94,7 @@ class CropBatches:
 
 @contextmanager
 def report_lost_workers(configuration: SegmentationConfiguration) -> Iterator[None]:
-    """Tell in one line that a worker was lost; PyTorch raises it wherever the main thread happens to be.
+    """Context that turns PyTorch's error about a killed data worker into an `InputError` of one line.
 
     Raises:
         InputError: a worker was lost.
@@ -127,7 +127,7 @@ def _load_crops(
 
 
 def leave_quietly(_worker: int) -> None:
-    """Let a worker whose trainer has left say nothing of the ends of their pipes; its own errors go another way."""
+    """Initialise a data worker so that it prints no broken-pipe traceback after its trainer ended."""
     said = sys.excepthook
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})  # its end by PyTorch, put off by `defer_interrupt`
@@ -141,7 +141,7 @@ def leave_quietly(_worker: int) -> None:
 
 @contextmanager
 def defer_interrupt() -> Iterator[None]:
-    """Put an end from outside off while processes are started: Python drops one between a fork and what runs after it.
+    """Context that blocks SIGINT, SIGTERM and SIGHUP while processes are forked, which would lose them.
 
     The processes go on putting off Ctrl-C and a lost connection, until the one that started them ends; PyTorch has them
     end at once where they are told to by SIGTERM.
@@ -158,27 +158,27 @@ def defer_interrupt() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Collate:
-    """Makes a batch of items in the worker: laid over one another where the recipe says so, neighbours found."""
+    """Collate function run in the workers: batches items, at random overlays them (Mix3D), and finds neighbours."""
 
     configuration: SegmentationConfiguration
     epoch: int
     mix3d: float
 
     def __call__(self, items: Sequence[Item]) -> Item:
-        """Return the batch."""
+        """Return the items' batch, perhaps overlaid, prepared for the network."""
         batch = collate(items)
         if self.mix3d and self._chance(items[0]) < self.mix3d:
             batch = overlay_clouds(batch)
         return self.configuration.network.prepare(batch)
 
     def _chance(self, first: Item) -> float:
-        """Return a number from 0 to 1 that follows from the batch itself: workers don't know how many came before."""
+        """Return a random number from 0 to 1 seeded by the first item's points: workers don't know batch numbers."""
         content = zlib.crc32(first["coord"].numpy().tobytes())
         return float(stream(self.configuration.seed, "mix3d", self.epoch, content).random())
 
 
 def adaptation_batches(tiles: list[CloudTile], configuration: SegmentationConfiguration) -> Iterator[Item]:
-    """Yield batches of a test's points without effects, from which the norms' statistics are taken."""
+    """Yield batches of random unaugmented crops of a test's tiles, for AdaBN; none without tiles."""
     if not tiles:
         return
     # By their points: a sliver says as much of the scene as it holds of it.

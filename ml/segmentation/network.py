@@ -19,18 +19,18 @@ from .recipes import SegmentationConfiguration
 
 
 def build(configuration: SegmentationConfiguration) -> nn.Module:
-    """Return the network of a configuration, with random weights."""
+    """Return a configuration's segmentation network with random weights of PyTorch's global generator."""
     return configuration.network.build(len(configuration.features), len(class_names(configuration.scheme())))
 
 
 def scores_of(model: nn.Module, batch: Item) -> Tensor:
-    """Return the classes' scores (N, C) of a prepared batch."""
+    """Return the network's class scores (logits, N, C) of a prepared batch."""
     scores: Tensor = model(batch["feat"], batch)
     return scores
 
 
 def adapt_network(model: nn.Module, batches: Iterable[Item]) -> nn.Module:
-    """Return a copy of a network whose norms have the statistics of other points (AdaBN).
+    """Return a copy of a network whose batch norms have the statistics of other points (AdaBN).
 
     Raises:
         InputError: there are no points.
@@ -96,7 +96,7 @@ def _look(pools: list[_Pool], scores: Callable[[B], Tensor], batch: B) -> int:
 
 
 class _Pool:
-    """The statistics of one norm over batches, in double precision."""
+    """Accumulator of one batch norm's statistics over batches, weighted by points, in double precision."""
 
     def __init__(self, norm: _BatchNorm) -> None:
         assert norm.running_mean is not None
@@ -110,7 +110,7 @@ class _Pool:
         return 0 if self.norm.num_batches_tracked is None else int(self.norm.num_batches_tracked)
 
     def add(self, points: int) -> None:
-        """Take in what the last batch left, unless it left nothing: a stage with a single point."""
+        """Add the statistics of the norm's last batch of `points`, unless it updated none (a single point)."""
         seen, self.seen = self.seen, self._batches()
         if self.seen == seen or self.norm.running_mean is None or self.norm.running_var is None:
             return
@@ -120,7 +120,7 @@ class _Pool:
         self.square += points * (variance + mean.square())
 
     def store(self) -> None:
-        """Give the norm its pooled statistics; none if it saw nothing."""
+        """Write the pooled statistics to the norm, in place; nothing if it saw no batch."""
         if not self.weight or self.norm.running_mean is None or self.norm.running_var is None:
             return
         mean = self.mean / self.weight
@@ -129,7 +129,7 @@ class _Pool:
 
 
 def overlay_clouds(batch: Batch) -> Batch:
-    """Return a batch whose clouds are laid over one another in pairs, a last one without a partner as it is: Mix3D.
+    """Return the batch with its clouds merged in pairs (Mix3D augmentation); an odd last one stays alone.
 
     Nekrasov et al., "Mix3D: out-of-context data augmentation for 3D scenes" (2021): things then appear where their
     surroundings don't announce them. Clouds must be centred; their points, labels and features stay as they are.

@@ -50,7 +50,7 @@ _COPC = "copc"
 
 @dataclass(frozen=True)
 class Labelling:
-    """Predictor that labels points.
+    """A trained classifier with the settings by which it labels points.
 
     Attributes:
         classifier: scores of a batch.
@@ -74,7 +74,7 @@ def predict_file(
     overwrite: bool = False,
     progress: Progress = silent,
 ) -> dict[str, Any]:
-    """Write a copy of a LAS or LAZ file with a class for every point; return counts, points/s and memory.
+    """Write a copy of a LAS or LAZ file with a class for every point; return counts, seconds and points per second.
 
     Every attribute, record and header entry stays as it is. The class's id of the scheme is written to the attribute
     ``predicted_class``, which is added unless the file has it from an earlier run.
@@ -117,7 +117,7 @@ def predict_file(
 
 
 def _check(source: Path, target: Path, overwrite: bool, classification: bool) -> None:
-    """Refuse before the work what couldn't be written after it."""
+    """Raise `InputError` or `OutputError` if source or target can't be used; make the target's folder."""
     for path, what in ((source, "cloud"), (target, "--output")):
         if path.suffix.lower() not in (".las", ".laz"):
             raise InputError(what, str(path), "must end in .las or .laz")
@@ -150,7 +150,7 @@ class TileStore:
         self._largest = 0
 
     def fill(self, source: Path, progress: Progress) -> int:
-        """Read a cloud into tiles; return its number of points."""
+        """Sort a cloud's points into the tiles' files; return the number of points."""
         done = 0
         with open_cloud(source) as cloud:
             self._origin = np.floor(np.asarray(cloud.header.offset, dtype=np.float64))
@@ -172,7 +172,7 @@ class TileStore:
         return done
 
     def scaling(self, kind: str, voxel: float) -> Scaling:
-        """Return the scaling of the whole cloud's intensities, of one point per voxel (m); see `tiles.scalings`."""
+        """Return the scaling of the cloud's intensities, ``share`` or ``robust`` over one point per voxel (m)."""
         if kind == "share" or not self._has_intensity:
             return Scaling()
         histogram = np.zeros(LEVELS, dtype=np.int64)
@@ -184,7 +184,7 @@ class TileStore:
         return Scaling(middle, high - low if high > low else 1.0)
 
     def tiles(self) -> Iterator[tuple[CloudTile, Bool, Int]]:
-        """Yield each tile with what lies around it, which points are its own, and where those stand in the file."""
+        """Yield each tile with its margin, the mask of its own points, and their indices in the file."""
         for row, column in sorted(self._known):
             parts, cores = [], []
             for north in (-1, 0, 1):
@@ -205,7 +205,7 @@ class TileStore:
             yield tile, core, record["index"][core]
 
     def _near(self, row: int, column: int, north: int, east: int) -> AnyArray:
-        """Return a tile's points that the tile which it lies ``north`` and ``east`` of sees, relative to that one."""
+        """Return a tile's points within `MARGIN` of the tile that it is ``north`` and ``east`` of, relative to that."""
         if (row, column) not in self._known:
             return np.empty(0, dtype=_RECORD)
         record = np.fromfile(self._folder / f"{row}_{column}", dtype=_RECORD)
@@ -236,7 +236,7 @@ class TileStore:
 def write_copy(
     source: Path, target: Path, labels: UInt8, ids: UInt8, codes: ClassScheme | None, progress: Progress
 ) -> Int:
-    """Copy a LAS file with one more attribute; return the number of points of each class (C,).
+    """Copy a LAS file with the predicted classes as one more attribute; return the number of points per class (C,).
 
     Args:
         source, target: files.
@@ -275,7 +275,7 @@ def write_copy(
 
 
 def copy_header_texts(source: Path, target: Path) -> None:
-    """Copy a LAS file's system identifier and generating software as they are: not all are ASCII, as they should be."""
+    """Copy a LAS file's system identifier and generating software byte by byte into another, in place."""
     with source.open("rb") as old, target.open("r+b") as new:
         old.seek(HEADER_TEXTS.start)
         new.seek(HEADER_TEXTS.start)
@@ -283,7 +283,7 @@ def copy_header_texts(source: Path, target: Path) -> None:
 
 
 def extended_header(old: laspy.LasHeader, needs_codes: bool) -> laspy.LasHeader:
-    """Return a copy of a header with the attribute for the classes, and without texts: see `copy_header_texts`.
+    """Return a copy of a LAS header with the predicted-class attribute, without COPC records and identifier texts.
 
     Raises:
         InputError: LAS codes are wanted, and the file's point format holds those up to 31 only.
@@ -305,7 +305,7 @@ def extended_header(old: laspy.LasHeader, needs_codes: bool) -> laspy.LasHeader:
 def extended_record(
     old: Any, header: laspy.LasHeader, ids: UInt8, codes: ClassScheme | None
 ) -> laspy.ScaleAwarePointRecord:
-    """Return a copy of points with their classes; all other attributes bit by bit as they are."""
+    """Return a copy of LAS points with predicted class ids (and LAS codes if given), all else bit for bit."""
     record = laspy.ScaleAwarePointRecord.zeros(len(old), header=header)
     for name in old.array.dtype.names:
         record.array[name] = old.array[name]

@@ -34,7 +34,7 @@ SetUp = Literal["real", "synthetic", "mixed", "mixed_mapped", "fine_tuned"]
 
 
 class Adaptation(Part):
-    """Adaptation that brings domains nearer to each other."""
+    """Options of domain adaptation: AdaBN and Mix3D."""
 
     adabn: bool = Field(False, description="Before a test, take the norms' statistics from its points (no labels).")
     adabn_crops: int = quantity(40, ge=1, le=100_000, unit="1", description="Crops that they are taken from.")
@@ -42,7 +42,7 @@ class Adaptation(Part):
 
 
 class Data(Part):
-    """Where points come from."""
+    """Sources of real and synthetic training, validation and test points."""
 
     real: tuple[Source, ...] = Field((), description="Real training data, or what stands in for it.")
     synthetic: tuple[Source, ...] = Field((), description="Synthetic training data.")
@@ -51,7 +51,7 @@ class Data(Part):
 
 
 class SegmentationConfiguration(Configuration):
-    """One training of a segmentation. The defaults are the full recipe."""
+    """Configuration of a segmentation training; the defaults are the full recipe."""
 
     task: Literal["segmentation"] = Field("segmentation", description="What is learned.")
     classes: str = Field("5", min_length=1, description="5, 17, or a JSON file of classes.")
@@ -97,11 +97,11 @@ class SegmentationConfiguration(Configuration):
         return self
 
     def scheme(self) -> ClassScheme:
-        """Return the scheme of the classes; raise `InputError` if there is no such scheme."""
+        """Return the class scheme named by `classes`; raise `InputError` if there is none."""
         return class_scheme(self.classes)
 
     def crop_settings(self) -> CropSettings:
-        """Return how items are made."""
+        """Return the size, voxel and features of crops."""
         return CropSettings(self.crop_points, self.voxel, self.features)
 
     def needed_sources(self) -> dict[str, tuple[Source, ...]]:
@@ -119,7 +119,7 @@ class SegmentationConfiguration(Configuration):
 
 
 def class_shares(tiles: Sequence[CloudTile], classes: int) -> Float:
-    """Return the share of the labelled points that each class has (C,).
+    """Return each class's share of the labelled points (C,), of the sum 1.
 
     Raises:
         InputError: no point has a label.
@@ -131,13 +131,13 @@ def class_shares(tiles: Sequence[CloudTile], classes: int) -> Float:
 
 
 def class_weights(shares: Float) -> Float:
-    """Return the weights of the loss (C,): 1 / (f + 0.02), scaled to the mean 1."""
+    """Return the classes' loss weights (C,): 1 / (share + 0.02), scaled to the mean 1."""
     weights = 1.0 / (shares + 0.02)
     return np.asarray(weights / weights.mean(), dtype=np.float64)
 
 
 def mapped_intensities(synthetic: Sequence[CloudTile], real: Sequence[CloudTile]) -> list[CloudTile]:
-    """Return synthetic tiles whose intensities are distributed as those of the real ones, quantile on quantile.
+    """Return the synthetic tiles with intensities quantile-mapped to the real tiles' distribution.
 
     Both are training data: nothing of a test is looked at.
 
@@ -170,7 +170,7 @@ def _histogram(tiles: Sequence[CloudTile], where: str) -> Int:
 
 
 def plan(domains: Sequence[int], per_tile: int, synthetic_share: float | None, seed: int, epoch: int) -> list[Draw]:
-    """Return the crops of an epoch, shuffled.
+    """Return the planned crops of an epoch over the tiles of one or two domains, shuffled.
 
     Args:
         domains: number of tiles of each domain, the synthetic one first where there are two.

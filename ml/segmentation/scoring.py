@@ -48,7 +48,7 @@ def pieces(
     margin: float = MARGIN,
     largest: int = LARGEST,
 ) -> Iterator[tuple[Index, Index]]:
-    """Yield pieces: the indices of their own points, and of all points that they see, own ones included.
+    """Yield square pieces of a tile as (indices of their own points, indices of these and the points around).
 
     Every point that is to be in a piece is in exactly one.
 
@@ -65,7 +65,7 @@ def pieces(
     position = np.asarray(plan, dtype=np.float64)
 
     def cut(inside: Index, seen: Index, low: Float, edge: float, margin: float) -> Iterator[tuple[Index, Index]]:
-        """Cut points into squares counted from ``low``; ``seen`` holds all that the squares may see."""
+        """Yield the pieces of squares counted from ``low``, recursively smaller; ``seen`` are candidates around."""
         cells = np.floor((position[inside] - low) / edge).astype(np.int64)
         for cell in np.unique(cells, axis=0):
             core, corner, near = inside[np.all(cells == cell, axis=1)], low + cell * edge, position[seen]
@@ -86,7 +86,7 @@ def label_tile(
     core: Bool | None = None,
     seed: int = 0,
 ) -> NDArray[np.int16]:
-    """Return the class of each point of a tile: thinned out, predicted piece by piece, carried back.
+    """Return the predicted class of each (core) point of a tile, (N,): predicted per voxel, carried to all points.
 
     Args:
         tile: N points of any density; its labels aren't looked at.
@@ -109,7 +109,7 @@ def label_tile(
 
 
 def _needed_points(small: Float32, full: Float32, core: Bool | None, voxel: float) -> Bool:
-    """Return which of the thinned points are needed for the classes of the core: those within two cells of it."""
+    """Return a mask of the thinned points within two voxels of the core's bounding box in plan; all without a core."""
     if core is None:
         return np.ones(len(small), dtype=bool)
     low, high = full[core][:, :2].min(axis=0) - 2 * voxel, full[core][:, :2].max(axis=0) + 2 * voxel
@@ -117,7 +117,7 @@ def _needed_points(small: Float32, full: Float32, core: Bool | None, voxel: floa
 
 
 def carry(known: Float32, labels: NDArray[np.int16], points: Float32) -> NDArray[np.int16]:
-    """Return for each point (M,) the label of the nearest known point.
+    """Return for each point (M,) the label of the nearest known point in 3D.
 
     Args:
         known: (N, 3) m, at least one.
@@ -131,7 +131,7 @@ def carry(known: Float32, labels: NDArray[np.int16], points: Float32) -> NDArray
 
 
 def trained_model(run: Run[SegmentationConfiguration]) -> nn.Module:
-    """Return the network of a trained run.
+    """Load a run's network with the weights of its last checkpoint, in evaluation mode.
 
     Raises:
         InputError: the checkpoint is damaged or of another network.
@@ -149,7 +149,7 @@ def trained_model(run: Run[SegmentationConfiguration]) -> nn.Module:
 
 
 def classifier(model: nn.Module, configuration: SegmentationConfiguration) -> Classifier:
-    """Return what scores the points of an item."""
+    """Return a function from an item to class scores (N, C) by the model in evaluation mode, without gradients."""
 
     def scores(batch: Item) -> Tensor:
         model.eval()
@@ -160,7 +160,7 @@ def classifier(model: nn.Module, configuration: SegmentationConfiguration) -> Cl
 
 
 def check_tests(configuration: SegmentationConfiguration) -> None:
-    """Look at the data of all tests, as far as can be told without a network: trainings take hours.
+    """Raise `InputError` or `MissingFileError` if a test's data can't be scored, before hours of training.
 
     Raises:
         MissingFileError: there are none.
@@ -178,7 +178,7 @@ def check_tests(configuration: SegmentationConfiguration) -> None:
 def score_all(
     model: nn.Module, configuration: SegmentationConfiguration, progress: Progress = silent
 ) -> dict[str, Any]:
-    """Return the scores of a configuration's tests by name, see `Confusion.to_dict`."""
+    """Score the model on all tests of a configuration; return `Confusion.to_dict` by test name."""
     return {
         name: score(model, configuration, sources, progress)[0].to_dict()
         for name, sources in configuration.data.tests.items()
@@ -191,7 +191,7 @@ def score(
     sources: Sequence[Source],
     progress: Progress = silent,
 ) -> tuple[Confusion, tuple[CloudTile, Any] | None]:
-    """Return the confusion over all points of some sources, and the largest tile with its classes, to be drawn.
+    """Return the confusion over all points of some sources, and (largest tile, its predicted classes) or None.
 
     Raises:
         InputError: the sources tell different classes apart, or a mapping's groups leave out a class.
@@ -226,7 +226,7 @@ def _targets(sources: Sequence[Source], scheme: ClassScheme) -> tuple[str, ...]:
 
 
 def _groups(source: Source, scheme: ClassScheme) -> NDArray[np.int16]:
-    """Return for each class of the scheme (C,) the place of the target that it counts as."""
+    """Return for each class of the scheme (C,) the index of the source's target (class or group) it counts as."""
     mapping, names = source.label_mapping(), class_names(scheme)
     groups = mapping.group_of(names) if mapping else np.arange(len(names), dtype=np.int16)
     if (groups == IGNORED).any():

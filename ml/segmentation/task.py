@@ -41,7 +41,7 @@ CONFIGURATION = SegmentationConfiguration
 
 
 def train(run: SegmentationRun, progress: Progress = silent) -> dict[str, Any]:
-    """Train a run, score it on its configuration's tests and return the metrics.
+    """Train a run's network, score it on the configuration's tests, write and return the metrics.
 
     Raises:
         InputError: data are missing, or don't fit the configuration.
@@ -66,7 +66,7 @@ def train(run: SegmentationRun, progress: Progress = silent) -> dict[str, Any]:
 
 
 def evaluate(run: SegmentationRun, evaluation: Evaluation, progress: Progress = silent) -> tuple[dict[str, Any], str]:
-    """Score a trained run on labelled data, each by itself; write tables and pictures.
+    """Score a trained run on each of the labelled data, write tables and pictures; return scores and text tables.
 
     Raises:
         InputError: a cloud has no labels and there is no mapping, or its classes don't fit.
@@ -96,7 +96,7 @@ def evaluate(run: SegmentationRun, evaluation: Evaluation, progress: Progress = 
 
 
 def _names(evaluation: Evaluation) -> list[str]:
-    """Return a name for the results of each data, with as many of its folders as tell it from the others.
+    """Return a unique name for each of the data: its path's last parts, as many as tell all apart.
 
     Raises:
         InputError: data are given twice.
@@ -114,7 +114,7 @@ def _names(evaluation: Evaluation) -> list[str]:
 
 
 def _test_source(path: Path, evaluation: Evaluation) -> Source:
-    """Return a test's source; a cloud that memory holds with ease is one tile, as tiles' edges see less around them."""
+    """Return a test's source; a cloud of up to 5 million points is one tile, as tiles' edges see less around them."""
     if path.is_dir():
         return Source(path=str(path), split=evaluation.split, mapping=evaluation.mapping)
     tile = 60.0
@@ -125,7 +125,7 @@ def _test_source(path: Path, evaluation: Evaluation) -> Source:
 
 
 def predict(run: SegmentationRun, prediction: Prediction, progress: Progress = silent) -> dict[str, Any]:
-    """Label the points of a LAS or LAZ file; see `prediction.predict_file`."""
+    """Write a copy of a LAS or LAZ file with each point's predicted class; return counts, speed and peak memory."""
     configuration = run.configuration
     labelling = Labelling(
         classifier(trained_model(run), configuration),
@@ -148,7 +148,7 @@ Domains = dict[str, list[CloudTile]]
 
 
 def train_network(run: Run[SegmentationConfiguration], progress: Progress = silent) -> tuple[nn.Module, Domains]:
-    """Train a run; return the network with its last weights, and what it was trained on.
+    """Train the network of a run's configuration; return it with the last epoch's weights, and its tiles by domain.
 
     Raises:
         InputError: data are missing, or don't fit the configuration.
@@ -169,7 +169,7 @@ def train_network(run: Run[SegmentationConfiguration], progress: Progress = sile
 
 
 def _pretraining(run: Run[SegmentationConfiguration]) -> Run[SegmentationConfiguration]:
-    """Return the run of the first part of fine-tuning, begun or to be gone on with."""
+    """Start or resume the run of fine-tuning's first part, on synthetic data, in the run's folder; return it."""
     configuration = run.configuration.model_copy(update={"set_up": "synthetic"})
     return Run.start(run.folder / PRETRAINING, configuration, resume=True)
 
@@ -181,7 +181,7 @@ def _fit(
     validation: list[CloudTile],
     progress: Progress,
 ) -> None:
-    """Train on given domains by the run's schedule; afterwards the model has the run's last weights."""
+    """Train the model in place on some domains by the run's schedule, to the last epoch's weights."""
     configuration = run.configuration
     batches, device = CropBatches(configuration, domains.values()), next(model.parameters()).device
     loss = objective(configuration, batches.tiles, device)
@@ -191,7 +191,7 @@ def _fit(
 
 
 def smoothed_loss(scores: Tensor, truth: Tensor, weights: Tensor, smoothing: float) -> Tensor:
-    """Return the cross-entropy with smoothed labels, a mean weighed by each point's own class; 0 without any label.
+    """Return the label-smoothed cross-entropy, averaged with each point's class weight; 0 without any label.
 
     The share ``smoothing`` of a label goes to all classes alike. (PyTorch's own weights weigh these shares too: with
     weights as far apart as a road's, the best answer to a point of a frequent class would then be a rare one.)
@@ -211,7 +211,7 @@ def smoothed_loss(scores: Tensor, truth: Tensor, weights: Tensor, smoothing: flo
 def objective(
     configuration: SegmentationConfiguration, tiles: Sequence[CloudTile], device: torch.device
 ) -> Callable[[nn.Module, Item], tuple[Tensor, Figures]]:
-    """Return what is minimised, its classes weighed by their shares of the training tiles.
+    """Return a function (model, batch) -> (loss, {"accuracy": share}); classes weigh by their share of the tiles.
 
     Raises:
         InputError: no point has a label.

@@ -15,7 +15,7 @@ Generator = np.random.Generator
 
 
 class CropEffects(PointEffects):
-    """Effects on crops. All of it off leaves them as they are; the defaults are the recipe's."""
+    """Options of the random augmentation of segmentation crops; the defaults are the recipe's."""
 
     rotation: bool = Field(True, description="Turn about the vertical by any angle.")
     smallest_scale: float = quantity(0.9, gt=0, le=1, unit="1", description="Smallest factor on the coordinates.")
@@ -31,7 +31,7 @@ class CropEffects(PointEffects):
     @field_validator("mirror", mode="before")
     @classmethod
     def _read_true(cls, mirror: Any) -> Any:
-        """Read true, which was every second crop."""
+        """Return the probability of mirroring: 0.5 for true and 0 for false, as older configurations have it."""
         return 0.5 * mirror if isinstance(mirror, bool) else mirror
 
     @model_validator(mode="after")
@@ -43,14 +43,14 @@ class CropEffects(PointEffects):
 
 @effect("segmentation", order=10)
 def leave_out_points(crop: Crop, effects: CropEffects, random: Generator) -> None:
-    """Leave out single points."""
+    """Drop random points from the crop, in place, up to the share `dropout`."""
     if effects.dropout:
         crop.keep(effects.kept_points(len(crop), random))
 
 
 @effect("segmentation", order=20)
 def move(crop: Crop, effects: CropEffects, random: Generator) -> None:
-    """Turn a crop about its middle, scale and mirror it, and add noise to its points."""
+    """Rotate the crop about its mean's vertical, scale and mirror it at random, and jitter its points, in place."""
     angle = random.uniform(0.0, 2.0 * np.pi) if effects.rotation else 0.0
     scale = random.uniform(effects.smallest_scale, effects.largest_scale)
     turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
@@ -68,7 +68,7 @@ def move(crop: Crop, effects: CropEffects, random: Generator) -> None:
 
 @effect("segmentation", order=30)
 def change_intensities(crop: Crop, effects: CropEffects, random: Generator) -> None:
-    """Change intensities as a scanner with another gain and compression would have."""
+    """Apply a random gain and exponent to the intensities, in place, as another scanner would have."""
     if crop.strength is not None and effects.intensity_gain:
         gain, exponent = np.exp(random.normal(0.0, effects.intensity_gain, 2))
         crop.strength = (np.sign(crop.strength) * np.abs(crop.strength) ** exponent * gain).astype(np.float32)
@@ -76,6 +76,6 @@ def change_intensities(crop: Crop, effects: CropEffects, random: Generator) -> N
 
 @effect("segmentation", order=60)
 def leave_out_intensities(crop: Crop, effects: CropEffects, random: Generator) -> None:
-    """Leave out the intensities."""
+    """Remove the crop's intensities with probability `intensity_drop`, in place."""
     if random.random() < effects.intensity_drop:
         crop.strength = None

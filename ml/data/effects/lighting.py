@@ -27,7 +27,7 @@ _SCANNER_ASIDE = 15.0
 
 @effect("centerline", order=40)
 def change_intensities(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
-    """Change intensities as another scanner and other materials would have."""
+    """Change the sequence's intensities at random, in place, as another scanner, materials and markings would."""
     if rng.random() < effects.plain or not stretch.strength.any():
         return
     share = rng.random(7)
@@ -48,14 +48,14 @@ def change_intensities(stretch: Stretch, effects: SequenceEffects, rng: Generato
 
 @effect("centerline", order=60)
 def tint(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
-    """Change colours as another camera would have."""
+    """Multiply the sequence's colours by random factors per channel, in place, as another camera would."""
     if stretch.color is not None:
         factors = np.exp(effects.tint * (rng.uniform(-1.0, 1.0) + rng.uniform(-1.0, 1.0, 3)))
         stretch.color = np.clip(stretch.color * factors, 0.0, 1.0)
 
 
 def _repaint_lines(value: Float, stretch: Stretch, probability: float, rng: Generator) -> tuple[Float, Bool]:
-    """Return intensities and what is marked (K,) where the lines of a carriageway without shoulders are others.
+    """Return intensities and marking mask (K,) with lane and edge lines of a rural carriageway repainted or worn off.
 
     Two lanes are parted by dashes on motorways; on rural roads as well by a solid or a double line, or by none; and
     many of them have no edge lines. On a motorway that would lead astray: beside a ramp it is by its dashes that the
@@ -82,7 +82,7 @@ def _repaint_lines(value: Float, stretch: Stretch, probability: float, rng: Gene
 
 
 def _verges(value: Float, stretch: Stretch, marked: Bool, widest: float, rng: Generator) -> tuple[Float, Bool]:
-    """Return intensities, and which points (K,) look like pavement, where a rural road has verges of crushed stone.
+    """Return intensities (K,) with crushed-stone verges added to a rural road, and the mask of what looks paved (K,).
 
     These are hardly brighter or darker than asphalt: the pavement seems wider than it is.
     """
@@ -100,7 +100,7 @@ def _verges(value: Float, stretch: Stretch, marked: Bool, widest: float, rng: Ge
 
 
 def _wear_markings(value: Float, paved: Bool, marked: Bool, share: float) -> Float:
-    """Return intensities whose markings have lost a share of what they are brighter than the pavement."""
+    """Return intensities (K,) with the markings' excess over the pavement's median reduced by a share."""
     bare = paved & ~marked
     if not marked.any() or not bare.any():
         return value
@@ -109,7 +109,7 @@ def _wear_markings(value: Float, paved: Bool, marked: Bool, share: float) -> Flo
 
 
 def _blur_footprint(value: Float, stretch: Stretch, width: float) -> Float:
-    """Return the means of intensities (K,) over a beam's footprint: over points of the slice within half a width in y.
+    """Return intensities (K,) averaged over a beam's footprint: the slice's points within `width` / 2 (m) in y.
 
     A line seen by a wide beam is wider and fainter than it is.
     """
@@ -129,7 +129,7 @@ def _blur_footprint(value: Float, stretch: Stretch, width: float) -> Float:
 
 
 def _falloff(y: Float, power: float, rng: Generator) -> Float:
-    """Return factors (K,) of intensities that fall off with the range from one or two scanners above the road.
+    """Return factors (K,) for intensities that fall with range^`power` from one or two random scanners above the road.
 
     Heights go from a vehicle's to an aircraft's, equally in logarithms. Of two passes beside each other a point belongs
     to either, the likelier the nearer: seen from near it is bright, and from far dark, in the same place.
@@ -144,7 +144,7 @@ def _falloff(y: Float, power: float, rng: Generator) -> Float:
 
 
 def _tracks(stretch: Stretch, rng: Generator) -> Float:
-    """Return a random function (K,) of about unit deviation that only changes across the road: waves of 1.5 to 6 m."""
+    """Return random values (K,) of about unit deviation that vary across the road only: waves of 1.5 to 6 m."""
     count = 5
     rate = 2.0 * np.pi / np.exp(rng.uniform(np.log(1.5), np.log(6.0), count))
     y = stretch.coord[:, 1] - np.nan_to_num(stretch.center)[stretch.number]
@@ -154,7 +154,7 @@ def _tracks(stretch: Stretch, rng: Generator) -> Float:
 
 
 def _waves(stretch: Stretch, rng: Generator) -> Float:
-    """Return a smooth random function of the place (K,) of about unit deviation: waves of 2 to 20 m any way."""
+    """Return random values (K,) of about unit deviation, smooth over the ground: waves of 2 to 20 m any way."""
     count = 6
     rate = 2.0 * np.pi / np.exp(rng.uniform(np.log(2.0), np.log(20.0), count))
     way, phase = rng.uniform(0.0, 2.0 * np.pi, (2, count))

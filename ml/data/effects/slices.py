@@ -21,7 +21,7 @@ _RIM = 0.7
 
 
 class SequenceCrop(Part):
-    """Both sides of every slice cut off, so that the middle of what is left isn't the centre.
+    """Options for cropping both sides of every slice, so that the middle of what is left isn't the centre.
 
     A strip reaches to a distance R from the true centre to either side, two numbers drawn for the whole sequence: a
     road's from ``reach``, a carriageway's from its edge line out to ``beyond`` farther, but at most to the middle of
@@ -46,7 +46,7 @@ class SequenceCrop(Part):
 
 
 class SequenceEffects(PointEffects):
-    """Effects on a sequence while training. Strengths are the largest; each sample draws its own below them."""
+    """Options of the augmentation of sequences of slices; strengths are upper limits, each sample draws below them."""
 
     renamed: ClassVar[Mapping[str, str]] = {"colorless": "color_drop"}
 
@@ -100,7 +100,7 @@ class SequenceEffects(PointEffects):
 
 @effect("centerline", order=-30)
 def stand_alone(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
-    """Put what lies beyond the pavement on the outer side of a carriageway on the median's side as well, mirrored.
+    """Replace the median's side of a carriageway by its mirrored outer side, in place, with probability `alone`.
 
     So a motorway's carriageway becomes a rural road. Heights go on from the pavement's own edge.
     """
@@ -133,7 +133,7 @@ def stand_alone(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> N
 
 @effect("centerline", order=-20)
 def crop_sides(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
-    """Cut off both sides of every slice; slices without a known centre are cut as if it lay at the frame's origin."""
+    """Drop points on both sides of every slice at random, in place; an unknown centre counts as the frame's origin."""
     count, crop = len(stretch.center), effects.crop
     center = np.nan_to_num(stretch.center)
     if rng.random() >= crop.probability:
@@ -153,7 +153,7 @@ def crop_sides(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> No
 
 @effect("centerline", order=-10)
 def drop(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
-    """Leave out single points, whole slices, and a hole of some metres."""
+    """Drop random points, whole slices and a rectangular hole of some metres from the sequence, in place."""
     slices, points = len(stretch.center), len(stretch)
     keep = effects.kept_points(points, rng)
     keep &= (rng.random(slices) >= effects.empty)[stretch.number]
@@ -166,7 +166,7 @@ def drop(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
 
 @effect("centerline", order=10)
 def mirror(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
-    """Swap left and right. The frames are mirrored as well, so that a mirrored sample has no way back to the cloud."""
+    """Mirror left and right with probability `mirror`, in place, frames included: no way back to the cloud remains."""
     if rng.random() >= effects.mirror:
         return
     frames = stretch.frames
@@ -182,7 +182,7 @@ def mirror(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
 
 @effect("centerline", order=20)
 def turn_round(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
-    """Run along the road in the other direction, the last slice first."""
+    """Reverse the sequence's direction of travel with probability `turn_round`, in place, the last slice first."""
     if rng.random() >= effects.turn_round:
         return
     last = len(stretch.center) - 1
@@ -200,7 +200,7 @@ def turn_round(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> No
 
 @effect("centerline", order=30)
 def move(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
-    """Tilt the ground and add noise to the points. Their slices stay what they are."""
+    """Tilt the ground (truth included) and jitter the points at random, in place; each stays in its slice."""
     grade, cross = rng.uniform(-effects.tilt, effects.tilt, 2)
     along = stretch.along()
     middle = 0.5 * along[-1]

@@ -38,7 +38,7 @@ class Tokens:
 
 
 class PointFeatures(nn.Module):
-    """Features of single points: a small network of x, height and attributes. Not of y, which would tie it to a place.
+    """A small per-point MLP of x, height and attributes; not of y, so that it is the same across the road.
 
     Args:
         columns: the columns of a batch's ``feat`` that are used.
@@ -83,13 +83,13 @@ def cell_sums(coord: Tensor, mask: Tensor, features: Tensor, reach: float, numbe
 
 
 def cell_features(sums: Tensor) -> Tensor:
-    """Return means of features and heights, and the logarithm of the number of points, from `cell_sums`."""
+    """Return per cell the means of features and heights and log(1 + points), (N, number, C + 2), from `cell_sums`."""
     mass = sums[..., -1:]
     return torch.cat([sums[..., :-1] / (mass + _FEW), torch.log1p(mass)], dim=-1)
 
 
 class FixedKernelPoints(nn.Module):
-    """Kernel points at fixed places, each with a kernel of cells over twice the spacing.
+    """Layer that gathers points' features at fixed kernel points, each with a kernel of cells over twice the spacing.
 
     Args:
         count: kernel points of a slice.
@@ -112,7 +112,7 @@ class FixedKernelPoints(nn.Module):
         self.norm = nn.LayerNorm(width)
 
     def forward(self, coord: Tensor, mask: Tensor, features: Tensor) -> Tokens:
-        """Gather the features (N, P, inputs) of points (N, P, 3), m, of which a mask (N, P) says whether they exist."""
+        """Return the K tokens of N slices from points (N, P, 3), m, their mask (N, P) and features (N, P, inputs)."""
         sums = cell_sums(coord, mask, features, self.reach, self.number)
         tokens = self.norm(self.kernel(cell_features(sums).transpose(1, 2)).transpose(1, 2))
         height, weight = sums[..., -2:].unfold(1, 2 * self.cells, self.cells).sum(-1).unbind(-1)
@@ -120,7 +120,7 @@ class FixedKernelPoints(nn.Module):
 
 
 class DeformableKernelPoints(nn.Module):
-    """Kernel points that move along the slice's orthogonal before they gather.
+    """Layer that gathers points' features at kernel points which first move across the road by learned shifts.
 
     What fixed kernel points see there says how far each moves, as in a deformable KPConv; here at most one spacing.
 
@@ -143,7 +143,7 @@ class DeformableKernelPoints(nn.Module):
 
     @full_precision
     def forward(self, coord: Tensor, mask: Tensor, features: Tensor, seen: Tensor) -> Tokens:
-        """Gather the features (N, P, inputs) of points (N, P, 3), m.
+        """Return the tokens of N slices gathered at the moved kernel points, from points and features.
 
         Args:
             coord: the points.
@@ -165,7 +165,7 @@ class DeformableKernelPoints(nn.Module):
 
 
 class GridConvolution(nn.Module):
-    """A residual convolution over slices x kernel points.
+    """A residual 2D convolution over slices x kernel points, dilated across the road.
 
     Args:
         width: features.
@@ -182,14 +182,14 @@ class GridConvolution(nn.Module):
         self.mix = nn.Linear(width, width)
 
     def forward(self, grid: Tensor) -> Tensor:
-        """Return (B, S, K, C) from the same."""
+        """Return the grid (B, S, K, C) plus its convolution; the shape stays."""
         inner = self.convolution(self.norm(grid).permute(0, 3, 1, 2)).permute(0, 2, 3, 1)
         mixed: Tensor = self.mix(functional.gelu(inner))
         return grid + mixed
 
 
 class RelativeAttention(nn.Module):
-    """A transformer's layer in which a place is only known by how far it is from others.
+    """A transformer layer whose only position encoding is a learned bias by relative position.
 
     Args:
         count: longest sequence.
@@ -215,7 +215,7 @@ class RelativeAttention(nn.Module):
         self.dropout = nn.Dropout(dropout)
 
     def forward(self, sequence: Tensor) -> Tensor:
-        """Return (N, L, C) from the same."""
+        """Return the sequence (N, L, C) after self-attention and the feed-forward network; the shape stays."""
         number, length, width = sequence.shape
         each = width // self.heads
         parts = self.project(self.before(sequence)).view(number, length, 3, self.heads, each)
@@ -227,7 +227,7 @@ class RelativeAttention(nn.Module):
 
 
 class AttentionPool(nn.Module):
-    """The weighted means of a slice's tokens, with weights of each of several heads, as one vector."""
+    """Multi-head attention pooling: a linear map of the heads' weighted means of a slice's tokens."""
 
     def __init__(self, width: int, heads: int, outputs: int) -> None:
         super().__init__()
@@ -235,7 +235,7 @@ class AttentionPool(nn.Module):
         self.out = nn.Linear(width * heads, outputs)
 
     def forward(self, tokens: Tensor) -> Tensor:
-        """Return (N, outputs) from (N, K, width)."""
+        """Return pooled vectors (N, outputs) of tokens (N, K, width)."""
         weights = self.score(tokens).softmax(1)
         pooled: Tensor = self.out((weights.transpose(1, 2) @ tokens).flatten(1))
         return pooled

@@ -16,7 +16,7 @@ Figures = dict[str, float]
 
 
 class LossOptions(Part):
-    """Weights of the losses."""
+    """Weights of the terms of the centreline models' loss."""
 
     beta: float = quantity(
         0.5,
@@ -42,7 +42,7 @@ OUTLIER = 3.0
 
 
 def likelihood(error: Tensor, log_std: Tensor, known: Tensor, beta: float) -> Tensor:
-    """Return the mean negative logarithm (T,) of each target's likelihood, up to a constant.
+    """Return the mean negative log-likelihood (T,) of each target, Gaussian with linear tails, up to a constant.
 
     It is a Gaussian's up to `OUTLIER` deviations, and beyond goes on as a straight line (Huber).
 
@@ -61,7 +61,7 @@ def likelihood(error: Tensor, log_std: Tensor, known: Tensor, beta: float) -> Te
 
 
 def cross_entropy(logits: Tensor, places: Tensor, lines: Tensor, known: Tensor) -> Tensor:
-    """Return the mean cross-entropy (L,) of the kernel points' shares against where the lines lie.
+    """Return the mean cross-entropy (L,) of softmax(logits) over kernel points against the lines' true places.
 
     The truth is shared linearly by the two kernel points around a line; one beyond the outermost belongs to that.
 
@@ -80,7 +80,7 @@ def cross_entropy(logits: Tensor, places: Tensor, lines: Tensor, known: Tensor) 
 
 
 def centerline_loss(options: LossOptions, half_width: float) -> Callable[[nn.Module, Batch], tuple[Tensor, Figures]]:
-    """Return the loss of a model and a batch, and the mean error of its centres (m) as a further figure.
+    """Return a function (model, batch) -> (loss, {"center_mae": m}) that adds up the terms by their weights.
 
     Args:
         options: what counts how much.

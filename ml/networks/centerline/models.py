@@ -45,7 +45,7 @@ _LARGEST_LOG = 5.0
 
 
 class ModelOptions(Part):
-    """Base of a model's options: its name, its sizes, and how it is built."""
+    """Base of a centreline model's options: name and sizes; builds the model."""
 
     name: str
     features: tuple[Literal["intensity", "contrast", "red", "green", "blue", "has_color"], ...] = Field(
@@ -64,7 +64,7 @@ class ModelOptions(Part):
     dropout: float = quantity(0.0, ge=0, lt=1, unit="1", description="Share left out in the attention's layers.")
 
     def build(self, half_width: float, slices: int) -> CenterlineModel:
-        """Return the model with weights from PyTorch's global generator.
+        """Return the centreline model with random weights from PyTorch's global generator.
 
         Args:
             half_width: what a slice sees to either side, m.
@@ -81,7 +81,7 @@ class ModelOptions(Part):
 
 
 class Heads(nn.Module):
-    """Lines by soft-argmax over a slice's tokens, other numbers and all deviations from the slice's context."""
+    """Output heads: lines by soft-argmax over a slice's tokens, scalars and deviations from the slice's context."""
 
     def __init__(self, width: int, context: int, spacing: float) -> None:
         super().__init__()
@@ -93,7 +93,7 @@ class Heads(nn.Module):
         self.spread = nn.Sequential(nn.Linear(context, context), nn.GELU(), nn.Linear(context, len(CORRIDOR)))
 
     def forward(self, tokens: Tokens, context: Tensor) -> Output:
-        """Return the output for N slices with context (N, D): center (N,), corridor (N, K) and so on."""
+        """Return center (N,), corridor (N, K), its log_std (N, K) and logits of N slices with context (N, D)."""
         maps = self.maps(self.local(tokens.features) + self.context(context)[:, None])
         logits, residual, lift = maps.split([len(LINES), len(LINES), 1], dim=-1)
         share = logits.softmax(1)
@@ -110,7 +110,7 @@ class Heads(nn.Module):
 
 
 class CenterlineModel(nn.Module):
-    """Base of the models: the points' features, the fixed kernel points' tokens and the heads."""
+    """Base of the centreline models: point features, fixed kernel points, heads and refinement; subclasses encode."""
 
     def __init__(self, options: ModelOptions, half_width: float, slices: int) -> None:
         super().__init__()
@@ -125,7 +125,7 @@ class CenterlineModel(nn.Module):
         self.again = Refinement(options.point_width, options.fine_width, options.context, slices, *fine, options.heads)
 
     def forward(self, batch: Batch) -> Output:
-        """Return the output for a batch."""
+        """Return centreline, corridor, deviations and logits of a batch's slices, see the module."""
         shape = batch["mask"].shape[:2]
         coord, feat, mask = (batch[name].flatten(0, 1) for name in ("coord", "feat", "mask"))
         features = self.points(coord, feat)
@@ -150,15 +150,15 @@ class CenterlineModel(nn.Module):
         return found | {"center_std": std[..., 0], "corridor_std": std[..., 1:]}
 
     def look(self, tokens: Tokens, coord: Tensor, mask: Tensor, features: Tensor, slices: int) -> tuple[Tokens, Tensor]:
-        """Return tokens that have seen their surroundings, and the context (N, D) of each of the N slices."""
+        """Return the tokens encoded with their surroundings, and the context (N, D) of each of the N slices."""
         raise NotImplementedError
 
     def line(self, center: Tensor, found: Output, context: Tensor, frame: Tensor) -> tuple[Tensor, Tensor]:
-        """Return a line through centres (B, S): its y in the frames, m, and its direction in them, rad.
+        """Return y (m) and direction (rad), both (B, S) in the slices' frames, of a line through regressed centres.
 
         Args:
             center: y of the centres, m; a constant.
-            found: what else the heads said.
+            found: the heads' other outputs.
             context: (B, S, D).
             frame: (B, S, 4).
         """
@@ -166,7 +166,7 @@ class CenterlineModel(nn.Module):
 
 
 class SequenceModel(CenterlineModel):
-    """A model whose slices know of each other: the line is a parabola through the centres of all."""
+    """Base of the models whose slices see each other: the line is a parabola fitted through all centres."""
 
     def __init__(self, options: ModelOptions, half_width: float, slices: int) -> None:
         super().__init__(options, half_width, slices)
@@ -174,19 +174,19 @@ class SequenceModel(CenterlineModel):
         self.stiffness = nn.Parameter(torch.tensor([-6.0, -4.0, -2.0]))
 
     def line(self, center: Tensor, found: Output, context: Tensor, frame: Tensor) -> tuple[Tensor, Tensor]:
-        """See `CenterlineModel.line`; each centre weighs what its context says."""
+        """Return y (m) and direction (rad), both (B, S), of a parabola through the centres, weighted by context."""
         weight = torch.exp(2.0 * torch.tanh(0.5 * self.trust(context)[..., 0]))
         guess, heading = parabola(frame, center, weight, torch.exp(self.stiffness))
         return guess, heading + found["corridor"][..., CORRIDOR.index("heading")]
 
 
 def all_targets(values: Mapping[str, Tensor], kind: str = "") -> Tensor:
-    """Return what is said of the centre and the corridor (..., T), columns `TARGETS`; ``kind`` may be ``_std``."""
+    """Concatenate centre and corridor to (..., T), columns `TARGETS`; with ``kind`` = "_std" their deviations."""
     return torch.cat([values[f"center{kind}"][..., None], values[f"corridor{kind}"]], dim=-1)
 
 
 def both_ways(model: nn.Module, batch: Batch) -> Output:
-    """Return the mean of a model's output and of that for the mirrored batch, mirrored back.
+    """Return centre, corridor and deviations averaged over a batch and its mirror image, mirrored back.
 
     Mirroring the batch mirrors the result exactly. Variances are averaged; what the two disagree on is left out, as the
     calibration sees it.

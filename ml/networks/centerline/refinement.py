@@ -18,7 +18,7 @@ _FIRST_LOG_STD = -1.5
 
 
 class Refinement(nn.Module):
-    """How far a road's centre lies from where it was first found, by soft-argmax over fine cells around that.
+    """Layers that regress a centre's offset from its first estimate, by soft-argmax over fine cells around that.
 
     All cells have the same weights and see twice the sum of `_APART` cells to either side: a line between two lanes is
     found in the same way wherever the first look left it, or, where none is painted, by the lines on either side.
@@ -54,7 +54,7 @@ class Refinement(nn.Module):
     def forward(
         self, coord: Tensor, mask: Tensor, features: Tensor, guess: Tensor, heading: Tensor, context: Tensor
     ) -> tuple[Tensor, Tensor, Tensor]:
-        """Look again.
+        """Return the centre's offset (m) from the first estimate, its log deviation and the soft-argmax' logits.
 
         Args:
             coord: (B, S, P, 3) points, m.
@@ -85,7 +85,7 @@ class Refinement(nn.Module):
 
 @full_precision
 def parabola(frame: Tensor, center: Tensor, weight: Tensor, stiffness: Tensor) -> tuple[Tensor, Tensor]:
-    """Fit a parabola through the centres of each sequence, by weighted least squares in its middle slice's frame.
+    """Return y and direction, (B, S) in the slices' frames, of a weighted least-squares parabola per sequence.
 
     Args:
         frame: (B, S, 4) float64: x, y and direction of the slices' frames.
@@ -114,7 +114,7 @@ def parabola(frame: Tensor, center: Tensor, weight: Tensor, stiffness: Tensor) -
 
 
 def _in_the_middle(frame: Tensor, dtype: torch.dtype) -> tuple[Tensor, Tensor]:
-    """Return origins (B, S, 2) and directions (B, S), -pi to pi, of frames in that of the sequence's middle slice."""
+    """Return frames' origins (B, S, 2) and directions (B, S), -pi to pi, in their sequence's middle frame."""
     middle = frame[:, frame.shape[1] // 2, :]
     delta = frame[..., :2] - middle[:, None, :2]
     cos, sin = torch.cos(middle[:, 2:3]), torch.sin(middle[:, 2:3])

@@ -12,12 +12,12 @@ from .models import ModelOptions, SequenceModel
 
 @network("centerline")
 class SequenceOptions(ModelOptions):
-    """A sequence of slices, with an LSTM along them."""
+    """Options of the network `sequence`, with an LSTM along the slices of a sequence."""
 
     name: Literal["sequence"] = Field("sequence", description="Network.")
 
     def build(self, half_width: float, slices: int) -> SequenceModel:
-        """See `ModelOptions.build`."""
+        """Return the network for slices of +-`half_width`, m, with random weights of PyTorch's global generator."""
         return Sequence(self, half_width, slices)
 
 
@@ -33,7 +33,7 @@ class Sequence(SequenceModel):
         self.summary = nn.LSTM(options.context, options.context // 2, batch_first=True, bidirectional=True)
 
     def look(self, tokens: Tokens, coord: Tensor, mask: Tensor, features: Tensor, slices: int) -> tuple[Tokens, Tensor]:
-        """See `CenterlineModel.look`."""
+        """Return tokens after convolutions and an LSTM along the slices, and the context (N, D) of the N slices."""
         grid = tokens.features.unflatten(0, (-1, slices))
         for layer in self.across:
             grid = layer(grid)

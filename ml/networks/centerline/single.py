@@ -13,12 +13,12 @@ from .models import CenterlineModel, ModelOptions, Output
 
 @network("centerline")
 class SingleOptions(ModelOptions):
-    """Each slice by itself."""
+    """Options of the network `single`, which sees each slice by itself."""
 
     name: Literal["single"] = Field("single", description="Network.")
 
     def build(self, half_width: float, slices: int) -> CenterlineModel:
-        """See `ModelOptions.build`."""
+        """Return the network for slices of +-`half_width`, m, with random weights; `slices` doesn't matter."""
         return Single(self, half_width)
 
 
@@ -34,7 +34,7 @@ class Single(CenterlineModel):
         )
 
     def look(self, tokens: Tokens, coord: Tensor, mask: Tensor, features: Tensor, slices: int) -> tuple[Tokens, Tensor]:
-        """See `CenterlineModel.look`."""
+        """Return tokens of moved kernel points after self-attention, and the context (N, D) of the N slices."""
         moved = self.deformable(coord, mask, features, tokens.features)
         mixed = tokens.features + moved.features
         for layer in self.attention:
@@ -42,5 +42,5 @@ class Single(CenterlineModel):
         return Tokens(mixed, moved.places, moved.heights), self.pool(mixed)
 
     def line(self, center: Tensor, found: Output, context: Tensor, frame: Tensor) -> tuple[Tensor, Tensor]:
-        """See `CenterlineModel.line`: one slice knows no more than its own centre and direction."""
+        """Return each slice's own centre y (m) and regressed heading (rad), both (B, S): no line joins slices."""
         return center, found["corridor"][..., CORRIDOR.index("heading")]

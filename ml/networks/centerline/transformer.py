@@ -16,12 +16,12 @@ from .models import ModelOptions, SequenceModel
 
 @network("centerline")
 class TransformerOptions(ModelOptions):
-    """A sequence of slices, with a transformer over them."""
+    """Options of the network `transformer`, with attention along the slices of a sequence."""
 
     name: Literal["transformer"] = Field("transformer", description="Network.")
 
     def build(self, half_width: float, slices: int) -> SequenceModel:
-        """See `ModelOptions.build`."""
+        """Return the network for slices of +-`half_width`, m, with random weights of PyTorch's global generator."""
         return Transformer(self, half_width, slices)
 
 
@@ -42,7 +42,7 @@ class Transformer(SequenceModel):
         self.summary = nn.ModuleList(RelativeAttention(slices, options.context, heads, dropout) for _ in range(2))
 
     def look(self, tokens: Tokens, coord: Tensor, mask: Tensor, features: Tensor, slices: int) -> tuple[Tokens, Tensor]:
-        """See `CenterlineModel.look`."""
+        """Return tokens after convolutions and attention along the slices, and the context (N, D) of the N slices."""
         grid = tokens.features.unflatten(0, (-1, slices))
         for number, layer in enumerate(self.grid):
             grid = layer(grid)

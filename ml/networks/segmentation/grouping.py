@@ -23,7 +23,7 @@ _CHUNK_ELSEWHERE = 1 << 26
 
 
 class Norm(nn.BatchNorm1d):
-    """Batch norm over packed points (N, C); nothing special happens to batches of one point, or of none, in training.
+    """Batch norm over packed points (N, C) that also accepts batches of one point or none in training.
 
     A single value has no variance: it becomes the norm's bias, and the running statistics stay as they are.
     """
@@ -35,7 +35,7 @@ class Norm(nn.BatchNorm1d):
         return super().forward(values)
 
     def observe(self, mean: Tensor, variance: Tensor, count: int) -> None:
-        """Move the running statistics towards mean and (population) variance of `count` values, both (C,)."""
+        """Update the running statistics with mean and population variance (C,) of `count` values, in place."""
         if count < 2 or self.running_mean is None or self.running_var is None or self.num_batches_tracked is None:
             return
         with torch.no_grad():
@@ -45,12 +45,12 @@ class Norm(nn.BatchNorm1d):
             self.running_var.lerp_(variance.detach() * (count / (count - 1)), share)
 
     def scale_sign(self) -> Tensor:
-        """Return +1 or -1 for each channel (C,): whether what the norm gives rises with what it gets."""
+        """Return the sign of the norm's scale per channel (C,), +1 or -1, detached: does output rise with input."""
         return torch.where(self.weight.detach() < 0, -1.0, 1.0).to(self.weight.dtype)
 
 
 class Grouping:
-    """Which M queries look at which of N support points, K neighbours each, and how the pairs lie.
+    """Neighbourhood graph of M queries with K of N support points each, and the pairs' relative positions.
 
     Args:
         index: (M, K) integers below N.
@@ -73,7 +73,7 @@ class Grouping:
         return gathered - self.queries[:, None]
 
     def pair_statistics(self) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Return the statistics of the pairs that support points are in; computed once, from the geometry alone.
+        """Return pair shares (N,), centred sums (N, 3), mean (3,) and covariance (3, 3) of relative positions; cached.
 
         The share of all pairs that each is in (N,); the sum of its relative positions less their overall mean, over the
         number of pairs (N, 3); that mean (3,); the relative positions' covariance (3, 3).
@@ -131,7 +131,7 @@ def gather_max(values: Tensor, index: Tensor) -> Tensor:
 
 
 def _largest(values: Tensor, index: Tensor, *, with_place: bool) -> tuple[Tensor, Tensor]:
-    """Return maxima (M, C), and which row of `values` each comes from (M, C) or, if nobody asks, nothing (0,)."""
+    """Return maxima (M, C) over the rows of each neighbourhood, and their rows (M, C), or (0,) unless `with_place`."""
     (queries, limit), channels = index.shape, values.shape[1]
     largest = values.new_empty(queries, channels)
     place = index.new_empty((queries, channels) if with_place else 0)
@@ -144,14 +144,14 @@ def _largest(values: Tensor, index: Tensor, *, with_place: bool) -> tuple[Tensor
 
 
 def _chunks(queries: int, size: int, device: torch.device) -> Iterator[slice]:
-    """Yield slices of queries of whose results, `size` numbers each, a cache holds all."""
+    """Yield slices of the queries so short that their results, `size` numbers each, fit into the device's cache."""
     rows = max(_CHUNK.get(device.type, _CHUNK_ELSEWHERE) // max(size, 1), 1)
     for begin in range(0, queries, rows):
         yield slice(begin, begin + rows)
 
 
 def _first_column(values: Tensor, largest: Tensor) -> Tensor:
-    """Return which of K values (M, K, C) is the largest, the first of equal ones (M, C); `values` are lost."""
+    """Return the index (M, C) of the first largest of K values (M, K, C), given the maxima; overwrites `values`."""
     limit = values.shape[1]
     # The first of equal ones gets the largest number. Not integers: comparing into floats is far quicker.
     countdown = torch.arange(limit, 0, -1, dtype=values.dtype, device=values.device)[:, None]
@@ -161,7 +161,7 @@ def _first_column(values: Tensor, largest: Tensor) -> Tensor:
 
 @full_precision
 def normalised_max(features: Tensor, weight: Tensor, norm: Norm, grouping: Grouping) -> Tensor:
-    """Return the maximum over neighbours of a norm of a convolution, without activation (M, C).
+    """Return max over neighbours (M, C) of batch norm(convolution), without activation or M x K x C memory.
 
     Args:
         features: of the support points (N, C0).
@@ -184,7 +184,7 @@ def normalised_max(features: Tensor, weight: Tensor, norm: Norm, grouping: Group
 def normalised_max_of_two(
     features: Tensor, weights: tuple[Tensor, Tensor], norms: tuple[Norm, Norm], grouping: Grouping
 ) -> Tensor:
-    """Return the maximum over neighbours of two layers, the second without activation (M, C2).
+    """Return max over neighbours (M, C2) of two layers with batch norm, the second without activation.
 
     Args:
         features: of the support points (N, C0).
@@ -216,7 +216,7 @@ def normalised_max_of_two(
 def _statistics(
     norm: Norm, sign: Tensor, grouping: Grouping, values: Tensor, directions: Tensor
 ) -> tuple[Tensor, Tensor]:
-    """Return mean and variance (C,) that a norm uses for values of channels turned by `sign`."""
+    """Return mean and variance (C,) for a norm: of all pairs in training (updates it), else its running ones."""
     if not norm.training or not grouping.pairs:
         return _running_moments(norm, sign)
     mean, variance = grouping.moments(values, directions)
@@ -277,7 +277,7 @@ class _PairsMax(torch.autograd.Function):
 def pairs_max(
     support: Tensor, offset: Tensor, index: Tensor, weight: Tensor, *, moments: bool
 ) -> tuple[Tensor, Tensor, Tensor]:
-    """Return the maximum over neighbours of a layer on ``y_ij = relu(support_j + offset_i)``, and moments of ``y``.
+    """Return max over neighbours j of `weight` y_ij, y_ij = relu(support_j + offset_i), and sums of y and y y^T.
 
     The pairs are made chunk by chunk, and again for the gradient, so that a cache holds them.
 

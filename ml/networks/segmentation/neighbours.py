@@ -58,7 +58,7 @@ _TINY = 1e-8
 
 @dataclass(frozen=True)
 class Neighbourhood:
-    """How a cloud is thinned out and which points are neighbours.
+    """Options for thinning a cloud stage by stage, and for its points' neighbourhoods.
 
     Attributes:
         radius: of the balls around the first stage's points, m; it doubles with each stage.
@@ -80,7 +80,7 @@ class Neighbourhood:
 
 
 def build_neighbours(coord: torch.Tensor, offset: torch.Tensor, neighbourhood: Neighbourhood) -> Neighbours:
-    """Return the stages of packed clouds.
+    """Return thinned stages and neighbour indices of packed clouds as tensors, see `Neighbours`.
 
     Args:
         coord: (N, 3) float32 or float64, m; on the CPU.
@@ -120,7 +120,7 @@ def _check_ends(coord: torch.Tensor, offset: torch.Tensor) -> Int:
 
 
 def _stages_of(coord: NDArray[np.floating], neighbourhood: Neighbourhood) -> dict[str, NDArray[np.generic]]:
-    """Return the arrays of one cloud, with indices that count from its own first point."""
+    """Return positions, samples and neighbours of one cloud's stages, indices counted from its own first point."""
     local = _about_middle(coord)
     order = geometric_order(local)
     # What the network sees is rounded to the coordinates' dtype, so neighbours are those of the rounded positions.
@@ -143,7 +143,7 @@ def _stages_of(coord: NDArray[np.floating], neighbourhood: Neighbourhood) -> dic
 
 
 def _about_middle(coord: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Return coordinates about the middle of their extent, which, unlike a sum, doesn't depend on the points' order."""
+    """Return coordinates (N, 3) centred on the middle of their bounding box, which doesn't depend on their order."""
     if not len(coord):
         return coord
     exact = coord.astype(np.float64)
@@ -151,7 +151,7 @@ def _about_middle(coord: NDArray[np.floating]) -> NDArray[np.floating]:
 
 
 def _in_given_order(found: dict[str, NDArray[np.generic]], order: Int) -> dict[str, NDArray[np.generic]]:
-    """Return arrays that were found in another order of the cloud's points such that they fit the given one."""
+    """Return arrays whose indices into the cloud, found for points in `order`, are mapped back to the given order."""
     place = np.empty_like(order)
     place[order] = np.arange(len(order))
     turned = {name: order[found[name]] if len(order) else found[name] for name in ("sample1", "group1")}
@@ -159,7 +159,7 @@ def _in_given_order(found: dict[str, NDArray[np.generic]], order: Int) -> dict[s
 
 
 def geometric_order(points: NDArray[np.floating]) -> Int:
-    """Return an order of points (N, 3) that looks random but follows from their coordinates alone."""
+    """Return a pseudo-random permutation (N,) of points (N, 3), determined by a hash of their coordinates alone."""
     bits = np.ascontiguousarray(points.astype(np.float64) + 0.0).view(np.uint64)  # + 0.0: one zero, not two
     key = np.zeros(len(points), dtype=np.uint64)
     for axis in range(3):
@@ -168,7 +168,7 @@ def geometric_order(points: NDArray[np.floating]) -> Int:
 
 
 def _mix_bits(key: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """Return 64-bit numbers stirred (the finaliser of SplitMix64; Steele, Lea and Flood, 2014)."""
+    """Return hashes of 64-bit keys (the finaliser of SplitMix64; Steele, Lea and Flood, 2014)."""
     key = key + np.uint64(0x9E3779B97F4A7C15)
     key = (key ^ (key >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     key = (key ^ (key >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
@@ -184,7 +184,7 @@ def _sample(points: Float, radius: float, sampling: Sampling) -> Int:
 
 
 def farthest_sample(points: Float, count: int) -> Int:
-    """Return points each of which is the farthest from those before it, the first one first; the first of equal ones.
+    """Return the indices (count,) of farthest-point sampling that starts with point 0; ties go to the first.
 
     Eldar et al., "The farthest point strategy for progressive image sampling" (1997). Takes N x count distances.
     """
@@ -199,7 +199,7 @@ def farthest_sample(points: Float, count: int) -> Int:
 
 
 def _first_in_ball(queries: cKDTree | None, support: cKDTree | None, radius: float, limit: int) -> Int:
-    """Return for each query the first `limit` support points nearer than the radius (M, limit), padded with the first.
+    """Return indices (M, limit) of the first `limit` support points in each query's ball, padded with the first.
 
     Every query is a support point itself, so that no ball is empty.
     """
@@ -220,7 +220,7 @@ def _first_in_ball(queries: cKDTree | None, support: cKDTree | None, radius: flo
 
 
 def nearest_three(points: Float, tree: cKDTree | None) -> tuple[Int, Float]:
-    """Return for each point the nearest three of a tree and their weights, 1 / (distance + 1e-8), of the sum 1.
+    """Return indices and inverse-distance weights (N, 3), of the sum 1, of each point's three nearest in a tree.
 
     Where the tree has fewer, index and weight of the others are 0.
     """

@@ -39,7 +39,7 @@ _EXPANSION = 4
 
 @network("segmentation")
 class PointNeXtOptions(SegmentationNetwork):
-    """PointNeXt in one of its sizes."""
+    """Options of the network `pointnext`: its size, neighbourhoods and dropout."""
 
     name: Literal["pointnext"] = Field("pointnext", description="Network.")
     preset: Literal["S", "B", "L", "XL"] = Field("B", description="Size.")
@@ -51,30 +51,30 @@ class PointNeXtOptions(SegmentationNetwork):
 
     @property
     def blocks(self) -> tuple[int, ...]:
-        """Return the set abstraction and the blocks of each stage after the first."""
+        """Return the number of layers (set abstraction and residual blocks) of each stage after the first."""
         return _SIZES[self.preset][1]
 
     @property
     def channels(self) -> list[int]:
-        """Return the channels of all stages, the first one's first; each has twice as many as the one before."""
+        """Return the number of channels of each stage, doubling from stage to stage."""
         return [(self.width or _SIZES[self.preset][0]) << stage for stage in range(len(self.blocks) + 1)]
 
     @property
     def neighbourhood(self) -> Neighbourhood:
-        """Return how the stages' points are found."""
+        """Return the options by which the stages' points and neighbours are found."""
         return Neighbourhood(self.radius, self.neighbours, tuple(count > 1 for count in self.blocks), self.sampling)
 
     def build(self, features: int, classes: int) -> nn.Module:
-        """See `SegmentationNetwork.build`."""
+        """Return a PointNeXt with random weights for points of `features` numbers and `classes` scores."""
         return PointNeXt(self, features, classes)
 
     def prepare(self, batch: Batch) -> Batch:
-        """Return a batch with the indices of all stages' points and neighbours."""
+        """Return the batch with all stages' sampled points and neighbour indices added, computed on the CPU."""
         return batch | build_neighbours(batch["coord"], batch["offset"], self.neighbourhood)
 
 
 class PointNeXt(nn.Module):
-    """The network.
+    """PointNeXt (Qian et al. 2022) for semantic segmentation of packed clouds.
 
     Args:
         options: its size and neighbourhoods.
@@ -97,7 +97,7 @@ class PointNeXt(nn.Module):
         )
 
     def forward(self, feat: Tensor, neighbours: Neighbours) -> Tensor:
-        """Return the classes' scores of each point (N, classes), before the softmax.
+        """Return the class scores (logits) of each point, (N, classes).
 
         Args:
             feat: (N, features), in the order of the coordinates that `neighbours` was built from.
@@ -121,7 +121,7 @@ class PointNeXt(nn.Module):
         return scores
 
     def _groupings(self, neighbours: Neighbours, number: int, dtype: torch.dtype) -> tuple[Grouping, Grouping | None]:
-        """Return whom a stage's points look at in the stage before, and in their own if there are blocks that do."""
+        """Return the neighbourhoods of a stage's points in the stage before, and in their own (None without blocks)."""
         radius = self.options.neighbourhood.stage_radius(number)
         before, own = (neighbours[f"positions{each}"].to(dtype) / radius for each in (number - 1, number))
         group = Grouping(neighbours[f"group{number}"], before, own)
@@ -131,7 +131,7 @@ class PointNeXt(nn.Module):
 
 
 class Stage(nn.Module):
-    """Set abstraction, and the blocks that follow it."""
+    """One encoder stage: a set abstraction that thins the points out, and the residual blocks that follow it."""
 
     def __init__(self, few: int, many: int, count: int, small: bool) -> None:
         super().__init__()
@@ -139,7 +139,7 @@ class Stage(nn.Module):
         self.blocks = nn.ModuleList(InvertedResidual(many) for _ in range(count - 1))
 
     def forward(self, values: Tensor, sample: Tensor, group: Grouping, inner: Grouping | None) -> Tensor:
-        """Return (M, many) from (N, few); see `SetAbstraction` and `InvertedResidual`."""
+        """Return features (M, many) of the stage's points from those of the stage before, (N, few)."""
         thinned: Tensor = self.abstraction(values, sample, group)
         for block in self.blocks:
             thinned = block(thinned, inner)
@@ -147,7 +147,7 @@ class Stage(nn.Module):
 
 
 class Pointwise(nn.Module):
-    """A layer on each point by itself: linear, norm and, if wanted, ReLU."""
+    """A pointwise layer: linear, batch norm and, if active, ReLU."""
 
     def __init__(self, few: int, many: int, *, active: bool = True) -> None:
         super().__init__()
@@ -156,13 +156,13 @@ class Pointwise(nn.Module):
         self.active = active
 
     def forward(self, values: Tensor) -> Tensor:
-        """Return (N, many) from (N, few)."""
+        """Return features (N, many) of points with features (N, few)."""
         normed: Tensor = self.norm(self.linear(values))
         return F.relu_(normed) if self.active else normed
 
 
 class SetAbstraction(nn.Module):
-    """Thins out: each remaining point takes the maximum over its neighbours of one layer.
+    """Layer that downsamples a cloud: each remaining point takes the maximum over its neighbours of one linear layer.
 
     In a small network there are two layers, and what each remaining point had is added.
     """
@@ -177,7 +177,7 @@ class SetAbstraction(nn.Module):
         self.skip = nn.Linear(few, many) if small else None
 
     def forward(self, values: Tensor, sample: Tensor, grouping: Grouping) -> Tensor:
-        """Return (M, many).
+        """Return features (M, many) of the remaining points.
 
         Args:
             values: of all points (N, few).
@@ -195,7 +195,7 @@ class SetAbstraction(nn.Module):
 
 
 class InvertedResidual(nn.Module):
-    """Looks at neighbours, then widens and narrows each point's features, and adds what it got."""
+    """Inverted residual block: max over neighbours, pointwise expansion by 4 and reduction, and a skip connection."""
 
     def __init__(self, channels: int) -> None:
         super().__init__()
@@ -205,13 +205,13 @@ class InvertedResidual(nn.Module):
         self.narrow = Pointwise(channels * _EXPANSION, channels, active=False)
 
     def forward(self, values: Tensor, grouping: Grouping) -> Tensor:
-        """Return (N, channels) from (N, channels)."""
+        """Return the points' features (N, channels) after the block; the shape stays."""
         seen = F.relu_(normalised_max(values, self.look.weight, self.look_norm, grouping))
         return F.relu_(self.narrow(self.widen(seen)) + values)
 
 
 class FeaturePropagation(nn.Module):
-    """Brings a thin stage's features back to the stage before, by interpolation, and joins them with that one's."""
+    """Decoder layer that interpolates a stage's features to the stage before and fuses them with that one's."""
 
     def __init__(self, few: int, many: int) -> None:
         super().__init__()
@@ -220,7 +220,7 @@ class FeaturePropagation(nn.Module):
         self.second = Pointwise(few, few)
 
     def forward(self, own: Tensor, thin: Tensor, nearest: Tensor, weight: Tensor) -> Tensor:
-        """Return (N, few).
+        """Return decoded features (N, few) of the points of the stage before.
 
         Args:
             own: features of the stage before (N, few).
