@@ -32,13 +32,14 @@ PARTS = {"blender": [*BLENDER_TESTS], "others": ["tests", *(f"--ignore={folder}"
 """The tests in two processes: once ifcopenshell has worked in one, Blender 5.2's OBJ exporter aborts there."""
 ALONE = ["-n", "0", "-m", "alone", *BLENDER_TESTS]
 """What the tests that measure the clock are called with, after the others: they are slow ones, all of Blender."""
-ONLY = {("3.13", "blender"): "smoke or not any_blender", ("3.13", "others"): "smoke"}
-"""Marker expressions by Python and part, where not all of a part's tests are run on that Python."""
-
 QUICK = "not slow and not fuzz and not cluster"
 """Marker expression of the tests of `make test`."""
 SLOW = "slow"
 """That of `make test-slow`."""
+ONLY = {("3.13", "blender"): "smoke or not any_blender", ("3.13", "others"): "smoke"}
+"""Marker expressions by Python and part, where not all of a part's tests are run on that Python."""
+LATER = {("3.13", "blender"): f"any_blender and not smoke and {QUICK}"}
+"""Those of tests that `make test` leaves out on that Python, and `make test-slow` runs with the slow ones."""
 
 nox.needs_version = ">=2026.10"
 nox.options.sessions = ["lint", "tests", "summary"]
@@ -130,7 +131,9 @@ def pytest_runs(version: str, markers: str, arguments: list[str]) -> list[list[s
     if any(argument.startswith("tests") for argument in arguments):
         return [arguments]
     only = {part: f"({ONLY[version, part]}) and " if (version, part) in ONLY else "" for part in PARTS}
-    runs = [["-m", f"{only[part]}({markers}) and not alone", *arguments, *paths] for part, paths in PARTS.items()]
+    also = {part: f" or ({LATER[version, part]})" for part in PARTS if markers == SLOW and (version, part) in LATER}
+    chosen = {part: f"{only[part]}({markers}) and not alone{also.get(part, '')}" for part in PARTS}
+    runs = [["-m", chosen[part], *arguments, *paths] for part, paths in PARTS.items()]
     if markers == SLOW and version == min(BLENDER):
         runs.append([*arguments, *ALONE])
     return runs

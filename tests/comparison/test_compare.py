@@ -81,7 +81,10 @@ def test_report_and_picture_say_what_gives_a_cloud_away(folder: Path, capsys: py
     assert "synthetic synthetic-0: told from the real ones by all 1.00" in text
     assert "gives away 1.00" in text
 
-    # The same clouds give the same report.
+
+@pytest.mark.slow
+def test_the_same_clouds_give_the_same_report(folder: Path) -> None:
+    assert compare(folder, "--overwrite", "--quiet") == 0
     written = (folder / "out" / "comparison.json").read_bytes()
     assert compare(folder, "--overwrite", "--quiet") == 0
     assert (folder / "out" / "comparison.json").read_bytes() == written

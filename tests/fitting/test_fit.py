@@ -607,7 +607,13 @@ def test_a_fit_that_leaves_its_points_is_refused(tmp_path: Path) -> None:
     picture.save(tmp_path / "fit.png")
 
 
-@pytest.mark.parametrize("path", REAL, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(path, id=path.stem, marks=pytest.mark.slow if "rural2lane_t000" in path.stem else ())
+        for path in REAL
+    ],
+)
 def test_real_axes_are_far_from_being_refused(path: Path) -> None:
     _, _, report = fitted_axis(path, RoadScenario())
     assert max(report["horizontal"]["worst"], report["height"]["worst"]) < 0.2 * REFUSED_BEYOND * 0.05

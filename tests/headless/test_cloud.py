@@ -16,7 +16,7 @@ from tests.helpers.clouds.random_points import make_points
 
 ORIGIN = np.array([294_000.0, 5_628_000.0, 180.0])
 REAL = Path(__file__).parents[3] / "shared" / "real"
-QUICK = ("ign_lidarhd_street", "semkitti_seq00_000000", "als_rural2lane_t000-075")
+QUICK = ("semkitti_seq00_000000", "als_dual4lane_t338-369")
 """One file of each producer; the others are larger."""
 
 

@@ -15,7 +15,10 @@ from synthroads_addon.road.parameters import read_parameters
 from tests.helpers.clouds.road_clouds import cloud_of, road, write
 
 
-@pytest.fixture(scope="module", params=[("RQ31", "EKA1A", 4), ("RQ25", "EKA3", 9)], ids=lambda p: p[0])
+ROADS = [("RQ31", "EKA1A", 4), pytest.param(("RQ25", "EKA3", 9), marks=pytest.mark.slow)]
+
+
+@pytest.fixture(scope="module", params=ROADS, ids=("RQ31", "RQ25"))
 def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
     """Return the folder of a reconstruction, and what it says."""
     folder = tmp_path_factory.mktemp("reconstruct")

@@ -114,7 +114,11 @@ def test_every_cross_section_follows_the_analytic_surface(design_class: str, cro
 
 
 @pytest.mark.parametrize(
-    "fidelity", [name if name == "high" else pytest.param(name, marks=pytest.mark.any_blender) for name in TOLERANCES]
+    "fidelity",
+    [
+        pytest.param(name, marks={"high": (), "draft": pytest.mark.any_blender}.get(name, pytest.mark.slow))
+        for name in TOLERANCES
+    ],
 )
 def test_every_fidelity_keeps_its_tolerance_with_turnouts_and_damage(fidelity: str) -> None:
     parameters = sample_road(everything("EKA1A", "RQ36", 800.0), 5)

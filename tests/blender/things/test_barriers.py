@@ -21,6 +21,8 @@ from tests.helpers.scenes.furnished_road import (
     volume,
 )
 
+pytestmark = pytest.mark.any_blender
+
 PARTS = ("concrete_barriers", "noise_barriers", "temporary_barriers")
 PANELS = {"aluminium": 0.12, "concrete": 0.2, "wood": 0.14, "glass": 0.06}
 PANEL_MATERIALS = {"aluminium": "noise_aluminium", "concrete": "noise_concrete", "wood": "noise_wood"}

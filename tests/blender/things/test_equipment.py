@@ -29,6 +29,8 @@ from tests.helpers.scenes.furnished_road import (
 )
 from tests.helpers.scenes.own_frame import axes, own_frame
 
+pytestmark = pytest.mark.any_blender
+
 MOST_TRIANGLES = 1000
 PARTS = ("kilometre_boards", "poles", "traffic_lights", "cabinets", "delineators")
 CLASSES = {"KilometreBoard": "road_sign", "Pole": "pole", "TrafficLight": "traffic_light", "Cabinet": "utility"}

@@ -41,6 +41,8 @@ from tests.helpers.scenes.furnished_road import (
 )
 from tests.helpers.scenes.own_frame import axes, own_frame
 
+pytestmark = pytest.mark.any_blender
+
 MOST_TRIANGLES = 1500
 MOST_MILLISECONDS = 20.0
 """Processor time for making a sign, on a busy machine."""

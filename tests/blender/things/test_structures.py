@@ -31,6 +31,8 @@ from tests.helpers.scenes.furnished_road import (
     volume,
 )
 
+pytestmark = pytest.mark.any_blender
+
 PARTS = ("gantries", "overpasses", "beacons")
 
 

@@ -22,6 +22,8 @@ from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.twin.plants import placed_plants
 from tests.helpers.scenes.furnished_road import Data, Float, FurnishedRoad, normals, of_material, pieces
 
+pytestmark = pytest.mark.any_blender
+
 TREES, SHRUBS, GRASSES = (SPECIES[kind] for kind in ("tree", "shrub", "grass"))
 SHAPES = species_shapes()
 GROUPS = {"tree": tree.shape_group, "shrub": shrub.shape_group, "grass": tuft_group}

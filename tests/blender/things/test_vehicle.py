@@ -31,6 +31,8 @@ from tests.helpers.scenes.furnished_road import (
     volume,
 )
 
+pytestmark = pytest.mark.any_blender
+
 MODELS = tuple(VEHICLE_TYPES)
 ON_ROAD = 0.01
 """Distance that the wheels may be above or below the road, m."""

@@ -43,7 +43,7 @@ def row(folder: Path, knob: str, value: Any, *more: str) -> dict[str, Any]:
 def test_a_knob_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     document = tmp_path / "page.md"
     document.write_text("<!-- table: tradeoff small -->\n<!-- end of table -->\n")
-    scenario = str(small_scenario(tmp_path))
+    scenario = str(small_scenario(tmp_path, "road.length=20"))
     words = ["--scenario", scenario, "--output", str(tmp_path / "out"), "--knobs", "caster"]
     pictures = ["--pictures", str(tmp_path / "pictures")]
     assert commands.command("tradeoff", [*words, "--document", str(document), *pictures]) == 0
@@ -84,8 +84,8 @@ def test_a_knob_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 @pytest.mark.any_blender
 def test_plants_that_are_left_out_are_an_error(tmp_path: Path) -> None:
     """On a wide strip: beside the road itself hardly anything grows."""
-    wide = "road.half_width=60"
-    few, all_of_them = (row(tmp_path, "vegetation_detail", value, wide)["errors"] for value in (0, 1))
+    wide = ("road.half_width=60", "road.length=20")
+    few, all_of_them = (row(tmp_path, "vegetation_detail", value, *wide)["errors"] for value in (0, 1))
     assert few["labels_percent"] > all_of_them["labels_percent"] + 1.0
 
 
@@ -141,10 +141,12 @@ def test_a_pixel_per_return_is_the_truth_or_says_what_it_needs(tmp_path: Path) -
 
 @pytest.mark.any_blender
 def test_relief_and_spacing_leave_their_errors(tmp_path: Path) -> None:
-    none, full = (row(tmp_path, "roughness_adjustment", value)["errors"]["relief_mm"] for value in (0, 1))
+    bare = ("road.length=20", "vegetation_detail=0")
+    none, full = (row(tmp_path, "roughness_adjustment", value, *bare)["errors"]["relief_mm"] for value in (0, 1))
     assert none > 3.0
     assert full < 0.5 * none
-    whole, thin = (row(tmp_path, "point_spacing", value)["errors"]["density_percent"] for value in ("none", 0.2))
+    spacings = (row(tmp_path, "point_spacing", value, *bare) for value in ("none", 0.2))
+    whole, thin = (found["errors"]["density_percent"] for found in spacings)
     assert abs(whole) < 2.0
     assert 20.0 < thin < 100.0
 

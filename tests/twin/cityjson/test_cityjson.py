@@ -160,7 +160,7 @@ def on_road(road: RoadParameters, rings: list[np.ndarray]) -> tuple[np.ndarray, 
     return local, np.clip(station, 0.0, geometry.length), np.clip(offset, edges[:, -1], edges[:, 0])
 
 
-@pytest.mark.parametrize("index", [2, None, 22])
+@pytest.mark.parametrize("index", [2, None, pytest.param(22, marks=pytest.mark.slow)])
 def test_vertices_lie_on_the_analytic_road_within_a_millimetre(
     index: int | None, full_city: City, cities: Callable[[int], City]
 ) -> None:

@@ -20,7 +20,7 @@ from tests.helpers.scenes.panel_road import SAME, cheap, road, road_file, settin
 
 __all__ = ["cheap", "road", "road_file", "settings", "small_pictures"]
 
-pytestmark = pytest.mark.usefixtures("small_pictures")
+pytestmark = [pytest.mark.usefixtures("small_pictures"), pytest.mark.any_blender]
 
 
 def set_file(folder: Path) -> Path:
