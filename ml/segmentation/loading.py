@@ -5,7 +5,7 @@ import signal
 import sys
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from types import TracebackType
 
@@ -123,7 +123,13 @@ def _load_crops(
     )
     with defer_interrupt():
         batches = iter(loader)
-    yield from batches
+    try:
+        yield from batches
+    finally:
+        # PyTorch calls it an error if a worker was ended by a signal, as all are that are interrupted: where only the
+        # garbage collector hears of it, that is a traceback on standard error.
+        with suppress(RuntimeError):
+            getattr(batches, "_shutdown_workers", int)()
 
 
 def leave_quietly(_worker: int) -> None:

@@ -14,7 +14,6 @@ from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import read_parameters
 from tests.helpers.clouds.road_clouds import cloud_of, road, write
 
-
 ROADS = [("RQ31", "EKA1A", 4), pytest.param(("RQ25", "EKA3", 9), marks=pytest.mark.slow)]
 
 

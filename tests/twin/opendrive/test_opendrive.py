@@ -191,8 +191,8 @@ def strips_of(geometry: RoadGeometry, read: OpenDrive, section: Section) -> dict
 def worst_border(road: RoadParameters, read: Roads, apart: float = 1.0) -> float:
     """Return the largest distance (m) of a lane's border from its strip's boundary, beside it or in height.
 
-    A place of a tilted road that climbs lies up to 10 cm farther along it than its s says: where a border runs obliquely
-    it may be as much beside its strip's as that makes.
+    A place of a tilted road that climbs lies up to 10 cm farther along it than its s says: where a border runs
+    obliquely it may be as much beside its strip's as that makes.
     """
     geometry = RoadGeometry(road)
     where = away_from_steps(geometry, stations(read.length, apart))

@@ -1,0 +1,52 @@
+"""Data workers of training: what becomes of those that don't end by themselves."""
+
+from __future__ import annotations
+
+import multiprocessing
+import subprocess
+import sys
+import time
+from multiprocessing.process import BaseProcess
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+import torch
+
+from ml.segmentation import loading
+
+
+class SlowCrops:
+    """Four crops, each of which takes a worker a long time."""
+
+    def __len__(self) -> int:
+        return 4
+
+    def __getitem__(self, number: int) -> torch.Tensor:
+        if number:
+            time.sleep(60.0)
+        return torch.zeros(1)
+
+
+def test_workers_that_a_signal_ends_with_the_training_leave_no_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The signal to all processes of a terminal or job; of the workers' end PyTorch hears while it waits for them."""
+    monkeypatch.setattr(loading, "Collate", lambda *_: torch.stack)
+    ignored: list[Any] = []
+    monkeypatch.setattr(sys, "unraisablehook", ignored.append)
+    settings: Any = SimpleNamespace(batch=1, workers=2, device="cpu")
+    crops: Any = SlowCrops()
+    batches = loading._load_crops(crops, settings, 0, 0.0, slice(None))
+    assert next(batches).shape == (1, 1)
+
+    workers, join = multiprocessing.active_children(), BaseProcess.join
+
+    def end_and_join(process: BaseProcess, timeout: float | None = None) -> None:
+        """Join a worker that another process ends now: if the training does workers take it for their proper end."""
+        subprocess.run(["kill", "-TERM", str(process.pid)], check=True)
+        time.sleep(0.5)
+        join(process, timeout)
+
+    monkeypatch.setattr(BaseProcess, "join", end_and_join)
+    del batches
+    assert len(workers) == 2
+    assert [str(fault.exc_value) for fault in ignored] == []
