@@ -37,7 +37,7 @@ class StripSurface:
 
 
 @dataclass(frozen=True)
-class _Damage:
+class _StripDamage:
     """One rut or pothole on one strip: the stations between which it lies, and where across it needs points."""
 
     start: float
@@ -115,9 +115,9 @@ def _lane_numbers(geometry: RoadGeometry) -> dict[int, int]:
 # --- damage -----------------------------------------------------------------------------------------------------
 
 
-def _damages(geometry: RoadGeometry, tolerance: float) -> dict[int, list[_Damage]]:
+def _damages(geometry: RoadGeometry, tolerance: float) -> dict[int, list[_StripDamage]]:
     """Return what damages each strip, by the strip's number."""
-    damages: dict[int, list[_Damage]] = {}
+    damages: dict[int, list[_StripDamage]] = {}
     for side, section in geometry.sections.items():
         strips = [number for number, strip in enumerate(geometry.strips) if strip.side == side]
         outwards = strips[::-1] if side == "left" else strips
@@ -128,7 +128,7 @@ def _damages(geometry: RoadGeometry, tolerance: float) -> dict[int, list[_Damage
             for index in damaged_strips(alone):
                 shares = damage_columns(alone, index, tolerance)
                 shares = 1.0 - shares[::-1] if side == "left" else shares
-                damages.setdefault(outwards[index], []).append(_Damage(*_range(item), shares))
+                damages.setdefault(outwards[index], []).append(_StripDamage(*_range(item), shares))
     return damages
 
 
@@ -146,7 +146,7 @@ def _range(item: Rut | Pothole) -> tuple[float, float]:
     return item.station - item.length / 2.0, item.station + item.length / 2.0
 
 
-def _row_masks(stations: Float, damages: list[_Damage]) -> Mask:
+def _row_masks(stations: Float, damages: list[_StripDamage]) -> Mask:
     """Return which damages (N, D) a row's points must follow: those before or behind it."""
     starts, ends = np.array([d.start for d in damages]), np.array([d.end for d in damages])
     between = (starts < stations[1:, None] - 1e-6) & (ends > stations[:-1, None] + 1e-6)
@@ -156,7 +156,7 @@ def _row_masks(stations: Float, damages: list[_Damage]) -> Mask:
     return rows
 
 
-def _shares(damages: list[_Damage], mask: Mask) -> Float:
+def _shares(damages: list[_StripDamage], mask: Mask) -> Float:
     """Return where across (C,), from 0 at the left to 1 at the right edge, a row needs points."""
     inside = [damage.shares for damage, there in zip(damages, mask.tolist(), strict=True) if there]
     return space_shares(np.unique(np.concatenate([[0.0, 1.0], *inside])))
@@ -165,7 +165,7 @@ def _shares(damages: list[_Damage], mask: Mask) -> Float:
 # --- polygons ---------------------------------------------------------------------------------------------------
 
 
-def _faces(edges: _Edges, damages: list[_Damage], chosen: Mask) -> Faces:
+def _faces(edges: _Edges, damages: list[_StripDamage], chosen: Mask) -> Faces:
     """Return a strip's polygons between those rows that are chosen (N - 1,), row by row.
 
     From edge to edge there is one polygon, but where the strip is damaged. Rows with different numbers of points are

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.blender.model.build import Place
+from synthroads_addon.blender.model.build import BuildTarget
 from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.scenario.scenario import Scenario, load_scenario
@@ -35,7 +35,7 @@ def scenario(folder: Path) -> Scenario:
 def test_a_scan_by_command_is_of_the_edited_road_that_is_named(tmp_path: Path) -> None:
     file = tmp_path / "two.blend"
     build_small(small_parameters(40.0), parts=("road",))
-    model = build_small(place=Place(beside=True))
+    model = build_small(place=BuildTarget(beside=True))
     model.root.name = "Ramp"
     rail = small_parameters().objects["rail-right"]
     model.objects["rail-right"].location = (0.7, 1.2, 0.0)  # shows nothing until it is built again

@@ -52,7 +52,7 @@ _EVALUATION, _MOST_AT_ONCE = 0.1, 32
 
 
 @dataclass(frozen=True)
-class Place:
+class BuildTarget:
     """Which road a new one takes the place of.
 
     Attributes:
@@ -82,7 +82,7 @@ class Place:
         return root
 
 
-MEANT = Place()
+MEANT = BuildTarget()
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def build_road(
     parts: Collection[str] | None = None,
     stretch: tuple[float, float] | None = None,
     geometry: RoadGeometry | None = None,
-    place: Place = MEANT,
+    place: BuildTarget = MEANT,
 ) -> RoadModel:
     """Build the road in the current scene, in the place of one built before; all else stays as it is.
 
@@ -152,7 +152,7 @@ def build_steps(
     vegetation_detail: float = 1.0,
     parts: Collection[str] | None = None,
     stretch: tuple[float, float] | None = None,
-    place: Place = MEANT,
+    place: BuildTarget = MEANT,
 ) -> Generator[float | None, None, RoadModel]:
     """Build the road as `build_road` does, in steps between which the window may live; return the model.
 
@@ -198,7 +198,7 @@ class _Build:
         parts: Collection[str] | None,
         stretch: tuple[float, float] | None,
         geometry: RoadGeometry | None = None,
-        place: Place = MEANT,
+        place: BuildTarget = MEANT,
     ) -> None:
         known = model_parts()
         self._wanted = set(known if parts is None else parts)
@@ -296,7 +296,7 @@ def _home(root: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Collectio
     return next(collection for collection in root.users_collection if collection in inside)
 
 
-def _parts_of(root: bpy.types.Object, place: Place = MEANT) -> dict[bpy.types.Object, str]:
+def _parts_of(root: bpy.types.Object, place: BuildTarget = MEANT) -> dict[bpy.types.Object, str]:
     """Return the objects that were built for a road, in all scenes, and their roles; not the user's copies of some."""
     objects: dict[bpy.types.Object, str] = {}
     for scene in bpy.data.scenes:

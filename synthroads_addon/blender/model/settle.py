@@ -15,7 +15,7 @@ from ...road.objects import LineObject
 from ..compat import set_modifier_input
 from ..nodes.inputs import input_name
 from ..things.model_builder import ROLE
-from .build import Place, RoadModel, build_steps
+from .build import BuildTarget, RoadModel, build_steps
 from .edits import own_modifier, place_reason
 from .older_files import PARAMETERS
 from .places import PLACED, Lost, RoadAxes, line_update
@@ -47,7 +47,7 @@ def settle_steps(road: str, edited: EditedRoad) -> Generator[float | None, None,
     names = {item.name for item in (*parts.values(), *copies)}
     kept = {edit.name: edit for edit in edited.by_hand if edit.name in names}
     copied = frozenset(item.name for item in copies) - set(kept)
-    place = Place(road, keep_moves=False, keeps=frozenset(kept), drops=copied)
+    place = BuildTarget(road, keep_moves=False, keeps=frozenset(kept), drops=copied)
     model = yield from build_steps(parameters, settings.tolerance, settings.vegetation_detail, place=place)
     for name, edit in kept.items():
         _release(bpy.data.objects[name], edit.part, edit.reason)

@@ -70,7 +70,7 @@ def scene_mesh(
     """
     depsgraph = _depsgraph(source)
     root = road_of_id(depsgraph.scene, road)
-    reading = _Reading(depsgraph, objects, classes, class_ids, root)
+    reading = _SceneWalk(depsgraph, objects, classes, class_ids, root)
     reading.copy_all()
     tables = reading.tables(_origin(root), number_objects)
     return join_parts(reading.pairs(None), tables)
@@ -136,7 +136,7 @@ def scanned_scene_steps(
         what was read.
     """
     checked_factor(speed_factor)
-    reading: _Reading | None = None
+    reading: _SceneWalk | None = None
     attempt = 0
     with Changes() as changes:
         while reading is None or not reading.complete:
@@ -148,7 +148,7 @@ def scanned_scene_steps(
             lanes: dict[str, LaneMotion] = {}
             if geometry is not None:
                 lanes = lane_motions(geometry, speed_factor, origin - np.array(geometry.parameters.transform.translate))
-            reading = _Reading(depsgraph, objects, classes, class_ids, root, lanes, speed_factor)
+            reading = _SceneWalk(depsgraph, objects, classes, class_ids, root, lanes, speed_factor)
             if attempt == _ATTEMPTS:
                 reading.copy_all()
             for share in reading.copies():
@@ -159,7 +159,7 @@ def scanned_scene_steps(
     return CopiedScene(done.materials, lambda: _put_together(done, origin, number_objects))
 
 
-def _put_together(reading: _Reading, origin: Float, number_objects: bool) -> ScannedScene:
+def _put_together(reading: _SceneWalk, origin: Float, number_objects: bool) -> ScannedScene:
     tables = reading.tables(origin, number_objects)
     moving = tuple(_moving(reading, carrier, motion, tables) for carrier, motion in reading.motions.items())
     return ScannedScene(join_parts(reading.pairs(None), tables), moving, reading.labels.by_name.unmatched_patterns())
@@ -178,7 +178,7 @@ class CopiedScene:
     put_together: Callable[[], ScannedScene]
 
 
-def _moving(reading: _Reading, carrier: Hashable, motion: BodyMotion, tables: SceneTables) -> MovingMesh:
+def _moving(reading: _SceneWalk, carrier: Hashable, motion: BodyMotion, tables: SceneTables) -> MovingMesh:
     """Return what one carrier moves, in the motion's own frame."""
     rotation, translation, _ = motion.pose(np.zeros(1))
     into = np.eye(4)
@@ -229,7 +229,7 @@ class _QueuedMesh:
     undeformed: bool
 
 
-class _Reading:
+class _SceneWalk:
     """One walk through an evaluated scene: its meshes, and who uses them where.
 
     What the walk finds is looked at at once. Objects' own meshes are found again at any time, and are copied

@@ -70,7 +70,7 @@ def _joined_lines(geometry: RoadGeometry, position: Float, heading: Float) -> li
 
 
 @dataclass(frozen=True)
-class Place:
+class RoadCoordinates:
     """Places in a road's own coordinates: s and t, and h at right angles to its tilted surface, (N,) each, m."""
 
     s: Float
@@ -129,7 +129,7 @@ class RoadFrame:
         """Return h (N,) of points that lie ``below`` the plane, m: at right angles to it."""
         return np.asarray(-below * np.cos(np.arctan(self.crossfall(station))) * self._cosine(station))
 
-    def place(self, station: Float, offset: Float, height: Float) -> Place:
+    def place(self, station: Float, offset: Float, height: Float) -> RoadCoordinates:
         """Return the road's coordinates of points (N,) at stations, offsets and heights above the profile, m."""
         geometry = self.geometry
         station, offset, height = (np.asarray(values, dtype=np.float64) for values in (station, offset, height))
@@ -145,7 +145,8 @@ class RoadFrame:
             s = np.clip(s + ahead * self._cosine(s) / bend, 0.0, geometry.length)
         _, left, above = self._beside(s, plan, level)
         tilt = self.superelevation.at(s)
-        return Place(s, left * np.cos(tilt) + above * np.sin(tilt), above * np.cos(tilt) - left * np.sin(tilt))
+        cos, sin = np.cos(tilt), np.sin(tilt)
+        return RoadCoordinates(s, left * cos + above * sin, above * cos - left * sin)
 
     def _beside(self, s: Float, plan: Float, level: Float) -> tuple[Float, Float, Float]:
         """Return how far (N,) points lie ahead of a place of the line along it, to its left, and above it, m."""

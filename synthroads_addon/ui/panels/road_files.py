@@ -10,7 +10,7 @@ import bpy
 
 from ...base.errors import InputError
 from ...base.files import output_folder
-from ...blender.model.build import Place
+from ...blender.model.build import BuildTarget
 from ...blender.model.store import BUILT_FROM, find_road, recall_parameters
 from ...fitting.fit import AxisRefusedError
 from ...fitting.plot import axis_picture
@@ -66,7 +66,7 @@ class _Load(FileOperator):
             look_along(space, recall_parameters(road))
         return str(job.result)
 
-    def _work(self, path: Path, scenario: Scenario, place: Place) -> Work[str]:
+    def _work(self, path: Path, scenario: Scenario, place: BuildTarget) -> Work[str]:
         parameters, message = yield Aside(lambda _: self.read(path, scenario), "Reading", 0.0, 0.02)
         yield from road_work(parameters, scenario, json.dumps([_FROM_FILE, path.name]), place)
         return message

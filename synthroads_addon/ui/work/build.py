@@ -5,7 +5,7 @@ Annotations are not postponed here: Blender reads the properties from them.
 
 import bpy
 
-from ...blender.model.build import MEANT, Place, RoadModel, build_steps
+from ...blender.model.build import MEANT, BuildTarget, RoadModel, build_steps
 from ...blender.model.roads import ROAD, choose_road
 from ...blender.model.settle import settle_steps
 from ...blender.model.store import find_road, recall, remember
@@ -39,7 +39,7 @@ class SYNTHROADS_OT_build(LongOperator, bpy.types.Operator):
         """Return the building of the road that the panel asks for."""
         settings = context.scene.synthroads
         self._first = find_road(context.scene) is None
-        place = Place(beside=True) if self.beside else shown_place(context.scene)
+        place = BuildTarget(beside=True) if self.beside else shown_place(context.scene)
         return PanelJob("Build", build_work(settings.scenario(), settings.road_values(), place))
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[RoadModel]) -> str:
@@ -85,13 +85,13 @@ def edited_work(road: str, edited: EditedRoad) -> Work[RoadModel]:
     return (yield from settle_steps(road, edited))
 
 
-def shown_place(scene: bpy.types.Scene) -> Place:
+def shown_place(scene: bpy.types.Scene) -> BuildTarget:
     """Return the place of the road that the panel shows: it stays that one, whatever is clicked during the work."""
     root = find_road(scene)
-    return MEANT if root is None else Place(str(root[ROAD]))
+    return MEANT if root is None else BuildTarget(str(root[ROAD]))
 
 
-def build_work(scenario: Scenario, built_from: str, place: Place = MEANT) -> Work[RoadModel]:
+def build_work(scenario: Scenario, built_from: str, place: BuildTarget = MEANT) -> Work[RoadModel]:
     """Sample a road and build it in the open scene.
 
     Args:
@@ -106,7 +106,9 @@ def build_work(scenario: Scenario, built_from: str, place: Place = MEANT) -> Wor
     return (yield from road_work(parameters, scenario, built_from, place))
 
 
-def road_work(parameters: RoadParameters, scenario: Scenario, built_from: str, place: Place = MEANT) -> Work[RoadModel]:
+def road_work(
+    parameters: RoadParameters, scenario: Scenario, built_from: str, place: BuildTarget = MEANT
+) -> Work[RoadModel]:
     """Build a road that is given in the open scene; see `build_work`."""
     fidelity = scenario.settings()
     yield Step(0.02, "Building")

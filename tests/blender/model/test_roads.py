@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.blender.model.build import Place, remove_road
+from synthroads_addon.blender.model.build import BuildTarget, remove_road
 from synthroads_addon.blender.model.roads import ROAD, choose_road, renew_ids
 from synthroads_addon.blender.model.store import find_road, objects_of, recall_parameters, road_named, roads
 from synthroads_addon.blender.things.model_builder import ROLE
@@ -99,7 +99,7 @@ class TestSeveral:
         scene = bpy.context.scene
         first = build_small(parts=ONLY)
         assert find_road(scene) == first.root
-        second = build_small(parts=ONLY, place=Place(beside=True))
+        second = build_small(parts=ONLY, place=BuildTarget(beside=True))
         assert roads(scene) == [first.root, second.root]
         bpy.context.view_layer.objects.active = None
         assert find_road(scene) == first.root
@@ -113,7 +113,7 @@ class TestSeveral:
 
     def test_building_one_leaves_the_other_and_all_else_as_it_is(self) -> None:
         first = build_small(parts=ONLY)
-        build_small(parts=ONLY, place=Place(beside=True))
+        build_small(parts=ONLY, place=BuildTarget(beside=True))
         kept = [item.name for item in objects_of(first.root).values()] + [first.root.name, add_cube().name]
         before = described(kept)
         other = roads(bpy.context.scene)[1]
@@ -138,7 +138,7 @@ class TestSeveral:
         assert list(parts) == list(model.objects)
         assert not set(parts.values()) & set(model.objects.values())
         before = described([item.name for item in parts.values()])
-        build_small(small_parameters(40.0), parts=ONLY, place=Place(str(first[ROAD])))
+        build_small(small_parameters(40.0), parts=ONLY, place=BuildTarget(str(first[ROAD])))
         assert described([item.name for item in parts.values()]) == before
 
     def test_a_road_appended_from_another_file_is_one_of_its_own(self, tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from synthroads_addon.base.classes import class_id
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.compat import set_modifier_input
 from synthroads_addon.blender.files import empty_file
-from synthroads_addon.blender.model.build import Place, RoadModel, build_road
+from synthroads_addon.blender.model.build import BuildTarget, RoadModel, build_road
 from synthroads_addon.blender.model.settle import move_line, settle
 from synthroads_addon.blender.model.truth import EditedRoad, open_road, read_road
 from synthroads_addon.blender.scene.evaluated import scanned_scene
@@ -214,7 +214,7 @@ class TestPlaces:
         assert opened is not None
         assert opened.edited == edited
         before = shown()
-        here = build_small(small_parameters(40.0), parts=("road",), place=Place(beside=True))
+        here = build_small(small_parameters(40.0), parts=("road",), place=BuildTarget(beside=True))
         bpy.data.objects.remove(here.objects["Road"])
         assert shown().keys() >= before.keys()
         assert opened.edited == open_road(opened.name).edited  # type: ignore[union-attr]

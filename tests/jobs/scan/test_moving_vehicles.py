@@ -36,6 +36,8 @@ from synthroads_addon.scenario.scenario import load_scenario
 from tests.blender.things.test_vehicle import MODELS, VEHICLES, alone, vehicle
 from tests.helpers.scenes.furnished_road import Data, Float, road_data
 
+pytestmark = pytest.mark.any_blender
+
 FINE = 1e-4
 """Tolerance (m) of a road whose mesh is hardly farther from the analytic surface than 32 bits make it."""
 HEIGHTS = 5e-5

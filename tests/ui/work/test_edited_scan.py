@@ -12,7 +12,7 @@ import pytest
 from synthroads_addon.base.classes import class_id
 from synthroads_addon.blender.compat import modifier_input
 from synthroads_addon.blender.files import empty_file
-from synthroads_addon.blender.model.build import Place
+from synthroads_addon.blender.model.build import BuildTarget
 from synthroads_addon.blender.model.roads import ROAD
 from synthroads_addon.blender.model.store import objects_of, recall_parameters, roads
 from synthroads_addon.road.parameters import read_parameters
@@ -89,7 +89,7 @@ def test_three_roads_in_two_scenes_are_built_scanned_and_exported_one_by_one(tmp
     empty_file()
     build_small(small_parameters(50.0))
     first = bpy.context.scene
-    renamed = build_small(small_parameters(60.0), place=Place(beside=True)).root
+    renamed = build_small(small_parameters(60.0), place=BuildTarget(beside=True)).root
     renamed.name = "Ramp"
     with bpy.data.libraries.load(str(appended)) as (source, wanted):
         wanted.collections = source.collections
@@ -107,7 +107,7 @@ def test_three_roads_in_two_scenes_are_built_scanned_and_exported_one_by_one(tmp
             item.hide_viewport = item.hide_viewport or item.name not in own
         bpy.context.view_layer.objects.active = root
         before = other_lines(own)
-        build_small(small_parameters(length), place=Place(str(root[ROAD])))
+        build_small(small_parameters(length), place=BuildTarget(str(root[ROAD])))
         own |= names_of(root)
         kept = [line for line in before if _BLOCK.match(line)["name"] not in own and is_there(line)]  # type: ignore[index]
         assert len(kept) > 1000

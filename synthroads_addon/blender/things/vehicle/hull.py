@@ -16,7 +16,7 @@ from .details import VehicleMaterials
 Float = NDArray[np.float64]
 
 
-class Patch(NamedTuple):
+class HullPatch(NamedTuple):
     """Faces of another material than the paint.
 
     Attributes:
@@ -52,7 +52,7 @@ class Hull(NamedTuple):
     wheel: float
     arch: float
     tumble: float
-    patches: tuple[Patch, ...]
+    patches: tuple[HullPatch, ...]
 
 
 # The half cross-section from the middle of the underside to that of the roof. Shares of the half widths (body, top,
@@ -67,7 +67,7 @@ _ARCH_STEPS = 6
 
 def hull(tree: Tree, materials: VehicleMaterials, patches: Iterable[tuple[Any, ...]], **fields: Any) -> Value:
     """Return the body, closed, its faces outwards; `fields` are those of `Hull`."""
-    shape = Hull(patches=tuple(Patch(*patch) for patch in patches), **fields)
+    shape = Hull(patches=tuple(HullPatch(*patch) for patch in patches), **fields)
     table = _rows(shape)
     mesh, column, row = op.grid(tree, 2 * _BANDS + 1, len(table))
     # Columns go round, from the middle of the underside up the left side and down the right one.
@@ -98,7 +98,7 @@ def _triples(rows: Sequence[tuple[float, float, float]]) -> list[tuple[float, fl
     return [(float(a), float(b), float(c)) for a, b, c in rows]
 
 
-def _in_patch(patch: Patch, places: Float, face_row: Value, band: Value) -> Value:
+def _in_patch(patch: HullPatch, places: Float, face_row: Value, band: Value) -> Value:
     first, last = np.searchsorted(places, [patch.start - 1e-6, patch.end - 1e-6])
     within: Operand = (face_row > int(first) - 1) & (face_row < int(last))
     chosen = band.equals(patch.bands[0])
