@@ -32,7 +32,7 @@ _STIFFNESS = 0.05  # of the first spline, relative to the density of the data; i
 
 @dataclass(frozen=True)
 class Chain:
-    """A continuous, piecewise linear function of the station.
+    """A continuous, piecewise linear curvature or grade by station.
 
     Attributes:
         pose: of the start: x, y, heading in plan; the elevation in height.
@@ -50,27 +50,27 @@ class Chain:
 
     @property
     def size(self) -> int:
-        """Number M of elements."""
+        """Return the number M of elements."""
         return len(self.kinds)
 
     @property
-    def turns(self) -> int:
-        """Number of the pose's parameters: across and heading, or elevation."""
+    def pose_size(self) -> int:
+        """Return the number of the pose's parameters: 2 (across and heading) in plan, 1 (elevation) in height."""
         return 2 if len(self.pose) == 3 else 1
 
     @property
     def value_columns(self) -> slice:
-        """Where the values stand among all parameters (`basis`)."""
-        return slice(self.turns, self.turns + self.size + 1)
+        """Return the slice of the values at the knots among all parameters (`basis`)."""
+        return slice(self.pose_size, self.pose_size + self.size + 1)
 
     @property
     def slopes(self) -> Float:
-        """(M,) change of value per metre."""
+        """Return the change of value per metre (M,) of each element."""
         return np.diff(self.values) / np.diff(self.knots)
 
     @cached_property
     def groups(self) -> tuple[Float, Float]:
-        """Return (M + 1, G) and (M + 1,): values = first @ free values + second."""
+        """Return a matrix (M + 1, G) and a vector (M + 1,): values = matrix @ free values + vector."""
         label = np.arange(self.size + 1)
         zero = np.zeros(self.size + 1, bool)
         for e, kind in enumerate(self.kinds):
@@ -86,25 +86,25 @@ class Chain:
         return ((label[:, None] == names) & ~held[:, None]).astype(np.float64), given
 
     def tie_values(self) -> Chain:
-        """Return the chain with values that obey the kinds: the mean of each group."""
+        """Return a chain whose values obey the elements' kinds: those tied together are set to their mean."""
         choice, given = self.groups
         mean = choice.T @ self.values / np.maximum(choice.sum(axis=0), 1.0)
         return replace(self, values=choice @ mean + given)
 
     def freedom(self) -> int:
-        """Number of free parameters."""
-        start = 0 if self.pinned else self.turns
+        """Return the number of free parameters."""
+        start = 0 if self.pinned else self.pose_size
         return start + self.groups[0].shape[1] + self.size - 1
 
     def basis(self, free_knots: bool) -> Float:
-        """Return (F, P): the change of all F parameters for each of the P free ones.
+        """Return the derivatives (F, P) of all F parameters by the P free ones.
 
         All are: pose (across, heading; or elevation), M + 1 values, M - 1 inner knots.
         """
-        everything = np.eye(self.turns + 2 * self.size)
+        everything = np.eye(self.pose_size + 2 * self.size)
         values = np.zeros((len(everything), self.groups[0].shape[1]))
         values[self.value_columns] = self.groups[0]
-        pose = everything[:, : 0 if self.pinned else self.turns]
+        pose = everything[:, : 0 if self.pinned else self.pose_size]
         knots = everything[:, self.value_columns.stop :]
         return np.hstack((pose, values, knots if free_knots else knots[:, :0]))
 
@@ -119,7 +119,7 @@ class Chain:
 def ramp_integrals(
     chain: Chain, stations: Float, grid: Float, weight: NDArray[Any]
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return two (N, M): from the start to each station, weight times each element's rising and falling ramp.
+    """Return two integrals (N, M) from the start to each station: weight times each element's rising or falling ramp.
 
     `grid` (Q + 1) holds all knots and stations; `weight` (Q) is given at the middles of its steps.
     """
@@ -147,7 +147,7 @@ def quadrature_grid(chain: Chain, stations: Float) -> Float:
 
 
 def assemble_jacobian(pose: Float, rise: Float, fall: Float, slopes: Float) -> Float:
-    """Return (N, F) derivatives from those by the pose and by every element's ramps.
+    """Return the Jacobian (N, F) by pose, values and inner knots from derivatives by the pose and elements' ramps.
 
     A knot's value raises the ramp before it and the one after it; a knot that moves with its value held changes its
     elements by their slopes times the same ramps.
@@ -176,7 +176,7 @@ class Spacings(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """Map points of an axis, in order; the residual is the weighted offset.
+    """Map points of an axis, in order; a residual is the weighted offset from a chain of curvatures.
 
     Attributes:
         points, weights: (N, 2) m, and (N,).
@@ -196,12 +196,12 @@ class Plan:
     spacings: ClassVar[Spacings] = Spacings(7.0, 20.0, 5.0)
 
     def measure(self, chain: Chain, stations: Float) -> tuple[Float, Float]:
-        """Return stations (N,) of the points on the chain, from the former ones, and residuals (N,), m."""
+        """Return the points' stations (N,) on the chain, near the given ones, and weighted residuals (N,), m."""
         feet, offset = chain.alignment.project_near(self.points, stations, self.reach)
         return feet, self.weights * offset
 
     def jacobian(self, chain: Chain, stations: Float) -> Float:
-        """Return (N, F) derivatives of the residuals by all parameters (see `Chain.basis`).
+        """Return the derivatives (N, F) of the weighted residuals by all F parameters (see `Chain.basis`).
 
         A change of curvature at s' turns the rest of the road about the point there. The offset at s thus falls by
         t(s) . (z(s) - z(s')) for each radian; the foot's own shift has no effect.
@@ -221,11 +221,11 @@ class Plan:
         return self.weights[:, None] * assemble_jacobian(np.column_stack((across, -lever)), rise, fall, chain.slopes)
 
     def move_pose(self, pose: Float, step: Float) -> Float:
-        """Return the pose after a step of its parameters."""
+        """Return the pose (x, y, heading) after a step (m to the left, rad)."""
         return pose + np.array([-np.sin(pose[2]) * step[0], np.cos(pose[2]) * step[0], step[1]])
 
     def fit_window(self, chosen: Int, spacing: float, start: Start | None, origin: float) -> ChainFit:
-        """Return the fit by fixed knots of a spacing (m) to some of the points, those of a window.
+        """Return the fit of a chain, its knots fixed ``spacing`` (m) apart, to the points of one window.
 
         Args:
             chosen: indices of the points.
@@ -237,14 +237,14 @@ class Plan:
         return refine(part, *_first_plan(part.points, spacing, start), False, 8)
 
     def state_at(self, chain: Chain, cut: float) -> Start:
-        """Return pose and value at a station of the chain."""
+        """Return pose (x, y, heading) and curvature (1/m) of the chain at a station (m)."""
         position, heading, value = chain.alignment.frame(cut)
         return np.append(position, heading), float(value)
 
 
 @dataclass(frozen=True)
 class Heights:
-    """Elevations at stations; the residual is the weighted height above the chain. Attributes and methods as `Plan`.
+    """Elevations at stations; a residual is the weighted height above a chain of grades. Otherwise as `Plan`.
 
     Attributes:
         heights, weights, stations: (N,) m, 1, and m along the whole axis.
@@ -284,7 +284,7 @@ Start = tuple[Float, float]
 
 
 def elevations(chain: Chain, stations: Float) -> Float:
-    """Return the elevation (N,), the integral of a chain of grades; the end grades go on beyond the ends."""
+    """Return the elevation (N,), m, the integral of a chain of grades; the end grades go on beyond the ends."""
     gap = np.diff(chain.knots)
     base = chain.pose[0] + np.concatenate(([0.0], np.cumsum(0.5 * gap * (chain.values[:-1] + chain.values[1:]))))
     element = np.clip(np.searchsorted(chain.knots, stations, side="right") - 1, 0, chain.size - 1)
@@ -304,13 +304,13 @@ class ChainFit:
     residuals: Float
 
     @property
-    def square(self) -> float:
-        """Sum of squared residuals, m^2."""
+    def sum_of_squares(self) -> float:
+        """Return the weighted sum of squared residuals, m^2."""
         return float(self.residuals @ self.residuals)
 
     @property
     def rms(self) -> float:
-        return float(np.sqrt(self.square / len(self.residuals)))
+        return float(np.sqrt(self.sum_of_squares / len(self.residuals)))
 
     @property
     def p95(self) -> float:
@@ -318,13 +318,13 @@ class ChainFit:
 
     @cached_property
     def linear(self) -> tuple[Float, Float]:
-        """Return R (F, F) and (F,): the sum of squares is that of R d + the vector, but for a constant."""
+        """Return R (F, F) and b (F,): but for a constant |R d + b|^2 is the sum of squares after a step d (F,)."""
         q, r = np.linalg.qr(self.data.jacobian(self.chain, self.stations))
         return r, q.T @ self.residuals
 
 
 def knot_room(chain: Chain, least: float) -> Float:
-    """Return (M - 1,) how far each inner knot may move, m: its elements don't get shorter than `least`."""
+    """Return how far each inner knot (M - 1,) may move, m, so that no element gets shorter than ``least``."""
     gap = np.diff(chain.knots)
     spare = np.maximum(gap - least, 0.02 * gap)  # those that are already shorter may still move a little
     return 0.5 * np.minimum(spare[:-1], spare[1:])
@@ -336,17 +336,18 @@ def apply_step(data: AxisData, chain: Chain, step: Float) -> Chain:
     spare = _SHARE * np.maximum(np.diff(chain.knots) - data.least, 0.0)
     knots = chain.knots.copy()
     knots[1:-1] += np.clip(step[chain.value_columns.stop :], -spare[:-1], spare[1:])
-    return replace(chain, pose=data.move_pose(chain.pose, step[: chain.turns]), values=values, knots=knots).tie_values()
+    pose = data.move_pose(chain.pose, step[: chain.pose_size])
+    return replace(chain, pose=pose, values=values, knots=knots).tie_values()
 
 
 def least_squares(matrix: Float, wanted: Float) -> Float:
-    """Return the x of full rank with the least ``|matrix x - wanted|``; by QR, since chains are ill-conditioned."""
+    """Return the least-squares solution of ``matrix x = wanted`` (full rank), by QR: chains are ill-conditioned."""
     q, r = np.linalg.qr(matrix)
     return np.linalg.solve(r, q.T @ wanted)
 
 
 def knot_penalty(data: AxisData, chain: Chain, width: int) -> Float:
-    """Return (M - 1, width) rows that measure steps of the knots, the last of `width` parameters, by their room.
+    """Return rows (M - 1, width) that penalise steps of the inner knots, the last parameters, relative to their room.
 
     Far from its place a knot's linear effect is worth nothing: without this, every knot would seem dispensable.
     """
@@ -357,7 +358,7 @@ def knot_penalty(data: AxisData, chain: Chain, width: int) -> Float:
 
 
 def refine(data: AxisData, chain: Chain, stations: Float, free_knots: bool, steps: int) -> ChainFit:
-    """Levenberg-Marquardt: improve all free parameters at once, at most `steps` times.
+    """Return a chain's fit improved by Levenberg-Marquardt in all its free parameters, in at most ``steps`` steps.
 
     The damping holds knots by their room, scaled by the present sum of squares: exact data end quadratically.
     """
@@ -366,15 +367,15 @@ def refine(data: AxisData, chain: Chain, stations: Float, free_knots: bool, step
     damping, system = 1.0, _system(fit, basis, free_knots)
     for _ in range(steps if basis.shape[1] else 0):
         r, target, held, scale = system
-        weight = np.sqrt(damping * (fit.square + 1e-12 * len(fit.residuals)))
+        weight = np.sqrt(damping * (fit.sum_of_squares + 1e-12 * len(fit.residuals)))
         rows = np.vstack((r, weight * held, np.sqrt(1e-7 * damping) * np.eye(r.shape[1])))
         step = least_squares(rows, np.concatenate((target, np.zeros(len(rows) - len(target))))) / scale
         trial_chain = apply_step(data, fit.chain, basis @ step)
         trial = ChainFit(data, trial_chain, *data.measure(trial_chain, fit.stations))
-        if trial.square < fit.square:
-            gain = 1.0 - trial.square / fit.square
+        if trial.sum_of_squares < fit.sum_of_squares:
+            gain = 1.0 - trial.sum_of_squares / fit.sum_of_squares
             fit, damping = trial, max(0.2 * damping, 1e-6)
-            if gain < 1e-4 or fit.square < 1e-16 * len(fit.residuals):
+            if gain < 1e-4 or fit.sum_of_squares < 1e-16 * len(fit.residuals):
                 break
             system = _system(fit, basis, free_knots)
         else:
@@ -394,13 +395,13 @@ def _system(fit: ChainFit, basis: Float, free_knots: bool) -> tuple[Float, ...]:
 
 
 def column_scale(matrix: Float) -> Float:
-    """Return the columns' lengths, none so small that dividing by it would blow up noise."""
+    """Return the columns' Euclidean norms (P,), none so small that dividing by it would blow up noise."""
     scale = np.sqrt((matrix**2).sum(axis=0))
     return np.maximum(scale, max(1e-9 * scale.max(initial=0.0), 1e-300))
 
 
 def _first_plan(points: Float, spacing: float, start: Start | None) -> tuple[Chain, Float]:
-    """Return a chain of curvatures along the points (N, 2) and their stations (N,), m.
+    """Return a first guess: a chain of curvatures along the points (N, 2), and their stations (N,), m.
 
     The curvatures are fitted to the spline's heading, not taken from it, so that the chain doesn't drift away.
     """
@@ -426,7 +427,7 @@ def _first_plan(points: Float, spacing: float, start: Start | None) -> tuple[Cha
 
 
 def _first_heights(station: Float, heights: Float, spacing: float, start: Start | None) -> Chain:
-    """Return a chain of grades along heights (N,) at stations (N,) counted from the part's begin, m."""
+    """Return a first guess: a chain of grades along heights (N,) at stations (N,) from the part's begin, m."""
     if start is not None:
         station, heights = np.append(0.0, station), np.append(start[0][0], heights)
     knots = _even_knots(station[-1], spacing)
@@ -440,7 +441,7 @@ def _first_heights(station: Float, heights: Float, spacing: float, start: Start 
 
 
 def _even_knots(length: float, spacing: float) -> Float:
-    """Return knots from 0 to the length, about `spacing` apart, at least two."""
+    """Return evenly spaced knots (stations, m) from 0 to the length, about ``spacing`` apart, at least two."""
     return np.linspace(0.0, length, max(1, round(length / spacing)) + 1)
 
 
@@ -449,7 +450,7 @@ def _free(knots: Float) -> Int:
 
 
 def _smooth_values(run: Float, values: Float, spacing: float, at: Float) -> Float:
-    """Return (M, D): at `at` (M), a cubic spline of even knots through values (N, D) at `run` (N).
+    """Return the values (M, D) at ``at`` (M,) of a cubic smoothing spline through values (N, D) at ``run`` (N,), m.
 
     Its third differences are penalised, so that it goes on smoothly through gaps in the data.
     """
@@ -464,7 +465,7 @@ def _smooth_values(run: Float, values: Float, spacing: float, at: Float) -> Floa
 
 
 def _cubic(place: Float, count: int) -> Float:
-    """Return (N, count + 3) values of the cubic B-splines over `count` unit intervals."""
+    """Return the values (N, count + 3) at places (N,) of the cubic B-splines over ``count`` unit intervals."""
     interval = np.clip(place.astype(np.int64), 0, count - 1)
     f = place - interval
     weights = np.stack(((1 - f) ** 3, 3 * f**3 - 6 * f**2 + 4, -3 * f**3 + 3 * f**2 + 3 * f + 1, f**3), axis=1) / 6
@@ -474,7 +475,7 @@ def _cubic(place: Float, count: int) -> Float:
 
 
 def _hat_integrals(station: Float, knots: Float) -> Float:
-    """Return (N, K): the integral from the first knot to each station of each knot's hat, for even knots."""
+    """Return the integrals (N, K) from the first of even knots to each station of each knot's hat function."""
     width = knots[1] - knots[0]
     v = np.clip((station[:, None] - knots) / width, -1.0, 1.0)
     whole = np.where(v < 0.0, 0.5 * (v + 1.0) ** 2, 0.5 + v - 0.5 * v**2)

@@ -47,7 +47,7 @@ _PLAY = 1e-5  # of a radius: roundings that touch must not overlap once stations
 
 @dataclass(frozen=True)
 class Deviations:
-    """Distances of points from what was fitted to them.
+    """Statistics of points' distances from what was fitted to them.
 
     Attributes:
         rms, p95, worst: of the distances, m.
@@ -61,13 +61,13 @@ class Deviations:
 
     @classmethod
     def of(cls, station: Float, distance: Float) -> Self:
-        """Return root mean square, 95th percentile and maximum of distances (N,) at stations (N,), m."""
+        """Return root mean square, 95th percentile and maximum of the absolute distances (N,) at stations (N,), m."""
         size = np.abs(distance)
         worst, rms = int(size.argmax()), float(np.sqrt((size**2).mean()))
         return cls(rms, float(np.percentile(size, 95)), float(size[worst]), float(station[worst]))
 
     def to_dict(self, largest: str = "worst", digits: int = 2) -> dict[str, float]:
-        """Return them as JSON data, m; the name of the worst, and the digits of its station, are given."""
+        """Return them rounded as JSON data, m; ``largest`` names the maximum, ``digits`` are its station's."""
         sizes = {"rms": self.rms, "p95": self.p95, largest: self.worst}
         rounded = {name: round(value, 4) for name, value in sizes.items()}
         return rounded | {f"{largest}_station": round(self.worst_station, digits)}
@@ -75,7 +75,7 @@ class Deviations:
 
 @dataclass(frozen=True)
 class AxisFit:
-    """A fitted axis and how far the points are from it.
+    """The alignment and profile fitted to the points of an axis, and how far the points are from them.
 
     Attributes:
         alignment: starts at the foot of the first point and ends at that of the last.
@@ -100,11 +100,11 @@ class AxisFit:
 
     @property
     def limit(self) -> float:
-        """Return how far a point may be away, across or in height, m."""
+        """Return the largest distance that a point may have from the fit, across or in height, m."""
         return REFUSED_BEYOND * self.tolerance
 
     def check(self, name: str) -> None:
-        """Refuse a fit that leaves a point farther away than `limit`.
+        """Raise AxisRefusedError if the fit leaves a point farther away than `limit`.
 
         Args:
             name: of the file that the points are from.
@@ -117,7 +117,7 @@ class AxisFit:
 
 
 class AxisRefusedError(InputError):
-    """The road that was fitted to an axis leaves its points.
+    """Raised where the road fitted to an axis leaves a point farther away than is allowed.
 
     Attributes:
         name: of the file that the points are from.
@@ -134,7 +134,7 @@ class AxisRefusedError(InputError):
         super().__init__(f"axis {name}", None, f"{text}; {picture} shows it" if picture else text)
 
     def with_picture(self, picture: Path | str) -> Self:
-        """Return the error with the name of a file, or of what else shows the fit."""
+        """Return a copy of the error that names the file of a picture, or what else shows the fit."""
         return type(self)(self.name, self.fit, picture)
 
 
@@ -193,7 +193,7 @@ def alignment_object(fit: AxisFit) -> AlignmentObject:
 
 
 def _written_radius(radius: float) -> float:
-    """Return the radius of a rounding as it is written."""
+    """Return a rounding's radius (m) as written: a little less, lest roundings overlap; 0 for one too flat."""
     return radius * (1.0 - _PLAY) if radius < _FLATTEST else 0.0
 
 
@@ -229,7 +229,7 @@ def fit_axis(points: ArrayLike, tolerance: float = 0.05) -> AxisFit:
 
 
 def _check_points(points: ArrayLike) -> Float:
-    """Return (N, 3) finite points without consecutive duplicates in plan, N >= 2."""
+    """Return the points as (N, 3), N >= 2, without consecutive duplicates in plan; InputError for what isn't finite."""
     array = finite_array("points", points)
     if array.ndim != 2 or array.shape[1] not in (2, 3):
         raise InputError("points", array.shape, "an array of shape (N, 3) or (N, 2) is needed")
@@ -260,7 +260,7 @@ def _bridge_gaps(points: Float) -> tuple[Float, Float]:
 
 
 def _fit_plan(points: Float, weights: Float, tolerance: float) -> tuple[Alignment, Float]:
-    """Return the alignment from the first point's foot to the last one's, and all points' stations, roughly."""
+    """Return the alignment from the first point's foot to the last one's, and the points' approximate stations (N,)."""
     run = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
     chain, station = _fit_windows(Plan(points, weights), run, tolerance)
     return _trim_ends(chain, float(station[0]), float(station[-1])), station - station[0]
@@ -273,7 +273,7 @@ def _fit_heights(station: Float, heights: Float, weights: Float, length: float, 
 
 
 def _fit_windows(data: AxisData, run: Float, tolerance: float) -> tuple[Chain, Float]:
-    """Fit window after window; return the whole chain and the stations (N,) of all points on it, roughly.
+    """Fit window after window; return the whole chain and the approximate stations (N,) of all points on it, m.
 
     `run` (N) tells how far along the points are, roughly as well.
     """
@@ -302,7 +302,7 @@ def _fit_windows(data: AxisData, run: Float, tolerance: float) -> tuple[Chain, F
 def _solve(
     data: AxisData, chosen: Int, start: Start | None, origin: float, length: float, tolerance: float
 ) -> ChainFit:
-    """Fit one window: as exact data if they are, else with knots as dense as the tolerance needs."""
+    """Return the fit of one window: as exact data if they are, else with knots as dense as the tolerance needs."""
     scale = 2.5 * length / len(chosen)  # knots need data between them
     count = independent_count(length, len(chosen))
     exact = Goal(tolerance, 2.0 * tolerance, _EXACT, count, int(length / 15.0) + 5)
@@ -326,20 +326,20 @@ def _solve(
 
 
 def _is_exact(fit: ChainFit) -> bool:
-    """Return whether nothing but rounding is left of the residuals."""
+    """Return whether the residuals are no more than the rounding of coordinates leaves."""
     r = fit.residuals
-    return fit.rms < _EXACT or (fit.rms < _ROUNDED and float(r[1:] @ r[:-1]) < _RANDOM * fit.square)
+    return fit.rms < _EXACT or (fit.rms < _ROUNDED and float(r[1:] @ r[:-1]) < _RANDOM * fit.sum_of_squares)
 
 
 def _window_end(chain: Chain, tail: float) -> float:
-    """Return where to leave a window: at its last knot before the tail, or within a long element."""
+    """Return the station (m) at which to leave a window: its last knot before the tail, or within a long element."""
     latest = max(chain.knots[-1] - tail, 0.5 * chain.knots[-1])  # points that turn back make a short chain
     good = chain.knots[(chain.knots <= latest) & (chain.knots >= 0.4 * latest)]
     return float(good[-1]) if len(good) else float(latest)
 
 
 def _cut_chain(chain: Chain, cut: float) -> Chain:
-    """Return the chain up to a station."""
+    """Return the part of a chain up to a station (m)."""
     count = int(np.searchsorted(chain.knots, cut - 1e-9))  # elements that begin before the cut
     knots = np.append(chain.knots[:count], cut)
     values = np.append(chain.values[:count], np.interp(cut, chain.knots, chain.values))

@@ -33,7 +33,7 @@ _RED: Color = (200, 30, 40)
 
 @contextmanager
 def draw_refused_fit(folder: Path | None) -> Iterator[None]:
-    """Write the picture of a fit that is refused meanwhile to a folder, if there is one, so that the error names it.
+    """Write the picture of a fit that is refused within the context to a folder, if given, and name it in the error.
 
     Raises:
         AxisRefusedError: the one that was raised, with the picture's path.
@@ -69,7 +69,7 @@ def axis_picture(fit: AxisFit, name: str) -> Image.Image:
 def _draw_row(
     draw: ImageDraw.ImageDraw, top: float, fit: AxisFit, title: str, values: Float, deviations: Deviations
 ) -> None:
-    """Draw one diagram: its limits are shown where the points come near them."""
+    """Draw one diagram of deviations over the station, with their limits where the points come near them."""
     reach = 1.15 * max(deviations.worst, 2.0 * fit.tolerance)
     box = (_LEFT * SCALE, top * SCALE, (_WIDTH - _MARGIN) * SCALE, (top + _PANEL) * SCALE)
     first, last = float(min(fit.stations.min(), 0.0)), float(max(fit.stations.max(), fit.alignment.length))

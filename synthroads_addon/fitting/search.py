@@ -77,7 +77,7 @@ class Goal:
         return fit.rms <= self.rms and fit.p95 <= self.p95
 
     def score(self, fit: ChainFit) -> float:
-        return self.expected_score(fit.square, fit.chain, len(fit.residuals))
+        return self.expected_score(fit.sum_of_squares, fit.chain, len(fit.residuals))
 
     def expected_score(self, square: float, chain: Chain, points: int) -> float:
         """Score of a chain with a sum of squares; an element costs half a parameter beyond its own."""
@@ -139,7 +139,7 @@ def _lift(chain: Chain, new: Chain, keep: list[int]) -> Float:
     inner = [i for i in keep if 0 < i < chain.size]
     old_knots, new_knots = chain.value_columns.stop, new.value_columns.stop
     lift = np.zeros((old_knots + chain.size - 1, new_knots + new.size - 1))
-    lift[: chain.turns, : chain.turns] = np.eye(chain.turns)
+    lift[: chain.pose_size, : chain.pose_size] = np.eye(chain.pose_size)
     lift[chain.value_columns, new.value_columns] = weights
     lift[chain.value_columns, new_knots:] = shifts[:, inner]
     lift[[old_knots + i - 1 for i in inner], range(new_knots, new_knots + len(inner))] = 1.0
@@ -162,13 +162,13 @@ def foresee(fit: ChainFit, edits: Sequence[Edit], free_knots: bool, goal: Goal) 
     scaled = least_squares(rows, np.concatenate((target, np.zeros(len(rows) - len(target)))))
     rest = rows @ scaled
     rest[: len(target)] -= target
-    square = float(rest @ rest) - float(projected @ projected) + fit.square
+    square = float(rest @ rest) - float(projected @ projected) + fit.sum_of_squares
     return apply_step(fit.data, new, basis @ (scaled / scale)), square
 
 
 def _allowance(fit: ChainFit, goal: Goal) -> float:
     """Return what a knot's step over its whole room costs, m: as much as all residuals."""
-    return float(np.sqrt(fit.square + len(fit.residuals) * goal.floor**2))
+    return float(np.sqrt(fit.sum_of_squares + len(fit.residuals) * goal.floor**2))
 
 
 def _covariance_root(fit: ChainFit, free_knots: bool, goal: Goal) -> Float:
@@ -200,7 +200,7 @@ def rank_edits(fit: ChainFit, free_knots: bool, goal: Goal) -> list[tuple[float,
         square[np.diag_indices(len(square))] *= 1.0 + 1e-9
         if (np.diag(square) > 0).all():
             cost = float(violation @ np.linalg.solve(square, violation))
-            score = goal.expected_score(fit.square + cost, apply_edits(chain, [edit])[0], len(fit.residuals))
+            score = goal.expected_score(fit.sum_of_squares + cost, apply_edits(chain, [edit])[0], len(fit.residuals))
             result.append((score - present, edit))
     return sorted(result, key=lambda pair: pair[0])
 

@@ -72,7 +72,7 @@ class Element:
 
     @property
     def kind(self) -> Kind:
-        """Kind of the element, told by angles (`FLAT_CLOTHOID`, `FLAT_ARC`), so that it doesn't depend on scale.
+        """Return "line", "arc" or "clothoid", told by angles (`FLAT_CLOTHOID`, `FLAT_ARC`) whatever the scale.
 
         What is no clothoid is well represented by `mean_curvature`, which is not zero where the kind is "arc".
         """
@@ -92,7 +92,7 @@ class Element:
 
 
 class Alignment:
-    """A chain of elements with a start; evaluated in float64 at any station, and inverted.
+    """A horizontal alignment: lines, arcs and clothoids chained from a start, evaluated at stations and inverted.
 
     Stations are metres along the axis in the map plane, 0 at the start. At an element's border curvature is that of
     the element which begins there; at the very end that of the last one; beyond the ends it is 0.
@@ -106,7 +106,7 @@ class Alignment:
     """
 
     def __init__(self, elements: Sequence[Element], x: float = 0.0, y: float = 0.0, heading: float = 0.0) -> None:
-        """Raise InputError without elements, or where x, y or heading is not a finite number."""
+        """Chain elements from x, y (m) and a heading (rad); InputError without any or for a value that isn't finite."""
         for name, value in (("x", x), ("y", y), ("heading", heading)):
             finite_array(f"alignment.{name}", value)
         if not elements:
@@ -121,7 +121,7 @@ class Alignment:
         self._nodes = self._build_nodes()
 
     def _build_pieces(self, lengths: Float, headings: Float) -> None:
-        """Tabulate the pieces' series; the first and last piece are the tangents beyond the ends."""
+        """Store the power series of all pieces of the elements, first and last the tangents beyond the ends."""
         k_start = np.array([element.curvature_start for element in self.elements])
         k_change = np.array([element.curvature_end for element in self.elements]) - k_start
         sharpest = np.maximum(np.abs(k_start), np.abs(k_start + k_change))
@@ -156,7 +156,7 @@ class Alignment:
         self._borders = np.concatenate((borders, [np.nextafter(self.length, np.inf)]))
 
     def _build_nodes(self) -> Float:
-        """Return (M, 3) station, x, y of coarse nodes, both ends included, at most `_NODE_SPACING` apart."""
+        """Return station, x, y (M, 3) of coarse nodes along the axis, ends included, at most `_NODE_SPACING` apart."""
         borders = np.concatenate((self._borders[:-1], [self.length]))
         count = np.maximum(1, np.ceil(np.diff(borders) / _NODE_SPACING)).astype(np.int64)
         owner = np.repeat(np.arange(len(count)), count)
@@ -166,7 +166,7 @@ class Alignment:
         return np.column_stack((station, x, y))
 
     def _evaluate(self, station: Float) -> tuple[Float, Float, Float, Float]:
-        """Return x, y from the start, heading and curvature at flat stations."""
+        """Return x and y less the start's (m), heading (rad) and curvature (1/m), each (N,), at stations (N,)."""
         piece = np.searchsorted(self._borders, station, side="right")
         u = station - self._middles[piece]
         v = u / self._halves[piece]
@@ -194,7 +194,7 @@ class Alignment:
         return position, out[2].reshape(stations.shape)[()], out[3].reshape(stations.shape)[()]
 
     def position(self, station: ArrayLike) -> Float:
-        """Return the map position (..., 2), m."""
+        """Return the axis' map positions (..., 2), m, at stations (...)."""
         return self.frame(station)[0]
 
     def place(self, station: Float, offset: Float) -> Float:
@@ -203,15 +203,15 @@ class Alignment:
         return position + offset[:, None] * left_vectors(heading)
 
     def heading(self, station: ArrayLike) -> Float:
-        """Return the heading (...), rad, counter-clockwise from +x."""
+        """Return the axis' heading (...) at stations (...), rad, counter-clockwise from +x, not wrapped."""
         return self.frame(station)[1]
 
     def curvature(self, station: ArrayLike) -> Float:
-        """Return the curvature (...), 1/m, positive in a left curve."""
+        """Return the axis' curvature (...) at stations (...), 1/m, positive in a left curve."""
         return self.frame(station)[2]
 
     def project(self, points: ArrayLike) -> tuple[Float, Float]:
-        """Return station (N,) and offset (N,) of map points (N, 2); the offset is positive to the left.
+        """Return station and offset (N,), m, of map points (N, 2) projected onto the axis; offset positive to the left.
 
         The foot is the road's nearest point. The tangents beyond the ends serve the points whose nearest point of the
         road is an end (the nearer tangent, if both would do), so a road that bends round and crosses its own
@@ -227,7 +227,7 @@ class Alignment:
         return station, offset
 
     def project_near(self, points: ArrayLike, station: ArrayLike, reach: float) -> tuple[Float, Float]:
-        """Return station (N,) and offset (N,) of points (N, 2) whose stations are known to within `reach` metres.
+        """Return station and offset (N,) of points (N, 2) whose stations are known to within `reach` metres.
 
         Faster than `project`, it cannot stray to another branch of a road that crosses itself, and it takes the
         tangents beyond the ends like the road. A foot farther away is replaced by the end of the reach.
@@ -240,7 +240,7 @@ class Alignment:
         return foot, offset
 
     def _leaves(self, x: Float, y: Float) -> Iterator[tuple[Int, Float, Float, Int]]:
-        """Halve the points along their longer extent until few are left, near few nodes; yield both.
+        """Yield compact groups of the points: indices, x, y, and the indices of all nodes that may be nearest to them.
 
         Points in any order thus fall into compact boxes, and each box meets only the nodes around it.
         """
@@ -258,7 +258,7 @@ class Alignment:
             stack += [(chosen[part], x[part], y[part]) for part in (order[:half], order[half:])]
 
     def _nodes_near(self, low: Float, high: Float) -> Int:
-        """Return indices of every node that may be next to the nearest point of something in the box.
+        """Return the indices of all nodes that may lie next to the foot of a point in the box from low to high (2,).
 
         The nearest node of a point is at most half a spacing farther than its foot, hence the margin.
         """
@@ -268,8 +268,8 @@ class Alignment:
         return np.flatnonzero(nearest <= farthest.min() + _NODE_SPACING)
 
     def _project_leaf(self, x: Float, y: Float, nodes: Int) -> tuple[Float, Float]:
-        """Start from every node that is a local minimum of the distance and near the least; keep the best foot."""
-        owner, column = _rivals(x, y, self._nodes[nodes, 1], self._nodes[nodes, 2])
+        """Return station and offset (K,) of points: of the feet found from each locally nearest node the nearest."""
+        owner, column = _candidate_nodes(x, y, self._nodes[nodes, 1], self._nodes[nodes, 2])
         start = nodes[column]
         stations = self._nodes[:, 0]
         low = stations[np.maximum(start - 1, 0)]
@@ -285,7 +285,7 @@ class Alignment:
         return station, offset
 
     def _on_tangents(self, x: Float, y: Float) -> tuple[Float, Float]:
-        """Return station and offset on the nearer of both tangents, of points that lie beyond an end."""
+        """Return station and offset (K,), m, of points beyond an end, on the nearer of both end tangents."""
         feet = []
         for end, side in ((0.0, -1.0), (self.length, 1.0)):
             px, py, heading, _ = (float(value[0]) for value in self._evaluate(np.array([end])))
@@ -297,7 +297,7 @@ class Alignment:
         return np.where(later, station_1, station_0), np.where(later, offset_1, offset_0)
 
     def _find_feet(self, x: Float, y: Float, station: Float, low: Float, high: Float) -> tuple[Float, Float, Float]:
-        """Improve stations between low and high until the tangent there is square to the point.
+        """Return the points' feet, found by iteration within brackets of stations, and their distances from there, m.
 
         The step is exact on a circle: with g along and d across, the angle at its centre is atan2(k g, 1 - k d). A
         step that leaves the bracket, which narrows by the sign of g, is replaced by bisection.
@@ -326,7 +326,7 @@ class Alignment:
 
 
 def _series(bend: Float, slope: Float) -> NDArray[np.complex128]:
-    """Return (terms + 1, P) coefficients of the position for unit half length; the constant is left 0."""
+    """Return the position's complex coefficients (terms + 1, P) for unit half length; the constant is left 0."""
     w = np.zeros((_TERMS + 1, len(bend)), complex)
     z = np.zeros_like(w)
     w[0] = 1.0
@@ -337,15 +337,15 @@ def _series(bend: Float, slope: Float) -> NDArray[np.complex128]:
 
 
 def _step(along: Float, offset: Float, bend: Float) -> Float:
-    """Return the arc length to the foot on the circle of curvature, for a straight the distance along."""
+    """Return the arc length (m) along the circle of curvature to a point's foot, on a straight the distance along."""
     turn, lever = bend * along, 1.0 - bend * offset
     curved = np.abs(turn) > 1e-9
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(curved, np.arctan2(turn, lever) / np.where(curved, bend, 1.0), along / lever)
 
 
-def _rivals(x: Float, y: Float, node_x: Float, node_y: Float) -> tuple[Int, Int]:
-    """Return (point, node) index pairs, sorted by point: nodes whose distance is a local minimum near the least."""
+def _candidate_nodes(x: Float, y: Float, node_x: Float, node_y: Float) -> tuple[Int, Int]:
+    """Return (point, node) index pairs, sorted by point, of nodes at a local minimum of distance near the least."""
     centre_x, centre_y = node_x.mean(), node_y.mean()  # cancellation then stays far below a node spacing
     p = np.column_stack((x - centre_x, y - centre_y))
     q = np.stack((node_x - centre_x, node_y - centre_y))
@@ -367,7 +367,7 @@ def left_vectors(heading: Float) -> Float:
 
 
 def clip_offset(offset: ArrayLike, curvature: ArrayLike) -> Float:
-    """Return the offset cut where its curve would fold, so that 1 - curvature x offset stays above 0.
+    """Return the offset (m) cut where its parallel curve would fold, so that 1 - curvature x offset stays above 0.
 
     Args:
         offset: m, positive to the left; broadcast against `curvature`.

@@ -26,7 +26,7 @@ _TWO = "at least two distinct points are needed"
 
 
 def read_axis(path: str | os.PathLike[str]) -> Float:
-    """Return the points (N, 3) of an axis, m, in the file's order.
+    """Read the points (N, 3) of an axis, m, from a CSV or GeoJSON file in a projected system, in the file's order.
 
     CSV (comma, semicolon, tab or spaces): with a header that names at least x and y (z optional, other columns
     ignored, any order, any case), or without one as x, y and, optionally, z. Empty lines and lines that begin with #
@@ -44,12 +44,12 @@ def read_axis(path: str | os.PathLike[str]) -> Float:
     points = np.array(rows, dtype=np.float64).reshape(-1, 3)
     if len(np.unique(points[:, :2], axis=0)) < 2:
         raise InputError(name, None, f"{_TWO}, the file has {len(points)} points in all")
-    _refuse_slips(name, points)
+    _check_spacing(name, points)
     return points
 
 
-def _refuse_slips(name: str, points: Float) -> None:
-    """Refuse a point (of N, 3) far from its neighbours: it lacks a digit, and the fit would look for a road there."""
+def _check_spacing(name: str, points: Float) -> None:
+    """Raise InputError for a point (of N, 3) implausibly far from its neighbours, as if it lacked a digit."""
     steps = np.diff(points[:, :2], axis=0)
     length = np.hypot(*steps.T)
     if length.max() > _LONGEST_STEP:
@@ -112,7 +112,7 @@ def _is_number(entry: str) -> bool:
 
 
 def _columns(place: str, head: list[str]) -> list[int]:
-    """Return the places of x, y and, where there is one, z."""
+    """Return the column indices of x, y and, if present, z in a header; InputError if x or y is missing or doubled."""
     names = [entry.lower() for entry in head]
     for axis in ("x", "y"):
         if axis not in names:
@@ -167,7 +167,7 @@ def _read_json(name: str, text: str) -> list[tuple[float, float, float]]:
 
 
 def _line_strings(name: str, node: object) -> Iterator[dict[str, Any]]:
-    """Yield every LineString in a GeoJSON document; refuse what is no GeoJSON and lines of several parts."""
+    """Yield every LineString of a GeoJSON document; InputError for lines of several parts and what is no GeoJSON."""
     member = node if isinstance(node, dict) else {}
     kind = member.get("type")
     if kind == "FeatureCollection" and isinstance(member.get("features"), list):
@@ -185,7 +185,7 @@ def _line_strings(name: str, node: object) -> Iterator[dict[str, Any]]:
 
 
 def _refuse_degrees(name: str, document: dict[str, Any], rows: list[tuple[float, float, float]]) -> None:
-    """Refuse geographic coordinates: by the file's own word, or where it says nothing, by their size and extent."""
+    """Raise InputError for geographic coordinates, told by the member `crs` or, without it, by size and extent."""
     system = json.dumps(document.get("crs")) if document.get("crs") else ""
     named = any(word in system for word in ("CRS84", "4326", "4258"))
     plan = np.array(rows).reshape(-1, 3)[:, :2]
@@ -196,7 +196,7 @@ def _refuse_degrees(name: str, document: dict[str, Any], rows: list[tuple[float,
 
 
 def centerline_geojson(geometry: RoadGeometry, stations: Float) -> dict[str, Any]:
-    """Return a FeatureCollection with the centreline through the given stations (N,), elevations included.
+    """Return a GeoJSON FeatureCollection with the centreline through stations (N,), m, elevations included.
 
     Coordinates are those of the parameter set's reference system, named by the member ``crs`` (GeoJSON 2008); 0.1 mm.
     """

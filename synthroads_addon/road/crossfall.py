@@ -44,7 +44,7 @@ def crossing_length(design_class: str, half_width: float) -> float:
 
 
 def wanted_percent(design_class: str, side: str, curvature: float) -> float:
-    """Return the crossfall (%, positive to the right) of a carriageway on a curvature (1/m).
+    """Return the crossfall (%, positive where it falls to the right) that a carriageway needs at a curvature (1/m).
 
     Outwards on straights and in curves wide enough for it, else to the inside of the curve.
     """
@@ -56,7 +56,7 @@ def wanted_percent(design_class: str, side: str, curvature: float) -> float:
 def crossfall_points(
     design_class: str, side: str, half_width: float, elements: tuple[HorizontalElement, ...]
 ) -> tuple[CrossfallPoint, ...]:
-    """Return a carriageway's crossfall along the elements: constant on straights and arcs, run off on clothoids.
+    """Return a carriageway's crossfall by station: constant on lines and arcs, changing along the clothoids.
 
     Where it changes its sign it does so in `crossing_length`, so that the part without enough crossfall is short.
     """
@@ -84,7 +84,7 @@ def crossfall_points(
 def _run_off(
     design_class: str, half_width: float, begin: tuple[float, float], end: tuple[float, float]
 ) -> list[tuple[float, float]]:
-    """Return (station, percent) at the corners after ``begin`` up to ``end``."""
+    """Return (station m, crossfall %) at the corners of a crossfall transition after ``begin`` up to ``end``."""
     (s0, a), (s1, b) = begin, end
     if a * b >= 0.0 or s1 <= s0:
         return [end]

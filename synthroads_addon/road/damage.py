@@ -32,7 +32,7 @@ DAMAGES = (
 
 
 def damage_numbers(pavement: Pavement) -> list[int]:
-    """Return the kind of each of a pavement's damages, as `DAMAGES` numbers them, in the order of `instances`."""
+    """Return the index in `DAMAGES` of each of a pavement's ruts, potholes, patches and cracks, in this order."""
     numbers = [1] * len(pavement.ruts) + [2] * len(pavement.potholes) + [3] * len(pavement.patches)
     first = DAMAGES.index("longitudinal crack")
     kinds = ("longitudinal", "transverse", "alligator")
@@ -48,7 +48,7 @@ def damage_depth(section: CarriagewaySection, station: Float, offset: Float) -> 
 
 
 def deepest_damage(section: CarriagewaySection, station: Float, offset: Float) -> Int:
-    """Return the damage (N,) that is deepest at stations and offsets (N,): ruts count first, potholes after; -1: none.
+    """Return the index (N,) of the deepest rut or pothole, ruts counted first, at stations and offsets (N,); -1: none.
 
     Of two that are as deep the first counts.
     """
@@ -61,7 +61,7 @@ def deepest_damage(section: CarriagewaySection, station: Float, offset: Float) -
 
 
 def _depths(section: CarriagewaySection, station: Float, offset: Float) -> Iterator[tuple[Bool, Float]]:
-    """Yield of every rut, then of every pothole, which places (N,) lie along it, and its depth (K,) there, m."""
+    """Yield for each rut, then each pothole, a mask (N,) of the places along it and its depth (K,) at these, m."""
     for rut in section.carriageway.pavement.ruts:
         near = (station > rut.start_station) & (station < rut.end_station)
         yield near, _rut_depth(section, rut, station[near], offset[near]) if near.any() else np.empty(0)
@@ -89,7 +89,7 @@ def _pothole_depth(pothole: Pothole, station: Float, offset: Float) -> Float:
 
 
 def damaged_strips(section: CarriagewaySection) -> list[int]:
-    """Return the indices (into ``section.kinds``) of the strips that damage lies in, in order."""
+    """Return the sorted indices into ``section.kinds`` of the strips that ruts or potholes lie in."""
     first, lanes = section.kinds.index("lane"), len(section.carriageway.lanes)
     strips = {first + lanes - 1 - rut.lane for rut in section.carriageway.pavement.ruts if rut.lane < lanes}
     for pothole in section.carriageway.pavement.potholes:
@@ -100,7 +100,7 @@ def damaged_strips(section: CarriagewaySection) -> list[int]:
 
 
 def damage_rows(section: CarriagewaySection, tolerance: float) -> list[float]:
-    """Return the stations at which a mesh needs rows to follow the damage within the tolerance (m)."""
+    """Return stations (m, unsorted) where a mesh needs rows to follow ruts and potholes within the tolerance (m)."""
     rows: list[float] = []
     for rut in section.carriageway.pavement.ruts:
         ramp = min(rut.ramp_length, (rut.end_station - rut.start_station) / 2.0)
@@ -115,7 +115,7 @@ def damage_rows(section: CarriagewaySection, tolerance: float) -> list[float]:
 def damage_columns(
     section: CarriagewaySection, strip: int, tolerance: float, start: float = -np.inf, end: float = np.inf
 ) -> Float:
-    """Return the (K,) shares of a strip's width, from 0 at its inner to 1 at its outer edge, that a mesh needs.
+    """Return the sorted (K,) shares of a strip's width, 0 its inner and 1 its outer edge, that a mesh needs for damage.
 
     Args:
         section: of a carriageway.
@@ -144,7 +144,7 @@ def damage_columns(
 
 
 def space_shares(shares: Float) -> Float:
-    """Return sorted shares (K,) of a strip's width, both ends included, without those that only make slivers."""
+    """Return sorted shares (K,) of a strip's width without those that make slivers; both ends are kept."""
     kept = [shares[0]]
     for share in shares[1:-1].tolist():
         if min(share - kept[-1], shares[-1] - share) > _SLIVER:
@@ -158,7 +158,7 @@ def _shares(section: CarriagewaySection, strip: int, station: float, distance: F
 
 
 def _across(section: CarriagewaySection, pothole: Pothole) -> tuple[float, float]:
-    """Return the distances of a pothole's inner and outer edge."""
+    """Return the distances of a pothole's inner and outer edge from the centreline, m, positive outwards."""
     middle = section.carriageway.sign * pothole.offset
     return middle - pothole.width / 2.0, middle + pothole.width / 2.0
 
@@ -168,12 +168,12 @@ def _has_lane(section: CarriagewaySection, rut: Rut) -> bool:
 
 
 def _cells_of_cosine(depth: float, tolerance: float) -> int:
-    """Return into how many chords half a wave of a cosine of this height is cut: depth pi^2 / (16 n^2) off at most."""
+    """Return the number n of chords that follow half a cosine wave (m): depth pi^2 / (16 n^2) off at most."""
     return int(np.ceil(np.pi / 4.0 * np.sqrt(depth / (0.5 * tolerance)))) + 1
 
 
 def _cells_of_bowl(depth: float, tolerance: float) -> int:
-    """Return into how many cells a bowl's diameter is cut.
+    """Return the number of cells across a pothole's bowl that follow it within half the tolerance (m).
 
     Its slope jumps at the rim by 4 depth / diameter, and cells of a side h across the rim are h / 4 times that off.
     """

@@ -52,7 +52,7 @@ _STILL, _MOST_ROUNDS = 1e-7, 2000  # of the membrane over a hole: m, rounds
 
 @dataclass(frozen=True)
 class HeightGrid:
-    """Where the cells of a raster lie.
+    """Georeference of a raster without rotation: where the centres of its cells lie on the map.
 
     Attributes:
         east, north: map coordinates of the first cell's centre, m.
@@ -83,25 +83,25 @@ class HeightGrid:
         return np.stack([self.east + column * self.step_east, self.north + row * self.step_north])
 
     def locate(self, east: Float, north: Float) -> Float:
-        """Return rows and columns with fractions (2, ...) of map coordinates (...), m."""
+        """Return the fractional rows and columns (2, ...) of map coordinates (...), m."""
         return np.stack([(north - self.north) / self.step_north, (east - self.east) / self.step_east])
 
     def between_centres(self, located: Float) -> Bool:
-        """Return whether rows and columns (2, ...) lie between the centres of the outermost cells."""
+        """Return a mask (...): which fractional rows and columns (2, ...) lie within the outermost cells' centres."""
         row, column = located
         room = 1e-6  # of a cell, for rounding
         inside = (row >= -room) & (row <= self.rows - 1 + room)
         return inside & (column >= -room) & (column <= self.columns - 1 + room)
 
     def first_of_four(self, located: Float) -> Cells:
-        """Return the first of the four cells (2, ...) around rows and columns (2, ...), which may not be NaN."""
+        """Return the cell of least row and column (2, ...) of the four around fractional ones (2, ...), not NaN."""
         row, column = np.floor(located).astype(np.int64)
         return np.stack([np.clip(row, 0, self.rows - 2), np.clip(column, 0, self.columns - 2)])
 
 
 @dataclass(frozen=True)
 class Corridor:
-    """The ground that a road needs.
+    """The area beside a centreline over which a road needs an elevation model.
 
     Attributes:
         alignment: centreline in local coordinates.
@@ -115,7 +115,7 @@ class Corridor:
     reach: float
 
     def points(self, cell: float) -> Iterator[Float]:
-        """Yield east and north (2, N) of map points, half a cell (m) apart or less, up to a cell beyond the reach.
+        """Yield blocks of map points (2, N), m, half a cell apart or less, that cover the corridor and a cell more.
 
         So each cell that a height within the reach is interpolated from is one of the four around some point.
         """
@@ -132,7 +132,7 @@ class Corridor:
 
 
 class ElevationModel:
-    """Heights of the ground in memory, interpolated bilinearly between the centres of the cells.
+    """Heights of the ground in memory, by tiles, interpolated bilinearly between the centres of a raster's cells.
 
     Attributes:
         path: file that it was read from.
@@ -170,12 +170,12 @@ class ElevationModel:
         return self._tiles[number, row % _TILE, column % _TILE]
 
     def set(self, cells: Cells, heights: Float) -> None:
-        """Give loaded cells (2, N) heights (N,), m."""
+        """Set the heights (N,), m, of loaded cells (2, N), in place."""
         row, column = cells
         self._tiles[self._number[row // _TILE, column // _TILE], row % _TILE, column % _TILE] = heights
 
     def load(self, dataset: DatasetReader, cells: Cells | None) -> None:
-        """Read the tiles that hold cells (2, N), or all.
+        """Replace the heights in memory by the raster's tiles that hold cells (2, N), or by all tiles.
 
         Raises:
             InputError: that is more than fits into memory.
@@ -198,7 +198,7 @@ class ElevationModel:
             self._tiles[number, :height, :width] = values.astype(np.float64).filled(np.nan) * scale + offset
 
     def extremes(self) -> Cells:
-        """Return a lowest and a highest of the loaded cells, as (2, 2); none, (2, 0), if none has a height."""
+        """Return a lowest and a highest of the loaded cells as columns of (2, 2); (2, 0) if none has a height."""
         if np.isnan(self._tiles).all():
             return np.empty((2, 0), dtype=np.int64)
         flat = np.nanargmin(self._tiles), np.nanargmax(self._tiles)
@@ -208,7 +208,7 @@ class ElevationModel:
 
 
 def read_elevation_model(path: str | os.PathLike[str], epsg: int, corridor: Corridor | None = None) -> ElevationModel:
-    """Return the heights of a GeoTIFF or ESRI ASCII grid.
+    """Read a digital elevation model (GeoTIFF, ESRI ASCII grid), which must be in the coordinate system ``epsg``.
 
     Args:
         path: the file. An ASCII grid without ``.prj`` beside it is taken to be in the map coordinates of ``epsg``.
@@ -256,14 +256,14 @@ def read_elevation_model(path: str | os.PathLike[str], epsg: int, corridor: Corr
 
 
 def _reason(error: BaseException) -> str:
-    """Return the text of an error's first cause, which says most, in one line."""
+    """Return the message of an error's innermost cause, which says most, in one line."""
     while error.__cause__ is not None:
         error = error.__cause__
     return " ".join(str(error).split())
 
 
 def _check_kind(name: str, dataset: DatasetReader) -> None:
-    """Refuse what is no single band of heights in metres."""
+    """Raise InputError unless a raster is a GeoTIFF or ASCII grid of one band of heights in metres."""
     if dataset.driver not in ("GTiff", "AAIGrid"):
         raise InputError(f"{name}: format", dataset.driver, "a GeoTIFF or ESRI ASCII grid is needed")
     if dataset.count != 1:
@@ -282,7 +282,7 @@ def _check_unit(name: str, what: str, unit: str) -> None:
 
 
 def _check_system(name: str, dataset: DatasetReader, epsg: int) -> None:
-    """Refuse another map coordinate system than the road's, and feet."""
+    """Raise InputError unless a raster is in the road's map coordinate system and in metres."""
     from rasterio.crs import CRS  # the package is optional
     from rasterio.errors import CRSError
 
@@ -306,7 +306,7 @@ def _check_system(name: str, dataset: DatasetReader, epsg: int) -> None:
 
 
 def _horizontal(system: CRS) -> tuple[CRS, str]:
-    """Return the horizontal part of a coordinate system, and the unit of its vertical part, if it has one."""
+    """Return the horizontal part of a coordinate system and its vertical part's unit, empty without such a part."""
     parts: list[dict[str, Any]] = system.to_dict(projjson=True).get("components", [])
     if not parts:
         return system, ""
@@ -364,7 +364,7 @@ def _too_fine(path: str) -> InputError:
 
 
 def _four_around(first: Cells) -> Cells:
-    """Return the cells (2, M), each once, that are one of four whose first is among some (2, N)."""
+    """Return the distinct cells (2, M) of all blocks of 2 by 2 cells whose first cells are given (2, N)."""
     corner = first.min(axis=1, keepdims=True)
     seen = np.zeros(first.max(axis=1) - corner[:, 0] + 2, dtype=bool)
     seen[tuple(first - corner)] = True
@@ -378,7 +378,7 @@ def _area(low: Float, high: Float) -> str:
 
 
 def _check_heights(model: ElevationModel, cells: Cells) -> None:
-    """Refuse cells (2, N) that lie too high or too low."""
+    """Raise InputError if a cell (2, N) is lower than `LOWEST` or higher than `HIGHEST`."""
     heights = model.at(cells)
     wrong = np.flatnonzero((heights < LOWEST) | (heights > HIGHEST))
     if len(wrong):
@@ -387,7 +387,7 @@ def _check_heights(model: ElevationModel, cells: Cells) -> None:
 
 
 def _fill_holes(model: ElevationModel, cells: Cells) -> None:
-    """Fill those of the cells (2, N) that have no height, from around them; InputError where they are too many."""
+    """Fill in place those of the cells (2, N) without height, from around them; InputError if they are too many."""
     needed = cells.shape[1]
     cells = cells[:, np.isnan(model.at(cells))]
     if cells.shape[1] > HOLES_SHARE * needed:
@@ -403,14 +403,11 @@ def _fill_holes(model: ElevationModel, cells: Cells) -> None:
         left = left[:, ~rim]
     if left.size:
         _refuse(model, left, "no height, and the hole there is too large")
-    _stretch(model, cells)
+    _smooth_filled(model, cells)
 
 
-def _stretch(model: ElevationModel, cells: Cells) -> None:
-    """Stretch a membrane over filled cells (2, N), which carries a plane on: each is the mean of those beside it.
-
-    Laplace's equation, by Jacobi's rounds.
-    """
+def _smooth_filled(model: ElevationModel, cells: Cells) -> None:
+    """Smooth filled cells (2, N) in place by Jacobi's iteration of Laplace's equation, which carries a plane on."""
     heights = model.at(cells)
     for _ in range(_MOST_ROUNDS):
         mean = np.nanmean(model.at(cells[:, :, None] + _BESIDE[:, None]), axis=1)

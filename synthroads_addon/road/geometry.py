@@ -75,7 +75,7 @@ class RoadGeometry:
 
     @cached_property
     def numbers(self) -> InstanceNumbers:
-        """The instance numbers of all objects and of what they consist of."""
+        """The instance numbers of all objects and of their parts, made once."""
         return InstanceNumbers(self.parameters)
 
     def crossfall(self, carriageway: Carriageway, station: ArrayLike) -> Float:
@@ -88,7 +88,7 @@ class RoadGeometry:
         return self._across({side: section.distances(station) for side, section in self.sections.items()}, True)
 
     def boundary_elevations(self, station: ArrayLike) -> Float:
-        """Return the (N, M + 1) local elevations of the strips' boundaries at N stations, without damage."""
+        """Return the (N, M + 1) local elevations of the strips' boundaries at N stations, m, without damage."""
         station = np.atleast_1d(np.asarray(station, dtype=np.float64))
         relative = {
             side: section.elevations(station, self.crossfall(section.carriageway, station))
@@ -97,7 +97,7 @@ class RoadGeometry:
         return self.profile.elevation(station)[:, None] + self._across(relative, False)
 
     def elevation(self, station: ArrayLike, offset: ArrayLike) -> Float:
-        """Return the surface's local elevation (N,), damage included; NaN outside the outermost boundaries."""
+        """Return the surface's local elevation (N,), m, damage included; NaN outside the outermost boundaries."""
         station, offset = _pairs(station, offset)
         strip = self.strip_index(station, offset)
         inside = np.flatnonzero(strip >= 0)
@@ -113,7 +113,7 @@ class RoadGeometry:
         return result
 
     def strip_index(self, station: ArrayLike, offset: ArrayLike) -> Index:
-        """Return the index into `strips` of stations and offsets (N,); -1 outside."""
+        """Return the index (N,) into `strips` of the strip at stations and offsets (N,), m; -1 outside the road."""
         station, offset = _pairs(station, offset)
         boundaries = self.offsets(station)
         index = np.count_nonzero(boundaries >= offset[:, None], axis=1) - 1
@@ -135,7 +135,7 @@ class RoadGeometry:
         return result
 
     def point(self, station: ArrayLike, offset: ArrayLike) -> Float:
-        """Return local points (N, 3) of the surface; z is NaN outside the road."""
+        """Return the surface's local points (N, 3) at stations and offsets (N,), m; z is NaN outside the road."""
         station, offset = _pairs(station, offset)
         return np.column_stack([self.alignment.place(station, offset), self.elevation(station, offset)])
 
@@ -189,7 +189,7 @@ def profile_of(axis: AlignmentObject) -> Profile:
 
 
 def sections_of(parameters: RoadParameters) -> dict[Side, CarriagewaySection]:
-    """Return the cross-section of every carriageway, its turnouts included."""
+    """Return the cross-section of every carriageway by side, its turnouts included."""
     turnouts = parameters.of_type(Turnout).values()
     return {
         item.side: CarriagewaySection(item, [turnout for turnout in turnouts if turnout.carriageway == name])
@@ -205,5 +205,5 @@ def _strips(section: CarriagewaySection) -> list[SurfaceStrip]:
 
 
 def _pairs(*values: ArrayLike) -> list[Float]:
-    """Return values of any shape as flat arrays (N,) of one length."""
+    """Return values flattened and broadcast to arrays (N,) of one length."""
     return np.broadcast_arrays(*(np.asarray(value, dtype=np.float64).ravel() for value in values))

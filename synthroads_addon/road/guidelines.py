@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class DesignLimits:
-    """Limits of one design class.
+    """Limits of the RAA for one design class of motorways.
 
     Attributes:
         speed: speed used for driving dynamics on a wet road, km/h.
@@ -47,7 +47,7 @@ LONGEST_STRAIGHT = 2000.0
 
 @dataclass(frozen=True)
 class StandardCrossSection:
-    """One direction of an RQ, m; lanes from outside to inside."""
+    """Widths of one carriageway of a standard cross-section (RQ), m; lanes from outside to inside."""
 
     lanes: tuple[float, ...]
     hard_shoulder: float
@@ -58,7 +58,7 @@ class StandardCrossSection:
 
     @property
     def paved_width(self) -> float:
-        """Return the width from the inner edge strip to the hard shoulder, m."""
+        """Return the width of one carriageway from the inner edge strip to the hard shoulder, m."""
         return math.fsum(self.lanes) + self.hard_shoulder + self.outer_edge_strip + self.inner_edge_strip
 
 

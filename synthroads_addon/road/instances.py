@@ -35,7 +35,7 @@ _PLANTS_PER_METRE = 8
 
 @dataclass(frozen=True)
 class Parts:
-    """Numbers of an object's parts.
+    """The block of instance numbers of an object's parts.
 
     Attributes:
         kind: ``dash``, ``damage``, ``strip``, ``tree`` or ``shrub``.
@@ -52,7 +52,7 @@ class Parts:
 
 @dataclass(frozen=True)
 class PassNumbers:
-    """Numbers of the passes of a vehicle that leaves the road and comes in again.
+    """Instance numbers of a vehicle's later passes: whenever it comes in again after it has left the road.
 
     Attributes:
         first: number of its second pass; the first has the vehicle's own.
@@ -63,12 +63,12 @@ class PassNumbers:
     step: int
 
     def number(self, own: int, passes: int) -> int:
-        """Return the number of a pass, 0 the first, of a vehicle with a number of its own."""
+        """Return the instance number of a vehicle's pass, 0 the first, which has the number ``own``."""
         return own if passes <= 0 else self.first + (passes - 1) * self.step
 
 
 class InstanceNumbers:
-    """Numbers of everything in a parameter set that points can be of.
+    """Instance numbers of everything in a parameter set that points can be of: objects, parts, passes of vehicles.
 
     Args:
         parameters: the whole road's, not those of a stretch.
@@ -96,7 +96,7 @@ class InstanceNumbers:
         self.passes = {name: PassNumbers(first + number, len(vehicles)) for number, name in enumerate(vehicles)}
 
     def name_of(self, number: int) -> str | None:
-        """Return what a number stands for: an object's id, with a slash and its part; None if it stands for nothing."""
+        """Return an instance number's object id, for a part with a slash and the part's name; None if it is unused."""
         if number in self._own:
             return self._own[number]
         starts, names = self._blocks
@@ -114,7 +114,7 @@ class InstanceNumbers:
         return None
 
     def part_name(self, name: str, part: int) -> str:
-        """Return the name of an object's part, counted from 0."""
+        """Return the name of an object's part, counted from 0, such as "dash-3" or "median"."""
         kind, item = self.parts[name].kind, self._parameters.objects[name]
         if kind == "strip":
             return GRASS_STRIPS[part]
@@ -123,11 +123,11 @@ class InstanceNumbers:
         return f"{kind}-{part}"
 
     def part(self, name: str, part: int) -> tuple[str, int]:
-        """Return the id and the number of an object's part, counted from 0."""
+        """Return the name (object/part) and the instance number of an object's part, counted from 0."""
         return f"{name}/{self.part_name(name, part)}", self.parts[name].first + part
 
     def damages(self) -> dict[int, int]:
-        """Return the kinds of the damages of all pavements, as `road.damage.DAMAGES` numbers them, by their numbers."""
+        """Return instance number -> index in `road.damage.DAMAGES` of the damages of all pavements."""
         return {
             self.parts[name].first + part: kind
             for name, item in self._parameters.of_type(Carriageway).items()
@@ -135,19 +135,19 @@ class InstanceNumbers:
         }
 
     def owner(self, number: int) -> str | None:
-        """Return the id of the object that a number is of, or of a part of; None if it stands for nothing."""
+        """Return the id of the object that an instance number is of, or of a part of; None if it is unused."""
         name = self.name_of(number)
         return None if name is None else name.partition("/")[0]
 
-    def about(self, instance: int) -> dict[str, int]:
-        """Return where the numbers of the parts and passes of an object with a number begin, as attributes."""
+    def part_attributes(self, instance: int) -> dict[str, int]:
+        """Return the first instance numbers and counts of an object's parts and passes, as attributes by name."""
         name = self._own[instance]
         parts, again = self.parts.get(name), self.passes.get(name)
         told = {"first_part_instance": parts.first, "part_count": parts.count} if parts else {}
         return told | ({"first_pass_instance": again.first, "pass_step": again.step} if again else {})
 
     def belong(self, name: str, numbers: NDArray[np.integer]) -> Bool:
-        """Return which numbers (N,) are an object's or its parts'; not those of later passes."""
+        """Return a mask (N,) of the instance numbers that are an object's or its parts', not those of later passes."""
         found: Bool = numbers == self._parameters.objects[name].instance
         if name in self.parts:
             parts = self.parts[name]
@@ -155,7 +155,7 @@ class InstanceNumbers:
         return found
 
     def to_dict(self) -> dict[str, object]:
-        """Return the numbers of parts and passes as JSON data, as a job's report has them."""
+        """Return the instance numbers of parts and passes as JSON data, as a job's report has them."""
         parts = {
             name: {"instance": self._parameters.objects[name].instance, "part": one.kind, "first": one.first}
             | {"count": one.count}
@@ -170,13 +170,13 @@ class InstanceNumbers:
 
     @cached_property
     def _blocks(self) -> tuple[list[int], list[str]]:
-        """Return where the blocks begin, and whose they are, in the order of their numbers."""
+        """Return the sorted first numbers of all blocks of parts, and the ids of the objects that they are of."""
         ordered = sorted((one.first, name) for name, one in self.parts.items())
         return [first for first, _ in ordered], [name for _, name in ordered]
 
 
 class _FreeNumbers:
-    """Numbers that no object has, lowest first.
+    """Instance numbers that no object has, lowest first.
 
     Args:
         taken: numbers of the objects, in order.
@@ -187,7 +187,7 @@ class _FreeNumbers:
         self._gaps = [(a + 1, b) for a, b in zip([0, *taken], ends, strict=True) if b > a + 1]
 
     def block(self, count: int, name: str) -> int:
-        """Return the first of so many numbers side by side, and take them."""
+        """Take the lowest ``count`` consecutive free numbers and return the first; InputError if there are none."""
         for place, (start, end) in enumerate(self._gaps):
             if end - start >= count:
                 self._gaps[place] = (start + count, end)
@@ -195,12 +195,12 @@ class _FreeNumbers:
         raise InputError(f"objects.{name}", count, f"consists of so many parts: no numbers up to {LARGEST} are left")
 
     def rest(self) -> int:
-        """Return the first number after all that are taken."""
+        """Return the first number of the last gap: what follows it is free."""
         return self._gaps[-1][0] if self._gaps else LARGEST
 
 
 def _parts_of(item: RoadObject, parameters: RoadParameters, length: int) -> tuple[str, int, int]:
-    """Return what an object consists of, of how many parts, and how many numbers are kept for them."""
+    """Return the kind of an object's parts, their count and the least count of numbers to keep; "", 0, 0 without."""
     if isinstance(item, Carriageway):
         return "damage", len(damage_kinds(item.pavement)), 0
     if isinstance(item, LineMarking):
@@ -213,20 +213,20 @@ def _parts_of(item: RoadObject, parameters: RoadParameters, length: int) -> tupl
 
 
 def damage_kinds(pavement: Pavement) -> list[str]:
-    """Return what each of a pavement's damages is, in the order of their numbers."""
+    """Return "rut", "pothole", "patch" or "crack" for each of a pavement's damages, in the order of their numbers."""
     names = ("rut", "pothole", "patch", "crack")
     items = (pavement.ruts, pavement.potholes, pavement.patches, pavement.cracks)
     return [name for name, of_kind in zip(names, items, strict=True) for _ in of_kind]
 
 
 def places_per_metre(plants: Vegetation, terrain: Terrain) -> int:
-    """Return how many places for plants a metre of road has: in the nodes' float32, so that rounding is the same."""
+    """Return the number of places for plants per metre of road, rounded by float32 as in the nodes."""
     per_metre = np.float32(np.float32(terrain.half_width) * np.float32(2.0)) * np.float32(plants.density)
     return max(1, math.ceil(np.float32(per_metre * np.float32(SPARE))))
 
 
 def dash_count(line: LineMarking, length: float) -> int:
-    """Return how many dashes a line has on a road of a length (m); 1 for a solid one, whose dash is the line itself."""
+    """Return how many dashes a line has on a road of a length (m); 1 for a solid line, which is its own dash."""
     period = line.dash_length + line.gap_length
     reach = min(line.end_station, length) - line.start_station
     return max(1, math.ceil(reach / period)) if period else 1

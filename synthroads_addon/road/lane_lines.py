@@ -21,7 +21,7 @@ _GAUSS = np.polynomial.legendre.leggauss(5)
 
 
 class LaneLine:
-    """The centre of a lane: half way between its boundaries, on the undamaged pavement or in its ruts.
+    """The centre line of a lane, which vehicles follow, in plan and in height, ruts included.
 
     Distances are measured in plan along the lane's own line, from the road's beginning, and grow with the station.
     Potholes aren't part of the surface here: a tyre at speed leaves them before the body follows.
@@ -57,7 +57,7 @@ class LaneLine:
         return np.arctan2(across, along)
 
     def height(self, station: Float, offset: Float) -> Float:
-        """Return the surface's local elevation (N,) at stations and offsets (N,) on the carriageway's pavement.
+        """Return the surface's local elevation (N,), m, at stations and offsets (N,) on the carriageway's pavement.
 
         The pavement's plane goes on beyond its edges.
         """
@@ -69,7 +69,7 @@ class LaneLine:
         return np.asarray(height)
 
     def range_at(self, station: float) -> tuple[float, float]:
-        """Return the stations between which the lane can be driven on, around the one given.
+        """Return the (start, end) stations, m, of the stretch around a station on which the lane can be driven on.
 
         It ends where the lane becomes narrower than `VEHICLE_LANE_WIDTH`, or than it is at the station itself.
         """
@@ -84,14 +84,14 @@ class LaneLine:
         return float(low[-1]) if len(low) else 0.0, float(high[0]) if len(high) else self.geometry.length
 
     def distance(self, station: Float) -> Float:
-        """Return the distances (N,) along the line at stations (N,), m."""
+        """Return the distances (N,) along the lane's line from the road's beginning at stations (N,), m."""
         knots, distances, _ = self._table
         panel = _panel(knots, station)
         begin = knots[panel]
         return np.asarray(distances[panel] + self._length(begin, station - begin))
 
     def station(self, distance: Float) -> Float:
-        """Return the stations (N,) at distances (N,) along the line, m.
+        """Return the stations (N,) at distances (N,) along the lane's line, m: the inverse of `distance`.
 
         In each panel it is the cubic with the right ends and rates there, which is less than 1e-6 m off; beyond the
         road's ends the line goes on with the rate that it has there.
@@ -123,7 +123,7 @@ class LaneLine:
         return knots, distances, (self._rate(knots[:-1], step, 0.0), self._rate(knots[:-1], step, 1.0))
 
     def _length(self, begin: Float, step: Float) -> Float:
-        """Return the line's lengths (N,) from stations on, over steps (N,) within one panel each."""
+        """Return the lengths (N,) of the lane's line, m, from stations over steps (N,) within one panel each."""
         shares, weights = (_GAUSS[0] + 1.0) / 2.0, _GAUSS[1] / 2.0
         rates = (weight * self._rate(begin, step, share) for share, weight in zip(shares, weights, strict=True))
         return np.asarray(step * sum(rates))
@@ -144,7 +144,7 @@ class LaneLine:
 
 
 def lane_of(geometry: RoadGeometry, vehicle: Vehicle) -> LaneLine:
-    """Return the line that a vehicle follows.
+    """Return the centre line of the lane that a vehicle drives on.
 
     Raises:
         InputError: its carriageway has no such lane.
@@ -160,7 +160,7 @@ def _panel(borders: Float, value: Float) -> Index:
 
 
 def wheel_pose(line: LaneLine, chassis: Chassis, station: Float) -> tuple[Float, Float]:
-    """Return rotations (K, 3, 3) and local places (K, 3) of a vehicle with its middle at stations (K,) of its lane.
+    """Return rotations (K, 3, 3) and local places (K, 3), m, of a vehicle with its middle at stations (K,) of its lane.
 
     Its frame has its origin on the road below its middle, x forward, y left, z up. It stands on the road with its
     axles' wheels, so that grade and crossfall pitch and roll it.
@@ -192,10 +192,10 @@ def wheel_pose(line: LaneLine, chassis: Chassis, station: Float) -> tuple[Float,
 
 
 def _height(line: LaneLine, plan: Float, near: Float) -> Float:
-    """Return the road's height (K,) at places in plan (K, 2) whose stations are about those given."""
+    """Return the road's local elevation (K,), m, at plan points (K, 2) within 2 m of stations ``near`` (K,)."""
     return line.height(*line.geometry.alignment.project_near(plan, near, 2.0))
 
 
 def _unit(vectors: Float) -> Float:
-    """Return unit vectors; those are (3, K)."""
+    """Return vectors (3, K) scaled to unit length."""
     return np.asarray(vectors / np.sqrt((vectors * vectors).sum(axis=0)))

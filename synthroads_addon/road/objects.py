@@ -40,7 +40,7 @@ class RoadObject(Model):
 
     @property
     def semantic_class(self) -> str:
-        """Return the class of its points."""
+        """Return the name of the semantic class of its points."""
         return self.points_class
 
 
@@ -87,7 +87,7 @@ def _in_order(points: tuple[WidthPoint, ...]) -> tuple[WidthPoint, ...]:
 
 
 def _form(width: object) -> str | None:
-    """Return which of its two forms a width has: only that form's faults are worth telling."""
+    """Return "points" or "number" by the form that a width has, None for neither; the union's discriminator."""
     if isinstance(width, list | tuple):
         return "points"
     return "number" if isinstance(width, int | float) and not isinstance(width, bool) else None
@@ -110,7 +110,7 @@ StripWidth = Annotated[Annotated[float, Field(strict=True, ge=0, le=2), Tag("num
 
 
 def width_at(width: AnyWidth, station: ArrayLike) -> Float:
-    """Return a width (m) at stations of any shape, same shape."""
+    """Return a width (m) at stations of any shape, same shape, interpolated between its points."""
     station = np.asarray(station, dtype=np.float64)
     if isinstance(width, tuple):
         return np.interp(station, [p.station for p in width], [p.width for p in width])
@@ -118,15 +118,15 @@ def width_at(width: AnyWidth, station: ArrayLike) -> Float:
 
 
 def width_kinks(width: AnyWidth) -> list[float]:
-    """Return the stations (m) at which a width's change changes."""
+    """Return the stations (m) at which a width's rate of change jumps; none where it is constant."""
     return [point.station for point in width] if isinstance(width, tuple) else []
 
 
 def nominal_width(width: AnyWidth) -> float:
-    """Return the largest width along the road, m: what the cross-section says where nothing is left out."""
+    """Return a width's largest value along the road, m: what the cross-section says where nothing is left out."""
     return max(point.width for point in width) if isinstance(width, tuple) else width
 
 
 def least_width(width: AnyWidth) -> float:
-    """Return the smallest width along the road, m."""
+    """Return a width's smallest value along the road, m."""
     return min(point.width for point in width) if isinstance(width, tuple) else width

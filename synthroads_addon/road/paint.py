@@ -85,7 +85,7 @@ def arrow_outlines(arrow: Arrow) -> list[Float]:
 
 
 def pieces(outline: Float, cuts: Float) -> Iterator[Float]:
-    """Yield a convex outline (K, 2) cut across the road into pieces between one station and the next (m)."""
+    """Yield the pieces (M, 2) of a convex outline (K, 2) between each two neighbours of the stations ``cuts``, m."""
     for first, last in pairwise(cuts):
         piece = _clip_outline(_clip_outline(outline, first, 1.0), last, -1.0)
         if len(piece) > 2:
@@ -107,7 +107,7 @@ def _clip_outline(outline: Float, station: float, keep: float) -> Float:
 
 
 def _between(section: CarriagewaySection, station: Float) -> tuple[Float, Float]:
-    """Return the distances (N,) between which a gore is hatched."""
+    """Return the inner and outer distances (N,) from the centreline between which a gore is hatched, m."""
     inner = section.lane_boundaries(station)[:, 0] + _EDGE_LINE
     lane, _ = section.boundaries_of("turnout_lane", station)
     return inner, lane - _EDGE_LINE
@@ -116,7 +116,7 @@ def _between(section: CarriagewaySection, station: Float) -> tuple[Float, Float]
 def _meet(
     section: CarriagewaySection, station: Float, lean: float, outside: bool, limits: tuple[float, float]
 ) -> Float:
-    """Return where (N, 2: station, distance) slanting lines through a gore's middle at stations (N,) meet its edge."""
+    """Return the points (N, 2: station, distance), m, where slanting lines from a gore's middle meet its edge."""
     inner, outer = _between(section, station)
     middle, at = (inner + outer) / 2.0, station
     for _ in range(_STEPS):
@@ -126,7 +126,7 @@ def _meet(
 
 
 def _counter_clockwise(outline: Float) -> Float:
-    """Return an outline seen from above against the clock: offsets grow to the left of the stations."""
+    """Return an outline (K, 2) counter-clockwise as seen from above, reversed where it isn't."""
     x, y = outline.T
     area = np.sum(x * np.roll(y, -1) - np.roll(x, -1) * y)
     return outline if area > 0.0 else outline[::-1]

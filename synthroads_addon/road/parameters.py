@@ -75,7 +75,7 @@ class HorizontalElement(Model):
 
     @classmethod
     def between(cls, length: float, curvature_start: float, curvature_end: float) -> HorizontalElement:
-        """Return the element of these curvatures (1/m), whatever kind that makes it."""
+        """Return the line, arc or clothoid of a length (m) with the curvatures at its ends (1/m)."""
         same = curvature_start == curvature_end
         kind: Literal["line", "arc", "clothoid"] = "clothoid" if not same else "arc" if curvature_start else "line"
         return cls(kind=kind, length=length, curvature_start=curvature_start, curvature_end=curvature_end)
@@ -125,7 +125,7 @@ OBJECT_ID = r"[A-Za-z0-9_.-]{1,64}"
 
 
 def _at_least_one(kind: str) -> dict[str, Any]:
-    """Return what JSON Schema says of a dictionary with an object of a type: not all are of another."""
+    """Return the JSON Schema condition that a dictionary holds at least one object of a type."""
     return {"not": {"additionalProperties": {"properties": {"type": {"not": {"const": kind}}}}}}
 
 
@@ -169,7 +169,7 @@ class RoadParameters(Model):
         return self
 
     def _dangling(self, item: RoadObject) -> str:
-        """Return what an object names that isn't there, or an empty string."""
+        """Return a message if an object names a carriageway, lane or turnout that isn't there, else an empty string."""
         if isinstance(item, LineMarking | Arrow | Vehicle | Turnout):
             carriageway = self.objects.get(item.carriageway)
             if not isinstance(carriageway, Carriageway):
@@ -200,16 +200,16 @@ class RoadParameters(Model):
 
     @property
     def terrain(self) -> Terrain | None:
-        """Return the terrain, if the road has one."""
+        """Return the terrain, or None if the road has none."""
         return next(iter(self.of_type(Terrain).values()), None)
 
     def carriageway(self, side: Literal["left", "right"]) -> Carriageway | None:
-        """Return the carriageway of one side, if there is one."""
+        """Return the carriageway of one side, or None if there is none."""
         return next((c for c in self.of_type(Carriageway).values() if c.side == side), None)
 
 
 def read_parameters(path: Path | str) -> RoadParameters:
-    """Read a parameter set from a file; raise `InputError` naming file, field, value and what is allowed."""
+    """Read a parameter set from a JSON file; InputError names file, field, value and what is allowed."""
     data = read_json(path)
     if isinstance(data, dict) and data.get("type") not in (None, "RoadParameters"):
         raise InputError(f"{path}: type", data["type"], "must be 'RoadParameters'")

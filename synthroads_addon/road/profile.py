@@ -23,7 +23,7 @@ NO_ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class IntersectionPoint:
-    """A point where two grades meet.
+    """A point of vertical intersection: where two grades meet, and the radius of the rounding there.
 
     Attributes:
         station: m.
@@ -46,7 +46,7 @@ class IntersectionPoint:
 
 
 class Profile:
-    """Elevation, grade and vertical curvature over the station, vectorised.
+    """A vertical profile: elevation, grade and vertical curvature over the station, vectorised.
 
     The first and last grade go on beyond the ends; a single point makes a level profile. The first and last point have
     only one grade, so their radius has no effect.
@@ -60,7 +60,7 @@ class Profile:
     """
 
     def __init__(self, points: Sequence[IntersectionPoint]) -> None:
-        """Raise InputError without points, with stations that don't increase, or where roundings overlap."""
+        """Build the profile; InputError without points, for stations not increasing, or where roundings overlap."""
         if not points:
             raise InputError("profile.points", None, "at least one point of vertical intersection is needed")
         self.points = tuple(points)
@@ -95,7 +95,7 @@ class Profile:
             raise InputError(f"profile.points[{place + 1}].radius", self.points[place + 1].radius, allowed)
 
     def _build_pieces(self, station: Float, elevation: Float, curvature: Float) -> None:
-        """Tabulate quadratics z + u (g + c u / 2): the first grade, then a rounding and a grade for each point.
+        """Store quadratics z + u (g + c u / 2): the first grade, then a rounding and a grade for each point.
 
         A grade is measured from its point, a rounding from its start: nothing is carried along the road.
         """
@@ -123,16 +123,16 @@ class Profile:
         return self._evaluate(station)[0]
 
     def grade(self, station: ArrayLike) -> Float:
-        """Return the grade dz/ds, m/m, rising positive; at a kink that of the side after it."""
+        """Return the grade dz/ds (m/m, rising positive) at stations of any shape; at a kink that of the side after."""
         return self._evaluate(station)[1]
 
     def curvature(self, station: ArrayLike) -> Float:
-        """Return d2z/ds2, 1/m, positive in a sag; at a border that of the side after it."""
+        """Return d2z/ds2, 1/m, positive in a sag, at stations of any shape; at a border that of the side after it."""
         return self._evaluate(station)[2]
 
 
 def _grades(gap: Float, rise: Float) -> Float:
-    """Return the grades with the first and last repeated outwards; one point is level."""
+    """Return the grades (P + 1,) before, between and after P points, the outer ones repeated; 0 for one point."""
     if not len(gap):
         return np.zeros(2)
     grades = rise / gap

@@ -39,7 +39,7 @@ class CarriagewaySection:
         self._constant = None if self._varies else self._distances(np.zeros(1))
 
     def distances(self, station: ArrayLike) -> Float:
-        """Return the (N, B) distances of the boundaries at N stations, innermost first, m."""
+        """Return the (N, B) distances of the strips' boundaries from the centreline at N stations, inner first, m."""
         station = np.atleast_1d(np.asarray(station, dtype=np.float64))
         if self._constant is not None:
             return np.repeat(self._constant, len(station), axis=0)
@@ -101,12 +101,12 @@ class CarriagewaySection:
         return rise * (plane - pivot[:, None]) - verge_fall
 
     def kinks(self) -> list[float]:
-        """Return the stations at which a width's change changes."""
+        """Return the stations (m, unsorted) at which the rate of change of a strip's width jumps."""
         kinks = [width_kinks(width) for width in (self.carriageway.inner_offset, *(w for _, w in self._widths))]
         return [s for stations in (*kinks, *(shape.kinks() for shape in self.turnouts)) for s in stations]
 
     def steps(self) -> list[tuple[float, float]]:
-        """Return lowest and highest station of the centimetres along which the pavement changes at once."""
+        """Return the (lowest, highest) stations, m, of the few centimetres over which the pavement's width jumps."""
         return [step for shape in self.turnouts for step in shape.steps()]
 
     def bend(self, station: Float) -> Float:

@@ -57,7 +57,7 @@ def frame_of(geometry: RoadGeometry, start: float, end: float) -> tuple[Float, i
 
 
 def cut_stretch(parameters: RoadParameters, start: float, end: float) -> RoadParameters:
-    """Return a set with only what stands between two stations (the end is the next stretch's, but for the last one).
+    """Return a parameter set with only what stands between two stations, the end excluded but at the road's own.
 
     The road itself stays whole, and so do plants, which are cut with its surface, and what runs obliquely. What is
     periodic (posts, dashes) is cut in its rhythm.
@@ -77,7 +77,7 @@ def cut_stretch(parameters: RoadParameters, start: float, end: float) -> RoadPar
 
 
 def _cut_line(item: LineObject | LineMarking, start: float, end: float) -> RoadObject:
-    """Return a line object that begins and ends near a stretch; its beginning moves by whole periods."""
+    """Return a line object cut to begin and end near a stretch; its beginning moves by whole periods."""
     low, high = start - BEYOND, end + BEYOND
     update: dict[str, float] = {}
     if item.start_station < low:

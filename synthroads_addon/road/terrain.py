@@ -66,7 +66,7 @@ def undulation(terrain: Terrain, plan: Float) -> Float:
 def road_elevation_model(
     path: str, epsg: int, axis: AlignmentObject, origin: tuple[float, float], half_width: float
 ) -> ElevationModel:
-    """Return the elevation model beneath a road; the last ones are kept as long as their files don't change.
+    """Return the elevation model beneath a road from its file; the last two are cached while the files don't change.
 
     Args:
         path: GeoTIFF or ESRI ASCII grid; if relative, from the working directory.
@@ -92,7 +92,7 @@ def _read_model(
 def fit_to_ground(
     axis: AlignmentObject, origin: tuple[float, float], model: ElevationModel, embankment_height: float
 ) -> tuple[float, float, float]:
-    """Return the local origin's map coordinates, m, that put a road at its height above the ground.
+    """Return the local origin's map coordinates (east, north, elevation), m, that put a road at its mean height.
 
     Args:
         axis: centreline and profile, local.
@@ -127,7 +127,7 @@ def surface_elevation(geometry: RoadGeometry, station: Float, offset: Float) -> 
 
 
 def known_elevation(geometry: RoadGeometry, station: Float, offset: Float) -> Float:
-    """Return `surface_elevation` in bounded memory, with the road's edge going on where an elevation model ends."""
+    """Return the surface's local elevation (N,), m, with the road's edge going on where an elevation model ends."""
     height = np.empty(station.shape)
     for first in range(0, len(station), _BLOCK):
         part = slice(first, first + _BLOCK)
@@ -141,7 +141,7 @@ def known_elevation(geometry: RoadGeometry, station: Float, offset: Float) -> Fl
 
 
 def highest_pavement(geometry: RoadGeometry, station: Float, offset: Float) -> float | None:
-    """Return the largest local elevation of those places (N,) that are paved, m; None without any."""
+    """Return the largest local elevation, m, of those places (N,) that are paved; None if none is."""
     strip = geometry.strip_index(station, offset)
     paved = np.array([item.class_name == "road" for item in geometry.strips])
     on = (strip >= 0) & paved[strip] & (station >= 0.0) & (station <= geometry.length)

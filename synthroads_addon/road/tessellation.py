@@ -17,7 +17,7 @@ root sum of squares stays below the whole."""
 
 
 def sample_stations(geometry: RoadGeometry, tolerance: float, start: float = 0.0, end: float = np.inf) -> Float:
-    """Return the (N,) increasing stations at which the road is sampled.
+    """Return the increasing stations (N,), m, of a mesh's rows: as few as keep it within the tolerance (m).
 
     Every kink (element, rounding, crossfall point, end of a dash) is a station of its own. Between two kinks the
     spacing is even and keeps the chord's sagitta ds^2 k / 8 and the twist of the widest strip within the tolerance.
@@ -60,14 +60,14 @@ def _kinks(geometry: RoadGeometry, tolerance: float) -> Float:
 
 
 def _around(kinks: Float, start: float, end: float) -> Float:
-    """Return those of the sorted kinks that the spacing between two stations depends on: at least two."""
+    """Return those of the sorted kinks that enclose the stations from start to end, at least two."""
     low = int(np.clip(np.searchsorted(kinks, start, side="right") - 1, 0, len(kinks) - 2))
     high = int(np.searchsorted(kinks, end, side="left"))
     return kinks[low : max(high, low + 1) + 1]
 
 
 def _chord_spacing(geometry: RoadGeometry, kinks: Float, tolerance: float) -> Float:
-    """Return the largest spacing (K,) whose horizontal and vertical sagitta keep their share of the tolerance."""
+    """Return the largest spacings (K,), m, whose horizontal and vertical sagitta keep their share of the tolerance."""
     samples = np.linspace(kinks[:-1] + 1e-6, kinks[1:] - 1e-6, 5)
     widest = np.abs(geometry.offsets(kinks)).max(axis=1)
     reach = np.maximum(widest[:-1], widest[1:])
@@ -80,7 +80,7 @@ def _chord_spacing(geometry: RoadGeometry, kinks: Float, tolerance: float) -> Fl
 
 
 def _twist_spacing(geometry: RoadGeometry, kinks: Float, tolerance: float) -> Float:
-    """Return the largest spacing (K,) at which two triangles stay close to a strip whose crossfall changes.
+    """Return the largest spacings (K,), m, at which two triangles stay close to a strip whose crossfall changes.
 
     The middle of a twisted quad of width w and length ds lies w ds (dq/ds) / 4 off its diagonal.
     """

@@ -47,7 +47,7 @@ class TurnoutWidths:
 
 
 class TurnoutShape:
-    """The widths of one turnout by station.
+    """The widths that one turnout gives its carriageway's strips, by station.
 
     Along it counts w (m): for an exit from its beginning in the direction of traffic, for an entry backwards from its
     end; so both begin with their taper and end with their ramp. x counts from the gore's tip.
@@ -70,17 +70,17 @@ class TurnoutShape:
             self.nose = max(min(cubed ** (1.0 / 3.0), turnout.ramp.length - NOSE_BEFORE_END), STEP)
 
     def station(self, w: float) -> float:
-        """Return the station of a w (both m)."""
+        """Return the station at a distance w along the turnout (both m), for an entry backwards from its end."""
         return self.turnout.start_station + w if self._forward else self.turnout.end_station - w
 
     def kinks(self) -> list[float]:
-        """Return the stations at which a width bends or steps, in no order."""
+        """Return the stations (m, unsorted) at which a width's rate of change, or a width, jumps."""
         last = self.turnout.length + STEP + BLEND if self.turnout.ramp else self.turnout.length
         marks = [self.station(w) for w in (0.0, self._taper, self._tip, last)]
         return [*marks, *(station for step in self.steps() for station in step)]
 
     def steps(self) -> list[tuple[float, float]]:
-        """Return lowest and highest station of each `STEP` along which the pavement changes at once."""
+        """Return (lowest, highest) station of each `STEP` over which the pavement's width jumps; a bay has none."""
         if self.turnout.ramp is None:
             return []
         begins = [self._tip + x for x in (self.nose, self.turnout.ramp.length)]
@@ -88,20 +88,20 @@ class TurnoutShape:
         return [(low, high) for low, high in steps]
 
     def range(self) -> tuple[float, float]:
-        """Return the lowest and the highest station at which it changes anything."""
+        """Return the lowest and the highest station, m, at which the turnout changes any width."""
         marks = self.kinks()
         return min(marks), max(marks)
 
     def gore_tip(self) -> float:
-        """Return the station of the gore's tip; only exits and entries have one."""
+        """Return the station of the gore's tip, m; only exits and entries have one."""
         return self.station(self._tip)
 
     def nose_station(self) -> float:
-        """Return the station of the nose; only exits and entries have one."""
+        """Return the station of the nose, m; only exits and entries have one."""
         return self.station(self._tip + self.nose)
 
     def bend(self, station: Float) -> Float:
-        """Return the second derivative (1/m) of the ramp's offset by station (N,)."""
+        """Return the second derivative (N,) of the ramp's offset by station, 1/m; 0 without a ramp."""
         ramp = self.turnout.ramp
         if ramp is None:
             return np.zeros(station.shape)
@@ -109,7 +109,7 @@ class TurnoutShape:
         return np.where((x > 0.0) & (x < ramp.length), x / ramp.clothoid_parameter**2, 0.0)
 
     def widths(self, station: Float) -> TurnoutWidths:
-        """Return the widths at stations (N,)."""
+        """Return the widths of the turnout's strips, and how others change, at stations (N,), m."""
         full = width_at(self.carriageway.hard_shoulder_width, station)
         strips = {kind: np.zeros(station.shape) for kind in TURNOUT_STRIPS}
         turnout, w = self.turnout, self._w(station)

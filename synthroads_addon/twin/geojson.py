@@ -112,7 +112,7 @@ class _Writer:
     def _vehicles(self) -> Iterator[Feature]:
         for placed in placed_vehicles(self.geometry):
             about = attributes_of(placed.vehicle) | {"id": placed.name, "feature": "vehicle"}
-            about |= self.geometry.numbers.about(placed.vehicle.instance)
+            about |= self.geometry.numbers.part_attributes(placed.vehicle.instance)
             ahead = placed.rotation[:, 0]
             about["heading_deg"] = round(math.degrees(math.atan2(ahead[1], ahead[0])), 4)
             yield _feature(about, "Point", self._map(placed.place[None])[0])
@@ -182,7 +182,7 @@ class _Writer:
         points[:, 2] += item.film_thickness
         lines = np.split(points, np.flatnonzero(np.diff(owner)) + 1)
         about = attributes_of(item) | {"id": name, "feature": "marking", "dashes": np.round(dashes, DIGITS).tolist()}
-        about |= self.geometry.numbers.about(item.instance)
+        about |= self.geometry.numbers.part_attributes(item.instance)
         yield _feature(about, "MultiLineString", [self._map(line) for line in lines])
 
     def _painted(self, name: str, item: Hatching | Arrow) -> Iterator[Feature]:

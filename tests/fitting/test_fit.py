@@ -383,7 +383,7 @@ def check_jacobian(data: Plan | Heights, chain: Chain, stations: np.ndarray, tol
     """Central differences of the residuals by every parameter."""
     matrix = data.jacobian(chain, stations)
     for column in range(matrix.shape[1]):
-        value = chain.turns <= column < chain.value_columns.stop
+        value = chain.pose_size <= column < chain.value_columns.stop
         size = 1e-7 if value and isinstance(data, Plan) else 1e-4
         results = []
         for sign in (1.0, -1.0):
@@ -392,7 +392,7 @@ def check_jacobian(data: Plan | Heights, chain: Chain, stations: np.ndarray, tol
             knots = chain.knots.copy()
             knots[1:-1] += step[chain.value_columns.stop :]
             moved = Chain(
-                data.move_pose(chain.pose, step[: chain.turns]),
+                data.move_pose(chain.pose, step[: chain.pose_size]),
                 knots,
                 chain.values + step[chain.value_columns],
                 chain.kinds,

@@ -45,26 +45,26 @@ class Asset(StandingThing):
 
     @property
     def semantic_class(self) -> str:
-        """Return the class of its points, which its library chooses."""
+        """Return the name of the semantic class of its points, which its library chooses."""
         return self.class_name
 
     def twin(self) -> TwinTypes:
-        """Return its types: those that its library gives, else those of its class; nothing known of others."""
+        """Return its types in the twin formats: those that its library gives, else those of its semantic class."""
         given = {name: getattr(self.twin_types, name) for name in AssetTypes.model_fields} if self.twin_types else {}
         types = {"opendrive": f"none.{self.name}"} | class_types().get(self.class_name, {})
         return TwinTypes(kind=self.name, **(types | {key: value for key, value in given.items() if value}))
 
     def bodies(self, place: Place) -> list[Body]:
-        """Return nothing: its shape is its library's."""
+        """Return an empty list: its shape is in its library's file."""
         return []
 
     def footprint(self) -> Iterator[Block]:
-        """Yield its place: its size is its library's."""
+        """Yield one box without extent at its place: its size is in its library's file."""
         yield self.upright(0.0, 0.0)
 
 
 @cache
 def class_types() -> dict[str, dict[str, str]]:
-    """Return the types in the twin formats of what has a semantic class, by the class and the format."""
+    """Return semantic class -> twin format -> type of assets, read once from the presets."""
     types: dict[str, dict[str, str]] = read_json(PRESETS / "twin_types.json")
     return types

@@ -9,7 +9,7 @@ from pydantic import Field
 from ...base.arrays import Float
 from ...base.schema import quantity
 from ..objects import Side
-from .body import Body, Place, box, circle, moved, plate, prism
+from .body import Body, Place, box, circle, plate, prism, shift
 from .limits import Interval, Limits, interval, share
 from .thing import Block, StandingThing, TwinTypes
 
@@ -36,7 +36,7 @@ LENS_PROUD = 0.03
 
 
 def foot_outline() -> Float:
-    """Return the outline (8, 2) of a foot, anticlockwise from above."""
+    """Return the outline (8, 2) of a beacon's foot, m, anticlockwise from above."""
     x, y, cut = FOOT[0] / 2.0, FOOT[1] / 2.0, CORNER
     half = np.array([(x, cut - y), (x, y - cut), (x - cut, y), (cut - x, y)])
     return np.concatenate([half, -half])
@@ -68,11 +68,11 @@ class ConstructionBeacon(StandingThing):
     height: float = quantity(1.0, ge=0.5, le=2, unit="m", description="Height of its blade.")
 
     def twin(self) -> TwinTypes:
-        """Return its types: a marker."""
+        """Return its types in the twin formats: a marker."""
         return TwinTypes("IfcSign.MARKER", "obstacle.constructionBeacon")
 
     def bodies(self, place: Place) -> list[Body]:
-        """Return blade, foot and lamp."""
+        """Return the closed solids of blade, foot and lamp, in its frame."""
         top = BLADE_BOTTOM + self.height
         thick = BLADE + 2.0 * SHEETING
         blade = box((self.width, thick, self.height), (0.0, 0.0, (BLADE_BOTTOM + top) / 2.0))
@@ -86,7 +86,7 @@ class ConstructionBeacon(StandingThing):
         drum = plate(circle(2.0 * radius, LENS_SIDES), -deep / 2.0, deep / 2.0)
         lamp = [
             box(HOUSING, (0.0, 0.0, top + HOUSING_MIDDLE)),
-            moved(drum, (0.0, 0.0, top + LENS_MIDDLE)),
+            shift(drum, (0.0, 0.0, top + LENS_MIDDLE)),
         ]
         glass = box((2.0 * radius, deep + LENS_PROUD, 2.0 * radius), (0.0, 0.0, top + LENS_MIDDLE))
         return [
@@ -97,6 +97,6 @@ class ConstructionBeacon(StandingThing):
         ]
 
     def footprint(self) -> Iterator[Block]:
-        """Yield the blade's box."""
+        """Yield the box of its blade, in which nothing else may stand."""
         body = self.upright(self.width / 2.0, self.height)
         yield body._replace(start=self.station - _REACH, end=self.station + _REACH)

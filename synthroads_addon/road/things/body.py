@@ -24,7 +24,7 @@ _BAR_AXIS = np.array([1.0, 0.0, 0.0])
 
 @dataclass(frozen=True)
 class Body:
-    """A closed body.
+    """A closed solid of a thing: a row of cross-sections, with its material.
 
     Attributes:
         sections: (R, K, 3) R >= 2 outlines of K corners, m, in the thing's frame: of what stands at one place x to the
@@ -45,7 +45,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Place:
-    """Surroundings of what stands at one place, in its frame.
+    """The ground and the pavement around a thing that stands at one place, in its frame.
 
     Attributes:
         ground: height of the surface at x (N,) and y (N,), m.
@@ -65,7 +65,7 @@ LEVEL = Place(lambda x, y: np.zeros(np.broadcast(x, y).shape), lambda x, y, shea
 
 @dataclass(frozen=True)
 class Course:
-    """The road along which something runs, in local coordinates.
+    """The road's surface along which something runs, in local coordinates.
 
     Attributes:
         length: of the road, m.
@@ -85,54 +85,54 @@ class Course:
 
 
 def prism(outline: Sequence[Point2] | Float, low: float, high: float) -> Float:
-    """Return the body over an outline (x, y) between two heights."""
+    """Return the sections (2, K, 3) of the prism over an outline (K, 2) in x, y between two heights, m."""
     flat = np.asarray(outline, dtype=np.float64)
     return np.stack([np.column_stack([flat, np.full(len(flat), z)]) for z in (low, high)])
 
 
 def box(size: Sequence[float], middle: Sequence[float] = (0.0, 0.0, 0.0)) -> Float:
-    """Return a box of a size (x, y, z) around its middle."""
+    """Return the sections (2, 4, 3) of a box of a size (x, y, z), m, around its middle."""
     (x, y, z), half = middle, np.asarray(size, dtype=np.float64) / 2.0
     corners = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]) * half[:2] + (x, y)
     return prism(corners, z - half[2], z + half[2])
 
 
 def plate(outline: Sequence[Point2] | Float, front: float, back: float) -> Float:
-    """Return the upright plate over an outline (x, z) between two y."""
+    """Return the sections (2, K, 3) of an upright plate: an outline (K, 2) in x, z extruded between two y, m."""
     flat = np.asarray(outline, dtype=np.float64)
     return np.stack([np.column_stack([flat[:, 0], np.full(len(flat), y), flat[:, 1]]) for y in (front, back)])
 
 
 def circle(diameter: float, sides: int = 12) -> Float:
-    """Return the corners (K, 2) of a round outline; they lie on its circle."""
+    """Return the corners (K, 2) of a regular polygon of so many sides, inscribed in a circle of the diameter, m."""
     turn = 2.0 * np.pi * np.arange(sides) / sides
     return diameter / 2.0 * np.column_stack([np.cos(turn), np.sin(turn)])
 
 
 def post(diameter: float, low: float, high: float, x: float = 0.0, y: float = 0.0, sides: int = 12) -> Float:
-    """Return a round post."""
+    """Return the sections (2, K, 3) of an upright round post between two heights, its axis at x and y, m."""
     return prism(circle(diameter, sides) + (x, y), low, high)
 
 
-def moved(sections: Float, by: Sequence[float], scale: Sequence[float] = (1.0, 1.0, 1.0)) -> Float:
-    """Return sections scaled, then moved."""
+def shift(sections: Float, by: Sequence[float], scale: Sequence[float] = (1.0, 1.0, 1.0)) -> Float:
+    """Return sections (R, K, 3) scaled along each axis about the origin, then shifted."""
     return sections * np.asarray(scale) + np.asarray(by)
 
 
-def tilted(sections: Float, angle: float) -> Float:
-    """Return sections turned about the x axis (rad)."""
+def rotate_x(sections: Float, angle: float) -> Float:
+    """Return sections (R, K, 3) rotated about the x axis by an angle (rad)."""
     cosine, sine = math.cos(angle), math.sin(angle)
     return sections @ np.array([(1.0, 0.0, 0.0), (0.0, cosine, sine), (0.0, -sine, cosine)])
 
 
-def turned(sections: Float, angle: float) -> Float:
-    """Return sections turned about the z axis (rad)."""
+def rotate_z(sections: Float, angle: float) -> Float:
+    """Return sections (R, K, 3) rotated about the z axis by an angle (rad)."""
     cosine, sine = math.cos(angle), math.sin(angle)
     return sections @ np.array([(cosine, sine, 0.0), (-sine, cosine, 0.0), (0.0, 0.0, 1.0)])
 
 
 def bar(start: Sequence[float], end: Sequence[float], width: float) -> Float:
-    """Return a square bar from one place to another; it is turned there from the x axis the shortest way."""
+    """Return the sections (2, 4, 3) of a bar of square section from one point to another, its sides ``width`` (m)."""
     first, last = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     along = (last - first) / np.linalg.norm(last - first)
     axis = np.cross(_BAR_AXIS, along)
@@ -149,8 +149,8 @@ def bar(start: Sequence[float], end: Sequence[float], width: float) -> Float:
 # --- shapes along the road ------------------------------------------------------------------------------------------
 
 
-def swept(feet: Float, left: Float, across: ArrayLike, height: ArrayLike) -> Float:
-    """Return an outline swept along the road.
+def sweep(feet: Float, left: Float, across: ArrayLike, height: ArrayLike) -> Float:
+    """Return the sections (N, K, 3) of an outline swept along the road.
 
     Args:
         feet, left: (N, 3) points below its axis, and unit vectors to the left.
@@ -163,7 +163,7 @@ def swept(feet: Float, left: Float, across: ArrayLike, height: ArrayLike) -> Flo
 
 
 def boxes(feet: Float, left: Float, size: Sequence[Any], low: ArrayLike, beside: float = 0.0) -> list[Float]:
-    """Return upright boxes beside feet (N, 3).
+    """Return the sections (2, 4, 3) of upright boxes beside feet (N, 3), one for each.
 
     Args:
         left: (N, 3) unit vectors to the left.

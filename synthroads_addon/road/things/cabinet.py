@@ -31,7 +31,7 @@ PHONE_BAND = ((0.46, 1.0), (0.52, 1.0))
 
 
 def phone_outline() -> Float:
-    """Return a square of side 1 (16, 2) with rounded corners, anticlockwise from above."""
+    """Return a square of side 1 with rounded corners (16, 2), anticlockwise from above."""
     inner, radius = (1.0 - PHONE_CORNER) / 2.0, PHONE_CORNER / 2.0
     start = np.deg2rad([-90.0, 0.0, 90.0, 180.0])
     turn = start[:, None] + np.pi / 2.0 * np.arange(PHONE_STEPS) / (PHONE_STEPS - 1.0)
@@ -64,13 +64,13 @@ class Cabinet(StandingThing):
     )
 
     def twin(self) -> TwinTypes:
-        """Return its types, by what it is."""
+        """Return its types in the twin formats: an emergency phone or a distribution board."""
         phone = self.kind == "emergency_phone"
         entity = "IfcCommunicationsAppliance.USERDEFINED" if phone else "IfcDistributionBoard.DISTRIBUTIONBOARD"
         return TwinTypes(entity, f"obstacle.{self.kind}", kind=self.kind)
 
     def bodies(self, place: Place) -> list[Body]:
-        """Return body, plinth and lid or band; doors, panel and letters are left out."""
+        """Return the closed solids of body, plinth and lid or band in its frame; doors and panel are details."""
         return self._phone() if self.kind == "emergency_phone" else self._cabinet(place)
 
     def _cabinet(self, place: Place) -> list[Body]:
@@ -90,7 +90,7 @@ class Cabinet(StandingThing):
         ]
 
     def _block(self, inset: float, low: float, high: float) -> Float:
-        """Return a box between two heights, so much smaller than the cabinet all around."""
+        """Return the sections of a box between two heights, on all sides by ``inset`` smaller than the cabinet, m."""
         size = (self.width - 2.0 * inset, self.depth - 2.0 * inset, high - low)
         return box(size, (0.0, 0.0, (high + low) / 2.0))
 
@@ -110,7 +110,7 @@ class Cabinet(StandingThing):
         )
 
     def footprint(self) -> Iterator[Block]:
-        """Yield a box that holds it, however it is turned, on a batter too."""
+        """Yield the box that holds it, however it is turned, on a batter too; nothing else may stand there."""
         half = max(self.width, self.depth) / 2.0
         on_slope = half / STEEPEST if self.kind == "utility" else 0.0
         yield self.upright(half, self.height + on_slope)

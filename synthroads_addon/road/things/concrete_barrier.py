@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from ...base.schema import quantity
-from .body import Body, Course, swept
+from .body import Body, Course, sweep
 from .limits import Limits, share
 from .thing import Block, LengthwiseThing, TwinTypes
 
@@ -50,15 +50,15 @@ class ConcreteBarrier(LengthwiseThing):
     terminal_length: float = quantity(8.0, ge=0, le=50, unit="m", description="Length over which either end is ramped.")
 
     def twin(self) -> TwinTypes:
-        """Return its types: a barrier of concrete."""
+        """Return its types in the twin formats: a barrier of concrete."""
         return TwinTypes("IfcRailing.GUARDRAIL", "barrier.concreteBarrier")
 
     def reach(self) -> tuple[float, float]:
-        """Return half its foot's width, m."""
+        """Return how far it reaches to the right and to the left of its axis, m: half its foot's width."""
         return self.base_width / 2.0, self.base_width / 2.0
 
     def bodies(self, course: Course) -> list[Body]:
-        """Return the barrier, ramped down at its ends."""
+        """Return the barrier's closed solid in local coordinates, ramped down at its ends; none off the road."""
         end = self.end_on(course.length)
         if end is None:
             return []
@@ -69,8 +69,8 @@ class ConcreteBarrier(LengthwiseThing):
         height = share * np.maximum(self.height * self.height_share(end, station), TIP)[:, None]
         height[:, [0, -1]] = -BURIED
         feet = course.feet(station, self.offset_at(station))
-        return [Body(swept(feet, course.left(station), across * self.base_width / 2.0, height), "barrier_concrete")]
+        return [Body(sweep(feet, course.left(station), across * self.base_width / 2.0, height), "barrier_concrete")]
 
     def footprint(self) -> Iterator[Block]:
-        """Yield the barrier's box."""
+        """Yield the barrier's box, in which nothing else may stand."""
         yield self.strip(*self.reach(), self.height)

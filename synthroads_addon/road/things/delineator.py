@@ -41,11 +41,11 @@ class Delineator(StandingThing):
     height: float = quantity(1.0, ge=0.3, le=1.5, unit="m", description="Top above the surface.")
 
     def twin(self) -> TwinTypes:
-        """Return its types: a marker."""
+        """Return its types in the twin formats: a marker."""
         return TwinTypes("IfcSign.MARKER", "pole.delineator")
 
     def bodies(self, place: Place) -> list[Body]:
-        """Return the post with its slanted top, and the reflectors on it."""
+        """Return the closed solid of the post with its slanted top, in its frame, and the box of its reflectors."""
         outline = np.array(OUTLINE)
         top = TOP + SLANT * outline[:, 0]
         ends = [np.column_stack([outline, z * self.height]) for z in (np.full(len(outline), -BURIED), top)]
@@ -54,5 +54,5 @@ class Delineator(StandingThing):
         return [Body(np.stack(ends), "plastic_white"), Body(glass, "reflector", detail=wide)]
 
     def footprint(self) -> Iterator[Block]:
-        """Yield the post's box."""
+        """Yield the post's box, in which nothing else may stand."""
         yield self.upright(REACH, self.height)

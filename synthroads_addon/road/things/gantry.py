@@ -10,7 +10,7 @@ from ...base.arrays import Float
 from ...base.schema import Model, quantity
 from ..guidelines import CLEARANCE
 from ..objects import Side
-from .body import Body, Place, bar, box, circle, moved
+from .body import Body, Place, bar, box, circle, shift
 from .limits import Interval, Limits, interval, share
 from .thing import Block, Signal, StandingThing, TwinTypes
 
@@ -136,12 +136,12 @@ class Gantry(StandingThing):
         return self.beam_depth / 2.0 + max(signs, default=0.0)
 
     def beam_bottom(self, low: float) -> float:
-        """Return the height (m) of the beam's lower edge, from that of the lowest part: taller signs hang below it."""
+        """Return the height (m) of the beam's lower edge from that of the lowest part: taller signs hang below it."""
         tallest = max((sign.height for sign in self.signs), default=0.0)
         return low + max(tallest - self.beam_height, 0.0) * OVERHANG
 
     def ends_in_beam(self, sign: GantrySign, low: float) -> bool:
-        """Return whether a sign whose lower edge is at the lowest part (m) would end below the beam's top."""
+        """Return whether a sign with its lower edge at the height ``low`` (m) would end below the beam's top."""
         return low + sign.height < self.beam_bottom(low) + self.beam_height
 
     def post_offsets(self) -> list[float]:
@@ -152,7 +152,7 @@ class Gantry(StandingThing):
 
     @property
     def foot_offset(self) -> float:
-        """Return the offset of the end that it is counted to stand at, m."""
+        """Return the offset of the beam's end that it counts as standing at, m: that of ``post_side``."""
         return self.left_offset if self.post_side == "left" else self.right_offset
 
     @property
@@ -161,26 +161,26 @@ class Gantry(StandingThing):
         return any(sign.kind == "display" for sign in self.signs)
 
     def twin(self) -> TwinTypes:
-        """Return its types: what signs hang on."""
+        """Return its types in the twin formats: an assembly that signs hang on."""
         return TwinTypes("IfcElementAssembly.SIGNALASSEMBLY.SITE", f"gantry.{self.kind}", kind=f"Gantry {self.kind}")
 
     def part_models(self) -> dict[str, GantrySign]:
-        """Return its signs."""
+        """Return its signs by name: sign-1, sign-2, ..."""
         return {f"sign-{number}": sign for number, sign in enumerate(self.signs, 1)}
 
     def signals(self) -> dict[str, Signal]:
-        """Return what its boards and displays tell."""
+        """Return the messages of its boards and displays to drivers, by the name of the sign."""
         return {
             name: Signal(sign.kind, text="\n".join(sign.text), dynamic=sign.kind == "display", facing=sign.facing)
             for name, sign in self.part_models().items()
         }
 
     def bodies(self, place: Place) -> list[Body]:
-        """Return beam, posts, boards with what they hang on, and the catwalk with its ladder."""
+        """Return the closed solids of beam, posts, boards with their hangers, catwalk and ladder, in its frame."""
         left, right = self.offset - self.left_offset, self.offset - self.right_offset
         low = place.pavement((left, right), (-self.reach(1.0), self.reach(-1.0)), 0.0) + self.clearance
         bottom = self.beam_bottom(low)
-        shapes = [moved(shape, (left, 0.0, bottom)) for shape in self._beam(right - left)]
+        shapes = [shift(shape, (left, 0.0, bottom)) for shape in self._beam(right - left)]
         made = [Body(shape, "gantry_steel", "beam", "IfcBeam.BEAM") for shape in shapes]
         size = (right - left, self.beam_depth + JOINT, self.beam_height)
         joints = box(size, ((left + right) / 2.0, 0.0, bottom + self.beam_height / 2.0))
@@ -192,7 +192,7 @@ class Gantry(StandingThing):
         return [*made, *self._catwalk(place, (left, right), bottom + self.beam_height)] if self.catwalk else made
 
     def _beam(self, length: float) -> list[Float]:
-        """Return the beam from x = 0 on, its lower edge on z = 0."""
+        """Return the sections of the beam's shapes (one, or a truss's bars) from x = 0 on, its lower edge on z = 0."""
         depth, height = self.beam_depth, self.beam_height
         middle = (length / 2.0, 0.0, height / 2.0)
         if self.beam == "box":
@@ -219,7 +219,7 @@ class Gantry(StandingThing):
         return chords
 
     def _post(self, place: Place, name: str, offset: float, bottom: float) -> list[Body]:
-        """Return a post: one at an end encloses the beam's end, the middle one ends in it."""
+        """Return the solids of a post: one at an end encloses the beam's end, the middle one ends in it."""
         x, outer = self.offset - offset, offset in (self.left_offset, self.right_offset)
         foot = float(place.ground([x], [0.0])[0]) + self.elevation
         top = bottom + (self.beam_height + POST_ENCLOSES if outer else POST_ENTERS)
@@ -241,7 +241,7 @@ class Gantry(StandingThing):
         return [Body(shape, material, name, "IfcColumn.COLUMN", detail) for shape, material, detail in parts]
 
     def _board(self, name: str, sign: GantrySign, levels: tuple[float, float]) -> list[Body]:
-        """Return a board's body, in front of the beam as the traffic below it sees it, and what it hangs on."""
+        """Return the solids of a board, in front of the beam as the traffic below sees it, and of its hangers."""
         low, bottom = levels
         beam = bottom + self.beam_height / 2.0
         z = beam if self.ends_in_beam(sign, low) else low + sign.height / 2.0
@@ -266,7 +266,7 @@ class Gantry(StandingThing):
         return made
 
     def _catwalk(self, place: Place, ends: tuple[float, float], level: float) -> list[Body]:
-        """Return the catwalk on the beam, and the ladder at the right post, or at the left one if there is no right."""
+        """Return the solids of the catwalk on the beam and of the ladder at the right post, else at the left one."""
         clear = self.post_width / 2.0 + CATWALK_CLEAR
         length, width = max(ends[1] - ends[0] - 2.0 * clear, 1.0), max(self.beam_depth, NARROWEST_CATWALK)
         start, middle, edge = ends[0] + clear, ends[0] + clear + length / 2.0, (width - CATWALK_BAR) / 2.0
@@ -287,17 +287,17 @@ class Gantry(StandingThing):
             shapes += [box(size, (x, y, CATWALK_SUPPORT + upright / 2.0)) for x in along.tolist()]
         size = (length + CATWALK_SUPPORT - CATWALK_BAR, width * 0.96, CATWALK_SUPPORT + 0.02)
         supports = box(size, (middle, 0.0, CATWALK_SUPPORT / 2.0))
-        walk = [moved(shape, (0.0, 0.0, level)) for shape in shapes]
+        walk = [shift(shape, (0.0, 0.0, level)) for shape in shapes]
         ladder, rungs = self._ladder(place, ends, level)
         return [
             *(Body(shape, "gantry_steel", "catwalk", "IfcPlate.USERDEFINED") for shape in walk),
             *(Body(shape, "gantry_steel", "ladder", "IfcStair.LADDER") for shape in ladder),
-            Body(moved(supports, (0.0, 0.0, level)), "gantry_steel", "catwalk", detail=CATWALK_SUPPORT),
+            Body(shift(supports, (0.0, 0.0, level)), "gantry_steel", "catwalk", detail=CATWALK_SUPPORT),
             Body(rungs, "gantry_steel", "rungs", detail=LADDER_RUNG[1]),
         ]
 
     def _ladder(self, place: Place, ends: tuple[float, float], level: float) -> tuple[list[Float], Float]:
-        """Return a ladder's rails, and the box around its rungs."""
+        """Return the sections of a ladder's two rails, and of the box around its rungs."""
         right = self.kind != "cantilever" or self.post_side == "right"
         # Behind the boards of the carriageway that the post stands beside.
         x, y = ends[right], (self.beam_depth / 2.0 + LADDER_AWAY) * (1.0 if right else -1.0)
@@ -311,7 +311,7 @@ class Gantry(StandingThing):
         return rails, box((wide, thick, top - foot), (x, y, (top + foot) / 2.0))
 
     def footprint(self) -> Iterator[Block]:
-        """Yield the boxes of its posts, then that of its beam."""
+        """Yield the boxes of its posts, then that of its beam, in which nothing else may stand."""
         half, s, top = self.post_width / 2.0, self.station, self.clearance + self.beam_height
         for d in self.post_offsets():
             yield Block("foot", s - half, s + half, d - half, d + half, 0.0, top)

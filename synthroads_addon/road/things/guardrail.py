@@ -8,7 +8,7 @@ from pydantic import Field
 
 from ...base.arrays import Float
 from ...base.schema import quantity
-from .body import Body, Course, boxes, swept
+from .body import Body, Course, boxes, sweep
 from .limits import Interval, Limits, interval
 from .thing import Block, LengthwiseThing, TwinTypes
 
@@ -64,7 +64,7 @@ class Guardrail(LengthwiseThing):
     )
 
     def twin(self) -> TwinTypes:
-        """Return its types: a guardrail."""
+        """Return its types in the twin formats: a guardrail."""
         return TwinTypes("IfcRailing.GUARDRAIL", "barrier.guardRail")
 
     def reach(self) -> tuple[float, float]:
@@ -74,7 +74,7 @@ class Guardrail(LengthwiseThing):
         return rear if self.faces == "left" else face, rear if self.faces == "right" else face
 
     def bodies(self, course: Course) -> list[Body]:
-        """Return beams, posts, and the spacers between them."""
+        """Return the closed solids of beams, posts and spacers in local coordinates; none off the road."""
         end = self.end_on(course.length)
         if end is None:
             return []
@@ -89,10 +89,10 @@ class Guardrail(LengthwiseThing):
         profile = np.array([*BEAM, *((x - SHEET, z) for x, z in reversed(BEAM))])
         across = profile[:, 0] + POST[0] / 2.0 + SPACER[self.faces]
         height = self._top(end, station)[:, None] + profile[:, 1]
-        return (swept(feet, left, side * across, height) for side in sides)
+        return (sweep(feet, left, side * across, height) for side in sides)
 
     def _posts(self, course: Course, end: float, sides: tuple[float, ...]) -> list[Float]:
-        """Return posts wherever the beam is high enough, and their spacers."""
+        """Return the sections of the posts, wherever the beam is high enough for one, and of their spacers."""
         count = int((end - self.start_station) / self.post_spacing + 1e-4) + 1
         station = self.start_station + np.arange(count) * self.post_spacing
         station = station[(self._top(end, station) >= LOWEST_POST) & (station <= end + 1e-9)]
@@ -112,6 +112,6 @@ class Guardrail(LengthwiseThing):
         return self.height * share + TIP * (1.0 - share)
 
     def footprint(self) -> Iterator[Block]:
-        """Yield the rail's box, to the face of its beam."""
+        """Yield the rail's box, to the face of its beam; nothing else may stand there."""
         right, left = (_REAR if self.faces == other else _FACE for other in ("left", "right"))
         yield self.strip(right, left, self.height)

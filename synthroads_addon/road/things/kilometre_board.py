@@ -40,15 +40,15 @@ class KilometreBoard(StandingThing):
     lower_edge: float = quantity(1.2, ge=0.2, le=4, unit="m", description="Lower edge above the surface.")
 
     def twin(self) -> TwinTypes:
-        """Return its types: a marker."""
+        """Return its types in the twin formats: a marker, with its kilometre as reference."""
         return TwinTypes("IfcSign.MARKER", "pole.signalPost", reference=self.text)
 
     def signals(self) -> dict[str, Signal]:
-        """Return its kilometre."""
+        """Return its kilometre as the message of its one part, "face"."""
         return {"face": Signal("kilometreBoard", text=self.text)}
 
     def bodies(self, place: Place) -> list[Body]:
-        """Return the board, and its post up into it."""
+        """Return the closed solids of the board, and of its post up into it, in its frame."""
         middle = self.lower_edge + self.height / 2.0
         outline = face_outline("rectangle", self.width, self.height) + (0.0, middle)
         return [
@@ -57,6 +57,6 @@ class KilometreBoard(StandingThing):
         ]
 
     def footprint(self) -> Iterator[Block]:
-        """Yield the boxes of its post and of the board."""
+        """Yield the boxes of its post and of the board, in which nothing else may stand."""
         yield self.upright(_POST_REACH, self.lower_edge + self.height)
         yield self.face(self.width, self.lower_edge, self.height)

@@ -22,13 +22,13 @@ class Interval(ClosedModel):
 
 
 def interval(low: float, high: float, unit: str, description: str, title: str | None = None) -> Any:
-    """Declare an interval with its default limits."""
+    """Return a pydantic field for an `Interval` with its default limits."""
     limits = Interval(minimum=low, maximum=high)
     return Field(limits, title=title, description=description, json_schema_extra=notes(unit=unit))
 
 
 def share(default: float, description: str, title: str | None = None) -> Any:
-    """Declare a probability that a road (or a carriageway) has something."""
+    """Return a pydantic field, 0 to 1, for the probability that a road (or a carriageway) has something."""
     return quantity(default, "1", description, (0, 1), title=title)
 
 

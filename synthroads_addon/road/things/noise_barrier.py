@@ -63,16 +63,16 @@ class NoiseBarrier(LengthwiseThing):
     post_width: float = quantity(0.16, ge=0.05, le=0.5, unit="m", description="Width of a post (HEA profile).")
 
     def twin(self) -> TwinTypes:
-        """Return its types: a wall, for which IFC has no type of its own."""
+        """Return its types in the twin formats: a wall, for which IFC has no predefined type."""
         return TwinTypes("IfcWall.USERDEFINED", "barrier.noiseBarrier")
 
     def reach(self) -> tuple[float, float]:
-        """Return half the width of panels and posts, m."""
+        """Return how far it reaches to the right and to the left of its axis, m: half of panels or posts."""
         half = max(self.thickness / 2.0, self.post_width * FLANGE)
         return half, half
 
     def bodies(self, course: Course) -> list[Body]:
-        """Return panels on their plinths, level at the lower one of their posts, and the posts."""
+        """Return the closed solids of panels, plinths and posts in local coordinates; none off the road."""
         end = self.end_on(course.length)
         if end is None:
             return []
@@ -89,7 +89,7 @@ class NoiseBarrier(LengthwiseThing):
         return [*self._walls(pairs), *(Body(shape, "galvanised_steel") for shape in web)]
 
     def _walls(self, pairs: Float) -> list[Body]:
-        """Return panels and plinths between the feet (B, 2, 3) of posts."""
+        """Return the solids of panels and plinths between the feet (B, 2, 3) of posts, level at the lower one."""
         along = (pairs[:, 1] - pairs[:, 0]) * (1.0, 1.0, 0.0)
         length = np.maximum(np.linalg.norm(along, axis=1), _NONE)
         left = np.stack([-along[:, 1], along[:, 0], along[:, 2]], axis=1) / length[:, None]
@@ -120,7 +120,7 @@ class NoiseBarrier(LengthwiseThing):
         return [*walls, *made, *(Body(shape, face, detail=out) for shape in slats)]
 
     def _glazing(self, middle: Float, left: Float, long: Float, levels: tuple[float, Float]) -> list[Body]:
-        """Return panes in their frames; those of shorter bays are squeezed."""
+        """Return the solids of glass panes and their frames; those of shorter bays are squeezed."""
         low, squeezed = levels
         tall = self.height - low
         ahead = np.stack([left[:, 1], -left[:, 0], left[:, 2]], axis=1)
@@ -138,6 +138,6 @@ class NoiseBarrier(LengthwiseThing):
         return [*(Body(shape, glass) for shape in panes), *(Body(shape, frame) for shape in shapes)]
 
     def footprint(self) -> Iterator[Block]:
-        """Yield the box around panels and posts."""
+        """Yield the box around panels and posts, in which nothing else may stand."""
         half = max(self.thickness, self.post_width) / 2.0
         yield self.strip(half, half, self.height)

@@ -12,7 +12,7 @@ from pydantic import Field
 from ...base.arrays import Float
 from ...base.schema import quantity
 from ..guidelines import CLEARANCE
-from .body import Body, Place, Point2, Point3, box, moved, prism
+from .body import Body, Place, Point2, Point3, box, prism, shift
 from .limits import Interval, Limits, interval, share
 from .thing import Block, StandingThing, TwinTypes
 
@@ -98,11 +98,11 @@ class Overpass(StandingThing):
         return 0.0
 
     def twin(self) -> TwinTypes:
-        """Return its types: a bridge."""
+        """Return its types in the twin formats: a bridge."""
         return TwinTypes("IfcBridge.NOTDEFINED", "building.overpass", "Bridge", "BridgeConstructiveElement")
 
     def bodies(self, place: Place) -> list[Body]:
-        """Return deck, edge beams, railings, piers and abutments; its embankments are ground.
+        """Return the closed solids of deck, edge beams, railings, piers and abutments, in its frame.
 
         The deck is level, its underside `clearance` above the pavement's highest point below it. A skewed bridge is
         sheared: its faces stay parallel to the road, as its piers do.
@@ -116,23 +116,23 @@ class Overpass(StandingThing):
             wing = float(np.clip((self.deck_thickness - ground) * place.slope, *WINGS))
             ends.append(x + side * wing)
             for body in self._abutment(f"abutment-{number}", ground - BURIED, wing):
-                walls.append(replace(body, sections=moved(body.sections, (x, 0.0, 0.0), (side, 1.0, 1.0))))
+                walls.append(replace(body, sections=shift(body.sections, (x, 0.0, 0.0), (side, 1.0, 1.0))))
         deck = self._deck((faces[0] - SEAT, faces[1] + SEAT), (ends[0], ends[1]))
-        skewed = [replace(body, sections=_skewed(body.sections, shear, low)) for body in (*deck, *walls)]
+        skewed = [replace(body, sections=_shear_sections(body.sections, shear, low)) for body in (*deck, *walls)]
         for number, offset in enumerate(self.pier_offsets, 1):
             x = self.offset - offset
             foot = float(place.ground([x], [x * shear])[0]) - BURIED - low
             for body in self._pier(f"pier-{number}", foot):
-                skewed.append(replace(body, sections=moved(body.sections, (x, x * shear, low))))
+                skewed.append(replace(body, sections=shift(body.sections, (x, x * shear, low))))
         return skewed
 
     def _deck(self, ends: Point2, reach: Point2) -> list[Body]:
-        """Return the deck between two x, and the pavement, edge beams and railings on it between two others."""
+        """Return the solids of the deck between two x, and of pavement, edge beams and railings between two others."""
         width, height, (start, end) = self.width, self.deck_thickness, reach
         half = np.array(DECK) * (width / 2.0, height - PAVEMENT / 2.0)
         slab = half[[0, *range(3, len(half))]]
-        shapes = [_across(np.concatenate([slab, slab[::-1] * (-1.0, 1.0)]), ends)]
-        shapes += [_across(half[:4] * (side, 1.0), ends) for side in (1.0, -1.0)]
+        shapes = [_extrude(np.concatenate([slab, slab[::-1] * (-1.0, 1.0)]), ends)]
+        shapes += [_extrude(half[:4] * (side, 1.0), ends) for side in (1.0, -1.0)]
         size = (end - start, width * (1.0 - 1.96 * EDGE), PAVEMENT)
         shapes.append(box(size, ((start + end) / 2.0, 0.0, height - PAVEMENT / 2.0)))
         materials = (*["bridge_concrete"] * 3, "asphalt")
@@ -143,14 +143,14 @@ class Overpass(StandingThing):
         beam = [(width / 2.0, below), (width / 2.0, top), (inner, top), (inner, seat), (nose, seat), (nose, below)]
         for number, side in enumerate((-1.0, 1.0), 1):
             outline = np.array(beam) * (side, 1.0)
-            made.append(Body(_across(outline, reach), "barrier_concrete", f"edge-beam-{number}", "IfcBeam.EDGEBEAM"))
+            made.append(Body(_extrude(outline, reach), "barrier_concrete", f"edge-beam-{number}", "IfcBeam.EDGEBEAM"))
             if self.parapet_height > LOWEST_PARAPET:
                 place = (start, side * (width / 2.0 - RAILING_INSIDE), top)
                 made += self._railing(f"parapet-{number}", place, end - start)
         return made
 
     def _railing(self, name: str, place: Point3, length: float) -> list[Body]:
-        """Return a railing along x from a place on."""
+        """Return the solids of a railing that runs along x from a place on for a length, m."""
         height, middle, (wide, high) = self.parapet_height - CURB, length / 2.0, RAILING_HAND
         upper, rail = height - high - RAILING_LOWER, (length, RAILING_RAIL, RAILING_RAIL)
         shapes = [
@@ -162,11 +162,11 @@ class Overpass(StandingThing):
         along = RAILING_POST / 2.0 + np.arange(bays + 1) * (length - RAILING_POST) / bays
         shapes += [box((RAILING_POST, RAILING_POST, tall), (x, 0.0, tall / 2.0)) for x in along.tolist()]
         bars = box((length, 1.4 * RAILING_BAR, upper - RAILING_LOWER), (middle, 0.0, (upper + RAILING_LOWER) / 2.0))
-        steel = [Body(moved(shape, place), "galvanised_steel", name, "IfcRailing.BALUSTRADE") for shape in shapes]
-        return [*steel, Body(moved(bars, place), "galvanised_steel", name, detail=RAILING_BAR)]
+        steel = [Body(shift(shape, place), "galvanised_steel", name, "IfcRailing.BALUSTRADE") for shape in shapes]
+        return [*steel, Body(shift(bars, place), "galvanised_steel", name, detail=RAILING_BAR)]
 
     def _abutment(self, name: str, foot: float, wing: float) -> list[Body]:
-        """Return an abutment whose face looks to -x and stands on x = 0; the deck's underside is z = 0."""
+        """Return the solids of an abutment with its face on x = 0 towards -x; the deck's underside is z = 0."""
         wide, height, (behind, before) = self.width - 2.0 * WALL_INSIDE, self.deck_thickness, BACK_WALL
         end = ABUTMENT - before
 
@@ -185,7 +185,7 @@ class Overpass(StandingThing):
         return [*made, Body(pads, "galvanised_steel", name, detail=BEARING)]
 
     def _pier(self, name: str, foot: float) -> list[Body]:
-        """Return a pier along y with rounded ends; the deck's underside is z = 0."""
+        """Return the solids of a pier along y with rounded ends, and its bearings; the deck's underside is z = 0."""
         wide = self.pier_width
         straight = max((self.width * PIER_LENGTH - wide) / 2.0, 0.01 * wide)
         turn = np.pi * np.arange(PIER_ROUND) / (PIER_ROUND - 1.0)
@@ -200,7 +200,7 @@ class Overpass(StandingThing):
         ]
 
     def footprint(self) -> Iterator[Block]:
-        """Yield the boxes of its piers, its deck, and what lies behind its abutments."""
+        """Yield the boxes of its piers, its deck and what lies behind its abutments: nothing else may stand there."""
         start, end, half = self.station - self.width / 2.0, self.station + self.width / 2.0, self.pier_width / 2.0
         for d in self.pier_offsets:
             yield Block("foot", start, end, d - half, d + half, 0.0, self.clearance)
@@ -210,11 +210,11 @@ class Overpass(StandingThing):
         yield Block("wall", start, end, -_FAR, right, 0.0, top)
 
 
-def _across(outline: Float, ends: Point2) -> Float:
-    """Return the body over an outline (y, z) between two x."""
+def _extrude(outline: Float, ends: Point2) -> Float:
+    """Return the sections (2, K, 3) of an outline (K, 2) in y, z extruded between two x, m."""
     return np.stack([np.column_stack([np.full(len(outline), x), outline]) for x in ends])
 
 
-def _skewed(sections: Float, shear: float, low: float) -> Float:
-    """Return sections moved along y by their x times a shear, and up by a height (m)."""
+def _shear_sections(sections: Float, shear: float, low: float) -> Float:
+    """Return sections sheared, y growing by ``shear`` times x, and moved up by ``low`` (m)."""
     return sections + sections[..., :1] * np.array([0.0, shear, 0.0]) + (0.0, 0.0, low)

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from ...base.arrays import Float
 from ...base.schema import quantity
-from .body import BURIED, Body, Place, box, circle, moved, post, prism, tilted
+from .body import BURIED, Body, Place, box, circle, post, prism, rotate_x, shift
 from .limits import Interval, Limits, interval, share
 from .thing import Block, StandingThing, TwinTypes
 
@@ -68,11 +68,11 @@ class Pole(StandingThing):
     arm_length: float = quantity(1.5, ge=0, le=6, unit="m", description="Length of its arm; 0 for none.")
 
     def twin(self) -> TwinTypes:
-        """Return its types: a mast and what it carries."""
+        """Return its types in the twin formats: a mast and what it carries."""
         return TwinTypes("IfcElementAssembly.MAST.FACTORY", f"pole.{self.kind}", kind=self.kind)
 
     def bodies(self, place: Place) -> list[Body]:
-        """Return the mast, its arm, and a street light or cameras."""
+        """Return the closed solids of the mast, its arm, and a street light or cameras, in its frame."""
         lighting = self.kind == "lighting"
         mount = self.height - (LUMINAIRE_DEPTH / 2.0 if lighting else CAMERA_MOUNT)
         rise = self.arm_length * ARM_RISE
@@ -97,7 +97,7 @@ class Pole(StandingThing):
         ]
 
     def _cameras(self, mount: float) -> list[Body]:
-        """Return a camera along the road either way, a dome camera at the end of the arm, and the mast's cabinet."""
+        """Return the solids of a camera either way along the road, a dome at the arm's end, and the mast's cabinet."""
         across, along, high = CAMERA
         wider, longer, thick = CAMERA_SHIELD
         away, level = (self.diameter + along) / 2.0, mount - CAMERA_BELOW
@@ -105,10 +105,10 @@ class Pole(StandingThing):
         shapes, small = [box((wide, deep, tall), (0.0, self.diameter / 2.0 + 0.1, middle))], []
         for side in (1.0, -1.0):
             place, facing = (0.0, -side * away, level), (side, side, 1.0)
-            shapes.append(moved(tilted(box(CAMERA), np.deg2rad(CAMERA_TILT)), place, facing))
+            shapes.append(shift(rotate_x(box(CAMERA), np.deg2rad(CAMERA_TILT)), place, facing))
             shield = box((across + wider, along + longer, thick), (0.0, -0.03, high / 2.0 + 0.012))
             lens = box((0.09, 0.02, 0.09), (0.0, -along / 2.0, 0.0))
-            small += [moved(tilted(shape, np.deg2rad(CAMERA_TILT)), place, facing) for shape in (shield, lens)]
+            small += [shift(rotate_x(shape, np.deg2rad(CAMERA_TILT)), place, facing) for shape in (shield, lens)]
         if self.arm_length > SHORTEST_ARM:
             radius, cap, low, ball = CAMERA_DOME
             shapes.append(post(2.0 * radius, mount - low, mount - low + cap, -self.arm_length))
@@ -117,12 +117,12 @@ class Pole(StandingThing):
         return [*head, *(Body(shape, "cabinet_grey", "fittings", detail=0.09) for shape in small)]
 
     def footprint(self) -> Iterator[Block]:
-        """Yield the box of its mast."""
+        """Yield the box of its mast, in which nothing else may stand."""
         yield self.upright(self.diameter / 2.0, self.height)
 
 
 def _arm(length: float, mount: float, rise: float) -> Float:
-    """Return a quarter of an ellipse from the mast's axis to the left, and up to the height of its end."""
+    """Return the sections of a bent arm: a quarter of an ellipse from the mast's axis to the left, and up."""
     turn = np.pi / 2.0 * np.arange(ARM_POINTS) / (ARM_POINTS - 1.0)
     line = np.column_stack([length * (np.cos(turn) - 1.0), np.zeros(ARM_POINTS), mount - rise * (1.0 - np.sin(turn))])
     steps = np.diff(line, axis=0) / np.linalg.norm(np.diff(line, axis=0), axis=1)[:, None]

@@ -14,13 +14,13 @@ THINGS = discover_models(__package__, Thing, "type")
 
 
 def limits_of(group: str = "") -> Iterator[tuple[type[Thing], type[Limits]]]:
-    """Yield the things that have limits, with these, in their order: all, or those of a part of the scenario."""
+    """Yield (thing class, its limits class) in the limits' order: all things with limits, or those of one group."""
     pairs = [(thing, thing.limits) for thing in THINGS.values() if thing.limits is not None]
     yield from sorted((pair for pair in pairs if group in ("", pair[1].group)), key=lambda pair: pair[1].place)
 
 
 def limits_model(name: str, group: str, base: type[ClosedModel]) -> type[ClosedModel]:
-    """Return a part of the scenario by a name: the fields of its base, then those of its things' limits."""
+    """Return a new pydantic class, a part of the scenario: the fields of its base, then of its things' limits."""
     # Of several bases pydantic takes the fields of the last first.
     bases = (*reversed([limits for _, limits in limits_of(group)]), base)
     return create_model(name, __base__=bases, __doc__=base.__doc__, __module__=__name__)

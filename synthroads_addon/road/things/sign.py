@@ -67,17 +67,17 @@ class TrafficSign(StandingThing):
         return large and self.post_diameter >= _LARGE_POST and self.posts <= _MOST_LATTICES
 
     def twin(self) -> TwinTypes:
-        """Return its types: a sign."""
+        """Return its types in the twin formats: a sign, with its code as reference."""
         return TwinTypes("IfcSign.PICTORAL", "pole.signalPost", reference=self.code)
 
     def signals(self) -> dict[str, Signal]:
-        """Return what its face tells."""
+        """Return the message of its one face to drivers, "face": code, subtype, speed limit and text."""
         kind, _, subtype = self.code.partition("-")
         speed = float(subtype) if kind == _SPEED_LIMIT and subtype.isdigit() else None
         return {"face": Signal(kind, subtype or "-1", speed=speed, text="\n".join(self.text))}
 
     def bodies(self, place: Place) -> list[Body]:
-        """Return the face, the posts, each from the ground below it, and the rails and clamps between them."""
+        """Return the closed solids of face and posts, from the ground below each, in its frame; rails are a detail."""
         share, spread, long = BEHIND[self.shape]
         half, top = self.post_diameter / 2.0, self.lower_edge + self.height * share
         outline = face_outline(self.shape, self.width, self.height) + (0.0, self.lower_edge + self.height / 2.0)
@@ -99,7 +99,7 @@ class TrafficSign(StandingThing):
         ]
 
     def _post(self, x: float, low: float, high: float) -> list[Body]:
-        """Return a tube, or the three chords of a lattice and its diagonals."""
+        """Return the solid of a tube, or those of the three chords of a lattice and a box for its diagonals."""
         wide, steel = self.post_diameter, "galvanised_steel"
         if not self.on_lattices:
             return [Body(post(wide, low, high, x), steel)]
@@ -111,7 +111,7 @@ class TrafficSign(StandingThing):
         return [*chords, Body(diagonals, steel, "diagonals", detail=LATTICE_CHORD)]
 
     def footprint(self) -> Iterator[Block]:
-        """Yield the boxes of its posts, then that of its face."""
+        """Yield the boxes of its posts, then that of its face, in which nothing else may stand."""
         face = self.face(self.width, self.lower_edge, self.height)
         half = self.post_diameter / 2.0
         for i in range(self.posts):

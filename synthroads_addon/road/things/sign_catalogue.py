@@ -50,7 +50,7 @@ class SignType(Model):
     )
 
     def fields(self) -> dict[str, Any]:
-        """Return the fields of a `TrafficSign` of this type, but its code, text and place."""
+        """Return the fields of a `TrafficSign` of this type, all but its code, text and place."""
         return {
             "shape": self.shape,
             "width": self.width,
@@ -79,11 +79,11 @@ class SignCatalogue(Model):
 
 @cache
 def sign_catalogue() -> SignCatalogue:
-    """Return the shipped catalogue."""
+    """Return the shipped catalogue of traffic signs, read once from the presets."""
     path = PRESETS / "signs.json"
     return SignCatalogue.from_dict(read_json(path), source=str(path))
 
 
 def sign_type(sign: TrafficSign) -> SignType | None:
-    """Return what the catalogue says of a sign, or None if it doesn't have its code."""
+    """Return a sign's entry in the catalogue, by its code, or None if there is none."""
     return sign_catalogue().signs.get(sign.code)

@@ -25,12 +25,12 @@ MOST_OF_SIDE = 0.499
 
 
 def corner_radius(shape: str, width: float, height: float) -> float:
-    """Return the radius (m) of the corners of a sign's face."""
+    """Return the radius (m) of the rounded corners of a sign's face, by its shape and smaller side."""
     return float(np.clip(_CORNERS[shape] * min(width, height), *_CORNER_LIMITS))
 
 
 def face_outline(shape: str, width: float, height: float) -> Float:
-    """Return the corners (K, 2) of a sign's face around its middle, anticlockwise: those of its shape, rounded."""
+    """Return the corners (K, 2) of a sign's rounded face around its middle, m, anticlockwise."""
     corners = np.array(SIGN_OUTLINES["rectangle" if shape == "round" else shape])
     most = min(width, height) * MOST_OF_SIDE
     radius = most if shape == "round" else min(corner_radius(shape, width, height), most)

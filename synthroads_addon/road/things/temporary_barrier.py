@@ -50,15 +50,15 @@ class TemporaryBarrier(LengthwiseThing):
         return self.segment_length <= LONGEST_PLASTIC
 
     def twin(self) -> TwinTypes:
-        """Return its types: a guardrail that is moved."""
+        """Return its types in the twin formats: a guardrail, marked as temporary."""
         return TwinTypes("IfcRailing.GUARDRAIL", "barrier.temporaryBarrier", temporary=True)
 
     def reach(self) -> tuple[float, float]:
-        """Return half its foot's width, m."""
+        """Return how far it reaches to the right and to the left of its axis, m: half its foot's width."""
         return self.base_width / 2.0, self.base_width / 2.0
 
     def bodies(self, course: Course) -> list[Body]:
-        """Return its elements, each straight from foot to foot, and the reflectors on those of steel."""
+        """Return the closed solids of its straight elements, and of their reflectors, in local coordinates."""
         if self.end_on(course.length) is None:
             return []
         gap = GAP / 2.0
@@ -81,7 +81,7 @@ class TemporaryBarrier(LengthwiseThing):
         return made if self.plastic else [*made, *self._reflectors(feet.mean(axis=1), np.stack([along, left, up], 1))]
 
     def _reflectors(self, middle: Float, axes: Float) -> list[Body]:
-        """Return the reflectors on either flank of elements around middles (E, 3), whose axes (E, 3, 3) are rows."""
+        """Return the solids of reflectors on both flanks of elements: middles (E, 3), axes (E, 3, 3) as rows."""
         beside = self.base_width / 2.0 * FLANKS["steel"][5][0] + REFLECTOR[1] / 4.0
         shapes = [box(REFLECTOR, (0.0, side * beside, self.height * 0.82)) for side in (1.0, -1.0)]
         pairs = ((shape, place, frame) for shape in shapes for place, frame in zip(middle, axes, strict=True))
@@ -93,5 +93,5 @@ class TemporaryBarrier(LengthwiseThing):
 
 
 def _unit(vectors: Float) -> Float:
-    """Return vectors (N, 3) of length 1; what has none keeps it: its coordinates are too large for its size."""
+    """Return vectors (N, 3) scaled to length 1; those of length 0 stay 0."""
     return vectors / np.maximum(np.linalg.norm(vectors, axis=1), _NONE)[:, None]

@@ -42,7 +42,7 @@ class Block(NamedTuple):
 
 
 class TwinTypes(NamedTuple):
-    """Names of a thing's types in the formats of the geometric-semantic model.
+    """Names of a thing's types in the twin formats: IFC, OpenDRIVE and CityJSON.
 
     Attributes:
         ifc: entity, predefined type, and of an assembly where it is put together, with dots between them.
@@ -100,15 +100,15 @@ class Thing(RoadObject):
     left_out: ClassVar[str] = ""
 
     def footprint(self) -> Iterator[Block]:
-        """Yield the boxes in which nothing else may stand."""
+        """Yield the boxes, in stations, offsets and heights, in which nothing else may stand."""
         raise NotImplementedError
 
     def twin(self) -> TwinTypes:
-        """Return its types in the formats of the geometric-semantic model."""
+        """Return its types in the twin formats: IFC, OpenDRIVE and CityJSON."""
         return TwinTypes()
 
     def part_models(self) -> Mapping[str, Model]:
-        """Return what the parameter set says of single parts, by their names."""
+        """Return the parameters of its named parts, by name; empty where it has none."""
         return {}
 
 
@@ -116,16 +116,16 @@ class StandingThing(Thing, PointObject):
     """Base of what stands at one place."""
 
     def bodies(self, place: Place) -> list[Body]:
-        """Return its bodies in its frame; none if its shape isn't known here."""
+        """Return its closed solids in its frame; none if its shape isn't known here."""
         raise NotImplementedError
 
     def signals(self) -> Mapping[str, Signal]:
-        """Return what those of its parts that are faces for drivers tell."""
+        """Return the messages of its faces to drivers, by the name of the part; empty where it has none."""
         return {}
 
     @property
     def turn(self) -> float:
-        """Return the turn of its frame about the vertical, rad; 0 where it faces traffic with the stations."""
+        """Return the rotation of its frame about the vertical, rad; 0 where it faces traffic with the stations."""
         return math.radians(self.rotation_deg)
 
     @property
@@ -134,12 +134,12 @@ class StandingThing(Thing, PointObject):
         return self.offset
 
     def upright(self, half: float, top: float) -> Block:
-        """Return what stands upright on its foot, half (m) its half width both ways."""
+        """Return the box of what stands on its foot: ``half`` (m) is half its width both ways, ``top`` its height."""
         s, d, z = self.station, self.offset, self.elevation
         return Block("foot", s - half, s + half, d - half, d + half, z, z + top)
 
     def face(self, width: float, lower_edge: float, height: float) -> Block:
-        """Return an upright face of a width and height (m), turned as the thing stands."""
+        """Return the box around an upright face of a width and height (m), turned as the thing stands."""
         turn = np.radians(self.rotation_deg)
         sine, cosine = float(abs(np.sin(turn))), float(abs(np.cos(turn)))
         across, along = cosine * width / 2.0 + _FACE_REACH * sine, sine * width / 2.0 + _FACE_REACH * cosine
@@ -151,7 +151,7 @@ class LengthwiseThing(Thing, LineObject):
     """Base of what runs along the road."""
 
     def bodies(self, course: Course) -> list[Body]:
-        """Return its bodies on the road."""
+        """Return its closed solids on the road, in local coordinates."""
         raise NotImplementedError
 
     def reach(self) -> tuple[float, float]:
@@ -159,7 +159,7 @@ class LengthwiseThing(Thing, LineObject):
         raise NotImplementedError
 
     def strip(self, right: float, left: float, height: float) -> Block:
-        """Return what is as high (m) all along, and reaches so far (m) to the right and to the left of its axis."""
+        """Return the box of its whole length, so wide (m) to the right and left of its axis and so high (m)."""
         start, end = sorted((self.start_station, self.end_station))
         return Block("barrier", start, end, self.offset - right, self.offset + left, 0.0, height)
 
@@ -169,19 +169,19 @@ class LengthwiseThing(Thing, LineObject):
         return end if end - self.start_station >= _SHORTEST else None
 
     def ramp_length(self, end: float) -> float:
-        """Return over which length (m) it is ramped at either end if it ends at a station (m); 0 if it isn't."""
+        """Return the length (m) over which either end is ramped down if it ends at a station (m); 0 if none is."""
         ramp = min(float(getattr(self, "terminal_length", 0.0)), (end - self.start_station) / 2.0)
         return ramp if ramp > _SHORTEST_RAMP else 0.0
 
     def height_share(self, end: float, station: Float) -> Float:
-        """Return the share (N,) of its height that it has at stations (N,) if it ends at a station (m)."""
+        """Return the share (N,) of its full height at stations (N,), ramped at its ends, if it ends at ``end`` (m)."""
         ramp = self.ramp_length(end)
         if not ramp:
             return np.ones(station.shape)
         return np.clip(np.minimum(station - self.start_station, end - station) / ramp, 0.0, 1.0)
 
     def element_ends(self, step: float, length: float) -> Float:
-        """Return the stations (E, 2) of the ends of its elements of a length on a road (m); the last takes the rest."""
+        """Return the end stations (E, 2), m, of its elements of ``step`` (m) each; the last one takes the rest."""
         count = max(1.0, math.ceil((self.end_station - self.start_station) / step - SHORTEST_ELEMENT))
         border = np.arange(min(count, max(math.ceil((length - self.start_station) / step), 0.0)) + 1.0)
         station = np.where(border < count, self.start_station + border * step, self.end_station)

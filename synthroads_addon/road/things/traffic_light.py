@@ -8,7 +8,7 @@ import numpy as np
 
 from ...base.arrays import Float
 from ...base.schema import quantity
-from .body import BURIED, Body, Place, box, moved, post
+from .body import BURIED, Body, Place, box, post, shift
 from .limits import Limits, share
 from .thing import Block, Signal, StandingThing, TwinTypes
 
@@ -52,19 +52,19 @@ class TrafficLight(StandingThing):
     light_diameter: float = quantity(0.2, ge=0.1, le=0.4, unit="m", description="Diameter of a light.")
 
     def level(self, number: int) -> float:
-        """Return the height of a light's middle above the surface, m; 0 is the uppermost."""
+        """Return the height of the middle of a light, 0 the uppermost, above the surface, m."""
         return self.height - MARGIN - (number + 0.5) * self.light_diameter * CHAMBER[2]
 
     def twin(self) -> TwinTypes:
-        """Return its types: a signal."""
+        """Return its types in the twin formats: a signal."""
         return TwinTypes("IfcSignal.VISUAL", "pole.signalPost")
 
     def signals(self) -> dict[str, Signal]:
-        """Return what its lights are: OpenDRIVE's number of lights one above the other."""
+        """Return one changing signal for its head, with OpenDRIVE's number of lights one above the other."""
         return {"head": Signal("1000001", country="OpenDRIVE", dynamic=True)}
 
     def bodies(self, place: Place) -> list[Body]:
-        """Return post, board, chambers and visors; the lights lie inside these."""
+        """Return the closed solids of post, board, chambers and visors, in its frame; lights are a detail."""
         wide, rear = self.light_diameter, -POST / 2.0
         across, along, up = (share * wide for share in CHAMBER)
         tall = up * self.lights
@@ -78,14 +78,14 @@ class TrafficLight(StandingThing):
         for number in range(self.lights):
             level = self.level(number)
             shapes.append(box((across, along, up - JOINT * wide), (0.0, -along / 2.0 - 0.055, level)))
-            shapes.append(moved(self._visor(), (0.0, front, level)))
+            shapes.append(shift(self._visor(), (0.0, front, level)))
             lamps.append(box((wide, 0.12 * wide, wide), (0.0, front - 0.06 * wide, level)))
         mast = Body(post(POST, -BURIED, self.height - 0.03), "galvanised_steel")
         head = [Body(shape, "plastic_black", "head") for shape in shapes]
         return [*head, mast, *(Body(lamp, "lamp_red", "lamps", detail=0.12 * wide) for lamp in lamps)]
 
     def _visor(self) -> Float:
-        """Return a sheet bent over a light, open below, that reaches forward; the light's middle is the origin."""
+        """Return the sections of a sheet bent over a light, open below, which reaches forward from its middle."""
         radius, thick, reach, more = VISOR
         turn, outer = np.array(VISOR_TURNS), radius * self.light_diameter
         ring = np.column_stack([np.cos(turn), np.zeros(len(turn)), np.sin(turn)])
@@ -94,5 +94,5 @@ class TrafficLight(StandingThing):
         return np.stack([outline, outline - ahead[:, None] * (0.0, 1.0, 0.0)])
 
     def footprint(self) -> Iterator[Block]:
-        """Yield the box of its post."""
+        """Yield the box of its post, in which nothing else may stand."""
         yield self.upright(self.light_diameter / 2.0, self.height)

@@ -35,7 +35,7 @@ limits (directive 96/53/EC)."""
 
 
 class Chassis(NamedTuple):
-    """Where a vehicle stands on the road, m.
+    """Places of a vehicle's axles and wheels, by which it stands on the road, m.
 
     Attributes:
         front, rear: places along it, from its middle to the front, of the middles of its front axles (a tractor's are
@@ -49,7 +49,7 @@ class Chassis(NamedTuple):
 
     @property
     def wheel_base(self) -> float:
-        """Return the distance between its front and hind axles, m."""
+        """Return the distance between the middles of its front and its hind axles, m."""
         return self.front - self.rear
 
 

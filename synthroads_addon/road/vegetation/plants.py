@@ -46,7 +46,7 @@ _SLOPE = 0.25
 
 @dataclass(frozen=True)
 class PlantPlaces:
-    """Places of a stand along a stretch of road, those of the first metre first.
+    """Places where plants of a stand may grow along a stretch of road, those of the first metre first.
 
     Attributes:
         number: (N,) of each place.
@@ -62,7 +62,7 @@ class PlantPlaces:
 
 @dataclass(frozen=True)
 class Plants:
-    """Plants of a stand.
+    """Trees or shrubs of a stand: where each grows and how large it is.
 
     Attributes:
         number: (N,) of each plant's place.
@@ -83,24 +83,24 @@ class Plants:
 
 
 def random_share(seed: int, number: Int) -> NDArray[np.float32]:
-    """Return the random numbers (N,) from 0 to 1 that Blender's nodes have for a seed and ids (N,)."""
+    """Return the random numbers (N,), 0 to 1, of Blender's node Random Value for a seed and ids (N,)."""
     start = np.uint32(0xDEADBEEF + (2 << 2) + 13)
     with np.errstate(over="ignore"):
         a = np.full(len(number), start + np.uint32(seed % 2**32))
         b = start + number.astype(np.uint32)
         c = np.full(len(number), start)
         for one, other, bits in (("c", "b", 14), ("a", "c", 11), ("b", "a", 25), ("c", "b", 16)):
-            a, b, c = _mixed(a, b, c, one, other, bits)
+            a, b, c = _mix_words(a, b, c, one, other, bits)
         for one, other, bits in (("a", "c", 4), ("b", "a", 14), ("c", "b", 24)):
-            a, b, c = _mixed(a, b, c, one, other, bits)
+            a, b, c = _mix_words(a, b, c, one, other, bits)
     return c.astype(np.float32) / np.float32(0xFFFFFFFF)
 
 
 Words = NDArray[np.uint32]
 
 
-def _mixed(a: Words, b: Words, c: Words, one: str, other: str, bits: int) -> tuple[Words, Words, Words]:
-    """Return the state of the hash after one step: ``one ^= other; one -= rotated(other)``."""
+def _mix_words(a: Words, b: Words, c: Words, one: str, other: str, bits: int) -> tuple[Words, Words, Words]:
+    """Return the state of Jenkins' hash after one step: ``one ^= other; one -= rotated(other)``."""
     words = {"a": a, "b": b, "c": c}
     turned = (words[other] << np.uint32(bits)) | (words[other] >> np.uint32(32 - bits))
     words[one] = (words[one] ^ words[other]) - turned
@@ -110,7 +110,7 @@ def _mixed(a: Words, b: Words, c: Words, one: str, other: str, bits: int) -> tup
 def plant_places(
     geometry: RoadGeometry, plants: Vegetation, terrain: Terrain, start: float = 0.0, end: float | None = None
 ) -> PlantPlaces:
-    """Return the places of a stand in the whole metres that hold a stretch from ``start`` to ``end``, m.
+    """Return the places of a stand in the whole metres from ``start`` to ``end`` (m), and whether a plant grows there.
 
     Where plants grow there are as many on each square metre of ground, sloping or not, as the density says.
     """
@@ -132,7 +132,7 @@ def plant_places(
 
 
 def _steepness(geometry: RoadGeometry, station: Float, offset: Float, curvature: Float) -> Float:
-    """Return the area of ground (N,) above each square metre in plan."""
+    """Return the area of ground (N,) per area in plan at stations and offsets (N,), at most 10."""
     along = _SLOPE / np.maximum(1.0 - curvature * offset, 0.02)
 
     def height(ahead: Float | float, beside: float) -> Float:
@@ -144,7 +144,7 @@ def _steepness(geometry: RoadGeometry, station: Float, offset: Float, curvature:
 
 
 def grown_plants(geometry: RoadGeometry, plants: Vegetation, terrain: Terrain) -> Plants:
-    """Return the trees or shrubs of a stand."""
+    """Return the trees or shrubs of a stand along the whole road: places, heights, breadths and kinds."""
     places = plant_places(geometry, plants, terrain)
     number, seed = places.number[places.stands], plants.seed % SEEDS
     station, offset = places.station[places.stands], places.offset[places.stands]

@@ -29,7 +29,7 @@ _LEAST = 0.1
 
 @cache
 def species_shapes() -> dict[str, dict[str, dict[str, float]]]:
-    """Return the shapes of the species by kind of plant and name: inputs of its group, for a plant of height 1."""
+    """Return kind of plant -> species -> measures of a plant of height 1 (inputs of its node group), read once."""
     shapes: dict[str, dict[str, dict[str, float]]] = read_json(PRESETS / "plants.json")
     return shapes
 
@@ -71,7 +71,7 @@ class PlantShape(NamedTuple):
 
 
 def plant_shape(kind: str, species: str, variant: int) -> PlantShape:
-    """Return the shape of one of the kinds of a species of trees or shrubs."""
+    """Return the measures of a tree or shrub of height 1: one of the variants that each species has."""
     shape = species_shapes()[kind][species]
     radius = shape["crown_radius"] * KINDS[kind][variant]
     bottom = shape["crown_bottom"] * BOTTOMS[kind][variant]

@@ -82,5 +82,5 @@ def _vehicles(geometry: RoadGeometry, model: CityModel) -> Iterator[CityObject]:
     for placed in placed_vehicles(geometry):
         model.trace.simplify(placed)
         attributes: dict[str, Any] = attributes_of(placed.vehicle) | {"class": placed.vehicle.points_class}
-        attributes |= geometry.numbers.about(placed.vehicle.instance)
+        attributes |= geometry.numbers.part_attributes(placed.vehicle.instance)
         yield CityObject(placed.name, "GenericCityObject", attributes, solids([loft(placed.box())], _BOXES))

@@ -122,7 +122,7 @@ class Scene:
         """Give an entity what the parameter set says of its object, under the same names, and its class."""
         label = item.semantic_class
         values = self.ifc.parameters_of(item) | ({"class": self.ifc.value(label)} if label else {})
-        numbers = self.geometry.numbers.about(item.instance)
+        numbers = self.geometry.numbers.part_attributes(item.instance)
         values |= {key: self.ifc.value(number) for key, number in numbers.items()}
         self.ifc.properties(entity, "SynthRoads", values)
 

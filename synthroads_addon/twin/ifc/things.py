@@ -12,7 +12,7 @@ from typing import Any
 
 from ...base.arrays import Float
 from ...base.errors import InputError
-from ...road.things.body import Body, turned
+from ...road.things.body import Body, rotate_z
 from ...road.things.thing import LengthwiseThing, StandingThing, Thing, TwinTypes
 from ..things import PlacedThing, placed_things
 from .entities import Entity, Values
@@ -124,7 +124,7 @@ class _Writer:
     def _inside(self, sections: Float) -> Float:
         """Return sections in the frame of the thing's placement: x along the road, y to the left."""
         if isinstance(self.thing, StandingThing):
-            return turned(sections, self.thing.turn - math.pi / 2.0)
+            return rotate_z(sections, self.thing.turn - math.pi / 2.0)
         return self.place.inside(sections)
 
 

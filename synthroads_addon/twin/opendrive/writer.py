@@ -161,7 +161,7 @@ def _list_rest(root: Element, parameters: RoadParameters) -> None:
     for name, item in parameters.objects.items():
         if isinstance(item, kinds):
             entry = element(root, "userData", {"code": "instance", "value": item.instance})
-            first = numbers.about(item.instance)
+            first = numbers.part_attributes(item.instance)
             element(
                 entry,
                 "parameterObject",
