@@ -19,16 +19,16 @@ UInt16 = NDArray[np.uint16]
 
 @dataclass(frozen=True)
 class ArrayRows:
-    """Record of arrays that have a row each for the same things; an array that isn't there is None."""
+    """Base of records of arrays that have a row each for the same things; an array that isn't there is None."""
 
     def select(self, rows: Bool | Index | slice) -> Self:
-        """Return the rows chosen by a mask, indices or a slice."""
+        """Return a record of the rows chosen by a mask, indices or a slice."""
         arrays = (getattr(self, field.name) for field in fields(self))
         return type(self)(*(None if array is None else array[rows] for array in arrays))
 
     @classmethod
     def join(cls, parts: Sequence[Any]) -> Self:
-        """Return the rows of several records of this class, in order; at least one record is needed."""
+        """Return one record with the rows of several records of this class, in order; at least one is needed."""
 
         def joined(arrays: list[Any]) -> AnyArray | None:
             return None if arrays[0] is None else np.concatenate(arrays)
@@ -37,7 +37,7 @@ class ArrayRows:
 
 
 def otsu(values: Float) -> float:
-    """Return Otsu's threshold (1979): the one with the largest variance between those below and those above it."""
+    """Return Otsu's threshold (1979) of values (N,): the one with the largest variance between the two sides."""
     count, edges = np.histogram(values, bins=256)
     middle = (edges[:-1] + edges[1:]) / 2.0
     below, moment = np.cumsum(count)[:-1], np.cumsum(count * middle)[:-1]

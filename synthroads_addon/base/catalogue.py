@@ -10,7 +10,7 @@ from .errors import InputError, nearest_name
 
 @dataclass(frozen=True)
 class Entry:
-    """One thing that comes under a name.
+    """Entry of a catalogue: one thing that a command takes by name, shipped or in a file of one's own.
 
     Attributes:
         name: as it is given to a command; of a file of one's own its path.
@@ -33,7 +33,7 @@ class Entry:
 
 
 def plain(value: Any) -> str:
-    """Return a figure as text: numbers short, lists with commas, of counts the name before."""
+    """Return a figure as text: numbers short, lists with commas, of counts the name before, "-" for None."""
     if isinstance(value, dict):
         return ", ".join(f"{name} {plain(number)}" for name, number in value.items())
     if isinstance(value, (list, tuple)):
@@ -42,7 +42,7 @@ def plain(value: Any) -> str:
 
 
 def span(values: Sequence[float]) -> str:
-    """Return the smallest and the largest of some numbers as text."""
+    """Return the smallest and the largest of some numbers as text, "2 to 5", or the one that all are."""
     low, high = min(values), max(values)
     return f"{low:g}" if low == high else f"{low:g} to {high:g}"
 
@@ -53,7 +53,7 @@ Rows = Callable[[Entry], Sequence[Sequence[str]]]
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of things that come under a name.
+    """Kind of a catalogue's entries: how they are named, read and shown in a table.
 
     Attributes:
         title: of all of them.
@@ -75,7 +75,7 @@ class Kind:
 
 
 def figures(*names: str, **shown: Callable[[Any], str]) -> Rows:
-    """Return what makes one row of an entry: its title, then some of its figures.
+    """Return a function that makes one table row of an entry: its title, then some of its figures.
 
     Args:
         names: of the figures, in the order of the columns.
@@ -85,7 +85,7 @@ def figures(*names: str, **shown: Callable[[Any], str]) -> Rows:
 
 
 def entries(kind: Kind, wanted: Sequence[str] = ()) -> list[Entry]:
-    """Return what is shipped of a kind, or what is wanted of it.
+    """Return the shipped entries of a kind, or those that are wanted.
 
     Args:
         kind: of the things.
@@ -117,5 +117,5 @@ def _find_names(kind: Kind, text: str) -> list[str]:
 
 
 def preset(folder: Path, ending: str, name_or_file: str, names: Sequence[str]) -> Path:
-    """Return the file of something shipped, or the one named."""
+    """Return the path of something shipped if the name is among ``names``, else the name itself as a path."""
     return folder / f"{name_or_file}{ending}" if name_or_file in names else Path(name_or_file)

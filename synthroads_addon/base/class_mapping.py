@@ -34,7 +34,7 @@ class ClassMapping(Model):
     collections: dict[str, str] = Field({}, description="Pattern of collections' names -> class.")
 
     def check(self, known: Iterable[str], source: str) -> None:
-        """Refuse classes that a scheme doesn't have.
+        """Raise InputError if the mapping names a class that a scheme doesn't have.
 
         Args:
             known: names of the scheme's classes.
@@ -57,7 +57,7 @@ def fits_pattern(name: str, pattern: str) -> bool:
 
 
 class NameClasses:
-    """A mapping at work on the names of one scene; it remembers which patterns fitted.
+    """Finds the classes of one scene's things by their names, and remembers which patterns fitted.
 
     Args:
         mapping: names -> classes; none if None.
@@ -72,7 +72,7 @@ class NameClasses:
         self._used: set[tuple[str, str]] = set()
 
     def find(self, kind: str, *names: str) -> int | None:
-        """Return the class of the first of these names that has one; None if none has."""
+        """Return the ``class_id`` of the first of these names that has one; None if none has."""
         numbers = [self._find(kind, name) for name in names]
         return next((number for number in numbers if number is not None), None)
 

@@ -53,7 +53,7 @@ Member = str | int | ClassSelector
 
 
 def _form(member: object) -> str | None:
-    """Return whether a class's member is a name, a number or a selector, so that errors speak of that form alone."""
+    """Return "name", "number" or "selector" by the form of a class's member, else None; the union's discriminator."""
     if isinstance(member, str | bool):
         return "name" if isinstance(member, str) else None
     return {int: "number", dict: "selector", ClassSelector: "selector"}.get(type(member))
@@ -139,7 +139,7 @@ class ClassScheme:
     fine: Mapping[int, PointClass] = field(default_factory=dict)
 
     def source_ids(self) -> dict[str, int]:
-        """Return the ``class_id`` that points are handed in with by the names that objects may have as their class."""
+        """Return class name -> ``class_id`` of points as handed in, for all names that objects may have as class."""
         return {row.name: number for number, row in self.fine.items()} | {row.name: row.id for row in classes()}
 
     def sources(self) -> ClassScheme:
@@ -149,7 +149,7 @@ class ClassScheme:
         return ClassScheme("17", (*full, *fine), np.arange(256, dtype=np.uint8))
 
     def selectors(self) -> Iterator[tuple[int, ClassSelector]]:
-        """Yield the selectors with the ``class_id`` of what they find; of several that fit the first counts."""
+        """Yield (``class_id``, selector) of the fine classes; of several that fit the first counts."""
         return ((number, selector) for number, row in self.fine.items() for selector in row.selectors())
 
     def names(self) -> dict[int, str]:
@@ -182,13 +182,13 @@ class ClassScheme:
 
 @cache
 def classes() -> tuple[PointClass, ...]:
-    """Return all classes ordered by id."""
+    """Return the classes of the full table ordered by id, read once."""
     return _read_rows(PRESETS / "classes.json")
 
 
 @cache
 def class_id(name: str) -> int:
-    """Return the id of the class `name`; KeyError if there is none."""
+    """Return the id of the class ``name`` in the full table; KeyError if there is none."""
     return {row.name: row.id for row in classes()}[name]
 
 
@@ -198,7 +198,7 @@ def scheme_names() -> list[str]:
 
 
 def class_scheme(name_or_file: str) -> ClassScheme:
-    """Return a built-in scheme, or one from a JSON file of the form of ``presets/classes_5.json``.
+    """Return a built-in class scheme, or one from a JSON file of the form of ``presets/classes_5.json``.
 
     Classes of the full table that no row names become unlabelled. A row with selectors, or of a name that the full
     table doesn't have and without `of`, is a fine class.
@@ -219,7 +219,7 @@ def class_scheme(name_or_file: str) -> ClassScheme:
 
 
 def stored_scheme(data: object, source: str) -> ClassScheme:
-    """Return the scheme that a cloud says it was written with (`ClassScheme.to_dict`)."""
+    """Return the class scheme that a cloud says it was written with (`ClassScheme.to_dict`), else InputError."""
     if not isinstance(data, dict) or "classes" not in data:
         raise InputError(source, None, "holds no table of its classes")
     table = ClassTable.from_dict({"classes": data["classes"]}, source)
@@ -261,7 +261,7 @@ def _read_rows(path: Path) -> tuple[PointClass, ...]:
 
 
 def _read_table(path: Path) -> ClassTable:
-    """Return a table with the classes that it extends before its own."""
+    """Read a table, the classes that it extends before its own; InputError for reserved ids and LAS codes."""
     table = ClassTable.from_dict(read_json(path), str(path))
     for row in table.classes:
         if row.id == UNLABELLED:
@@ -282,7 +282,7 @@ def _rows(rows: Iterable[ClassRow]) -> tuple[PointClass, ...]:
 
 
 def _fine_classes(rows: Sequence[ClassRow]) -> dict[int, PointClass]:
-    """Return the classes that the full table doesn't have, by numbers that no row names, in the rows' order."""
+    """Return number -> class for the classes that the full table doesn't have; numbers from 254 downwards."""
     known = {row.name for row in classes()}
     named = {member for row in rows for member in row.of if isinstance(member, int)}
     free = (number for number in range(UNLABELLED - 1, -1, -1) if number not in named)
@@ -292,7 +292,7 @@ def _fine_classes(rows: Sequence[ClassRow]) -> dict[int, PointClass]:
 
 
 def _merging_table(rows: Sequence[ClassRow], fine: Mapping[int, PointClass], source: str) -> NDArray[np.uint8]:
-    """Return the (256,) table from the ids of points handed in to a scheme's, checked."""
+    """Return the (256,) table from ``class_id`` as handed in to the scheme's; InputError for a wrong member."""
     ids = {row.name: row.id for row in classes()}
     table = np.full(256, UNLABELLED, dtype=np.uint8)
     for row in rows:

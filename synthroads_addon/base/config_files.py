@@ -15,7 +15,7 @@ millions."""
 
 
 class Loader(yaml.SafeLoader):
-    """Reads YAML as plain data; see the module."""
+    """PyYAML's safe loader that limits the number of values and allows no key twice in a mapping."""
 
     def __init__(self, stream: str) -> None:
         super().__init__(stream)

@@ -11,7 +11,7 @@ _TABLE = PRESETS / "crs.json"
 
 @cache
 def wkt(epsg: int) -> str:
-    """Return WKT 1 (OGC 01-009), as LAS 1.4 asks for it.
+    """Return the WKT 1 (OGC 01-009, as LAS 1.4 asks for) of the coordinate system with an EPSG code.
 
     Raises:
         InputError: the code is unknown, or it isn't shipped and `pyproj` isn't installed.

@@ -20,7 +20,7 @@ _TYPES = {"integer": "whole number", "number": "number", "string": "text"}
 
 @dataclass(frozen=True)
 class FieldEntry:
-    """A field as ``--set`` takes it.
+    """A field of a file, with what it may hold, as ``--set`` takes it.
 
     Attributes:
         path: e.g. ``scan.platform.height``.
@@ -60,7 +60,7 @@ class FieldEntry:
 
 @dataclass(frozen=True)
 class Wording:
-    """How a rule's value is told.
+    """Turns the JSON Schema of a field into words for people.
 
     Attributes:
         constant: from JSON's text of a value that may be chosen to what is shown of it.
@@ -71,7 +71,7 @@ class Wording:
     group: Callable[[str], str]
 
     def value(self, rule: Rule) -> str:
-        """Return what a value may be, with its limits."""
+        """Return in words what a field may hold, its limits included, by its JSON Schema."""
         if "$ref" in rule:
             return self.group(class_of(rule))
         if "const" in rule:
@@ -105,7 +105,7 @@ PLAIN = Wording(lambda text: text.strip('"'), lambda name: "object")
 
 
 def class_of(rule: Rule) -> str:
-    """Return the name of the class that a rule refers to."""
+    """Return the name of the class that a rule's ``$ref`` refers to."""
     return str(rule["$ref"]).rpartition("/")[2]
 
 
@@ -131,7 +131,7 @@ def _fields(schema: Rule, parts: Mapping[str, Rule], outer: FieldEntry | None) -
 
 
 def _kinds_as_one(classes: Sequence[Rule]) -> Sequence[Rule]:
-    """Return classes, a field being of one of them, as one: the constants by which they differ become a choice."""
+    """Return the classes of a field that is of one of them merged: constants that tell them apart become a choice."""
     if len(classes) < 2:
         return classes
     properties: dict[str, Rule] = {}
@@ -145,7 +145,7 @@ def _kinds_as_one(classes: Sequence[Rule]) -> Sequence[Rule]:
 
 
 def _field(name: str, rule: Rule, schema: Rule, inner: Sequence[Rule], outer: FieldEntry | None) -> FieldEntry:
-    """Return a field of a class; what lies in an interval has its unit and its meaning.
+    """Return the entry of one field of a class; what lies in an interval has its unit and its meaning.
 
     Args:
         name: of the field.
@@ -175,17 +175,17 @@ def _field(name: str, rule: Rule, schema: Rule, inner: Sequence[Rule], outer: Fi
 
 
 def _choices(rule: Rule) -> Sequence[Rule]:
-    """Return the rules of which a field follows one."""
+    """Return the rules of which a field follows one, those of nested unions included; itself if it is no union."""
     several = rule.get("anyOf") or rule.get("oneOf")
     return [inner for choice in several for inner in _choices(choice)] if several else [rule]
 
 
 def _limits(rule: Rule) -> dict[str, float]:
-    """Return a number's limits, but for those that only keep out overflow."""
+    """Return a number's limits by their JSON Schema keys, but for those that only keep out overflow."""
     return {key: rule[key] for key in _LIMITS if abs(rule.get(key, LARGEST)) < LARGEST}
 
 
 def _limits_in_words(rule: Rule) -> str:
-    """Return a number's limits in words."""
+    """Return a number's limits as text, such as ", from 0 to 5"; empty if it has none."""
     words = [f"{_LIMITS[key]} {value:g}" for key, value in _limits(rule).items()]
     return f", {' '.join(words)}" if words else ""

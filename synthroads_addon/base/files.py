@@ -42,7 +42,7 @@ def read_text(path: str | os.PathLike[str], kind: str, wanted: str = "", encodin
 
 
 def preset_names(folder: Path, ending: str = ".json") -> list[str]:
-    """Return the names of the presets in a folder, which are its files of an ending."""
+    """Return the sorted names of the presets in a folder, which are its files of an ending."""
     return sorted(path.stem for path in folder.glob(f"*{ending}"))
 
 
@@ -69,7 +69,7 @@ def preset_path(folder: Path, name_or_file: str, field: str, endings: Sequence[s
 
 
 def stamp(path: str, wanted: str) -> tuple[int, int]:
-    """Return when a file was last changed (ns) and its size (bytes), by which one that was read is known again.
+    """Return when a file was last changed (ns) and its size (bytes), by which its change is noticed.
 
     Raises:
         MissingFileError: it doesn't exist; ``wanted`` is said before the system's own words.
@@ -227,7 +227,7 @@ def _sync(descriptor: int) -> None:
 
 
 def write_file(path: Path, content: bytes, field: str = "--output", overwrite: bool = False) -> None:
-    """Write one file in a temporary folder beside it and rename it; it is on the disk before it has its name.
+    """Write one file atomically, by renaming one from a temporary folder beside it; it is on the disk by then.
 
     Args:
         path: of the file; its folder is made if it isn't there.

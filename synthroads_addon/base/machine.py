@@ -13,7 +13,7 @@ LEAST_MEMORY = 128 << 20
 
 
 def machine(versions: Mapping[str, str]) -> str:
-    """Describe the machine in words: its processor, the usable cores, and the versions of programs by their names."""
+    """Return the machine in words: processor, usable cores, and versions of programs by their names."""
     programs = ", ".join(f"{name} {version}" for name, version in versions.items())
     return f"{_processor()}, {available_cores()} cores; {programs}"
 
@@ -32,7 +32,7 @@ def physical_memory() -> int | None:
 
 
 def prepare_memory() -> None:
-    """Refuse to begin where hardly any memory can be had, and have linear algebra take what it needs of it.
+    """Raise MemoryError if hardly any memory can be had, and have linear algebra take its buffers now.
 
     OpenBLAS tries for ever to get its buffer, where it can't, and takes it when it is first needed.
 

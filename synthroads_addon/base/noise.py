@@ -72,13 +72,13 @@ def noise_field(position: Float, wavelength: float | Float, seed: int, octaves: 
 
 
 def _turn_coordinates(point: list[Float]) -> list[Float]:
-    """Return coordinates turned by `_TURN`."""
+    """Return coordinates, three arrays (N,), rotated by `_TURN`."""
     x, y, z = point
     return [(a * x + b * y + c * z) / 19.0 for a, b, c in _TURN]
 
 
 def _octave(point: list[Float], key: np.uint32) -> Float32:
-    """Return unit-variance value noise on the lattice of whole numbers."""
+    """Return value noise of unit variance (N,) at three coordinates (N,), on the lattice of whole numbers."""
     weights: list[_Weights] = []
     nodes: list[_Hash] = []
     for coordinate, prime in zip(point, _AXES, strict=True):
@@ -99,7 +99,7 @@ def _octave(point: list[Float], key: np.uint32) -> Float32:
 
 
 def _weights(t: Float32) -> _Weights:
-    """Return the weights of the nodes below and above, their squares summing to 1."""
+    """Return the weights of the nodes below and above at shares t of a cell, their squares summing to 1."""
     above = t * t * (np.float32(3.0) - np.float32(2.0) * t)
     below = np.float32(1.0) - above
     scale = np.float32(1.0) / np.sqrt(above * above + below * below)

@@ -18,7 +18,7 @@ class Progress(Protocol):
 
 
 def silent(stage: str, share: float) -> None:
-    """Report nothing."""
+    """Ignore a report of progress."""
 
 
 def exhaust(steps: Generator[S, None, T], report: Callable[[S], object]) -> T:
@@ -44,7 +44,7 @@ class StageTimer:
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
-        """Measure what happens inside; a stage that comes again, its seconds together."""
+        """Measure the seconds and peak memory of what happens inside; seconds of a stage that comes again add up."""
         self.progress(name, 0.0)
         start = time.perf_counter()
         yield
@@ -56,7 +56,7 @@ class StageTimer:
 
     @property
     def seconds(self) -> float:
-        """Return the sum of all stages, s."""
+        """Return the sum of all stages' seconds."""
         return sum(row["seconds"] or 0.0 for row in self.stages.values())
 
 

@@ -19,7 +19,7 @@ _LEAST = 1e-9
 
 
 def stream(seed: int, *purpose: str | int) -> np.random.Generator:
-    """Return the generator of one purpose, e.g. ``stream(seed, "range noise", strip, block)``.
+    """Return the random generator for one purpose, e.g. ``stream(seed, "range noise", strip, block)``.
 
     The same seed and purpose give the same numbers on every machine (PCG64 seeded by `SeedSequence`).
     """
@@ -28,7 +28,7 @@ def stream(seed: int, *purpose: str | int) -> np.random.Generator:
 
 
 def quantile_bound(parts: Sequence[Float], quantile: float, key: str = "") -> tuple[float, float]:
-    """Return a quantile of all values and its upper confidence bound by the bootstrap.
+    """Return a quantile of all parts' values and its upper 95 % confidence bound by the bootstrap; 0, 0 of none.
 
     The parts (stretches of a path, say) are drawn anew, with replacement: values within a part are alike, so that their
     number says less than that of the parts. Efron & Tibshirani 1993, An Introduction to the Bootstrap.
@@ -52,7 +52,7 @@ def quantile_bound(parts: Sequence[Float], quantile: float, key: str = "") -> tu
 
 
 def ratio_bound(above: Float, below: Float, key: str = "") -> tuple[float, float]:
-    """Return the ratio of two sums over parts, and its upper confidence bound; see `quantile_bound`.
+    """Return the ratio of two sums over parts, and its upper 95 % confidence bound; see `quantile_bound`.
 
     Args:
         above, below: (S,) of each part.
@@ -68,6 +68,6 @@ def ratio_bound(above: Float, below: Float, key: str = "") -> tuple[float, float
 
 
 def _draw_parts(parts: int, key: str) -> Float:
-    """Return how often each part is drawn (draws, parts)."""
+    """Return how often each part is drawn (draws, parts) in the bootstrap's draws with replacement."""
     rng = stream(0, "choice", key)
     return rng.multinomial(parts, np.full(parts, 1.0 / parts), size=_DRAWS).astype(np.float64)

@@ -26,7 +26,7 @@ def rotation_matrix(heading: ArrayLike, pitch: ArrayLike = 0.0, roll: ArrayLike 
 
 
 def wrap_angle(angle: ArrayLike) -> Float:
-    """Wrap angles (...), rad, to the range from -pi to pi."""
+    """Return angles (...), rad, wrapped to the range from -pi to pi."""
     value = np.asarray(angle, dtype=np.float64)
     return np.asarray(value - 2.0 * np.pi * np.round(value / (2.0 * np.pi)))
 

@@ -35,7 +35,7 @@ def notes(
     unset: str = "",
     labels: Mapping[str, str] | None = None,
 ) -> dict[str, Any]:
-    """Return what a field's declaration says beside its type: for the JSON Schema, and for the panel that follows it.
+    """Return the extra JSON Schema entries of a field (unit, conditions, labels), those that are empty left out.
 
     Args:
         unit: ``m``, ``deg``, ``1``, ...
@@ -60,7 +60,7 @@ def quantity(
     lt: float | None = None,
     **further: Any,
 ) -> Any:
-    """Declare a numeric field.
+    """Return a pydantic field for a strict number with a unit and limits.
 
     Args:
         default: value where none is given; None where the field may be left out, ``...`` where it is required.
@@ -102,7 +102,7 @@ _FORMER = {"deprecated": True, "description": "Of earlier versions; nothing show
 
 
 def _complete_schema(schema: dict[str, Any], model: type[Any]) -> None:
-    """Say in a class's JSON Schema what pydantic doesn't: unknown keys and conditions between fields."""
+    """Add to a class's JSON Schema, in place, unknown keys and conditions between fields."""
     schema["additionalProperties"] = False
     schema.get("properties", {}).update(dict.fromkeys(sorted(model.former_fields), _FORMER))
     if model.vendor_keys_allowed:
@@ -114,7 +114,7 @@ def _complete_schema(schema: dict[str, Any], model: type[Any]) -> None:
 
 @cache
 def _keys(model: type[Model]) -> tuple[frozenset[str], frozenset[str]]:
-    """Return the keys of a class, and those of whole numbers."""
+    """Return the keys of a class's fields, and those of its fields of whole numbers; cached."""
     fields = {field.alias or name: field.annotation for name, field in model.model_fields.items()}
     whole = [name for name, kind in fields.items() if kind is int or int in get_args(kind)]
     return frozenset(fields), frozenset(whole)
@@ -136,7 +136,7 @@ class Model(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _prepare(cls, data: Any) -> Any:
-        """Refuse unknown keys; take 2.0 for 2 where a whole number is wanted, and 0.0 for -0.0.
+        """Return input data with 2.0 as 2 for whole numbers and -0.0 as 0.0; ValueError for unknown keys.
 
         JSON doesn't tell the first two apart, comparisons don't the others: what is equal has to have the same text.
         """
@@ -154,7 +154,7 @@ class Model(BaseModel):
 
     @classmethod
     def from_dict(cls: type[T], data: object, source: str = "") -> T:
-        """Validate plain JSON data; raise `InputError` naming the first wrong field."""
+        """Return the model of plain JSON data; InputError names the first wrong field."""
         try:
             return cls.model_validate(data)
         except ValidationError as error:
@@ -168,7 +168,7 @@ class Model(BaseModel):
         return data
 
     def to_json(self) -> str:
-        """Return the canonical text: the same set gives the same bytes."""
+        """Return the canonical JSON text: the same set gives the same bytes."""
         return canonical_json(self.to_dict())
 
 
@@ -183,7 +183,7 @@ def _unsigned_zeros(value: Any) -> Any:
 
 
 def _without_absent_fields(data: Any) -> Any:
-    """Leave out fields that are None; what a vendor wrote is kept as it is."""
+    """Return JSON data without fields that are None; what a vendor wrote is kept as it is."""
     if isinstance(data, dict):
         return {
             key: value if key.startswith(VENDOR_PREFIX) else _without_absent_fields(value)
@@ -194,7 +194,7 @@ def _without_absent_fields(data: Any) -> Any:
 
 
 def canonical_json(data: object) -> str:
-    """Serialise with one layout for the whole project: one space of indent, keys as ordered, final newline."""
+    """Return data as JSON text in the project's one layout: one space of indent, keys as ordered, final newline."""
     return json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
@@ -204,17 +204,17 @@ def first_repeated(values: Sequence[Any]) -> Any:
 
 
 def compact_json(data: object) -> str:
-    """Serialise without spaces and line ends."""
+    """Return data as JSON text without spaces and line ends."""
     return json.dumps(data, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
 
 
 def round_value(value: float, digits: int = 9) -> float:
-    """Round a sampled value so that its text is short and the same on every machine (-0.0 becomes 0.0)."""
+    """Return a value rounded to decimals, so that its text is the same on every machine (-0.0 becomes 0.0)."""
     return round(float(value), digits) + 0.0
 
 
 def read_json(path: Path | str) -> Any:
-    """Read a JSON file; NaN and infinity are refused, as JSON has none, and so is a key that an object has twice.
+    """Return the data of a JSON file; NaN, infinity and a key that an object has twice are refused.
 
     Raises:
         MissingFileError: there is no such file, or it can't be read.
@@ -279,7 +279,7 @@ def _finite(text: str) -> float:
 
 
 def _refuse_key_twice(members: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return an object; the usual reading keeps the last of two like keys and drops the other without a word."""
+    """Return an object's members as a dictionary; ValueError for a key that is there twice."""
     data = dict(members)
     if len(data) < len(members):
         raise ValueError(f"an object has the key {first_repeated([key for key, _ in members])!r} twice")
@@ -299,7 +299,7 @@ _WORDING = {
 
 
 def _input_error(error: ValidationError, data: object, source: str) -> InputError:
-    """Turn pydantic's first complaint into the project's one line."""
+    """Return pydantic's first complaint as the project's error of one line."""
     first = error.errors(include_url=False)[0]
     kind, value, context = first["type"], first.get("input"), first.get("ctx", {})
     path = _real_path(first["loc"], data, missing=kind == "missing")

@@ -46,7 +46,7 @@ class _State(Enum):
 
 
 class Stepper(Generic[T]):
-    """Work that is done in turns.
+    """Runs a function in turns, in a thread of its own that only works while the caller waits.
 
     Args:
         work: what is to be done; it calls `yield_if_due`, `yield_now`, `run_aside` and `run_in_caller`.
@@ -67,7 +67,7 @@ class Stepper(Generic[T]):
 
     @property
     def runs_aside(self) -> bool:
-        """Return whether it is computing what needs no turn."""
+        """Return whether the work is computing what needs no turn (`run_aside`)."""
         return self._state is _State.ASIDE
 
     def run_for(self, seconds: float) -> bool:
@@ -121,13 +121,13 @@ class Stepper(Generic[T]):
         self._hand_back(_State.DONE)
 
     def _hand_back(self, state: _State) -> None:
-        """Let the caller go on."""
+        """Set the work's state and let the caller go on."""
         with self._change:
             self._state = state
             self._change.notify_all()
 
     def _wait(self) -> None:
-        """Wait for the next turn."""
+        """Hand back to the caller and wait for the next turn; Cancelled if the work is to stop."""
         with self._change:
             self._state = _State.WAITING
             self._change.notify_all()
@@ -137,21 +137,21 @@ class Stepper(Generic[T]):
 
 
 def yield_if_due() -> None:
-    """Hand back to the caller if the turn's time is over."""
+    """Hand back to the stepper's caller if the turn's time is over; do nothing outside of a `Stepper`."""
     stepper: Stepper[object] | None = getattr(_here, "stepper", None)
     if stepper is not None and time.perf_counter() >= stepper._deadline:
         stepper._wait()
 
 
 def yield_now() -> None:
-    """Hand back to the caller."""
+    """Hand back to the stepper's caller; do nothing outside of a `Stepper`."""
     stepper: Stepper[object] | None = getattr(_here, "stepper", None)
     if stepper is not None:
         stepper._wait()
 
 
 def run_aside(compute: Callable[[], R]) -> R:
-    """Return what is computed while the caller goes on; it must touch nothing that the caller may touch."""
+    """Return what a function returns, run while the stepper's caller goes on: it must touch nothing of the caller's."""
     stepper: Stepper[object] | None = getattr(_here, "stepper", None)
     if stepper is None:
         return compute()
@@ -163,7 +163,7 @@ def run_aside(compute: Callable[[], R]) -> R:
 
 
 def run_in_caller(function: Callable[[], R]) -> R:
-    """Return what a function returns in the caller's thread: for what only the main thread may do."""
+    """Return what a function returns, run in the stepper's caller's thread: for what only the main thread may do."""
     stepper: Stepper[object] | None = getattr(_here, "stepper", None)
     if stepper is None:
         return function()

@@ -7,7 +7,7 @@ _NUMBER = re.compile(r"[-–+\d.,]*( \([\d.,]+\))?")
 
 
 def text_table(head: Sequence[str], rows: Sequence[Sequence[str]], right: Collection[int] | None = None) -> list[str]:
-    """Return the lines of a table with columns two spaces apart.
+    """Return the lines of a plain-text table with columns two spaces apart.
 
     Args:
         head: titles of the columns.
@@ -28,6 +28,6 @@ def text_table(head: Sequence[str], rows: Sequence[Sequence[str]], right: Collec
 
 
 def markdown_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
-    """Return the lines of a Markdown table, whose rows have as many cells each as there are titles."""
+    """Return the lines of a Markdown table; each row has as many cells as there are titles."""
     first, *rest = (f"| {' | '.join(cells)} |" for cells in (head, *rows))
     return [first, "|" + "---|" * len(head), *rest]

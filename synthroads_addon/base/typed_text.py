@@ -33,7 +33,7 @@ def typed_value(model: type[BaseModel], path: str, text: str) -> Any:
 
 
 def declared_kinds(kind: Any, path: Sequence[str]) -> list[Any]:
-    """Return the types that the field at a path is declared with, one of each class that it may lie in; none: no field.
+    """Return the types that the field at a path is declared with in all classes that it may lie in; none: no field.
 
     Args:
         kind: a class of fields, or any other type, in which the path begins.
@@ -63,7 +63,7 @@ def alternatives(kind: Any) -> Iterator[Any]:
 
 
 def _is_taken(value: Any, kinds: Sequence[Any]) -> bool:
-    """Return whether a value is of one of some types; limits of the field don't count."""
+    """Return whether a value is valid for one of some types; limits of the field don't count."""
     for kind in kinds:
         try:
             TypeAdapter(kind).validate_python(value)

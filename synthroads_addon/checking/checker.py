@@ -15,7 +15,7 @@ RULES: dict[str, Rule] = {rule.id: rule for module in MODULES for rule in module
 
 
 def check(parameters: RoadParameters) -> list[Violation]:
-    """Return every broken rule in the order of `RULES`, then along the road; none if the road keeps them all."""
+    """Return all violations in the order of `RULES`, then along the road; an empty list if it keeps all rules."""
     violations: list[Violation] = []
     with np.errstate(all="ignore"):
         road = Road(parameters)
@@ -29,5 +29,5 @@ def check(parameters: RoadParameters) -> list[Violation]:
 
 
 def _finite(value: float) -> float:
-    """Return a number that JSON can hold: values that overflowed count as the largest one."""
+    """Return a number that JSON can hold: NaN as 0, and what overflowed as the largest number."""
     return float(np.nan_to_num(value))

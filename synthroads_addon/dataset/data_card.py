@@ -16,7 +16,7 @@ _LAYOUTS = {
 
 
 def data_card(recipe: Recipe, manifest: Manifest, jobs: Sequence[SceneJob]) -> str:
-    """Return the card as Markdown; it is made from recipe and manifest alone, so that it has the same bytes as well."""
+    """Return the data card as Markdown, made from recipe and manifest alone, so that it has the same bytes too."""
     return "\n".join([*_head(recipe, manifest), *_how(recipe, jobs), *_content(manifest), *_files(recipe)]) + "\n"
 
 

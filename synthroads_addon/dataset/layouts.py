@@ -27,12 +27,12 @@ _FULL = 65535.0
 
 
 def layout_root(folder: Path, layout: Layout, scheme: ClassScheme) -> Path:
-    """Return the folder that a loader takes as its root: one for each scheme of classes, as ids differ between them."""
+    """Return the folder that a loader takes as its root: one for each scheme of classes, as ids differ."""
     return folder / layout / f"classes-{scheme.name}"
 
 
 class LayoutWriter(ABC):
-    """Writes the tiles of one scene.
+    """Base of writers of one scene's tiles in a layout for training.
 
     Args:
         folder: for the scene's folders.
@@ -49,14 +49,14 @@ class LayoutWriter(ABC):
 
     @abstractmethod
     def write(self, tile: Tile) -> None:
-        """Write one tile."""
+        """Write one tile's points and labels."""
 
     @abstractmethod
     def close(self) -> None:
-        """Write what comes last."""
+        """Write what can only be known after all tiles."""
 
     def strength(self, points: PointBlock) -> Float32:
-        """Return intensities (N,) from 0 to 1: the 16 bits of the cloud's file as a share."""
+        """Return intensities (N,) from 0 to 1, float32: the 16 bits of the cloud's file as a share."""
         return np.clip(np.rint(points.intensity * self._scale) / _FULL, 0.0, 1.0).astype(np.float32)
 
 
@@ -68,7 +68,7 @@ class PointceptWriter(LayoutWriter):
     """
 
     def write(self, tile: Tile) -> None:
-        """See `LayoutWriter`."""
+        """Write one tile's folder of arrays; InputError for instance numbers above 31 bits."""
         points = tile.points
         folder = layout_root(self.folder, "pointcept", self.scheme) / self.job.split / f"{self.job.name}-{tile.name}"
         folder.mkdir(parents=True)
@@ -89,7 +89,7 @@ class PointceptWriter(LayoutWriter):
         (folder / "tile.json").write_text(_tile_text(self.job, tile), encoding="utf-8")
 
     def close(self) -> None:
-        """See `LayoutWriter`: nothing comes last."""
+        """Do nothing: all is written with the tiles."""
 
 
 class SemanticKittiWriter(LayoutWriter):
@@ -109,7 +109,7 @@ class SemanticKittiWriter(LayoutWriter):
             (self._sequence / name).mkdir(parents=True)
 
     def write(self, tile: Tile) -> None:
-        """See `LayoutWriter`."""
+        """Write one tile as the sequence's next frame: points and labels."""
         points, frame = tile.points, len(self._corners)
         values = np.empty((len(points), 4), dtype="<f4")
         values[:, :3] = points.xyz - tile.corner
@@ -123,7 +123,7 @@ class SemanticKittiWriter(LayoutWriter):
         self._corners.append(tile.corner)
 
     def close(self) -> None:
-        """Write poses, times, calibration and what the numbers stand for."""
+        """Write poses, times, calibration, the sequence's place and what its instance numbers stand for."""
         origin = self._corners[0] if self._corners else np.zeros(3)
         shifts = [(corner - origin).tolist() for corner in self._corners]
         poses = [f"1 0 0 {x!r} 0 1 0 {y!r} 0 0 1 {z!r}" for x, y, z in shifts]
@@ -140,7 +140,7 @@ class SemanticKittiWriter(LayoutWriter):
             (self._sequence / name).write_text(text, encoding="utf-8", newline="\n")
 
     def _number(self, instance: int) -> int:
-        """Return the 16-bit number of an instance; what comes after 65,535 others has none."""
+        """Return an instance's 16-bit number in the sequence, given on first use; 0 for none, and after 65,535."""
         if instance == 0:
             return 0
         if instance not in self._numbers and len(self._numbers) >= 0xFFFF:
@@ -191,7 +191,7 @@ def _tile_text(job: SceneJob, tile: Tile) -> str:
 
 
 def layout_descriptions(recipe: Recipe, jobs: Sequence[SceneJob]) -> dict[str, str]:
-    """Return the files that describe the layouts as a whole, by path: classes, and which scene is in which split."""
+    """Return path -> text of the files that describe whole layouts: classes, and the scenes of each split."""
     texts: dict[str, str] = {}
     schemes = {scheme.name: scheme for scheme in (job.scenario.cloud.scheme() for job in jobs)}
     for layout, scheme in product(recipe.layouts, schemes.values()):
@@ -207,7 +207,7 @@ def layout_descriptions(recipe: Recipe, jobs: Sequence[SceneJob]) -> dict[str, s
 
 
 def _kitti_configuration(scheme: ClassScheme, jobs: Sequence[SceneJob]) -> str:
-    """Return the configuration in the form of SemanticKITTI's own (labels, color_map in BGR, learning maps, split)."""
+    """Return the YAML text of a configuration like SemanticKITTI's: labels, color_map in BGR, learning maps, split."""
     import yaml  # Blender's Python has none
 
     ids = {row.id + 1: row for row in scheme.rows}

@@ -81,7 +81,7 @@ def read_manifest(folder: Path) -> Manifest:
 
 
 def append_record(folder: Path, entry: SceneEntry) -> None:
-    """Record one more scene beside the manifest, at a cost that doesn't grow with their number."""
+    """Record one more scene beside the manifest, on the disk, at a cost that doesn't grow with their number."""
     # In ASCII, so that a line that was cut off is text all the same, and no character in it ends a line.
     line = json.dumps(entry.to_dict(), separators=(",", ":"))
     with (folder / RECORDS).open("a", encoding="utf-8", newline="\n") as file:
@@ -132,7 +132,7 @@ def checksum(path: Path) -> str:
 
 
 def file_entries(folder: Path) -> dict[str, dict[str, Any]]:
-    """Return size and checksum of every file below a folder, by path relative to it, sorted."""
+    """Return size (bytes) and SHA-256 of every file below a folder, by its path relative to it, sorted."""
     files = sorted(path for path in folder.rglob("*") if path.is_file())
     return {
         path.relative_to(folder).as_posix(): {"bytes": path.stat().st_size, "sha256": checksum(path)} for path in files
@@ -140,7 +140,7 @@ def file_entries(folder: Path) -> dict[str, dict[str, Any]]:
 
 
 def faults(folder: Path, scenes: Iterable[SceneEntry], checksums: bool = True) -> list[str]:
-    """Return what is wrong with the files of scenes: missing, of another size, or (if asked) another checksum."""
+    """Return a sentence for each file of scenes that is missing or has another size or (if asked) checksum."""
     sentences = []
     for scene in scenes:
         for name, entry in (scene.files or {}).items():
@@ -155,7 +155,7 @@ def faults(folder: Path, scenes: Iterable[SceneEntry], checksums: bool = True) -
 
 
 def check_same_recipe(folder: Path, recipe_text: str, generator: str) -> Manifest:
-    """Return the manifest of a set to be continued; raise `InputError` if it was made from anything else."""
+    """Return the manifest of a set to be continued; InputError if recipe or program was another one."""
     manifest = read_manifest(folder)
     if manifest.recipe_sha256 != hashlib.sha256(recipe_text.encode()).hexdigest():
         raise InputError("--resume", str(folder), "was begun with another recipe; choose another folder")
@@ -180,13 +180,13 @@ def make_manifest(
 
 
 def write_manifest(folder: Path, manifest: Manifest) -> None:
-    """Write the manifest, which from then on has all that was recorded."""
+    """Write the manifest atomically and remove the records, which it has from then on."""
     write_atomically(folder / MANIFEST, canonical_json(manifest.to_dict()))
     (folder / RECORDS).unlink(missing_ok=True)
 
 
 def paths_of_set(folder: Path, manifest: Manifest) -> list[str]:
-    """Return the paths that a data set wrote into its folder, besides its manifest and recipe.
+    """Return the relative paths that a data set wrote into its folder, besides its manifest and recipe.
 
     Args:
         folder: of the data set.
@@ -211,7 +211,7 @@ def paths_of_set(folder: Path, manifest: Manifest) -> list[str]:
 
 
 def _folders(folder: Path, scene: SceneEntry) -> Iterator[str]:
-    """Yield the folders of a scene, once it is known that all in them is its own."""
+    """Yield the folders of a scene; OutputError where one holds a file that isn't the scene's."""
     for name in scene.folders or ():
         place = PurePosixPath(name)
         if ".." in place.parts or not any(_fits(place, pattern) for pattern in PUBLISHED):
@@ -250,7 +250,7 @@ def finish_removal(folder: Path) -> None:
 
 
 def remove(path: Path) -> None:
-    """Remove a file or a folder with all that is in it, of a link the link alone; nothing if nothing is there."""
+    """Remove a file, or a folder with all that is in it; of a link the link alone; nothing if nothing is there."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
     else:

@@ -44,7 +44,7 @@ class SceneGroup(ClosedModel):
         return self
 
     def splits(self) -> list[str]:
-        """Return the split of each scene."""
+        """Return the split's name of each scene of the group, in order."""
         if isinstance(self.split, str):
             return [self.split] * self.scenes
         return [name for name, count in self.split.items() for _ in range(count)]
@@ -79,7 +79,7 @@ class Recipe(ClosedModel):
 
 @dataclass(frozen=True)
 class SceneJob:
-    """One scene of a data set.
+    """One scene of a data set: its name, split and scenario.
 
     Attributes:
         name: of its folder.
@@ -95,7 +95,7 @@ class SceneJob:
 
 
 def recipe_names() -> list[str]:
-    """Return the names of the built-in recipes."""
+    """Return the names of the built-in recipes, sorted."""
     return preset_names(RECIPES, ".yaml")
 
 
@@ -111,7 +111,7 @@ def load_recipe(name_or_file: str) -> Recipe:
 
 
 def scene_jobs(recipe: Recipe) -> list[SceneJob]:
-    """Return all scenes of a recipe, in order.
+    """Return all scenes of a recipe in order, each with its name, split and scenario.
 
     A scene's seed and variant follow from the recipe's seed and the scene's name alone: a group can be added, made
     longer or removed without changing the other scenes.
@@ -148,6 +148,6 @@ def _scenario(recipe: Recipe, group: SceneGroup, name: str, place: int) -> Scena
 
 
 def group_outputs(group: SceneGroup, recipe: Recipe) -> list[str]:
-    """Return the outputs that the recipe itself names for a group, if it does."""
+    """Return the outputs that the recipe itself names for a group; empty if it names none."""
     outputs = group.set.get("outputs", recipe.set.get("outputs", []))
     return list(outputs) if isinstance(outputs, list) else []

@@ -28,13 +28,13 @@ class Tile:
 
     @property
     def name(self) -> str:
-        """Return a name that sorts well: n00e03, s01w02."""
+        """Return the tile's name, such as n00e03 or s01w02, by its row and column."""
         north, east = ("s" if self.row < 0 else "n"), ("w" if self.column < 0 else "e")
         return f"{north}{abs(self.row):02d}{east}{abs(self.column):02d}"
 
 
 class TileSorter(TileFiles):
-    """Takes a cloud's blocks and gives them back tile by tile; a context manager.
+    """Sorts a cloud's blocks of points into square tiles on disk; a context manager.
 
     Args:
         edge: of a tile, m.
@@ -48,13 +48,13 @@ class TileSorter(TileFiles):
         self.origin = np.asarray(origin, dtype=np.float64)
 
     def add(self, blocks: Iterable[PointBlock]) -> None:
-        """Take blocks; all must have the same attributes."""
+        """Sort blocks of points into the tiles' files; all must have the same attributes."""
         for block in blocks:
             place = np.floor((block.xyz[:, :2] - self.origin[:2]) / self.edge).astype(np.int64)
             self.append(block, place[:, ::-1])
 
     def tiles(self) -> Iterator[Tile]:
-        """Yield the tiles by row and column."""
+        """Yield the tiles with their points, by row and column."""
         for (row, column), points in self.by_tile():
             corner = self.origin + np.array([column * self.edge, row * self.edge, 0.0])
             yield Tile(row, column, corner, points)

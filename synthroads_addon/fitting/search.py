@@ -48,7 +48,7 @@ class Edit:
 
     @property
     def span(self) -> tuple[int, int]:
-        """First and last element concerned."""
+        """Return the first and the last element concerned."""
         return (self.index - 1, self.index) if self.kind == "merge" else (self.index, self.index)
 
 
@@ -58,7 +58,7 @@ Condition = tuple[Edit, Float, Float]
 
 @dataclass(frozen=True)
 class Goal:
-    """Goal of the search.
+    """Bounds of a fit and scoring of chains in the search.
 
     Attributes:
         rms, p95: bounds of the residuals, m.
@@ -80,22 +80,22 @@ class Goal:
         return self.expected_score(fit.sum_of_squares, fit.chain, len(fit.residuals))
 
     def expected_score(self, square: float, chain: Chain, points: int) -> float:
-        """Score of a chain with a sum of squares; an element costs half a parameter beyond its own."""
+        """Return the score (BIC, least is best) of a chain with a sum of squares, m^2; elements cost extra."""
         misfit = np.log(max(square, 0.0) / points + self.floor**2)
         return self.count * misfit + (chain.freedom() + 0.5 * chain.size) * np.log(self.count)
 
     def rank(self, fit: ChainFit) -> tuple[bool, bool, float]:
-        """Key that is least for the best fit: bounds first, then the number of elements, then the score."""
+        """Return a sort key, least for the best fit: bounds first, then the number of elements, then the score."""
         return (not self.is_met(fit), fit.chain.size > self.most, self.score(fit))
 
 
 def independent_count(length: float, points: int) -> float:
-    """Return the number of observations that count, at least 4."""
+    """Return the number of observations that count as independent along a length (m), at least 4."""
     return max(4.0, min(float(points), max(10.0, length / _CORRELATED)))
 
 
 def apply_edits(chain: Chain, edits: Sequence[Edit]) -> tuple[Chain, list[int]]:
-    """Return the chain's structure after edits, with its values as they are, and the knots that stay.
+    """Return the chain after edits, its values as they are, and the indices of the knots that stay.
 
     Constant elements that come to lie side by side are one.
     """
@@ -119,7 +119,7 @@ def apply_edits(chain: Chain, edits: Sequence[Edit]) -> tuple[Chain, list[int]]:
 
 
 def _interpolation(chain: Chain, keep: list[int]) -> tuple[Float, Float]:
-    """Return old values (M + 1) as a linear function of the kept ones (M + 1, K) and of the knots (M + 1, M + 1)."""
+    """Return matrices from the kept values, (M + 1, K), and from the knots, (M + 1, M + 1), to the old values."""
     weights = np.zeros((chain.size + 1, len(keep)))
     weights[keep, np.arange(len(keep))] = 1.0
     shifts = np.zeros((chain.size + 1, chain.size + 1))
@@ -134,7 +134,7 @@ def _interpolation(chain: Chain, keep: list[int]) -> tuple[Float, Float]:
 
 
 def _lift(chain: Chain, new: Chain, keep: list[int]) -> Float:
-    """Return all parameters of the chain as a linear function of those of the edited one."""
+    """Return the matrix that gives all parameters of the chain from those of the edited one."""
     weights, shifts = _interpolation(chain, keep)
     inner = [i for i in keep if 0 < i < chain.size]
     old_knots, new_knots = chain.value_columns.stop, new.value_columns.stop
@@ -167,12 +167,12 @@ def foresee(fit: ChainFit, edits: Sequence[Edit], free_knots: bool, goal: Goal) 
 
 
 def _allowance(fit: ChainFit, goal: Goal) -> float:
-    """Return what a knot's step over its whole room costs, m: as much as all residuals."""
+    """Return the cost of a knot's step over its whole room, m: the root of all squared residuals, floors included."""
     return float(np.sqrt(fit.sum_of_squares + len(fit.residuals) * goal.floor**2))
 
 
 def _covariance_root(fit: ChainFit, free_knots: bool, goal: Goal) -> Float:
-    """Return W with W.T @ W the free parameters' covariance for unit noise."""
+    """Return a matrix W with W.T @ W the covariance of the free parameters for unit noise."""
     basis = fit.chain.basis(free_knots)
     rows = fit.linear[0] @ basis
     if free_knots:
@@ -183,7 +183,7 @@ def _covariance_root(fit: ChainFit, free_knots: bool, goal: Goal) -> Float:
 
 
 def rank_edits(fit: ChainFit, free_knots: bool, goal: Goal) -> list[tuple[float, Edit]]:
-    """Return (expected change of score, edit), cheapest first, by each edit's own Wald statistic."""
+    """Return (expected change of score, edit) for all single edits, cheapest first, by their Wald statistics."""
     chain, present = fit.chain, goal.score(fit)
     root = _covariance_root(fit, free_knots, goal)
     basis = chain.basis(free_knots)
@@ -206,7 +206,7 @@ def rank_edits(fit: ChainFit, free_knots: bool, goal: Goal) -> list[tuple[float,
 
 
 def _merges(chain: Chain, basis: Float, free_knots: bool) -> Iterator[Condition]:
-    """Yield for each inner knot that its value is that of the straight between its neighbours."""
+    """Yield for each inner knot its removal, on condition that its value is that of the straight past it."""
     rows, knots, values = basis[chain.value_columns], chain.knots, chain.values
     first = basis.shape[1] - chain.size  # + i: the column of inner knot i
     for i in range(1, chain.size):
@@ -222,7 +222,7 @@ def _merges(chain: Chain, basis: Float, free_knots: bool) -> Iterator[Condition]
 
 
 def _snaps(data: AxisData, chain: Chain, basis: Float) -> Iterator[Condition]:
-    """Yield for each element that its ends' values are equal, and that they are zero."""
+    """Yield for each element its snaps, on condition that its ends' values are equal, or that they are zero."""
     rows = basis[chain.value_columns]
     for e, kind in enumerate(chain.kinds):
         pair, ends = rows[[e, e + 1]], chain.values[[e, e + 1]]
@@ -239,7 +239,7 @@ def _snaps(data: AxisData, chain: Chain, basis: Float) -> Iterator[Condition]:
 
 
 def _disjoint_edits(ways: list[tuple[float, Edit]], most: int, gain: float) -> list[tuple[float, Edit]]:
-    """Return edits that pay and don't touch each other, cheapest first."""
+    """Return (change of score, edit) of edits that pay and don't touch each other, cheapest first."""
     taken: set[int] = set()
     chosen: list[tuple[float, Edit]] = []
     for change, edit in ways:
@@ -272,7 +272,7 @@ def simplify_fit(fit: ChainFit, free_knots: bool, goal: Goal) -> ChainFit | None
 
 
 def _trials(fit: ChainFit, edits: list[Edit], free_knots: bool, goal: Goal) -> Iterator[ChainFit]:
-    """Foresee every edit and refine the most promising ones, best first."""
+    """Yield the refined fits of the edits that are expected to score best, in that order."""
     foreseen = [foresee(fit, [edit], free_knots, goal) for edit in edits]
     scores = [goal.expected_score(square, chain, len(fit.residuals)) for chain, square in foreseen]
     for i in np.argsort(scores, kind="stable")[:_TRIALS]:
@@ -298,7 +298,7 @@ def descent(fit: ChainFit, goal: Goal) -> list[ChainFit]:
 
 
 def split_chains(fit: ChainFit) -> list[Chain]:
-    """Return chains with one element more, or one freer, the one that would help most first."""
+    """Return chains with one element more, or one freed from being an arc or line, the most helpful first."""
     chain, data = fit.chain, fit.data
     cuts = np.linspace(0.0, 1.0, _PARTS + 1)[:-1]
     fine = np.append((chain.knots[:-1, None] + np.diff(chain.knots)[:, None] * cuts).ravel(), chain.knots[-1])
@@ -330,7 +330,7 @@ def _split_element(chain: Chain, freed: Int, e: int, knot: float) -> Chain:
 
 
 def _gain(columns: list[Float], q: Float, rest: Float) -> float:
-    """Return by how much new columns, beside the old ones q, would lower the sum of squares."""
+    """Return by how much (m^2) new columns, beside the old ones q, would lower the sum of squares."""
     new = np.stack(columns, axis=1)
     new = new - q @ (q.T @ new)
     new /= column_scale(new)

@@ -41,13 +41,13 @@ HIGHEST_CLIMB = 120.0
 
 
 def _widest(room: float) -> float:
-    """Return the largest radius whose least clothoid, A = R/3, is no longer than a room, both m."""
+    """Return the largest radius whose least clothoid, A = R/3, fits into a length ``room``, both m."""
     return 9.0 * room
 
 
 @dataclass
 class _AlignmentPart:
-    """An element in the making; straights and arcs can still grow."""
+    """A horizontal element in the making, with the curvatures at its ends; straights and arcs can still grow."""
 
     length: float
     start: float
@@ -59,7 +59,7 @@ class _AlignmentPart:
 
 
 class HorizontalSampler:
-    """Draws one chain of elements."""
+    """Draws the horizontal alignment of a road: one chain of lines, arcs and clothoids."""
 
     def __init__(self, scenario: RoadScenario, rng: np.random.Generator) -> None:
         self.design_class, self.length, self.rng = scenario.design_class, scenario.length, rng
@@ -72,7 +72,7 @@ class HorizontalSampler:
         self.turned = 0.0
 
     def draw(self) -> tuple[HorizontalElement, ...]:
-        """Return elements whose lengths add up to the scenario's length."""
+        """Return the drawn elements, whose lengths add up to the scenario's length."""
         first = 0.0 if self._may_begin_straight() and self.rng.random() < 0.35 else self._sign() / self._radius(None)
         self.parts = [_AlignmentPart(min(_SHORTEST_END, self.length), first, first)]
         self.room = self.length - self.parts[0].length
@@ -84,11 +84,11 @@ class HorizontalSampler:
         return self._elements()
 
     def _may_begin_straight(self) -> bool:
-        """Return whether a straight can be all of the road, or else a curve can follow it."""
+        """Return whether the road may begin straight: as it is all straight or a curve can follow."""
         return self.length <= LONGEST_STRAIGHT or _widest(self.length - 3.0 * _SHORTEST_END) > self.radii[0]
 
     def _joint(self) -> list[_AlignmentPart]:
-        """Return what follows: clothoids and the next straight or arc, the last at an end's least length.
+        """Return the next parts, clothoids and a straight or arc of an end's least length; none without room.
 
         What was the end has a neighbour then: it gets what it lacks to its full least length. Nothing follows where the
         road has no room for it.
@@ -125,7 +125,7 @@ class HorizontalSampler:
         return [_AlignmentPart(lacking, 0.0, 0.0), *joint, end] if joint else []
 
     def _arc_after_arc(self, kind: str, start: float, room: float) -> list[_AlignmentPart]:
-        """Return the clothoids of an S-curve ("s") or an egg curve ("egg")."""
+        """Return the clothoids of an S-curve ("s") or egg curve ("egg") after a curvature; none without room."""
         least = self._least(start, 0.0) if kind == "s" else 0.0
         if not (radius := self._radius(1.0 / abs(start), room - least)):
             return []
@@ -137,7 +137,7 @@ class HorizontalSampler:
         return [] if alike else self._clothoids([(start, end)], self._egg(start, end), room)
 
     def _clothoids(self, curvatures: list[_Pair], lengths: Lengths, room: float) -> list[_AlignmentPart]:
-        """Return clothoids with lengths between the least and the drawn ones, so long as there is room; else none.
+        """Return clothoids with lengths between the least and the drawn ones, as the room (m) allows; else none.
 
         Every rule for lengths is linear in them, so that what lies between two sets that keep it keeps it as well.
         """
@@ -150,12 +150,12 @@ class HorizontalSampler:
         return [_AlignmentPart(length, *pair) for length, pair in zip(fitting, curvatures, strict=True)]
 
     def _sign(self) -> float:
-        """Return a direction to turn to; the farther the road has turned, the likelier back again."""
+        """Return 1 (left) or -1 at random; the farther the road has turned, the likelier back again."""
         left = 0.5 - min(0.45, max(-0.45, 0.4 * self.turned))
         return 1.0 if self.rng.random() < left else -1.0
 
     def _radius(self, before: float | None, room: float = math.inf) -> float:
-        """Draw a radius that is balanced with the one before and whose clothoid has room; 0 where there is none.
+        """Draw a radius (m) balanced with the one before and whose clothoid has room; 0 where there is none.
 
         It is even in the logarithm, as small radii matter more.
         """
@@ -173,18 +173,18 @@ class HorizontalSampler:
         return round_value(math.exp(self.rng.uniform(math.log(low), math.log(high))), 6)
 
     def _least(self, start: float, end: float) -> float:
-        """Return the least length A^2 / R of a clothoid between a straight and an arc: A >= R/3, and the run-off's."""
+        """Return the least length (m) of a clothoid from a straight to an arc: A >= R/3, and the run-off's."""
         radius = 1.0 / max(abs(start), abs(end))
         return max(max(self.limits.clothoid, radius / 3.0) ** 2 / radius, self._run_off(start, end))
 
     def _transition(self, start: float, end: float, crossing: float = 0.0) -> Lengths:
-        """Return the least length and a drawn one of a clothoid between a straight and an arc; A <= R."""
+        """Return the least length and a drawn one, m, of a clothoid between a straight and an arc; A <= R."""
         radius = 1.0 / max(abs(start), abs(end))
         least = max(crossing, self._least(start, end))
         return [least], [self.rng.uniform(least, max(least, min(radius, 2.0 * least)))]
 
     def _s_curve(self, start: float, end: float) -> Lengths:
-        """Return least and drawn lengths of two clothoids back to back, whose parameters differ by at most 1.5."""
+        """Return least and drawn lengths (m) of an S-curve's two clothoids, of parameters within 1.5 of each other."""
         crossing = self._run_off(start, end) / 2.0
         first, second = self._transition(start, 0.0, crossing), self._transition(0.0, end, crossing)
         least, drawn = (self._alike(a + b, start, end) for a, b in zip(first, second, strict=True))
@@ -192,13 +192,13 @@ class HorizontalSampler:
 
     @staticmethod
     def _alike(lengths: list[float], start: float, end: float) -> list[float]:
-        """Return the lengths of an S-curve's clothoids, the one of the smaller parameter A no less than allowed."""
+        """Return an S-curve's clothoid lengths, that of the smaller parameter A raised to what the ratio allows."""
         a = [length / abs(k) for length, k in zip(lengths, (start, end), strict=True)]
         least = max(a) / 1.5**2
         return [max(square, least) * abs(k) for square, k in zip(a, (start, end), strict=True)]
 
     def _egg(self, start: float, end: float) -> Lengths:
-        """Return least and drawn length of an egg's clothoid: A from a third of the wider to all of the tighter radius.
+        """Return least and drawn length (m) of an egg's clothoid: A from a third of the wider to the tighter radius.
 
         Short ones are left out: they would hardly turn.
         """
@@ -211,7 +211,7 @@ class HorizontalSampler:
         return run_off_length(self.design_class, self.half_width, start, end)
 
     def _share_out(self) -> None:
-        """Give the length that is left to straights and arcs, within the longest straight and turn."""
+        """Lengthen straights and arcs, in place, to the road's length, within the longest straight and turn."""
         self.parts = _merge_parts(self.parts)
         spare = self.length - math.fsum(part.length for part in self.parts)
         growing = [part for part in self.parts if part.grows]
@@ -236,7 +236,7 @@ class HorizontalSampler:
         return max(0.0, longest - part.length)
 
     def _elements(self) -> tuple[HorizontalElement, ...]:
-        """Round lengths and curvatures; the last length takes what rounding leaves."""
+        """Return the parts as elements, rounded; the last length takes what rounding leaves."""
         parts = [part for part in self.parts if part.length > 1e-6]
         lengths = [round_value(part.length) for part in parts[:-1]]
         lengths.append(round_value(self.length - math.fsum(lengths)))
@@ -245,7 +245,7 @@ class HorizontalSampler:
 
 
 def _merge_parts(parts: list[_AlignmentPart]) -> list[_AlignmentPart]:
-    """Return parts with neighbours of one constant curvature joined."""
+    """Return parts with neighbouring straights or arcs of one curvature joined."""
     result: list[_AlignmentPart] = []
     for part in parts:
         if result and part.grows and result[-1].grows and result[-1].start == part.start:
@@ -256,7 +256,7 @@ def _merge_parts(parts: list[_AlignmentPart]) -> list[_AlignmentPart]:
 
 
 def sample_profile(scenario: RoadScenario, rng: np.random.Generator) -> tuple[VerticalPoint, ...]:
-    """Draw grades and roundings: a point of intersection every 300 to 900 m, elevation 0 at the road's middle.
+    """Return drawn points of vertical intersection, 300 to 900 m apart; elevation 0 at the road's middle.
 
     Each rounding has half of the shorter of its two tangents; a grade changes by no more than the least radius allows
     within it. Long roads turn back to the height they came from.
@@ -291,7 +291,7 @@ def sample_profile(scenario: RoadScenario, rng: np.random.Generator) -> tuple[Ve
 
 
 def _intersections(length: float, rng: np.random.Generator) -> list[float]:
-    """Return stations of the points of intersection, the road's ends included."""
+    """Return drawn stations (m) of the points of vertical intersection, the road's ends included."""
     spans = max(2, round(length / rng.uniform(300.0, 900.0)))
     shares = rng.uniform(0.7, 1.3, spans)
     stations = np.concatenate([[0.0], np.cumsum(shares) / shares.sum()]) * length

@@ -104,7 +104,7 @@ def check_conflicts(scenario: RoadScenario, with_axis: bool = False) -> None:
 
 @lru_cache(maxsize=16)
 def conflicts(scenario: RoadScenario, with_axis: bool = False) -> tuple[str, ...]:
-    """Return a sentence for each limit of a scenario that can't be kept."""
+    """Return a sentence for each limit of a scenario that can't be kept; cached."""
     kinds: list[Callable[[RoadScenario], Iterator[str]]] = [_ranges, _cross_section, _lane_changes, _turnouts, _lengths]
     if not with_axis:
         kinds.insert(1, _alignment)
@@ -112,7 +112,7 @@ def conflicts(scenario: RoadScenario, with_axis: bool = False) -> tuple[str, ...
 
 
 def _ranges(scenario: RoadScenario) -> Iterator[str]:
-    """Yield intervals that reach beyond what a parameter set may hold."""
+    """Yield a sentence for each interval that reaches beyond what a parameter set may hold."""
     for path, (low, high) in _ALLOWED.items():
         limits: Interval = attrgetter(path)(scenario)
         if limits.minimum < low:
@@ -171,7 +171,7 @@ def _lane_changes(scenario: RoadScenario) -> Iterator[str]:
 
 
 def _turnouts(scenario: RoadScenario) -> Iterator[str]:
-    """Yield limits that no turnout can keep to, where turnouts are wanted."""
+    """Yield a sentence for each limit that no turnout can keep to, where turnouts are wanted."""
     limits, name = scenario.turnouts, scenario.design_class
     if limits.exits > 0.0 or limits.entries > 0.0:
         yield from _short("turnouts.lane_length", limits.lane_length, TURNOUT_LANE_LENGTH[name], name)
@@ -186,7 +186,7 @@ def _turnouts(scenario: RoadScenario) -> Iterator[str]:
 
 
 def _lengths(scenario: RoadScenario) -> Iterator[str]:
-    """Yield what must be there, but doesn't fit in the road."""
+    """Yield a sentence for each thing that must be there, but doesn't fit in the road."""
     yield from _features(scenario)
     furniture, barriers, length = scenario.furniture, scenario.barriers, scenario.length
     if furniture.gantry_spacing is not None and furniture.gantry_spacing > length:
@@ -204,7 +204,7 @@ def _lengths(scenario: RoadScenario) -> Iterator[str]:
 
 
 def _features(scenario: RoadScenario) -> Iterator[str]:
-    """Yield turnouts and lane changes that must be there, but don't fit in the road or beside it."""
+    """Yield sentences on turnouts and lane changes that must be there, but don't fit in the road or beside it."""
     limits, section = scenario.turnouts, cross_section_of(scenario)
     ramps = RampLimits(scenario, section)
     narrow = f"is 1, within half_width {scenario.half_width:g} m there is no room for it"
@@ -225,7 +225,7 @@ def _short(path: str, limits: Interval, least: float, what: str) -> Iterator[str
 
 
 def _allowed_range(model: type[Model], name: str) -> tuple[float, float]:
-    """Return the least and the largest value of a field."""
+    """Return the least and the largest value that a model's field may have."""
     low, high = -1e8, 1e8
     for limit in model.model_fields[name].metadata:
         if hasattr(limit, "ge"):
@@ -238,7 +238,7 @@ def _allowed_range(model: type[Model], name: str) -> tuple[float, float]:
 
 
 def _allowed_by_things() -> Iterator[tuple[str, tuple[float, float]]]:
-    """Yield the intervals of the things' limits, and what they must keep to."""
+    """Yield the path of each interval of the things' limits, and the range that it must keep to."""
     for thing, limits in limits_of():
         for name, allowed in limits.allowed.items():
             yield f"{limits.group}.{name}", _allowed_range(thing, allowed) if isinstance(allowed, str) else allowed

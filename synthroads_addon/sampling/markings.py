@@ -26,7 +26,7 @@ _FIRST_MERGE_ARROW = 20.0  # from the beginning of the taper, m
 
 
 def place_markings(site: PlacementSite) -> Iterator[tuple[str, LineMarking | Hatching | Arrow]]:
-    """Yield (id, marking) of everything painted on a road, with instance 1. All has films of one thickness."""
+    """Yield (id, marking) of everything painted on a road, all with instance 1 and films of one thickness."""
     limits = site.scenario.markings.film_thickness
     film = round_value(site.stream("film").uniform(limits.minimum, limits.maximum))
     for side, carriageway in site.carriageways.items():
@@ -39,7 +39,7 @@ def place_markings(site: PlacementSite) -> Iterator[tuple[str, LineMarking | Hat
 
 
 class _Painter:
-    """Makes the markings of one carriageway."""
+    """Makes the markings of one carriageway as objects of a parameter set."""
 
     def __init__(self, site: PlacementSite, side: Side, carriageway: Carriageway, film: float) -> None:
         self.site, self.carriageway, self.film = site, carriageway, film
@@ -49,7 +49,7 @@ class _Painter:
         self.arrow_length = 7.5 if LIMITS[site.design_class].speed > 80.0 else 5.0
 
     def lines(self) -> Iterator[tuple[str, LineMarking]]:
-        """Yield the lines along lane boundaries: solid at the edges, dashed between lanes."""
+        """Yield (id, marking) of the lines along lane boundaries: solid at the edges, dashed between lanes."""
         lanes, limits = self.carriageway.lanes, self.site.scenario.markings
         dash, gap = limits.lane_dash or LANE_DASH, limits.lane_gap or LANE_GAP
         blocks = Reservations(_block_span(shape) for shape in self.section.turnouts if shape.turnout.ramp)
@@ -66,7 +66,7 @@ class _Painter:
         yield f"{self.name}-line-{len(lanes)}", self._line("inner_edge", span, boundary=len(lanes))
 
     def turnout(self, name: str, turnout: Turnout) -> Iterator[tuple[str, LineMarking | Hatching | Arrow]]:
-        """Yield what an exit or entry has: block marking, edge lines, hatching, and arrows where traffic leaves."""
+        """Yield (id, marking) of an exit or entry: block marking, edge lines, hatching; arrows where traffic leaves."""
         shape = self.site.shape(turnout)
         assert turnout.ramp is not None
         dashes = {"dash_length": BLOCK_DASH, "gap_length": BLOCK_GAP}
@@ -86,7 +86,7 @@ class _Painter:
             yield from self._arrows(f"{name}-arrow", "straight_right", stations, (inner + outer) / 2.0)
 
     def merge_arrows(self) -> Iterator[tuple[str, Arrow]]:
-        """Yield the arrows on a lane that ends, in front of its taper."""
+        """Yield (id, arrow) of the arrows on a lane that ends, in front of its taper."""
         lanes, ahead = self.carriageway.lanes, self.carriageway.traffic
         for index, lane in enumerate(lanes):
             if not isinstance(lane.width, tuple):

@@ -29,7 +29,7 @@ _STEP, _CELL = 0.6, 0.2
 
 
 def draw_materials(limits: MaterialLimits, seed: int) -> dict[str, float]:
-    """Return a value within each of the limits."""
+    """Return a value drawn within each of the limits, by name."""
     rng = stream(seed, "materials")
     return {name: draw(rng, getattr(limits, name)) for name in MaterialLimits.model_fields}
 
@@ -52,7 +52,7 @@ class PavementDamage:
         self._sign = 1.0 if side == "left" else -1.0
 
     def patches(self) -> tuple[Patch, ...]:
-        """Return patches as long as a lane's part that was taken out, and as wide as it or one of its halves."""
+        """Return drawn patches along lanes, each as wide as the lane or one of its halves."""
         rng = stream(self._seed, "patches", self._side)
         result = []
         for _ in range(_count(self._patch_density * self._length / 100.0, rng)):
@@ -66,7 +66,7 @@ class PavementDamage:
         return tuple(result)
 
     def cracks(self) -> tuple[Crack, ...]:
-        """Return longitudinal, transverse and alligator cracks."""
+        """Return drawn cracks: longitudinal, then transverse, then alligator ones."""
         rng = stream(self._seed, "cracks", self._side)
         share = self._crack_density * self._length / 1000.0
         result = [self._along(rng) for _ in range(_count(_LONG_PER_KM * share, rng))]
@@ -93,7 +93,7 @@ class PavementDamage:
         return self._crack("transverse", [np.column_stack([stations, distances])], rng, sealed=0.7)
 
     def _net(self, rng: np.random.Generator) -> Crack:
-        """Return a net of cells: rows and columns of a grid whose nodes were moved."""
+        """Return an alligator crack: rows and columns of a grid whose nodes were moved."""
         outer, inner = self._lane(rng)
         track = (outer + inner) / 2.0 + _TRACK * (1.0 if rng.random() < 0.5 else -1.0)
         start, end = self._stretch(_LENGTH["net"], rng)
@@ -111,7 +111,7 @@ class PavementDamage:
         return Crack(kind=kind, width=draw_between(rng, _BAND if closed else _GAP), sealed=closed, lines=corners)
 
     def _lane(self, rng: np.random.Generator) -> tuple[float, float]:
-        """Return the outer and inner edge of a lane, the outer lanes more often: they carry the heavy vehicles."""
+        """Return the distances (m) of outer and inner edge of a drawn lane, mostly an outer one: of heavy vehicles."""
         lanes = len(self._edges) - 1
         number = min(int(lanes * rng.random() ** 1.5), lanes - 1)
         return self._edges[number], self._edges[number + 1]

@@ -31,7 +31,7 @@ from .surroundings import (
 def sample_road(
     scenario: RoadScenario, seed: int, title: str = "", axis: AlignmentObject | None = None
 ) -> RoadParameters:
-    """Return the road of a seed.
+    """Return the parameter set of a road drawn from a seed within a scenario's limits.
 
     Args:
         scenario: limits of what is drawn.
@@ -80,7 +80,7 @@ def sample_road(
 
 
 def sample_alignment(scenario: RoadScenario, seed: int) -> AlignmentObject:
-    """Return an alignment within the limits of its class, its middle at the local origin."""
+    """Return a drawn alignment within the limits of its design class, its middle at the local origin."""
     rng = stream(seed, "alignment")
     heading = round_value(rng.uniform(-180.0, 180.0), 6)
     axis = AlignmentObject(
@@ -96,7 +96,7 @@ def sample_alignment(scenario: RoadScenario, seed: int) -> AlignmentObject:
 
 
 def _sample_site(scenario: RoadScenario, seed: int, axis: AlignmentObject) -> PlacementSite:
-    """Return the road without what stands on and beside it."""
+    """Return a drawn road without what stands on and beside it: axis, carriageways, turnouts and terrain."""
     sampler = CarriagewaySampler(scenario, seed, axis)
     carriageways: dict[Side, Carriageway] = {}
     turnouts: dict[str, Turnout] = {}

@@ -57,7 +57,7 @@ _SHORTEST_RUT = 0.3  # share of the road that is rutted, at least
 
 @dataclass(frozen=True)
 class Feature:
-    """Room that one kind of turnout, or a lane change, needs along a carriageway.
+    """Kind of turnout, or lane change, that a carriageway may have, with the room that it needs.
 
     Attributes:
         kind: what it is.
@@ -77,13 +77,13 @@ class Feature:
 
     @property
     def least(self) -> float:
-        """Return the shortest stretch that it takes, m."""
+        """Return the shortest length that it takes along the carriageway, m."""
         return self.fixed + math.fsum(low for low, _ in self.lengths)
 
 
 @dataclass(frozen=True)
 class TurnoutPlace:
-    """A feature on its stretch.
+    """A turnout or lane change on its stretch of a carriageway.
 
     Attributes:
         kind: what it is.
@@ -97,7 +97,7 @@ class TurnoutPlace:
 
 
 class RampLimits:
-    """Ramps that lie within the terrain and go on for at least 10 m behind their nose.
+    """Limits of ramps so that they lie within the terrain and go on for at least 10 m behind their nose.
 
     Attributes:
         shortest: length of the shortest ramp, m.
@@ -106,7 +106,7 @@ class RampLimits:
     """
 
     def __init__(self, scenario: RoadScenario, section: StandardCrossSection, tightest: float = math.inf) -> None:
-        """Take the limits, the cross-section, and the tightest radius (m) of the road."""
+        """Work them out from a scenario's limits, the cross-section and the road's tightest radius (m)."""
         limits = scenario.turnouts
         # Inside the terrain, and well clear of the centre of a curve.
         reach = min(scenario.half_width - _BESIDE_ROAD, FARTHEST_REACH, 0.5 * tightest)
@@ -130,7 +130,7 @@ class RampLimits:
         return (6.0 * clothoid**2 * self.nose_wedge) ** (1.0 / 3.0)
 
     def clothoid(self, length: float, share: float) -> float:
-        """Return the parameter A (m) at a share (0 to 1) of those that a ramp of this length (m) may have."""
+        """Return the clothoid parameter A (m) at a share (0 to 1) of those that a ramp of this length (m) may have."""
         low = max(self.clothoids.minimum, math.sqrt(length**3 / (6.0 * self.widest_wedge)))
         high = min(self.clothoids.maximum, math.sqrt((length - NOSE_BEFORE_END) ** 3 / (6.0 * self.nose_wedge)))
         return round_value(low + max(0.0, high - low) * share)
@@ -170,7 +170,7 @@ def may_change_lanes(scenario: RoadScenario, section: StandardCrossSection) -> b
 
 
 def arrange_features(features: tuple[Feature, ...], length: float, rng: np.random.Generator) -> list[TurnoutPlace]:
-    """Draw which features a carriageway of a length (m) has, and their places in the order of traffic.
+    """Return drawn turnouts and lane changes of a carriageway of a length (m), in the order of traffic.
 
     Where they don't all fit, the certain ones (of share 1) come first.
     """
@@ -203,7 +203,7 @@ def arrange_features(features: tuple[Feature, ...], length: float, rng: np.rando
 
 
 def pack_features(stretches: Sequence[tuple[Feature, float]]) -> list[float]:
-    """Return where features of given lengths (m) begin when each is as far forward as it may be, and where they end."""
+    """Return where features of given lengths (m) begin, each as early as allowed, and, last, where all end."""
     begins: list[float] = []
     reached, ends = -TURNOUT_GAP, dict[FeatureKind, float]()
     for feature, length in stretches:
@@ -213,14 +213,14 @@ def pack_features(stretches: Sequence[tuple[Feature, float]]) -> list[float]:
 
 
 def lowest_station(side: Side, road_length: float, begin: float, length: float) -> float:
-    """Return the lowest station (m) of a stretch that begins at a distance along a carriageway and has a length (m)."""
+    """Return the lowest station (m) of a stretch that begins at a distance along the traffic and has a length (m)."""
     return max(0.0, round_value(begin if side == "right" else road_length - begin - length))
 
 
 def sample_turnout(
     scenario: RoadScenario, ramps: RampLimits, place: TurnoutPlace, side: Side, length: float, rng: np.random.Generator
 ) -> Turnout:
-    """Return the turnout at a place beside a road of a length (m), with instance 1."""
+    """Return a drawn turnout at a place beside a road of a length (m), with instance 1."""
     limits = scenario.turnouts
     begin = place.begin + BLEND + STEP if place.kind == "entry" else place.begin
     same: dict[str, Any] = {
@@ -291,7 +291,7 @@ class CarriagewaySampler:
         self.concrete = stream(seed, "pavement").random() < scenario.pavement.concrete
 
     def draw(self, side: Side) -> tuple[Carriageway, dict[str, Turnout]]:
-        """Return a carriageway and its turnouts by id, all with instance 1."""
+        """Return a drawn carriageway and its turnouts by id, all with instance 1."""
         rng = stream(self.seed, "section", side)
         turnouts: dict[str, Turnout] = {}
         lanes = tuple(Lane(width=width) for width in self.section.lanes)
@@ -354,7 +354,7 @@ class CarriagewaySampler:
         return tuple(inner + sum(steady[i:]) for i in range(len(steady) + 1))
 
     def _ruts(self, lanes: tuple[Lane, ...], rng: np.random.Generator) -> tuple[Rut, ...]:
-        """Return the ruts of the outermost lane that is there all along, on a part of the road."""
+        """Return at most one drawn rut, of the outermost lane that is there all along, on a part of the road."""
         limits = self.scenario.pavement
         if rng.random() >= limits.rutted:
             return ()
@@ -374,7 +374,7 @@ class CarriagewaySampler:
         return (rut,)
 
     def _potholes(self, side: Side, lanes: tuple[Lane, ...], rng: np.random.Generator) -> tuple[Pothole, ...]:
-        """Return potholes that lie wholly on the pavement, anywhere on it."""
+        """Return drawn potholes that lie wholly on the main road's pavement."""
         limits, sign = self.scenario.pavement, 1.0 if side == "left" else -1.0
         count = int(draw_between(rng, bounds(limits.potholes_per_km)) * self.length / 1000.0 + rng.random())
         inner, (smallest, largest) = self.section.median / 2.0, bounds(limits.pothole_size)
@@ -391,7 +391,7 @@ class CarriagewaySampler:
         return tuple(potholes)
 
     def _paved_width(self, lanes: tuple[Lane, ...], station: float) -> float:
-        """Return the width (m) of the main road's pavement at a station."""
+        """Return the width (m) of the main road's pavement of one carriageway at a station."""
         full = self.section.paved_width
         for lane in lanes:
             if isinstance(lane.width, tuple):

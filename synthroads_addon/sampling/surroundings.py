@@ -53,7 +53,7 @@ def _seed(rng: np.random.Generator) -> int:
 
 
 def sample_terrain(scenario: RoadScenario, seed: int) -> Terrain:
-    """Return the ground of a seed; its instance number is 1."""
+    """Return the drawn terrain of a seed; its instance number is 1."""
     rng = stream(seed, "terrain")
     names = ("embankment_height", "undulation", "wavelength", "batter_slope")
     drawn = {name: draw(rng, getattr(scenario, name)) for name in names}
@@ -62,7 +62,7 @@ def sample_terrain(scenario: RoadScenario, seed: int) -> Terrain:
 
 
 def sample_environment(scenario: RoadScenario, seed: int) -> Environment:
-    """Return the light and weather of a seed."""
+    """Return the drawn light and weather of a seed."""
     rng, limits = stream(seed, "environment"), scenario.environment
     names = ("sun_azimuth_deg", "sun_elevation_deg", "cloud_cover")
     light = {name: draw(rng, getattr(limits, name)) for name in names}
@@ -76,7 +76,7 @@ def sample_environment(scenario: RoadScenario, seed: int) -> Environment:
 
 
 def sample_materials(scenario: RoadScenario, seed: int) -> MaterialVariation:
-    """Return how the materials of a seed differ from the mean."""
+    """Return the drawn variation of a road's materials from the mean ones."""
     drawn = draw_materials(scenario.materials, seed)
     return MaterialVariation(**{name: value for name, value in drawn.items() if name in MaterialVariation.model_fields})
 
@@ -85,7 +85,7 @@ def sample_materials(scenario: RoadScenario, seed: int) -> MaterialVariation:
 
 
 def sample_vegetation(site: PlacementSite) -> Iterator[tuple[str, Vegetation]]:
-    """Yield the plants by id, species by species; their instance numbers are 1.
+    """Yield (id, stand of plants), species by species; their instance numbers are 1.
 
     Grass grows everywhere beside the road. Shrubs follow behind the verge, one species after the other. Trees mix, and
     grow where they are no obstacle that needed a barrier (RPS).
@@ -101,7 +101,7 @@ def sample_vegetation(site: PlacementSite) -> Iterator[tuple[str, Vegetation]]:
 
 
 def _room_beside(site: PlacementSite) -> float:
-    """Return the width (m) of the ground between the verge and the end of the terrain, where the road has all lanes."""
+    """Return the largest width (m) of ground between a verge and the terrain's end, where the road has all lanes."""
     edges = []
     for road in site.carriageways.values():
         strips = (road.inner_edge_strip_width, road.outer_edge_strip_width, road.hard_shoulder_width, road.verge_width)
@@ -117,7 +117,7 @@ def _first_tree(site: PlacementSite) -> float:
 
 
 def _species(rng: np.random.Generator, kind: Kind, names: tuple[str, ...]) -> list[str]:
-    """Return some of the species, in random order; reed is not the first of several."""
+    """Return some drawn species of a kind in random order; reed is not the first of several."""
     known = list(dict.fromkeys(names))
     mixed = [known[i] for i in rng.permutation(len(known))]
     if mixed[0] == "reed":
@@ -128,7 +128,7 @@ def _species(rng: np.random.Generator, kind: Kind, names: tuple[str, ...]) -> li
 def _mix_species(
     site: PlacementSite, kind: Kind, names: tuple[str, ...], density: float, heights: Interval, band_start: float
 ) -> Iterator[tuple[str, Vegetation]]:
-    """Yield species that share a density (1/m2) between them, the first most of it, all from a distance (m) on."""
+    """Yield (id, stand) of species that share a density (1/m2), the first most of it, from ``band_start`` (m) on."""
     if density <= 0.0:
         return
     rng = site.stream(kind)
@@ -140,7 +140,7 @@ def _mix_species(
 
 
 def _belts(site: PlacementSite, room: float) -> Iterator[tuple[str, Vegetation]]:
-    """Yield the shrubs, each species in a belt of its own behind that of the one before."""
+    """Yield (id, stand) of the shrubs, each species in a belt of its own behind that of the one before."""
     limits, density = site.scenario.vegetation, round_value(site.scenario.shrubs_per_hectare / 10_000.0)
     if density <= 0.0 or room <= SHRUB_DISTANCE:
         return
@@ -174,7 +174,7 @@ def _plants(
 
 
 def sample_vehicles(site: PlacementSite, objects: Mapping[str, RoadObject]) -> Iterator[tuple[str, Vehicle]]:
-    """Yield the vehicles by id; their instance numbers are 1.
+    """Yield (id, vehicle) of the drawn traffic; their instance numbers are 1.
 
     They are `VEHICLE_GAP` apart at the time 0 and remain so: in each lane the faster drive ahead of the slower.
 
@@ -210,7 +210,7 @@ def sample_vehicles(site: PlacementSite, objects: Mapping[str, RoadObject]) -> I
 
 
 def _closures(side: Side, objects: Mapping[str, RoadObject]) -> Float:
-    """Return stations and distances from the centreline (N, 2) of what closes lanes of a carriageway, m."""
+    """Return stations and distances from the centreline (N, 2), m, of what closes lanes of a carriageway."""
     places = []
     for item in objects.values():
         if isinstance(item, ConstructionBeacon):
@@ -222,7 +222,7 @@ def _closures(side: Side, objects: Mapping[str, RoadObject]) -> Float:
 
 
 def _open_stretches(section: CarriagewaySection, length: float, closures: Float) -> Float:
-    """Return the beginning and end (lanes, 2) of the longest part of each lane that is open, from outside, m.
+    """Return begin and end (lanes, 2), m, of the longest drivable part of each lane, the outermost lane first.
 
     A lane is open where it is wide enough, and closed altogether if anything that closes lanes, or the ground between
     two such things, is in the way of its vehicles. Beginning and end are the same where there is no open part.
@@ -238,7 +238,7 @@ def _open_stretches(section: CarriagewaySection, length: float, closures: Float)
 
 
 def _wide_stretch(width: AnyWidth, length: float) -> tuple[float, float]:
-    """Return the beginning and end of the longest part of a lane that is wide enough to drive on, m."""
+    """Return begin and end, m, of the longest part of a lane that is wide enough to drive on; 0, 0 without."""
     if not isinstance(width, tuple):
         return 0.0, length if width >= VEHICLE_LANE_WIDTH else 0.0
     kinks = np.unique([0.0, length, *(s for s in width_kinks(width) if 0.0 < s < length)])
@@ -256,7 +256,7 @@ def _wide_stretch(width: AnyWidth, length: float) -> tuple[float, float]:
 
 
 def _traffic(rng: np.random.Generator, stretches: Float, heavy: Bool, limits: Interval) -> list[tuple[int, float, str]]:
-    """Return lane, speed (m/s) and model of vehicles, in this order sorted; none where every lane is closed.
+    """Return sorted (lane, speed in m/s, model) of drawn vehicles; none where every lane is closed.
 
     The outer lanes have most. Heavy vehicles drive in the outermost, and of three or more in the second as well; where
     these are closed there are none.
@@ -277,7 +277,7 @@ def _traffic(rng: np.random.Generator, stretches: Float, heavy: Bool, limits: In
 
 
 def _pick(rng: np.random.Generator, sums: Float, number: int) -> Index:
-    """Draw so many numbers from 0 to N - 1, whose weights have the running sums (N,)."""
+    """Return drawn indices (number,) from 0 to N - 1, whose weights have the running sums (N,)."""
     return sums.searchsorted(rng.random(number) * sums[-1], side="right")
 
 
@@ -304,7 +304,7 @@ def _queue(rng: np.random.Generator, lengths: list[float], stretch: list[float],
 
 
 def origin_on_ground(scenario: RoadScenario, axis: AlignmentObject, terrain: Terrain) -> tuple[float, float, float]:
-    """Return the map coordinates of a sampled road's local origin, m: the scenario's, or its elevation model's height.
+    """Return the local origin's map coordinates, m: the scenario's, the height fitted to its elevation model.
 
     Raises:
         InputError: the elevation model is missing, unreadable or unfit for this road.

@@ -96,17 +96,17 @@ class AssetLibrary(ClosedModel):
 
 
 def library_names() -> list[str]:
-    """Return the names of the built-in libraries."""
+    """Return the sorted names of the built-in asset libraries."""
     return sorted(path.parent.name for path in LIBRARIES.glob("*/library.json"))
 
 
 def library_file(name_or_file: str) -> Path:
-    """Return the file of a built-in library, or of one's own."""
+    """Return the file of a built-in asset library of this name, else the name itself as a path."""
     return LIBRARIES / name_or_file / "library.json" if name_or_file in library_names() else Path(name_or_file)
 
 
 def read_asset_library(name_or_file: str | os.PathLike[str]) -> AssetLibrary:
-    """Read a library and see that its assets' files are there; the last ones read are kept until they change.
+    """Return an asset library, whose assets' files are there; the last ones read are cached until they change.
 
     Raises:
         MissingFileError: the library, or a file that it names, doesn't exist or cannot be read.

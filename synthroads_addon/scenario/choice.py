@@ -6,13 +6,13 @@ from .scenario import OF_POINTS, Scenario
 
 
 def has_kind(scenario: Scenario, kind: str) -> bool:
-    """Return whether points of a job have what a kind of error of colours is of: ``colour`` or ``layers``."""
+    """Return whether a job's points have what an error is of: colours ("colour") or material layers ("layers")."""
     wanted = scenario.coloured_layers
     return "rgb" in wanted if kind == "colour" else bool(set(MATERIAL_LAYERS) & wanted)
 
 
 def check_choice(scenario: Scenario, foreign: bool = False) -> None:
-    """Refuse a choice that can't be made or promised, before any work starts.
+    """Raise InputError if a scenario asks for a choice of settings that can't be made or promised.
 
     Args:
         scenario: the job; nothing is refused if it leaves no choice.

@@ -51,7 +51,7 @@ class CloudScenario(ClosedModel):
         return self
 
     def file_names(self) -> tuple[str, ...]:
-        """Return the names of the files, ``cloud.laz`` and the like."""
+        """Return the names of the cloud's files, ``cloud.laz`` and the like."""
         return tuple(f"cloud.{kind}" for kind in self.formats)
 
     def arrays(self) -> frozenset[str]:
@@ -59,7 +59,7 @@ class CloudScenario(ClosedModel):
         return frozenset[str]().union(*(LAYERS[name].types for name in self.attributes))
 
     def scheme(self) -> ClassScheme:
-        """Return the scheme of the classes; raise `InputError` if there is none, or no thing that it names."""
+        """Return the cloud's class scheme; InputError if there is none, or no thing that it names."""
         scheme = class_scheme(self.classes)
         check_selectors(scheme, self.classes)
         return scheme

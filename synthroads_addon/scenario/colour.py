@@ -13,7 +13,7 @@ _LEAST_SCALE = 0.5
 
 
 def image_scale(typical_range: float) -> float:
-    """Return how many times as far apart and as coarse images are as from `USUAL_RANGE`, seen from a range (m)."""
+    """Return the factor on images' spacing and pixels for a range (m): 1 at `USUAL_RANGE`, 0.5 at least."""
     return max(typical_range / USUAL_RANGE, _LEAST_SCALE)
 
 
@@ -112,7 +112,7 @@ class ColourScenario(ClosedModel):
         return self
 
     def settings(self, fidelity: str, typical_range: float = USUAL_RANGE) -> ColourSettings:
-        """Return the numbers that a fidelity (draft, standard, high) stands for, after the scenario's own.
+        """Return the colour settings of a fidelity, with the scenario's own values in place of the preset's.
 
         Args:
             fidelity: draft, standard or high.

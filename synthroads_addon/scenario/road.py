@@ -28,7 +28,7 @@ class FreeCrossSection(ClosedModel):
 
 
 def _form(section: object) -> str | None:
-    """Return whether a cross-section is a standard one's name or a free one, so that errors speak of that alone."""
+    """Return "name" or "free" by the form of a cross-section, else None; the union's discriminator."""
     if isinstance(section, str):
         return "name"
     return "free" if isinstance(section, dict | FreeCrossSection) else None
@@ -234,7 +234,7 @@ class RoadScenario(ClosedModel):
     @model_validator(mode="before")
     @classmethod
     def _fill_in_what_fits(cls, data: Any) -> Any:
-        """Take, where one of design class and cross-section isn't given, what fits the other."""
+        """Return data with the missing one of design class and cross-section filled in so that it fits the other."""
         if not isinstance(data, dict):
             return data
         given, section = str(data.get("design_class")), data.get("cross_section")

@@ -99,7 +99,7 @@ class ScanScenario(DeviceChoice):
 
 
 def scanner_setting(scan: ScanScenario) -> ScannerSetting:
-    """Return the scenario's device as the scenario sets it; see `setting_of`.
+    """Return the scenario's scanner with the rates and angles that the scenario sets (`setting_of`).
 
     Raises:
         InputError: there is no such device, it can't do it, or values contradict each other.

@@ -125,7 +125,7 @@ class Scenario(ClosedModel):
 
     @property
     def beam_rings(self) -> tuple[int, ...]:
-        """Return the rays on each ring around the beam's axis."""
+        """Return the number of rays on each ring around the beam's axis: the scenario's, else the fidelity's."""
         own = self.scan.beam_rings
         return RINGS[self.settings().rays_per_pulse] if own is None else own
 
@@ -136,7 +136,7 @@ class Scenario(ClosedModel):
 
     @property
     def coloured_layers(self) -> frozenset[str]:
-        """Return the layers that points get besides what the scanner measures: ``rgb`` and material layers."""
+        """Return the names of the layers that points get besides what is measured: ``rgb`` and material layers."""
         rgb = {"rgb"} if self.colour.rgb else set()
         return frozenset(rgb | (self.kept_layers & optional_arrays("material")))
 
@@ -165,7 +165,7 @@ class Scenario(ClosedModel):
         return section if length > longest else None
 
     def settings(self) -> Settings:
-        """Return the numbers that the fidelity stands for, after the scenario's own."""
+        """Return the settings that the fidelity stands for, with the scenario's own values in their place."""
         values: dict[str, Any] = {
             "tolerance": self.geometric_tolerance,
             "vegetation_detail": self.vegetation_detail,
@@ -201,12 +201,12 @@ FIDELITIES = {
 
 
 def scenario_names() -> list[str]:
-    """Return the names of the built-in scenarios."""
+    """Return the names of the built-in scenarios, sorted."""
     return preset_names(SCENARIOS)
 
 
 def load_scenario(name_or_file: str, changes: list[str] | None = None) -> Scenario:
-    """Load a built-in scenario or a file and apply ``path=value`` changes.
+    """Return a built-in scenario, or one from a file, with ``path=value`` changes applied.
 
     Raises:
         InputError: there is no such scenario, or a field is unknown or out of its limits.
@@ -219,7 +219,7 @@ def load_scenario(name_or_file: str, changes: list[str] | None = None) -> Scenar
 
 
 def with_changes(data: Any, changes: Iterable[tuple[str, Any]]) -> Any:
-    """Return a scenario's JSON data with values set by their dotted paths, one after another.
+    """Return a scenario's JSON data with values set by their dotted paths, and what doesn't fit them left out.
 
     What the scenario said itself and doesn't fit them any more gives way, see `drop_misfits`.
     """
@@ -308,7 +308,7 @@ def _kind(data: Mapping[str, Any], part: str, tag: str) -> Any:
 
 
 def _misfit_of_road(road: dict[str, Any], named: AbstractSet[str]) -> str | None:
-    """Return design class or cross-section, whichever gives way to the other; None if neither does."""
+    """Return "design_class" or "cross_section", whichever gives way to the other; None if neither does."""
     others = [name for name in _CLASS_AND_SECTION if not any(path.startswith(f"road.{name}") for path in named)]
     section = road.get("cross_section")
     if len(others) != 1 or not isinstance(section, str):
@@ -317,7 +317,7 @@ def _misfit_of_road(road: dict[str, Any], named: AbstractSet[str]) -> str | None
 
 
 def _misfits_of_device(scan: dict[str, Any], named: AbstractSet[str]) -> list[str]:
-    """Return the settings of a scan that its device can't do and no change names."""
+    """Return the names of a scan's settings that its device can't do and that no change names."""
     misfits: list[str] = []
     try:
         ScanScenario.from_dict(scan)

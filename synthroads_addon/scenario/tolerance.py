@@ -18,7 +18,7 @@ _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\s\d]
 
 @dataclass(frozen=True)
 class ErrorKind:
-    """A kind of error.
+    """Kind of error: its column in the trade-off's tables, and its units.
 
     Attributes:
         column: of the trade-off's tables, see `tradeoff.ROW_TITLES`.
@@ -71,12 +71,12 @@ class Tolerance(ClosedModel):
         return {key: _in_si(key, value) if isinstance(value, str) else value for key, value in data.items()}
 
     def limits(self) -> dict[str, float]:
-        """Return the kinds of errors that are limited, and how."""
+        """Return the largest allowed error of each kind that is limited, in SI units, by the kind's name."""
         return {name: value for name in KINDS if (value := getattr(self, name)) is not None}
 
 
 def _in_si(name: str, text: str) -> float | str:
-    """Return the number of a text with a unit; an unknown kind's text stays as it is, and is refused later."""
+    """Return the number of a text such as ``5mm`` in SI units; an unknown kind's text stays, and is refused later."""
     if name not in KINDS:
         return text
     try:
@@ -86,7 +86,7 @@ def _in_si(name: str, text: str) -> float | str:
 
 
 def with_unit(field: str, text: str, units: dict[str, float]) -> float:
-    """Return a number with a unit, such as ``5mm``, in the unit whose factor is 1.
+    """Return the number of a text with a unit, such as ``5mm``, in the unit whose factor is 1.
 
     Raises:
         InputError: it is no number, or lacks a unit where it needs one, or has another.
@@ -107,7 +107,7 @@ def with_unit(field: str, text: str, units: dict[str, float]) -> float:
 
 
 def parse_tolerance(text: str, field: str = "--tolerance") -> dict[str, float]:
-    """Parse ``height=5mm,colour=2,intensity=5%`` into the data of a `Tolerance`.
+    """Return the data of a `Tolerance`, in SI units, from a text such as ``height=5mm,intensity=5%``.
 
     Raises:
         InputError: a kind that there isn't, or one named twice; a number or a unit is wrong, or a limit is exceeded.

@@ -36,7 +36,7 @@ _journal: int | None = None
 
 @contextmanager
 def scratch_folder(parent: Path | None = None) -> Iterator[Path]:
-    """Yield a new folder that is removed at the end, and remove what dead processes have left beside it.
+    """Yield a new folder that is removed at the end, and first remove what dead processes have left beside it.
 
     Args:
         parent: folder in which it is made, under a hidden name; the system's folder for temporary files if None.
@@ -80,7 +80,7 @@ def _use_for_temporary_files(variables: dict[str, str | None], folder: str | Non
 
 
 def temporary_folder_error(folder: Path, error: Exception) -> OutputError:
-    """Return the error of a temporary folder to which something couldn't be written."""
+    """Return the error that says that something couldn't be written to a temporary folder."""
     reason, place = getattr(error, "strerror", None) or "is the disk or the memory full?", folder
     while _NAME.fullmatch(place.name):
         place = place.parent
@@ -131,7 +131,7 @@ def _is_ours(folder: Path) -> bool:
 
 
 def _make_folder(parent: Path, prefix: str) -> Path:
-    """Make a scratch folder with its lock file; one that is empty still may be taken for a leftover: then anew."""
+    """Return a new scratch folder with its lock file, tried anew where an empty one was taken for a leftover."""
     while True:
         folder = Path(tempfile.mkdtemp(prefix=f"{prefix}{os.getpid()}-", dir=parent))
         record_folder(folder)

@@ -18,7 +18,7 @@ _TAKEN = (errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES, errno.EDEADLK)
 
 
 def try_lock(descriptor: int) -> bool | None:
-    """Lock an open file against other processes, without waiting.
+    """Lock an open file without waiting and return whether that worked; None if its file system knows no locks.
 
     Returns:
         True if it is locked now, False if another process has locked it, None if its file system knows no locks (as
@@ -41,7 +41,7 @@ def try_lock(descriptor: int) -> bool | None:
 
 @dataclass(frozen=True)
 class Owner:
-    """A process, as another one on this or another machine knows it again.
+    """Identity of a process, by which another one on this or another machine knows it again.
 
     Attributes:
         host: name of the machine.

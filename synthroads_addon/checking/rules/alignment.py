@@ -37,7 +37,7 @@ def _radius(road: Road) -> Iterator[Finding]:
 
 
 def _sharp_clothoid_ends(road: Road) -> Iterator[tuple[float, float]]:
-    """Yield (station, |curvature|) of clothoids' sharper ends where no neighbour is as sharp or stands for it."""
+    """Yield (station m, |curvature| 1/m) of clothoids' sharper ends beside which no neighbour is as sharp."""
     k0, k1 = np.abs(road.k0), np.abs(road.k1)
     last = len(k0) - 1
     for i in np.flatnonzero(~road.constant).tolist():
@@ -53,7 +53,7 @@ def _sharp_clothoid_ends(road: Road) -> Iterator[tuple[float, float]]:
 
 
 def _clothoids(road: Road) -> Iterator[tuple[int, float, float, float]]:
-    """Yield (index, A, smallest radius, largest radius it must suit) of every clothoid.
+    """Yield (index, A, smallest radius, largest radius that it must suit), lengths in m, of every clothoid.
 
     A clothoid that passes through zero curvature is two, of the same A: it must suit both radii. Any other, an egg's
     too, must suit the smaller radius. The largest is 0 where the road's begin or end cuts the clothoid's sharper end:
@@ -105,7 +105,7 @@ def _clothoid_ratio(road: Road) -> Iterator[Finding]:
 
 
 def _ratio(one: float, other: float) -> float:
-    """Return the larger over the smaller of two lengths; infinite or NaN where the smaller is 0."""
+    """Return the larger of two lengths over the smaller; infinite or NaN where the smaller is 0."""
     small, large = sorted((np.float64(one), np.float64(other)))
     return float(large / small)
 
@@ -140,12 +140,12 @@ def _straight_between(road: Road) -> Iterator[Finding]:
 
 
 def _direction(near: float, far: float) -> float:
-    """Return the sign of an element beside a straight: of its curvature there, or else at its other end."""
+    """Return the sign (1 left, -1 right) of an element beside a straight: of its curvature there or at its far end."""
     return float(np.sign(near if abs(near) > STRAIGHT else far))
 
 
 def _arcs(road: Road) -> list[CurvatureRun]:
-    """Return the arcs in order; where two clothoids meet at their sharper ends is an arc without length."""
+    """Return the arcs in order; where two clothoids meet at their sharper ends an arc of length 0 is added."""
     arcs = [run for run in road.runs if not run.straight]
     k0, k1 = road.k0, road.k1
     for i, (a, b) in enumerate(pairwise(~road.constant)):

@@ -28,7 +28,7 @@ from .rule import Finding, Road, Rule, above, at_least, below, gaps
 
 
 def _gaps(road: Road, edges: Edges, protecting: Bool, start: float, end: float) -> Iterator[tuple[float, float]]:
-    """Yield the stretches (m) between two stations along which none of some barriers (B,) stands.
+    """Yield the stretches (m) between two stations along which none of the barriers of a mask (B,) stands.
 
     None is asked for beside a ramp, which a barrier of one offset cannot follow.
     """
@@ -81,7 +81,7 @@ def _curve_barrier(road: Road) -> Iterator[Finding]:
 
 
 def _obstacles(road: Road) -> Iterator[tuple[int, str]]:
-    """Yield (index of its body, what it is) of everything that a vehicle must not run into."""
+    """Yield (index in `Road.bodies`, what it is) of every foot that a vehicle must not run into."""
     for i, (name, block) in enumerate(zip(road.bodies.names, road.bodies.items, strict=True)):
         thing: Any = road.parameters.objects[name]
         if block.part == "foot" and thing.obstacle and above(getattr(thing, "post_diameter", np.inf), OBSTACLE_POST):
@@ -89,7 +89,7 @@ def _obstacles(road: Road) -> Iterator[tuple[int, str]]:
 
 
 def _missing_barrier(road: Road, edges: Edges, index: int, reach: tuple[float, float]) -> tuple[float, float] | None:
-    """Return (metres, first station) that barriers lack between a carriageway and a body beside it, or None.
+    """Return (m, first station) that barriers lack between a carriageway and a body beside it; None if none lack.
 
     Args:
         road: the road.

@@ -75,7 +75,7 @@ def _lever(edges: Edges) -> float:
 
 
 def _flat_zone(fall: Crossfall) -> tuple[Bool, Bool]:
-    """Return where (N - 1,) a piece lies wholly, and at least partly, where the crossfall is below the least."""
+    """Return two masks (N - 1,): pieces wholly, and at least partly, of less than the least crossfall."""
     low = np.minimum(fall.percent[:-1], fall.percent[1:])
     high = np.maximum(fall.percent[:-1], fall.percent[1:])
     least = LEAST_CROSSFALL_PERCENT

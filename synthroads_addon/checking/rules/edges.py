@@ -24,7 +24,7 @@ BETWEEN = 3
 
 
 class WidthByStation:
-    """A width by station.
+    """A width as a function of the station, linear between its points.
 
     Attributes:
         constant: whether it is the same all along the road.
@@ -37,14 +37,14 @@ class WidthByStation:
         self.station, self.width = np.array(points, dtype=np.float64).T
 
     def __call__(self, station: Float) -> Float:
-        """Return the widths at stations, m."""
+        """Return the widths (N,) at stations (N,), m."""
         if self.constant:
             return np.full(len(station), self.width[0])
         return np.interp(station, self.station, self.width)
 
 
 class EdgeDistances(NamedTuple):
-    """Distances at N stations, m.
+    """Distances of a carriageway's edges from the centreline at N stations, m.
 
     Attributes:
         inner: (N,) inner paved edge.
@@ -63,18 +63,18 @@ class EdgeDistances(NamedTuple):
 
     @property
     def middle(self) -> Float:
-        """Return the middle (N,) of the main road's pavement."""
+        """Return the distance (N,) of the middle of the main road's pavement, m."""
         return 0.5 * (self.inner + self.main)
 
     def clearance(self, low: Float, high: Float) -> Float:
-        """Return how far (N,) what lies between two distances is from the pavement; negative over it."""
+        """Return how far (N,), m, what lies between two distances is from the pavement; negative over it."""
         main = np.maximum(self.inner - high, low - self.gap_low)
         ramp = np.maximum(self.gap_high - high, low - self.outer)
         return np.minimum(main, ramp)
 
 
 class TurnoutEdges:
-    """Width that a turnout adds to its carriageway.
+    """What a turnout adds to the widths of its carriageway, along the road.
 
     Along it counts w (m): for an exit from its beginning in the direction of traffic, for an entry backwards from its
     end; so both begin with their taper and end with their ramp. For an emergency bay it counts as for an exit.
@@ -109,21 +109,21 @@ class TurnoutEdges:
         self._added = np.array(marks), np.array([0.0, lane, lane, beyond, beyond])
 
     def station(self, w: float) -> float:
-        """Return the station of a w, m."""
+        """Return the station at a distance w along the turnout (both m), for an entry backwards from its end."""
         return self.turnout.start_station + w if self._forward else self.turnout.end_station - w
 
     def span(self, first: float, last: float) -> tuple[float, float]:
-        """Return the lower and the higher station of two w, m."""
+        """Return the stations of two distances w along the turnout, the lower one first, m."""
         a, b = self.station(first), self.station(last)
         return (a, b) if a <= b else (b, a)
 
     @property
     def ramp_span(self) -> tuple[float, float]:
-        """Stations of the gore's tip and the ramp's end, the lower one first, m; empty for a bay."""
+        """Return the stations of the gore's tip and the ramp's end, the lower one first, m; empty for a bay."""
         return self.span(self.tip, self.end) if self.turnout.ramp else (np.inf, -np.inf)
 
     def marks(self) -> Float:
-        """Return the stations at which the pavement's edge bends or steps, and some between where it is curved."""
+        """Return the stations (m, unsorted) at which the pavement's edge bends or steps, and some on its curves."""
         w = list(self._added[0])
         if self.turnout.ramp:
             parts = ((self.tip, self.nose), (self.nose, self.end))
@@ -131,7 +131,7 @@ class TurnoutEdges:
         return np.array([self.station(at) for at in w])
 
     def widen(self, station: Float, edges: _WidthSums) -> None:
-        """Add what it does to the sums of the carriageway's widths at N stations, in place."""
+        """Add the turnout's widths at N stations to the carriageway's sums, in place."""
         start, end = self.turnout.start_station, self.turnout.end_station
         w = station - start if self._forward else end - station
         inside = np.flatnonzero((w > 0.0) & (w <= self.end))
@@ -150,7 +150,7 @@ class TurnoutEdges:
 
 
 class _WidthSums(NamedTuple):
-    """Widths (N,) at N stations, m.
+    """Sums of widths (N,) at N stations, m, which turnouts add to.
 
     Attributes:
         full: of the hard shoulder as the carriageway has it.
@@ -168,7 +168,7 @@ class _WidthSums(NamedTuple):
 
 
 class Edges:
-    """The edges of a carriageway.
+    """The edges of a carriageway as functions of the station.
 
     Attributes:
         name, carriageway: the carriageway with its id.
@@ -199,7 +199,7 @@ class Edges:
         self.at_marks = self.at(self.marks)
 
     def at(self, station: Float) -> EdgeDistances:
-        """Return the edges at N stations."""
+        """Return the edges' distances at N stations."""
         count = len(station)
         parts = self._main(station) if self._constant is None else [np.repeat(x, count, axis=0) for x in self._constant]
         inner, lanes, base, full = parts
@@ -215,20 +215,20 @@ class Edges:
         return EdgeDistances(inner, lanes, base + full, outer, gap_low, gap_high)
 
     def inner(self, station: Float) -> Float:
-        """Return the inner paved edge (N,) at N stations."""
+        """Return the distance (N,) of the inner paved edge at N stations, m."""
         return self._inner(station)
 
     def between(self, start: float, end: float) -> Float:
-        """Return the stations of a begin and an end and of the marks between them, m."""
+        """Return the stations (K,), m: the begin, the marks between it and the end, and the end."""
         inside = self.marks[(self.marks > start) & (self.marks < end)]
         return np.concatenate(([start], inside, [end]))
 
     def distances(self, low: Offset, high: Offset) -> tuple[Offset, Offset]:
-        """Return the smaller and the larger distance of what lies between two offsets."""
+        """Return the smaller and the larger distance from the centreline of what lies between two offsets, all m."""
         return (low, high) if self.sign > 0 else (-high, -low)
 
     def _main(self, station: Float) -> list[Float]:
-        """Return inner edge, lane boundaries, outer edge of the outer edge strip, width of the hard shoulder."""
+        """Return inner edge, lane boundaries, outer edge of the outer edge strip, and width of the hard shoulder, m."""
         inner = self._inner(station)
         widths = [inner + self._inner_strip(station), *(width(station) for width in reversed(self.lane_widths))]
         lanes = np.array(list(accumulate(widths))).T[:, ::-1]

@@ -84,7 +84,7 @@ def _delineator_distance(road: Road) -> Iterator[Finding]:
 
 
 def _by_side(road: Road, items: dict[str, KilometreBoard] | dict[str, Cabinet]) -> Iterator[list[tuple[str, float]]]:
-    """Yield the ids and stations of objects on either side of the centreline, in order."""
+    """Yield for either side of the centreline the (id, station) of objects there, by station."""
     for sign in (1.0, -1.0):
         places = [(name, item.station) for name, item in items.items() if sign * item.offset > 0.0]
         yield sorted(places, key=lambda pair: pair[1])
@@ -108,7 +108,7 @@ def _phone_spacing(road: Road) -> Iterator[Finding]:
 
 
 def _kilometre_text(road: Road) -> Iterator[Finding]:
-    """Compare each board with the others: kilometres rise or fall with the stations, from an unknown beginning."""
+    """Yield the boards whose kilometre doesn't fit the others': kilometres rise or fall with the stations."""
     boards = road.of(KilometreBoard)
     if not boards:
         return
@@ -125,13 +125,13 @@ def _kilometre_text(road: Road) -> Iterator[Finding]:
 
 
 def _off(begin: Float, known: Bool) -> Float:
-    """Return how far (N,) the beginnings of the road that boards tell are from the middle one of those known, m."""
+    """Return the distances (N,), m, of the road's beginnings that boards tell from the middle one of those known."""
     middle = np.sort(begin[known])[np.sum(known) // 2] if known.any() else np.nan
     return np.abs(begin - middle)
 
 
 def _metres(text: str) -> float:
-    """Return the m that a board tells, or NaN where it is no number."""
+    """Return the kilometre that a board tells in m, or NaN where its text is no number."""
     whole, _, part = text.strip().replace(",", ".").partition(".")
     digits = whole + part
     return float(f"{whole}.{part}0") * 1000.0 if whole.isascii() and digits.isascii() and digits.isdigit() else np.nan
@@ -147,7 +147,7 @@ def _object_range(road: Road) -> Iterator[Finding]:
 
 
 def _ranges(road: Road) -> Iterator[tuple[str, float, float]]:
-    """Yield (id, start, end) of all that lies along the road, damage of the pavement included."""
+    """Yield (id, start m, end m) of all that lies along the road, damage of the pavement included."""
     for name, item in road.each(PointObject, Vehicle):
         yield name, item.station, item.station
     for name, item in road.each(LineObject, LineMarking):
@@ -193,7 +193,7 @@ def _object_overlap(road: Road) -> Iterator[Finding]:
 
 
 def _near_pairs(bodies: Bodies) -> tuple[np.ndarray, np.ndarray]:
-    """Return the indices (P,), (P,) of all pairs of bodies whose stations overlap, in the order of the file."""
+    """Return the indices (P,), (P,) of all pairs of bodies whose stations overlap, of each pair the lower one first."""
     order = np.argsort(bodies.start, kind="stable")
     until = np.searchsorted(bodies.start[order], bodies.end[order], side="left")
     count = np.maximum(until - np.arange(len(order)) - 1, 0)

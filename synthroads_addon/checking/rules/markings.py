@@ -41,12 +41,12 @@ def _lines_on(road: Road, edges: Edges) -> _Lines:
 
 
 def _select_lines(lines: _Lines, kinds: Iterable[str], boundary: int) -> _Lines:
-    """Return those of some kinds on a lane boundary out of a carriageway's lines."""
+    """Return those of a carriageway's lines that lie on a lane boundary and are of one of some kinds."""
     return [(name, line) for name, line in lines if line.boundary == boundary and line.kind in kinds]
 
 
 def _lanes_beside(road: Road, edges: Edges, boundary: int) -> tuple[Bool, Bool]:
-    """Return where (M - 1,) between two marks both lanes beside a boundary have their width, and where one is gone."""
+    """Return masks (M - 1,) of the pieces between marks: both lanes beside a boundary full; one of them gone."""
     least = narrowest_lane(road)
     full, gone = [], []
     for lane in (boundary - 1, boundary):
@@ -62,7 +62,7 @@ def _spans(marks: Float, where: Bool) -> _Spans:
 
 
 def _required_lines(road: Road, edges: Edges) -> Iterator[tuple[str, int, _Spans, _Lines]]:
-    """Yield (kind, boundary, where it must run, its lines) of every line along a carriageway's lanes."""
+    """Yield (kind, boundary, stretches where it must run, its lines) for every line along a carriageway's lanes."""
     lines, whole, last = _lines_on(road, edges), [(0.0, road.length)], len(edges.lane_widths)
     yield "outer_edge", 0, whole, _select_lines(lines, ("outer_edge", "block"), 0)
     for boundary in range(1, last):
@@ -74,7 +74,7 @@ def _required_lines(road: Road, edges: Edges) -> Iterator[tuple[str, int, _Spans
 
 
 def _required_at(road: Road, turnout: TurnoutEdges) -> Iterator[tuple[str, tuple[float, float], _Lines]]:
-    """Yield (kind, where it must run, its lines) of the lines of an exit or entry; a bay has none."""
+    """Yield (kind, stretch where it must run, its lines) for the lines of an exit or entry; a bay has none."""
     begins = {"turnout_edge": turnout.taper, "gore_edge": turnout.tip} if turnout.turnout.ramp else {}
     for kind, begin in begins.items():
         lines = [(name, line) for name, line in road.of(LineMarking).items() if line.turnout == turnout.name]
@@ -132,7 +132,7 @@ def _marking_between(road: Road) -> Iterator[Finding]:
 
 
 def _regulated_lines(road: Road) -> Iterator[tuple[str, LineMarking]]:
-    """Yield the lines whose width and pattern the RMS give: not free ones, nor temporary (yellow) ones."""
+    """Yield (id, line) for which the RMS give width and pattern: neither free nor temporary (yellow) ones."""
     for name, line in road.of(LineMarking).items():
         if line.color == "white" and line.kind != "free":
             yield name, line

@@ -23,7 +23,7 @@ Spans = list[tuple[float, float]]
 
 
 class Bodies:
-    """The boxes around all things of a road.
+    """The boxes that the things of a road stand in, as arrays.
 
     Attributes:
         items: the boxes.
@@ -45,17 +45,17 @@ class Bodies:
         self.start, self.end, self.low, self.high, self.bottom, self.top = numbers.T
 
     def of(self, *kinds: type, part: str) -> list[int]:
-        """Return the indices of the boxes of some classes of objects that are one part of them."""
+        """Return the indices of the boxes of one part of the things of some classes."""
         return [i for kind in kinds for i in self._of.get(kind, ()) if self.items[i].part == part]
 
     @property
     def station(self) -> Float:
-        """Return the stations (N,) of their middles, m."""
+        """Return the stations (N,) of the boxes' middles, m."""
         return 0.5 * self.start + 0.5 * self.end
 
 
 class Around:
-    """Where the bodies are in relation to the carriageways.
+    """Where bodies stand in relation to the carriageways: clearances and sides.
 
     Posts and faces are looked at in their middle, what is long at its ends and at the stations of `marks` as well: the
     pavement's edge is straight, or hollow beside a ramp, from one to the next.
@@ -96,7 +96,7 @@ class Around:
 
 
 def _least(values: Float, index: NDArray[np.intp], count: int) -> Float:
-    """Return the smallest (count,) of the values of each index."""
+    """Return the smallest of the values of each index, (count,); infinite where it has none."""
     least = np.full(count, np.inf)
     np.minimum.at(least, index, values)
     return least
@@ -125,7 +125,7 @@ class Barriers:
         self.outer = {name: outer[index] for name, outer in around.outer.items()}
 
     def spans(self, which: Bool) -> Spans:
-        """Return the stations that the barriers of a mask (B,) stand along."""
+        """Return the (start, end) stations, m, of the barriers of a mask (B,)."""
         return list(zip(self.start[which].tolist(), self.end[which].tolist(), strict=True))
 
 
@@ -171,10 +171,10 @@ class Signs:
         self.bare = {name: values[index] for name, values in around.bare.items()}
 
     def away(self, edges: Edges) -> Float:
-        """Return by how much (S,) the signs are turned away from a carriageway's traffic, degrees."""
+        """Return the angles (S,) by which the signs are turned away from a carriageway's traffic, degrees."""
         return self.turned if edges.traffic > 0 else 180.0 - self.turned
 
     def seen_by(self, edges: Edges, code: str, room: float) -> NDArray[np.intp]:
-        """Return the indices of the signs of a code that a carriageway's traffic sees, turned by `room` at most."""
+        """Return the indices of a code's signs that a carriageway's traffic sees, turned at most ``room`` degrees."""
         seen = self.of[edges.name] & (self.away(edges) <= room)
         return np.array([i for i, sign_code in enumerate(self.codes) if sign_code == code and seen[i]], dtype=np.intp)

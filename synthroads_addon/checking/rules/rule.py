@@ -39,7 +39,7 @@ SAME_CROSSFALL = 1e-6
 
 
 class Finding(NamedTuple):
-    """Finding of a rule: `Violation` without what its rule knows."""
+    """What a rule finds: a `Violation` without the rule's id and unit."""
 
     object: str
     station: float
@@ -50,7 +50,7 @@ class Finding(NamedTuple):
 
 @dataclass(frozen=True)
 class Violation:
-    """A broken rule.
+    """A broken rule: where, and by how much.
 
     Attributes:
         rule: stable id of the rule, e.g. ``radius-minimum``.
@@ -72,7 +72,7 @@ class Violation:
 
 @dataclass(frozen=True)
 class Rule:
-    """A rule of the checker.
+    """A rule of the checker: what is required, by which source, and the function that finds violations.
 
     Attributes:
         id: short stable name.
@@ -110,7 +110,7 @@ class CurvatureRun:
 
     @property
     def straight(self) -> bool:
-        """Whether it is a straight."""
+        """Return whether it is a straight."""
         return abs(self.curvature) < STRAIGHT
 
     @property
@@ -125,7 +125,7 @@ class CurvatureRun:
 
 
 class Road:
-    """A parameter set as arrays.
+    """A parameter set as arrays, as the rules read it.
 
     Attributes:
         axis: id of the alignment.
@@ -179,37 +179,37 @@ class Road:
 
     @property
     def turnouts(self) -> Iterator[tuple[Edges, TurnoutEdges]]:
-        """The turnouts with their carriageways."""
+        """Yield (carriageway's edges, turnout's edges) for all turnouts."""
         return ((edges, turnout) for edges in self.sides.values() for turnout in edges.turnouts)
 
     @cached_property
     def crossfalls(self) -> dict[str, Crossfall]:
-        """The carriageways' crossfall, by the carriageway's id."""
+        """Return the carriageways' crossfall, by the carriageway's id."""
         return {name: Crossfall(edges.carriageway, self.length) for name, edges in self.sides.items()}
 
     @cached_property
     def bodies(self) -> Bodies:
-        """Obstacles on the road as boxes."""
+        """Return the boxes that all things of the road stand in."""
         return Bodies(self.parameters)
 
     @cached_property
     def around(self) -> Around:
-        """Where the bodies are in relation to the carriageways."""
+        """Return where the bodies are in relation to the carriageways."""
         return Around(self.bodies, self.sides, self.marks)
 
     @cached_property
     def barriers(self) -> Barriers:
-        """The guardrails and concrete barriers."""
+        """Return the guardrails and concrete barriers."""
         return Barriers(self.parameters, self.bodies, self.around)
 
     @cached_property
     def signs(self) -> Signs:
-        """The traffic signs, kilometre boards and traffic lights."""
+        """Return the traffic signs, kilometre boards and traffic lights."""
         return Signs(self.parameters, self.bodies, self.around)
 
     @cached_property
     def beside(self) -> dict[str, Beside]:
-        """Which of the barriers protect the traffic of each carriageway, by the carriageway's id."""
+        """Return which of the barriers protect the traffic of each carriageway, by the carriageway's id."""
         return {name: Beside(self.barriers, name, edges) for name, edges in self.sides.items()}
 
     def _runs(self) -> list[CurvatureRun]:
@@ -229,7 +229,7 @@ class Road:
 
 
 class Vertical:
-    """The profile as arrays; points whose station isn't past all before them are left out (and found by a rule).
+    """The vertical profile as arrays; points whose station isn't past all before are left out (a rule finds them).
 
     Attributes:
         station, radius: (P,) m.
@@ -267,7 +267,7 @@ class Crossfall:
 
 
 def same_curvature(a: Float | float, b: Float | float) -> Bool:
-    """Return where two curvatures count as equal."""
+    """Return a mask of where two curvatures (1/m) count as equal."""
     room = SAME_CURVATURE + TOLERANCE * np.maximum(np.abs(a), np.abs(b))
     return np.asarray(np.abs(np.subtract(a, b)) <= room)
 
@@ -279,7 +279,7 @@ def indices_of_increase(station: Float) -> NDArray[np.intp]:
 
 
 def out_of_order(stations: Iterable[float]) -> Iterator[tuple[int, float, float]]:
-    """Yield number (from 1), station and the largest one before of those that don't lie past all before them."""
+    """Yield (number from 1, station, largest one before) of the stations that don't lie past all before them."""
     past = -np.inf
     for number, station in enumerate(stations, start=1):
         if station <= past:
@@ -288,29 +288,29 @@ def out_of_order(stations: Iterable[float]) -> Iterator[tuple[int, float, float]
 
 
 def below(value: float, limit: float) -> bool:
-    """Return whether a value falls short of a limit by more than the tolerance."""
+    """Return whether a value falls short of a limit by more than the relative tolerance."""
     return bool(value < limit - TOLERANCE * max(abs(limit), TOLERANCE))
 
 
 def above(value: float, limit: float) -> bool:
-    """Return whether a value exceeds a limit by more than the tolerance."""
+    """Return whether a value exceeds a limit by more than the relative tolerance."""
     return below(-value, -limit)
 
 
 def at_least(item: str, station: float, value: float, limit: float, text: str) -> Iterator[Finding]:
-    """Yield a finding if a value falls short of its limit."""
+    """Yield one finding if a value falls short of its limit, else none."""
     if below(value, limit):
         yield Finding(item, station, value, limit, text)
 
 
 def at_most(item: str, station: float, value: float, limit: float, text: str) -> Iterator[Finding]:
-    """Yield a finding if a value exceeds its limit."""
+    """Yield one finding if a value exceeds its limit, else none."""
     if above(value, limit):
         yield Finding(item, station, value, limit, text)
 
 
 def stretches(mask: Bool) -> Iterator[tuple[int, int]]:
-    """Yield (first, last) index of every run of neighbouring True values."""
+    """Yield the (first, last) index of every run of neighbouring True values in a mask."""
     if not mask.any():
         return
     edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))

@@ -20,7 +20,7 @@ SAME_SLOPE = 0.01
 
 
 def _widths(carriageway: Carriageway) -> Iterator[tuple[str, AnyWidth]]:
-    """Yield (what it is, width) of all widths of a carriageway."""
+    """Yield (name for people, width) of all widths of a carriageway."""
     yield "The inner offset", carriageway.inner_offset
     yield "The hard shoulder", carriageway.hard_shoulder_width
     yield "The outer edge strip", carriageway.outer_edge_strip_width
@@ -48,7 +48,7 @@ def _standard_sections(road: Road) -> list[StandardCrossSection]:
 
 
 def _lane_ramps(lane: WidthByStation) -> list[tuple[int, int]]:
-    """Return (first, last) point of every straight piece of a lane's widths that has the width 0 at one of its ends."""
+    """Return (first, last) point of every straight piece of a lane's widths that is 0 at just one end."""
     if lane.constant:
         return []
     slope = np.diff(lane.width) / np.diff(lane.station)
@@ -77,7 +77,7 @@ def _lane_width(road: Road) -> Iterator[Finding]:
 
 
 def lane_tapers(road: Road, edges: Edges) -> Iterator[tuple[int, float, float]]:
-    """Yield (lane, first station, last station) of every stretch on the road on which a lane begins or ends."""
+    """Yield (lane, first station, last station) of every taper on the road along which a lane begins or ends."""
     for i, lane in enumerate(edges.lane_widths):
         for first, last in _lane_ramps(lane):
             begin, end = float(lane.station[first]), float(lane.station[last])
@@ -111,7 +111,7 @@ def _is_standard(edges: Edges) -> bool:
 
 
 def _strip_widths(road: Road, fields: tuple[str, ...]) -> Iterator[Finding]:
-    """Yield where strips of a standard cross-section are narrower than in those of the class."""
+    """Yield findings for strips of a standard cross-section narrower than in those of the class."""
     for field in fields:
         what, least = field.replace("_", " "), min(getattr(section, field) for section in _standard_sections(road))
         for name, edges in road.sides.items():

@@ -39,12 +39,12 @@ class _Beacon(NamedTuple):
 
 
 def _carriageway_at(road: Road, offset: float) -> Edges | None:
-    """Return the carriageway on an offset's side of the centreline."""
+    """Return the carriageway on an offset's side of the centreline, or None if there is none."""
     return next((edges for edges in road.sides.values() if edges.sign * offset > 0.0), None)
 
 
 def _beacon_rows(road: Road) -> Iterator[tuple[Edges, list[_Beacon]]]:
-    """Yield the rows of beacons in order: those of one carriageway that traffic passes on the same side."""
+    """Yield (carriageway, beacons by station) for the beacons that traffic passes on the same side."""
     rows: dict[tuple[str, str], list[_Beacon]] = {}
     for name, beacon in road.of(ConstructionBeacon).items():
         edges = _carriageway_at(road, beacon.offset)
@@ -56,7 +56,7 @@ def _beacon_rows(road: Road) -> Iterator[tuple[Edges, list[_Beacon]]]:
 
 
 def _construction_zones(road: Road) -> Iterator[tuple[Edges, list[_Beacon]]]:
-    """Yield the rows of beacons of each construction zone."""
+    """Yield (carriageway, beacons by station) for each construction zone."""
     for edges, beacons in _beacon_rows(road):
         first = 0
         for i, (here, there) in enumerate(pairwise(beacons), start=1):
@@ -67,7 +67,7 @@ def _construction_zones(road: Road) -> Iterator[tuple[Edges, list[_Beacon]]]:
 
 
 def _is_passed_outside(edges: Edges, place: _Beacon) -> bool:
-    """Return whether traffic passes a beacon outwards of it, seen from the centreline."""
+    """Return whether traffic passes a beacon on its side away from the centreline."""
     return (place.beacon.pass_side == "left") == (edges.sign > 0)
 
 
@@ -103,7 +103,7 @@ def _open_lane(road: Road) -> Iterator[Finding]:
 
 
 def _open_widths(edges: Edges, station: Float, distance: Float, half: Float | float) -> tuple[Float, Float]:
-    """Return how much (N,) of the lanes is left inwards and outwards of what stands at N distances, m."""
+    """Return the widths (N,), (N,) of the lanes left open inwards and outwards of what stands at N distances, m."""
     lanes = edges.at(station).lanes
     outermost, innermost = lanes[:, 0], lanes[:, -1]
     inwards = np.minimum(distance - half, outermost) - innermost
@@ -143,7 +143,7 @@ def _vehicle_overlap(road: Road) -> Iterator[Finding]:
 
 
 def _vehicles_beside(road: Road, edges: Edges, row: Float) -> Iterator[tuple[str, float, float, float]]:
-    """Yield (id, station, distance of its middle, distance of the row) of vehicles beside a row of places (R, 2)."""
+    """Yield (id, station, distance of its middle, distance of the row), m, of vehicles beside a row (R, 2)."""
     for name, vehicle in road.of(Vehicle).items():
         if vehicle.carriageway == edges.name and row[0, 0] <= vehicle.station <= row[-1, 0]:
             lanes = edges.at(np.array([vehicle.station])).lanes[0]

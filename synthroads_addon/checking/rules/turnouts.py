@@ -22,12 +22,12 @@ _NAMES = {"emergency_bay": "emergency bay", "exit": "exit", "entry": "entry"}
 
 
 def _clip_to_road(road: Road, station: float) -> float:
-    """Return a station (m), or the nearer end of the road beyond it."""
+    """Return a station (m) moved to the nearer end of the road if it lies beyond it."""
     return min(max(station, 0.0), road.length)
 
 
 def _find_small(road: Road, bays: bool, field: str, least: float, text: str) -> Iterator[Finding]:
-    """Yield the emergency bays, or the exits and entries, of which a length or width falls short of the least (m)."""
+    """Yield findings for bays, or for exits and entries, with a length or width below the least (m)."""
     for name, turnout in road.of(Turnout).items():
         if (turnout.ramp is None) == bays:
             value = getattr(turnout, field)
@@ -72,7 +72,7 @@ def _nose(road: Road) -> Iterator[Finding]:
 
 
 def _consecutive(turnouts: Iterable[TurnoutEdges]) -> Iterator[tuple[TurnoutEdges, TurnoutEdges]]:
-    """Return each two turnouts that follow one another."""
+    """Return an iterator over the pairs of turnouts that follow one another, by station."""
     return pairwise(sorted(turnouts, key=lambda item: item.turnout.start_station))
 
 

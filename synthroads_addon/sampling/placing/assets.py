@@ -15,7 +15,7 @@ from .site import PlacementSite
 
 
 def sample_assets(site: PlacementSite) -> Iterator[tuple[str, Asset]]:
-    """Yield the assets of the scenario's libraries by id, placed by their rules; their instance numbers are 1.
+    """Yield (id, asset) of the scenario's libraries, placed by their rules; their instance numbers are 1.
 
     Where the road leaves no room for one, there is none.
 
@@ -45,7 +45,7 @@ def sample_assets(site: PlacementSite) -> Iterator[tuple[str, Asset]]:
 def _places(
     site: PlacementSite, placement: AssetPlacement, field: str, purpose: tuple[str | int, ...]
 ) -> Iterator[tuple[float, float, float]]:
-    """Yield station (m), offset (m) and rotation (deg) of an asset's copies. In the median each takes either half."""
+    """Yield station (m), offset (m) and rotation (deg) of an asset's copies; in the median each takes either half."""
     in_median = placement.side == "median"
     sides = [side for side in site.sections if in_median or placement.side in (side, "both")]
     for group in [sides] if in_median else [[side] for side in sides]:
@@ -69,7 +69,7 @@ def _draw_places(rng: np.random.Generator, limits: Interval, number: int, highes
 
 
 def _stations(rng: np.random.Generator, placement: AssetPlacement, length: float) -> Float:
-    """Return the stations (N,) of an asset's copies along one side, m."""
+    """Return the drawn stations (N,) of an asset's copies along one side, m."""
     start = placement.start_station
     end = length if placement.end_station is None else min(placement.end_station, length)
     if end <= start:
@@ -88,7 +88,7 @@ def _stations(rng: np.random.Generator, placement: AssetPlacement, length: float
 def _room(
     site: PlacementSite, section: CarriagewaySection, in_median: bool, stations: Float, field: str, needed: float
 ) -> tuple[Float, Float]:
-    """Return the distance (N,) of the edge that an asset's distance counts from, and the room beyond it there, m."""
+    """Return the distances (N,) of the edge that an asset's distance counts from, and the room (N,) beyond it, m."""
 
     def beside(at: Float) -> tuple[Float, Float]:
         if in_median:

@@ -57,18 +57,18 @@ class BarrierSystem:
 
     @classmethod
     def draw(cls, rng: np.random.Generator, limits: BarrierLimits, concrete_share: float) -> Self:
-        """Return the system of a side or of the median."""
+        """Return a drawn system for a side or the median, of concrete with the probability ``concrete_share``."""
         profile = pick(rng, CONCRETE_PROFILES)
         concrete = profile if rng.random() < concrete_share else None
         return cls(concrete, draw(rng, limits.guardrail_height), pick(rng, POST_SPACINGS))
 
     @property
     def name(self) -> str:
-        """Return the first part of its barriers' ids."""
+        """Return the first part of its barriers' ids: "concrete-barrier" or "guardrail"."""
         return "concrete-barrier" if self.concrete else "guardrail"
 
     def beside(self, roadside: Roadside, piece: BarrierPiece, terminal: float) -> LineObject:
-        """Return a barrier of a piece; its nearest part stands 0.5 m from the base."""
+        """Return the barrier of a piece on the road's side; its nearest part stands 0.5 m from the piece's base."""
         terminal = min(terminal, (piece.end - piece.start) / 4.0)
         if self.concrete:
             axis = piece.base + BARRIER_DISTANCE + self.concrete[2] / 2.0
@@ -76,7 +76,7 @@ class BarrierSystem:
         return self.rail(piece[:2], roadside.sign * (piece.base + BARRIER_AXIS), roadside.towards_road, terminal)
 
     def rail(self, span: Range, offset: float, faces: Side | Literal["both"], terminal: float = 0.0) -> Guardrail:
-        """Return a guardrail between two stations with the axis of its posts at an offset, ramped at its ends, m."""
+        """Return a guardrail between two stations, its posts' axis at an offset, its ends ramped; all m."""
         return Guardrail(
             instance=1,
             start_station=round_value(span[0]),
@@ -90,7 +90,7 @@ class BarrierSystem:
 
 
 def median_barriers(layout: Layout, rng: np.random.Generator) -> Iterator[tuple[str, LineObject]]:
-    """Yield the barriers of the median, which go on beyond both ends of the road; none where 0.5 m can't be kept."""
+    """Yield (id, barrier) of the median, all along the road; none where 0.5 m from the pavement can't be kept."""
     limits, median = layout.site.scenario.barriers, layout.median
     system = BarrierSystem.draw(rng, limits, limits.concrete_median)
     if not limits.median or len(median.inner) < 2:
@@ -111,7 +111,7 @@ def median_barriers(layout: Layout, rng: np.random.Generator) -> Iterator[tuple[
 
 
 def roadside_barriers(layout: Layout, roadside: Roadside, rng: np.random.Generator) -> Iterator[tuple[str, LineObject]]:
-    """Yield the barriers of one side: where something needs them, and at random elsewhere."""
+    """Yield (id, barrier) of one side: where something needs one, and at random elsewhere."""
     limits, length = layout.site.scenario.barriers, roadside.length
     system = BarrierSystem.draw(rng, limits, limits.concrete_roadside)
     if not limits.roadside:
@@ -127,7 +127,7 @@ def roadside_barriers(layout: Layout, roadside: Roadside, rng: np.random.Generat
 
 
 def plan_noise_barrier(layout: Layout, roadside: Roadside, rng: np.random.Generator) -> NoiseBarrier | None:
-    """Return a side's noise barrier, if it gets one, its place reserved and a barrier before it asked for.
+    """Return a side's drawn noise barrier, its place reserved and a barrier before it asked for; None without.
 
     It stands where the edge runs straight on for long enough, away from turnouts, large boards and overpasses.
     """
@@ -162,7 +162,7 @@ def plan_noise_barrier(layout: Layout, roadside: Roadside, rng: np.random.Genera
 
 
 def _by_the_road(layout: Layout, roadside: Roadside) -> Iterator[Range]:
-    """Yield where embankment or curves need a barrier."""
+    """Yield the stretches that need a barrier because of the embankment or tight curves."""
     terrain = layout.site.terrain
     if terrain.embankment_height > EMBANKMENT_HEIGHT and terrain.batter_slope < EMBANKMENT_RUN:
         yield 0.0, roadside.length
@@ -173,7 +173,7 @@ def _by_the_road(layout: Layout, roadside: Roadside) -> Iterator[Range]:
 
 
 def _elsewhere(roadside: Roadside, rng: np.random.Generator) -> Iterator[Range]:
-    """Yield stretches without a reason that the parameters know of, away from turnouts."""
+    """Yield random stretches for barriers that no rule asks for, away from turnouts."""
     slots = math.ceil(roadside.length / _SLOT)
     for slot in range(slots):
         if rng.random() >= _IN_SLOT:
@@ -190,7 +190,7 @@ def _inner(roadside: Roadside, segment: Segment) -> Range:
 
 
 def _pieces(roadside: Roadside, stretches: list[Range]) -> Iterator[BarrierPiece]:
-    """Yield the barriers of stretches: one in each segment of the edge, long enough where there is room."""
+    """Yield the barriers on stretches: one in each segment of the edge, lengthened to the least where there is room."""
     for segment in roadside.edge.segments:
         low, high = segment.start, segment.end
         inside = [
@@ -206,7 +206,7 @@ def _pieces(roadside: Roadside, stretches: list[Range]) -> Iterator[BarrierPiece
 
 
 def _prolong_piece(roadside: Roadside, segment: Segment, piece: BarrierPiece) -> BarrierPiece:
-    """Return a piece that fills a short segment made longer beside a neighbour that stands nearer to the road."""
+    """Return a barrier too short for its segment made longer beside a neighbour that stands nearer to the road."""
     lack = SHORTEST_BARRIER - (piece.end - piece.start)
     if lack <= 0.0:
         return piece

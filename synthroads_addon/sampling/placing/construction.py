@@ -50,7 +50,7 @@ class Zone(NamedTuple):
     edge: float
 
     def distance(self, station: Float, depth: float) -> Float:
-        """Return the distance (N,) of a line so deep (m) in the closed lane, which the tapers lead from the edge."""
+        """Return a line's distances (N,) from the centreline, ``depth`` (m) into the closed lane, and in the tapers."""
         outer, inner = self.edge - EDGE_DISTANCE - (BEACON_DISTANCE - depth), self.boundary + depth
         return np.interp(station, self.stations, (outer, inner, inner, outer))
 
@@ -71,7 +71,7 @@ def construction_zones(layout: Layout, rng: np.random.Generator) -> tuple[dict[S
 
 
 def _zone(layout: Layout, roadside: Roadside, rng: np.random.Generator) -> Zone | None:
-    """Return a zone where the carriageway is wide enough, has no turnouts and keeps its widths; None without room."""
+    """Return a drawn zone where the carriageway is wide, has no turnouts and keeps its widths; None without room."""
     limits, length = layout.site.scenario.furniture.construction_length, roadside.length
     section = layout.site.sections[roadside.side]
     turnouts = ((start - _TURNOUT_ROOM, end + _TURNOUT_ROOM) for start, end in roadside.turnouts.stretches)
@@ -132,14 +132,14 @@ def _equipment(
 
 
 def _beacon_stations(marks: tuple[float, float, float, float]) -> Float:
-    """Return the stations of beacons, one at each end of the tapers."""
+    """Return the stations (N,) of a zone's beacons, m, one at each end of the tapers."""
     spans = zip(pairwise(marks), (SPACING_TAPER, SPACING, SPACING_TAPER), strict=True)
     parts = [np.linspace(*span, math.ceil((span[1] - span[0]) / step), endpoint=False) for span, step in spans]
     return np.append(np.concatenate(parts), marks[3])
 
 
 def _line(side: Side, zone: Zone, film_thickness: float) -> LineMarking:
-    """Return the yellow line along the beacons."""
+    """Return the yellow line marking along a zone's beacons."""
     distances = zone.distance(np.array(zone.stations), LINE_DISTANCE).tolist()
     places = zip(zone.stations, distances, strict=True)
     points = [WidthPoint(station=round_value(station), width=round_value(width)) for station, width in places]

@@ -21,7 +21,7 @@ _REACH = 0.5  # m along the road: a post keeps clear of barriers and pavement ov
 
 
 def delineators(roadside: Roadside, stations: Float) -> Iterator[tuple[str, Delineator]]:
-    """Yield (id, post) at stations (P,) along one side, behind the barrier where one stands."""
+    """Yield (id, delineator) at stations (P,) along one side, behind the barrier where one stands."""
     distances = roadside.edge.line_beside(stations, _REACH) + DELINEATOR_DISTANCE
     for piece in roadside.pieces:
         covered = (stations > piece.start - _REACH) & (stations < piece.end + _REACH)
@@ -34,7 +34,7 @@ def delineators(roadside: Roadside, stations: Float) -> Iterator[tuple[str, Deli
 
 
 def delineator_stations(elements: tuple[HorizontalElement, ...]) -> Float:
-    """Return stations of delineators, from half a spacing after the beginning to the end.
+    """Return the stations (P,) of delineators, m, from half a spacing after the beginning to the end.
 
     Between two posts lies the spacing of the table at the tightest curvature within the next 50 m, so that the posts
     come closer before a curve begins.
@@ -54,7 +54,7 @@ def delineator_stations(elements: tuple[HorizontalElement, ...]) -> Float:
 
 
 def _spacing_behind(elements: tuple[HorizontalElement, ...], starts: list[float], station: float) -> float:
-    """Return the spacing (m) behind a post: the table's at the tightest curvature within the widest spacing.
+    """Return the spacing (m) behind a delineator: the table's at the tightest curvature within the widest spacing.
 
     Args:
         elements: of the centreline.

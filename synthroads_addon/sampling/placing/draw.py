@@ -12,13 +12,13 @@ T = TypeVar("T")
 
 
 def draw(rng: np.random.Generator, limits: Interval) -> float:
-    """Return a number within limits, each with the same chance."""
+    """Return a number drawn uniformly from an interval of the scenario, rounded."""
     low, high = limits.minimum, limits.maximum
     return min(max(round_value(low + (high - low) * rng.random()), low), high)
 
 
 def draw_between(rng: np.random.Generator, limits: tuple[float, float]) -> float:
-    """Return a number between two limits, each with the same chance."""
+    """Return a number drawn uniformly between two limits, rounded."""
     return round_value(limits[0] + (limits[1] - limits[0]) * rng.random())
 
 

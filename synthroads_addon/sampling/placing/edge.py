@@ -37,7 +37,7 @@ class Segment(NamedTuple):
 
 
 class EdgeProfile:
-    """Distances (m) from the centreline at stations, linear in between.
+    """Distances (m) of the pavement's edges from the centreline by station, linear in between.
 
     Attributes:
         stations: (K,) m.
@@ -90,29 +90,29 @@ class EdgeProfile:
         return np.where(outside, paved.max(axis=0), line.max(axis=0))
 
     def base_at(self, station: float) -> float:
-        """Return the base of the segment at a station, m."""
+        """Return the base (m) of the segment at a station: where barriers are placed from."""
         return next((s.base for s in self.segments if station <= s.end), self.segments[-1].base)
 
     def _values(self, values: Float, start: float, end: float) -> Float:
-        """Return the values at two stations, and at those between them at which an edge bends."""
+        """Return the values at two stations, and at the profile's own between them."""
         inside = values[(self.stations > start) & (self.stations < end)]
         return np.append(inside, np.interp([start, end], self.stations, values))
 
 
 def ramp_station(shape: TurnoutShape, x: float) -> float:
-    """Return the station at a distance x (m) from the gore's tip, away from the turnout's lane."""
+    """Return the station (m) at a distance x (m) from the gore's tip, away from the turnout's lane."""
     ahead = shape.carriageway.traffic if shape.turnout.kind == "exit" else -shape.carriageway.traffic
     return shape.gore_tip() + ahead * x
 
 
 def island_begin(shape: TurnoutShape, ramp: Ramp, room: float) -> float:
-    """Return the distance x (m) from the gore's tip at which the island becomes so wide (m)."""
+    """Return the distance x (m) from the gore's tip at which the island is ``room`` (m) wide."""
     hard_shoulder = float(width_at(shape.carriageway.hard_shoulder_width, shape.gore_tip()))
     return float((6.0 * ramp.clothoid_parameter**2 * (hard_shoulder + room)) ** (1.0 / 3.0))
 
 
 def _ramp_marks(shape: TurnoutShape, ramp: Ramp) -> tuple[Float, tuple[float, float]]:
-    """Return the stations that follow a ramp's bend, and the range in which its island is wide enough."""
+    """Return the stations (m) that follow a ramp's bend, and the range in which its island is wide enough."""
     leaves = min(max(island_begin(shape, ramp, ISLAND_ROOM), shape.nose + STEP), ramp.length)
     distances = np.concatenate([np.arange(0.0, ramp.length, _RAMP_GRID), [leaves, leaves + STEP]])
     tip, ahead = ramp_station(shape, 0.0), ramp_station(shape, 1.0) - ramp_station(shape, 0.0)
@@ -121,7 +121,7 @@ def _ramp_marks(shape: TurnoutShape, ramp: Ramp) -> tuple[Float, tuple[float, fl
 
 
 def _segments(stations: Float, line: Float, paved: Float) -> list[Segment]:
-    """Return the stretches of one base: where the line runs level, and where it lies farther out than beside both."""
+    """Return the segments, each of one base: where the line runs level, or lies farther out than on both sides."""
     level = np.abs(np.diff(line)) < _LEVEL
     # Where the line leaves a ramp's outer side, the ramp goes on to move away.
     in_island = line < paved - _LEVEL
@@ -142,7 +142,7 @@ def _segments(stations: Float, line: Float, paved: Float) -> list[Segment]:
 
 
 def _join_segments(segments: list[Segment]) -> list[Segment]:
-    """Join neighbours whose bases differ too little for two lines of barriers."""
+    """Return segments with neighbours joined whose bases differ too little for two lines of barriers."""
     joined: list[Segment] = []
     for segment in segments:
         joined.append(segment)
@@ -158,7 +158,7 @@ def _in_line(before: Segment, after: Segment) -> bool:
 
 
 def _raise_short_segments(segments: list[Segment], beside_island: list[float]) -> list[Segment]:
-    """Return the segments, those too short for a barrier between two wider ones at the base of the less wide one.
+    """Return segments, those too short for a barrier between wider ones set out to the less wide one's base.
 
     Beside an island (stations, m) a barrier can't stand farther out: that part of the segment falls away.
     """

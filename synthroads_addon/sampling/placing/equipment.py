@@ -33,7 +33,7 @@ _CABINET_HALF = 1.0  # m
 
 
 def plan_periodic(layout: Layout, rng: np.random.Generator) -> None:
-    """Put pairs, one on either side, of kilometre boards every half kilometre and of emergency phones every 2 km.
+    """Place kilometre boards every half kilometre and emergency phones every 2 km, in pairs on both sides.
 
     The kilometres rise or fall with the stations. Phones keep away from boards: their spacing is a multiple of theirs.
     """
@@ -56,26 +56,26 @@ def plan_periodic(layout: Layout, rng: np.random.Generator) -> None:
 
 
 def put_kilometre_board(roadside: Roadside, station: float, halves: int) -> None:
-    """Put a board that counts half kilometres."""
+    """Place a kilometre board, its text given in half kilometres, at a station of a roadside."""
     fields = {"text": f"{halves // 2},{5 * (halves % 2)}"}
     outer = _gore_is_taken(roadside, station)
     roadside.put(PlacementRequest("kilometre-board", KilometreBoard, station, _HALF, _BOARD_WIDTH, fields, outer=outer))
 
 
 def put_phone(roadside: Roadside, station: float) -> None:
-    """Put an emergency phone."""
+    """Place an emergency phone at a station of a roadside."""
     outer = _gore_is_taken(roadside, station)
     fields = {"kind": "emergency_phone"}
     roadside.put(PlacementRequest("emergency-phone", Cabinet, station, _HALF, _PHONE_WIDTH, fields, outer=outer))
 
 
 def _gore_is_taken(roadside: Roadside, station: float) -> bool:
-    """Return whether what belongs at a station has to stand outside of a ramp: the exit board stands in the gore."""
+    """Return whether what belongs at a station must stand outside of a ramp, as the exit board stands in the gore."""
     return not roadside.near.is_free(station - _HALF, station + _HALF)
 
 
 def plan_traffic_lights(layout: Layout, rng: np.random.Generator) -> None:
-    """Put traffic lights beside entry ramps, on their outer side before the gore."""
+    """Place traffic lights beside entry ramps, at random, on their outer side before the gore."""
     for side, roadside in layout.sides.items():
         for turnout in layout.site.turnouts_of_kind(side, "entry"):
             if rng.random() >= layout.site.scenario.furniture.traffic_lights or turnout.ramp is None:
@@ -89,7 +89,7 @@ def plan_traffic_lights(layout: Layout, rng: np.random.Generator) -> None:
 
 @small_thing("equipment", 20)
 def plan_lighting(layout: Layout, rng: np.random.Generator) -> None:
-    """Put lighting poles all along one side or both; each stands behind a barrier, so none beside turnouts."""
+    """Place lighting poles, at random, all along one side or both, but not beside turnouts."""
     limits = layout.site.scenario.furniture
     if rng.random() >= limits.lighting:
         return
@@ -107,7 +107,7 @@ def plan_lighting(layout: Layout, rng: np.random.Generator) -> None:
 
 @small_thing("equipment", 10)
 def plan_surveillance(layout: Layout, rng: np.random.Generator) -> None:
-    """Put a surveillance pole somewhere beside the road."""
+    """Place at most one surveillance pole, at random, beside the road."""
     limits = layout.site.scenario.furniture
     if rng.random() >= limits.surveillance:
         return
@@ -121,7 +121,7 @@ def plan_surveillance(layout: Layout, rng: np.random.Generator) -> None:
 
 @small_thing("equipment", 30)
 def plan_cabinets(layout: Layout, rng: np.random.Generator) -> None:
-    """Put utility cabinets at random stations, as many per km as drawn."""
+    """Place utility cabinets at random stations, as many per km as drawn."""
     sides = list(layout.sides.values())
     number = draw(rng, layout.site.scenario.furniture.cabinets_per_km) * layout.length / 1000.0
     for _ in range(int(number + rng.random())):

@@ -56,7 +56,7 @@ def place_furniture(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
 
 
 def _plan_fixed(layout: Layout, streams: Streams) -> None:
-    """Plan what has its station by a rule."""
+    """Place what has its station by a rule: gore signs, kilometre boards, phones, exit signs."""
     signs = layout.site.scenario.furniture.signs
     if signs:
         plan_gore_signs(layout)
@@ -66,7 +66,7 @@ def _plan_fixed(layout: Layout, streams: Streams) -> None:
 
 
 def _fronts_by_rules(layout: Layout, streams: Streams) -> Iterator[tuple[str, RoadObject]]:
-    """Yield barriers and delineators."""
+    """Yield (id, object) of barriers and delineators by the safety rules."""
     yield from median_barriers(layout, streams["barriers"])
     for roadside in layout.sides.values():
         yield from roadside_barriers(layout, roadside, streams["barriers"])
@@ -77,7 +77,7 @@ def _fronts_by_rules(layout: Layout, streams: Streams) -> Iterator[tuple[str, Ro
 
 
 def _fronts_at_random(layout: Layout, streams: Streams) -> Iterator[tuple[str, RoadObject]]:
-    """Yield barriers and delineators."""
+    """Yield (id, object) of barriers and delineators at random."""
     yield from random_median_barrier(layout, streams["barriers"])
     for roadside in layout.sides.values():
         yield from random_front(layout, roadside, streams["barriers"])
@@ -86,7 +86,7 @@ def _fronts_at_random(layout: Layout, streams: Streams) -> Iterator[tuple[str, R
 def _behind(
     layout: Layout, streams: Streams, planned: list[GantryPlan], bridge: OverpassPlan | None
 ) -> Iterator[tuple[str, RoadObject]]:
-    """Yield what stands behind the barriers."""
+    """Yield (id, object) of what stands behind the barriers: requests, median signs, gantries, overpass."""
     for roadside in layout.sides.values():
         yield from roadside.objects()
     yield from median_signs(layout)

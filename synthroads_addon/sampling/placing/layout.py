@@ -52,7 +52,7 @@ class BarrierPiece(NamedTuple):
 
 @dataclass(frozen=True)
 class PlacementRequest:
-    """A thing of the small zone whose distance isn't known yet.
+    """A requested thing of the small zone, whose distance from the road is known once the barriers stand.
 
     Attributes:
         name: first part of its id.
@@ -80,7 +80,7 @@ class PlacementRequest:
 
 
 class Roadside:
-    """The outer side of one carriageway while it is furnished.
+    """The outer side of one carriageway while it is furnished: what is reserved, requested and built.
 
     Attributes:
         side, sign, traffic: as in `Carriageway`.
@@ -122,11 +122,11 @@ class Roadside:
         return station + self.traffic * distance
 
     def protect(self, start: float, end: float) -> None:
-        """Ask for a barrier before an obstacle that stands between two stations."""
+        """Ask for a barrier before an obstacle that stands between two stations (m)."""
         self.protected.append(self._barrier_stretch(start, end))
 
     def put(self, request: PlacementRequest) -> None:
-        """Put a thing into the small zone, and ask for its barrier."""
+        """Request a thing: reserve its stretch of the small zone, and ask for a barrier if it is an obstacle."""
         low, high = request.station - request.half, request.station + request.half
         self.near.add(low, high)
         if request.obstacle:
@@ -134,7 +134,7 @@ class Roadside:
         self.requests.append(request)
 
     def front(self, start: float, end: float, depth: float, outer: bool = False) -> float:
-        """Return the distance (m) from which zones are counted between two stations.
+        """Return the distance (m) from the centreline from which zones are counted between two stations.
 
         It is the largest of the paved edge and of the barriers' bases; beside an island that is deep enough (m) for the
         thing, the main road's.
@@ -148,13 +148,13 @@ class Roadside:
         return max(self.edge.largest_paved(start, end), *(p.base for p in near), 0.0)
 
     def front_of_obstacle(self, start: float, end: float, depth: float) -> float:
-        """Return the distance (m) from which zones are counted for an obstacle: behind all of the barrier before it."""
+        """Return `front` (m) for an obstacle: behind all of the barrier before it."""
         first, last = self._barrier_stretch(start, end)
         along = [p.base for p in self.pieces if p.start < last and p.end > first and not p.ramp]
         return max(self.front(start, end, depth), *along, 0.0)
 
     def objects(self) -> Iterator[tuple[str, PointObject]]:
-        """Yield (id, object) of the requests in the order of their stations."""
+        """Yield (id, object) of the requested things in the order of their stations, with instance 1."""
         counts: Counter[str] = Counter()
         for request in sorted(self.requests, key=lambda item: item.station):
             counts[request.name] += 1
@@ -173,14 +173,14 @@ class Roadside:
         return front + SMALL_ZONE + request.width / 2.0 + request.shift
 
     def _barrier_stretch(self, start: float, end: float) -> Range:
-        """Return the stretch of the barrier before an obstacle that stands between two stations."""
+        """Return the stretch (m) of the barrier before an obstacle that stands between two stations."""
         lead, tail = OBSTACLE_LEAD + _MARGIN, OBSTACLE_TAIL + _MARGIN
         return (start - lead, end + tail) if self.traffic > 0 else (start - tail, end + lead)
 
 
 @dataclass
 class MedianStrip:
-    """The median while it is furnished.
+    """The median while it is furnished: what is reserved and which signs stand in it.
 
     Attributes:
         inner: distances of the carriageways' inner edges from the centreline by side, the smallest along the road, m.
@@ -206,7 +206,7 @@ class MedianStrip:
 
 
 class Layout:
-    """A road while it is furnished.
+    """A road while it is furnished: both outer sides and the median.
 
     Attributes:
         site: the road.
@@ -221,7 +221,7 @@ class Layout:
         self.median = MedianStrip({side: least_width(c.inner_offset) for side, c in site.carriageways.items()})
 
     def reserve(self, low: float, high: float, sides: Iterable[Side], zones: Iterable[str], in_median: bool) -> None:
-        """Take a stretch for an obstacle, and ask for barriers before it.
+        """Reserve a stretch for an obstacle, and ask for barriers before it.
 
         Args:
             low, high: stations, m.
@@ -239,7 +239,7 @@ class Layout:
 
     @cached_property
     def tight_arcs(self) -> list[tuple[float, float, float]]:
-        """Start and end (m) and curvature (1/m) of the arcs that are tight for the design class."""
+        """Return start and end (m) and curvature (1/m) of the arcs that are tight for the design class."""
         arcs, start, tight = [], 0.0, 1.0 / (TIGHT_CURVE * self.site.limits.radius)
         for element in self.site.alignment.horizontal:
             if element.kind == "arc" and abs(element.curvature_start) > tight:

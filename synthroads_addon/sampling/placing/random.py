@@ -33,7 +33,7 @@ _DELINEATOR_HALF = 0.5  # m
 
 
 def plan_random_signs(layout: Layout, rng: np.random.Generator) -> None:
-    """Put signs of any kind."""
+    """Place signs of any kind at random stations and distances."""
     codes = list(sign_catalogue().signs)
     for roadside in layout.sides.values():
         for _ in range(_count(SIGNS_PER_KM, layout, rng)):
@@ -42,7 +42,7 @@ def plan_random_signs(layout: Layout, rng: np.random.Generator) -> None:
 
 
 def plan_random_equipment(layout: Layout, rng: np.random.Generator) -> None:
-    """Put kilometre boards of any kilometre, emergency phones and traffic lights."""
+    """Place kilometre boards of any kilometre, emergency phones and traffic lights at random stations."""
     furniture = layout.site.scenario.furniture
     for roadside in layout.sides.values():
         for station in _stations(roadside, BOARDS_PER_KM if furniture.kilometre_boards else 0.0, layout, rng):
@@ -56,7 +56,7 @@ def plan_random_equipment(layout: Layout, rng: np.random.Generator) -> None:
 
 
 def random_median_barrier(layout: Layout, rng: np.random.Generator) -> Iterator[tuple[str, LineObject]]:
-    """Yield a barrier somewhere in the median, where that is wide enough."""
+    """Yield (id, barrier) of at most one guardrail somewhere in the median, where that is wide enough."""
     limits, median = layout.site.scenario.barriers, layout.median
     system = BarrierSystem.draw(rng, limits, limits.concrete_median)
     room = median.half_width - BARRIER_AXIS
@@ -69,7 +69,7 @@ def random_median_barrier(layout: Layout, rng: np.random.Generator) -> Iterator[
 def random_front(
     layout: Layout, roadside: Roadside, rng: np.random.Generator
 ) -> Iterator[tuple[str, LineObject | Delineator]]:
-    """Yield the barriers and delineators of one side."""
+    """Yield (id, object) of one side's barriers and delineators at random stations and distances."""
     limits, taken = layout.site.scenario.barriers, Reservations()
     system = BarrierSystem.draw(rng, limits, limits.concrete_roadside)
     for _ in range(_count(BARRIERS_PER_KM, layout, rng) if limits.roadside else 0):
@@ -101,7 +101,7 @@ def _delineators(
 
 
 def _stations(roadside: Roadside, per_km: float, layout: Layout, rng: np.random.Generator) -> Iterator[float]:
-    """Yield stations at which a small thing has room; each must be taken before the next."""
+    """Yield random stations (m) at which a small thing has room; each must be taken before the next is asked for."""
     for _ in range(_count(per_km, layout, rng)):
         start = draw_start(rng, free_ranges(0.0, layout.length, roadside.near), 2.0 * _HALF)
         if start is not None:

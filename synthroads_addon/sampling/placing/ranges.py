@@ -10,17 +10,17 @@ Range = tuple[float, float]
 
 
 class Reservations:
-    """Stretches that are taken; they may overlap."""
+    """Stretches of road that are taken; they may overlap."""
 
     def __init__(self, stretches: Iterable[Range] = ()) -> None:
         self.stretches = list(stretches)
 
     def add(self, start: float, end: float) -> None:
-        """Take a stretch."""
+        """Take the stretch between two stations."""
         self.stretches.append((start, end))
 
     def within(self, start: float, end: float) -> list[Range]:
-        """Return what is taken between two stations; the outermost may reach beyond them, what only touches doesn't."""
+        """Return the taken stretches that overlap the one between two stations; what only touches it is left out."""
         return [(low, high) for low, high in self.stretches if high > start and low < end]
 
     def is_free(self, start: float, end: float) -> bool:
@@ -29,7 +29,7 @@ class Reservations:
 
 
 def free_ranges(low: float, high: float, *taken: Reservations) -> list[Range]:
-    """Return the parts of low to high (m) that none has taken, in order."""
+    """Return the parts of the stretch from low to high (m) that none has taken, in order."""
     free, reached = [], low
     for start, end in sorted(stretch for item in taken for stretch in item.within(low, high)):
         if start > reached:
@@ -41,7 +41,7 @@ def free_ranges(low: float, high: float, *taken: Reservations) -> list[Range]:
 
 
 def draw_start(rng: np.random.Generator, ranges: list[Range], length: float) -> float | None:
-    """Return where a thing of a length (m) begins, anywhere in the ranges with the same chance; None without room."""
+    """Return a drawn start (m) of a thing of a length (m) that fits in one of the ranges; None without room."""
     rooms = [(start, end - start - length) for start, end in ranges if end - start >= length]
     if not rooms:
         return None
@@ -54,7 +54,7 @@ def draw_start(rng: np.random.Generator, ranges: list[Range], length: float) -> 
 
 
 def draw_stretch(rng: np.random.Generator, ranges: list[Range], least: float, most: float = math.inf) -> Range | None:
-    """Return a stretch in the ranges of a length from the least to the most (m) that has room; None without room."""
+    """Return a drawn stretch in the ranges, of a length from the least to the most (m); None without room."""
     longest = min(most, max((end - start for start, end in ranges), default=0.0))
     length = least + max(0.0, longest - least) * rng.random()
     start = draw_start(rng, ranges, length)
@@ -62,7 +62,7 @@ def draw_stretch(rng: np.random.Generator, ranges: list[Range], least: float, mo
 
 
 def nearest_free(station: float, half: float, room: float, length: float, *taken: Reservations) -> float | None:
-    """Return the nearest station at which a thing fits between what is taken, or None.
+    """Return the station (m) nearest to the wanted one at which a thing fits between what is taken, or None.
 
     Args:
         station: where it should stand, m.
@@ -83,7 +83,7 @@ def nearest_free(station: float, half: float, room: float, length: float, *taken
 
 
 def merge_ranges(ranges: Iterable[Range], gap: float) -> list[Range]:
-    """Return the ranges in order, those joined that overlap or lie less than a gap (m) apart."""
+    """Return the ranges sorted, those joined that overlap or lie less than a gap (m) apart."""
     merged: list[Range] = []
     for start, end in sorted(ranges):
         if merged and start - merged[-1][1] < gap:
@@ -94,7 +94,7 @@ def merge_ranges(ranges: Iterable[Range], gap: float) -> list[Range]:
 
 
 def lengthen_range(start: float, end: float, least: float, low: float, high: float) -> Range:
-    """Return a range made at least so long to both sides, as far as low and high (all m) allow."""
+    """Return a range lengthened to both sides to at least ``least``, as far as low and high (all m) allow."""
     lack = max(0.0, least - (end - start))
     start = max(low, start - lack / 2.0)
     end = min(high, max(end, start + least))

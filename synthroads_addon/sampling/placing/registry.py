@@ -16,7 +16,7 @@ _LAST = 1000
 
 
 class SmallThing(NamedTuple):
-    """Plan of small things, which the layout builds once the barriers stand.
+    """Registered plan of small things, which the layout builds once the barriers stand.
 
     Attributes:
         order, stream: its place among the plans, and the name of its random numbers; plans of one name share them.
@@ -32,7 +32,7 @@ _PLANS: list[SmallThing] = []
 
 
 def small_thing(stream: str, order: int = _LAST) -> Callable[[Plan], Plan]:
-    """Register a plan of small things, by the safety rules and at random alike.
+    """Return a decorator that registers a plan of small things, by the safety rules and at random alike.
 
     Args:
         stream: name of its random numbers; one of its own, so that no other thing changes with it.
@@ -48,7 +48,7 @@ def small_thing(stream: str, order: int = _LAST) -> Callable[[Plan], Plan]:
 
 @cache
 def small_things() -> tuple[SmallThing, ...]:
-    """Return all plans in their order."""
+    """Return all registered plans of small things in their order, their files imported once."""
     for file in iter_modules(import_module(__package__).__path__):
         import_module(f"{__package__}.{file.name}")
     return tuple(sorted(_PLANS, key=lambda item: item[:2]))

@@ -36,7 +36,7 @@ _NARROWEST_GORE_SIGN = 0.1  # m
 
 
 def plan_gore_signs(layout: Layout) -> None:
-    """Put the exit boards onto the islands behind the noses, on thin posts, smaller where there is little room."""
+    """Place the exit boards onto the islands behind the noses, on thin posts, smaller where there is little room."""
     sign = sign_catalogue().signs[GORE_SIGN]
     for side, roadside in layout.sides.items():
         section = layout.site.sections[side]
@@ -55,7 +55,7 @@ def plan_gore_signs(layout: Layout) -> None:
 
 
 def plan_exit_signs(layout: Layout, rng: np.random.Generator) -> None:
-    """Put the signs that announce exits; those that fall before the road's begin are left out."""
+    """Place the signs that announce exits; those that fall before the road's begin are left out."""
     for side, roadside in layout.sides.items():
         for turnout in layout.site.turnouts_of_kind(side, "exit"):
             number, names = str(rng.integers(1, 100)), _names(rng, 3)
@@ -66,7 +66,7 @@ def plan_exit_signs(layout: Layout, rng: np.random.Generator) -> None:
 
 
 def plan_other_signs(layout: Layout, rng: np.random.Generator, zones: dict[Side, Range]) -> None:
-    """Put all other signs.
+    """Place all other signs: speed limits, and those behind entries and before curves and construction zones.
 
     Args:
         layout: what stands already.
@@ -90,7 +90,7 @@ def plan_other_signs(layout: Layout, rng: np.random.Generator, zones: dict[Side,
 def place_sign(
     roadside: Roadside, code: str, station: float, room: float, values: dict[str, str] | None = None, shift: float = 0.0
 ) -> bool:
-    """Put a sign as near as possible to a station; return whether there is room for it.
+    """Request a sign as near as possible to a station; return whether there is room for it.
 
     Args:
         roadside: where.
@@ -118,7 +118,7 @@ def place_sign(
 
 
 def place_sign_on_both_sides(layout: Layout, roadside: Roadside, code: str, station: float) -> None:
-    """Put a sign to the right of a carriageway, and one into the median where that has room for it."""
+    """Place a sign to the right of a carriageway, and one into the median where that has room for it."""
     if not place_sign(roadside, code, station, _ROOM):
         return
     sign, median = sign_catalogue().signs[code], layout.median
@@ -138,7 +138,7 @@ def place_sign_on_both_sides(layout: Layout, roadside: Roadside, code: str, stat
 
 
 def destination_values(rng: np.random.Generator) -> dict[str, str]:
-    """Return what is filled into the texts of boards: a number, names, and names with growing distances."""
+    """Return drawn values for the texts of boards: a number, a name, and names with growing distances."""
     names = _names(rng, 4)
     distances = np.cumsum(rng.integers(3, 60, 3)).tolist()
     near, middle, far = (f"{name} {distance} km" for name, distance in zip(names[1:], distances, strict=True))
@@ -152,7 +152,7 @@ def median_signs(layout: Layout) -> Iterator[tuple[str, TrafficSign]]:
 
 
 def _gore_station(shape: TurnoutShape, width: float) -> float:
-    """Return where the island is wide enough for a sign (m), or else the last station on it."""
+    """Return the station (m) at which the island is wide enough for a sign, or else the last one on it."""
     ramp = shape.turnout.ramp
     assert ramp is not None
     wide_enough = island_begin(shape, ramp, width + 2.0 * (SIGN_DISTANCE + _GORE_MARGIN))
@@ -176,7 +176,7 @@ def _announce_construction(layout: Layout, roadside: Roadside, zone: Range) -> N
 
 
 def _curve_signs(layout: Layout, roadside: Roadside) -> Iterator[tuple[str, float]]:
-    """Yield code and station of the danger signs before tight curves."""
+    """Yield code and station (m) of the danger signs before tight curves, in the direction of traffic."""
     ahead = roadside.traffic
     arcs = sorted((*sorted((ahead * start, ahead * end)), ahead * bend > 0.0) for start, end, bend in layout.tight_arcs)
     announced = -np.inf

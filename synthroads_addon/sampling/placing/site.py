@@ -19,7 +19,7 @@ from ...scenario.road import RoadScenario
 
 @dataclass(frozen=True)
 class PlacementSite:
-    """A road without its furniture.
+    """A sampled road without its furniture: what the placement needs to know of it.
 
     Attributes:
         scenario, seed: limits, and the seed of everything drawn.
@@ -37,27 +37,27 @@ class PlacementSite:
 
     @cached_property
     def sections(self) -> dict[Side, CarriagewaySection]:
-        """Cross-sections of the carriageways by side."""
+        """Return the cross-sections of the carriageways by side."""
         sides = self.carriageways.items()
         return {side: CarriagewaySection(road, self.turnouts_of(side).values()) for side, road in sides}
 
     @cached_property
     def length(self) -> float:
-        """Length of the centreline, m."""
+        """Return the length of the centreline, m."""
         return self.alignment.length
 
     @property
     def design_class(self) -> str:
-        """Design class of the RAA."""
+        """Return the name of the design class of the RAA."""
         return self.scenario.design_class
 
     @property
     def limits(self) -> DesignLimits:
-        """Limits of the design class."""
+        """Return the limits of the design class."""
         return LIMITS[self.scenario.design_class]
 
     def stream(self, *purpose: str | int) -> np.random.Generator:
-        """Return the random stream of a purpose."""
+        """Return the random generator of a purpose, keyed by the road's seed."""
         return stream(self.seed, *purpose)
 
     def turnouts_of(self, side: Side) -> dict[str, Turnout]:
@@ -74,6 +74,6 @@ class PlacementSite:
         return next(shape for shape in shapes if shape.turnout is turnout)
 
     def begin(self, turnout: Turnout) -> float:
-        """Return the station at which traffic meets a turnout first."""
+        """Return the station (m) at which traffic meets a turnout first."""
         ahead = self.shape(turnout).carriageway.traffic > 0
         return turnout.start_station if ahead else turnout.end_station

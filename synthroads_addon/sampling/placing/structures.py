@@ -67,7 +67,7 @@ class GantryPlan:
 
 
 def plan_gantries(layout: Layout, rng: np.random.Generator) -> list[GantryPlan]:
-    """Return the gantries: all along at a spacing where one is given, else one or none."""
+    """Return drawn gantries, their places reserved: all along at a given spacing, else one or none."""
     limits = layout.site.scenario.furniture
     spacing = limits.gantry_spacing
     if spacing is not None:
@@ -83,7 +83,7 @@ def plan_gantries(layout: Layout, rng: np.random.Generator) -> list[GantryPlan]:
 
 
 def gantries(layout: Layout, plans: list[GantryPlan], rng: np.random.Generator) -> Iterator[tuple[str, Gantry]]:
-    """Yield (id, gantry) of planned gantries."""
+    """Yield (id, gantry) of planned gantries, with their signs and instance 1."""
     limits = layout.site.scenario.furniture
     for number, plan in enumerate(plans, start=1):
         beam, height, depth = pick(rng, BEAMS)
@@ -114,7 +114,7 @@ def gantries(layout: Layout, plans: list[GantryPlan], rng: np.random.Generator) 
 
 
 def _kind(layout: Layout, rng: np.random.Generator) -> tuple[Kind, tuple[Side, ...]]:
-    """Return a kind that the road has room for, and the carriageways that it spans."""
+    """Return a drawn kind of gantry that the road has room for, and the carriageways that it spans."""
     sides: tuple[Side, ...] = tuple(layout.sides)
     kinds: tuple[Kind, ...] = ("cantilever", "one_sided", "two_sided")
     if layout.median.obstacle_half < LEAST_POST_WIDTH:
@@ -124,7 +124,7 @@ def _kind(layout: Layout, rng: np.random.Generator) -> tuple[Kind, tuple[Side, .
 
 
 def _in_the_way(layout: Layout, kind: Kind, sides: tuple[Side, ...]) -> list[Reservations]:
-    """Return what a gantry has to keep clear of."""
+    """Return the reservations that a gantry has to keep clear of."""
     obstacles = [] if kind == "cantilever" else [layout.median.taken]
     for roadside in (layout.sides[side] for side in sides):
         obstacles += [roadside.near, roadside.crossed, roadside.restless]
@@ -155,7 +155,7 @@ def _reach(layout: Layout, plan: GantryPlan, roadside: Roadside, post: float) ->
 
 
 def _lanes(layout: Layout, plan: GantryPlan, side: Side) -> list[tuple[float, float]]:
-    """Return the inner and outer distances (m) of a carriageway's lanes, outermost first."""
+    """Return the inner and outer distances (m) of a carriageway's lanes, outermost first, without very narrow ones."""
     boundaries = layout.site.sections[side].lane_boundaries(plan.station)[0].tolist()
     lanes = list(zip(boundaries[1:], boundaries[:-1], strict=True))
     return [lane for lane in lanes if lane[1] - lane[0] >= _NARROWEST_LANE] or lanes
@@ -164,7 +164,7 @@ def _lanes(layout: Layout, plan: GantryPlan, side: Side) -> list[tuple[float, fl
 def _signs(
     layout: Layout, plan: GantryPlan, side: Side, reach: tuple[float, float], displays: bool, rng: np.random.Generator
 ) -> Iterator[GantrySign]:
-    """Yield a display or a destination sign over each lane below the beam."""
+    """Yield a drawn display or destination sign over each lane below the beam."""
     names = sign_catalogue().destinations
     for inner, outer in _lanes(layout, plan, side):
         if inner < reach[0]:
@@ -202,12 +202,12 @@ class OverpassPlan:
 
     @property
     def corner(self) -> float:
-        """Return how much nearer to the road than its middle a corner of an abutment square to the deck stands, m."""
+        """Return how much nearer to the road than its middle an abutment's corner, square to the deck, stands, m."""
         return self.width / 2.0 * abs(sin(radians(self.skew)))
 
 
 def plan_overpass(layout: Layout, rng: np.random.Generator) -> OverpassPlan | None:
-    """Return the overpass, if the road gets one and has room, its stretch reserved and barriers asked for."""
+    """Return a drawn overpass, its stretch reserved and barriers asked for; None where there is none, or no room."""
     limits = layout.site.scenario.furniture
     if rng.random() >= limits.overpass:
         return None
@@ -232,7 +232,7 @@ def plan_overpass(layout: Layout, rng: np.random.Generator) -> OverpassPlan | No
 
 
 def overpass(layout: Layout, plan: OverpassPlan, rng: np.random.Generator) -> Overpass:
-    """Return a planned overpass: its piers behind the barriers, its abutments behind verge and piers."""
+    """Return a planned overpass as an object: piers behind the barriers, abutments behind verge and piers."""
     offsets, abutments = [0.0] if plan.in_median else [], {"left": 5.0, "right": -5.0}
     span = pick(rng, ABUTMENT_SPANS)
     low, high = plan.station - plan.half, plan.station + plan.half
