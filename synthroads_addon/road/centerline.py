@@ -40,10 +40,11 @@ def read_axis(path: str | os.PathLike[str]) -> Float:
     name = os.fspath(path)
     kind = "this is no text: CSV with columns x, y, z or GeoJSON is needed"
     text = read_text(name, kind, "an axis file is needed here", encoding="utf-8-sig")
-    rows = _read_json(name, text) if text.lstrip().startswith(("{", "[")) else _read_csv(name, text)
+    rows, system = _read_json(name, text) if text.lstrip().startswith(("{", "[")) else (_read_csv(name, text), "")
     points = np.array(rows, dtype=np.float64).reshape(-1, 3)
     if len(np.unique(points[:, :2], axis=0)) < 2:
         raise InputError(name, None, f"{_TWO}, the file has {len(points)} points in all")
+    _refuse_degrees(name, system, points)
     _check_spacing(name, points)
     return points
 
@@ -143,7 +144,8 @@ def _point(place: str, entries: list[object]) -> tuple[float, float, float]:
     return values[0], values[1], values[2] if len(values) > 2 else 0.0
 
 
-def _read_json(name: str, text: str) -> list[tuple[float, float, float]]:
+def _read_json(name: str, text: str) -> tuple[list[tuple[float, float, float]], str]:
+    """Return the points of a GeoJSON document's one LineString, and the text of its member `crs`, empty without."""
     try:
         document = json.loads(text)
     except json.JSONDecodeError as error:
@@ -162,8 +164,7 @@ def _read_json(name: str, text: str) -> list[tuple[float, float, float]]:
         if not isinstance(position, list) or len(position) < 2:
             raise InputError(place, position, "a list of two or three numbers is needed")
         rows.append(_point(place, position))
-    _refuse_degrees(name, document, rows)
-    return rows
+    return rows, json.dumps(document.get("crs")) if document.get("crs") else ""
 
 
 def _line_strings(name: str, node: object) -> Iterator[dict[str, Any]]:
@@ -184,15 +185,14 @@ def _line_strings(name: str, node: object) -> Iterator[dict[str, Any]]:
         raise InputError(f"{name} type", kind, "GeoJSON with a LineString is needed")
 
 
-def _refuse_degrees(name: str, document: dict[str, Any], rows: list[tuple[float, float, float]]) -> None:
-    """Raise InputError for geographic coordinates, told by the member `crs` or, without it, by size and extent."""
-    system = json.dumps(document.get("crs")) if document.get("crs") else ""
+def _refuse_degrees(name: str, system: str, points: Float) -> None:
+    """Raise InputError for longitudes and latitudes, told by a file's `crs` or, without it, by size and extent."""
     named = any(word in system for word in ("CRS84", "4326", "4258"))
-    plan = np.array(rows).reshape(-1, 3)[:, :2]
-    seems = len(plan) > 0 and bool((np.abs(plan) <= (180.0, 90.0)).all()) and np.ptp(plan, axis=0).max() < 2.0
+    plan = points[:, :2]
+    seems = bool((np.abs(plan) <= (180.0, 90.0)).all()) and np.ptp(plan, axis=0).max() < 2.0
     if named or (not system and seems):
-        first = list(rows[0][:2]) if rows else None
-        raise InputError(f"{name} coordinates", first, "metres of a projected system are needed, not degrees")
+        allowed = "metres of a projected system are needed, not degrees"
+        raise InputError(f"{name} coordinates", plan[0].tolist(), allowed)
 
 
 def centerline_geojson(geometry: RoadGeometry, stations: Float) -> dict[str, Any]:

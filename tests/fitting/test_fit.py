@@ -545,6 +545,7 @@ def geojson(coordinates: object, kind: str = "LineString", **more: object) -> st
         (geojson([[300, 0], [300]]), r"axis\.csv coordinates\[1\] is \[300\]: a list of two or three"),
         (geojson([[300, 0], 5]), r"axis\.csv coordinates\[1\] is 5"),
         (geojson([[6.1, 50.7], [6.2, 50.8]]), r"axis\.csv coordinates .*metres of a projected system"),
+        ("x,y\n6.1,50.7\n6.2,50.8\n", r"axis\.csv coordinates is \[6\.1, 50\.7\]: metres of a projected system"),
         (geojson([[0, 0], [90, 9]], crs={"properties": {"name": "EPSG:4326"}}), r"metres of a projected system"),
     ],
 )
