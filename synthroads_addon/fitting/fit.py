@@ -289,7 +289,7 @@ def _fit_windows(data: AxisData, run: Float, tolerance: float) -> tuple[Chain, F
         end = max(end, min(first + 8, len(run)))
         every = -(-(end - first) // _MOST_POINTS)
         chosen = np.unique(np.append(np.arange(first, end, every), end - 1))
-        fit = _solve(data, chosen, start, origin, float(run[end - 1] - run[first]), tolerance)
+        fit = _fit_window(data, chosen, start, origin, float(run[end - 1] - run[first]), tolerance)
         station[first:end] = origin + np.interp(np.arange(first, end), chosen, fit.stations)
         if end == len(run):
             return _join_pieces([*pieces, fit.chain]), station
@@ -299,7 +299,7 @@ def _fit_windows(data: AxisData, run: Float, tolerance: float) -> tuple[Chain, F
         first, origin = int(chosen[np.argmax(fit.stations >= cut)]), origin + cut
 
 
-def _solve(
+def _fit_window(
     data: AxisData, chosen: Int, start: Start | None, origin: float, length: float, tolerance: float
 ) -> ChainFit:
     """Return the fit of one window: as exact data if they are, else with knots as dense as the tolerance needs."""

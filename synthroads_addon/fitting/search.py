@@ -1,7 +1,7 @@
 """Which elements an axis is made of: knots and kinds of a chain, found by trying, scored, and refined at every step.
 
 Starting from more knots than needed, `search` takes away what the data can spare (a knot; the freedom of an element to
-be no arc, or no line), first with the knots where they are, then with knots that move. What a removal costs is foreseen
+be no arc, or no line), first with the knots where they are, then with knots that move. Costs of a removal are predicted
 by the linearised problem, in which all other parameters give way, and then measured by a refinement. From the best
 chain found on the way down it goes on in both directions until nothing helps.
 
@@ -133,7 +133,7 @@ def _interpolation(chain: Chain, keep: list[int]) -> tuple[Float, Float]:
     return weights, shifts
 
 
-def _lift(chain: Chain, new: Chain, keep: list[int]) -> Float:
+def _lift_matrix(chain: Chain, new: Chain, keep: list[int]) -> Float:
     """Return the matrix that gives all parameters of the chain from those of the edited one."""
     weights, shifts = _interpolation(chain, keep)
     inner = [i for i in keep if 0 < i < chain.size]
@@ -146,11 +146,11 @@ def _lift(chain: Chain, new: Chain, keep: list[int]) -> Float:
     return lift
 
 
-def foresee(fit: ChainFit, edits: Sequence[Edit], free_knots: bool, goal: Goal) -> tuple[Chain, float]:
+def predict_edits(fit: ChainFit, edits: Sequence[Edit], free_knots: bool, goal: Goal) -> tuple[Chain, float]:
     """Return the edited chain at the optimum of the linearised problem, and the sum of squares expected there."""
     new, keep = apply_edits(fit.chain, edits)
     new = new.tie_values()
-    basis, lift = new.basis(free_knots), _lift(fit.chain, new, keep)
+    basis, lift = new.basis(free_knots), _lift_matrix(fit.chain, new, keep)
     start = np.zeros(len(lift))  # the jump to the new chain's values
     values = fit.chain.value_columns
     start[values] = lift[values, new.value_columns] @ new.values - fit.chain.values
@@ -258,7 +258,7 @@ def simplify_fit(fit: ChainFit, free_knots: bool, goal: Goal) -> ChainFit | None
     batch = _disjoint_edits(ways, max(1, fit.chain.size // 3), 0.5 * np.log(goal.count))
     present = goal.score(fit)
     while len(batch) > 1:
-        chain, _ = foresee(fit, [edit for _, edit in batch], free_knots, goal)
+        chain, _ = predict_edits(fit, [edit for _, edit in batch], free_knots, goal)
         trial = refine(fit.data, chain, fit.stations, free_knots, _STEPS)
         if goal.score(trial) - present <= 0.5 * math.fsum(change for change, _ in batch):
             return trial
@@ -273,10 +273,10 @@ def simplify_fit(fit: ChainFit, free_knots: bool, goal: Goal) -> ChainFit | None
 
 def _trials(fit: ChainFit, edits: list[Edit], free_knots: bool, goal: Goal) -> Iterator[ChainFit]:
     """Yield the refined fits of the edits that are expected to score best, in that order."""
-    foreseen = [foresee(fit, [edit], free_knots, goal) for edit in edits]
-    scores = [goal.expected_score(square, chain, len(fit.residuals)) for chain, square in foreseen]
+    predicted = [predict_edits(fit, [edit], free_knots, goal) for edit in edits]
+    scores = [goal.expected_score(square, chain, len(fit.residuals)) for chain, square in predicted]
     for i in np.argsort(scores, kind="stable")[:_TRIALS]:
-        yield refine(fit.data, foreseen[i][0], fit.stations, free_knots, _STEPS)
+        yield refine(fit.data, predicted[i][0], fit.stations, free_knots, _STEPS)
 
 
 def descent(fit: ChainFit, goal: Goal) -> list[ChainFit]:
@@ -315,11 +315,11 @@ def split_chains(fit: ChainFit) -> list[Chain]:
         freed[e] = FREE
         ends = [] if kind == FREE else list(full[:, chain.value_columns][:, e : e + 2].T)
         if ends:
-            ways.append((_gain(ends, q, rest), replace(chain, kinds=freed)))
+            ways.append((_square_gain(ends, q, rest), replace(chain, kinds=freed)))
         for knot in fine[e * _PARTS + 1 : (e + 1) * _PARTS]:
             if min(knot - chain.knots[e], chain.knots[e + 1] - knot) >= data.least:
                 hat = hats @ np.interp(fine, [chain.knots[e], knot, chain.knots[e + 1]], [0.0, 1.0, 0.0])
-                ways.append((_gain([hat, *ends], q, rest), _split_element(chain, freed, e, knot)))
+                ways.append((_square_gain([hat, *ends], q, rest), _split_element(chain, freed, e, knot)))
     return [new for _, new in sorted(ways, key=lambda way: -way[0])]
 
 
@@ -329,7 +329,7 @@ def _split_element(chain: Chain, freed: Int, e: int, knot: float) -> Chain:
     return replace(chain, knots=np.insert(chain.knots, e + 1, knot), values=values, kinds=np.insert(freed, e, FREE))
 
 
-def _gain(columns: list[Float], q: Float, rest: Float) -> float:
+def _square_gain(columns: list[Float], q: Float, rest: Float) -> float:
     """Return by how much (m^2) new columns, beside the old ones q, would lower the sum of squares."""
     new = np.stack(columns, axis=1)
     new = new - q @ (q.T @ new)

@@ -134,7 +134,7 @@ class Alignment:
         heading = headings[owner] + lengths[owner] * middle * (k_start[owner] + 0.5 * middle * k_change[owner])
         bend = k_start[owner] + middle * k_change[owner]
         slope = k_change[owner] / lengths[owner]
-        series = _series(bend * half, slope * half**2) * (half * np.exp(1j * heading))
+        series = _position_series(bend * half, slope * half**2) * (half * np.exp(1j * heading))
         odd = 2.0 * series[1::2].sum(axis=0)  # from one end of the piece to the other
         start = np.concatenate(([0.0], np.cumsum(odd)))
         series[0] = start[:-1] - (series[2::2].sum(axis=0) - series[1::2].sum(axis=0))
@@ -222,7 +222,7 @@ class Alignment:
         if places.ndim != 2 or places.shape[1] != 2:
             raise InputError("points", places.shape, "an array of shape (N, 2) is needed")
         station, offset = np.empty(len(places)), np.empty(len(places))
-        for chosen, x, y, nodes in self._leaves(places[:, 0] - self.x, places[:, 1] - self.y):
+        for chosen, x, y, nodes in self._point_groups(places[:, 0] - self.x, places[:, 1] - self.y):
             station[chosen], offset[chosen] = self._project_leaf(x, y, nodes)
         return station, offset
 
@@ -239,7 +239,7 @@ class Alignment:
         foot, _, offset = self._find_feet(x, y, guess, guess - reach, guess + reach)
         return foot, offset
 
-    def _leaves(self, x: Float, y: Float) -> Iterator[tuple[Int, Float, Float, Int]]:
+    def _point_groups(self, x: Float, y: Float) -> Iterator[tuple[Int, Float, Float, Int]]:
         """Yield compact groups of the points: indices, x, y, and the indices of all nodes that may be nearest to them.
 
         Points in any order thus fall into compact boxes, and each box meets only the nodes around it.
@@ -281,10 +281,10 @@ class Alignment:
             station, along, offset = station[best], along[best], offset[best]
         beyond = ((station <= 0.0) & (along < 0.0)) | ((station >= self.length) & (along > 0.0))
         if beyond.any():
-            station[beyond], offset[beyond] = self._on_tangents(x[beyond], y[beyond])
+            station[beyond], offset[beyond] = self._project_on_tangents(x[beyond], y[beyond])
         return station, offset
 
-    def _on_tangents(self, x: Float, y: Float) -> tuple[Float, Float]:
+    def _project_on_tangents(self, x: Float, y: Float) -> tuple[Float, Float]:
         """Return station and offset (K,), m, of points beyond an end, on the nearer of both end tangents."""
         feet = []
         for end, side in ((0.0, -1.0), (self.length, 1.0)):
@@ -314,7 +314,7 @@ class Alignment:
             along[active], offset[active] = g, d
             low[active] = left = np.where(g > 0, s, low[active])
             high[active] = right = np.where(g < 0, s, high[active])
-            target = s + _step(g, d, bend)
+            target = s + _arc_to_foot(g, d, bend)
             outside = ~((target >= left) & (target <= right))
             # At the road's end the bracket closes at once; elsewhere its middle is a safe guess.
             target[outside] = 0.5 * (left + right)[outside]
@@ -325,7 +325,7 @@ class Alignment:
         return station, along, offset
 
 
-def _series(bend: Float, slope: Float) -> NDArray[np.complex128]:
+def _position_series(bend: Float, slope: Float) -> NDArray[np.complex128]:
     """Return the position's complex coefficients (terms + 1, P) for unit half length; the constant is left 0."""
     w = np.zeros((_TERMS + 1, len(bend)), complex)
     z = np.zeros_like(w)
@@ -336,7 +336,7 @@ def _series(bend: Float, slope: Float) -> NDArray[np.complex128]:
     return z
 
 
-def _step(along: Float, offset: Float, bend: Float) -> Float:
+def _arc_to_foot(along: Float, offset: Float, bend: Float) -> Float:
     """Return the arc length (m) along the circle of curvature to a point's foot, on a straight the distance along."""
     turn, lever = bend * along, 1.0 - bend * offset
     curved = np.abs(turn) > 1e-9

@@ -67,13 +67,13 @@ def crossfall_points(
         end = station + element.length
         if element.kind != "clothoid":
             percent = wanted_percent(design_class, side, element.curvature_start)
-            corners += _run_off(design_class, half_width, (from_station, from_percent), (station, percent))
+            corners += _run_off_corners(design_class, half_width, (from_station, from_percent), (station, percent))
             corners.append((end, percent))
             from_station, from_percent = end, percent
         station = end
     if from_station < station:
         percent = wanted_percent(design_class, side, elements[-1].curvature_end)
-        corners += _run_off(design_class, half_width, (from_station, from_percent), (station, percent))
+        corners += _run_off_corners(design_class, half_width, (from_station, from_percent), (station, percent))
     points: list[CrossfallPoint] = []
     for at, percent in corners:
         if not points or round_value(at) > points[-1].station:
@@ -81,7 +81,7 @@ def crossfall_points(
     return tuple(points)
 
 
-def _run_off(
+def _run_off_corners(
     design_class: str, half_width: float, begin: tuple[float, float], end: tuple[float, float]
 ) -> list[tuple[float, float]]:
     """Return (station m, crossfall %) at the corners of a crossfall transition after ``begin`` up to ``end``."""

@@ -42,7 +42,7 @@ def damage_numbers(pavement: Pavement) -> list[int]:
 def damage_depth(section: CarriagewaySection, station: Float, offset: Float) -> Float:
     """Return the depth (N,) of ruts and potholes at stations and offsets (N,), m; where both are, the deeper one."""
     depth = np.zeros(station.shape)
-    for near, of_one in _depths(section, station, offset):
+    for near, of_one in _damage_depths(section, station, offset):
         depth[near] = np.maximum(depth[near], of_one)
     return depth
 
@@ -53,14 +53,14 @@ def deepest_damage(section: CarriagewaySection, station: Float, offset: Float) -
     Of two that are as deep the first counts.
     """
     deepest, result = np.full(station.shape, _SHALLOW), np.full(station.shape, -1, dtype=np.int64)
-    for number, (near, of_one) in enumerate(_depths(section, station, offset)):
+    for number, (near, of_one) in enumerate(_damage_depths(section, station, offset)):
         deeper = np.flatnonzero(near)[of_one > deepest[near]]
         result[deeper] = number
         deepest[near] = np.maximum(deepest[near], of_one)
     return result
 
 
-def _depths(section: CarriagewaySection, station: Float, offset: Float) -> Iterator[tuple[Bool, Float]]:
+def _damage_depths(section: CarriagewaySection, station: Float, offset: Float) -> Iterator[tuple[Bool, Float]]:
     """Yield for each rut, then each pothole, a mask (N,) of the places along it and its depth (K,) at these, m."""
     for rut in section.carriageway.pavement.ruts:
         near = (station > rut.start_station) & (station < rut.end_station)
@@ -93,7 +93,7 @@ def damaged_strips(section: CarriagewaySection) -> list[int]:
     first, lanes = section.kinds.index("lane"), len(section.carriageway.lanes)
     strips = {first + lanes - 1 - rut.lane for rut in section.carriageway.pavement.ruts if rut.lane < lanes}
     for pothole in section.carriageway.pavement.potholes:
-        low, high = _across(section, pothole)
+        low, high = _pothole_edges(section, pothole)
         distances = section.distances(pothole.station)[0]
         strips |= set(np.flatnonzero((distances[:-1] < high) & (distances[1:] > low)).tolist())
     return sorted(strips)
@@ -135,7 +135,7 @@ def damage_columns(
     for pothole in section.carriageway.pavement.potholes:
         if not start <= pothole.station <= end:
             continue
-        low, high = _across(section, pothole)
+        low, high = _pothole_edges(section, pothole)
         cells = _cells_of_bowl(pothole.depth, tolerance)
         shares.append(_shares(section, strip, pothole.station, np.linspace(low, high, cells + 1)))
     together = np.unique(np.concatenate(shares))
@@ -157,7 +157,7 @@ def _shares(section: CarriagewaySection, strip: int, station: float, distance: F
     return (distance - inner) / max(outer - inner, 1e-9)
 
 
-def _across(section: CarriagewaySection, pothole: Pothole) -> tuple[float, float]:
+def _pothole_edges(section: CarriagewaySection, pothole: Pothole) -> tuple[float, float]:
     """Return the distances of a pothole's inner and outer edge from the centreline, m, positive outwards."""
     middle = section.carriageway.sign * pothole.offset
     return middle - pothole.width / 2.0, middle + pothole.width / 2.0

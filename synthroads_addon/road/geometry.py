@@ -98,7 +98,7 @@ class RoadGeometry:
 
     def elevation(self, station: ArrayLike, offset: ArrayLike) -> Float:
         """Return the surface's local elevation (N,), m, damage included; NaN outside the outermost boundaries."""
-        station, offset = _pairs(station, offset)
+        station, offset = _flat_arrays(station, offset)
         strip = self.strip_index(station, offset)
         inside = np.flatnonzero(strip >= 0)
         result = np.full(offset.shape, np.nan)
@@ -114,7 +114,7 @@ class RoadGeometry:
 
     def strip_index(self, station: ArrayLike, offset: ArrayLike) -> Index:
         """Return the index (N,) into `strips` of the strip at stations and offsets (N,), m; -1 outside the road."""
-        station, offset = _pairs(station, offset)
+        station, offset = _flat_arrays(station, offset)
         boundaries = self.offsets(station)
         index = np.count_nonzero(boundaries >= offset[:, None], axis=1) - 1
         last = len(self.strips) - 1
@@ -136,7 +136,7 @@ class RoadGeometry:
 
     def point(self, station: ArrayLike, offset: ArrayLike) -> Float:
         """Return the surface's local points (N, 3) at stations and offsets (N,), m; z is NaN outside the road."""
-        station, offset = _pairs(station, offset)
+        station, offset = _flat_arrays(station, offset)
         return np.column_stack([self.alignment.place(station, offset), self.elevation(station, offset)])
 
     def marking_edges(self, line: LineMarking, station: ArrayLike) -> tuple[Float, Float]:
@@ -204,6 +204,6 @@ def _strips(section: CarriagewaySection) -> list[SurfaceStrip]:
     return [SurfaceStrip(kind, *_SURFACES.get(kind, paved), instance, side) for kind in section.kinds]
 
 
-def _pairs(*values: ArrayLike) -> list[Float]:
+def _flat_arrays(*values: ArrayLike) -> list[Float]:
     """Return values flattened and broadcast to arrays (N,) of one length."""
     return np.broadcast_arrays(*(np.asarray(value, dtype=np.float64).ravel() for value in values))

@@ -179,7 +179,7 @@ def wheel_pose(line: LaneLine, chassis: Chassis, station: Float) -> tuple[Float,
     for along in (rear, front):
         for beside in (-track, track):
             wheel = middle + along * ahead + beside * left
-            heights[along, beside] = _height(line, wheel.T, station + along * per_metre)
+            heights[along, beside] = _road_height(line, wheel.T, station + along * per_metre)
     behind, before = (0.5 * (heights[along, -track] + heights[along, track]) for along in (rear, front))
     rise = (before - behind) / (front - rear)
     roll = sum(heights[along, track] - heights[along, -track] for along in (rear, front)) / (4.0 * track)
@@ -191,7 +191,7 @@ def wheel_pose(line: LaneLine, chassis: Chassis, station: Float) -> tuple[Float,
     return np.moveaxis(np.stack([forward, side, up], axis=1), -1, 0), place.T
 
 
-def _height(line: LaneLine, plan: Float, near: Float) -> Float:
+def _road_height(line: LaneLine, plan: Float, near: Float) -> Float:
     """Return the road's local elevation (K,), m, at plan points (K, 2) within 2 m of stations ``near`` (K,)."""
     return line.height(*line.geometry.alignment.project_near(plan, near, 2.0))
 

@@ -56,7 +56,7 @@ def hatching_outlines(geometry: RoadGeometry, hatching: Hatching) -> list[Float]
     tip, nose = shape.gore_tip(), shape.nose_station()
     forward = 1.0 if nose > tip else -1.0
     stations = np.linspace(tip, nose, 400)
-    inner, outer = _between(section, stations)
+    inner, outer = _hatched_range(section, stations)
     wide = np.flatnonzero(outer - inner >= _NARROWEST)
     if not len(wide):
         return []
@@ -68,7 +68,7 @@ def hatching_outlines(geometry: RoadGeometry, hatching: Hatching) -> list[Float]
     edges = []
     for shift in (-hatching.stripe_width / 2.0, hatching.stripe_width / 2.0):
         for outside in (False, True):
-            edges.append(_meet(section, middle + shift, forward * lean, outside, (tip, nose)))
+            edges.append(_edge_crossings(section, middle + shift, forward * lean, outside, (tip, nose)))
     corners = np.stack([edges[0], edges[2], edges[3], edges[1]], axis=1)
     corners[:, :, 1] *= section.carriageway.sign
     keep = (corners[:, :, 0] * forward).max(axis=1) < nose * forward - 0.2
@@ -106,23 +106,23 @@ def _clip_outline(outline: Float, station: float, keep: float) -> Float:
     return np.array(corners).reshape(-1, 2)
 
 
-def _between(section: CarriagewaySection, station: Float) -> tuple[Float, Float]:
+def _hatched_range(section: CarriagewaySection, station: Float) -> tuple[Float, Float]:
     """Return the inner and outer distances (N,) from the centreline between which a gore is hatched, m."""
     inner = section.lane_boundaries(station)[:, 0] + _EDGE_LINE
     lane, _ = section.boundaries_of("turnout_lane", station)
     return inner, lane - _EDGE_LINE
 
 
-def _meet(
+def _edge_crossings(
     section: CarriagewaySection, station: Float, lean: float, outside: bool, limits: tuple[float, float]
 ) -> Float:
     """Return the points (N, 2: station, distance), m, where slanting lines from a gore's middle meet its edge."""
-    inner, outer = _between(section, station)
+    inner, outer = _hatched_range(section, station)
     middle, at = (inner + outer) / 2.0, station
     for _ in range(_STEPS):
-        edge = _between(section, at)[1 if outside else 0]
+        edge = _hatched_range(section, at)[1 if outside else 0]
         at = np.clip(station + lean * (edge - middle), min(limits), max(limits))
-    return np.column_stack([at, _between(section, at)[1 if outside else 0]])
+    return np.column_stack([at, _hatched_range(section, at)[1 if outside else 0]])
 
 
 def _counter_clockwise(outline: Float) -> Float:

@@ -164,11 +164,11 @@ class RoadParameters(Model):
         if len(set(sides)) != len(sides) or not sides:
             raise ValueError("objects must contain one Carriageway per side at most, and at least one")
         for name, item in self.objects.items():
-            if fault := self._dangling(item):
+            if fault := self._missing_reference(item):
                 raise ValueError(f"objects.{name}: {fault}")
         return self
 
-    def _dangling(self, item: RoadObject) -> str:
+    def _missing_reference(self, item: RoadObject) -> str:
         """Return a message if an object names a carriageway, lane or turnout that isn't there, else an empty string."""
         if isinstance(item, LineMarking | Arrow | Vehicle | Turnout):
             carriageway = self.objects.get(item.carriageway)

@@ -30,7 +30,7 @@ def sample_stations(geometry: RoadGeometry, tolerance: float, start: float = 0.0
         start, end: stations (m) of the stretch that is wanted.
     """
     end = min(end, geometry.length)
-    kinks = _around(_kinks(geometry, tolerance), start, end)
+    kinks = _enclosing_kinks(_kinks(geometry, tolerance), start, end)
     spacing = np.minimum(_chord_spacing(geometry, kinks, tolerance), _twist_spacing(geometry, kinks, tolerance))
     # Between the two ends of a step there is nothing to follow.
     spacing = np.where(np.diff(kinks) <= 2.0 * STEP, np.inf, np.minimum(spacing, MAXIMUM_SPACING))
@@ -59,7 +59,7 @@ def _kinks(geometry: RoadGeometry, tolerance: float) -> Float:
     return kinks[keep] if len(kinks) > 2 else kinks
 
 
-def _around(kinks: Float, start: float, end: float) -> Float:
+def _enclosing_kinks(kinks: Float, start: float, end: float) -> Float:
     """Return those of the sorted kinks that enclose the stations from start to end, at least two."""
     low = int(np.clip(np.searchsorted(kinks, start, side="right") - 1, 0, len(kinks) - 2))
     high = int(np.searchsorted(kinks, end, side="left"))

@@ -40,7 +40,7 @@ HIGHEST_CLIMB = 120.0
 """Height above or below the road's begin from which it no longer climbs or falls, m."""
 
 
-def _widest(room: float) -> float:
+def _widest_radius(room: float) -> float:
     """Return the largest radius whose least clothoid, A = R/3, fits into a length ``room``, both m."""
     return 9.0 * room
 
@@ -73,21 +73,21 @@ class HorizontalSampler:
 
     def draw(self) -> tuple[HorizontalElement, ...]:
         """Return the drawn elements, whose lengths add up to the scenario's length."""
-        first = 0.0 if self._may_begin_straight() and self.rng.random() < 0.35 else self._sign() / self._radius(None)
+        first = 0.0 if self._may_begin_straight() and self.rng.random() < 0.35 else self._turn() / self._radius(None)
         self.parts = [_AlignmentPart(min(_SHORTEST_END, self.length), first, first)]
         self.room = self.length - self.parts[0].length
-        while joint := self._joint():
+        while joint := self._next_parts():
             self.parts += joint
             self.room -= math.fsum(part.length for part in joint)
             self.turned += math.fsum(part.length * (part.start + part.end) / 2 for part in joint)
-        self._share_out()
+        self._distribute_length()
         return self._elements()
 
     def _may_begin_straight(self) -> bool:
         """Return whether the road may begin straight: as it is all straight or a curve can follow."""
-        return self.length <= LONGEST_STRAIGHT or _widest(self.length - 3.0 * _SHORTEST_END) > self.radii[0]
+        return self.length <= LONGEST_STRAIGHT or _widest_radius(self.length - 3.0 * _SHORTEST_END) > self.radii[0]
 
-    def _joint(self) -> list[_AlignmentPart]:
+    def _next_parts(self) -> list[_AlignmentPart]:
         """Return the next parts, clothoids and a straight or arc of an end's least length; none without room.
 
         What was the end has a neighbour then: it gets what it lacks to its full least length. Nothing follows where the
@@ -113,7 +113,7 @@ class HorizontalSampler:
 
     def _arc_after_straight(self, last: _AlignmentPart) -> list[_AlignmentPart]:
         before = next((part.start for part in reversed(self.parts[:-1]) if part.start), 0.0)
-        sign = self._sign()
+        sign = self._turn()
         least = (STRAIGHT_SAME_DIRECTION if before * sign > 0.0 else _SHORTEST_STRAIGHT) if before else 0.0
         lacking = max(0.0, least - last.length)
         room = self.room - lacking - _SHORTEST_END
@@ -126,7 +126,7 @@ class HorizontalSampler:
 
     def _arc_after_arc(self, kind: str, start: float, room: float) -> list[_AlignmentPart]:
         """Return the clothoids of an S-curve ("s") or egg curve ("egg") after a curvature; none without room."""
-        least = self._least(start, 0.0) if kind == "s" else 0.0
+        least = self._least_length(start, 0.0) if kind == "s" else 0.0
         if not (radius := self._radius(1.0 / abs(start), room - least)):
             return []
         if kind == "s":
@@ -149,7 +149,7 @@ class HorizontalSampler:
         fitting = [a + (b - a) * share for a, b in zip(least, drawn, strict=True)]
         return [_AlignmentPart(length, *pair) for length, pair in zip(fitting, curvatures, strict=True)]
 
-    def _sign(self) -> float:
+    def _turn(self) -> float:
         """Return 1 (left) or -1 at random; the farther the road has turned, the likelier back again."""
         left = 0.5 - min(0.45, max(-0.45, 0.4 * self.turned))
         return 1.0 if self.rng.random() < left else -1.0
@@ -167,12 +167,12 @@ class HorizontalSampler:
             low = max(low, before / BALANCE if before < BALANCED_BELOW else min(_BALANCED_FROM, before / BALANCE))
             high = min(high, before * BALANCE) if before < BALANCED_BELOW else high
         if room < math.inf:
-            low, high = max(low, self.limits.clothoid**2 / max(room, 1.0)), min(high, _widest(room))
+            low, high = max(low, self.limits.clothoid**2 / max(room, 1.0)), min(high, _widest_radius(room))
         if low > high:
             return 0.0
         return round_value(math.exp(self.rng.uniform(math.log(low), math.log(high))), 6)
 
-    def _least(self, start: float, end: float) -> float:
+    def _least_length(self, start: float, end: float) -> float:
         """Return the least length (m) of a clothoid from a straight to an arc: A >= R/3, and the run-off's."""
         radius = 1.0 / max(abs(start), abs(end))
         return max(max(self.limits.clothoid, radius / 3.0) ** 2 / radius, self._run_off(start, end))
@@ -180,18 +180,18 @@ class HorizontalSampler:
     def _transition(self, start: float, end: float, crossing: float = 0.0) -> Lengths:
         """Return the least length and a drawn one, m, of a clothoid between a straight and an arc; A <= R."""
         radius = 1.0 / max(abs(start), abs(end))
-        least = max(crossing, self._least(start, end))
+        least = max(crossing, self._least_length(start, end))
         return [least], [self.rng.uniform(least, max(least, min(radius, 2.0 * least)))]
 
     def _s_curve(self, start: float, end: float) -> Lengths:
         """Return least and drawn lengths (m) of an S-curve's two clothoids, of parameters within 1.5 of each other."""
         crossing = self._run_off(start, end) / 2.0
         first, second = self._transition(start, 0.0, crossing), self._transition(0.0, end, crossing)
-        least, drawn = (self._alike(a + b, start, end) for a, b in zip(first, second, strict=True))
+        least, drawn = (self._limit_ratio(a + b, start, end) for a, b in zip(first, second, strict=True))
         return least, drawn
 
     @staticmethod
-    def _alike(lengths: list[float], start: float, end: float) -> list[float]:
+    def _limit_ratio(lengths: list[float], start: float, end: float) -> list[float]:
         """Return an S-curve's clothoid lengths, that of the smaller parameter A raised to what the ratio allows."""
         a = [length / abs(k) for length, k in zip(lengths, (start, end), strict=True)]
         least = max(a) / 1.5**2
@@ -210,7 +210,7 @@ class HorizontalSampler:
     def _run_off(self, start: float, end: float) -> float:
         return run_off_length(self.design_class, self.half_width, start, end)
 
-    def _share_out(self) -> None:
+    def _distribute_length(self) -> None:
         """Lengthen straights and arcs, in place, to the road's length, within the longest straight and turn."""
         self.parts = _merge_parts(self.parts)
         spare = self.length - math.fsum(part.length for part in self.parts)
@@ -264,7 +264,7 @@ def sample_profile(scenario: RoadScenario, rng: np.random.Generator) -> tuple[Ve
     limits = LIMITS[scenario.design_class]
     steepest = limits.grade_percent
     lowest, highest = bounds(scenario.grade_percent) if scenario.grade_percent else (-steepest, steepest)
-    stations = _intersections(scenario.length, rng)
+    stations = _intersection_stations(scenario.length, rng)
     grades = [round_value(rng.uniform(lowest, highest))]
     radii: list[float] = []
     climbed = 0.0
@@ -290,7 +290,7 @@ def sample_profile(scenario: RoadScenario, rng: np.random.Generator) -> tuple[Ve
     return tuple(VerticalPoint(station=station, elevation=round_value(z), radius=radius) for station, z, radius in rows)
 
 
-def _intersections(length: float, rng: np.random.Generator) -> list[float]:
+def _intersection_stations(length: float, rng: np.random.Generator) -> list[float]:
     """Return drawn stations (m) of the points of vertical intersection, the road's ends included."""
     spans = max(2, round(length / rng.uniform(300.0, 900.0)))
     shares = rng.uniform(0.7, 1.3, spans)

@@ -93,7 +93,7 @@ def sample_vegetation(site: PlacementSite) -> Iterator[tuple[str, Vegetation]]:
     scenario, limits = site.scenario, site.scenario.vegetation
     room = _room_beside(site)
     yield from _mix_species(site, "grass", limits.grasses, scenario.grass_density, limits.grass_height, 0.0)
-    yield from _belts(site, room)
+    yield from _shrub_belts(site, room)
     first_tree = _first_tree(site)
     if first_tree < room:
         density = scenario.trees_per_hectare / 10_000.0
@@ -116,7 +116,7 @@ def _first_tree(site: PlacementSite) -> float:
     return round_value(max(0.0, OBSTACLE_DISTANCE[site.design_class] - narrowest))
 
 
-def _species(rng: np.random.Generator, kind: Kind, names: tuple[str, ...]) -> list[str]:
+def _draw_species(rng: np.random.Generator, kind: Kind, names: tuple[str, ...]) -> list[str]:
     """Return some drawn species of a kind in random order; reed is not the first of several."""
     known = list(dict.fromkeys(names))
     mixed = [known[i] for i in rng.permutation(len(known))]
@@ -132,20 +132,20 @@ def _mix_species(
     if density <= 0.0:
         return
     rng = site.stream(kind)
-    species = _species(rng, kind, names)
+    species = _draw_species(rng, kind, names)
     shares = sorted(rng.uniform(0.5, 1.5, len(species)).tolist(), reverse=True)
     for name, part in zip(species, shares, strict=True):
         band = (band_start, site.terrain.half_width)
         yield _plants(rng, kind, name, round_value(density * part / math.fsum(shares)), band, heights)
 
 
-def _belts(site: PlacementSite, room: float) -> Iterator[tuple[str, Vegetation]]:
+def _shrub_belts(site: PlacementSite, room: float) -> Iterator[tuple[str, Vegetation]]:
     """Yield (id, stand) of the shrubs, each species in a belt of its own behind that of the one before."""
     limits, density = site.scenario.vegetation, round_value(site.scenario.shrubs_per_hectare / 10_000.0)
     if density <= 0.0 or room <= SHRUB_DISTANCE:
         return
     rng = site.stream("shrub")
-    species = _species(rng, "shrub", limits.shrubs)
+    species = _draw_species(rng, "shrub", limits.shrubs)
     between = np.sort(rng.uniform(SHRUB_DISTANCE, room, len(species) - 1))
     borders = [SHRUB_DISTANCE, *map(round_value, between), site.terrain.half_width]
     for name, band in zip(species, pairwise(borders), strict=True):
@@ -189,7 +189,7 @@ def sample_vehicles(site: PlacementSite, objects: Mapping[str, RoadObject]) -> I
         stretches = _open_stretches(section, site.length, _closures(side, objects))
         number = int(per_km * site.length / 1000.0 + rng.random())
         traffic = _traffic(rng, stretches, rng.random(number) < heavy_share, limits.speed)
-        colors = iter(_pick(rng, _COLOR_SUMS, number).tolist())
+        colors = iter(_draw_indices(rng, _COLOR_SUMS, number).tolist())
         count = 0
         for lane, queue in groupby(traffic, key=lambda vehicle: vehicle[0]):
             vehicles = list(queue)
@@ -268,15 +268,15 @@ def _traffic(rng: np.random.Generator, stretches: Float, heavy: Bool, limits: In
         return []
     if outer[-1] == 0.0:
         heavy = np.zeros_like(heavy)
-    lanes = np.where(heavy, _pick(rng, outer, len(heavy)), _pick(rng, sums, len(heavy)))
-    models = np.where(heavy, _pick(rng, _HEAVY_SUMS, len(heavy)), _pick(rng, _LIGHT_SUMS, len(heavy)))
+    lanes = np.where(heavy, _draw_indices(rng, outer, len(heavy)), _draw_indices(rng, sums, len(heavy)))
+    models = np.where(heavy, _draw_indices(rng, _HEAVY_SUMS, len(heavy)), _draw_indices(rng, _LIGHT_SUMS, len(heavy)))
     highest = np.where(heavy, min(HEAVY_SPEED, limits.maximum), limits.maximum)
     speeds = limits.minimum + (highest - limits.minimum) * rng.random(len(heavy))
     rows = zip(lanes.tolist(), speeds.tolist(), models.tolist(), highest.tolist(), strict=True)
     return sorted((lane, min(round_value(speed), most), _MODELS[model]) for lane, speed, model, most in rows)
 
 
-def _pick(rng: np.random.Generator, sums: Float, number: int) -> Index:
+def _draw_indices(rng: np.random.Generator, sums: Float, number: int) -> Index:
     """Return drawn indices (number,) from 0 to N - 1, whose weights have the running sums (N,)."""
     return sums.searchsorted(rng.random(number) * sums[-1], side="right")
 

@@ -58,7 +58,7 @@ def _embankment_barrier(road: Road) -> Iterator[Finding]:
     if not below(terrain.batter_slope, EMBANKMENT_RUN):
         return
     for name, edges in road.sides.items():
-        for start, end in _gaps(road, edges, road.beside[name].outer, 0.0, road.length):
+        for start, end in _gaps(road, edges, road.protecting[name].outer, 0.0, road.length):
             text = (
                 f"The embankment is {terrain.embankment_height:.1f} m high and 1 : {terrain.batter_slope:g} steep, and "
                 f"{end - start:.1f} m beside it are without barrier (RPS)."
@@ -72,7 +72,7 @@ def _curve_barrier(road: Road) -> Iterator[Finding]:
     for run, (name, edges) in product(curves, road.sides.items()):
         if edges.sign * run.curvature > 0.0:
             continue
-        for start, end in _gaps(road, edges, road.beside[name].outer, run.start, run.end):
+        for start, end in _gaps(road, edges, road.protecting[name].outer, run.start, run.end):
             text = (
                 f"The curve's radius of {run.radius:.0f} m is below {below_radius:.0f} m, and {end - start:.1f} m "
                 "of its outer side are without barrier (RPS)."
@@ -97,10 +97,10 @@ def _missing_barrier(road: Road, edges: Edges, index: int, reach: tuple[float, f
         index: which body.
         reach: m that the barriers begin before it and end behind it, in the direction of traffic.
     """
-    body, beside = road.bodies.items[index], road.beside[edges.name]
+    body, facing = road.bodies.items[index], road.protecting[edges.name]
     low, high = edges.distances(body.low, body.high)
-    outside = road.around.outer[edges.name][index]
-    between = beside.outer & (beside.distance < low) if outside else beside.inner & (beside.distance > high)
+    outside = road.positions.outer[edges.name][index]
+    between = facing.outer & (facing.distance < low) if outside else facing.inner & (facing.distance > high)
     before, behind = reach if edges.traffic > 0 else reach[::-1]
     start, end = max(body.start - before, 0.0), min(body.end + behind, road.length)
     missing = list(_gaps(road, edges, between, start, end))
@@ -111,7 +111,7 @@ def _obstacle_barrier(road: Road) -> Iterator[Finding]:
     limit = OBSTACLE_DISTANCE[road.design_class]
     for i, what in _obstacles(road):
         for side, edges in road.sides.items():
-            distance = road.around.clearance[side][i]
+            distance = road.positions.clearance[side][i]
             if distance < 0.0 or not below(distance, limit):
                 continue
             if lacking := _missing_barrier(road, edges, i, (OBSTACLE_LEAD, OBSTACLE_TAIL)):
@@ -126,8 +126,8 @@ def _noise_barrier(road: Road) -> Iterator[Finding]:
     limit = OBSTACLE_DISTANCE[road.design_class]
     for i in road.bodies.of(NoiseBarrier, part="barrier"):
         for side, edges in road.sides.items():
-            distance = road.around.clearance[side][i]
-            if distance < 0.0 or not road.around.outer[side][i]:
+            distance = road.positions.clearance[side][i]
+            if distance < 0.0 or not road.positions.outer[side][i]:
                 continue
             reach = (OBSTACLE_LEAD, OBSTACLE_TAIL) if below(distance, limit) else (0.0, 0.0)
             if lacking := _missing_barrier(road, edges, i, reach):
@@ -147,7 +147,7 @@ def _tree_distance(road: Road) -> Iterator[Finding]:
             distance = edges.verge + plants.band_start
             if distance < 0.0 or not below(distance, least):
                 continue
-            near = road.beside[edges.name].outer & (road.barriers.clearance < distance)
+            near = road.protecting[edges.name].outer & (road.barriers.clearance < distance)
             for start, _ in islice(_gaps(road, edges, near, 0.0, road.length), 1):
                 text = (
                     f"Trees stand {distance:.2f} m from the {edges.carriageway.side} paved edge with no barrier in "

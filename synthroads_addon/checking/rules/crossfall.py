@@ -68,13 +68,13 @@ def _crossfall_inside(road: Road) -> Iterator[Finding]:
             yield from at_least(name, station, inwards[worst], needed, text)
 
 
-def _lever(edges: Edges) -> float:
+def _edge_lever(edges: Edges) -> float:
     """Return the largest distance of the main road's farther edge from its rotation axis, m."""
     width = float((edges.at_marks.main - edges.at_marks.inner).max())
     return width / (2.0 if edges.carriageway.rotation_axis == "carriageway_axis" else 1.0)
 
 
-def _flat_zone(fall: Crossfall) -> tuple[Bool, Bool]:
+def _flat_pieces(fall: Crossfall) -> tuple[Bool, Bool]:
     """Return two masks (N - 1,): pieces wholly, and at least partly, of less than the least crossfall."""
     low = np.minimum(fall.percent[:-1], fall.percent[1:])
     high = np.maximum(fall.percent[:-1], fall.percent[1:])
@@ -85,10 +85,10 @@ def _flat_zone(fall: Crossfall) -> tuple[Bool, Bool]:
 
 def _run_off_steepest(road: Road) -> Iterator[Finding]:
     for name, fall in road.crossfalls.items():
-        lever = _lever(road.sides[name])
+        lever = _edge_lever(road.sides[name])
         wide = lever >= NARROW_RUN_OFF
         allowed = road.limits.run_off_percent if wide else NARROW_RUN_OFF_PER_METRE * lever
-        wholly, _ = _flat_zone(fall)
+        wholly, _ = _flat_pieces(fall)
         limit = np.where(wholly, max(allowed, LEAST_RUN_OFF_PER_METRE * lever), allowed)
         slope = np.abs(fall.slope) * lever
         for first, last in stretches(fall.runs_off & (slope > limit * (1.0 + TOLERANCE))):
@@ -99,9 +99,9 @@ def _run_off_steepest(road: Road) -> Iterator[Finding]:
 
 def _run_off_least(road: Road) -> Iterator[Finding]:
     for name, fall in road.crossfalls.items():
-        lever = _lever(road.sides[name])
+        lever = _edge_lever(road.sides[name])
         least = LEAST_RUN_OFF_PER_METRE * lever
-        _, partly = _flat_zone(fall)
+        _, partly = _flat_pieces(fall)
         slope = np.abs(fall.slope) * lever
         for first, last in stretches(fall.runs_off & partly & (slope < least * (1.0 - TOLERANCE))):
             worst = first + int(np.argmin(slope[first : last + 1]))

@@ -31,7 +31,7 @@ OVERLAP_ROOM = 1e-3
 def _posts(road: Road, edges: Edges) -> Float:
     """Return the sorted stations of the delineators on a carriageway's outer side, m."""
     index = np.array(road.bodies.of(Delineator, part="foot"), dtype=np.intp)
-    return np.sort(road.bodies.station[index[road.around.outer[edges.name][index]]])
+    return np.sort(road.bodies.station[index[road.positions.outer[edges.name][index]]])
 
 
 def _spacing(road: Road, borders: Float) -> Float:
@@ -73,7 +73,7 @@ def _delineator_spacing(road: Road) -> Iterator[Finding]:
 
 
 def _delineator_distance(road: Road) -> Iterator[Finding]:
-    posts, clearance = road.of(Delineator), road.around.nearest
+    posts, clearance = road.of(Delineator), road.positions.nearest
     for i in np.flatnonzero((clearance >= 0.0) & (clearance < DELINEATOR_DISTANCE)).tolist():
         name, distance = road.bodies.names[i], float(clearance[i]) + sizes.REACH
         if name in posts and below(distance, DELINEATOR_DISTANCE):
@@ -116,7 +116,7 @@ def _kilometre_text(road: Road) -> Iterator[Finding]:
     kilometre = np.array([_metres(board.text) for board in boards.values()])
     known = np.isfinite(kilometre)
     begins = [kilometre - station, kilometre + station] if known.any() else [kilometre]
-    off = min((_off(begin, known) for begin in begins), key=lambda far: int(np.sum(far > KILOMETRE_ROOM)))
+    off = min((_kilometre_errors(begin, known) for begin in begins), key=lambda far: int(np.sum(far > KILOMETRE_ROOM)))
     for i in np.flatnonzero(~(off <= KILOMETRE_ROOM)).tolist():
         board = boards[names[i]]
         value = float(np.nan_to_num(off[i], nan=road.length))
@@ -124,7 +124,7 @@ def _kilometre_text(road: Road) -> Iterator[Finding]:
         yield Finding(names[i], board.station, value, KILOMETRE_ROOM, text)
 
 
-def _off(begin: Float, known: Bool) -> Float:
+def _kilometre_errors(begin: Float, known: Bool) -> Float:
     """Return the distances (N,), m, of the road's beginnings that boards tell from the middle one of those known."""
     middle = np.sort(begin[known])[np.sum(known) // 2] if known.any() else np.nan
     return np.abs(begin - middle)
@@ -161,7 +161,7 @@ def _ranges(road: Road) -> Iterator[tuple[str, float, float]]:
 
 def _object_on_pavement(road: Road) -> Iterator[Finding]:
     allowed = road.of(ConstructionBeacon)
-    clearance, where = road.around.nearest, road.around.where
+    clearance, where = road.positions.nearest, road.positions.where
     worst: dict[str, tuple[float, float]] = {}
     for i in np.flatnonzero(clearance < -TOLERANCE).tolist():
         name = road.bodies.names[i]

@@ -54,7 +54,7 @@ class Bodies:
         return 0.5 * self.start + 0.5 * self.end
 
 
-class Around:
+class BodyPositions:
     """Where bodies stand in relation to the carriageways: clearances and sides.
 
     Posts and faces are looked at in their middle, what is long at its ends and at the stations of `marks` as well: the
@@ -113,7 +113,7 @@ class Barriers:
         outer: by carriageway, (B,) whether one stands outside of its middle.
     """
 
-    def __init__(self, parameters: RoadParameters, bodies: Bodies, around: Around) -> None:
+    def __init__(self, parameters: RoadParameters, bodies: Bodies, positions: BodyPositions) -> None:
         index = bodies.of(Guardrail, ConcreteBarrier, part="barrier")
         self.names = [bodies.names[i] for i in index]
         items: list[Any] = [parameters.objects[name] for name in self.names]
@@ -121,15 +121,15 @@ class Barriers:
         self.start, self.end, self.offset = np.array(numbers, dtype=np.float64).reshape(-1, 3).T
         sides = [item.faces if isinstance(item, Guardrail) else "both" for item in items]
         self.faces = np.array([(side != "right", side != "left") for side in sides], dtype=bool).reshape(-1, 2)
-        self.clearance, self.where = around.nearest[index], around.where[index]
-        self.outer = {name: outer[index] for name, outer in around.outer.items()}
+        self.clearance, self.where = positions.nearest[index], positions.where[index]
+        self.outer = {name: outer[index] for name, outer in positions.outer.items()}
 
     def spans(self, which: Bool) -> Spans:
         """Return the (start, end) stations, m, of the barriers of a mask (B,)."""
         return list(zip(self.start[which].tolist(), self.end[which].tolist(), strict=True))
 
 
-class Beside:
+class ProtectingBarriers:
     """Which barriers protect the traffic of a carriageway: they have a face to it and stand off all pavement.
 
     Attributes:
@@ -157,7 +157,7 @@ class Signs:
         bare: by carriageway, (S,) whether one stands between the main road and a ramp.
     """
 
-    def __init__(self, parameters: RoadParameters, bodies: Bodies, around: Around) -> None:
+    def __init__(self, parameters: RoadParameters, bodies: Bodies, positions: BodyPositions) -> None:
         index = bodies.of(TrafficSign, KilometreBoard, part="face") + bodies.of(TrafficLight, part="foot")
         self.names = [bodies.names[i] for i in index]
         items: list[Any] = [parameters.objects[name] for name in self.names]
@@ -165,10 +165,10 @@ class Signs:
         numbers = [(item.station, item.rotation_deg) for item in items]
         self.station, rotation = np.array(numbers, dtype=np.float64).reshape(-1, 2).T
         self.turned = np.abs((rotation + 180.0) % 360.0 - 180.0)
-        outer = {name: values[index] for name, values in around.outer.items()}
+        outer = {name: values[index] for name, values in positions.outer.items()}
         anyone = np.any(list(outer.values()), axis=0)
         self.of: dict[str, Bool] = {name: values | ~anyone for name, values in outer.items()}
-        self.bare = {name: values[index] for name, values in around.bare.items()}
+        self.bare = {name: values[index] for name, values in positions.bare.items()}
 
     def away(self, edges: Edges) -> Float:
         """Return the angles (S,) by which the signs are turned away from a carriageway's traffic, degrees."""

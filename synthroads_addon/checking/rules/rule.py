@@ -22,7 +22,7 @@ from ...road.parameters import AlignmentObject, RoadParameters
 from ...road.section import Carriageway, Turnout
 from ...road.surroundings import Terrain
 from .edges import Edges, Float, TurnoutEdges
-from .obstacles import Around, Barriers, Beside, Bodies, Bool, Signs
+from .obstacles import Barriers, Bodies, BodyPositions, Bool, ProtectingBarriers, Signs
 
 Sure = Literal["confirmed", "derived", "unconfirmed", "definition"]
 
@@ -193,24 +193,24 @@ class Road:
         return Bodies(self.parameters)
 
     @cached_property
-    def around(self) -> Around:
+    def positions(self) -> BodyPositions:
         """Return where the bodies are in relation to the carriageways."""
-        return Around(self.bodies, self.sides, self.marks)
+        return BodyPositions(self.bodies, self.sides, self.marks)
 
     @cached_property
     def barriers(self) -> Barriers:
         """Return the guardrails and concrete barriers."""
-        return Barriers(self.parameters, self.bodies, self.around)
+        return Barriers(self.parameters, self.bodies, self.positions)
 
     @cached_property
     def signs(self) -> Signs:
         """Return the traffic signs, kilometre boards and traffic lights."""
-        return Signs(self.parameters, self.bodies, self.around)
+        return Signs(self.parameters, self.bodies, self.positions)
 
     @cached_property
-    def beside(self) -> dict[str, Beside]:
+    def protecting(self) -> dict[str, ProtectingBarriers]:
         """Return which of the barriers protect the traffic of each carriageway, by the carriageway's id."""
-        return {name: Beside(self.barriers, name, edges) for name, edges in self.sides.items()}
+        return {name: ProtectingBarriers(self.barriers, name, edges) for name, edges in self.sides.items()}
 
     def _runs(self) -> list[CurvatureRun]:
         runs: list[CurvatureRun] = []

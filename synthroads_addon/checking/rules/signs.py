@@ -18,7 +18,7 @@ LOW_SIGNS = "450"
 
 
 def _sign_distance(road: Road) -> Iterator[Finding]:
-    clearance = road.around.nearest
+    clearance = road.positions.nearest
     for i in np.flatnonzero((clearance >= 0.0) & (clearance < SIGN_DISTANCE)):
         body, name, distance = road.bodies.items[i], road.bodies.names[i], clearance[i]
         if body.part == "face" and below(body.bottom, CLEARANCE):
@@ -90,7 +90,7 @@ def _gore_sign(road: Road) -> Iterator[Finding]:
 
 def _clearance(road: Road) -> Iterator[Finding]:
     spans = [(name, item.station, item.clearance) for name, item in road.each(Gantry, Overpass)]
-    for i in np.flatnonzero(road.around.nearest < 0.0):
+    for i in np.flatnonzero(road.positions.nearest < 0.0):
         body = road.bodies.items[i]
         if body.part == "face":
             spans.append((road.bodies.names[i], 0.5 * (body.start + body.end), body.bottom))

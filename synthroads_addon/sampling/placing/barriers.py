@@ -116,8 +116,8 @@ def roadside_barriers(layout: Layout, roadside: Roadside, rng: np.random.Generat
     system = BarrierSystem.draw(rng, limits, limits.concrete_roadside)
     if not limits.roadside:
         return
-    stretches = [*roadside.protected, *_by_the_road(layout, roadside), *_elsewhere(roadside, rng)]
-    roadside.pieces = list(_pieces(roadside, merge_ranges(stretches, _JOIN)))
+    stretches = [*roadside.protected, *_stretches_by_rules(layout, roadside), *_stretches_at_random(roadside, rng)]
+    roadside.pieces = list(_barrier_pieces(roadside, merge_ranges(stretches, _JOIN)))
     borders = {segment.end for segment in roadside.edge.segments[:-1]}
     for number, piece in enumerate(roadside.pieces, start=1):
         terminal = SHORT_TERMINAL if borders & {piece.start, piece.end} else TERMINAL
@@ -137,7 +137,7 @@ def plan_noise_barrier(layout: Layout, roadside: Roadside, rng: np.random.Genera
     free = [
         stretch
         for segment in roadside.edge.segments
-        for stretch in free_ranges(*_inner(roadside, segment), roadside.far, roadside.crossed, roadside.restless)
+        for stretch in free_ranges(*_free_part(roadside, segment), roadside.far, roadside.crossed, roadside.restless)
     ]
     longest = max((end - start for start, end in free), default=0.0)
     least, most = limits.noise_barrier_length.minimum, min(limits.noise_barrier_length.maximum, longest)
@@ -161,7 +161,7 @@ def plan_noise_barrier(layout: Layout, roadside: Roadside, rng: np.random.Genera
     )
 
 
-def _by_the_road(layout: Layout, roadside: Roadside) -> Iterator[Range]:
+def _stretches_by_rules(layout: Layout, roadside: Roadside) -> Iterator[Range]:
     """Yield the stretches that need a barrier because of the embankment or tight curves."""
     terrain = layout.site.terrain
     if terrain.embankment_height > EMBANKMENT_HEIGHT and terrain.batter_slope < EMBANKMENT_RUN:
@@ -172,7 +172,7 @@ def _by_the_road(layout: Layout, roadside: Roadside) -> Iterator[Range]:
             yield start, end
 
 
-def _elsewhere(roadside: Roadside, rng: np.random.Generator) -> Iterator[Range]:
+def _stretches_at_random(roadside: Roadside, rng: np.random.Generator) -> Iterator[Range]:
     """Yield random stretches for barriers that no rule asks for, away from turnouts."""
     slots = math.ceil(roadside.length / _SLOT)
     for slot in range(slots):
@@ -183,13 +183,13 @@ def _elsewhere(roadside: Roadside, rng: np.random.Generator) -> Iterator[Range]:
             yield stretch
 
 
-def _inner(roadside: Roadside, segment: Segment) -> Range:
+def _free_part(roadside: Roadside, segment: Segment) -> Range:
     """Return the part of a segment that neither a neighbour's barriers nor what stands behind those reach."""
     start = segment.start + _FROM_BORDER if segment.start > 0.0 else 0.0
     return start, segment.end - _FROM_BORDER if segment.end < roadside.length else segment.end
 
 
-def _pieces(roadside: Roadside, stretches: list[Range]) -> Iterator[BarrierPiece]:
+def _barrier_pieces(roadside: Roadside, stretches: list[Range]) -> Iterator[BarrierPiece]:
     """Yield the barriers on stretches: one in each segment of the edge, lengthened to the least where there is room."""
     for segment in roadside.edge.segments:
         low, high = segment.start, segment.end

@@ -63,19 +63,19 @@ def construction_zones(layout: Layout, rng: np.random.Generator) -> tuple[dict[S
     for side, roadside in layout.sides.items():
         if rng.random() >= limits.construction_zone:
             continue
-        zone = _zone(layout, roadside, rng)
+        zone = _draw_zone(layout, roadside, rng)
         if zone:
             zones[side] = zone.stations[0], zone.stations[3]
             objects |= dict(_equipment(layout, roadside, zone, rng))
     return zones, objects
 
 
-def _zone(layout: Layout, roadside: Roadside, rng: np.random.Generator) -> Zone | None:
+def _draw_zone(layout: Layout, roadside: Roadside, rng: np.random.Generator) -> Zone | None:
     """Return a drawn zone where the carriageway is wide, has no turnouts and keeps its widths; None without room."""
     limits, length = layout.site.scenario.furniture.construction_length, roadside.length
     section = layout.site.sections[roadside.side]
     turnouts = ((start - _TURNOUT_ROOM, end + _TURNOUT_ROOM) for start, end in roadside.turnouts.stretches)
-    free = free_ranges(0.0, length, Reservations(turnouts), Reservations(_changes(section.carriageway)))
+    free = free_ranges(0.0, length, Reservations(turnouts), Reservations(_width_changes(section.carriageway)))
     longest = max((end - start for start, end in free), default=0.0)
     least = max(TAPERS_IN[0] + SHORTEST_ALONG + TAPER_OUT, limits.minimum)
     most = min(longest, limits.maximum)
@@ -98,7 +98,7 @@ def _zone(layout: Layout, roadside: Roadside, rng: np.random.Generator) -> Zone 
     return Zone(stations, boundaries[lane + 1], edge)
 
 
-def _changes(carriageway: Carriageway) -> Iterator[Range]:
+def _width_changes(carriageway: Carriageway) -> Iterator[Range]:
     """Yield stretches along which a width of the carriageway changes."""
     widths = (carriageway.inner_offset, carriageway.inner_edge_strip_width, *(lane.width for lane in carriageway.lanes))
     for width in (*widths, carriageway.outer_edge_strip_width, carriageway.hard_shoulder_width):

@@ -51,8 +51,8 @@ def place_furniture(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
         if item.stream not in streams:
             streams[item.stream] = site.stream("furniture", item.stream)
         item.plan(layout, streams[item.stream])
-    yield from _fronts_by_rules(layout, streams) if by_rules else _fronts_at_random(layout, streams)
-    yield from _behind(layout, streams, planned, bridge)
+    yield from _barriers_by_rules(layout, streams) if by_rules else _barriers_at_random(layout, streams)
+    yield from _objects_behind_barriers(layout, streams, planned, bridge)
 
 
 def _plan_fixed(layout: Layout, streams: Streams) -> None:
@@ -65,7 +65,7 @@ def _plan_fixed(layout: Layout, streams: Streams) -> None:
         plan_exit_signs(layout, streams["signs"])
 
 
-def _fronts_by_rules(layout: Layout, streams: Streams) -> Iterator[tuple[str, RoadObject]]:
+def _barriers_by_rules(layout: Layout, streams: Streams) -> Iterator[tuple[str, RoadObject]]:
     """Yield (id, object) of barriers and delineators by the safety rules."""
     yield from median_barriers(layout, streams["barriers"])
     for roadside in layout.sides.values():
@@ -76,14 +76,14 @@ def _fronts_by_rules(layout: Layout, streams: Streams) -> Iterator[tuple[str, Ro
             yield from delineators(roadside, stations)
 
 
-def _fronts_at_random(layout: Layout, streams: Streams) -> Iterator[tuple[str, RoadObject]]:
+def _barriers_at_random(layout: Layout, streams: Streams) -> Iterator[tuple[str, RoadObject]]:
     """Yield (id, object) of barriers and delineators at random."""
     yield from random_median_barrier(layout, streams["barriers"])
     for roadside in layout.sides.values():
         yield from random_front(layout, roadside, streams["barriers"])
 
 
-def _behind(
+def _objects_behind_barriers(
     layout: Layout, streams: Streams, planned: list[GantryPlan], bridge: OverpassPlan | None
 ) -> Iterator[tuple[str, RoadObject]]:
     """Yield (id, object) of what stands behind the barriers: requests, median signs, gantries, overpass."""

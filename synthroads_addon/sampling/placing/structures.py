@@ -73,12 +73,12 @@ def plan_gantries(layout: Layout, rng: np.random.Generator) -> list[GantryPlan]:
     if spacing is not None:
         stations = spacing * (0.5 + np.arange(int(layout.length / spacing + 0.5)))
         half = min(_HALF, spacing / 2.0)
-        plans = (_at(layout, rng, station, half) for station in stations.tolist())
+        plans = (_gantry_at(layout, rng, station, half) for station in stations.tolist())
         return [plan for plan in plans if plan]
     if rng.random() >= limits.gantries:
         return []
     kind, sides = _kind(layout, rng)
-    start = draw_start(rng, free_ranges(0.0, layout.length, *_in_the_way(layout, kind, sides)), 2.0 * _HALF)
+    start = draw_start(rng, free_ranges(0.0, layout.length, *_obstructions(layout, kind, sides)), 2.0 * _HALF)
     return [] if start is None else [_reserve_place(layout, GantryPlan(kind, start + _HALF, sides), _HALF)]
 
 
@@ -90,7 +90,7 @@ def gantries(layout: Layout, plans: list[GantryPlan], rng: np.random.Generator) 
         post = pick(rng, POST_WIDTHS)
         if plan.kind != "cantilever":
             post = min(post, layout.median.obstacle_half)
-        reaches = {side: _reach(layout, plan, layout.sides[side], post) for side in plan.sides}
+        reaches = {side: _beam_reach(layout, plan, layout.sides[side], post) for side in plan.sides}
         ends = [layout.sides[side].sign * distance for side in plan.sides for distance in reaches[side]]
         displays = bool(rng.random() < 0.5)
         left, right = round_value(max(ends)), round_value(min(ends))
@@ -123,7 +123,7 @@ def _kind(layout: Layout, rng: np.random.Generator) -> tuple[Kind, tuple[Side, .
     return kind, sides if kind == "two_sided" else (side,)
 
 
-def _in_the_way(layout: Layout, kind: Kind, sides: tuple[Side, ...]) -> list[Reservations]:
+def _obstructions(layout: Layout, kind: Kind, sides: tuple[Side, ...]) -> list[Reservations]:
     """Return the reservations that a gantry has to keep clear of."""
     obstacles = [] if kind == "cantilever" else [layout.median.taken]
     for roadside in (layout.sides[side] for side in sides):
@@ -131,10 +131,10 @@ def _in_the_way(layout: Layout, kind: Kind, sides: tuple[Side, ...]) -> list[Res
     return obstacles
 
 
-def _at(layout: Layout, rng: np.random.Generator, station: float, half: float) -> GantryPlan | None:
+def _gantry_at(layout: Layout, rng: np.random.Generator, station: float, half: float) -> GantryPlan | None:
     """Return the gantry at a station (m), its place reserved, or None where something is in the way."""
     kind, sides = _kind(layout, rng)
-    if all(item.is_free(station - half, station + half) for item in _in_the_way(layout, kind, sides)):
+    if all(item.is_free(station - half, station + half) for item in _obstructions(layout, kind, sides)):
         return _reserve_place(layout, GantryPlan(kind, station, sides), half)
     return None
 
@@ -144,7 +144,7 @@ def _reserve_place(layout: Layout, plan: GantryPlan, half: float) -> GantryPlan:
     return plan
 
 
-def _reach(layout: Layout, plan: GantryPlan, roadside: Roadside, post: float) -> tuple[float, float]:
+def _beam_reach(layout: Layout, plan: GantryPlan, roadside: Roadside, post: float) -> tuple[float, float]:
     """Return the distances (m) from the centreline between which the beam hangs over a carriageway."""
     front = roadside.front_of_obstacle(plan.station - _HALF, plan.station + _HALF, SMALL_ZONE + post)
     outer = front + SMALL_ZONE + post
