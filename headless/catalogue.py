@@ -6,7 +6,7 @@ Files of one's own are described in the same way.
 from collections import Counter
 from pathlib import Path
 
-from synthroads_addon.base.catalogue import Entry, Kind, figures, plain, preset, span
+from synthroads_addon.base.catalogue import Entry, Kind, figure_text, figures, preset_file, range_text
 from synthroads_addon.base.classes import ClassSelector, Member, class_scheme, scheme_names
 from synthroads_addon.base.files import PRESETS, preset_names
 from synthroads_addon.dataset.recipe import RECIPES, load_recipe, recipe_names
@@ -27,7 +27,7 @@ def _scenario(name: str) -> Entry:
         "device": made.scan.device,
         "fidelity": made.fidelity,
     }
-    return Entry(name, made.title, preset(SCENARIOS, ".json", name, scenario_names()), figures_by_name)
+    return Entry(name, made.title, preset_file(SCENARIOS, ".json", name, scenario_names()), figures_by_name)
 
 
 def _device(name: str) -> Entry:
@@ -46,7 +46,7 @@ def _device(name: str) -> Entry:
         "minimum_range": made.minimum_range,
         "maximum_ranges": [mode.maximum_range for mode in made.modes],
     }
-    return Entry(name, made.title, preset(DEVICES, ".json", name, device_names()), figures_by_name, made.source)
+    return Entry(name, made.title, preset_file(DEVICES, ".json", name, device_names()), figures_by_name, made.source)
 
 
 def _recipe(name: str) -> Entry:
@@ -58,7 +58,7 @@ def _recipe(name: str) -> Entry:
         "scenario": made.scenario,
         "layouts": list(made.layouts),
     }
-    file = preset(RECIPES, ".yaml", name, recipe_names())
+    file = preset_file(RECIPES, ".yaml", name, recipe_names())
     return Entry(name, made.title, file, figures_by_name, " ".join(made.description.split()))
 
 
@@ -108,9 +108,9 @@ KINDS = {
         figures(
             *("wavelength_nm", "pulse_rates_khz", "field_of_view_deg"),
             *("lines_per_second", "maximum_returns", "maximum_ranges"),
-            field_of_view_deg=span,
-            lines_per_second=span,
-            maximum_ranges=span,
+            field_of_view_deg=range_text,
+            lines_per_second=range_text,
+            maximum_ranges=range_text,
         ),
     ),
     "recipes": Kind(
@@ -130,7 +130,7 @@ KINDS = {
         (".json",),
         ("id", "class", "LAS", "stands for"),
         lambda one: [
-            [str(row["id"]), row["name"], str(row["las"]), plain(row["of"])] for row in one.figures["classes"]
+            [str(row["id"]), row["name"], str(row["las"]), figure_text(row["of"])] for row in one.figures["classes"]
         ],
     ),
     "assets": Kind(

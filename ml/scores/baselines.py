@@ -21,7 +21,7 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 from skimage.morphology import skeletonize
 
-from synthroads_addon.base.arrays import Bool, Float, Index, otsu
+from synthroads_addon.base.arrays import Bool, Float, Index, otsu_threshold
 
 from ..data.axis import MeasuredAxis
 
@@ -195,7 +195,7 @@ def _in_dark_pixels(cell: Index, shape: tuple[int, ...], intensity: Float) -> Bo
     number = np.ravel_multi_index((cell[:, 0], cell[:, 1]), shape)
     used, owner = np.unique(number, return_inverse=True)
     median = ndimage.median(intensity, owner, np.arange(len(used)))
-    return (median <= otsu(median))[owner]
+    return (median <= otsu_threshold(median))[owner]
 
 
 def prune_skeleton(skeleton: Bool, shortest: float) -> Bool:

@@ -36,7 +36,7 @@ class ArrayRows:
         return cls(*(joined([getattr(part, field.name) for part in parts]) for field in fields(cls)))
 
 
-def otsu(values: Float) -> float:
+def otsu_threshold(values: Float) -> float:
     """Return Otsu's threshold (1979) of values (N,): the one with the largest variance between the two sides."""
     count, edges = np.histogram(values, bins=256)
     middle = (edges[:-1] + edges[1:]) / 2.0

@@ -32,16 +32,16 @@ class Entry:
         return data | ({"note": self.note} if self.note else {})
 
 
-def plain(value: Any) -> str:
+def figure_text(value: Any) -> str:
     """Return a figure as text: numbers short, lists with commas, of counts the name before, "-" for None."""
     if isinstance(value, dict):
-        return ", ".join(f"{name} {plain(number)}" for name, number in value.items())
+        return ", ".join(f"{name} {figure_text(number)}" for name, number in value.items())
     if isinstance(value, (list, tuple)):
-        return ", ".join(map(plain, value))
+        return ", ".join(map(figure_text, value))
     return f"{value:g}" if isinstance(value, float) else "-" if value is None else str(value)
 
 
-def span(values: Sequence[float]) -> str:
+def range_text(values: Sequence[float]) -> str:
     """Return the smallest and the largest of some numbers as text, "2 to 5", or the one that all are."""
     low, high = min(values), max(values)
     return f"{low:g}" if low == high else f"{low:g} to {high:g}"
@@ -81,7 +81,7 @@ def figures(*names: str, **shown: Callable[[Any], str]) -> Rows:
         names: of the figures, in the order of the columns.
         shown: by the name of a figure, how it is written where not plainly.
     """
-    return lambda one: [[one.title, *(shown.get(name, plain)(one.figures[name]) for name in names)]]
+    return lambda one: [[one.title, *(shown.get(name, figure_text)(one.figures[name]) for name in names)]]
 
 
 def entries(kind: Kind, wanted: Sequence[str] = ()) -> list[Entry]:
@@ -116,6 +116,6 @@ def _find_names(kind: Kind, text: str) -> list[str]:
     return files
 
 
-def preset(folder: Path, ending: str, name_or_file: str, names: Sequence[str]) -> Path:
+def preset_file(folder: Path, ending: str, name_or_file: str, names: Sequence[str]) -> Path:
     """Return the path of something shipped if the name is among ``names``, else the name itself as a path."""
     return folder / f"{name_or_file}{ending}" if name_or_file in names else Path(name_or_file)

@@ -68,7 +68,7 @@ def preset_path(folder: Path, name_or_file: str, field: str, endings: Sequence[s
     return Path(name_or_file)
 
 
-def stamp(path: str, wanted: str) -> tuple[int, int]:
+def change_stamp(path: str, wanted: str) -> tuple[int, int]:
     """Return when a file was last changed (ns) and its size (bytes), by which its change is noticed.
 
     Raises:

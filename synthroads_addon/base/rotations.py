@@ -49,7 +49,7 @@ def quaternions(matrix: Float) -> Float:
     return np.asarray(row / np.linalg.norm(row, axis=1, keepdims=True))
 
 
-def matrices(quaternion: Float) -> Float:
+def quaternion_matrices(quaternion: Float) -> Float:
     """Return the rotation matrices (N, 3, 3) of unit quaternions (N, 4), scalar first."""
     w, x, y, z = quaternion.T
     rows = [

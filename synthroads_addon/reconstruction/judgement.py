@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy import ndimage
 
-from ..base.arrays import Bool, Float, otsu
+from ..base.arrays import Bool, Float, otsu_threshold
 from .layout import RoadLayout, axis_guides
 from .profiles import ACROSS, STRETCH, Grid, Profiles
 from .section import MeasuredSection
@@ -158,7 +158,7 @@ def _contrast(apart: Float, core: Float) -> float:
     apart, core = apart[np.isfinite(apart)], core[np.isfinite(core)]
     if not len(apart) or not len(core):
         return np.inf
-    reach = otsu(apart)
+    reach = otsu_threshold(apart)
     other = apart[apart > reach]
     clear = len(other) > 0 and float(np.median(other)) > _LIKE * robust_scale(core)
     return reach if clear else np.inf

@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from scipy import ndimage
 
-from ..base.arrays import Float, otsu
+from ..base.arrays import Float, otsu_threshold
 from ..base.errors import InputError
 from .edges import paved_edge
 from .lines import USUAL, WAVELENGTH, Line
@@ -163,7 +163,7 @@ def paved_by_brightness(profiles: Profiles, lines: list[Line]) -> Grid:
     level = ndimage.gaussian_filter1d(level, 10.0, mode="nearest")
     apart = np.abs(brightness - level[:, None])
     spread = robust_scale(apart[sure])
-    reach = otsu(np.asarray(apart[known], dtype=np.float64))
+    reach = otsu_threshold(np.asarray(apart[known], dtype=np.float64))
     below, above = float(np.median(apart[known & (apart <= reach)])), float(np.median(apart[known & (apart > reach)]))
     if above - below < _LIKE * spread:
         return np.where(known, 1.0, np.nan).astype(np.float32)

@@ -84,7 +84,7 @@ def arrow_outlines(arrow: Arrow) -> list[Float]:
     return [_counter_clockwise(part + (arrow.station, arrow.offset)) for part in parts]
 
 
-def pieces(outline: Float, cuts: Float) -> Iterator[Float]:
+def cut_outline(outline: Float, cuts: Float) -> Iterator[Float]:
     """Yield the pieces (M, 2) of a convex outline (K, 2) between each two neighbours of the stations ``cuts``, m."""
     for first, last in pairwise(cuts):
         piece = _clip_outline(_clip_outline(outline, first, 1.0), last, -1.0)

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..base.arrays import Float
-from ..base.files import stamp
+from ..base.files import change_stamp
 from ..base.random_streams import stream
 from ..base.schema import round_value
 from .elevation_model import Corridor, ElevationModel, read_elevation_model
@@ -78,7 +78,7 @@ def road_elevation_model(
     Raises:
         InputError: as `read_elevation_model`.
     """
-    file_stamp = stamp(path, "an elevation model is needed here")
+    file_stamp = change_stamp(path, "an elevation model is needed here")
     return _read_model(path, file_stamp, epsg, axis, origin, half_width + GROUND_MARGIN)
 
 

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from ..base.errors import InputError, MissingFileError
-from ..base.files import PRESETS, stamp
+from ..base.files import PRESETS, change_stamp
 from ..base.schema import ClosedModel, quantity, read_json
 from ..road.things.asset import AssetTypes
 from ..road.things.limits import Interval, interval
@@ -113,7 +113,7 @@ def read_asset_library(name_or_file: str | os.PathLike[str]) -> AssetLibrary:
         InputError: a field is unknown or wrong.
     """
     name = str(library_file(os.fspath(name_or_file)))
-    library = _read_library(name, stamp(name, "an asset library (JSON) is needed here"))
+    library = _read_library(name, change_stamp(name, "an asset library (JSON) is needed here"))
     for key, asset in library.assets.items():
         _check_file(Path(name).parent / asset.file, f"{name}: assets.{key}.file", asset.file)
     return library

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..road.alignment import left_vectors
 from ..road.geometry import RoadGeometry
 from ..road.objects import LineObject
-from ..road.paint import arrow_outlines, hatching_outlines, pieces
+from ..road.paint import arrow_outlines, cut_outline, hatching_outlines
 from ..road.pavement.outlines import CRACK_FILM, PATCH_FILM, crack_outlines, patch_outline
 from ..road.section import Arrow, Crack, Hatching, LineMarking, Patch, Pothole
 from ..road.terrain import known_elevation
@@ -88,7 +88,7 @@ def damaged_surface(geometry: RoadGeometry, item: Patch | Crack, stations: Float
 
 def _laid(geometry: RoadGeometry, outlines: Iterable[Float], stations: Float, film: float) -> Faces:
     """Return convex outlines (K, 2) as polygons that lie a film (m) above the road."""
-    parts = [piece for outline in outlines for piece in pieces(outline, _inside(stations, outline))]
+    parts = [piece for outline in outlines for piece in cut_outline(outline, _inside(stations, outline))]
     if not parts:
         return join_polygons([])
     places = np.concatenate(parts)

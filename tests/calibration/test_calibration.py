@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from headless.cli import main
-from synthroads_addon.base.arrays import otsu
+from synthroads_addon.base.arrays import otsu_threshold
 from synthroads_addon.base.errors import InputError, OutputError
 from synthroads_addon.base.noise import noise_field
 from synthroads_addon.calibration.expected import Expectation, Receiver, Views, chosen_views, read_texture, texture_of
@@ -211,7 +211,7 @@ def test_lines_are_found_where_they_are_and_not_by_each_points_own_brightness(tm
     kept = np.quantile(found["line"].intensity, (0.1, 0.25, 0.5, 0.75, 0.9))
     assert np.abs(kept - whole).max() < 0.12 * (whole[3] - whole[1])
     around = np.abs(real.xyz[:, 1] - 3.1) < 0.25
-    by_itself = real.intensity[paint & (real.intensity > otsu(real.intensity[around]))]
+    by_itself = real.intensity[paint & (real.intensity > otsu_threshold(real.intensity[around]))]
     assert np.quantile(by_itself, 0.1) - whole[0] > 0.14 * (whole[3] - whole[1])
     assert not any(tuple(row) in on_paint for row in np.round(found["paved"].place, 3).tolist())
 
@@ -230,7 +230,7 @@ def test_stations_and_offsets_beside_a_bent_axis_with_a_gap() -> None:
 def test_otsu_lies_between_two_heaps() -> None:
     rng = np.random.default_rng(3)
     values = np.concatenate([rng.normal(10.0, 1.0, 5000), rng.normal(20.0, 1.0, 1000)])
-    assert 12.5 < otsu(values) < 17.5
+    assert 12.5 < otsu_threshold(values) < 17.5
 
 
 def test_ranges_and_angles_from_one_place_follow_the_ground() -> None:

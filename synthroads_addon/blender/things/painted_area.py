@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...base.classes import class_id
 from ...base.stepper import run_aside
-from ...road.paint import arrow_outlines, hatching_outlines, pieces
+from ...road.paint import arrow_outlines, cut_outline, hatching_outlines
 from ...road.pavement.field import OPEN_CRACK, PATCH, SEALED_CRACK, damage_code
 from ...road.pavement.outlines import CRACK_FILM, PATCH_FILM, crack_outlines, patch_outline
 from ...road.section import Arrow, Carriageway, Hatching
@@ -173,4 +173,4 @@ def _pieces(outline: NDArray[np.float64], start: float, end: float) -> Iterator[
         borders = np.linspace(low, high, int(np.ceil((high - low) / _LONGEST)) + 1)
         # Its two ends are borders as well: all other pieces are those of the whole outline.
         inside = borders[(borders > start) & (borders < end)]
-        yield from pieces(outline, np.array([max(low, start), *inside, min(high, end)]))
+        yield from cut_outline(outline, np.array([max(low, start), *inside, min(high, end)]))

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...base.arrays import AnyArray
 from ...base.errors import InputError
-from ...base.rotations import matrices
+from ...base.rotations import quaternion_matrices
 from ..layers import Column, columns, make_points
 from ..points import PointBlock
 from .base import CloudReader, CloudWriter, check_coordinates, damage_error, header_from_notes
@@ -313,7 +313,7 @@ def _pose(scan: Any) -> tuple[AnyArray, AnyArray]:
     pose = scan["pose"]
     rotation, translation = np.eye(3), np.zeros(3)
     if pose.isDefined("rotation"):
-        rotation = matrices(np.array([[pose["rotation"][name].value() for name in "wxyz"]]))[0]
+        rotation = quaternion_matrices(np.array([[pose["rotation"][name].value() for name in "wxyz"]]))[0]
     if pose.isDefined("translation"):
         translation = np.array([pose["translation"][name].value() for name in "xyz"])
     return rotation, translation

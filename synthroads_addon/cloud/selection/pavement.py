@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base.arrays import Float, Index, otsu
+from ...base.arrays import Float, Index, otsu_threshold
 from ...base.errors import InputError
 from ...road.centerline import read_axis
 from .classes import RealClass, RealCloud, select_class
@@ -99,7 +99,7 @@ def _on_lines(intensity: Float, station: Float, offset: Float, road: RoadClasses
     if not points:
         raise InputError("--line", list(road.lines), "no points lie there")
     chosen, level = np.concatenate(points), np.concatenate(medians)
-    threshold = otsu(level)
+    threshold = otsu_threshold(level)
     return chosen[level > threshold], threshold
 
 

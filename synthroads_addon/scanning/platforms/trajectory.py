@@ -14,7 +14,7 @@ from pydantic import Field
 from ...base.arrays import Float, Int
 from ...base.errors import InputError, nearest_name
 from ...base.files import read_text
-from ...base.rotations import angle_between, matrices, quaternions, rotation_matrix, slerp
+from ...base.rotations import angle_between, quaternion_matrices, quaternions, rotation_matrix, slerp
 from ...road.centerline import FARTHEST, fields_of
 from .guides import Guide
 from .path import KNOT_RANGE, Strip, knot_spacing_for
@@ -88,7 +88,7 @@ class TrajectoryPath:
         step = self._position[row + 1] - self._position[row]
         position = self._position[row] + share[:, None] * step
         turned = slerp(self._attitude[row], self._attitude[row + 1], np.clip(share, 0.0, 1.0))
-        return position, matrices(turned) @ self._mounting
+        return position, quaternion_matrices(turned) @ self._mounting
 
     def _height_above(self, guide: Guide) -> Float:
         rows = np.unique(np.linspace(0, len(self._time) - 1, 1000).astype(np.int64))

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
 from synthroads_addon.base.errors import InputError, MissingFileError
-from synthroads_addon.base.rotations import matrices, quaternions, rotation_matrix, slerp
+from synthroads_addon.base.rotations import quaternion_matrices, quaternions, rotation_matrix, slerp
 from synthroads_addon.scanning.blocks import Blocks
 from synthroads_addon.scanning.devices.shots import shots
 from synthroads_addon.scanning.platforms.path import KNOT_ERROR
@@ -218,13 +218,13 @@ def test_poses_may_be_interpolated_between_knots(tmp_path, kind: str) -> None:
 def test_quaternions_are_the_rotations(first: list[float], second: list[float]) -> None:
     a, b = (rotation_matrix(*(np.array([angle]) for angle in angles)) for angles in (first, second))
     qa, qb = quaternions(a), quaternions(b)
-    np.testing.assert_allclose(matrices(qa), a, atol=1e-12)
-    np.testing.assert_allclose(matrices(qb), b, atol=1e-12)
+    np.testing.assert_allclose(quaternion_matrices(qa), a, atol=1e-12)
+    np.testing.assert_allclose(quaternion_matrices(qb), b, atol=1e-12)
     ends = Rotation.from_matrix(np.concatenate([a, b]))
     if (ends[0].inv() * ends[1]).magnitude() > 3.1:
         return  # either way round is as short
     for share in (0.0, 0.3, 1.0):
-        found = matrices(slerp(qa, qb, np.array([share])))[0]
+        found = quaternion_matrices(slerp(qa, qb, np.array([share])))[0]
         np.testing.assert_allclose(found, Slerp([0.0, 1.0], ends)(share).as_matrix(), atol=1e-7)
 
 
