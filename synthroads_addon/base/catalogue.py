@@ -27,7 +27,7 @@ class Entry:
     note: str = ""
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything as JSON data."""
+        """Return name, title, key figures, file and note as JSON data."""
         data = {"name": self.name, "title": self.title, **self.figures, "file": str(self.file)}
         return data | ({"note": self.note} if self.note else {})
 

@@ -87,7 +87,7 @@ class PointClass:
     of: tuple[Member, ...] = ()
 
     def selectors(self) -> Iterator[ClassSelector]:
-        """Yield the selectors among what it stands for."""
+        """Yield the selectors (by material, thing or asset) among what the class stands for."""
         return (member for member in self.of if isinstance(member, ClassSelector))
 
 
@@ -143,7 +143,7 @@ class ClassScheme:
         return {row.name: number for number, row in self.fine.items()} | {row.name: row.id for row in classes()}
 
     def sources(self) -> ClassScheme:
-        """Return the scheme of the points as they are scanned: the full table and the fine classes, none merged."""
+        """Return the class scheme of points as they are scanned: the full table and the fine classes, none merged."""
         full = classes()
         fine = (replace(row, id=number, of=()) for number, row in sorted(self.fine.items()))
         return ClassScheme("17", (*full, *fine), np.arange(256, dtype=np.uint8))
@@ -176,7 +176,7 @@ class ClassScheme:
         return {"name": self.name, "classes": rows}
 
     def as_stored(self) -> ClassScheme:
-        """Return the scheme for points whose ids are the scheme's own already."""
+        """Return the class scheme for points whose ids are already its own, not the full table's."""
         return ClassScheme(self.name, self.rows, np.arange(256, dtype=np.uint8))
 
 
@@ -227,7 +227,7 @@ def stored_scheme(data: object, source: str) -> ClassScheme:
 
 
 def asprs_scheme(codes: Iterable[int] = ()) -> ClassScheme:
-    """Return the scheme whose ids are LAS codes, for clouds of others; given codes without a meaning included."""
+    """Return the class scheme whose ids are LAS codes, for clouds of others, any given codes included."""
     named = {row.id: row for row in _asprs_classes()}
     every = sorted({*named, *(int(code) for code in codes)})
     rows = (named.get(code) or PointClass(code, f"class_{code}", code, _distinct_color(code)) for code in every)
@@ -236,12 +236,12 @@ def asprs_scheme(codes: Iterable[int] = ()) -> ClassScheme:
 
 @cache
 def _asprs_classes() -> tuple[PointClass, ...]:
-    """Return the LAS codes that have a meaning of their own (ASPRS LAS 1.4 R15, table 17)."""
+    """Return the classes of the LAS codes that have a meaning of their own (ASPRS LAS 1.4 R15, table 17)."""
     return _read_rows(PRESETS / "classes_asprs.json")
 
 
 def _distinct_color(number: int) -> tuple[int, int, int]:
-    """Return a colour that differs from those of the numbers around it: hues a golden section apart."""
+    """Return an sRGB colour (0 to 255) unlike those of neighbouring numbers: hues a golden section apart."""
     red, green, blue = colorsys.hsv_to_rgb(number * 0.618034 % 1.0, 0.65, 0.85)
     return round(red * 255), round(green * 255), round(blue * 255)
 

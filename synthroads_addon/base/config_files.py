@@ -23,7 +23,7 @@ class Loader(yaml.SafeLoader):
         self._sizes: dict[str, int] = {}
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
-        """Return the next node; raise `ComposerError` past `MOST_NODES`."""
+        """Return the next node of a YAML document; ComposerError past `MOST_NODES`, aliases counted in full."""
         event = self.peek_event()
         before = self._nodes
         if isinstance(event, yaml.AliasEvent):
@@ -37,7 +37,7 @@ class Loader(yaml.SafeLoader):
         return node
 
     def compose_mapping_node(self, anchor: Any) -> yaml.MappingNode:
-        """Return the next mapping; raise `ComposerError` where it has a key twice."""
+        """Return the next mapping of a YAML document; ComposerError where it has a key twice."""
         node = super().compose_mapping_node(anchor)
         seen = set()
         for key, _ in node.value:

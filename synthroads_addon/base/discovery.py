@@ -13,7 +13,7 @@ _LAST = 1000
 
 
 def discover_models(package: str, base: type[M], tag: str) -> dict[str, type[M]]:
-    """Return the models that the files of a folder define, by the one value that their field ``tag`` can have.
+    """Return tag -> pydantic model of all modules of a package, by the one value of each model's field ``tag``.
 
     They are ordered by their attribute ``order``; those without one come last, by name.
 
@@ -34,7 +34,7 @@ def discover_models(package: str, base: type[M], tag: str) -> dict[str, type[M]]
 
 
 def discriminated_union(models: Mapping[str, type[BaseModel]], tag: str) -> Any:
-    """Return the type of a field that holds one of several models, told apart by a tag; the first model if untagged.
+    """Return the annotation of a field that holds one of several models, told apart by a tag; by default the first.
 
     A field that only other models have is refused with their names.
 
@@ -59,7 +59,7 @@ def discriminated_union(models: Mapping[str, type[BaseModel]], tag: str) -> Any:
 
 
 def _place(pair: tuple[str, type[BaseModel]]) -> tuple[int, str]:
-    """Return the sort key of a name and its model."""
+    """Return the sort key of a (name, model): the model's order, then the name."""
     return getattr(pair[1], "order", _LAST), pair[0]
 
 

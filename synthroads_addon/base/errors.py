@@ -42,7 +42,7 @@ class Cancelled(SynthRoadsError):
 
 
 def _plain(value: object) -> object:
-    """Return a number of NumPy's as Python's own, as version 2 shows 1.5 as np.float64(1.5)."""
+    """Return a NumPy number as Python's own (NumPy 2 shows 1.5 as np.float64(1.5)), anything else as it is."""
     item = getattr(value, "item", None)
     return item() if type(value).__module__ == "numpy" and item and not hasattr(value, "__len__") else value
 
@@ -58,7 +58,7 @@ _LONGEST_FIELD, _LONGEST_VALUE, _LONGEST_ALLOWED = 300, 160, 1000
 
 
 def _short(text: str, limit: int) -> str:
-    """Return a text as one printable line; a long one loses its middle, as the end of a path says most."""
+    """Return a text as one printable line of at most ``limit`` characters, the middle of a long one left out."""
     if len(text) > 4 * limit:  # what is left out need not be looked at
         text = f"{text[: 2 * limit]}{text[-2 * limit :]}"
     text = " ".join(text.split())

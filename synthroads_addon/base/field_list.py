@@ -45,7 +45,7 @@ class FieldEntry:
     interval: bool = False
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything as JSON data."""
+        """Return path, type, unit, limits, default and description as JSON data."""
         return {
             "path": self.path,
             "type": self.value,
@@ -110,7 +110,7 @@ def class_of(rule: Rule) -> str:
 
 
 def fields_of(model: type[BaseModel]) -> Iterator[FieldEntry]:
-    """Yield the fields of a class and of all that lie in them, each before its own.
+    """Yield the entries of a class's fields and of all that lie in them, each before its own.
 
     Those of one value and those of earlier versions are left out.
     """
@@ -119,7 +119,7 @@ def fields_of(model: type[BaseModel]) -> Iterator[FieldEntry]:
 
 
 def _fields(schema: Rule, parts: Mapping[str, Rule], outer: FieldEntry | None) -> Iterator[FieldEntry]:
-    """Yield the fields of a class, which lies in a field or (None) in nothing."""
+    """Yield the entries of a class's fields by its JSON Schema; the class lies in ``outer``, or in nothing."""
     for name, rule in schema["properties"].items():
         if "const" in rule or rule.get("deprecated"):
             continue

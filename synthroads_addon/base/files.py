@@ -47,7 +47,7 @@ def preset_names(folder: Path, ending: str = ".json") -> list[str]:
 
 
 def preset_path(folder: Path, name_or_file: str, field: str, endings: Sequence[str] = (".json",)) -> Path:
-    """Return the file of a preset, or the one that is named.
+    """Return the file of a preset of this name, else the named file; InputError if it has no such ending.
 
     Args:
         folder: of the presets.
@@ -202,13 +202,13 @@ def _put_back(names: list[str], source: Path, target: Path, aside: Path) -> None
 
 
 def sync_file(path: Path) -> None:
-    """Have the system write a file to the disk, so that it is whole after a power cut once it has its name."""
+    """Write a file's content from the system's buffers to the disk (fsync), so that it survives a power cut."""
     with path.open("rb+") as file:
         _sync(file.fileno())
 
 
 def sync_folder(folder: Path) -> None:
-    """Have the system write a folder's names to the disk, where it can."""
+    """Write a folder's names from the system's buffers to the disk (fsync), where the system can."""
     if os.name == "nt":  # it opens no folders
         return
     descriptor = os.open(folder, os.O_RDONLY)

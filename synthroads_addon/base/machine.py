@@ -19,12 +19,12 @@ def machine(versions: Mapping[str, str]) -> str:
 
 
 def available_cores() -> int:
-    """Return how many cores this process may use."""
+    """Return the number of processor cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def physical_memory() -> int | None:
-    """Return the machine's memory, bytes; None where the system doesn't tell."""
+    """Return the machine's physical memory, bytes; None where the system doesn't tell."""
     try:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):

@@ -36,7 +36,7 @@ each axis at least 18 degrees off every axis and diagonal of the lattice (the be
 
 
 def noise_field(position: Float, wavelength: float | Float, seed: int, octaves: int = 4) -> Float:
-    """Return the field at positions: mean 0, standard deviation 1 at every place, nearly normal from 3 octaves on.
+    """Return a random field (N,) at positions (N, 3): mean 0, standard deviation 1, nearly normal from 3 octaves on.
 
     The correlation falls to 1/e at about 0.28 of the wavelength (4 octaves) and is 0 beyond 1.75 of it.
 

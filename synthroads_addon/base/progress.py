@@ -12,7 +12,7 @@ T = TypeVar("T")
 
 
 class Progress(Protocol):
-    """Called now and then with the stage's name and the share of it that is done; may raise `Cancelled`."""
+    """Callback of long work with the stage's name and the share of it that is done; may raise `Cancelled`."""
 
     def __call__(self, stage: str, share: float) -> None: ...
 

@@ -71,7 +71,7 @@ class Stepper(Generic[T]):
         return self._state is _State.ASIDE
 
     def run_for(self, seconds: float) -> bool:
-        """Let the work run for about some seconds; return whether any is left. Raises what goes wrong in it."""
+        """Let the work run for about ``seconds``; return whether any is left. Raises what the work raises."""
         self._deadline = time.perf_counter() + seconds
         with self._change:
             if self._state is _State.ASIDE:
@@ -86,7 +86,7 @@ class Stepper(Generic[T]):
         return self._state is not _State.DONE
 
     def result(self) -> T:
-        """Return what the work returned; only once `run_for` has said that there is no more of it."""
+        """Return what the work's function returned; only allowed once `run_for` has returned False."""
         assert self._state is _State.DONE
         return self._result  # type: ignore[return-value]
 
@@ -101,7 +101,7 @@ class Stepper(Generic[T]):
                 self._give_turn()
 
     def _give_turn(self) -> None:
-        """Let the work go on if it waits for that, until it hands back."""
+        """Let the work go on if it waits for its turn, and wait until it hands back."""
         if self._state is not _State.WAITING:
             return
         self._state = _State.WORKING

@@ -52,7 +52,7 @@ def declared_kinds(kind: Any, path: Sequence[str]) -> list[Any]:
 
 
 def alternatives(kind: Any) -> Iterator[Any]:
-    """Yield the types that a type allows: those of a union, without annotations."""
+    """Yield the types of which a type is the union, nested ones too, without annotations."""
     if get_origin(kind) is Annotated:
         yield from alternatives(get_args(kind)[0])
     elif get_origin(kind) in (Union, UnionType):

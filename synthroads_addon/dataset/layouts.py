@@ -61,7 +61,7 @@ class LayoutWriter(ABC):
 
 
 class PointceptWriter(LayoutWriter):
-    """``classes-N/SPLIT/SCENE-TILE/coord.npy`` and so on, as Pointcept's ``DefaultDataset`` loads them.
+    """Writes ``classes-N/SPLIT/SCENE-TILE/coord.npy`` and so on, as Pointcept's ``DefaultDataset`` loads them.
 
     coord float32 m, color uint8, strength float32 (N, 1) from 0 to 1, segment int32 (-1 ignored), instance int32 (-1
     none), normal float32 where the cloud has them. ``tile.json`` says where the tile lies.
@@ -93,7 +93,7 @@ class PointceptWriter(LayoutWriter):
 
 
 class SemanticKittiWriter(LayoutWriter):
-    """``classes-N/sequences/NN/velodyne/000000.bin`` with labels, poses, times and calibration; a tile is a frame.
+    """Writes ``classes-N/sequences/NN/velodyne/000000.bin`` with labels, poses and calibration; a tile is a frame.
 
     x y z remission as float32; labels as uint32: the class in the lower 16 bits (its id + 1; 0 is unlabelled), the
     instance in the upper ones, numbered from 1 within the sequence (``instances.json`` has the set's own numbers).

@@ -67,7 +67,7 @@ class Manifest(ClosedModel):
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """Return the manifest of a data set, with what a run that is at work or was stopped has recorded since.
+    """Return the manifest of a data set, with the scenes that a run has recorded since it was written.
 
     Raises:
         InputError: there is none, or it is damaged.

@@ -13,7 +13,7 @@ from ..cloud.tools.subsample import TileFiles
 
 @dataclass(frozen=True)
 class Tile:
-    """The points of one tile.
+    """The points of one square tile of a cloud, and where it lies.
 
     Attributes:
         row, column: of the tile, counted northwards and eastwards from the origin's.

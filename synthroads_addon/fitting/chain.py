@@ -110,7 +110,7 @@ class Chain:
 
     @cached_property
     def alignment(self) -> Alignment:
-        """Return the chain of curvatures as an alignment."""
+        """Return the chain, its values being curvatures, as an alignment."""
         rows = zip(np.diff(self.knots), self.values[:-1], self.values[1:], strict=True)
         x, y, heading = self.pose
         return Alignment([Element(float(n), float(a), float(b)) for n, a, b in rows], x, y, heading)
@@ -296,7 +296,7 @@ def elevations(chain: Chain, stations: Float) -> Float:
 
 @dataclass
 class ChainFit:
-    """A chain fitted to data, with the points' stations and residuals on it."""
+    """A chain fitted to data, with the points' stations and weighted residuals on it."""
 
     data: AxisData
     chain: Chain
@@ -331,7 +331,7 @@ def knot_room(chain: Chain, least: float) -> Float:
 
 
 def apply_step(data: AxisData, chain: Chain, step: Float) -> Chain:
-    """Return the chain after a step (F,) of all parameters, its knots kept apart."""
+    """Return the chain after a step (F,) of all its parameters, knots kept apart and values tied."""
     values = np.clip(chain.values + step[chain.value_columns], -data.limit, data.limit)
     spare = _SHARE * np.maximum(np.diff(chain.knots) - data.least, 0.0)
     knots = chain.knots.copy()
@@ -386,7 +386,7 @@ def refine(data: AxisData, chain: Chain, stations: Float, free_knots: bool, step
 
 
 def _system(fit: ChainFit, basis: Float, free_knots: bool) -> tuple[Float, ...]:
-    """Return R (P, P), the right side (P,), the knots' penalty (M - 1, P) and the scale (P,) of the linear problem."""
+    """Return R (P, P), right side (P,), the knots' penalty (M - 1, P) and the scale (P,) of the linear problem."""
     matrix = fit.data.jacobian(fit.chain, fit.stations) @ basis
     scale = column_scale(matrix)
     q, r = np.linalg.qr(matrix / scale)

@@ -139,7 +139,7 @@ class AxisRefusedError(InputError):
 
 
 def fitted_axis(path: Path, scenario: RoadScenario) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
-    """Fit an alignment to the points of a CSV or GeoJSON file.
+    """Return the alignment fitted to the points of a file (CSV, GeoJSON), the scenario for it, and a report.
 
     Returns:
         the alignment in local coordinates, the scenario with the length and map origin that follow from it, and how
@@ -198,7 +198,7 @@ def _written_radius(radius: float) -> float:
 
 
 def fit_axis(points: ArrayLike, tolerance: float = 0.05) -> AxisFit:
-    """Fit an alignment and a profile to the points of an axis.
+    """Return the alignment and profile fitted to the points of an axis, with the points' deviations.
 
     Args:
         points: (N, 3) map position and elevation, m, in the axis' order; (N, 2) is taken as elevation 0.
@@ -244,7 +244,7 @@ def _check_points(points: ArrayLike) -> Float:
 
 
 def _bridge_gaps(points: Float) -> tuple[Float, Float]:
-    """Return points (M, 3) with some added on the chord of every long gap, and weights (M,).
+    """Return points (M, 3) with light ones added on the chords of long gaps, and all points' weights (M,).
 
     A polyline with dense points on its curves only would leave the fit without a hold on the straights between. The
     added points weigh next to nothing, so a curve across a gap is still bridged as a curve.
@@ -382,7 +382,7 @@ def _trim_ends(chain: Chain, first: float, last: float) -> Alignment:
 
 
 def _profile(chain: Chain) -> Profile:
-    """Return the profile whose grade is the chain: every parabola's intersection lies at its middle."""
+    """Return the profile whose grade is the chain; each parabola's intersection lies at its middle."""
     middle = 0.5 * (chain.knots[1:] + chain.knots[:-1])
     gap, change = np.diff(chain.knots), np.diff(chain.values)
     level = elevations(chain, chain.knots)

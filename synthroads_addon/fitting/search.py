@@ -280,7 +280,7 @@ def _trials(fit: ChainFit, edits: list[Edit], free_knots: bool, goal: Goal) -> I
 
 
 def descent(fit: ChainFit, goal: Goal) -> list[ChainFit]:
-    """Return all fits from a rich chain down to few elements: first with fixed knots, then with free ones.
+    """Return all fits on the way from a rich chain down to few elements: with fixed knots, then with free ones.
 
     It goes on past the bounds, since a poor removal may be made good by the next, but not hopelessly far.
     """

@@ -45,7 +45,7 @@ _REACH = 0.98  # of the radius that an offset may use
 
 @dataclass(frozen=True)
 class Element:
-    """One horizontal element; its curvature varies linearly with the station.
+    """One element of a horizontal alignment; its curvature varies linearly with the station.
 
     Attributes:
         length: m, > 0.

@@ -86,7 +86,7 @@ def _read_csv(name: str, text: str) -> list[tuple[float, float, float]]:
 
 
 def fields_of(line: str, separator: str, place: str) -> list[str]:
-    """Return the entries of a line of CSV.
+    """Return the entries of one line of CSV as stripped text.
 
     Args:
         line: the line; a record of several lines isn't known here.

@@ -79,7 +79,7 @@ class RoadGeometry:
         return InstanceNumbers(self.parameters)
 
     def crossfall(self, carriageway: Carriageway, station: ArrayLike) -> Float:
-        """Return the crossfall (m/m, positive where the surface falls to the right) at the stations, same shape."""
+        """Return a carriageway's crossfall (m/m, positive where it falls to the right) at stations, same shape."""
         at, percent = zip(*((p.station, p.crossfall_percent) for p in carriageway.crossfall), strict=True)
         return np.interp(np.asarray(station, dtype=np.float64), at, percent) / 100.0
 
@@ -140,7 +140,7 @@ class RoadGeometry:
         return np.column_stack([self.alignment.place(station, offset), self.elevation(station, offset)])
 
     def marking_edges(self, line: LineMarking, station: ArrayLike) -> tuple[Float, Float]:
-        """Return the left and right edge offsets (N,) of a line marking at stations (N,).
+        """Return the left and the right edge's offsets (N,) of a line marking at stations (N,), m.
 
         A line between lanes is centred on the boundary; an edge line lies on the edge strip, so that the lane keeps
         its full width (RMS).
@@ -168,7 +168,7 @@ class RoadGeometry:
         return np.column_stack([first, np.minimum(first + line.dash_length, end)])
 
     def _across(self, by_side: dict[Side, Float], signed: bool) -> Float:
-        """Return (N, B) values of both sides, innermost first, as one row from left to right."""
+        """Return values (N, B) of both sides, innermost first, joined to one row from left to right, (N, M + 1)."""
         parts = []
         for side in _SIDES:
             if side in by_side:
@@ -198,7 +198,7 @@ def sections_of(parameters: RoadParameters) -> dict[Side, CarriagewaySection]:
 
 
 def _strips(section: CarriagewaySection) -> list[SurfaceStrip]:
-    """Return one carriageway's strips, innermost first."""
+    """Return the strips of one carriageway's surface, innermost first."""
     paved = ("road", section.carriageway.pavement.kind)
     instance, side = section.carriageway.instance, section.carriageway.side
     return [SurfaceStrip(kind, *_SURFACES.get(kind, paved), instance, side) for kind in section.kinds]

@@ -107,7 +107,7 @@ class LaneLine:
 
     @cached_property
     def _table(self) -> tuple[Float, Float, tuple[Float, Float]]:
-        """Stations of the panels' borders (P + 1,), distances there, and metres per station at both ends of each."""
+        """Return stations of the panels' borders (P + 1,), distances there, and metres per station at panels' ends."""
         road = self.geometry
         kinks = [s for width in (self._width, *self._inside) for s in width_kinks(width)]
         borders = np.clip(np.concatenate([road.alignment.element_starts, kinks, [0.0, road.length]]), 0.0, road.length)
@@ -129,7 +129,7 @@ class LaneLine:
         return np.asarray(step * sum(rates))
 
     def _rate(self, begin: Float, step: Float, share: float) -> Float:
-        """Return the metres along the line per metre of station (N,), at a share of each step.
+        """Return the metres along the lane's line per metre of station (N,), at a share of each step.
 
         Within a panel curvature and offset are linear; both are read inside of it, as they may jump or bend at its
         ends.

@@ -46,29 +46,29 @@ class CarriagewaySection:
         return self._distances(station)
 
     def paved_edge(self, station: ArrayLike) -> Float:
-        """Return the (N,) distances of the pavement's outer edge, a ramp's and a bay's included, m."""
+        """Return the (N,) distances from the centreline of the pavement's outer edge, ramps and bays included, m."""
         return self.distances(station)[:, -2]
 
     def road_edge(self, station: ArrayLike) -> Float:
-        """Return the (N,) distances of the verge's outer edge, m."""
+        """Return the (N,) distances from the centreline of the verge's outer edge, m."""
         return self.distances(station)[:, -1]
 
     def main_edge(self, station: ArrayLike) -> Float:
-        """Return the (N,) distances of the outer edge of the main road's pavement, as if it had no turnouts, m."""
+        """Return the (N,) distances from the centreline of the pavement's outer edge, turnouts left out, m."""
         station = np.atleast_1d(np.asarray(station, dtype=np.float64))
         inner = width_at(self.carriageway.inner_offset, station)
         widths = [width for kind, width in self._widths if kind not in TURNOUT_STRIPS and kind != "verge"]
         return inner + sum(width_at(width, station) for width in widths)
 
     def pivot(self, station: ArrayLike) -> Float:
-        """Return the (N,) distances of the line about which the crossfall turns, m."""
+        """Return the (N,) distances from the centreline of the line about which the crossfall turns, m."""
         inner = width_at(self.carriageway.inner_offset, np.atleast_1d(station))
         if self.carriageway.rotation_axis == "inner_edge":
             return inner
         return (inner + self.main_edge(station)) / 2.0
 
     def plane_edge(self, station: ArrayLike) -> Float:
-        """Return the (N,) distances up to which the surface lies in the pavement's plane; beyond it the verge falls.
+        """Return the (N,) distances, m, up to which the surface lies in the pavement's plane; beyond the verge falls.
 
         Only behind a ramp's end is it not the pavement's edge.
         """
@@ -77,17 +77,17 @@ class CarriagewaySection:
         return self.paved_edge(station) + extra
 
     def lane_boundaries(self, station: ArrayLike) -> Float:
-        """Return the (N, lanes + 1) distances of the lanes' boundaries, outermost first, m."""
+        """Return the (N, lanes + 1) distances from the centreline of the lanes' boundaries, outermost first, m."""
         first = self.kinds.index("lane")
         return self.distances(station)[:, first : first + len(self.carriageway.lanes) + 1][:, ::-1]
 
     def boundaries_of(self, kind: str, station: ArrayLike) -> tuple[Float, Float]:
-        """Return the (N,) inner and outer distances of the one strip of a kind, m."""
+        """Return the inner and the outer distances (N,) from the centreline of the one strip of a kind, m."""
         at, distances = self.kinds.index(kind), self.distances(station)
         return distances[:, at], distances[:, at + 1]
 
     def elevations(self, station: ArrayLike, crossfall: Float) -> Float:
-        """Return the (N, B) heights of the boundaries above the axis, innermost first, m.
+        """Return the (N, B) heights of the strips' boundaries above the profile, innermost first, m.
 
         Args:
             station: (N,) stations, m.

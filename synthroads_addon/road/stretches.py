@@ -34,14 +34,14 @@ _BARRIER_PERIOD = 4.0
 
 
 def stretches(length: float, longest: float = LONGEST) -> list[tuple[float, float]]:
-    """Return the (start, end) stations of a road's stretches: as few as can be, equally long, none above `longest`."""
+    """Return the (start, end) stations, m, of a road's stretches: the fewest, equally long, none above ``longest``."""
     count = max(1, math.ceil(length / longest - 1e-9))
     borders = [length * i / count for i in range(count + 1)]
     return list(pairwise(borders))
 
 
 def frame_of(geometry: RoadGeometry, start: float, end: float) -> tuple[Float, int]:
-    """Return the frame in which a stretch is built.
+    """Return the frame of a stretch: its origin's local coordinates (3,), m, and the station that it counts from.
 
     Args:
         geometry: the whole road's.

@@ -26,7 +26,7 @@ _BLOCK = 20_000
 
 
 def ground_elevation(geometry: RoadGeometry, terrain: Terrain, station: Float, offset: Float) -> Float:
-    """Return the ground's local elevation (N,) at stations and offsets (N,), without batter.
+    """Return the ground's local elevation (N,), m, at stations and offsets (N,), as it is without batter.
 
     Generated ground follows the profile at ``embankment_height`` below it and undulates. A digital elevation model is
     the ground itself; farther than `GROUND_MARGIN` beyond the terrain's reach the result can be NaN.
@@ -109,7 +109,7 @@ def fit_to_ground(
 
 
 def surface_elevation(geometry: RoadGeometry, station: Float, offset: Float) -> Float:
-    """Return the local elevation (N,) of the surface at stations and offsets (N,), without plants and furniture.
+    """Return the local elevation (N,), m, of road, batter or ground at stations and offsets (N,); no plants.
 
     Beside the road the batter rises or falls from the verge's edge until it meets the ground; without a terrain the
     road's edge goes on level.

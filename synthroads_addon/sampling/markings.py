@@ -137,7 +137,7 @@ def _block_span(shape: TurnoutShape) -> Range:
 
 
 def _lane_stretch(width: AnyWidth, length: float) -> Range:
-    """Return the stations (m) between which a lane that at most begins or ends once is there."""
+    """Return the stations (m) between which a lane is there that at most once begins or ends."""
     if not isinstance(width, tuple):
         return 0.0, length
     widths, stations = [p.width for p in width], [p.station for p in width]

@@ -130,6 +130,6 @@ def _count(expected: float, rng: np.random.Generator) -> int:
 
 
 def _wander(count: int, amplitude: float, rng: np.random.Generator) -> np.ndarray:
-    """Return a random walk (count,) whose steps have an amplitude (m) and which comes back to 0."""
+    """Return a random walk (count,), m, of normal steps of a standard deviation (m), which comes back to 0."""
     walk = np.cumsum(rng.normal(0.0, amplitude, count))
     return np.asarray(walk - np.linspace(walk[0], walk[-1], count))

@@ -137,12 +137,12 @@ class RampLimits:
 
 
 def bounds(limits: Interval, least: float = -math.inf) -> tuple[float, float]:
-    """Return an interval as (low, high), not below the least that the guidelines ask for."""
+    """Return an interval as (low, high), low raised to the least that the guidelines ask for."""
     return max(limits.minimum, least), limits.maximum
 
 
 def features_of(scenario: RoadScenario, section: StandardCrossSection, ramps: RampLimits) -> tuple[Feature, ...]:
-    """Return the features that a carriageway may have. Those that can't be within the limits are left out."""
+    """Return the turnouts and lane changes that a carriageway may have; those that can't fit are left out."""
     limits, design_class = scenario.turnouts, scenario.design_class
     taper, lane = limits.taper_length, limits.lane_length
     with_ramp = (bounds(taper, TURNOUT_TAPER), bounds(lane, TURNOUT_LANE_LENGTH[design_class]), ramps.lengths)
@@ -343,7 +343,7 @@ class CarriagewaySampler:
         )
 
     def _lane_edges(self, lanes: tuple[Lane, ...]) -> tuple[float, ...]:
-        """Return the distances (m) of the boundaries of those lanes that are there all along, outermost first."""
+        """Return the distances (m) from the centreline of the boundaries of steady lanes, outermost first."""
         inner = self.section.median / 2.0 + self.section.inner_edge_strip
         steady = [lane.width if isinstance(lane.width, float) else 0.0 for lane in lanes]
         first = next(i for i, width in enumerate(steady) if width)

@@ -55,7 +55,7 @@ class CloudScenario(ClosedModel):
         return tuple(f"cloud.{kind}" for kind in self.formats)
 
     def arrays(self) -> frozenset[str]:
-        """Return the names of the `PointBlock` arrays that the attributes are made of: no other need be computed."""
+        """Return the names of the `PointBlock` arrays that the attributes need: no other need be computed."""
         return frozenset[str]().union(*(LAYERS[name].types for name in self.attributes))
 
     def scheme(self) -> ClassScheme:

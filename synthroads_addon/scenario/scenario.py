@@ -120,7 +120,7 @@ class Scenario(ClosedModel):
 
     @property
     def chooses(self) -> bool:
-        """Return whether settings are to be chosen before the work begins."""
+        """Return whether settings are to be chosen, by a tolerance or a time, before the work begins."""
         return self.tolerance is not None or self.time_budget is not None
 
     @property
@@ -131,7 +131,7 @@ class Scenario(ClosedModel):
 
     @property
     def kept_layers(self) -> frozenset[str]:
-        """Return the names of the optional per-point layers that the files hold."""
+        """Return the names of the optional per-point layers that the cloud's files hold; none without a cloud."""
         return self.cloud.arrays() & optional_arrays() if "cloud" in self.outputs else frozenset()
 
     @property
@@ -157,7 +157,7 @@ class Scenario(ClosedModel):
         return read_material_table(self.materials_table) if self.materials_table else {}
 
     def section_length(self, length: float) -> float | None:
-        """Return the length (m) of the sections by which a road of a length (m) is built and scanned; None: whole."""
+        """Return the length (m) of the sections by which a road of a length (m) is scanned; None if whole."""
         if not set(self.outputs) & set(OF_POINTS):
             return None
         given = self.scan.section_length
@@ -178,7 +178,7 @@ class Scenario(ClosedModel):
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings that trade speed for accuracy.
+    """Settings of a job that trade speed for accuracy.
 
     Attributes:
         tolerance: largest chord error of the model's road surface, m.

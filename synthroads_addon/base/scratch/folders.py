@@ -103,19 +103,19 @@ def remove_scratch_folders() -> None:
 
 
 def record_folders_in(descriptor: int) -> None:
-    """Have each scratch and output folder that this process makes named in an open file."""
+    """Have each scratch and output folder that this process makes from now on named in an open file."""
     global _journal
     _journal = descriptor
 
 
 def record_folder(folder: Path) -> None:
-    """Name a folder that was just made in the file of `record_folders_in`, if there is one."""
+    """Append the path of a folder that was just made to the file of `record_folders_in`, if there is one."""
     if _journal is not None:
         os.write(_journal, os.fsencode(folder.absolute()) + b"\0")
 
 
 def remove_recorded_folders(descriptor: int) -> None:
-    """Remove what a dead process made and named in an open file: scratch folders, and others that are empty."""
+    """Remove the folders that a dead process named in an open file: scratch folders, and others if empty."""
     paths = os.pread(descriptor, os.fstat(descriptor).st_size, 0).split(b"\0")[:-1]
     for folder in (Path(os.fsdecode(path)) for path in reversed(paths)):
         with suppress(OSError):
@@ -176,7 +176,7 @@ def names_to_move(folder: Path) -> list[str]:
 
 
 def _finish_move(folder: Path) -> bool:
-    """Finish a move out of a scratch folder that was cut off; return whether no old file is in it alone."""
+    """Finish a scratch folder's move that was cut off; return whether the folder may go: no old file is in it alone."""
     aside, target = folder / ASIDE, folder.parent
     if not folder.name.startswith(_IN_OUTPUT) or not aside.is_dir():
         return True

@@ -61,12 +61,12 @@ class Owner:
     space: str = ""
 
     def to_json(self) -> str:
-        """Return the owner as one line of JSON."""
+        """Return the process's identity as one line of JSON."""
         return json.dumps(asdict(self)) + "\n"
 
 
 def read_owner(text: str) -> Owner | None:
-    """Return the owner that a text of `Owner.to_json` names; None where it is damaged or not whole."""
+    """Return the process that a text of `Owner.to_json` names; None where the text is damaged or cut off."""
     try:
         owner = Owner(**json.loads(text))
     except (ValueError, TypeError):
@@ -76,13 +76,13 @@ def read_owner(text: str) -> Owner | None:
 
 
 def this_process(locked: bool = False) -> Owner:
-    """Return the calling process as an owner."""
+    """Return the identity of the calling process."""
     pid = os.getpid()
     return Owner(socket.gethostname(), _boot_id(), pid, _start_of(pid) or 0, locked, _space())
 
 
 def is_dead(owner: Owner, lock: bool | None) -> bool:
-    """Return whether an owner is known to have ended; where that can't be told, it hasn't.
+    """Return whether a process is known to have ended; False where that can't be told.
 
     Args:
         owner: the process.
@@ -139,7 +139,7 @@ def _start_of(pid: int) -> int | None:
 
 
 class LockHeldError(Exception):
-    """A lock file is another process's.
+    """Raised where a lock file is held, or may be, by another process.
 
     Attributes:
         owner: the process, as far as the file says so.

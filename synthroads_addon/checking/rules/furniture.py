@@ -108,7 +108,7 @@ def _phone_spacing(road: Road) -> Iterator[Finding]:
 
 
 def _kilometre_text(road: Road) -> Iterator[Finding]:
-    """Yield the boards whose kilometre doesn't fit the others': kilometres rise or fall with the stations."""
+    """Yield findings for boards that don't fit the others: kilometres rise or fall with the stations."""
     boards = road.of(KilometreBoard)
     if not boards:
         return

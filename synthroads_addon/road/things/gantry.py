@@ -131,7 +131,7 @@ class Gantry(StandingThing):
         return self
 
     def reach(self, facing: float) -> float:
-        """Return how far the beam, and the signs on one side of it (1 or -1), reach along the road from its middle."""
+        """Return how far (m) the beam, and the signs on one side of it (1 or -1), reach along the road."""
         signs = [HANGER + sign.depth for sign in self.signs if sign.facing == facing]
         return self.beam_depth / 2.0 + max(signs, default=0.0)
 
@@ -249,7 +249,7 @@ class Gantry(StandingThing):
         share, wide, longer = HUNG
 
         def block(size: tuple[float, float, float], before: float, beside: float = 0.0, level: float = z) -> Float:
-            """Return a box whose middle is so far (m) before the beam's axis as its traffic sees it."""
+            """Return the sections of a box whose middle is so far (m) before the beam's axis as its traffic sees it."""
             return box(size, (x + beside, -sign.facing * before, level))
 
         board = block((sign.width, sign.depth, sign.height), behind + HANGER + sign.depth / 2.0)

@@ -94,7 +94,7 @@ class Overpass(StandingThing):
 
     @property
     def turn(self) -> float:
-        """Return 0: a skewed bridge is sheared."""
+        """Return 0: the frame of a skewed bridge isn't rotated, its solids are sheared."""
         return 0.0
 
     def twin(self) -> TwinTypes:

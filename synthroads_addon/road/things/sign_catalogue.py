@@ -62,7 +62,7 @@ class SignType(Model):
 
 
 class SignCatalogue(Model):
-    """The file's content."""
+    """The catalogue of traffic signs, as its JSON file holds it."""
 
     colors: dict[str, Color] = Field(description="Colours by name.")
     signs: dict[str, SignType] = Field(description="Signs by their number in the catalogue (VzKat).")

@@ -88,7 +88,7 @@ class TemporaryBarrier(LengthwiseThing):
         return [Body(place + shape @ frame, "reflector", detail=REFLECTOR[1]) for shape, place, frame in pairs]
 
     def footprint(self) -> Iterator[Block]:
-        """Yield nothing: it stands on the pavement and runs obliquely."""
+        """Yield no box: it stands on the pavement and runs obliquely."""
         yield from ()
 
 

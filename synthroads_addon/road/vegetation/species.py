@@ -61,7 +61,7 @@ class PlantShape(NamedTuple):
         return np.stack([_ring(radius, height, _TRUNK_SIDES) for radius, height in rows])
 
     def crown(self) -> Float:
-        """Return the sections (R, K, 3) of its crown: the outline that its branches end on, turned about its stem."""
+        """Return the sections (R, K, 3) of its crown: the outline that its branches end on, revolved about its stem."""
         turn = np.linspace(0.0, 1.0, _ROWS)  # the middle one is where it is widest
         share = turn ** (math.log(self.widest) / math.log(0.5))
         bulge = np.sin(np.pi * turn)

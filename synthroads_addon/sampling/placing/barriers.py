@@ -44,7 +44,7 @@ _IN_SLOT = 0.6  # share of the slots that get one
 
 @dataclass(frozen=True)
 class BarrierSystem:
-    """Barriers of one side: concrete, or steel of one system.
+    """Make of one side's barriers: concrete of one profile, or steel guardrails of one system.
 
     Attributes:
         concrete: profile, height and width of its foot (m); None for guardrails.

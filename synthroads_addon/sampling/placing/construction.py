@@ -37,7 +37,7 @@ _TURNOUT_ROOM = 20.0  # m along the road between a zone and a turnout
 
 
 class Zone(NamedTuple):
-    """A construction zone.
+    """Stations and distances of a construction zone beside one carriageway.
 
     Attributes:
         stations: (4,) where its tapers begin and end, in the order of stations, m.
@@ -56,7 +56,7 @@ class Zone(NamedTuple):
 
 
 def construction_zones(layout: Layout, rng: np.random.Generator) -> tuple[dict[Side, Range], dict[str, RoadObject]]:
-    """Return the carriageways' construction zones (lowest and highest station, m), and what stands in them by id."""
+    """Return the zones' (lowest, highest) stations, m, by carriageway, and what stands in them by id."""
     limits = layout.site.scenario.furniture
     zones: dict[Side, Range] = {}
     objects: dict[str, RoadObject] = {}
@@ -99,7 +99,7 @@ def _draw_zone(layout: Layout, roadside: Roadside, rng: np.random.Generator) -> 
 
 
 def _width_changes(carriageway: Carriageway) -> Iterator[Range]:
-    """Yield stretches along which a width of the carriageway changes."""
+    """Yield the stretches (m) along which a width of the carriageway changes."""
     widths = (carriageway.inner_offset, carriageway.inner_edge_strip_width, *(lane.width for lane in carriageway.lanes))
     for width in (*widths, carriageway.outer_edge_strip_width, carriageway.hard_shoulder_width):
         marks = width_kinks(width)

@@ -36,7 +36,7 @@ _ISLAND_MARGIN = 0.6  # m: to a ramp's inner edge beyond what lies in the island
 
 
 class BarrierPiece(NamedTuple):
-    """A barrier that stands.
+    """A barrier's stretch of road, and the line that its place is counted from.
 
     Attributes:
         start, end: stations, m.
@@ -109,12 +109,12 @@ class Roadside:
 
     @property
     def facing(self) -> float:
-        """Return the rotation (deg) of what faces this carriageway's traffic."""
+        """Return the rotation (deg) of things that face this carriageway's traffic: 0 or 180."""
         return 0.0 if self.traffic > 0 else 180.0
 
     @property
     def towards_road(self) -> Side:
-        """Return the side on which a barrier faces this carriageway."""
+        """Return the side, "left" or "right", on which a barrier faces this carriageway."""
         return "right" if self.sign > 0 else "left"
 
     def ahead(self, station: float, distance: float) -> float:
@@ -196,7 +196,7 @@ class MedianStrip:
 
     @property
     def half_width(self) -> float:
-        """Return the distance of the nearer edge from the centreline, m."""
+        """Return the distance of the nearer carriageway's inner edge from the centreline, m."""
         return min(self.inner.values())
 
     @property

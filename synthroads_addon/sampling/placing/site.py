@@ -69,7 +69,7 @@ class PlacementSite:
         return [item for item in self.turnouts_of(side).values() if item.kind == kind]
 
     def shape(self, turnout: Turnout) -> TurnoutShape:
-        """Return the shape of one of the road's turnouts."""
+        """Return the widths by station (`TurnoutShape`) of one of the road's turnouts."""
         shapes = (shape for section in self.sections.values() for shape in section.turnouts)
         return next(shape for shape in shapes if shape.turnout is turnout)
 
