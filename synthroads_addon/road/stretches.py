@@ -41,14 +41,11 @@ def stretches(length: float, longest: float = LONGEST) -> list[tuple[float, floa
 
 
 def frame_of(geometry: RoadGeometry, start: float, end: float) -> tuple[Float, int]:
-    """Return the frame of a stretch: its origin's local coordinates (3,), m, and the station that it counts from.
+    """Return the local coordinates (3,) of a stretch's scene origin, and the station that its nodes count from, m.
 
     Args:
         geometry: the whole road's.
         start, end: stations, m.
-
-    Returns:
-        the local coordinates (3,) of the scene's origin, and the station that the nodes count theirs from, m.
     """
     middle = np.array([(start + end) / 2.0])
     place = np.array([*geometry.alignment.position(middle)[0], *geometry.profile.elevation(middle)])
