@@ -74,7 +74,7 @@ class EdgeDistances(NamedTuple):
 
 
 class TurnoutEdges:
-    """What a turnout adds to the widths of its carriageway, along the road.
+    """Widths that a turnout adds to its carriageway, along the road.
 
     Along it counts w (m): for an exit from its beginning in the direction of traffic, for an entry backwards from its
     end; so both begin with their taper and end with their ramp. For an emergency bay it counts as for an exit.

@@ -39,7 +39,7 @@ SAME_CROSSFALL = 1e-6
 
 
 class Finding(NamedTuple):
-    """What a rule finds: a `Violation` without the rule's id and unit."""
+    """Finding of a rule: a `Violation` without the rule's id and unit."""
 
     object: str
     station: float
