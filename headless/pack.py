@@ -37,15 +37,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads pack`."""
     _check(arguments)
-    from ml.data.pack import packed_tiles, summary, within
+    from ml.data.pack import choose_tiles, pack_summary, packed_tiles
     from ml.data.packed import write_pack
     from synthroads_addon.base.classes import class_scheme
 
     scheme = class_scheme(arguments.classes)
     every = packed_tiles(arguments.source, arguments.split, scheme, arguments.voxel, arguments.corridor)
-    tiles = within(every, int(arguments.limit_mb * 1e6), arguments.seed)
+    tiles = choose_tiles(every, int(arguments.limit_mb * 1e6), arguments.seed)
     size = write_pack(arguments.output, tiles, scheme, arguments.voxel, arguments.overwrite)
-    packed = summary([tile.notes for tile in tiles], size)
+    packed = pack_summary([tile.notes for tile in tiles], size)
     return 0, packed, f"written {arguments.output}: {contents(packed)}"
 
 

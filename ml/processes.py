@@ -56,7 +56,7 @@ def average(tensors: Sequence[Tensor]) -> None:
 
 
 @contextmanager
-def helpers(run: Run[Any], learn: Callable[[Run[Any]], object], device: torch.device) -> Iterator[None]:
+def helper_processes(run: Run[Any], learn: Callable[[Run[Any]], object], device: torch.device) -> Iterator[None]:
     """Context in which the configuration's further processes run ``learn(run)``, joined by torch.distributed.
 
     Args:
@@ -82,7 +82,7 @@ def helpers(run: Run[Any], learn: Callable[[Run[Any]], object], device: torch.de
         for other in others:
             other.start()
         done = Event()
-        Thread(target=_end_without, args=(others, done), daemon=True).start()
+        Thread(target=_exit_if_lost, args=(others, done), daemon=True).start()
         try:
             _join(meeting, 0, count, device.type)
             yield
@@ -102,7 +102,7 @@ def helpers(run: Run[Any], learn: Callable[[Run[Any]], object], device: torch.de
                 distributed.destroy_process_group()
 
 
-def _end_without(others: Sequence[Any], done: Event) -> None:
+def _exit_if_lost(others: Sequence[Any], done: Event) -> None:
     """Watch the other processes (in a thread); 60 s after one has failed, exit this one with code 2 if it hangs.
 
     NCCL waits for a lost process up to `_PATIENCE`, and nothing that is raised meanwhile reaches it.

@@ -116,11 +116,11 @@ class Run(Generic[C]):
     def record(self, figures: Mapping[str, float]) -> None:
         """Append an epoch's figures to the history, and write the history's file."""
         self.history.append({name: float(value) for name, value in figures.items()})
-        write_file(self.folder / HISTORY, canonical_json(plain(self.history)).encode(), overwrite=True)
+        write_file(self.folder / HISTORY, canonical_json(to_json_data(self.history)).encode(), overwrite=True)
 
     def write_metrics(self, metrics: Mapping[str, Any]) -> None:
         """Write the trained model's metrics as JSON, and the history's curves as a PNG."""
-        write_file(self.folder / METRICS, canonical_json(plain(dict(metrics))).encode(), overwrite=True)
+        write_file(self.folder / METRICS, canonical_json(to_json_data(dict(metrics))).encode(), overwrite=True)
         if self.history:
             write_file(self.folder / CURVES, _curves(self.history), overwrite=True)
 
@@ -151,12 +151,12 @@ def lasting_data(configuration: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in configuration.items() if name not in FREE_WHEN_RESUMING}
 
 
-def plain(value: Any) -> Any:
+def to_json_data(value: Any) -> Any:
     """Return a copy of nested data as JSON can hold it: NaN and infinity become None, tuples lists, keys strings."""
     if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
+        return {str(key): to_json_data(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
+        return [to_json_data(item) for item in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

@@ -46,8 +46,8 @@ from ml.scores.evaluation import (  # noqa: E402
     Case,
     Cropping,
     Predictor,
-    case,
     evaluate,
+    make_case,
     mask_points,
     measure,
     skeleton_predictor,
@@ -283,7 +283,7 @@ def searched(shown: Sequence[Case], masks: Sequence[str], file: Path) -> GridSea
 
 def shown_by(roads: Sequence[LearningRoad], cropping: Cropping | None, estimated: bool) -> Callable[[int], list[Case]]:
     """Return what shows the roads as a seed has them."""
-    return lambda seed: [case(road, seed, cropping=cropping, estimated=estimated) for road in roads]
+    return lambda seed: [make_case(road, seed, cropping=cropping, estimated=estimated) for road in roads]
 
 
 def synthetic(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Model]]) -> dict[str, str]:
@@ -354,7 +354,7 @@ def recalibrated(
     found: dict[str, list[Predictor]] = {}
     for name, versions in learned.items():
         for seed, version in zip(seeds, versions, strict=False):
-            shown = [case(road, seed, cropping=None, estimated=False) for road in roads]
+            shown = [make_case(road, seed, cropping=None, estimated=False) for road in roads]
             again, _ = version.calibrate((one.road, one.frames) for one in shown)  # type: ignore[attr-defined]
             found.setdefault(f"{name}, recalibrated", []).append(again)
     return found
@@ -401,7 +401,7 @@ def real(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Model]]) 
     titles = {name: title for name, (title, _) in REAL_ROADS.items()}
     result = {}
     for table, cropping in CROPPINGS.items():
-        shown = case(roads[TUNED_ON], arguments.seeds[0], cropping=cropping, estimated=True)
+        shown = make_case(roads[TUNED_ON], arguments.seeds[0], cropping=cropping, estimated=True)
         search = searched([shown], ["ground", "dark"], arguments.output / f"skeleton-{table}.json")
         measured = measure_real(arguments.seeds, roads, cropping, trained, search)
         tables.write_tables(arguments.output, table, measured)
@@ -462,7 +462,7 @@ def draw_synthetic(
     arguments: argparse.Namespace, road: LearningRoad, versions: Mapping[str, Sequence[Predictor]], search: GridSearch
 ) -> None:
     """Draw centrelines and a corridor over a synthetic road."""
-    shown = case(road, arguments.seeds[0], cropping=None, estimated=False)
+    shown = make_case(road, arguments.seeds[0], cropping=None, estimated=False)
     learned = {name: several[0] for name, several in versions.items()}
     view = middle(road, 160.0)
     draw_lines(arguments.pictures / "centerline-lines.png", shown, learned, search, view, f"synthetic road {road.name}")
@@ -478,7 +478,7 @@ def draw_real(
 ) -> None:
     """Draw centrelines over a real road with cropped slices."""
     kind = REAL_ROADS[road.name][1]
-    shown = case(road, arguments.seeds[0], cropping=CROPPINGS["real-slices"], estimated=True)
+    shown = make_case(road, arguments.seeds[0], cropping=CROPPINGS["real-slices"], estimated=True)
     fit = of_kind(trained, kind, len(arguments.seeds), road.name)
     learned = {name: several[0] for name, several in fit.items()}
     title = f"real road, {REAL_ROADS[road.name][0]}, both sides of every slice cropped"

@@ -22,11 +22,11 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from headless.marked_documents import fill  # noqa: E402
-from ml.data.pack import CROP, summary  # noqa: E402
+from ml.data.pack import CROP, pack_summary  # noqa: E402
 from ml.data.packed import PackReader  # noqa: E402
 from ml.data.sources import Source  # noqa: E402
 from ml.runs import HISTORY, METRICS, PRETRAINING, Run  # noqa: E402
-from ml.scores.confusion import by_class, by_test  # noqa: E402
+from ml.scores.confusion import table_by_class, tables_by_test  # noqa: E402
 from ml.scores.metrics import Spread, finite_values  # noqa: E402
 from ml.scores.pictures import comparison  # noqa: E402
 from ml.segmentation.experiment import RESULTS  # noqa: E402
@@ -49,7 +49,7 @@ def small(folder: Path) -> str:
     name, scores = next(iter(metrics["tests"].items()))
     seconds = sum(epoch["seconds"] for epoch in read_json(folder / HISTORY))
     told = f"{metrics['parameters']:,} weights, trained in {seconds:,.0f} s on {metrics['device']}, scored on: {name}."
-    return f"{by_class([scores])}\n\n{told}"
+    return f"{table_by_class([scores])}\n\n{told}"
 
 
 def experiment(folder: Path) -> str:
@@ -59,7 +59,7 @@ def experiment(folder: Path) -> str:
         name: [training_seconds(folder / name / f"seed-{seed}") for seed in seeds] for name, seeds in results.items()
     }
     cells = " | ".join(Spread.over(finite_values(values)).text(0, "-") for values in seconds.values() if values)
-    return by_test(results, [f"| *training, s* |  | {cells} |"])
+    return tables_by_test(results, [f"| *training, s* |  | {cells} |"])
 
 
 def training_seconds(run: Path) -> float:
@@ -86,7 +86,7 @@ def real(runs: Sequence[Path], folder: Path, pictures: Path) -> dict[str, str]:
     note = {
         name: f"{scores[0]['ignored']:,} points without such a class don't count." for name, scores in found.items()
     }
-    return {f"real-{name}": f"{by_class(scores)}\n\n{note[name]}" for name, scores in found.items()}
+    return {f"real-{name}": f"{table_by_class(scores)}\n\n{note[name]}" for name, scores in found.items()}
 
 
 def prediction(file: Path) -> str:
@@ -100,7 +100,7 @@ def prediction(file: Path) -> str:
 
 def packed(file: Path) -> str:
     """Return what a packed file holds as a table."""
-    told = summary(PackReader(file).notes, file.stat().st_size)
+    told = pack_summary(PackReader(file).notes, file.stat().st_size)
     head = ("file (MB)", "roads", "tiles", "points", "bytes per point", f"crops of {CROP:,} points")
     cells = (f"{told['bytes'] / 1e6:.1f}", *(f"{told[name]:,}" for name in ("scenes", "tiles", "points")))
     return _table(head, [*cells, f"{told['bytes_per_point']:.2f}", f"{told['crops']:,}"])

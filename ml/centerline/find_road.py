@@ -11,7 +11,7 @@ from synthroads_addon.base.progress import Progress, silent
 
 from ..data.axis import MeasuredAxis
 from ..data.corridor import CORRIDOR
-from ..data.frames import along
+from ..data.frames import frames_along
 from ..data.strips import find_ground, path_through, strips
 from ..networks.centerline.models import TARGETS
 from .predictor import CenterlinePredictor, Regression
@@ -35,7 +35,7 @@ def find_road(
     """
     ground = find_ground(cloud, progress)
     line = line or path_through(ground)
-    frames = along(line, predictor.settings.frame_spacing)
+    frames = frames_along(line, predictor.settings.frame_spacing)
     shape = (len(frames), len(TARGETS))
     value, raw, std = (np.full(shape, np.nan) for _ in range(3))
     widths = np.full((*shape, 2), np.nan)
@@ -47,11 +47,11 @@ def find_road(
         value[number, _HEIGHT] += road.origin[2]
         raw[number], std[number], widths[number] = found.raw_std[own], found.std[own], found.widths[own]
         progress("finding the road", float(number[-1] + 1) / len(frames) if len(number) else 0.0)
-    kept = _span(value[:, 0])
+    kept = _found_span(value[:, 0])
     return Regression(frames.select(kept), value[kept], raw[kept], std[kept], widths[kept], ground.header.epsg)
 
 
-def _span(center: Float) -> slice:
+def _found_span(center: Float) -> slice:
     """Return the slice from the first to the last frame whose `center` isn't NaN; of all frames if all are NaN."""
     there = np.flatnonzero(np.isfinite(center))
     return slice(int(there[0]), int(there[-1]) + 1) if len(there) else slice(None)
@@ -63,7 +63,7 @@ UNITS = {"lanes": "1", "heading": "rad"}
 """All other numbers are in metres."""
 
 
-def geojson(found: Regression, name: str, spacing: float) -> dict[str, Any]:
+def centerline_geojson(found: Regression, name: str, spacing: float) -> dict[str, Any]:
     """Return centreline and pavement edges as a GeoJSON FeatureCollection, one LineString per stretch without a gap.
 
     Each has, per vertex, its station along the path, its standard deviation across the road and the half-widths of the

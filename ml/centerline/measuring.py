@@ -24,16 +24,16 @@ from ..scores.evaluation import (
     Case,
     Cropping,
     Predictor,
-    case,
+    make_case,
     measure,
     skeleton_predictor,
     trivial_predictors,
 )
-from ..scores.metrics import figures, or_none
+from ..scores.metrics import figures, nan_to_none
 from ..scores.pictures import PictureView, corridor_picture, lines_picture
 from ..scores.tables import as_data, report, write_tables
 from ..tasks import Evaluation
-from .predictor import CenterlinePredictor, errors
+from .predictor import CenterlinePredictor, target_errors
 
 if TYPE_CHECKING:
     from .task import CenterlineConfiguration
@@ -76,7 +76,7 @@ def measure_run(
         progress("drawing", number / min(len(shown), PICTURES))
         files += _draw(evaluation.output, one, predictor, name)
     found = {"corridor": corridor, "tables": as_data(measured), "files": files}
-    means = {figure: or_none(spread.mean) for figure, spread in measured[name]["all"].items()}
+    means = {figure: nan_to_none(spread.mean) for figure, spread in measured[name]["all"].items()}
     return {"roads": len(shown), **means, **found}, report(measured, corridor)
 
 
@@ -97,10 +97,10 @@ def read_cases(
             cache = Path(configuration.data.cache) if configuration.data.cache else None
             for folder in scene_folders(path, evaluation.split):
                 for road in read_scene(folder, settings.truth, cache):
-                    shown.append(case(road, seed, cropping=None, estimated=False, settings=settings))
+                    shown.append(make_case(road, seed, cropping=None, estimated=False, settings=settings))
         else:
-            road = _measure_case(path, settings.truth)
-            shown.append(case(road, seed, cropping=Cropping(), estimated=True, settings=settings))
+            road = _read_measured_case(path, settings.truth)
+            shown.append(make_case(road, seed, cropping=Cropping(), estimated=True, settings=settings))
     if not shown:
         names = ", ".join(str(path) for path in evaluation.data)
         raise InputError("data", names, f"holds no road with a {settings.truth} of the kind that was learned")
@@ -112,7 +112,7 @@ def corridor_figures(predictor: CenterlinePredictor, shown: Sequence[Case]) -> d
     error, std, wide = [], [], []
     for one in shown:
         found = predictor.regress(one.road, one.frames)
-        error.append(errors(found, one.road.known_truth))
+        error.append(target_errors(found, one.road.known_truth))
         std.append(found.std)
         wide.append(found.widths)
     every, deviation, widths = np.concatenate(error), np.concatenate(std), np.concatenate(wide)
@@ -121,11 +121,11 @@ def corridor_figures(predictor: CenterlinePredictor, shown: Sequence[Case]) -> d
         known = np.isfinite(every[:, index]) & np.isfinite(deviation[:, index])
         size = np.abs(every[known, index])
         target = TargetErrors(size, deviation[known, index], widths[known, index], name == "lanes")
-        rows[name] = {figure: or_none(value) for figure, value in figures(TARGET_METRICS, target).items()}
+        rows[name] = {figure: nan_to_none(value) for figure, value in figures(TARGET_METRICS, target).items()}
     return rows
 
 
-def _measure_case(cloud: Path, truth: TruthKind) -> LearningRoad:
+def _read_measured_case(cloud: Path, truth: TruthKind) -> LearningRoad:
     found = [cloud.with_name(cloud.stem + ending) for ending in AXIS_ENDINGS]
     there = [path for path in found if path.is_file()]
     if not cloud.exists():

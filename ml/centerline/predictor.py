@@ -98,7 +98,7 @@ class CenterlinePredictor:
 
         A frame in several sequences has the mean of what they say, weighted by the inverse variances. Its variance is
         their mean as well, since errors of the same points don't average out. Where sequences are interleaved, lines
-        are `join_line`.
+        are `smooth_line`.
         """
         mean, raw = self._regress(road, frames)
         calibration = [self.calibration[name] for name in TARGETS]
@@ -124,7 +124,7 @@ class CenterlinePredictor:
         reach = interleave_count(frames, self.settings.spacing)
         for line in LINES:
             column = TARGETS.index(line)
-            mean[:, column] = join_line(frames, mean[:, column], raw[:, column], reach)
+            mean[:, column] = smooth_line(frames, mean[:, column], raw[:, column], reach)
         return mean, raw
 
     def calibrate(self, shown: Iterable[tuple[LearningRoad, Frames]]) -> tuple[CenterlinePredictor, Float]:
@@ -142,7 +142,7 @@ class CenterlinePredictor:
         error, raw = [], []
         for road, frames in shown:
             found = self.regress(road, frames)
-            error.append(errors(found, road.known_truth))
+            error.append(target_errors(found, road.known_truth))
             raw.append(found.raw_std)
         every = np.concatenate(error)
         other = copy(self)
@@ -167,7 +167,7 @@ class CenterlinePredictor:
             yield some.flatten(), batch["frame"][..., 3].flatten().cpu().numpy(), filled, values, deviations
 
 
-def join_line(frames: Frames, y: Float, std: Float, reach: int) -> Float:
+def smooth_line(frames: Frames, y: Float, std: Float, reach: int) -> Float:
     """Return y (M,) of a line, m, smoothed by weighted local lines where neighbouring frames come from other sequences.
 
     Each is that of the straight line through the places in fewer than ``reach`` frames to either side, weighted by the
@@ -203,7 +203,7 @@ def _crossing_of(one: Float, x: Float, y: Float, xx: Float, xy: Float) -> Float:
     return np.divide(y - slope * x, one, out=np.full_like(one, np.nan), where=one > 0.0)
 
 
-def errors(found: Regression, truth: Truth) -> Float:
+def target_errors(found: Regression, truth: Truth) -> Float:
     """Return the regressed targets minus the truth (M, T), in the targets' units; NaN where either is missing."""
     there = truth.at(found.frames)
     return found.value - np.column_stack([there.center, there.corridor])

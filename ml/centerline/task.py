@@ -17,21 +17,21 @@ from synthroads_addon.base.progress import Progress, silent
 from synthroads_addon.base.schema import canonical_json, read_json
 
 from ..configuration import Configuration
-from ..data.batches import Batches, BatchOptions, DataOptions, Roads, fixed_batches, quiet, read_roads
+from ..data.batches import Batches, BatchOptions, DataOptions, Roads, crop_only_effects, fixed_batches, read_roads
 from ..data.effects import SequenceEffects
 from ..data.frames import read_path
 from ..data.slices import Batch, SliceSettings
 from ..networks.centerline.losses import LossOptions, centerline_loss
 from ..networks.centerline.models import TARGETS, CenterlineModel, ModelOptions, all_targets
 from ..networks.centerline.transformer import TransformerOptions
-from ..processes import helpers
+from ..processes import helper_processes
 from ..registry import network_union
-from ..runs import CALIBRATION, Run, plain, stream_seed
+from ..runs import CALIBRATION, Run, stream_seed, to_json_data
 from ..scores.calibration import DEVIATIONS, IntervalCalibration
-from ..scores.evaluation import Cropping, case
+from ..scores.evaluation import Cropping, make_case
 from ..tasks import Evaluation, Prediction
 from ..training_loop import chosen_device, fit, move_to_device
-from .find_road import corridor_json, find_road, geojson
+from .find_road import centerline_geojson, corridor_json, find_road
 from .measuring import measure_run
 from .predictor import CenterlinePredictor, UseOptions
 
@@ -66,7 +66,7 @@ CONFIGURATION = CenterlineConfiguration
 
 def train(run: Run[CenterlineConfiguration], progress: Progress = silent) -> dict[str, Any]:
     """Train a model, calibrate its deviations on the validation roads, save both in the run; return the metrics."""
-    with helpers(run, train_network, chosen_device(run.configuration)):
+    with helper_processes(run, train_network, chosen_device(run.configuration)):
         model, roads = train_network(run, progress)
     progress("calibrating", 0.0)
     metrics = calibrate(run, model, roads)
@@ -112,7 +112,7 @@ def evaluate(
     Raises:
         InputError: the run isn't finished, or the data hold no road with a known centreline.
     """
-    return measure_run(run.configuration, predictor(run), evaluation, progress)
+    return measure_run(run.configuration, load_predictor(run), evaluation, progress)
 
 
 def predict(run: Run[CenterlineConfiguration], prediction: Prediction, progress: Progress = silent) -> dict[str, Any]:
@@ -128,13 +128,13 @@ def predict(run: Run[CenterlineConfiguration], prediction: Prediction, progress:
     for path in (lines, corridor):
         if path.exists() and not prediction.overwrite:
             raise OutputError("--output", str(path), "is there already; --overwrite replaces it")
-    ready = predictor(run)
+    ready = load_predictor(run)
     line = None if prediction.path is None else read_path(prediction.path)
     found = find_road(ready, prediction.cloud, line, progress)
     name = prediction.cloud.stem
-    text = canonical_json(geojson(found, name, ready.settings.frame_spacing))
+    text = canonical_json(centerline_geojson(found, name, ready.settings.frame_spacing))
     calibration = {name: one.to_dict() for name, one in ready.calibration.items()}
-    table = canonical_json(plain(corridor_json(found, calibration)))
+    table = canonical_json(to_json_data(corridor_json(found, calibration)))
     write_file(lines, text.encode(), overwrite=prediction.overwrite)
     write_file(corridor, table.encode(), overwrite=prediction.overwrite)
     there = np.isfinite(found.value[:, 0])
@@ -146,7 +146,7 @@ def predict(run: Run[CenterlineConfiguration], prediction: Prediction, progress:
     }
 
 
-def predictor(run: Run[CenterlineConfiguration]) -> CenterlinePredictor:
+def load_predictor(run: Run[CenterlineConfiguration]) -> CenterlinePredictor:
     """Load a run's trained and calibrated centreline model.
 
     Raises:
@@ -191,7 +191,7 @@ def _first_model(configuration: CenterlineConfiguration) -> CenterlineModel:
 
 def _validation(configuration: CenterlineConfiguration, roads: Roads) -> Any:
     """Return a function (model, epoch) -> mean absolute error (m) and coverage of the centre on fixed sequences."""
-    crop = quiet(configuration.effects.crop)
+    crop = crop_only_effects(configuration.effects.crop)
     count = configuration.batches.validation
     known = [*roads.validation, *roads.measured_validation]
     batches = fixed_batches(known, configuration.slices, crop, count, configuration.seed)
@@ -217,14 +217,15 @@ def calibrate(run: Run[CenterlineConfiguration], model: CenterlineModel, roads: 
     configuration = run.configuration
     seed, settings = configuration.seed, configuration.slices
     ready = CenterlinePredictor(model, settings, configuration.use)
-    shown = [case(road, seed, cropping=None, estimated=False, settings=settings) for road in roads.validation]
+    shown = [make_case(road, seed, cropping=None, estimated=False, settings=settings) for road in roads.validation]
     # Strips that were cut around their axis beforehand: the middle of the strip must not be the answer.
     shown += [
-        case(road, seed, cropping=Cropping(), estimated=True, settings=settings) for road in roads.measured_validation
+        make_case(road, seed, cropping=Cropping(), estimated=True, settings=settings)
+        for road in roads.measured_validation
     ]
     calibrated, error = ready.calibrate((one.road, one.frames) for one in shown)
     found = calibrated.calibration
-    data = plain({name: one.to_dict() for name, one in found.items()})
+    data = to_json_data({name: one.to_dict() for name, one in found.items()})
     write_file(run.folder / CALIBRATION, canonical_json(data).encode(), overwrite=True)
     center = found["center"]
     return {

@@ -94,8 +94,8 @@ def read_roads(data: DataOptions, truth: TruthKind, progress: Progress = silent)
         MissingFileError, InputError: a file or folder is missing or damaged, or holds nothing of use.
     """
     cache = Path(data.cache) if data.cache else None
-    train = _scenes(data.data_sets, data.train_split, truth, cache, progress)
-    validation = _scenes(data.data_sets, data.validation_split, truth, cache, progress)
+    train = _read_scenes(data.data_sets, data.train_split, truth, cache, progress)
+    validation = _read_scenes(data.data_sets, data.validation_split, truth, cache, progress)
     measured = [_read_measured_road(road, truth) for road in data.measured]
     measured_validation = [_read_measured_road(road, truth) for road in data.measured_validation]
     if not train and not measured:
@@ -173,13 +173,13 @@ def fixed_batches(
     return [collate(samples[first : first + 32]) for first in range(0, len(samples), 32)]
 
 
-def quiet(crop: SequenceCrop) -> SequenceEffects:
+def crop_only_effects(crop: SequenceCrop) -> SequenceEffects:
     """Return effects that crop the slices' sides as `crop` says and are off otherwise."""
     strengths = [name for name, field in SequenceEffects.model_fields.items() if field.annotation is float]
     return SequenceEffects(crop=crop, gamma=(1.0, 1.0), **dict.fromkeys(strengths, 0.0))
 
 
-def _scenes(
+def _read_scenes(
     data_sets: Sequence[str], split: str, truth: TruthKind, cache: Path | None, progress: Progress
 ) -> list[LearningRoad]:
     folders = [folder for data_set in data_sets for folder in scene_folders(Path(data_set), split)]

@@ -157,7 +157,7 @@ def crop_of(tile: CloudTile, scaling: Scaling) -> Crop:
     return Crop(tile.coord, None if tile.strength is None else scaling.apply(tile.strength), color, tile.segment)
 
 
-def item(crop: Crop, settings: CropSettings, random: np.random.Generator) -> Item:
+def make_item(crop: Crop, settings: CropSettings, random: np.random.Generator) -> Item:
     """Return a crop as a dictionary of tensors (see the module), centred; noise stands for missing features.
 
     It is centred on the mean of x and y and the median of z. What is missing is small noise from ``random``.
@@ -193,7 +193,7 @@ def _draw_crop(crops: CropDataset | CropStream, place: int, random: np.random.Ge
     tile = crops.tiles[number]
     crop = cut_crop(tile, tile.coord[point], crops.settings.points, crops.scalings[tile.scene])
     apply_effects("segmentation", crop, crops.effects, random)
-    return item(crop, crops.settings, random)
+    return make_item(crop, crops.settings, random)
 
 
 def collate(items: Sequence[Item]) -> Item:

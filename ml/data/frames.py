@@ -66,7 +66,7 @@ class Frames:
         return Frames(self.position[::-1], self.direction[::-1] + np.pi, self.station[::-1])
 
 
-def along(path: MeasuredAxis, spacing: float = SPACING, reach: float = 5.0) -> Frames:
+def frames_along(path: MeasuredAxis, spacing: float = SPACING, reach: float = 5.0) -> Frames:
     """Return frames every ``spacing`` along a path, none in its gaps.
 
     Args:
@@ -90,14 +90,14 @@ def displace_frames(
         direction_deg: standard deviation of the error of direction beside what the deviation's own slope makes, deg.
         length: correlation length of the deviation, m; that of the error of direction is a third of it.
     """
-    share, slope = wander(frames.station, rng, length)
-    error, _ = wander(frames.station, rng, length / 3.0)
+    share, slope = random_deviation(frames.station, rng, length)
+    error, _ = random_deviation(frames.station, rng, length / 3.0)
     # A uniform share as a normal deviate, cut at two standard deviations.
     turn = np.deg2rad(direction_deg) * np.clip(np.sqrt(12.0) * error, -2.0, 2.0)
     return Frames(frames.at(window * share), frames.direction + np.arctan(window * slope) + turn, frames.station)
 
 
-def wander(station: Float, rng: np.random.Generator, length: float) -> tuple[Float, Float]:
+def random_deviation(station: Float, rng: np.random.Generator, length: float) -> tuple[Float, Float]:
     """Return smooth random values (M,) along stations (m), uniform in -0.5 to 0.5, and their slope (M,), 1/m.
 
     A Gaussian process of cosines with random wavelengths (Rahimi and Recht, "Random features", 2007; correlation length

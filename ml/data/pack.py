@@ -55,7 +55,7 @@ def corridor_tiles(
         for block in labelled_blocks(cloud, scheme, Source(path=str(clouds[0]))):
             away, _ = tree.query(block.xyz[:, :2], distance_upper_bound=corridor)
             grid.add(block.select(np.isfinite(away)))
-        blocks = [_lean(block) for block in grid.blocks()]
+        blocks = [_drop_unpacked_layers(block) for block in grid.blocks()]
     if not blocks:
         return
     points = concatenate(blocks)
@@ -67,7 +67,7 @@ def corridor_tiles(
             yield tile_of(part, scene.name, np.floor(part.xyz.min(axis=0)), scale)
 
 
-def _lean(block: PointBlock) -> PointBlock:
+def _drop_unpacked_layers(block: PointBlock) -> PointBlock:
     """Return a copy of the block without the layers that packed files don't hold (normals, materials, ...)."""
     block = replace(block, normal=None, material=None, scanner=None, true_range=None, true_xyz=None)
     return replace(block, roughness=None, metallic=None, specular=None, color_source=None)
@@ -87,7 +87,7 @@ def packed_tiles(
             yield pack_tile(tile)
 
 
-def within(tiles: Iterable[Packed], limit: int, seed: int) -> list[Packed]:
+def choose_tiles(tiles: Iterable[Packed], limit: int, seed: int) -> list[Packed]:
     """Return a random choice of tiles that fits into `limit` bytes, equally many per scene, in the given order.
 
     Args:
@@ -112,7 +112,7 @@ def within(tiles: Iterable[Packed], limit: int, seed: int) -> list[Packed]:
     return [given[place] for place in sorted(chosen)]
 
 
-def summary(notes: Sequence[Mapping[str, Any]], size: int) -> dict[str, Any]:
+def pack_summary(notes: Sequence[Mapping[str, Any]], size: int) -> dict[str, Any]:
     """Return a packed file's counts as JSON data: bytes, tiles, scenes, points, bytes per point and crops' worth.
 
     Args:

@@ -50,7 +50,7 @@ class Packed:
     content: bytes
 
 
-def words_of(tile: CloudTile) -> tuple[NDArray[np.uint64], NDArray[np.int32], Int]:
+def encode_words(tile: CloudTile) -> tuple[NDArray[np.uint64], NDArray[np.int32], Int]:
     """Return a tile's points as 64-bit words (N,) sorted by cube, the cubes' indices (B, 3) and point counts (B,).
 
     Raises:
@@ -86,7 +86,7 @@ def _fields(tile: CloudTile, inside: Int) -> Iterator[tuple[AnyArray, int]]:
 
 def pack_tile(tile: CloudTile) -> Packed:
     """Return a non-empty tile quantised to 8 bytes per point and compressed."""
-    word, cubes, counts = words_of(tile)
+    word, cubes, counts = encode_words(tile)
     planes = np.ascontiguousarray(word.astype("<u8").view(np.uint8).reshape(-1, 8).T)
     content = cubes.astype("<i4").tobytes() + counts.astype("<i4").tobytes() + planes.tobytes()
     notes = {

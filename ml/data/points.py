@@ -103,7 +103,7 @@ def read_ground(path: Path) -> Points:
     raise InputError(str(path), None, f"holds classes, but none of {', '.join(GROUND_CLASSES)}")
 
 
-def full_color(largest: int) -> float:
+def full_brightness(largest: int) -> float:
     """Return the stored value of full brightness, 65535 or 255, from the cloud's largest: some files store 8 bits."""
     return SIXTEEN_BITS if largest > _EIGHT_BITS else _EIGHT_BITS
 
@@ -125,7 +125,7 @@ def points_of(header: CloudHeader, blocks: Sequence[PointBlock], largest: int | 
         origin=origin,
         xyz=xyz - origin,
         intensity=(intensity * ((header.intensity_scale or 1.0) / SIXTEEN_BITS)).astype(np.float32),
-        rgb=(rgb / full_color(largest)).astype(np.float32),
+        rgb=(rgb / full_brightness(largest)).astype(np.float32),
         class_id=class_id,
         class_names=header.scheme.names(),
         has_color=header.has_color and largest > 0,
@@ -133,7 +133,7 @@ def points_of(header: CloudHeader, blocks: Sequence[PointBlock], largest: int | 
     )
 
 
-def thin(coord: NDArray[np.floating[Any]], cell: float) -> Index:
+def voxel_sample(coord: NDArray[np.floating[Any]], cell: float) -> Index:
     """Return the ascending indices of one point per occupied cell of a cubic grid: the nearest to the cell's centre.
 
     Of equally near points the first counts.

@@ -185,7 +185,7 @@ def read_scene(folder: Path, kind: TruthKind, cache: Path | None = None) -> list
         reference = truths(parameters, "road", points.origin)[0].axis
         whole = LearningRoad.of_points(folder.name, points, reference)
         if cache:
-            _keep(whole, folder, cache)
+            _write_cache(whole, folder, cache)
     found = truths(parameters, kind, whole.origin)
     names = [folder.name] if len(found) == 1 else [f"{folder.name}-{number + 1}" for number in range(len(found))]
     return [replace(whole, name=name, truth=truth) for name, truth in zip(names, found, strict=True)]
@@ -258,7 +258,7 @@ def _cache_folder(folder: Path, cache: Path) -> Path:
     return cache / f"{folder.name}-{hashlib.sha256(made_from.encode()).hexdigest()[:16]}"
 
 
-def _keep(road: LearningRoad, folder: Path, cache: Path) -> None:
+def _write_cache(road: LearningRoad, folder: Path, cache: Path) -> None:
     """Write a road's arrays to its folder in the cache, replacing damaged ones, atomically.
 
     Raises:

@@ -125,12 +125,12 @@ class SliceDataset(Dataset[Sample]):
         axis = road.known_truth.axis
         exact = Frames(axis.position(station), axis.direction(station), station)
         path = displace_frames(exact, rng, settings.window, settings.direction_deg, settings.wander_length)
-        cut = stretch(road, path, settings)
+        cut = cut_stretch(road, path, settings)
         if self.effects is not None:
             apply_effects("centerline", cut, self.effects, rng, before_thinning=True)
-            thin(cut, settings.points_per_slice, rng)
+            thin_slices(cut, settings.points_per_slice, rng)
             apply_effects("centerline", cut, self.effects, rng)
-        return sample(cut, settings, rng, number, np.arange(settings.slices))
+        return make_sample(cut, settings, rng, number, np.arange(settings.slices))
 
 
 @dataclass(eq=False)
@@ -179,11 +179,11 @@ class FrameSlices(Dataset[Sample]):
         run = self.runs[number]
         chosen = self.frames.select(run)
         place = int(np.floor(1000.0 * chosen.station[0])) & 0xFFFFFFFF
-        cut = stretch(self.road, chosen, self.settings)
-        return sample(cut, self.settings, stream(0, "frames", place), 0, run)
+        cut = cut_stretch(self.road, chosen, self.settings)
+        return make_sample(cut, self.settings, stream(0, "frames", place), 0, run)
 
 
-def stretch(road: LearningRoad, frames: Frames, settings: SliceSettings) -> Stretch:
+def cut_stretch(road: LearningRoad, frames: Frames, settings: SliceSettings) -> Stretch:
     """Return the sequence of slices at some frames: the road's points in them, in frame coordinates, and the truth.
 
     Where the truth is a carriageway's, points beyond the middle of the median are left out, see `Truth.room`.
@@ -216,9 +216,9 @@ def stretch(road: LearningRoad, frames: Frames, settings: SliceSettings) -> Stre
     return cut
 
 
-def sample(cut: Stretch, settings: SliceSettings, rng: np.random.Generator, road: int, number: Index) -> Sample:
+def make_sample(cut: Stretch, settings: SliceSettings, rng: np.random.Generator, road: int, number: Index) -> Sample:
     """Return a sequence as a dictionary of tensors (see the module); thins `cut` to `points_per_slice`, in place."""
-    thin(cut, settings.points_per_slice, rng)
+    thin_slices(cut, settings.points_per_slice, rng)
     ends = np.searchsorted(cut.number, np.arange(len(cut.center)), side="right")
     height = _medians(cut.coord[:, 2], ends)
     coord: Float = cut.coord - np.column_stack([np.zeros((len(cut.number), 2)), height[cut.number]])
@@ -271,7 +271,7 @@ def _starts(road: LearningRoad, number: int, settings: SliceSettings) -> list[tu
     return [(number, low, high - length) for low, high in parts.tolist() if high - low >= length]
 
 
-def thin(cut: Stretch, most: int, rng: np.random.Generator) -> None:
+def thin_slices(cut: Stretch, most: int, rng: np.random.Generator) -> None:
     """Drop random points so that each slice keeps at most ``most``, in place."""
     counts = np.bincount(cut.number, minlength=len(cut.center))
     if counts.max() <= most:

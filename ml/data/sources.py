@@ -26,7 +26,7 @@ from synthroads_addon.dataset.tiles import TileSorter
 from ..configuration import Part
 from .classes import IGNORED, LabelMapping, class_names, load_mapping, table_between
 from .packed import PackReader
-from .points import thin
+from .points import voxel_sample
 from .tiles import CloudTile, eight_bits
 
 FULL = 65535.0
@@ -76,7 +76,7 @@ def read_tiles(source: Source, scheme: ClassScheme, voxel: float | None) -> Iter
         raise MissingFileError(str(path), None, "no such file or folder of labelled points")
     for tile in tiles:
         try:
-            kept = slice(None) if voxel is None else thin(tile.coord, voxel)
+            kept = slice(None) if voxel is None else voxel_sample(tile.coord, voxel)
         except ValueError:
             raise InputError(str(path), None, f"a tile of {tile.scene} is too large for cells of {voxel:g} m") from None
         yield tile.select(kept)

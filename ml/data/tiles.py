@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from synthroads_addon.base.arrays import AnyArray, Float, Float32, Int, UInt8
 
 from .classes import IGNORED
-from .points import full_color, thin
+from .points import full_brightness, voxel_sample
 
 
 @dataclass(frozen=True)
@@ -56,9 +56,9 @@ def eight_bits(rgb: AnyArray, largest: int) -> UInt8:
 
     Args:
         rgb: as they are stored.
-        largest: of all values of the cloud, see `full_color`.
+        largest: of all values of the cloud, see `full_brightness`.
     """
-    return np.rint(rgb * (255.0 / full_color(largest))).astype(np.uint8)
+    return np.rint(rgb * (255.0 / full_brightness(largest))).astype(np.uint8)
 
 
 @dataclass(frozen=True)
@@ -101,5 +101,5 @@ def scalings(tiles: Sequence[CloudTile], kind: str, voxel: float | None = None) 
     for tile in tiles:
         found = parts.setdefault(tile.scene, [])
         if tile.strength is not None:
-            found.append(tile.strength if voxel is None else tile.strength[thin(tile.coord, voxel)])
+            found.append(tile.strength if voxel is None else tile.strength[voxel_sample(tile.coord, voxel)])
     return {scene: robust_scaling(found) for scene, found in parts.items()}

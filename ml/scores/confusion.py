@@ -11,7 +11,7 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.text_table import text_table
 
 from ..data.classes import IGNORED
-from .metrics import Metric, Spread, finite_values, markdown, or_none
+from .metrics import Metric, Spread, finite_values, markdown, nan_to_none
 
 
 class Confusion:
@@ -84,13 +84,13 @@ class Confusion:
         """Return per-class scores, means, accuracy, counts and the matrix as JSON data; NaN becomes None."""
         columns = {metric: self.values(metric) for metric in METRICS}
         rows = {
-            name: {metric: or_none(values[place]) for metric, values in columns.items()} | {"support": int(support)}
+            name: {metric: nan_to_none(values[place]) for metric, values in columns.items()} | {"support": int(support)}
             for place, (name, support) in enumerate(zip(self.names, self.support, strict=True))
         }
         return {
             "classes": rows,
-            **{f"mean_{metric}": or_none(self.mean(metric)) for metric in METRICS},
-            "accuracy": or_none(self.accuracy),
+            **{f"mean_{metric}": nan_to_none(self.mean(metric)) for metric in METRICS},
+            "accuracy": nan_to_none(self.accuracy),
             "points": int(self.counts.sum()),
             "ignored": self.ignored,
             "confusion": self.counts.tolist(),
@@ -123,7 +123,7 @@ def score_table(scores: Scores) -> str:
     return "\n".join([*lines, f"{percent([scores['accuracy']])} % of the points are right{unlabelled}"])
 
 
-def by_test(results: Mapping[str, Mapping[str, Mapping[str, Scores]]], rows: Sequence[str] = ()) -> str:
+def tables_by_test(results: Mapping[str, Mapping[str, Mapping[str, Scores]]], rows: Sequence[str] = ()) -> str:
     """Return Markdown with one table per test of an experiment: IoU by class and variant, %, mean (std) over seeds.
 
     Args:
@@ -139,7 +139,7 @@ def by_test(results: Mapping[str, Mapping[str, Mapping[str, Scores]]], rows: Seq
     return "\n".join([*lines, f"Seeds: {counts}."])
 
 
-def by_class(runs: Sequence[Scores]) -> str:
+def table_by_class(runs: Sequence[Scores]) -> str:
     """Return a Markdown table of precision, recall and IoU by class, %, mean (std) over seeds; classes with points.
 
     Means stand below them where every class has points: what is predicted without occurring would count as 0.

@@ -28,7 +28,7 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.random_streams import stream
 
 from ..data.corridor import CORRIDOR
-from ..data.frames import Frames, along, displace_frames, estimated_path, stretches
+from ..data.frames import Frames, displace_frames, estimated_path, frames_along, stretches
 from ..data.points import ROAD_CLASSES
 from ..data.roads import LearningRoad, Slices, crop_road, cut_beside_median
 from ..data.slices import SliceSettings
@@ -67,7 +67,7 @@ class Case:
     frames: Frames
 
 
-def case(
+def make_case(
     road: LearningRoad, seed: int, *, cropping: Cropping | None, estimated: bool, settings: SliceSettings | None = None
 ) -> Case:
     """Return a road, cropped if asked, with frames along its axis or an estimated path, displaced by the seed.
@@ -87,7 +87,7 @@ def case(
     seen = cut_beside_median(seen, settings.median_error, stream(seed, "median", road.name))
     path = estimated_path(seen.xyz.astype(np.float64)) if estimated else road.known_truth.axis
     rng = stream(seed, "frames", road.name)
-    strayed = displace_frames(along(path), rng, settings.window, settings.direction_deg, settings.wander_length)
+    strayed = displace_frames(frames_along(path), rng, settings.window, settings.direction_deg, settings.wander_length)
     return Case(seen, strayed)
 
 
@@ -134,10 +134,10 @@ def measure(
     return {name: {road: over_seeds(values) for road, values in by_road.items()} for name, by_road in rows.items()}
 
 
-def trivial_predictor(name: str, cut: Cut | None = None) -> Predictor:
+def trivial_predictor(name: str, cut: SliceCache | None = None) -> Predictor:
     """Return the untrained predictor of a rule's name in `baselines.RULES`; `cut` shares slices between predictors."""
     rule, length = baselines.RULES[name]
-    cut = cut or Cut()
+    cut = cut or SliceCache()
 
     def predict(road: LearningRoad, frames: Frames) -> Float:
         found = cut(road, frames, length)
@@ -148,7 +148,7 @@ def trivial_predictor(name: str, cut: Cut | None = None) -> Predictor:
     return predict
 
 
-class Cut:
+class SliceCache:
     """Cache of the slices of the last road and frames, per thickness.
 
     Args:
@@ -186,15 +186,15 @@ def mask_points(road: LearningRoad, mask: str) -> tuple[Float, Float]:
     return road.xyz[own, :2].astype(np.float64), road.intensity[own].astype(np.float64)
 
 
-def path_itself(road: LearningRoad, frames: Frames) -> Float:
+def predict_path(road: LearningRoad, frames: Frames) -> Float:
     """Predict the centre at each frame's origin: zeros (M, 1); what the displaced path alone is worth."""
     return np.zeros((len(frames), 1))
 
 
 def trivial_predictors(half_width: float = HALF_WIDTH) -> dict[str, list[Predictor]]:
     """Return all untrained baseline predictors by name, one each, for `measure`; they share the slices cut out."""
-    found: dict[str, list[Predictor]] = {"the displaced path": [path_itself]}
-    cut = Cut(half_width)
+    found: dict[str, list[Predictor]] = {"the displaced path": [predict_path]}
+    cut = SliceCache(half_width)
     found |= {name: [trivial_predictor(name, cut)] for name in baselines.RULES}
     for name in baselines.SPANNED:
         rule = trivial_predictor(name, cut)

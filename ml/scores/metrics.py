@@ -78,7 +78,7 @@ def over_seeds(rows: Sequence[Mapping[str, float]]) -> dict[str, Spread]:
     return {name: Spread.over(row.get(name, math.nan) for row in rows) for name in names}
 
 
-def or_none(value: float | None, digits: int | None = None) -> float | None:
+def nan_to_none(value: float | None, digits: int | None = None) -> float | None:
     """Return a number for JSON, perhaps rounded to `digits`; None for NaN and None."""
     if value is None or math.isnan(value):
         return None

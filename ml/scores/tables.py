@@ -11,7 +11,7 @@ from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.base.text_table import text_table
 
 from .distances import METRICS, TARGET_METRICS
-from .metrics import Metric, Spread, in_tables, markdown, or_none
+from .metrics import Metric, Spread, in_tables, markdown, nan_to_none
 
 Measured = Mapping[str, Mapping[str, Mapping[str, Spread]]]
 """Figures by predictor, road (or `all`) and name, as `evaluation.measure` returns them."""
@@ -76,7 +76,7 @@ def as_data(measured: Measured) -> dict[str, Any]:
     return {
         name: {
             road: {
-                figure: {"mean": or_none(spread.mean, 6), "std": or_none(spread.std, 6), "seeds": spread.count}
+                figure: {"mean": nan_to_none(spread.mean, 6), "std": nan_to_none(spread.std, 6), "seeds": spread.count}
                 for figure, spread in figures.items()
             }
             for road, figures in rows.items()

@@ -20,7 +20,7 @@ from synthroads_addon.scenario.scenario import apply_change, apply_values
 from ..configuration import EXPERIMENTS, load_configuration, shipped_file
 from ..data.sources import Source
 from ..runs import CHECKPOINT, CONFIGURATION, HISTORY, METRICS, PRETRAINING, Run, lasting_data
-from ..scores.confusion import by_test
+from ..scores.confusion import tables_by_test
 from .recipes import Data, SegmentationConfiguration
 from .scoring import score_all, trained_model
 from .task import train
@@ -190,4 +190,4 @@ def table(title: str, results: Mapping[str, Mapping[str, Any]]) -> str:
         title: above the tables.
         results: variant -> seed -> test -> scores as of `Confusion.to_dict`.
     """
-    return f"# {title}\n\n{by_test(results)}\n"
+    return f"# {title}\n\n{tables_by_test(results)}\n"

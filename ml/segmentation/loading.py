@@ -119,7 +119,7 @@ def _load_crops(
         num_workers=configuration.workers,
         collate_fn=Collate(configuration, epoch, mix3d),
         pin_memory=configuration.device != "cpu" and torch.cuda.is_available(),
-        worker_init_fn=leave_quietly,
+        worker_init_fn=silence_lost_pipes,
     )
     with defer_interrupt():
         batches = iter(loader)
@@ -132,7 +132,7 @@ def _load_crops(
             getattr(batches, "_shutdown_workers", int)()
 
 
-def leave_quietly(_worker: int) -> None:
+def silence_lost_pipes(_worker: int) -> None:
     """Initialise a data worker so that it prints no broken-pipe traceback after its trainer ended."""
     said = sys.excepthook
     if hasattr(signal, "pthread_sigmask"):

@@ -71,7 +71,7 @@ def adapt_norms(model: nn.Module, batches: Iterable[B], scores: Callable[[B], Te
         for norm in norms:
             norm.train()
             norm.momentum = 1.0  # each batch leaves its own statistics
-        points = sum(_look(pools, scores, batch) for batch in batches)
+        points = sum(_pool_statistics(pools, scores, batch) for batch in batches)
         if not points:
             raise InputError("adaptation", 0, "needs points of the domain to adapt to")
         done = True
@@ -87,7 +87,7 @@ def adapt_norms(model: nn.Module, batches: Iterable[B], scores: Callable[[B], Te
     return points
 
 
-def _look(pools: list[_Pool], scores: Callable[[B], Tensor], batch: B) -> int:
+def _pool_statistics(pools: list[_Pool], scores: Callable[[B], Tensor], batch: B) -> int:
     with torch.no_grad():
         points = len(scores(batch))
         for pool in pools:

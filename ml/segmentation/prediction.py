@@ -28,7 +28,7 @@ from synthroads_addon.cloud.tools.quantile_mapping import LEVELS
 
 from ..data.classes import IGNORED
 from ..data.crops import CropSettings
-from ..data.points import thin
+from ..data.points import voxel_sample
 from ..data.sources import FULL
 from ..data.tiles import CloudTile, Scaling, eight_bits
 from .scoring import Classifier, label_tile
@@ -178,7 +178,7 @@ class TileStore:
         histogram = np.zeros(LEVELS, dtype=np.int64)
         for row, column in self._known:
             record = np.fromfile(self._folder / f"{row}_{column}", dtype=_RECORD)
-            histogram += np.bincount(record["intensity"][thin(record["place"], voxel)], minlength=LEVELS)
+            histogram += np.bincount(record["intensity"][voxel_sample(record["place"], voxel)], minlength=LEVELS)
         share = np.cumsum(histogram) / histogram.sum()
         low, middle, high = (int(np.searchsorted(share, at)) / FULL for at in (0.1, 0.5, 0.9))
         return Scaling(middle, high - low if high > low else 1.0)

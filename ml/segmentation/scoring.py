@@ -18,8 +18,8 @@ from synthroads_addon.base.progress import Progress, silent
 from synthroads_addon.base.random_streams import stream
 
 from ..data.classes import IGNORED, class_names
-from ..data.crops import CropSettings, Item, crop_of, item
-from ..data.points import thin
+from ..data.crops import CropSettings, Item, crop_of, make_item
+from ..data.points import voxel_sample
 from ..data.sources import Source, read_tiles
 from ..data.tiles import CloudTile, Scaling, scalings
 from ..runs import Run
@@ -41,7 +41,7 @@ Classifier = Callable[[Item], torch.Tensor]
 """Turns a batch of one item into the scores of its points."""
 
 
-def pieces(
+def overlapping_pieces(
     plan: NDArray[np.floating[Any]],
     own: Bool | None = None,
     edge: float = EDGE,
@@ -96,16 +96,16 @@ def label_tile(
         core: (N,) the points whose class is wanted, in their order; all if not given.
         seed: of the noise that stands for missing features.
     """
-    keep = thin(tile.coord, settings.voxel)
+    keep = voxel_sample(tile.coord, settings.voxel)
     small = tile.select(keep)
     own = _needed_points(small.coord, tile.coord, core, settings.voxel)
     small = replace(small, segment=np.full(len(small), IGNORED, dtype=np.int16))
     labels = np.zeros(len(small), dtype=np.int16)
-    for number, (inside, seen) in enumerate(pieces(small.coord[:, :2], own)):
-        batch = item(crop_of(small.select(seen), scaling), settings, stream(seed, "missing features", number))
+    for number, (inside, seen) in enumerate(overlapping_pieces(small.coord[:, :2], own)):
+        batch = make_item(crop_of(small.select(seen), scaling), settings, stream(seed, "missing features", number))
         best = classifier(batch).argmax(dim=1).cpu().numpy()
         labels[inside] = best[np.searchsorted(seen, inside)]
-    return carry(small.coord[own], labels[own], tile.coord if core is None else tile.coord[core])
+    return nearest_labels(small.coord[own], labels[own], tile.coord if core is None else tile.coord[core])
 
 
 def _needed_points(small: Float32, full: Float32, core: Bool | None, voxel: float) -> Bool:
@@ -116,7 +116,7 @@ def _needed_points(small: Float32, full: Float32, core: Bool | None, voxel: floa
     return np.asarray(np.all((small[:, :2] >= low) & (small[:, :2] <= high), axis=1))
 
 
-def carry(known: Float32, labels: NDArray[np.int16], points: Float32) -> NDArray[np.int16]:
+def nearest_labels(known: Float32, labels: NDArray[np.int16], points: Float32) -> NDArray[np.int16]:
     """Return for each point (M,) the label of the nearest known point in 3D.
 
     Args:

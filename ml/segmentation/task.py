@@ -20,7 +20,7 @@ from ..data.classes import IGNORED, class_names
 from ..data.crops import Item
 from ..data.sources import Source
 from ..data.tiles import CloudTile, scalings
-from ..processes import helpers
+from ..processes import helper_processes
 from ..runs import PRETRAINING, Run
 from ..scores.confusion import Confusion, score_table
 from ..scores.pictures import comparison
@@ -49,7 +49,7 @@ def train(run: SegmentationRun, progress: Progress = silent) -> dict[str, Any]:
     configuration = run.configuration
     check_tests(configuration)
     device = chosen_device(configuration)
-    with helpers(run, train_network, device):
+    with helper_processes(run, train_network, device):
         model, domains = train_network(run, progress)
     tests = score_all(model, configuration, progress)
     metrics = {

@@ -26,7 +26,7 @@ def learn(run):
 if __name__ == "__main__":
     processes._GRACE = 2.0
     run = SimpleNamespace(configuration=SimpleNamespace(processes=2, device="cpu"))
-    with processes.helpers(run, learn, torch.device("cpu")):
+    with processes.helper_processes(run, learn, torch.device("cpu")):
         learn(run)
     print("done")
 """

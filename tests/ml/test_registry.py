@@ -18,9 +18,9 @@ from ml import registry
 from ml.configuration import TASKS, from_data
 from ml.data.crops import crop_of
 from ml.data.effects import CropEffects, SequenceEffects
-from ml.data.frames import along
+from ml.data.frames import frames_along
 from ml.data.samples import Sample, Stretch
-from ml.data.slices import stretch
+from ml.data.slices import cut_stretch
 from ml.data.tiles import Scaling
 from ml.networks.base import SegmentationNetwork
 from ml.registry import FOLDERS, Change, apply_effects, effect, effect_options, network, networks
@@ -136,7 +136,7 @@ def cut() -> Stretch:
     """Return some slices of a road."""
     road = roads()[0]
     assert road.truth is not None
-    return stretch(road, along(road.truth.axis).select(slice(40, 50)), SETTINGS)
+    return cut_stretch(road, frames_along(road.truth.axis).select(slice(40, 50)), SETTINGS)
 
 
 @pytest.mark.slow

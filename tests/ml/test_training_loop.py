@@ -16,7 +16,7 @@ import torch
 from torch import Tensor, distributed, nn
 
 from ml.configuration import Configuration, Schedule, load_configuration
-from ml.processes import helpers
+from ml.processes import helper_processes
 from ml.runs import CHECKPOINT, CURVES, METRICS, Run, stream_seed
 from ml.training_loop import fit, learning_rate
 from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
@@ -83,7 +83,7 @@ def learn(run: Run[Any], size: int = 16) -> tuple[nn.Module, list[Tensor]]:
 def test_two_processes_have_the_gradients_of_one_with_batches_twice_as_large(tmp_path: Path) -> None:
     one, gradients = learn(Run.start(tmp_path / "one", configuration(epochs=2)), size=32)
     run = Run.start(tmp_path / "two", configuration(epochs=2).model_copy(update={"processes": 2}))
-    with helpers(run, learn, torch.device("cpu")):
+    with helper_processes(run, learn, torch.device("cpu")):
         two, averaged = learn(run)
     assert not distributed.is_initialized()
     torch.testing.assert_close(averaged, gradients, rtol=1e-4, atol=1e-6)
@@ -94,7 +94,8 @@ def test_two_processes_have_the_gradients_of_one_with_batches_twice_as_large(tmp
 @pytest.mark.slow
 def test_a_lost_process_is_said_in_one_line(tmp_path: Path) -> None:
     run = Run.start(tmp_path / "run", configuration(epochs=2).model_copy(update={"processes": 2}))
-    with pytest.raises(InputError, match="processes is 2: one was lost"), helpers(run, lose, torch.device("cpu")):
+    lost = pytest.raises(InputError, match="processes is 2: one was lost")
+    with lost, helper_processes(run, lose, torch.device("cpu")):
         learn(run)
 
 

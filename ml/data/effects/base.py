@@ -25,13 +25,13 @@ class PointEffects(Part):
         return random.random(count) >= self.dropout * random.random()
 
 
-def usually(name: str, value: float) -> Any:
+def point_effect_field(name: str, value: float) -> Any:
     """Return the pydantic field `name` of `PointEffects` with another default."""
     return FieldInfo.merge_field_infos(PointEffects.model_fields[name], default=value)
 
 
 @effect("segmentation", "centerline", order=50)
-def leave_out_colors(sample: Sample, effects: PointEffects, random: np.random.Generator) -> None:
+def drop_colors(sample: Sample, effects: PointEffects, random: np.random.Generator) -> None:
     """Remove the sample's colours with probability `color_drop`, in place."""
     if random.random() < effects.color_drop:
         sample.color = None

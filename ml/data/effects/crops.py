@@ -9,7 +9,7 @@ from synthroads_addon.base.schema import quantity
 
 from ...registry import effect
 from ..samples import Crop
-from .base import PointEffects, usually
+from .base import PointEffects, point_effect_field
 
 Generator = np.random.Generator
 
@@ -22,7 +22,7 @@ class CropEffects(PointEffects):
     largest_scale: float = quantity(1.1, ge=1, le=10, unit="1", description="Largest factor on the coordinates.")
     jitter: float = quantity(0.005, ge=0, le=1, unit="m", description="Noise of each coordinate, one sigma.")
     jitter_limit: float = quantity(0.02, ge=0, le=5, unit="m", description="Largest noise of a coordinate.")
-    color_drop: float = usually("color_drop", 0.2)
+    color_drop: float = point_effect_field("color_drop", 0.2)
     intensity_drop: float = quantity(0.0, ge=0, le=1, unit="1", description="Share that loses its intensities.")
     intensity_gain: float = quantity(
         0.0, ge=0, le=3, unit="1", description="Another intensity model: sigma of the logarithm of gain and exponent."
@@ -42,14 +42,14 @@ class CropEffects(PointEffects):
 
 
 @effect("segmentation", order=10)
-def leave_out_points(crop: Crop, effects: CropEffects, random: Generator) -> None:
+def drop_points(crop: Crop, effects: CropEffects, random: Generator) -> None:
     """Drop random points from the crop, in place, up to the share `dropout`."""
     if effects.dropout:
         crop.keep(effects.kept_points(len(crop), random))
 
 
 @effect("segmentation", order=20)
-def move(crop: Crop, effects: CropEffects, random: Generator) -> None:
+def transform_crop(crop: Crop, effects: CropEffects, random: Generator) -> None:
     """Rotate the crop about its mean's vertical, scale and mirror it at random, and jitter its points, in place."""
     angle = random.uniform(0.0, 2.0 * np.pi) if effects.rotation else 0.0
     scale = random.uniform(effects.smallest_scale, effects.largest_scale)
@@ -75,7 +75,7 @@ def change_intensities(crop: Crop, effects: CropEffects, random: Generator) -> N
 
 
 @effect("segmentation", order=60)
-def leave_out_intensities(crop: Crop, effects: CropEffects, random: Generator) -> None:
+def drop_intensities(crop: Crop, effects: CropEffects, random: Generator) -> None:
     """Remove the crop's intensities with probability `intensity_drop`, in place."""
     if random.random() < effects.intensity_drop:
         crop.strength = None

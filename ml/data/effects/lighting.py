@@ -47,7 +47,7 @@ def change_intensities(stretch: Stretch, effects: SequenceEffects, rng: Generato
 
 
 @effect("centerline", order=60)
-def tint(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
+def tint_colors(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
     """Multiply the sequence's colours by random factors per channel, in place, as another camera would."""
     if stretch.color is not None:
         factors = np.exp(effects.tint * (rng.uniform(-1.0, 1.0) + rng.uniform(-1.0, 1.0, 3)))

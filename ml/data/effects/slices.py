@@ -12,7 +12,7 @@ from ...configuration import Part
 from ...registry import effect
 from ..frames import Frames
 from ..samples import HEADING, HEIGHT, LEFT, RIGHT, Stretch
-from .base import PointEffects, usually
+from .base import PointEffects, point_effect_field
 
 Generator = np.random.Generator
 
@@ -50,9 +50,9 @@ class SequenceEffects(PointEffects):
 
     renamed: ClassVar[Mapping[str, str]] = {"colorless": "color_drop"}
 
-    mirror: float = usually("mirror", 0.5)
-    dropout: float = usually("dropout", 0.3)
-    color_drop: float = usually("color_drop", 0.3)
+    mirror: float = point_effect_field("mirror", 0.5)
+    dropout: float = point_effect_field("dropout", 0.3)
+    color_drop: float = point_effect_field("color_drop", 0.3)
     turn_round: float = quantity(0.5, ge=0, le=1, unit="1", description="Probability of running against the path.")
     crop: SequenceCrop = Field(default=SequenceCrop(), description="Sides cut off.")
     alone: float = quantity(
@@ -99,7 +99,7 @@ class SequenceEffects(PointEffects):
 
 
 @effect("centerline", order=-30)
-def stand_alone(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
+def mirror_side(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
     """Replace the median's side of a carriageway by its mirrored outer side, in place, with probability `alone`.
 
     So a motorway's carriageway becomes a rural road. Heights go on from the pavement's own edge.
@@ -152,7 +152,7 @@ def crop_sides(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> No
 
 
 @effect("centerline", order=-10)
-def drop(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
+def drop_parts(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
     """Drop random points, whole slices and a rectangular hole of some metres from the sequence, in place."""
     slices, points = len(stretch.center), len(stretch)
     keep = effects.kept_points(points, rng)
@@ -199,7 +199,7 @@ def turn_round(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> No
 
 
 @effect("centerline", order=30)
-def move(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
+def tilt_and_jitter(stretch: Stretch, effects: SequenceEffects, rng: Generator) -> None:
     """Tilt the ground (truth included) and jitter the points at random, in place; each stays in its slice."""
     grade, cross = rng.uniform(-effects.tilt, effects.tilt, 2)
     along = stretch.along()

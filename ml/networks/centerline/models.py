@@ -35,6 +35,8 @@ Output = dict[str, Tensor]
 LINES = ("center", "left_edge", "right_edge")
 """Targets found by soft-argmax over the kernel points."""
 TARGETS = ("center", *CORRIDOR)
+Encoding = tuple[Tokens, Tensor]
+"""Tokens that have seen their surroundings, and the context (N, D) of each of N slices."""
 SCALE = (1.0, 1.0, 1.0, 0.5, 0.2, 0.05, 0.1)
 """Of `TARGETS`: errors of this size weigh alike; m, and what lanes and headings are measured in."""
 _MIDDLE = {"lanes": 4.0, "lane_width": 3.5, "heading": 0.0}
@@ -129,7 +131,7 @@ class CenterlineModel(nn.Module):
         shape = batch["mask"].shape[:2]
         coord, feat, mask = (batch[name].flatten(0, 1) for name in ("coord", "feat", "mask"))
         features = self.points(coord, feat)
-        tokens, context = self.look(self.kernel_points(coord, mask, features), coord, mask, features, shape[1])
+        tokens, context = self.encode(self.kernel_points(coord, mask, features), coord, mask, features, shape[1])
         found = {name: values.unflatten(0, shape) for name, values in self.heads(tokens, context).items()}
         context = context.unflatten(0, shape)
         # Where to look again is no way for the second look's errors to reach the first.
@@ -149,7 +151,7 @@ class CenterlineModel(nn.Module):
         std = torch.exp(found["log_std"]) * found["log_std"].new_tensor(SCALE)
         return found | {"center_std": std[..., 0], "corridor_std": std[..., 1:]}
 
-    def look(self, tokens: Tokens, coord: Tensor, mask: Tensor, features: Tensor, slices: int) -> tuple[Tokens, Tensor]:
+    def encode(self, tokens: Tokens, coord: Tensor, mask: Tensor, features: Tensor, slices: int) -> Encoding:
         """Return the tokens encoded with their surroundings, and the context (N, D) of each of the N slices."""
         raise NotImplementedError
 

@@ -7,7 +7,7 @@ from torch import Tensor, nn
 
 from ...registry import network
 from .layers import GridConvolution, Tokens
-from .models import ModelOptions, SequenceModel
+from .models import Encoding, ModelOptions, SequenceModel
 
 
 @network("centerline")
@@ -32,7 +32,7 @@ class Sequence(SequenceModel):
         self.after = nn.ModuleList(GridConvolution(width, 1, 5) for _ in range(min(1, options.layers)))
         self.summary = nn.LSTM(options.context, options.context // 2, batch_first=True, bidirectional=True)
 
-    def look(self, tokens: Tokens, coord: Tensor, mask: Tensor, features: Tensor, slices: int) -> tuple[Tokens, Tensor]:
+    def encode(self, tokens: Tokens, coord: Tensor, mask: Tensor, features: Tensor, slices: int) -> Encoding:
         """Return tokens after convolutions and an LSTM along the slices, and the context (N, D) of the N slices."""
         grid = tokens.features.unflatten(0, (-1, slices))
         for layer in self.across:

@@ -8,7 +8,7 @@ from torch import Tensor, nn
 from ...data.corridor import CORRIDOR
 from ...registry import network
 from .layers import DeformableKernelPoints, RelativeAttention, Tokens
-from .models import CenterlineModel, ModelOptions, Output
+from .models import CenterlineModel, Encoding, ModelOptions, Output
 
 
 @network("centerline")
@@ -33,7 +33,7 @@ class Single(CenterlineModel):
             RelativeAttention(count, width, options.heads, options.dropout) for _ in range(options.layers)
         )
 
-    def look(self, tokens: Tokens, coord: Tensor, mask: Tensor, features: Tensor, slices: int) -> tuple[Tokens, Tensor]:
+    def encode(self, tokens: Tokens, coord: Tensor, mask: Tensor, features: Tensor, slices: int) -> Encoding:
         """Return tokens of moved kernel points after self-attention, and the context (N, D) of the N slices."""
         moved = self.deformable(coord, mask, features, tokens.features)
         mixed = tokens.features + moved.features

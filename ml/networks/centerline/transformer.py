@@ -11,7 +11,7 @@ from torch import Tensor, nn
 
 from ...registry import network
 from .layers import GridConvolution, RelativeAttention, Tokens
-from .models import ModelOptions, SequenceModel
+from .models import Encoding, ModelOptions, SequenceModel
 
 
 @network("centerline")
@@ -41,7 +41,7 @@ class Transformer(SequenceModel):
         )
         self.summary = nn.ModuleList(RelativeAttention(slices, options.context, heads, dropout) for _ in range(2))
 
-    def look(self, tokens: Tokens, coord: Tensor, mask: Tensor, features: Tensor, slices: int) -> tuple[Tokens, Tensor]:
+    def encode(self, tokens: Tokens, coord: Tensor, mask: Tensor, features: Tensor, slices: int) -> Encoding:
         """Return tokens after convolutions and attention along the slices, and the context (N, D) of the N slices."""
         grid = tokens.features.unflatten(0, (-1, slices))
         for number, layer in enumerate(self.grid):

@@ -26,7 +26,7 @@ from scipy.spatial import cKDTree
 from synthroads_addon.base.arrays import Float, Int
 from synthroads_addon.base.errors import InputError
 
-from ...data.points import thin
+from ...data.points import voxel_sample
 
 Neighbours = dict[str, torch.Tensor]
 """Tensors by name; ``s`` is a stage's number, 0 being the cloud itself, with M_s points:
@@ -179,7 +179,7 @@ def _sample(points: Float, radius: float, sampling: Sampling) -> Int:
     if not len(points):
         return np.zeros(0, dtype=np.int64)
     if sampling == "grid":
-        return thin(points - points.min(axis=0), radius * 2.0 / 3.0)
+        return voxel_sample(points - points.min(axis=0), radius * 2.0 / 3.0)
     return farthest_sample(points, max(len(points) // _STRIDE, 1))
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from ml.centerline.predictor import CenterlinePredictor, UseOptions
-from ml.data.frames import Frames, along
+from ml.data.frames import Frames, frames_along
 from ml.data.roads import LearningRoad
 from ml.networks.centerline.models import TARGETS
-from ml.scores.evaluation import case, evaluate, skeleton_predictor
+from ml.scores.evaluation import evaluate, make_case, skeleton_predictor
 from ml.scores.metrics import Spread
 from tests.helpers.clouds.centerline_batches import SETTINGS, small
 from tests.helpers.clouds.centerline_roads import strip_road
@@ -22,10 +22,10 @@ from tools.figures_centerline import grid_search, road_table
 
 def test_the_grid_search_takes_the_best_that_finds_enough() -> None:
     road = strip_road("short", length=80.0)
-    search = grid_search([case(road, 1, cropping=None, estimated=True)], ["ground"])
+    search = grid_search([make_case(road, 1, cropping=None, estimated=True)], ["ground"])
     assert len(search.rows) == 48
     one, row = search.rows[7]
-    assert evaluate(skeleton_predictor(one), case(road, 1, cropping=None, estimated=True)) == row
+    assert evaluate(skeleton_predictor(one), make_case(road, 1, cropping=None, estimated=True)) == row
     figures = dict(search.rows)
     enough = [row["mae"] for row in figures.values() if row["found"] >= 0.8]
     assert figures[search.best]["mae"] == min(enough)
@@ -42,7 +42,7 @@ def test_what_was_found_is_remembered_by_points_and_frames(monkeypatch: pytest.M
 
     monkeypatch.setattr(CenterlinePredictor, "_sequences", counted)
     known = roads()[0]
-    places = along(known.known_truth.axis).select(slice(20, 43))
+    places = frames_along(known.known_truth.axis).select(slice(20, 43))
     plain = CenterlinePredictor(small("single").eval(), SETTINGS, UseOptions(step=10))
     wanted = plain.regress(known, places)
     remembering = figures_centerline.remembering(plain)

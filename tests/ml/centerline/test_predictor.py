@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ml.centerline.find_road import corridor_json, find_road, geojson
-from ml.centerline.predictor import CenterlinePredictor, Regression, UseOptions, errors, join_line
+from ml.centerline.find_road import centerline_geojson, corridor_json, find_road
+from ml.centerline.predictor import CenterlinePredictor, Regression, UseOptions, smooth_line, target_errors
 from ml.data import strips
 from ml.data.axis import MeasuredAxis
 from ml.data.corridor import CORRIDOR
-from ml.data.frames import Frames, along, displace_frames, read_path
+from ml.data.frames import Frames, displace_frames, frames_along, read_path
 from ml.data.roads import LearningRoad
 from ml.networks.centerline.models import TARGETS
 from ml.scores.calibration import IntervalCalibration
@@ -39,7 +39,7 @@ def road() -> LearningRoad:
 
 def frames(first: float = 20.0, last: float = 100.0) -> Frames:
     assert road().truth is not None
-    every = along(road().truth.axis)
+    every = frames_along(road().truth.axis)
     some = every.select((every.station >= first) & (every.station <= last))
     return displace_frames(some, np.random.default_rng(4), 6.0, 1.0, 100.0)
 
@@ -82,7 +82,7 @@ def test_frames_in_several_sequences_have_the_mean_by_inverse_variances(monkeypa
             )
 
     monkeypatch.setattr(ready, "_sequences", told)
-    monkeypatch.setattr("ml.centerline.predictor.join_line", lambda frames, y, std, reach: y)
+    monkeypatch.setattr("ml.centerline.predictor.smooth_line", lambda frames, y, std, reach: y)
     found = ready.regress(road(), places)
     # 1 / 0.1^2 = 100 and 1 / 0.2^2 = 25: (100 x 2 + 25 x 5) / 125; the mean of the inverse variances is 62.5.
     np.testing.assert_allclose(found.center, [1.0, 2.6, 4.0])
@@ -142,9 +142,9 @@ def test_errors_of_the_truth_itself_are_none():
     there = known.at(places)
     value = np.column_stack([there.center, there.corridor])
     found = Regression(places, value, *(np.ones_like(value) for _ in range(2)), np.ones((*value.shape, 2)))
-    np.testing.assert_allclose(errors(found, known), 0.0, atol=1e-12)
+    np.testing.assert_allclose(target_errors(found, known), 0.0, atol=1e-12)
     found.value[:, TARGETS.index("height")] += 0.25
-    np.testing.assert_allclose(errors(found, known)[:, TARGETS.index("height")], 0.25)
+    np.testing.assert_allclose(target_errors(found, known)[:, TARGETS.index("height")], 0.25)
 
 
 def test_heights_are_elevations():
@@ -215,7 +215,7 @@ def _found(gap: bool = True) -> Regression:
 
 
 def test_geojson_has_lines_in_map_coordinates():
-    data = json.loads(json.dumps(geojson(_found(), "cloud", 1.0), allow_nan=False))
+    data = json.loads(json.dumps(centerline_geojson(_found(), "cloud", 1.0), allow_nan=False))
     assert data["crs"]["properties"]["name"] == "urn:ogc:def:crs:EPSG::25832"
     names = [feature["properties"]["feature"] for feature in data["features"]]
     assert names == ["centerline"] * 2 + ["left_edge"] * 2 + ["right_edge"] * 2
@@ -224,11 +224,11 @@ def test_geojson_has_lines_in_map_coordinates():
     assert second["properties"]["stations"] == [3.0, 4.0, 5.0]
     assert second["properties"]["std"] == [0.1] * 3
     assert second["properties"]["interval_95"] == [0.2] * 3
-    assert len(geojson(_found(gap=False), "cloud", 1.0)["features"]) == 3
+    assert len(centerline_geojson(_found(gap=False), "cloud", 1.0)["features"]) == 3
 
 
 def test_geojson_is_read_back_as_an_axis(tmp_path: Path):
-    data = geojson(_found(gap=False), "cloud", 1.0)
+    data = centerline_geojson(_found(gap=False), "cloud", 1.0)
     data["features"] = data["features"][:1]
     (tmp_path / "line.geojson").write_text(json.dumps(data))
     np.testing.assert_allclose(MeasuredAxis.read(tmp_path / "line.geojson").points[:, 1], 1.0)
@@ -258,19 +258,19 @@ def test_lines_of_interleaved_sequences_are_joined():
     )
     true, _ = known.crossing(places.position, places.direction)
     std = np.full(len(station), 0.1)
-    np.testing.assert_allclose(join_line(places, true, std, 1), true, atol=1e-12)
-    np.testing.assert_allclose(join_line(places, true, std, 4), true, atol=0.006)
+    np.testing.assert_allclose(smooth_line(places, true, std, 1), true, atol=1e-12)
+    np.testing.assert_allclose(smooth_line(places, true, std, 4), true, atol=0.006)
     jagged = true + 0.2 * (station % 4 == 0) - 0.05
     inner = np.r_[4:56, 64:86]
-    assert np.abs(join_line(places, jagged, std, 4) - true)[inner].max() < 0.01
+    assert np.abs(smooth_line(places, jagged, std, 4) - true)[inner].max() < 0.01
     # Who isn't sure counts for little.
     std[station % 4 == 0] = 1.0
-    assert np.abs(join_line(places, jagged, std, 4) - true + 0.05)[inner].max() < 0.01
+    assert np.abs(smooth_line(places, jagged, std, 4) - true + 0.05)[inner].max() < 0.01
     jagged[20] = np.nan
-    again = join_line(places, jagged, std, 4)
+    again = smooth_line(places, jagged, std, 4)
     assert np.isnan(again[20])
     assert np.isfinite(np.delete(again, 20)).all()
     # Nothing crosses the gap.
     other = jagged.copy()
     other[60:] += 5.0
-    np.testing.assert_array_equal(join_line(places, other, std, 4)[:60], again[:60])
+    np.testing.assert_array_equal(smooth_line(places, other, std, 4)[:60], again[:60])

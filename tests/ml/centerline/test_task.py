@@ -93,7 +93,7 @@ def test_resumed_training_ends_with_the_same_bits(trained: Trained, data: Path, 
         task.train(broken, Stop(6))
     assert int((broken.last_checkpoint() or {})["epoch"]) == 1
     with pytest.raises(InputError, match="isn't finished"):
-        task.predictor(broken)
+        task.load_predictor(broken)
     resumed = Run.start(tmp_path / "broken", configuration(data, name), resume=True)
     task.train(resumed)
     assert same(weights(resumed), weights(whole))
@@ -122,7 +122,7 @@ def test_what_a_run_writes(trained: Trained):
     assert {"validation_mae", "validation_68", "validation_95", "corridor_mae", "calibration"} <= set(metrics)
     assert metrics["calibration"]["center"]["count"] == 160
     assert {"loss", "center_mae", "validation_mae", "validation_68", "validation_95"} <= set(run.history[0])
-    ready = task.predictor(Run.open(run.folder))
+    ready = task.load_predictor(Run.open(run.folder))
     assert ready.calibration["center"].factor == metrics["calibration"]["center"]["factor"]
 
 
@@ -170,7 +170,7 @@ def test_a_run_that_is_begun_anew_isnt_finished_by_the_one_before(trained: Train
         task.train(again, Stop(6))
     (tmp_path / "run" / CALIBRATION).write_text("{}", encoding="utf-8")
     with pytest.raises(InputError, match="isn't finished"):
-        task.predictor(again)
+        task.load_predictor(again)
 
 
 def test_beginning_with_another_run(trained: Trained, data: Path, tmp_path: Path):

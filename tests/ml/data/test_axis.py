@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ml.data.axis import MeasuredAxis
-from ml.data.frames import Frames, along, displace_frames, estimated_path, read_path, sequences, wander
+from ml.data.frames import Frames, displace_frames, estimated_path, frames_along, random_deviation, read_path, sequences
 from synthroads_addon.base.errors import InputError
 
 RADIUS = 300.0
@@ -98,7 +98,7 @@ def test_gaps() -> None:
     assert np.isnan(axis.direction([35.0])).all()
     y, _ = axis.crossing([[10.0, 1.0], [35.0, 1.0], [60.0, 1.0]], np.zeros(3))
     np.testing.assert_allclose(y, [-1.0, np.nan, -1.0])
-    frames = along(axis)
+    frames = frames_along(axis)
     assert len(frames) == 21 + 31
     assert not np.isnan(frames.position).any()
     assert not np.isnan(frames.direction).any()
@@ -130,17 +130,17 @@ def test_wander_is_smooth_and_uniform() -> None:
     station = np.arange(0.0, 50.0, 0.01)
     ends = []
     for seed in range(400):
-        value, slope = wander(station[:2], np.random.default_rng(seed), 80.0)
+        value, slope = random_deviation(station[:2], np.random.default_rng(seed), 80.0)
         ends.append(value[0])
         assert abs(slope[0]) < 0.05
     assert np.histogram(ends, bins=4, range=(-0.5, 0.5))[0].min() > 70
-    value, slope = wander(station, np.random.default_rng(0), 80.0)
+    value, slope = random_deviation(station, np.random.default_rng(0), 80.0)
     np.testing.assert_allclose(np.gradient(value, station)[1:-1], slope[1:-1], atol=1e-6)
 
 
 def test_displaced_frames_stay_in_their_window_and_turn_with_their_path() -> None:
     axis = arc(400.0)
-    exact = along(axis)
+    exact = frames_along(axis)
     moved = [displace_frames(exact, np.random.default_rng(seed), 12.0, 0.0, 100.0) for seed in range(20)]
     offsets = np.array([axis.project(frames.position)[1] for frames in moved])
     assert np.abs(offsets).max() <= 6.0 + 1e-3
@@ -230,7 +230,7 @@ def test_real_axes(file: Path) -> None:
     lengths = np.diff(axis.station)
     assert (lengths[~axis.joined] > 10.0).all()
     assert (lengths[axis.joined] < 3.5).all()
-    frames = along(axis)
+    frames = frames_along(axis)
     y, station = axis.crossing(frames.position, frames.direction)
     assert np.nanmax(np.abs(y)) < 1e-6
     # Where the axis jumps by centimetres between two blocks, the direction is steady all the same.

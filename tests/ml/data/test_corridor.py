@@ -9,7 +9,7 @@ import pytest
 
 from ml.data.axis import MeasuredAxis
 from ml.data.corridor import CORRIDOR, Truth, truths
-from ml.data.frames import Frames, along, displace_frames
+from ml.data.frames import Frames, displace_frames, frames_along
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.objects import WidthPoint
@@ -22,7 +22,7 @@ COLUMN = {name: place for place, name in enumerate(CORRIDOR)}
 
 
 def on_the_axis(truth: Truth) -> Frames:
-    frames = along(truth.axis, 7.0)
+    frames = frames_along(truth.axis, 7.0)
     return frames.select(slice(1, -1))
 
 

@@ -18,11 +18,11 @@ from tests.helpers.clouds.segmentation_data import road_block, road_tile, write_
 def test_limit_takes_tiles_of_every_scene_alike() -> None:
     packed = [pack_tile(road_tile(1500, seed, f"scene{seed % 3}")) for seed in range(12)]
     limit = (1 << 16) + 6 * (len(packed[0].content) + 900)
-    chosen = pack.within(packed, limit, 1)
+    chosen = pack.choose_tiles(packed, limit, 1)
     scenes = [tile.notes["scene"] for tile in chosen]
     assert len(chosen) == 6
     assert [scenes.count(f"scene{k}") for k in range(3)] == [2, 2, 2]
-    assert [tile.content for tile in chosen] == [tile.content for tile in pack.within(packed, limit, 1)]
+    assert [tile.content for tile in chosen] == [tile.content for tile in pack.choose_tiles(packed, limit, 1)]
 
 
 def test_command_packs_a_data_set(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -15,7 +15,7 @@ from ml.data.axis import MeasuredAxis
 from ml.data.corridor import CORRIDOR, Truth
 from ml.data.effects import SequenceEffects
 from ml.data.effects.slices import mirror, turn_round
-from ml.data.frames import Frames, along, displace_frames
+from ml.data.frames import Frames, displace_frames, frames_along
 from ml.data.points import Points
 from ml.data.roads import LearningRoad
 from ml.data.samples import Stretch
@@ -28,8 +28,8 @@ from ml.data.slices import (
     SliceDataset,
     SliceSettings,
     collate,
-    sample,
-    stretch,
+    cut_stretch,
+    make_sample,
 )
 from synthroads_addon.base.errors import InputError
 from tests.helpers.roads.analytic_roads import roads
@@ -40,7 +40,7 @@ ALL_POINTS = SliceSettings(points_per_slice=100_000, half_width=18.0)
 
 def path_of(road: LearningRoad, seed: int = 4) -> Frames:
     assert road.truth is not None
-    exact = along(road.truth.axis)
+    exact = frames_along(road.truth.axis)
     return displace_frames(exact, np.random.default_rng(seed), 12.0, 2.0, 100.0)
 
 
@@ -49,7 +49,7 @@ def rng() -> np.random.Generator:
 
 
 def as_sample(cut: Stretch, settings: SliceSettings = ALL_POINTS) -> Sample:
-    return sample(cut, settings, rng(), 0, np.arange(len(cut.center)))
+    return make_sample(cut, settings, rng(), 0, np.arange(len(cut.center)))
 
 
 def test_slices_hold_the_points_that_lie_in_them() -> None:
@@ -70,7 +70,7 @@ def test_slices_hold_the_points_that_lie_in_them() -> None:
 def test_a_sample_is_what_it_says() -> None:
     road = roads()[0]
     frames = path_of(road).select(slice(40, 50))
-    item = as_sample(stretch(road, frames, ALL_POINTS))
+    item = as_sample(cut_stretch(road, frames, ALL_POINTS))
     assert item["coord"].dtype == item["feat"].dtype == torch.float32
     assert item["offset"][-1] == len(item["coord"]) == len(item["feat"])
     starts = [0, *item["offset"][:-1].tolist()]
@@ -94,25 +94,25 @@ def test_a_sample_is_what_it_says() -> None:
 def test_intensities_are_scaled_within_the_sequence() -> None:
     road = roads()[0]
     frames = path_of(road).select(slice(40, 50))
-    one = as_sample(stretch(road, frames, ALL_POINTS))["feat"]
+    one = as_sample(cut_stretch(road, frames, ALL_POINTS))["feat"]
     assert abs(float(one[:, 0].median())) < 1e-6
     low, high = np.percentile(one[:, 0], (10, 90))
     assert abs(high - low - 1.0) < 1e-3
     brighter = replace(road, intensity=road.intensity * np.float32(7.0))
-    np.testing.assert_allclose(as_sample(stretch(brighter, frames, ALL_POINTS))["feat"], one, atol=1e-4)
+    np.testing.assert_allclose(as_sample(cut_stretch(brighter, frames, ALL_POINTS))["feat"], one, atol=1e-4)
     spike = road.intensity.copy()
     spike[::50] = 1000.0
-    assert as_sample(stretch(replace(road, intensity=spike), frames, ALL_POINTS))["feat"].max() == FEATURE_LIMIT
+    assert as_sample(cut_stretch(replace(road, intensity=spike), frames, ALL_POINTS))["feat"].max() == FEATURE_LIMIT
 
 
 def test_missing_features_are_small_noise() -> None:
     road = replace(roads()[0], has_color=False)
     bare = replace(road, intensity=np.zeros_like(road.intensity))
-    feat = as_sample(stretch(bare, path_of(road).select(slice(40, 50)), ALL_POINTS))["feat"]
+    feat = as_sample(cut_stretch(bare, path_of(road).select(slice(40, 50)), ALL_POINTS))["feat"]
     assert (feat[:, FEATURES.index("has_color")] == 0.0).all()
     assert 0.005 < float(feat[:, : FEATURES.index("has_color")].std()) < 0.02
     flat = replace(road, intensity=np.full_like(road.intensity, 0.25))
-    feat = as_sample(stretch(flat, path_of(road).select(slice(40, 50)), ALL_POINTS))["feat"]
+    feat = as_sample(cut_stretch(flat, path_of(road).select(slice(40, 50)), ALL_POINTS))["feat"]
     assert (feat[:, :2] == 0.0).all()
 
 
@@ -172,8 +172,8 @@ def test_rotation_and_shift_of_the_input_change_nothing_in_the_frames(kind: str,
     for road in roads(kind):  # type: ignore[arg-type]
         frames = path_of(road).select(slice(40, 50))
         moved = Frames(frames.position @ turn[:2, :2].T + by[:2], frames.direction + angle, frames.station)
-        one = as_sample(stretch(road, frames, ALL_POINTS))
-        same(one, as_sample(stretch(mapped(road, turn, by), moved, ALL_POINTS)), atol=2e-3)
+        one = as_sample(cut_stretch(road, frames, ALL_POINTS))
+        same(one, as_sample(cut_stretch(mapped(road, turn, by), moved, ALL_POINTS)), atol=2e-3)
 
 
 @pytest.mark.parametrize("kind", ["road", "carriageway"])
@@ -182,9 +182,9 @@ def test_a_mirrored_cloud_gives_the_mirrored_sample(kind: str) -> None:
     for road in roads(kind):  # type: ignore[arg-type]
         frames = path_of(road).select(slice(40, 50))
         flipped = Frames(frames.position * [1.0, -1.0], -frames.direction, frames.station)
-        cut = stretch(road, frames, ALL_POINTS)
+        cut = cut_stretch(road, frames, ALL_POINTS)
         mirror(cut, SequenceEffects(mirror=1.0), rng())
-        other = stretch(mapped(road, turn, np.zeros(3)), flipped, ALL_POINTS)
+        other = cut_stretch(mapped(road, turn, np.zeros(3)), flipped, ALL_POINTS)
         same(as_sample(cut), as_sample(other), atol=1e-3)
         np.testing.assert_allclose(cut.lines, other.lines, atol=1e-6)
         np.testing.assert_allclose(cut.room, other.room, atol=1e-6)
@@ -193,10 +193,10 @@ def test_a_mirrored_cloud_gives_the_mirrored_sample(kind: str) -> None:
 def test_seeing_the_road_against_its_direction() -> None:
     road = roads("carriageway")[0]
     frames = path_of(road).select(slice(40, 50))
-    cut = stretch(road, frames, ALL_POINTS)
+    cut = cut_stretch(road, frames, ALL_POINTS)
     turn_round(cut, SequenceEffects(turn_round=1.0), rng())
     assert (np.diff(cut.number) >= 0).all()
-    other = stretch(road, frames.reverse(), ALL_POINTS)
+    other = cut_stretch(road, frames.reverse(), ALL_POINTS)
     same(as_sample(cut), as_sample(other), atol=1e-4)
     np.testing.assert_allclose(cut.lines, other.lines, atol=1e-6)
     np.testing.assert_allclose(cut.room, other.room, atol=1e-6)
@@ -206,21 +206,21 @@ def test_a_slice_has_at_most_its_number_of_points_each_as_likely() -> None:
     road = roads()[0]
     settings = SliceSettings(points_per_slice=50, half_width=18.0)
     frames = path_of(road).select(slice(40, 50))
-    item = sample(stretch(road, frames, settings), settings, rng(), 0, np.arange(10))
+    item = make_sample(cut_stretch(road, frames, settings), settings, rng(), 0, np.arange(10))
     assert np.diff([0, *item["offset"].tolist()]).tolist() == [50] * 10
     drawn = [
-        sample(stretch(road, frames, settings), settings, np.random.default_rng(seed), 0, np.arange(10))
+        make_sample(cut_stretch(road, frames, settings), settings, np.random.default_rng(seed), 0, np.arange(10))
         for seed in range(40)
     ]
     y = np.concatenate([item["coord"][:, 1] for item in drawn])
-    whole = as_sample(stretch(road, frames, ALL_POINTS))["coord"][:, 1].numpy()
+    whole = as_sample(cut_stretch(road, frames, ALL_POINTS))["coord"][:, 1].numpy()
     shares = [np.histogram(values, bins=8, range=(-18, 18))[0] / len(values) for values in (y, whole)]
     np.testing.assert_allclose(shares[0], shares[1], atol=0.01)
 
 
 def test_a_carriageway_shows_nothing_beyond_the_middle_of_the_median() -> None:
     for road in roads("carriageway"):
-        cut = stretch(road, path_of(road).select(slice(40, 50)), ALL_POINTS)
+        cut = cut_stretch(road, path_of(road).select(slice(40, 50)), ALL_POINTS)
         y = cut.coord[:, 1] - cut.center[cut.number]
         inner = np.where(np.isfinite(cut.room[0]))[0][0]
         reach = (y if inner == 0 else -y).max()
@@ -302,7 +302,7 @@ def test_a_batch_without_a_point() -> None:
     road = roads()[0]
     frames = path_of(road).select(slice(40, 50))
     away = Frames(frames.position + 500.0, frames.direction, frames.station)
-    item = as_sample(stretch(road, away, ALL_POINTS))
+    item = as_sample(cut_stretch(road, away, ALL_POINTS))
     assert item["offset"].tolist() == [0] * 10
     batch = collate([item, item])
     assert batch["coord"].shape == (2, 10, 1, 3)

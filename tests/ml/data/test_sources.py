@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from ml.data.classes import IGNORED, LabelMapping, load_mapping, table_between
-from ml.data.points import thin
+from ml.data.points import voxel_sample
 from ml.data.sources import Source, read_tiles
 from ml.data.tiles import CloudTile, robust_scaling, scalings
 from synthroads_addon.base.classes import class_scheme
@@ -29,7 +29,7 @@ from tests.helpers.clouds.segmentation_data import (
 def test_thinning_keeps_one_point_per_cell_whatever_the_order() -> None:
     random = np.random.default_rng(1)
     coord = random.uniform(-3.0, 3.0, (5000, 3))
-    keep = thin(coord, 0.5)
+    keep = voxel_sample(coord, 0.5)
     cells = np.floor(coord / 0.5)
     assert len(keep) == len(np.unique(cells, axis=0)) == len(np.unique(cells[keep], axis=0))
     away = np.abs(coord / 0.5 - cells - 0.5)
@@ -37,10 +37,10 @@ def test_thinning_keeps_one_point_per_cell_whatever_the_order() -> None:
         same = np.flatnonzero((cells == cells[index]).all(axis=1))
         assert (away[same] ** 2).sum(axis=1).min() == (away[index] ** 2).sum()
     order = random.permutation(len(coord))
-    assert set(order[thin(coord[order], 0.5)]) == set(keep)
-    assert len(thin(np.zeros((0, 3)), 0.1)) == 0
+    assert set(order[voxel_sample(coord[order], 0.5)]) == set(keep)
+    assert len(voxel_sample(np.zeros((0, 3)), 0.1)) == 0
     with pytest.raises(InputError, match="cells"):
-        thin(np.array([[0.0, 0.0, 0.0], [1e9, 1e9, 1e9]]), 0.1)
+        voxel_sample(np.array([[0.0, 0.0, 0.0], [1e9, 1e9, 1e9]]), 0.1)
 
 
 def test_seventeen_classes_become_five_by_name_and_never_the_other_way() -> None:

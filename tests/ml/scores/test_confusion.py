@@ -9,7 +9,7 @@ import pytest
 
 from ml.data.classes import IGNORED
 from ml.scores import confusion as confusion_module
-from ml.scores.confusion import METRICS, Confusion, by_class, by_test, score_table
+from ml.scores.confusion import METRICS, Confusion, score_table, table_by_class, tables_by_test
 from ml.scores.metrics import Spread, finite_values
 from synthroads_addon.base.errors import InputError
 from tests.helpers.page_modules import block_of_page
@@ -120,19 +120,19 @@ def test_scores_are_those_of_scikit_learn(seed: int) -> None:
 def test_classes_that_do_not_occur_have_no_row_and_there_is_no_mean() -> None:
     confusion = Confusion(("a", "b", "c"))
     confusion.add(np.array([0, 0, 1, 1]), np.array([0, 1, 1, 2]))
-    text = by_class([confusion.to_dict()] * 2)
+    text = table_by_class([confusion.to_dict()] * 2)
     assert [line.split("|")[1].strip() for line in text.splitlines()] == ["class", "---", "a", "b"]
     assert "| a | 2 | 100.0 (0.0) | 50.0 (0.0) | 50.0 (0.0) |" in text
     confusion.add(np.array([2]), np.array([2]))
-    assert "| mean | 5 |" in by_class([confusion.to_dict()])
-    assert by_test({"one": {}}).endswith("Seeds: .")
+    assert "| mean | 5 |" in table_by_class([confusion.to_dict()])
+    assert tables_by_test({"one": {}}).endswith("Seeds: .")
 
 
 def test_further_rows_end_the_first_tests_table() -> None:
     scores = {"classes": {"a": {"iou": 0.5, "support": 9}}, "mean_iou": 0.5, "points": 9}
     run = {"seen": scores, "unseen": scores}
     row = "| *training, s* |  | 132 (3) | - |"
-    lines = by_test({"tuned": {"1": run, "2": run}, "adapted": {"1": run}}, [row]).splitlines()
+    lines = tables_by_test({"tuned": {"1": run, "2": run}, "adapted": {"1": run}}, [row]).splitlines()
     assert lines.index(row) + 2 == lines.index("**unseen**")
     assert lines.count("| mean | 9 | 50.0 (0.0) | 50.0 |") == 2
     assert lines[-1] == "Seeds: tuned 2, adapted 1."
@@ -147,4 +147,4 @@ def test_a_metric_is_one_entry_that_data_and_tables_have(monkeypatch: pytest.Mon
     assert scores["classes"]["a"]["f1"] == pytest.approx(0.8)
     assert scores["mean_f1"] == pytest.approx((0.8 + 2 / 3) / 2)
     assert [line.split()[4] for line in score_table(scores).splitlines()[:3]] == ["F1", "80.0", "66.7"]
-    assert by_class([scores]).splitlines()[0] == "| class | points | precision | recall | IoU | F1 |"
+    assert table_by_class([scores]).splitlines()[0] == "| class | points | precision | recall | IoU | F1 |"

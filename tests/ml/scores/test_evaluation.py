@@ -19,10 +19,10 @@ from ml.scores.evaluation import (
     CORRIDOR_COLUMNS,
     Case,
     Cropping,
-    Cut,
+    SliceCache,
     along_parabolas,
-    case,
     evaluate,
+    make_case,
     measure,
     skeleton_predictor,
     trivial_predictor,
@@ -55,7 +55,7 @@ def road() -> LearningRoad:
 
 
 def test_a_known_error_is_what_is_measured(road: LearningRoad) -> None:
-    shown = case(road, 1, cropping=None, estimated=False)
+    shown = make_case(road, 1, cropping=None, estimated=False)
     right, wrong = evaluate(told(0.0), shown), evaluate(told(0.15), shown)
     assert right["mae"] < 1e-9
     assert right["chamfer_full"] < 1e-6
@@ -68,7 +68,7 @@ def test_a_known_error_is_what_is_measured(road: LearningRoad) -> None:
 
 
 def test_frames_stray_from_the_axis_by_the_seed(road: LearningRoad) -> None:
-    first, second, again = (case(road, seed, cropping=None, estimated=False).frames for seed in (1, 2, 1))
+    first, second, again = (make_case(road, seed, cropping=None, estimated=False).frames for seed in (1, 2, 1))
     assert np.array_equal(first.position, again.position)
     assert not np.allclose(first.position, second.position)
     y, _ = road.known_truth.axis.crossing(first.position, first.direction)
@@ -79,13 +79,13 @@ def test_frames_stray_from_the_axis_by_the_seed(road: LearningRoad) -> None:
 def test_the_estimated_path_does_not_know_the_axis(road: LearningRoad) -> None:
     """The truth may be anything: frames in use come from the points alone."""
     other = replace(road, truth=replace(road.known_truth, axis=road.known_truth.axis.translate((3.0, 4.0, 0.0))))
-    frames = [case(one, 1, cropping=None, estimated=True).frames for one in (road, other)]
+    frames = [make_case(one, 1, cropping=None, estimated=True).frames for one in (road, other)]
     assert np.array_equal(frames[0].position, frames[1].position)
 
 
 def test_without_cropping_the_extent_gives_the_answer_away(road: LearningRoad) -> None:
-    whole = evaluate(trivial_predictor(MIDDLE), case(road, 1, cropping=None, estimated=True))
-    shown = case(road, 1, cropping=Cropping(), estimated=True)
+    whole = evaluate(trivial_predictor(MIDDLE), make_case(road, 1, cropping=None, estimated=True))
+    shown = make_case(road, 1, cropping=Cropping(), estimated=True)
     cut = evaluate(trivial_predictor(MIDDLE), shown)
     assert whole["mae"] < 0.2
     assert cut["mae"] > 0.4
@@ -97,7 +97,8 @@ def test_cuts_of_single_slices_average_out_and_longer_ones_do_not(road: Learning
         length: np.mean(
             [
                 evaluate(
-                    trivial_predictor(MIDDLE_10), case(road, seed, cropping=Cropping(length=length), estimated=False)
+                    trivial_predictor(MIDDLE_10),
+                    make_case(road, seed, cropping=Cropping(length=length), estimated=False),
                 )["mae"]
                 for seed in (1, 2, 3)
             ]
@@ -112,13 +113,13 @@ def test_gaps_of_the_axis_are_left_out(road: LearningRoad) -> None:
     joined = axis.joined.copy()
     joined[80:120] = False
     gap = replace(road, truth=replace(road.known_truth, axis=MeasuredAxis(axis.points, joined)))
-    whole, holed = (evaluate(told(0.0), case(one, 1, cropping=None, estimated=True)) for one in (road, gap))
+    whole, holed = (evaluate(told(0.0), make_case(one, 1, cropping=None, estimated=True)) for one in (road, gap))
     assert whole["slices"] - holed["slices"] == pytest.approx(40, abs=2)
 
 
 def test_the_skeleton_takes_the_classes_where_there_are_any() -> None:
     lopsided = strip_road("lopsided", left=12.0, right=-5.0)
-    shown = case(lopsided, 1, cropping=None, estimated=True)
+    shown = make_case(lopsided, 1, cropping=None, estimated=True)
     by_mask = {mask: evaluate(skeleton_predictor(SkeletonSettings(mask=mask)), shown) for mask in ("classes", "ground")}
     assert by_mask["classes"]["mae"] < 0.6
     assert by_mask["ground"]["mae"] > 2.0
@@ -127,7 +128,7 @@ def test_the_skeleton_takes_the_classes_where_there_are_any() -> None:
 def test_without_classes_the_skeleton_takes_the_ground() -> None:
     lopsided = strip_road("lopsided", left=12.0, right=-5.0)
     unknown = replace(lopsided, class_id=np.zeros_like(lopsided.class_id))
-    shown = case(unknown, 1, cropping=None, estimated=True)
+    shown = make_case(unknown, 1, cropping=None, estimated=True)
     classes, ground = (evaluate(skeleton_predictor(SkeletonSettings(mask=m)), shown) for m in ("classes", "ground"))
     assert classes == ground
 
@@ -140,7 +141,7 @@ def test_only_one_carriageways_points_belong_to_it(road: LearningRoad) -> None:
     half = replace(road, truth=replace(road.known_truth, room=room))
     _, offset = road.known_truth.axis.project(road.xyz)
     assert offset[half.belonging].min() == pytest.approx(-2.0, abs=0.05)
-    shown = Case(half, case(road, 1, cropping=None, estimated=False).frames)
+    shown = Case(half, make_case(road, 1, cropping=None, estimated=False).frames)
     assert evaluate(trivial_predictor(MIDDLE), shown)["bias"] == pytest.approx(2.5, abs=0.1)
     assert evaluate(skeleton_predictor(SkeletonSettings(0.5, 5.0, "ground")), shown)["bias"] == pytest.approx(
         2.5, abs=0.4
@@ -149,12 +150,12 @@ def test_only_one_carriageways_points_belong_to_it(road: LearningRoad) -> None:
 
 def test_a_road_without_truth_is_refused(road: LearningRoad) -> None:
     with pytest.raises(InputError, match=r"strip.*known centreline"):
-        case(replace(road, truth=None), 1, cropping=None, estimated=False)
+        make_case(replace(road, truth=None), 1, cropping=None, estimated=False)
 
 
 def test_seeds_and_trained_versions_are_averaged(road: LearningRoad) -> None:
     predictors = {"two runs": [told(0.1), told(0.3)], "one for all": [told(0.2)]}
-    result = measure(predictors, lambda seed: [case(road, seed, cropping=None, estimated=False)], [1, 2])
+    result = measure(predictors, lambda seed: [make_case(road, seed, cropping=None, estimated=False)], [1, 2])
     spread = result["two runs"]["all"]["mae"]
     assert spread.mean == pytest.approx(0.2)
     assert spread.std == pytest.approx(0.1 * 2**0.5)
@@ -209,7 +210,7 @@ def test_a_report_shows_every_road_and_the_corridor() -> None:
 
 
 def test_pictures_are_drawn_with_and_without_uncertainty(road: LearningRoad) -> None:
-    shown = case(road, 1, cropping=Cropping(), estimated=True)
+    shown = make_case(road, 1, cropping=Cropping(), estimated=True)
     lines = {MIDDLE: trivial_predictor(MIDDLE)(road, shown.frames)[:, 0], "none": np.full(len(shown.frames), np.nan)}
     count = len(shown.frames)
     center = told(0.1)(road, shown.frames)
@@ -229,7 +230,7 @@ def test_pictures_are_drawn_with_and_without_uncertainty(road: LearningRoad) -> 
 def test_real_roads_give_their_axis_away_only_where_they_are_not_cropped() -> None:
     cloud = REAL / "als_rural2lane_t211-278.laz"
     road = read_measured(cloud, cloud.with_name(f"{cloud.stem}_axis.csv"), "carriageway")
-    whole, cut = (case(road, 1, cropping=cropping, estimated=True) for cropping in (None, Cropping()))
+    whole, cut = (make_case(road, 1, cropping=cropping, estimated=True) for cropping in (None, Cropping()))
     figures = evaluate(trivial_predictor(MIDDLE), whole)
     assert figures["mae"] < 0.1
     assert figures["slices"] == pytest.approx(730, abs=15)
@@ -240,12 +241,12 @@ def test_real_roads_give_their_axis_away_only_where_they_are_not_cropped() -> No
 
 def test_parabolas_average_cuts_out_and_follow_a_bend() -> None:
     road = strip_road("bend", radius=300.0)
-    shown = case(road, 2, cropping=None, estimated=False)
+    shown = make_case(road, 2, cropping=None, estimated=False)
     known = along_parabolas(
         lambda _, frames: road.known_truth.axis.crossing(frames.position, frames.direction)[0][:, None], 37.0
     )
     assert evaluate(known, shown)["distance_95"] < 0.01
-    cut = case(road, 2, cropping=Cropping(), estimated=False)
+    cut = make_case(road, 2, cropping=Cropping(), estimated=False)
     alone, together = (
         evaluate(predictor, cut)["mae"]
         for predictor in (trivial_predictor(MIDDLE), trivial_predictors()[f"{MIDDLE}, parabola of 37 m"][0])
@@ -258,7 +259,7 @@ def test_parabolas_average_cuts_out_and_follow_a_bend() -> None:
 
 
 def test_intervals_count_where_they_are_given(road: LearningRoad) -> None:
-    shown = case(road, 1, cropping=None, estimated=False)
+    shown = make_case(road, 1, cropping=None, estimated=False)
 
     def predict(road: LearningRoad, frames: Frames) -> Float:
         found = np.zeros((len(frames), len(CORRIDOR_COLUMNS)))
@@ -273,15 +274,15 @@ def test_intervals_count_where_they_are_given(road: LearningRoad) -> None:
 
 def test_roads_of_one_name_are_refused(road: LearningRoad) -> None:
     """Their figures would be taken for each other's."""
-    shown = case(road, 1, cropping=None, estimated=False)
+    shown = make_case(road, 1, cropping=None, estimated=False)
     with pytest.raises(InputError, match=f"road is '{road.name}': is the name of several roads"):
         measure({MIDDLE: [trivial_predictor(MIDDLE)]}, lambda seed: [shown, shown], [1])
 
 
 def test_predictors_that_share_slices_say_the_same_as_alone() -> None:
-    roads = [case(road, 1, cropping=None, estimated=False) for road in analytic_roads.roads()[:2]]
+    roads = [make_case(road, 1, cropping=None, estimated=False) for road in analytic_roads.roads()[:2]]
     shared = trivial_predictors(8.0)
     for shown in (*roads, replace(roads[0], frames=roads[0].frames.select(roads[0].frames.station < 50.0))):
         for name in baselines.RULES:
-            alone = trivial_predictor(name, Cut(8.0))(shown.road, shown.frames)
+            alone = trivial_predictor(name, SliceCache(8.0))(shown.road, shown.frames)
             np.testing.assert_array_equal(shared[name][0](shown.road, shown.frames), alone)

@@ -14,7 +14,7 @@ from ml.data.tiles import Scaling
 from ml.scores.confusion import Confusion
 from ml.segmentation import prediction
 from ml.segmentation.prediction import PREDICTED, Labelling, predict_file
-from ml.segmentation.scoring import carry, label_tile, pieces
+from ml.segmentation.scoring import label_tile, nearest_labels, overlapping_pieces
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
 from tests.helpers.clouds.segmentation_data import road_block, road_tile, write_cloud
@@ -39,7 +39,7 @@ def test_pieces_hold_every_point_once_and_see_their_margin() -> None:
     plan = np.random.default_rng(1).uniform(0.0, 90.0, (20_000, 2))
     own = plan[:, 0] < 70.0
     counts = np.zeros(len(plan), dtype=int)
-    for inside, seen in pieces(plan, own, edge=24.0, margin=4.0, largest=10**6):
+    for inside, seen in overlapping_pieces(plan, own, edge=24.0, margin=4.0, largest=10**6):
         counts[inside] += 1
         assert set(inside) <= set(seen)
         low, high = plan[inside].min(axis=0), plan[inside].max(axis=0)
@@ -53,19 +53,19 @@ def test_crowded_pieces_are_cut() -> None:
     random = np.random.default_rng(2)
     plan = np.concatenate([random.uniform(0.0, 48.0, (2000, 2)), random.normal(30.0, 4.0, (20_000, 2))])
     sizes, counts = [], np.zeros(len(plan), dtype=int)
-    for inside, seen in pieces(plan, edge=24.0, margin=4.0, largest=8000):
+    for inside, seen in overlapping_pieces(plan, edge=24.0, margin=4.0, largest=8000):
         counts[inside] += 1
         sizes.append(len(seen))
     assert (counts == 1).all()
     assert max(sizes) <= 8000
-    assert list(pieces(np.zeros((0, 2)))) == []
+    assert list(overlapping_pieces(np.zeros((0, 2)))) == []
 
 
 def test_classes_are_carried_to_the_full_cloud() -> None:
     known = np.array([[0, 0, 0], [1, 0, 0]], dtype=np.float32)
     points = np.array([[0.4, 0, 0], [0.6, 0, 0], [9, 0, 0]], dtype=np.float32)
-    assert carry(known, np.array([3, 4], dtype=np.int16), points).tolist() == [3, 4, 4]
-    assert len(carry(known, np.array([3, 4], dtype=np.int16), points[:0])) == 0
+    assert nearest_labels(known, np.array([3, 4], dtype=np.int16), points).tolist() == [3, 4, 4]
+    assert len(nearest_labels(known, np.array([3, 4], dtype=np.int16), points[:0])) == 0
 
 
 def test_a_tile_is_labelled_and_scored_on_all_its_points() -> None:

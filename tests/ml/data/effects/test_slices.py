@@ -11,12 +11,20 @@ import pytest
 
 from ml.data.corridor import CORRIDOR
 from ml.data.effects import SequenceEffects
-from ml.data.effects.base import leave_out_colors
-from ml.data.effects.lighting import _waves, change_intensities, tint
-from ml.data.effects.slices import SequenceCrop, crop_sides, drop, mirror, move, stand_alone, turn_round
-from ml.data.frames import along, displace_frames
+from ml.data.effects.base import drop_colors
+from ml.data.effects.lighting import _waves, change_intensities, tint_colors
+from ml.data.effects.slices import (
+    SequenceCrop,
+    crop_sides,
+    drop_parts,
+    mirror,
+    mirror_side,
+    tilt_and_jitter,
+    turn_round,
+)
+from ml.data.frames import displace_frames, frames_along
 from ml.data.samples import LEFT, RIGHT, Stretch
-from ml.data.slices import SliceSettings, stretch
+from ml.data.slices import SliceSettings, cut_stretch
 from ml.registry import apply_effects
 from synthroads_addon.base.errors import InputError
 from tests.helpers.roads.analytic_roads import roads
@@ -41,7 +49,7 @@ def with_crop(crop: SequenceCrop) -> SequenceEffects:
 
 
 def relight(one: Stretch, effects: SequenceEffects, random: np.random.Generator) -> None:
-    for effect in (change_intensities, leave_out_colors, tint):
+    for effect in (change_intensities, drop_colors, tint_colors):
         effect(one, effects, random)
 
 
@@ -58,9 +66,9 @@ def cut(kind: str = "road", which: int = 0, seed: int = 4, spacing: int = 1) -> 
 def _cut(kind: str, which: int, seed: int, spacing: int) -> Stretch:
     road = roads(kind)[which]  # type: ignore[arg-type]
     assert road.truth is not None
-    frames = displace_frames(along(road.truth.axis), rng(seed), 12.0, 2.0, 100.0)
+    frames = displace_frames(frames_along(road.truth.axis), rng(seed), 12.0, 2.0, 100.0)
     frames = frames.select(slice(40, 40 + 10 * spacing, spacing))
-    return stretch(road, frames, SETTINGS.model_copy(update={"truth": kind}))
+    return cut_stretch(road, frames, SETTINGS.model_copy(update={"truth": kind}))
 
 
 def contents(one: Stretch) -> dict[str, np.ndarray]:
@@ -169,7 +177,7 @@ def test_a_carriageway_is_cut_outside_its_edge_lines() -> None:
 def test_a_carriageway_stands_alone(number: int) -> None:
     """Beside its inner edge lies what lies beside the outer one, and at the edges' height."""
     one, plain = (without_shoulders(cut("carriageway", number)) for _ in range(2))
-    stand_alone(one, ALWAYS, rng())
+    mirror_side(one, ALWAYS, rng())
     edges = plain.paved_sides()
     inner = int(np.isfinite(plain.room).all(axis=0).argmax())
     sign = 1.0 if inner == 0 else -1.0
@@ -198,7 +206,7 @@ def test_where_the_inner_edge_is_unknown_no_points_are_put_nowhere() -> None:
     one = without_shoulders(cut("carriageway"))
     inner = int(np.isfinite(one.room).all(axis=0).argmax())
     one.corridor[3, (LEFT, RIGHT)[inner]] = np.nan
-    stand_alone(one, ALWAYS, rng())
+    mirror_side(one, ALWAYS, rng())
     assert np.isfinite(one.coord).all()
     assert (one.number == 3).sum() > 20
 
@@ -216,16 +224,16 @@ def test_dropout_holes_and_empty_slices() -> None:
     left = []
     for seed in range(40):
         one = cut()
-        drop(one, NONE.model_copy(update={"dropout": 0.5}), rng(seed))
+        drop_parts(one, NONE.model_copy(update={"dropout": 0.5}), rng(seed))
         left.append(len(one.number) / whole)
         assert (np.diff(one.number) >= 0).all()
     assert min(left) > 0.45
     assert max(left) > 0.9
     one = cut()
-    drop(one, NONE.model_copy(update={"empty": 1.0}), rng())
+    drop_parts(one, NONE.model_copy(update={"empty": 1.0}), rng())
     assert len(one.number) == 0
     one = cut()
-    drop(one, NONE.model_copy(update={"hidden": 1.0}), rng(3))
+    drop_parts(one, NONE.model_copy(update={"hidden": 1.0}), rng(3))
     assert 0.5 * whole < len(one.number) < whole - 20
 
 
@@ -236,7 +244,7 @@ def test_a_hole_is_as_long_as_a_vehicle(spacing: int) -> None:
         one = cut(spacing=spacing)
         x = one.coord[:, 0] + spacing * one.number
         places = {tuple(place) for place in np.column_stack([x, one.coord[:, 1]])}
-        drop(one, NONE.model_copy(update={"hidden": 1.0}), rng(seed))
+        drop_parts(one, NONE.model_copy(update={"hidden": 1.0}), rng(seed))
         x = one.coord[:, 0] + spacing * one.number
         gone = np.array(sorted(places - {tuple(place) for place in np.column_stack([x, one.coord[:, 1]])}))
         holes.append(np.ptp(gone, axis=0))
@@ -260,7 +268,7 @@ def test_tilt_carries_the_height_along(spacing: int) -> None:
     height = CORRIDOR.index("height")
     before = one.corridor[:, height].copy()
     z = one.coord[:, 2].copy()
-    move(one, NONE.model_copy(update={"tilt": 0.1}), rng(1))
+    tilt_and_jitter(one, NONE.model_copy(update={"tilt": 0.1}), rng(1))
     # The plane that was added, found from the points, says what the centreline's height must be.
     along_road = one.coord[:, 0] + spacing * one.number
     design = np.column_stack([along_road, one.coord[:, 1], np.ones(len(z))])
@@ -274,7 +282,7 @@ def test_tilt_carries_the_height_along(spacing: int) -> None:
 def test_jitter() -> None:
     one = cut()
     before = one.coord.copy()
-    move(one, NONE.model_copy(update={"jitter": 0.05}), rng(1))
+    tilt_and_jitter(one, NONE.model_copy(update={"jitter": 0.05}), rng(1))
     assert 0.001 < (one.coord - before).std() < 0.05
 
 

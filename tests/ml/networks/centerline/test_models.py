@@ -9,7 +9,7 @@ import torch
 from ml.configuration import from_data
 from ml.data.axis import MeasuredAxis
 from ml.data.corridor import CORRIDOR
-from ml.data.frames import along, displace_frames
+from ml.data.frames import displace_frames, frames_along
 from ml.data.slices import mirror_batch
 from ml.networks.centerline.layers import DeformableKernelPoints, PointFeatures, cell_features, cell_sums
 from ml.networks.centerline.models import TARGETS, both_ways
@@ -156,7 +156,7 @@ def test_weights_and_gradients_are_the_same_twice():
 def test_parabola_finds_the_direction_in_frames_that_wander(towards: float):
     turn = towards + np.linspace(0.0, 0.1, 200)
     axis = MeasuredAxis(300.0 * np.column_stack([np.sin(turn), 1.0 - np.cos(turn)]))
-    exact = along(axis).select(slice(8, 18))
+    exact = frames_along(axis).select(slice(8, 18))
     frames = displace_frames(exact, np.random.default_rng(2), window=12.0, direction_deg=3.0, length=100.0)
     y, station = axis.crossing(frames.position, frames.direction)
     frame = torch.from_numpy(np.column_stack([frames.position, frames.direction, 0.0 * y]))[None]

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from torch import Tensor
 from torch.utils.data import DataLoader
 
-from ml.data.points import thin
+from ml.data.points import voxel_sample
 from ml.networks.segmentation import neighbours
 from ml.networks.segmentation.neighbours import (
     Neighbourhood,
@@ -113,14 +113,14 @@ def test_one_in_four_stays_and_at_least_one(count: int, kept: int) -> None:
 
 def test_each_cell_keeps_the_point_nearest_to_its_middle() -> None:
     points = np.array([[0.0, 0, 0], [0.4, 0.4, 0.4], [0.9, 0.1, 0.1], [1.2, 0.5, 0.5], [1.3, 0.5, 0.5], [2.5, 0, 0]])
-    assert thin(points, 1.0).tolist() == [1, 4, 5]
+    assert voxel_sample(points, 1.0).tolist() == [1, 4, 5]
     equal = np.array([[0.0, 0, 0], [0.25, 0.5, 0.5], [0.75, 0.5, 0.5]])
-    assert thin(equal, 1.0).tolist() == [1]
+    assert voxel_sample(equal, 1.0).tolist() == [1]
 
 
 def test_about_a_fourth_of_a_surface_stays() -> None:
     plane = cloud(40_000, 3) * torch.tensor([2.0, 2.0, 0.0], dtype=torch.float64)
-    plane = plane[torch.from_numpy(thin(plane.numpy(), 0.1))]  # a training voxel of 0.1 m
+    plane = plane[torch.from_numpy(voxel_sample(plane.numpy(), 0.1))]  # a training voxel of 0.1 m
     sizes = single(plane, Neighbourhood())["positions1"].shape[0], len(plane)
     assert sizes[0] / sizes[1] == pytest.approx(0.25, abs=0.03)
 
