@@ -27,33 +27,33 @@ def set_modifier_input(modifier: bpy.types.NodesModifier, name: str, value: Any)
 
 
 def modifier_input(modifier: bpy.types.NodesModifier, name: str) -> Any:
-    """Return the value of the input `name` of a Geometry Nodes modifier."""
+    """Return the value of the input `name` of a Geometry Nodes modifier; KeyError if its group has none."""
     return identified_input(modifier, _identifier(modifier, name))
 
 
 def identified_input(modifier: bpy.types.NodesModifier, identifier: str) -> Any:
-    """Return the value of the input with an identifier of a Geometry Nodes modifier."""
+    """Return the value of a Geometry Nodes modifier's input by its socket identifier."""
     if _INPUTS_ARE_PROPERTIES:
         return getattr(modifier.properties.inputs, identifier).value
     return modifier[identifier]
 
 
 def object_inputs(modifier: bpy.types.NodesModifier) -> list[str]:
-    """Return the names of the inputs of a Geometry Nodes modifier that are objects."""
+    """Return the names of a Geometry Nodes modifier's inputs of the type object."""
     items = modifier.node_group.interface.items_tree
     sockets = (item for item in items if item.item_type == "SOCKET" and item.in_out == "INPUT")
     return [socket.name for socket in sockets if socket.socket_type == "NodeSocketObject"]
 
 
 def shown_input(modifier: bpy.types.NodesModifier, identifier: str) -> tuple[Any, str]:
-    """Return what a layout's `prop` takes to show an input by its identifier: the data and the property's name."""
+    """Return (data, property name), which `UILayout.prop` takes to show a modifier's input, by its identifier."""
     if _INPUTS_ARE_PROPERTIES:
         return getattr(modifier.properties.inputs, identifier), "value"
     return modifier, f'["{identifier}"]'
 
 
 def sky_texture(nodes: bpy.types.Nodes, elevation: float, azimuth: float) -> bpy.types.ShaderNodeTexSky:
-    """Add a physical sky without sun disc; elevation and azimuth (clockwise from north) of the sun in rad."""
+    """Add and return a physical sky texture node without sun disc; sun angles in rad, azimuth clockwise from north."""
     node = nodes.new("ShaderNodeTexSky")
     names = [item.identifier for item in node.bl_rna.properties["sky_type"].enum_items]
     node.sky_type = "NISHITA" if "NISHITA" in names else "SINGLE_SCATTERING"

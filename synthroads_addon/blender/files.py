@@ -16,7 +16,7 @@ from ..base.errors import OutputError
 
 
 def empty_file() -> None:
-    """Begin a new file with nothing in it; what was open is lost.
+    """Open a new empty Blender file, discarding the open one.
 
     Not `read_factory_settings`: that would also disable the extension that this code may belong to.
     """
@@ -24,7 +24,7 @@ def empty_file() -> None:
 
 
 def save_scene(path: Path, compress: bool = True) -> None:
-    """Save a copy of the open file, compressed if not told otherwise; the open file keeps its own name and state.
+    """Save a copy of the open Blender file under a path, overwriting; the open file keeps its name and state.
 
     Raises:
         OutputError: it can't be written.
@@ -36,7 +36,7 @@ def save_scene(path: Path, compress: bool = True) -> None:
 
 
 def complaint(error: Exception) -> str:
-    """Return what Blender complains of in one line, without its prefix; of a traceback the error and not its place."""
+    """Return a Blender error's message as one line, without "Error:"; of a traceback only its last line."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     if any("Traceback" in line for line in lines):
         lines = [line for line in lines if not line.startswith("Location:")][-1:]
@@ -46,7 +46,7 @@ def complaint(error: Exception) -> str:
 
 @contextmanager
 def stderr_if_it_succeeds() -> Iterator[None]:
-    """Hold back what is written to standard error meanwhile, and drop it where an error is raised that says it all.
+    """Context that holds back standard error and prints it on success; drops it if an error is raised.
 
     Blender prints the whole traceback of an importer in Python besides raising it.
     """

@@ -23,7 +23,7 @@ VELOCITY_PROPERTY = "synthroads_velocity"
 
 @dataclass(frozen=True)
 class Label:
-    """Label of an object's faces where these have none of their own.
+    """Class and instance of an object's faces where these have none of their own.
 
     Attributes:
         strong: class that the object has, stronger than its materials'; -1 for none.
@@ -37,7 +37,7 @@ class Label:
 
 
 class Labels:
-    """The labels of a scene's objects.
+    """Lookup of the class and instance labels of a scene's objects, by mapping, properties and collections.
 
     Args:
         scene: the scene.
@@ -61,7 +61,7 @@ class Labels:
         self._by_collection = self._collections(scene)
 
     def label_of(self, item: bpy.types.Object, owner: bpy.types.Object) -> Label:
-        """Return the label of an original object, and of the original that shows it as an instance (or itself)."""
+        """Return the label of an original object that `owner` shows as an instance (itself if it is none)."""
         strong = self.by_name.find("objects", item.name, owner.name)
         strong = self._property(item, owner) if strong is None else strong
         weak = self._by_collection.get(item, self._by_collection.get(owner, UNLABELLED))
@@ -90,7 +90,7 @@ class Labels:
         return -1
 
     def _collections(self, scene: bpy.types.Scene) -> dict[bpy.types.Object, int]:
-        """Return the class of each object that its collections give it; the innermost collection counts."""
+        """Return the class id of each object by its collections' names; the innermost collection counts."""
         mapped: dict[bpy.types.Object, int] = {}
         named: dict[bpy.types.Object, int] = {}
         for collection in _shown_collections(scene):
@@ -102,7 +102,7 @@ class Labels:
 
 
 def velocity_of(item: bpy.types.Object | None) -> tuple[bpy.types.Object, NDArray[np.float64]] | None:
-    """Return what moves an original object: itself or the nearest parent with a velocity, and that (3,), m/s.
+    """Return (object, velocity (3,), m/s) of the object itself or its nearest parent with one; None if all are still.
 
     Raises:
         InputError: a velocity isn't three finite numbers; names the object.
@@ -123,7 +123,7 @@ def velocity_of(item: bpy.types.Object | None) -> tuple[bpy.types.Object, NDArra
 
 
 def _shown_collections(scene: bpy.types.Scene) -> Iterator[bpy.types.Collection]:
-    """Yield the scene's collections, and those that its objects show as instances, outer ones first."""
+    """Yield the scene's collections and those shown as instances by its objects, outer ones first, each once."""
     waiting = list(scene.collection.children_recursive)
     seen = set(waiting)
     yield from waiting

@@ -18,27 +18,27 @@ from .materials import constants
 
 
 class BlenderServices:
-    """Services of the open file; in Blender's main thread only."""
+    """A scan's services of Blender (ray casters, materials, layers) on the open file; main thread only."""
 
     def caster(self, name: str, mesh: SceneMesh) -> Caster:
         """Return a ray caster over a mesh, see `make_caster`."""
         return make_caster(name, mesh)
 
     def materials(self, names: Sequence[str]) -> list[Material]:
-        """Return the means of materials of the open file."""
+        """Return the mean optical properties of the open file's materials of these names."""
         return list(constants(names).values())
 
     def reflectance_varies(self, names: Sequence[str]) -> bool:
-        """Return whether some of these materials of the open file reflect otherwise at other places."""
+        """Return whether a layer that the intensity depends on varies over some of these materials."""
         return bool(scene_constants(names).varying_layers(OF_INTENSITY))
 
     def layers(self, request: LayerRequest, progress: Callable[[float], None]) -> AbstractContextManager[LayerSource]:
-        """Open a source of colours and layers, see `layer_source`."""
+        """Return the context of a source of the points' colours and layers, rendering as the request asks."""
         return layer_source(request, progress=progress)
 
 
 class SnapshotServices:
-    """Services that read the open file's materials once; then any thread may use them, and nothing is rendered.
+    """A scan's services with a snapshot of the open file's materials: usable in any thread, nothing is rendered.
 
     Args:
         names: materials of the scene that is scanned.
@@ -52,14 +52,14 @@ class SnapshotServices:
         return make_caster(name, mesh)
 
     def materials(self, names: Sequence[str]) -> list[Material]:
-        """Return the means that were read."""
+        """Return the mean optical properties of all materials of the snapshot; `names` is ignored."""
         return list(self._means)
 
     def reflectance_varies(self, names: Sequence[str]) -> bool:
-        """Return that nothing varies: nothing is rendered here."""
+        """Return False: without rendering, materials count as constant."""
         return False
 
     @contextmanager
     def layers(self, request: LayerRequest, progress: Callable[[float], None]) -> Iterator[LayerSource]:
-        """Yield the materials' own values."""
+        """Context of a source of layers that are the materials' constants."""
         yield material_layers(request, self._constants)

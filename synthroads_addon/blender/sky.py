@@ -19,7 +19,7 @@ _LOWEST_SUN = 1.0  # degrees: below, the sky's model ends
 
 
 def new_sun(name: str, environment: Environment, angle: float = SUN_ANGLE) -> bpy.types.Object:
-    """Return a new lamp that shines as the sun does, in no scene; `angle` (rad) is the disc's."""
+    """Create a sun lamp object aimed by the environment, in no scene yet; `angle` (rad) is the disc's diameter."""
     lamp = bpy.data.lights.new(name, "SUN")
     lamp.energy, lamp.color, lamp.angle = SUN_STRENGTH * environment.sun_strength, SUN_COLOR, angle
     sun = bpy.data.objects.new(name, lamp)
@@ -28,7 +28,7 @@ def new_sun(name: str, environment: Environment, angle: float = SUN_ANGLE) -> bp
 
 
 def fill_sky(world: bpy.types.World, elevation_deg: float, azimuth_deg: float, sun_strength: float) -> None:
-    """Give a world the nodes of a clear sky, by the sun's elevation and azimuth (degrees) and its strength."""
+    """Replace a world's nodes by a clear physical sky for the sun's elevation and azimuth (degrees) and strength."""
     if world.node_tree is None:
         world.use_nodes = True
     nodes, links = world.node_tree.nodes, world.node_tree.links

@@ -46,7 +46,7 @@ _BOUNCES = 3
 
 
 def check_colour(settings: ColourSettings) -> None:
-    """Refuse what this Blender can't do.
+    """Raise `InputError` if colour settings contradict each other, or this Blender can't render them.
 
     Raises:
         InputError: a pixel per return in a Blender before 5.0 or without OSL, or with EEVEE; materials' nodes with
@@ -65,7 +65,7 @@ def check_colour(settings: ColourSettings) -> None:
 
 
 def renders_returns(settings: ColourSettings) -> bool:
-    """Return whether what is rendered is a pixel per return here, and not images."""
+    """Return whether colours come from rendering a pixel per return in this Blender, not from images or nodes."""
     return settings.source == "returns" or (
         settings.source == "auto" and not takes_nodes(settings) and settings.engine == "cycles" and HAS_RETURN_CAMERA
     )
@@ -75,7 +75,7 @@ def renders_returns(settings: ColourSettings) -> bool:
 def layer_source(
     request: LayerRequest, source: bpy.types.Scene | None = None, progress: Callable[[float], None] = lambda share: None
 ) -> Iterator[LayerSource]:
-    """Yield what gives the points their layers; images are rendered before. The scene is as it was afterwards.
+    """Context of a source of the points' colours and layers; renders images on entry, restores the scene on exit.
 
     Must be called on Blender's main thread. `ReturnCamera` must be used there as well; the others by any threads.
 
@@ -119,7 +119,7 @@ def layer_source(
 def _lit_stage(
     stack: ExitStack, request: LayerRequest, passes: Passes, day: Daylight | None, source: bpy.types.Scene | None
 ) -> RenderStage:
-    """Open a stage with the scene in daylight."""
+    """Enter a stage with the scene in daylight into the stack; return it."""
     lamps = (day.sun,) if day else ()
     world = day.world if day and passes.sky else None
     scene = source or bpy.context.scene
@@ -133,7 +133,7 @@ def _node_layers(
     day: Daylight | None,
     source: bpy.types.Scene | None,
 ) -> LayerSource:
-    """Return layers from materials' nodes; where these ask for what nobody can give them, from a pixel per return."""
+    """Return a source of layers from materials' nodes; materials that can't be evaluated use a pixel per return."""
     constants, names = fallback.constants, request.mesh.materials
     needed = needed_layers(request.wanted, request.settings.mode)
     if request.lit:
@@ -156,14 +156,14 @@ def _node_layers(
 
 
 def image_views(request: LayerRequest) -> list[View]:
-    """Return the cameras of a request's images."""
+    """Return the camera views along the path of which a request's images are rendered."""
     settings, points = request.settings, scene_sample(request.mesh)
     views = views_along(request.path, points, settings, request.field_of_view, settings.max_resolution)
     return views if request.pick is None else request.pick(views)
 
 
 def _passes(request: LayerRequest, constants: SurfaceConstants, by_return: bool = False) -> Passes:
-    """Return what must be rendered: no layer that isn't wanted, and none that is constant on every material.
+    """Return the passes to render for a request: only wanted layers that vary on some material.
 
     Args:
         request: what is wanted.

@@ -26,14 +26,14 @@ _EDITS = 3
 
 
 def seconds_of(work: Callable[[], object]) -> float:
-    """Return how long something takes, s."""
+    """Call a function; return its wall-clock time, s."""
     begin = time.perf_counter()
     work()
     return time.perf_counter() - begin
 
 
 def rendering(request: LayerRequest, count: int) -> dict[str, Any]:
-    """Return the rendering of all layers beside that of nothing but the picture, of the same images.
+    """Render some images with all layers and with the picture alone; return both rates, million samples per second.
 
     Both are without what the first image costs, which brings the scene into the renderer.
 
@@ -60,7 +60,7 @@ def rendering(request: LayerRequest, count: int) -> dict[str, Any]:
 
 
 def _bare_seconds(request: LayerRequest, views: list[View]) -> float:
-    """Return the seconds that the picture alone of some images takes."""
+    """Render the picture alone of some views; return the wall-clock seconds it takes."""
     with daylight(request.environment, True) as day:
         passes = Passes((), lit=True)
         with stage(bpy.context.scene, (), passes, (day.sun,), None) as bare:
@@ -80,7 +80,7 @@ def _render_picture(bare: RenderStage, view: View) -> None:
 
 
 def panel_edit(model: RoadModel, parameters: RoadParameters) -> float:
-    """Return the seconds from a changed width to the updated view, vegetation hidden: the median of some changes."""
+    """Return the median seconds from changing a lane's width to the updated view; hides the vegetation."""
     for name in parameters.of_type(Vegetation):
         if name in model.objects:
             model.objects[name].hide_viewport = True

@@ -29,7 +29,7 @@ _ABOVE = 10.0
 
 @dataclass
 class _Copy:
-    """A copy of a material that reads images.
+    """A copy of a material whose inputs (positions, normals, attributes) are read from images.
 
     Attributes:
         item: the copy.
@@ -41,7 +41,7 @@ class _Copy:
 
 
 class Calculator:
-    """Works out layers of materials at places; must be used on Blender's main thread.
+    """Evaluates layers of materials at given places by rendering; must be used on Blender's main thread.
 
     Attributes:
         stage: what renders.
@@ -55,15 +55,15 @@ class Calculator:
 
     @property
     def inputs(self) -> frozenset[SurfaceInput]:
-        """Return all that the materials ask for."""
+        """Return all inputs (positions, normals, attributes, ...) that the materials' nodes read."""
         return frozenset(what for copy in self._copies.values() for what, _ in copy.readers)
 
     def inputs_of(self, material: int) -> frozenset[SurfaceInput]:
-        """Return what a material asks for, by its index."""
+        """Return the inputs that the nodes of the material with this index read."""
         return frozenset(what for what, _ in self._copies[material].readers)
 
     def calculate(self, material: Index, values: dict[SurfaceInput, Float32]) -> dict[str, Float32]:
-        """Return the layers (N, C) of N places.
+        """Render the materials' layers at N places; return them by name, (N, C) float32.
 
         Args:
             material: (N,) of each place, ascending.
@@ -87,7 +87,7 @@ class Calculator:
         return {name: image[::-1].reshape(-1, image.shape[2])[pixel] for name, image in rendered.layers.items()}
 
     def _fill(self, values: dict[SurfaceInput, Float32], pixel: Index, width: int, height: int) -> None:
-        """Write the inputs into images, which are made anew where the size changes."""
+        """Write the inputs' values into the images that the materials read, made anew if the size changes."""
         if self._size != (width, height):
             self.close()
             self._size = width, height
@@ -105,7 +105,7 @@ class Calculator:
 
     @contextmanager
     def _plane(self, numbers: list[int], begins: np.ndarray, width: int) -> Iterator[None]:
-        """Show a plane with a face for each material."""
+        """Context in which the stage shows a plane with one face per material, of rows `begins` to the next."""
         height = float(begins[-1])
         corners: list[tuple[float, float, float]] = []
         faces: list[tuple[int, ...]] = []
@@ -132,7 +132,7 @@ class Calculator:
             bpy.data.meshes.remove(mesh)
 
     def close(self) -> None:
-        """Remove the images."""
+        """Remove the input images from the file."""
         for copy in self._copies.values():
             for _, node in copy.readers:
                 node.image = None
@@ -143,7 +143,7 @@ class Calculator:
 
 @contextmanager
 def calculator(items: dict[int, bpy.types.Material], layers: Sequence[str]) -> Iterator[Calculator]:
-    """Yield a calculator of materials by their index; afterwards nothing of it is left.
+    """Context of a calculator of materials by their index; removes all its data-blocks on exit.
 
     Args:
         items: materials that can be worked out, see `material_needs`.
@@ -161,7 +161,7 @@ def calculator(items: dict[int, bpy.types.Material], layers: Sequence[str]) -> I
 
 @contextmanager
 def _reading_copy(item: bpy.types.Material, layers: Sequence[str]) -> Iterator[_Copy]:
-    """Yield a copy of a material that shows nothing but its layers, and reads images for them."""
+    """Context of a copy of a material that outputs only the layers, its inputs read from images; removed on exit."""
     copied = item.copy()
     groups: list[bpy.types.NodeTree] = []
     try:
@@ -192,7 +192,7 @@ def _reading_copy(item: bpy.types.Material, layers: Sequence[str]) -> Iterator[_
 
 
 def _new_image(width: int, height: int) -> bpy.types.Image:
-    """Return an image of four numbers for each pixel, which nothing is done to."""
+    """Return a new float RGBA image without colour management."""
     image = bpy.data.images.new("SR Calculator", width, height, alpha=True, float_buffer=True, is_data=True)
     image.alpha_mode = "CHANNEL_PACKED"
     return image

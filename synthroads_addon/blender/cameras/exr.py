@@ -21,6 +21,6 @@ def read_layers(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def write_image(path: Path, values: NDArray[np.float32]) -> None:
-    """Write (H, W, 3) numbers, rows from the top, uncompressed and as they are."""
+    """Write (H, W, 3) float32 numbers, rows from the top, as an uncompressed EXR file."""
     header = {"compression": OpenEXR.NO_COMPRESSION, "type": OpenEXR.scanlineimage}
     OpenEXR.File(header, {"RGB": np.ascontiguousarray(values, np.float32)}).write(str(path))

@@ -21,21 +21,21 @@ _SENSOR = 36.0
 
 
 class RenderedLayers(ImageLayers):
-    """Layers from images that are files of a temporary folder, mapped into memory page by page.
+    """Source of layers from rendered images along the path, memory-mapped from files of a temporary folder.
 
     Attributes:
         report: images, pixels, layers and bytes, as JSON data.
     """
 
     def __init__(self, stage: RenderStage, views: Sequence[View], fallback: MaterialLayers, exposure: float) -> None:
-        """Begin without an image; `render` makes them."""
+        """Prepare without rendering; `render` makes the images."""
         super().__init__((), stage.passes.channels, fallback)
         self._stage, self._views, self._exposure = stage, views, exposure
         self._scratch = ExitStack()
         self._folder = self._scratch.enter_context(scratch_folder())
 
     def render(self, progress: Callable[[float], None]) -> None:
-        """Render all images; must run on Blender's main thread. Calls `progress` with the share that is done."""
+        """Render and store all images, calling `progress` with the share done; must run on Blender's main thread."""
         for number, view in enumerate(self._views):
             aim(self._stage.camera, view)
             self.images.append(self._store_image(number, view, self._stage.render(*view.size)))
@@ -75,13 +75,13 @@ class RenderedLayers(ImageLayers):
         return np.load(path, mmap_mode="r" if array.size else None)
 
     def close(self) -> None:
-        """Remove the files."""
+        """Remove the images' temporary files."""
         self.images.clear()
         self._scratch.close()
 
 
 def aim(camera: bpy.types.Object, view: View) -> None:
-    """Set a camera object to a view."""
+    """Set a camera object's place, lens and shift to those of a view."""
     data, (width, height) = camera.data, view.size
     data.type, data.sensor_fit, data.sensor_width = "PERSP", "HORIZONTAL", _SENSOR
     data.lens = view.focal * _SENSOR / width

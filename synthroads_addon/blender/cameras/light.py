@@ -22,7 +22,7 @@ _PROBE_SAMPLES = 128
 
 @dataclass(frozen=True)
 class Daylight:
-    """Lamp, sky, and what they make of a white surface.
+    """A sun lamp, a sky, and the light that a white surface gets from both.
 
     Attributes:
         sun: lamp.
@@ -39,7 +39,7 @@ class Daylight:
 
 @contextmanager
 def daylight(environment: Environment, sharp: bool) -> Iterator[Daylight]:
-    """Yield a sun and a sky; afterwards nothing is left of them.
+    """Context of a sun lamp and a sky for a road's environment, with their exposure; removes them on exit.
 
     Args:
         environment: the road's.
@@ -82,7 +82,7 @@ def _world(sky: _Sky) -> Iterator[bpy.types.World]:
 
 @lru_cache(maxsize=64)
 def _sky_radiance(sky: _Sky) -> tuple[float, float, float]:
-    """Return the radiance of a white matt horizontal surface under a sky, by rendering one.
+    """Render a white matt horizontal surface under a sky; return its radiance (red, green, blue), cached.
 
     Most of a small scan's time would go into it, so each sky is rendered once per process.
     """

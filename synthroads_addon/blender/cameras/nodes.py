@@ -30,7 +30,7 @@ AT_ONCE = 1 << 20
 
 
 class NodeLayers:
-    """Layers of each return from its material's nodes. Must be used on Blender's main thread if it renders.
+    """Source of each return's layers, evaluated from its material's nodes; on Blender's main thread if it renders.
 
     Args:
         calculator: of the materials that vary; None where none does.
@@ -69,7 +69,7 @@ class NodeLayers:
 
     @property
     def report(self) -> dict[str, Any]:
-        """Return what was rendered, and which materials weren't worked out and why, as JSON data."""
+        """Return images, pixels and layers rendered, and materials left out with why and their points, as JSON data."""
         result: dict[str, Any] = {}
         if self._calculator is not None:
             stage = self._calculator.stage
@@ -82,7 +82,7 @@ class NodeLayers:
         return result
 
     def sample(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
-        """Return the wanted layers of N points; see `LayerSource.sample`."""
+        """Return the wanted layers of N points, and how each point got them (its source)."""
         hard = self._hard[points.material]
         if not hard.any():
             return self._work_out(points, wanted)
@@ -117,7 +117,7 @@ class NodeLayers:
         return self.material.layer_values(points, channels, source, wanted)
 
     def _calculate(self, points: SeenPoints, rows: Index, channels: dict[str, Float32]) -> None:
-        """Fill in rows of the channels."""
+        """Render the layers of the points of `rows` and write them into the channels, in place."""
         assert self._calculator is not None
         material = points.material[rows]
         order = np.argsort(material, kind="stable")
@@ -127,7 +127,7 @@ class NodeLayers:
             channels[name][rows] = array
 
     def _inputs(self, points: SeenPoints, rows: Index, material: UInt16) -> dict[SurfaceInput, Float32]:
-        """Return all that the materials of rows of points ask for, (N, 4) each."""
+        """Return the values (N, 4) float32 of all inputs that the materials of the N points `rows` read."""
         assert self._calculator is not None
         asked: dict[SurfaceInput, list[int]] = {}
         for number in np.unique(material).tolist():
@@ -149,7 +149,7 @@ class NodeLayers:
         return values
 
     def _sunlight(self, points: SeenPoints, channels: dict[str, Float32]) -> Float32:
-        """Return the sun's light (N, 3) that points throw back to the scanner, exposed."""
+        """Return the sunlight (N, 3) that points reflect towards the scanner, exposed; 0 in shadow."""
         result = np.zeros((len(points), 3), np.float32)
         light = self.material.light
         normal = np.asarray(points.normal, np.float32)
@@ -160,7 +160,7 @@ class NodeLayers:
         material = points.material[rows]
 
         def layer(name: str) -> Float32:
-            """Return a layer of the lit points: what was worked out, else the material's own value."""
+            """Return a layer's values at the lit points: evaluated where it varies, else the material's constant."""
             values = self.material.constants.values[name][material]
             if name in channels:
                 use = np.flatnonzero(self.material.constants.varies[name][material])

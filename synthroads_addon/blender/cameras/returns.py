@@ -49,7 +49,7 @@ shader sr_return_camera(
 
 
 class ReturnCamera:
-    """Layers of each return by a pixel of its own. Must be used on Blender's main thread.
+    """Source of each return's layers by rendering one pixel per return; must be used on Blender's main thread.
 
     A return's ray starts a little before the place that was hit, along the scanner's ray, so that what the pulse
     came through on its way doesn't hide it. Pixels that show another place or another material than the return's
@@ -69,12 +69,12 @@ class ReturnCamera:
 
     @property
     def report(self) -> dict[str, Any]:
-        """Return what was rendered, as JSON data."""
+        """Return the images, pixels and layers rendered so far, as JSON data."""
         stage = self._stage
         return {"images": stage.images, "pixels": stage.pixels, "layers": list(stage.passes.channels)}
 
     def sample(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
-        """Return the wanted layers of N points; see `LayerSource.sample`."""
+        """Return the wanted layers of N points, and how each point got them (its source)."""
         parts = [
             self._block(points.select(slice(start, start + BLOCK)), wanted)
             for start in range(0, max(len(points), 1), BLOCK)
@@ -88,7 +88,7 @@ class ReturnCamera:
         return self.material.layer_values(points, channels, source, wanted)
 
     def _render_points(self, points: SeenPoints) -> tuple[dict[str, NDArray[np.float32]], NDArray[np.bool_]]:
-        """Return the channels (N, C) of points, and which of them are what their pixels show (N,)."""
+        """Render N points; return channels (N, C), and the mask (N,) of points whose pixel shows just that return."""
         # A height that is a power of two divides without error, whichever way a version counts the rows.
         height = int(np.clip(1 << ((len(points) - 1).bit_length() // 2), _SMALLEST, _HEIGHT))
         width = max(_SMALLEST, -(-len(points) // height))
@@ -114,7 +114,7 @@ class ReturnCamera:
         return channels, matching
 
     def _aim(self, points: SeenPoints, width: int, height: int) -> Float:
-        """Give the camera the rays of points; return where it stands (3,)."""
+        """Set up the camera's shader with a ray per point; return the camera's place (3,), m."""
         along = points.position - points.scanner
         along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
         # Near the returns, where 32-bit floats are fine.
@@ -135,7 +135,7 @@ class ReturnCamera:
         return middle
 
     def _set_shader(self, text: str) -> None:
-        """Compile a shader and give it to the camera."""
+        """Compile an OSL shader and make it the camera's; raise RuntimeError if that fails."""
         import _cycles  # not every Blender has it
 
         source, compiled = self._stage.folder / "camera.osl", self._stage.folder / "camera.oso"
@@ -157,7 +157,7 @@ class ReturnCamera:
 
 @contextmanager
 def _without_bumps() -> Iterator[None]:
-    """Leave normals as the surfaces have them while something is rendered.
+    """Context in which all bump nodes of the file are muted.
 
     A bump is worked out from what neighbouring pixels see, and here they see places that are far apart.
     """
@@ -173,7 +173,7 @@ def _without_bumps() -> Iterator[None]:
 
 
 def _fill_image(values: Float, width: int, height: int, columns: int) -> NDArray[np.float32]:
-    """Return (N, 3) values row by row as an image (height, columns, 3) that only `width` columns are used of.
+    """Return values (N, 3) row by row as an image (height, columns, 3) whose first `width` columns are used.
 
     What is left of the last row repeats the last value.
     """

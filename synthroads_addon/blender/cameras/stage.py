@@ -33,7 +33,7 @@ _POSITION, _DEPTH = "Position", "Depth"
 
 @dataclass(frozen=True)
 class Passes:
-    """Channels that are rendered.
+    """Selection of the passes to render, with samples and bounces.
 
     Attributes:
         layers: of the materials, see `MATERIAL_LAYERS`.
@@ -55,7 +55,7 @@ class Passes:
 
     @property
     def channels(self) -> dict[str, int]:
-        """Return the layers that come back, in order, and their components."""
+        """Return the rendered layers' names in order, with their numbers of components."""
         light = {SUN_GROUP: 3} if self.lit else {}
         light |= {SKY_GROUP: 3} if self.sky else {}
         return {name: MATERIAL_LAYERS[name] for name in self.layers} | light
@@ -63,7 +63,7 @@ class Passes:
 
 @dataclass(frozen=True)
 class RenderedPasses:
-    """One rendered image, rows from the top.
+    """Passes of one rendered image, rows from the top.
 
     Attributes:
         layers: by channel: (H, W, C) float32.
@@ -79,7 +79,7 @@ class RenderedPasses:
 
 
 class RenderStage:
-    """Renders the visible objects of a scene, under lights of its own.
+    """Temporary scene and camera that render the visible objects of another scene.
 
     Attributes:
         scene: the temporary scene.
@@ -94,7 +94,7 @@ class RenderStage:
         self.images = self.pixels = 0
 
     def render(self, width: int, height: int) -> RenderedPasses:
-        """Render an image through the camera as it is; must run on Blender's main thread.
+        """Render the camera's current view; return its passes; must run on Blender's main thread.
 
         Raises:
             OutputError: the image can't be written to the temporary folder.
@@ -114,7 +114,7 @@ class RenderStage:
             raise temporary_folder_error(self.folder, error) from None
 
     def forget(self) -> None:
-        """Have the renderer drop what it keeps from image to image."""
+        """Make the renderer drop the data it keeps from image to image."""
         self.scene.render.use_persistent_data = False
         self.scene.render.use_persistent_data = True
 
@@ -146,7 +146,7 @@ def stage(
     world: bpy.types.World | None,
     engine: str = "cycles",
 ) -> Iterator[RenderStage]:
-    """Yield a stage with the objects that are visible in a scene; afterwards nothing of it is left.
+    """Context of a stage with a scene's visible objects and prepared materials; removes and restores all on exit.
 
     Args:
         source: whose objects are rendered.
@@ -171,7 +171,7 @@ def stage(
 def new_stage(
     passes: Passes, folder: Path, items: Sequence[bpy.types.Object] = (), engine: str = "cycles"
 ) -> Iterator[RenderStage]:
-    """Yield a stage with objects and a camera and nothing else; afterwards the scene and the camera are gone.
+    """Context of a stage with the given objects and a camera; removes its scene, camera and images on exit.
 
     Args:
         passes: what is rendered.
@@ -198,7 +198,7 @@ def new_stage(
 
 
 def _remove_stage(scene: bpy.types.Scene) -> None:
-    """Remove the scene and what its renderer kept.
+    """Remove the stage's scene with its renderer's data, keeping the objects.
 
     A renderer that outlives its scene still knows the objects, and Blender 4.5 crashes now and then when one of these
     is removed later.
@@ -211,7 +211,7 @@ def _remove_stage(scene: bpy.types.Scene) -> None:
 
 
 def visible_objects(source: bpy.types.Scene) -> list[bpy.types.Object]:
-    """Return the objects that a scene shows, but for lamps and cameras: its current view layer, else its first."""
+    """Return the visible objects of a scene's view layer (the current, else the first), without lamps and cameras."""
     layer = bpy.context.view_layer if source == bpy.context.scene else source.view_layers[0]
     layer.update()
     return [
@@ -261,7 +261,7 @@ def _set_passes(scene: bpy.types.Scene, passes: Passes) -> None:
 def _set_light_groups(
     scene: bpy.types.Scene, passes: Passes, lights: Sequence[bpy.types.Object], world: bpy.types.World | None
 ) -> None:
-    """Have the light of sun and sky rendered apart where both are."""
+    """Put sun and sky into separate light groups if the passes include the sky."""
     if not passes.sky:
         return
     layer = scene.view_layers[0]
@@ -275,7 +275,7 @@ def _set_light_groups(
 
 @contextmanager
 def _silence() -> Iterator[None]:
-    """Drop what Blender itself writes to the standard output: lines for each image."""
+    """Context in which the process's standard output, where Blender reports each image, goes nowhere."""
     if sys.stdout is not None:
         sys.stdout.flush()
     try:

@@ -17,7 +17,7 @@ NUMBER = "sr_material"
 
 
 def scene_constants(names: Sequence[str]) -> SurfaceConstants:
-    """Return the means of a scene mesh's materials and which of their layers vary."""
+    """Return the mean layers of the named materials, and which layers vary on which."""
     varying = {layer: np.zeros(len(names), bool) for layer in MATERIAL_LAYERS}
     for index, item in numbered_materials(names):
         for layer, expression in layer_expressions(item).items():
@@ -27,7 +27,7 @@ def scene_constants(names: Sequence[str]) -> SurfaceConstants:
 
 @contextmanager
 def prepared_materials(names: Sequence[str], layers: Sequence[str], numbers: bool) -> Iterator[None]:
-    """Number the materials, give those that lack them outputs for layers, and undo it afterwards.
+    """Context in which the named materials have pass indices and outputs for the layers; undone on exit.
 
     Args:
         names: the scene mesh's materials; their numbers, as pass index, are their indices plus 1.
@@ -54,7 +54,7 @@ def prepared_materials(names: Sequence[str], layers: Sequence[str], numbers: boo
 
 
 def add_layer_outputs(item: bpy.types.Material, layers: Sequence[str], nodes: LayerNodes) -> None:
-    """Add outputs for those of the layers that a material varies and has no output for."""
+    """Add AOV outputs to a material for the layers that vary on it and lack one; `nodes` keeps what was added."""
     expressions = layer_expressions(item)
     own = {node.aov_name for node in item.node_tree.nodes if node.type == "OUTPUT_AOV"}
     for layer in layers:
@@ -63,7 +63,7 @@ def add_layer_outputs(item: bpy.types.Material, layers: Sequence[str], nodes: La
 
 
 def numbered_materials(names: Sequence[str]) -> Iterator[tuple[int, bpy.types.Material]]:
-    """Yield the open file's materials that a scene mesh's names stand for, with their indices."""
+    """Yield (index in `names`, material) of the open file's materials that a scene mesh's names stand for."""
     index = {name: number for number, name in enumerate(names)}
     for item in bpy.data.materials:
         if (name := table_name(item)) in index:

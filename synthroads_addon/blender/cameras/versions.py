@@ -6,7 +6,7 @@ import bpy
 
 
 def _compiles_shaders() -> bool:
-    """Return whether this Blender's Cycles was built with Open Shading Language: Debian's isn't."""
+    """Return whether this Blender's Cycles can compile Open Shading Language; Debian's can't."""
     try:
         import _cycles
     except ImportError:
@@ -19,12 +19,12 @@ HAS_RETURN_CAMERA = bpy.app.version >= (5, 0, 0) and _compiles_shaders()
 
 
 def eevee_engine() -> str:
-    """Return the identifier of EEVEE."""
+    """Return the render engine identifier of EEVEE in this Blender version."""
     return "BLENDER_EEVEE_NEXT" if bpy.app.version < (5, 0, 0) else "BLENDER_EEVEE"
 
 
 def multilayer_exr(settings: bpy.types.ImageFormatSettings) -> None:
-    """Have renders written as uncompressed multilayer EXR files of 32-bit floats."""
+    """Set image settings to uncompressed multilayer EXR of 32-bit floats, in place."""
     if hasattr(settings, "media_type"):
         settings.media_type = "MULTI_LAYER_IMAGE"
     settings.file_format = "OPEN_EXR_MULTILAYER"

@@ -10,7 +10,7 @@ NAMES = ("embree", "bvhtree")
 
 
 def make_caster(name: str, mesh: SceneMesh) -> Caster:
-    """Return the caster ``embree``, ``bvhtree`` or, as ``auto``, the fastest that is there.
+    """Build the ray caster ``embree`` or ``bvhtree`` for a mesh; ``auto`` takes the fastest that is installed.
 
     Raises:
         InputError: there is no such caster, or its package isn't installed.

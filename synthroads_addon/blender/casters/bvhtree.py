@@ -11,7 +11,7 @@ from ...scanning.scene.mesh import SceneMesh
 
 
 class BVHTreeCaster:
-    """Casts rays with Blender's bounding volume tree; always there, and slow."""
+    """Ray caster on Blender's bounding volume tree, one ray at a time: always available, slow."""
 
     name = "bvhtree"
     main_thread_only = False
@@ -22,7 +22,7 @@ class BVHTreeCaster:
     def cast(
         self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float
     ) -> NDArray[np.int32]:
-        """Return the (N,) indices of the faces hit, -1 for none; see `Caster.cast`."""
+        """Return the index (N,) of the first face that each ray hits within the range (m), -1 for none."""
         cast = self._tree.ray_cast
         faces = np.full(len(origins), -1, dtype=np.int32)
         for i, (origin, direction) in enumerate(zip(origins.tolist(), directions.tolist(), strict=True)):
@@ -34,5 +34,5 @@ class BVHTreeCaster:
     def occluded(
         self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float
     ) -> NDArray[np.bool_]:
-        """Return whether (N,) something is hit, see `Caster.occluded`."""
+        """Return a mask (N,) of the rays that hit anything within the range (m)."""
         return self.cast(origins, directions, maximum_range) >= 0

@@ -14,7 +14,7 @@ _AT_ONCE = 20_000
 
 
 class EmbreeCaster:
-    """Casts rays with Embree.
+    """Ray caster on Embree 4, which releases Python's lock while casting.
 
     Args:
         mesh: what rays are cast at.
@@ -42,7 +42,7 @@ class EmbreeCaster:
     def cast(
         self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float
     ) -> NDArray[np.int32]:
-        """Return the (N,) indices of the faces hit, -1 for none; see `Caster.cast`."""
+        """Return the index (N,) of the first face that each ray hits within the range (m), -1 for none."""
         if not self._meshes or len(origins) == 0:
             return np.full(len(origins), -1, dtype=np.int32)
         limit = np.full(len(origins), maximum_range, dtype=np.float32)
@@ -54,7 +54,7 @@ class EmbreeCaster:
     def occluded(
         self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float
     ) -> NDArray[np.bool_]:
-        """Return whether (N,) something is hit, see `Caster.occluded`: half the work of finding what is hit first."""
+        """Return a mask (N,) of the rays that hit anything within the range (m); half the work of `cast`."""
         if not self._meshes or len(origins) == 0:
             return np.zeros(len(origins), bool)
         limit = np.full(len(origins), maximum_range, dtype=np.float32)

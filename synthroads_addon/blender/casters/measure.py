@@ -23,7 +23,7 @@ CHUNK = 2**17
 
 @dataclass(frozen=True)
 class Rate:
-    """How fast rays were cast.
+    """Rate at which rays were cast, by wall clock and by processor time.
 
     Attributes:
         rays_per_second: by the clock.
@@ -36,7 +36,7 @@ class Rate:
 
 @dataclass(frozen=True)
 class Agreement:
-    """How well two casters agree on the same rays.
+    """Agreement of two casters on the same rays.
 
     Attributes:
         same: share of the rays for which both find the same face, or both none.
@@ -58,7 +58,7 @@ def bare_rate(
     chunk: int = CHUNK,
     repeats: int = 3,
 ) -> Rate:
-    """Return the rate at which a caster alone casts rays (N, 3); the best of some repeats."""
+    """Return the rate at which a caster alone casts N rays, in chunks on some threads: the best of the repeats."""
     parts = [slice(start, start + chunk) for start in range(0, len(origins), chunk)]
     best, least = np.inf, np.inf
     with ThreadPoolExecutor(threads) as pool:
@@ -77,7 +77,7 @@ def _exhaust(results: Iterable[Faces]) -> None:
 
 
 def agreement(mesh: SceneMesh, origins: Rays, directions: Rays, found: Faces, expected: Faces) -> Agreement:
-    """Compare the faces (N,) that two casters found for the same rays (N, 3); -1 is none."""
+    """Return the agreement of the faces (N,) that two casters found for the same rays (N, 3); -1 is none."""
     differ = np.flatnonzero(found != expected)
     if not len(differ):
         return Agreement(1.0, 0.0)
@@ -93,7 +93,7 @@ def agreement(mesh: SceneMesh, origins: Rays, directions: Rays, found: Faces, ex
 
 
 def _edge_distances(mesh: SceneMesh, origins: Float, directions: Float, faces: Faces) -> Float:
-    """Return how near (m) each ray's line passes to an edge of its face; infinity where it has none (face -1)."""
+    """Return the distance (N,), m, of each ray's line to the nearest edge of its face; infinity for face -1."""
     corners = mesh.vertices[mesh.triangles[faces]].astype(np.float64)
     distance = np.full(len(faces), np.inf)
     for i in range(3):
@@ -107,5 +107,5 @@ def _edge_distances(mesh: SceneMesh, origins: Float, directions: Float, faces: F
 
 
 def _across(vectors: Float, directions: Float) -> Float:
-    """Return the parts of vectors (N, 3) at a right angle to unit directions (N, 3)."""
+    """Return the components (N, 3) of vectors that are perpendicular to unit directions (N, 3)."""
     return vectors - np.einsum("ij,ij->i", vectors, directions)[:, None] * directions

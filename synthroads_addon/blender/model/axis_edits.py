@@ -25,7 +25,7 @@ _STILL = 2e-4
 
 @dataclass(frozen=True)
 class EditedAxis:
-    """An axis as its backbone shows it now.
+    """A road's axis as read from its edited backbone.
 
     Attributes:
         alignment: it.
@@ -39,7 +39,7 @@ class EditedAxis:
 
 
 def edited_axis(geometry: RoadGeometry, backbone: bpy.types.Object, place: Float) -> EditedAxis | None:
-    """Return a road's axis after edits of its backbone; None if it is as it was built.
+    """Return a road's axis read from its backbone: moved exactly or fitted to moved points; None if unedited.
 
     Args:
         geometry: of what the road was built from.
@@ -75,7 +75,7 @@ def edited_axis(geometry: RoadGeometry, backbone: bpy.types.Object, place: Float
 
 
 def moved_alignment(axis: AlignmentObject, place: Float) -> AlignmentObject:
-    """Return an alignment moved and turned about the vertical by an upright place (4, 4)."""
+    """Return an alignment transformed by an upright matrix (4, 4): shifted, and turned about the vertical."""
     x, y, _, _ = place @ np.array([axis.start_x, axis.start_y, 0.0, 1.0])
     heading = axis.start_heading_deg + float(np.rad2deg(turn_of(place)))
     rise = float(place[2, 3])
@@ -86,13 +86,13 @@ def moved_alignment(axis: AlignmentObject, place: Float) -> AlignmentObject:
 
 
 def _stations(alignment: Alignment, points: Float, before: Float) -> Float:
-    """Return the stations (N,) of points on an axis, increasing as those before do."""
+    """Return non-decreasing stations (N,), m, of points projected onto an axis near those before."""
     near, _ = alignment.project_near(points[:, :2], before, 0.25 * alignment.length + 100.0)
     return np.maximum.accumulate(near)
 
 
 def _carried(station: float, before: Float, now: Float) -> float:
-    """Return where a station lies now; beyond the ends it keeps its distance from them."""
+    """Return a station mapped from the axis before to the one now, m; beyond the ends it keeps its distance."""
     if station <= before[0]:
         return float(now[0] + station - before[0])
     if station >= before[-1]:

@@ -53,7 +53,7 @@ _EVALUATION, _MOST_AT_ONCE = 0.1, 32
 
 @dataclass(frozen=True)
 class BuildTarget:
-    """Which road a new one takes the place of.
+    """Which road a new one replaces, and what of it stays or goes.
 
     Attributes:
         road: the id of its root; the road that is meant in the scene (`roads.road_meant`) if empty.
@@ -70,7 +70,7 @@ class BuildTarget:
     drops: frozenset[str] = frozenset()
 
     def root(self, scene: bpy.types.Scene) -> bpy.types.Object | None:
-        """Return the root of the road that is replaced; None if there is none.
+        """Return the root object of the road to replace; None if there is none.
 
         Raises:
             InputError: it is linked from another file, where alone it can be built.
@@ -87,7 +87,7 @@ MEANT = BuildTarget()
 
 @dataclass(frozen=True)
 class RoadModel:
-    """A road in the scene.
+    """A road built in the scene: root, collection and objects.
 
     Attributes:
         root: the empty that all of the model's objects hang on, see `roads`.
@@ -104,7 +104,7 @@ class RoadModel:
 
     @property
     def road_id(self) -> str:
-        """Return the road's id, which its root has."""
+        """Return the road's id, as its root object keeps it."""
         return str(self.root[ROAD])
 
 
@@ -117,7 +117,7 @@ def build_road(
     geometry: RoadGeometry | None = None,
     place: BuildTarget = MEANT,
 ) -> RoadModel:
-    """Build the road in the current scene, in the place of one built before; all else stays as it is.
+    """Build the road's objects in the current scene, replacing the road of `place`; return the model.
 
     If it can't be built, the file is as it was before.
 
@@ -154,7 +154,7 @@ def build_steps(
     stretch: tuple[float, float] | None = None,
     place: BuildTarget = MEANT,
 ) -> Generator[float | None, None, RoadModel]:
-    """Build the road as `build_road` does, in steps between which the window may live; return the model.
+    """Generator that builds the road as `build_road` does, in short steps so that Blender's window stays responsive.
 
     The new road grows beside the one built before, and takes its place in the last step. Each object is evaluated in a
     step of its own, which Blender can't interrupt. Close the generator to give up: all that was made is removed, and
@@ -183,7 +183,7 @@ def build_steps(
 
 
 class _Build:
-    """A road that is being built: in a collection of its own, until it takes the place of the one built before.
+    """A road under construction in a staging collection, until it replaces the one built before.
 
     Attributes:
         log: data-blocks that were made for it.
@@ -220,7 +220,7 @@ class _Build:
         self._builder = ModelBuilder(parameters, self._collection, tolerance, detail, stretch, geometry, root)
 
     def build(self) -> None:
-        """Make the objects; see `base.stepper` for how this is done in steps."""
+        """Make the wanted parts' objects, updating `share`; runs within a `Stepper`."""
         self._builder.lay_out()
         there = required_parts(self._wanted)
         for number, (name, part) in enumerate(model_parts().items(), 1):
@@ -230,7 +230,7 @@ class _Build:
             self.share = number / len(model_parts())
 
     def evaluate(self) -> None:
-        """Have Blender work out what is new."""
+        """Have Blender evaluate the new objects; adapts how many are made at once to the time it takes."""
         scene = bpy.data.scenes[self._scene]
         layer = bpy.context.view_layer if scene == bpy.context.scene else scene.view_layers[0]
         begin = time.perf_counter()
@@ -240,7 +240,7 @@ class _Build:
         self._builder.at_once = int(np.clip(self._builder.at_once * np.clip(change, 0.25, 2.0), 1, _MOST_AT_ONCE))
 
     def swap(self) -> RoadModel:
-        """Put the new road in the place of the one built before."""
+        """Replace the road built before by the new one, label its parts and place its root; return the model."""
         parameters, builder, scene = self._builder.parameters, self._builder, bpy.data.scenes[self._scene]
         root = next(item for item in scene.objects if item.get(ROAD) == self._road)
         if FRAME in root:
@@ -277,7 +277,7 @@ _CLASSES = {"Road": "road", "Terrain": "ground", "Painted Areas": "road_marking"
 
 
 def _describe(item: bpy.types.Object, role: str, parameters: RoadParameters) -> None:
-    """Give a part its class, should its faces lose theirs; and lock the place of what lies along the whole road.
+    """Write a part's class to its object's properties; lock the transform of what lies along the whole road.
 
     Its shape follows the road, wherever its object is.
     """
@@ -291,13 +291,13 @@ def _describe(item: bpy.types.Object, role: str, parameters: RoadParameters) -> 
 
 
 def _home(root: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Collection:
-    """Return the collection that a root is in, in a scene."""
+    """Return the scene's collection that holds a road's root object."""
     inside = {scene.collection, *scene.collection.children_recursive}
     return next(collection for collection in root.users_collection if collection in inside)
 
 
 def _parts_of(root: bpy.types.Object, place: BuildTarget = MEANT) -> dict[bpy.types.Object, str]:
-    """Return the objects that were built for a road, in all scenes, and their roles; not the user's copies of some."""
+    """Return a road's built objects in all scenes with their roles, but for `place.keeps`, with copies to drop."""
     objects: dict[bpy.types.Object, str] = {}
     for scene in bpy.data.scenes:
         if scene.objects.get(root.name_full) == root:
@@ -308,7 +308,7 @@ def _parts_of(root: bpy.types.Object, place: BuildTarget = MEANT) -> dict[bpy.ty
 
 
 def _repoint(old: Mapping[bpy.types.Object, str], new: Mapping[str, bpy.types.Object]) -> None:
-    """Have modifiers of other objects that use a road's old parts use the new ones of the same role."""
+    """Make modifiers of other objects that refer to a road's old parts refer to the new ones of the same role."""
     for item in bpy.data.objects:
         if item in old or item.library is not None:
             continue
@@ -321,7 +321,7 @@ def _repoint(old: Mapping[bpy.types.Object, str], new: Mapping[str, bpy.types.Ob
 
 
 def remove_road(root: bpy.types.Object | None = None) -> None:
-    """Remove a road: the objects that were built for it, its root, and their collection if nothing else is in it.
+    """Delete a road's objects, its root, and their collection if it is empty then; the user's children stay in place.
 
     Args:
         root: of the road; that of the one that is meant in the current scene if None.

@@ -35,7 +35,7 @@ _KINDS = ("NodeSocketFloat", "NodeSocketInt", "NodeSocketBool")
 
 @dataclass(frozen=True)
 class HandEdit:
-    """A part that was edited by hand: known by its points alone, no longer by parameters.
+    """A part that was edited by hand, so that no parameters describe it, and why.
 
     Attributes:
         part: what it was in the road.
@@ -48,19 +48,19 @@ class HandEdit:
     reason: str
 
     def to_dict(self) -> dict[str, str]:
-        """Return it as JSON data."""
+        """Return part, object and reason as JSON data."""
         return {"part": self.part, "object": self.name, "reason": self.reason}
 
 
 def keep_built(item: bpy.types.Object) -> None:
-    """Keep what a part's mesh and inputs are, to find later what was edited."""
+    """Store a part's mesh digest and modifier inputs in a custom property, to find edits later."""
     modifier = own_modifier(item)
     inputs = {} if modifier is None else dict(_numbers(modifier))
     item[BUILT] = json.dumps({"mesh": mesh_digest(item), "inputs": inputs})
 
 
 def own_modifier(item: bpy.types.Object) -> bpy.types.NodesModifier | None:
-    """Return the modifier of a part's node group, if it is there and the only one."""
+    """Return an object's only modifier if it is a Geometry Nodes modifier with a group, else None."""
     if len(item.modifiers) != 1:
         return None
     modifier = item.modifiers[0]
@@ -68,7 +68,7 @@ def own_modifier(item: bpy.types.Object) -> bpy.types.NodesModifier | None:
 
 
 def mesh_digest(item: bpy.types.Object) -> str:
-    """Return a text that tells an object's own mesh from other ones; empty for an object without."""
+    """Return a checksum text of an object's unevaluated mesh (counts and places); empty for an object without one."""
     if not isinstance(item.data, bpy.types.Mesh):
         return ""
     places = vertices_of(item.data).astype(np.float32)
@@ -76,14 +76,14 @@ def mesh_digest(item: bpy.types.Object) -> str:
 
 
 def vertices_of(mesh: bpy.types.Mesh) -> Float:
-    """Return a mesh's vertices (V, 3)."""
+    """Return a mesh's vertices (V, 3), float64, m, in the object's frame."""
     flat = np.empty(3 * len(mesh.vertices), np.float32)
     mesh.vertices.foreach_get("co", flat)
     return flat.reshape(-1, 3).astype(np.float64)
 
 
 def attribute_of(mesh: bpy.types.Mesh, name: str, default: float = 0.0) -> NDArray[Any]:
-    """Return a number for each vertex (V,); the default where the mesh has no such attribute."""
+    """Return a float or integer point attribute (V,); filled with the default if the mesh has no such attribute."""
     attribute = mesh.attributes.get(name)
     if attribute is None or attribute.domain != "POINT" or attribute.data_type not in ("FLOAT", "INT"):
         return np.full(len(mesh.vertices), default)
@@ -99,7 +99,7 @@ def _numbers(modifier: bpy.types.NodesModifier) -> Iterator[tuple[str, float]]:
 
 
 def built_state(item: bpy.types.Object) -> dict[str, Any]:
-    """Return what was kept of a part when it was built; nothing for a part of an older version."""
+    """Return the mesh digest and inputs stored by `keep_built`; an empty dictionary if missing or damaged."""
     try:
         state = json.loads(item.get(BUILT, "{}"))
     except (TypeError, ValueError):
@@ -108,12 +108,12 @@ def built_state(item: bpy.types.Object) -> dict[str, Any]:
 
 
 def mesh_edited(item: bpy.types.Object) -> bool:
-    """Return whether a part's own mesh is no longer the one that was built."""
+    """Return whether a part's unevaluated mesh differs from the one that was built; False if that isn't known."""
     return built_state(item).get("mesh", "") not in ("", mesh_digest(item))
 
 
 def shape_reason(item: bpy.types.Object, carried: Collection[str], keeps_mesh: bool, grouped: bool = True) -> str:
-    """Return what was done to a part's shape that no parameter says; empty if nothing.
+    """Return the reason, in words, why no parameters describe a part's shape any more; empty if they do.
 
     Args:
         item: the part.
@@ -138,7 +138,7 @@ def shape_reason(item: bpy.types.Object, carried: Collection[str], keeps_mesh: b
 
 
 def place_reason(place: Float, scalable: bool = False) -> str:
-    """Return what in a part's place (4, 4) no parameter says; empty if nothing.
+    """Return the reason, in words, why no parameters describe a part's transform (4, 4); empty if they do.
 
     Args:
         place: in its road's frame.
@@ -159,5 +159,5 @@ def place_reason(place: Float, scalable: bool = False) -> str:
 
 
 def turn_of(place: Float) -> float:
-    """Return the turn about the vertical (rad) of an upright place (4, 4)."""
+    """Return the rotation about the vertical, rad, of an upright matrix (4, 4)."""
     return float(np.arctan2(place[1, 0], place[0, 0]))

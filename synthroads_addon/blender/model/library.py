@@ -24,7 +24,7 @@ _DECLARING = (model_parts(), points)
 
 
 def write_library(path: Path, pictures: Path) -> list[str]:
-    """Write the library to a new .blend file; the open file is lost. Return the names of its groups.
+    """Write the asset library of node groups to a .blend file, discarding the open file; return the groups' names.
 
     Args:
         path: of the file.
@@ -50,21 +50,21 @@ def write_library(path: Path, pictures: Path) -> list[str]:
 
 
 def user_groups() -> Iterator[tuple[str, bpy.types.NodeTree]]:
-    """Make all groups that users can use by hand; yield them with their catalogues."""
+    """Make all node groups for use by hand in the open file; yield (catalogue name, group)."""
     for catalogue in sorted(CATALOGUES):
         for name in sorted(CATALOGUES[catalogue]):
             yield catalogue, CATALOGUES[catalogue][name]()
 
 
 def catalogue_ids() -> dict[str, str]:
-    """Return the ids of the catalogues by their names within the library."""
+    """Read the asset catalogues' ids (UUIDs) from the library's catalogue file, by the catalogues' last names."""
     lines = (LIBRARY_FOLDER / _CATALOGUES_FILE).read_text(encoding="utf-8").splitlines()
     rows = [line.split(":") for line in lines if line.count(":") == 2]
     return {path.rpartition("/")[2]: key for key, path, _ in rows}
 
 
 def give_usual_materials(group: bpy.types.NodeTree) -> None:
-    """Make a group's usual materials the defaults of its inputs."""
+    """Set the defaults of a node group's material inputs to their usual materials, in place."""
     usual = usual_materials(group)
     for item in group.interface.items_tree:
         if item.item_type == "SOCKET" and item.in_out == "INPUT" and item.name in usual:

@@ -24,7 +24,7 @@ _RENAMED = {"Dash": "Dash Length", "Gap": "Gap Length"}
 
 
 def adopt_older_roads() -> list[bpy.types.Object]:
-    """Give roads that hang on no root one each, with what their collections say of them; return these roots.
+    """Give each road of a file of version 0.1, a collection, a root object with its data; return the new roots.
 
     Up to version 0.1 a road was a collection with its parameter set, whatever its name is now. Nothing moves.
     """
@@ -52,7 +52,7 @@ def _adopt(collection: bpy.types.Collection) -> bpy.types.Object:
 
 
 def _built_before(root: bpy.types.Object, collection: bpy.types.Collection) -> set[str]:
-    """Return the roles that an older road had: those that are there, and things that may have been deleted since."""
+    """Return the roles of an older road's parts as built: those present, and its parameter set's single objects."""
     there = {str(item[ROLE]) for item in collection.all_objects if ROLE in item}
     try:
         objects = json.loads(root[PARAMETERS])["objects"]
@@ -62,7 +62,7 @@ def _built_before(root: bpy.types.Object, collection: bpy.types.Collection) -> s
 
 
 def rename_inputs(parameters: RoadParameters, objects: Mapping[str, bpy.types.Object]) -> None:
-    """Name the inputs of lines and turnouts in words that older versions named by their ids; values stay.
+    """Rename a road's modifier inputs of lines and turnouts from older versions' ids to words, in place; values stay.
 
     Args:
         parameters: what the road was built from.
@@ -84,13 +84,13 @@ def rename_inputs(parameters: RoadParameters, objects: Mapping[str, bpy.types.Ob
 
 
 def _name_in_words(name: str, words: Mapping[str, str]) -> str:
-    """Return the new name of a panel or an input that is named by an id (which has no spaces); empty for others."""
+    """Return the name in words of a panel or input that is named by an id; empty for others."""
     key, _, rest = name.removeprefix("Marking ").partition(" ")
     return f"{words[key]} {_RENAMED.get(rest, rest)}".strip() if key in words else ""
 
 
 def _words(parameters: RoadParameters) -> Iterator[tuple[str, str]]:
-    """Yield the ids of lines and turnouts, and what they are called now."""
+    """Yield (id, name in words with side) of the road's lines and turnouts."""
     words = names_in_words(parameters)
     for key, item in parameters.objects.items():
         if isinstance(item, LineMarking | Turnout):

@@ -34,7 +34,7 @@ _LANE = 1.9
 
 
 class Lost(Exception):
-    """A part is where no parameter can say it; its text says where."""
+    """Raised for a part that stands where no parameters can place it; its text says where."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class RoadAxes:
     now: RoadGeometry
 
     def located(self, point: Float) -> tuple[float, float]:
-        """Return station and offset of a local point; raise `Lost` where there is no road."""
+        """Return station and offset, m, of a local point along the edited axis; raise `Lost` where there is no road."""
         station, offset = (float(value[0]) for value in self.now.alignment.project(point[None, :2]))
         if not -1e-6 <= station <= self.now.length + 1e-6:
             raise Lost("it stands beyond the road's ends")
@@ -59,13 +59,13 @@ class RoadAxes:
         return round(min(max(station, 0.0), self.now.length), 6), round(offset, 6)
 
     def turned(self, before: float, now: float) -> float:
-        """Return by how much (deg) the heading at a station was more than it is at another one."""
+        """Return the axis' heading at station `before` as built minus that at station `now` as edited, deg."""
         was, being = self.before.alignment.heading(before), self.now.alignment.heading(now)
         return float(np.rad2deg(was - being))
 
 
 def point_update(axes: RoadAxes, item: PointObject, vertex: Float, place: Float) -> dict[str, Any]:
-    """Return what changed of a thing that a vertex stands for; nothing if it wasn't moved.
+    """Return the changed fields (station, offset, rotation) of a thing whose object is a vertex; empty if unmoved.
 
     It is on the surface wherever it is in plan: its height in the scene says nothing.
 
@@ -90,7 +90,7 @@ def _turned(axes: RoadAxes, item: PointObject, station: float, turn: float) -> f
 
 
 def standing_update(axes: RoadAxes, item: Gantry | Overpass, place: Float) -> dict[str, Any]:
-    """Return what changed of a structure whose object stands where it stands, with all that is counted from it."""
+    """Return the changed fields of a gantry or overpass by its object's place (4, 4); empty if unmoved."""
     expected = on_plan(axes.before, [item])[0]
     rotation = item.rotation_deg if isinstance(item, Gantry) else 0.0
     heading = float(axes.before.alignment.heading(item.station)) - np.pi / 2.0 + np.deg2rad(rotation)
@@ -113,7 +113,7 @@ def standing_update(axes: RoadAxes, item: Gantry | Overpass, place: Float) -> di
 
 
 def asset_update(axes: RoadAxes, item: Asset, place: Float) -> dict[str, Any]:
-    """Return what changed of an asset: its place in all three directions, its turn, its size."""
+    """Return the changed fields of an asset by its object's place (4, 4): place, height, rotation, scale."""
     expected = on_plan(axes.before, [item])[0]
     expected[2] = _surface(axes.before, item.station, item.offset) + item.elevation
     heading = float(axes.before.alignment.heading(item.station)) - np.pi / 2.0 + np.deg2rad(item.rotation_deg)
@@ -135,7 +135,7 @@ def _surface(geometry: RoadGeometry, station: float, offset: float) -> float:
 
 
 def line_update(axes: RoadAxes, item: LineObject, part: bpy.types.Object, place: Float) -> dict[str, Any]:
-    """Return what changed of a thing that runs along the road: its middle's move, along and across the road.
+    """Return the changed stations and offsets of a line-like thing by its middle's move, m; empty if unmoved.
 
     Its shape follows the road whatever its object's place is. A move over an end of the road stops there.
 
@@ -163,7 +163,7 @@ def line_update(axes: RoadAxes, item: LineObject, part: bpy.types.Object, place:
 
 
 def vehicle_update(axes: RoadAxes, item: Vehicle, part: bpy.types.Object, place: Float) -> dict[str, Any]:
-    """Return what changed of a vehicle: it is in the middle of the lane that it was put on."""
+    """Return the changed station, carriageway and lane of a vehicle, snapped to the nearest lane; empty if unmoved."""
     before = axes.before.parameters
     line = LaneLine(axes.before, before.carriageway_of(item), item.lane)
     expected = on_plan(axes.before, [vehicle_place(line, item)])[0]

@@ -30,7 +30,7 @@ _BEAMS = frozenset(_BEAM_OF_SIDE)
 
 
 def edited_parameters(parameters: RoadParameters, objects: Mapping[str, bpy.types.Object]) -> RoadParameters:
-    """Return the parameter set with what was changed in the modifiers' inputs since the model was built from it.
+    """Return the parameter set updated with the modifier inputs that were edited since the model was built.
 
     Inputs hold 32 bits: a value that differs from its input only by that rounding stays as it is.
 
@@ -56,7 +56,7 @@ def edited_parameters(parameters: RoadParameters, objects: Mapping[str, bpy.type
 
 
 def carried_inputs(parameters: RoadParameters, role: str, modifier: bpy.types.NodesModifier) -> frozenset[str]:
-    """Return the names of a modifier's inputs that `edited_parameters` carries back into the parameter set."""
+    """Return the names of a part's modifier inputs whose values are read back into the parameter set."""
     if role == "Road":
         return frozenset(_road_inputs(parameters))
     item = parameters.objects.get(_ROLES.get(role, role))
@@ -66,7 +66,7 @@ def carried_inputs(parameters: RoadParameters, role: str, modifier: bpy.types.No
 
 
 def read_inputs(parameters: RoadParameters, role: str, modifier: bpy.types.NodesModifier) -> frozenset[str]:
-    """Return the names of the inputs that are read back: those that are carried, and whole numbers that nobody sees."""
+    """Return the names of a part's inputs that are read back, integers and switches such as the instance included."""
     item = parameters.objects.get(_ROLES.get(role, role))
     whole = _whole_fields(item, modifier) if item is not None else {}
     return carried_inputs(parameters, role, modifier) | frozenset(whole)
@@ -83,13 +83,13 @@ def _road_inputs(parameters: RoadParameters) -> Iterator[str]:
 
 
 def _number_fields(item: RoadObject, modifier: bpy.types.NodesModifier) -> dict[str, str]:
-    """Return the inputs that are named as numbers of an object, and those fields."""
+    """Return the float fields of a road object by the names of the modifier inputs that hold them."""
     fields = named_fields(item, modifier.node_group)
     return {name: field for name, field in fields.items() if isinstance(getattr(item, field), float)}
 
 
 def _field_value(item: RoadObject, field: str, modifier: bpy.types.NodesModifier, name: str) -> float:
-    """Return a field's value by its input; the faces of a bridge's abutments count from its middle there."""
+    """Return a field's value read from its input; an overpass' abutment inputs count from its middle."""
     before = float(getattr(item, field))
     middle = item.offset if isinstance(item, Overpass) and field in ("left_abutment", "right_abutment") else 0.0
     now = _input_value(before - middle, modifier, name)
@@ -97,7 +97,7 @@ def _field_value(item: RoadObject, field: str, modifier: bpy.types.NodesModifier
 
 
 def _whole_fields(item: RoadObject, modifier: bpy.types.NodesModifier) -> dict[str, str]:
-    """Return the inputs that are named as whole numbers and switches of an object, and those fields."""
+    """Return the integer and boolean fields of a thing by their inputs' names; empty for no `Thing`."""
     if not isinstance(item, Thing):
         return {}
     fields = named_fields(item, modifier.node_group)
@@ -105,7 +105,7 @@ def _whole_fields(item: RoadObject, modifier: bpy.types.NodesModifier) -> dict[s
 
 
 def edited_object(item: RoadObject, modifier: bpy.types.NodesModifier) -> RoadObject:
-    """Return an object with the inputs that are named as its fields."""
+    """Return a road object with its fields read from the modifier inputs named like them."""
     update: dict[str, Any] = {
         field: _field_value(item, field, modifier, name) for name, field in _number_fields(item, modifier).items()
     }
@@ -163,7 +163,7 @@ def _carriageway(carriageway: Carriageway, modifier: bpy.types.NodesModifier) ->
 
 
 def _fit_damage(before: CarriagewaySection, after: CarriagewaySection) -> Pavement:
-    """Return the pavement's damage where it lies now: it moves and widens with the strips that it lies in."""
+    """Return the pavement with ruts and potholes moved and widened along with the strips that they lie in."""
     pavement, sign = before.carriageway.pavement, before.carriageway.sign
     ruts = []
     for rut in pavement.ruts:
@@ -184,7 +184,7 @@ def _fit_damage(before: CarriagewaySection, after: CarriagewaySection) -> Paveme
 
 
 def _scale_width(width: AnyWidth, nominal: float) -> AnyWidth:
-    """Return a width whose largest value along the road is `nominal`; its points keep their shares."""
+    """Return a width scaled so that its largest value along the road is `nominal`, m."""
     if not isinstance(width, tuple):
         return nominal
     before = nominal_width(width)
@@ -194,6 +194,6 @@ def _scale_width(width: AnyWidth, nominal: float) -> AnyWidth:
 
 
 def _input_value(before: float, modifier: bpy.types.NodesModifier, name: str) -> float:
-    """Return an input's value: the one from before where it is the same in 32 bits, else its shortest decimal."""
+    """Return an input's value, m or as it is; `before` where it is the same in 32 bits, else its shortest decimal."""
     now = np.float32(modifier_input(modifier, name))
     return before if now == np.float32(before) else float(str(now))

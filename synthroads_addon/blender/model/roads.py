@@ -37,13 +37,13 @@ _FARTHEST = 20_000.0
 
 
 def new_id() -> str:
-    """Return an id that no other road of the file has."""
+    """Return a road id that no object of the file has."""
     taken = {item[ROAD] for item in bpy.data.objects if ROAD in item}
     return next(name for number in count(1) if (name := f"road-{number}") not in taken)
 
 
 def new_root() -> bpy.types.Object:
-    """Return a new root, in no collection yet."""
+    """Make a road's root object, an empty with a new id, in no collection yet."""
     root = bpy.data.objects.new(ROOT_NAME, None)
     root.empty_display_type, root.empty_display_size = "ARROWS", _SIZE
     root[ROAD] = new_id()
@@ -56,27 +56,27 @@ def is_root(item: bpy.types.Object) -> bool:
 
 
 def roots(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """Return the roots of a scene's roads that are complete, by name."""
+    """Return the root objects of a scene's completely built roads, sorted by name."""
     found = [item for item in scene.objects if is_root(item) and FRAME in item]
     return sorted(found, key=lambda item: item.name_full)
 
 
 def library_of(root: bpy.types.Object) -> str:
-    """Return the path of the file that a root comes from, linked or overridden; empty for one of this file."""
+    """Return the path of the file that a root is linked or overridden from; empty for one of this file."""
     override = root.override_library
     library = root.library if override is None else override.reference.library
     return "" if library is None else bpy.path.abspath(library.filepath)
 
 
 def root_above(item: bpy.types.Object | None) -> bpy.types.Object | None:
-    """Return the root that an object hangs on, or is; None if it hangs on none."""
+    """Return the road's root that an object is or descends from as a child; None if there is none."""
     while item is not None and not is_root(item):
         item = item.parent
     return item
 
 
 def root_of(item: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """Return the root of the road that an object is a part of, or hangs on; None if it belongs to none."""
+    """Return the root of the complete road that an object belongs to, as child or by id; None if to none."""
     above = root_above(item)
     if above is not None or OF_ROAD not in item:
         return above if above is None or FRAME in above else None
@@ -86,7 +86,7 @@ def root_of(item: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Object 
 def parts_and_copies(
     root: bpy.types.Object, scene: bpy.types.Scene
 ) -> tuple[dict[str, bpy.types.Object], list[bpy.types.Object]]:
-    """Return a road's parts in a scene by role, in the scene's order, and the copies that the user made of some."""
+    """Return a road's parts in a scene by role, and the list of the user's copies of parts."""
     by_role: dict[str, list[bpy.types.Object]] = {}
     lost = roots(scene)
     for item in scene.objects:
@@ -101,7 +101,7 @@ def parts_and_copies(
 
 
 def has_parts(root: bpy.types.Object, scene: bpy.types.Scene) -> bool:
-    """Return whether anything is left of a road in a scene; panels ask so each time that they are drawn."""
+    """Return whether a road still has any part in a scene; stops at the first, as panels ask at each drawing."""
     found = roots(scene)
     return any(ROLE in item and OF_ROAD in item and _belongs(item, root, found) for item in scene.objects)
 
@@ -114,12 +114,12 @@ def _belongs(item: bpy.types.Object, root: bpy.types.Object, scene_roots: list[b
 
 
 def _originality(item: bpy.types.Object) -> tuple[bool, str]:
-    """Return what sorts an object before its copies: they share all properties, but not the name."""
+    """Return a sort key that puts an original before its copies, which have another name than the one kept."""
     return item.name != item.get(NAME), item.name
 
 
 def road_meant(scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """Return the root of the road that is meant in a scene; None if it has none.
+    """Return the root of the scene's current road; None if it has no road.
 
     It is the active object's; else the only one; else the chosen one, see `choose_road`; else the first by name.
     """
@@ -134,19 +134,19 @@ def road_meant(scene: bpy.types.Scene) -> bpy.types.Object | None:
 
 
 def road_of_id(scene: bpy.types.Scene, road: str) -> bpy.types.Object | None:
-    """Return the root of a scene's road by the road's id; that of the road that is meant if the id is empty."""
+    """Return the root of a scene's road by its id, None if there is none; of the current road for an empty id."""
     if not road:
         return road_meant(scene)
     return next((root for root in roots(scene) if root[ROAD] == road), None)
 
 
 def choose_road(scene: bpy.types.Scene, root: bpy.types.Object) -> None:
-    """Have a road be the one that is meant while no object of another one is active."""
+    """Make a road the scene's current one while no object of another road is active."""
     scene[CHOSEN] = root
 
 
 def renew_ids() -> None:
-    """Give roads that are copies, or come from another file, ids of their own, and the parts that hang on them."""
+    """Give roads whose id is taken (copies, appended ones) new ids, in place, with the parts below their roots."""
     taken: set[str] = set()
     for root in sorted((item for item in bpy.data.objects if is_root(item)), key=_originality):
         if root[ROAD] in taken and root.library is None:
@@ -158,18 +158,18 @@ def renew_ids() -> None:
 
 
 def origin_of(root: bpy.types.Object) -> NDArray[np.float64]:
-    """Return the map coordinates (3,) of a scene's own origin that a road's root says."""
+    """Return the map coordinates (3,), m, of the scene's origin, as kept by a road's root."""
     return np.array(root[ORIGIN], dtype=np.float64)
 
 
 def scene_origin(scene: bpy.types.Scene) -> NDArray[np.float64] | None:
-    """Return the map coordinates (3,) of a scene's own origin by the road that is meant; None without a road."""
+    """Return the map coordinates (3,), m, of the scene's origin, as its current road says; None without a road."""
     root = road_meant(scene)
     return None if root is None else origin_of(root)
 
 
 def place_root(root: bpy.types.Object, frame: NDArray[np.float64], scene: bpy.types.Scene, keep: bool = True) -> None:
-    """Put a root where a road's frame lies on the map.
+    """Move a road's root to where its frame lies on the map, and store its frame and the scene's origin in it.
 
     The scene's origin is that of its other roads, if they are not too far away, else the frame's.
 
@@ -192,7 +192,7 @@ def place_root(root: bpy.types.Object, frame: NDArray[np.float64], scene: bpy.ty
 
 
 def displacement(root: bpy.types.Object) -> NDArray[np.float64]:
-    """Return the matrix (4, 4) that the user has moved a road by since it was built, in the scene's frame."""
+    """Return the transform (4, 4) by which the user moved a road since it was built; identity if not, or unbuilt."""
     if FRAME not in root:
         return np.eye(4)
     there = np.eye(4)
@@ -202,7 +202,7 @@ def displacement(root: bpy.types.Object) -> NDArray[np.float64]:
 
 
 def world_matrix(item: bpy.types.Object) -> NDArray[np.float64]:
-    """Return an object's place (4, 4) in the scene, from its properties: it may not have been evaluated yet."""
+    """Return an object's world matrix (4, 4), computed from its properties even if not evaluated yet."""
     deltas = (*item.delta_location, *item.delta_rotation_euler, *(factor - 1.0 for factor in item.delta_scale))
     if item.constraints or any(deltas) or (item.parent is not None and item.parent_type != "OBJECT"):
         return np.array(item.matrix_world, dtype=np.float64)

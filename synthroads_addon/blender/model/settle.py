@@ -26,7 +26,7 @@ from .truth import BY_HAND, EditedRoad
 
 
 def settle_steps(road: str, edited: EditedRoad) -> Generator[float | None, None, RoadModel]:
-    """Build an edited road again in its place, in steps as `build_steps`; return the model.
+    """Generator that rebuilds an edited road in its place, in steps as `build_steps`; its value is the model.
 
     Copies become parts of their own. Parts that were edited by hand stay as they are, as bodies of the user's that hang
     on the road's root.
@@ -56,7 +56,7 @@ def settle_steps(road: str, edited: EditedRoad) -> Generator[float | None, None,
 
 
 def settle(road: str, edited: EditedRoad) -> RoadModel:
-    """Do what `settle_steps` does at once."""
+    """Rebuild an edited road in its place, without pauses, copies becoming parts; return the model."""
     steps = settle_steps(road, edited)
     while True:
         try:
@@ -68,7 +68,7 @@ def settle(road: str, edited: EditedRoad) -> RoadModel:
 
 
 def _release(item: bpy.types.Object, part: str, reason: str) -> None:
-    """Make a part that was edited by hand a body of the user's; it keeps its class, and loses its number."""
+    """Turn a part that was edited by hand into a user's object, in place: no role, instance 0, class kept."""
     modifier = own_modifier(item)
     if modifier is not None and modifier.node_group.interface.items_tree.get("Instance") is not None:
         set_modifier_input(modifier, "Instance", 0)
@@ -79,7 +79,7 @@ def _release(item: bpy.types.Object, part: str, reason: str) -> None:
 
 
 def move_line(item: bpy.types.Object, scene: bpy.types.Scene) -> bool:
-    """Move what runs along a road to where its object was moved; return whether it moved.
+    """Write an object's move to the station and offset inputs of its line-like thing; return whether it moved.
 
     Such a thing's shape follows the road whatever its object's place is, so that a move shows nothing by itself. Only
     this object changes: an undo of its move undoes this too.
@@ -105,7 +105,7 @@ def move_line(item: bpy.types.Object, scene: bpy.types.Scene) -> bool:
 
 @lru_cache(maxsize=4)
 def _axes(text: str) -> RoadAxes | None:
-    """Return the axes of a road by its kept parameter set; None if that is damaged."""
+    """Return a road's geometry from its stored parameter set (JSON text), cached; None if that is damaged."""
     try:
         geometry = RoadGeometry(recall_parameters({PARAMETERS: text}))  # it reads this key only
     except InputError:

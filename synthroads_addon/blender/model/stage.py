@@ -19,7 +19,7 @@ _NOT_OURS = ("screens", "window_managers", "workspaces", "brushes", "palettes", 
 
 
 class DataBlockLog:
-    """Notes the data-blocks that are made while it looks, by Blender's number of them: those outlive an undo.
+    """Log of the data-blocks made while it records, by Blender's session numbers, which outlive an undo.
 
     Between two looks the user may make data-blocks too; those are not noted.
     """
@@ -30,7 +30,7 @@ class DataBlockLog:
 
     @contextmanager
     def record(self) -> Iterator[None]:
-        """Note what is made inside."""
+        """Context that logs the data-blocks made inside."""
         before = {item.session_uid for item in _blocks()}
         try:
             yield
@@ -38,14 +38,14 @@ class DataBlockLog:
             self._numbers |= {item.session_uid for item in _blocks()} - before
 
     def remove(self) -> None:
-        """Remove all that was noted and is still there."""
+        """Remove all logged data-blocks that still exist, and give node groups their former names back."""
         bpy.data.batch_remove([item for item in _blocks() if item.session_uid in self._numbers])
         for group in bpy.data.node_groups:
             # A new group takes the name of one of an older version.
             group.name = self._groups.get(group.session_uid, group.name)
 
     def keep(self, collection: bpy.types.Collection) -> None:
-        """Forget what was noted: it is complete now."""
+        """Clear the log and the collection's staging mark: the build is complete."""
         self._numbers.clear()
         if STAGING in collection:
             del collection[STAGING]
@@ -58,7 +58,7 @@ def _blocks() -> Iterator[Any]:
 
 
 def new_staging(scene: bpy.types.Scene) -> bpy.types.Collection:
-    """Return a new collection in a scene for what is being built. It is shown, as Blender evaluates only what is."""
+    """Make a marked collection in a scene for a road under construction, visible so that Blender evaluates it."""
     collection = bpy.data.collections.new("SynthRoads (building)")
     collection[STAGING] = True
     scene.collection.children.link(collection)
@@ -66,7 +66,7 @@ def new_staging(scene: bpy.types.Scene) -> bpy.types.Collection:
 
 
 def remove_staged() -> None:
-    """Remove what a build left that could not clean up: of a file saved, or an undo step made, in the midst of it."""
+    """Remove staging collections with their parts, which builds left in files saved or undo steps made meanwhile."""
     for collection in [item for item in bpy.data.collections if STAGING in item]:
         remove_with_meshes([item for item in collection.objects if ROLE in item or ROAD in item])
         bpy.data.collections.remove(collection)
@@ -74,7 +74,7 @@ def remove_staged() -> None:
 
 
 def remove_with_meshes(objects: list[bpy.types.Object]) -> None:
-    """Remove objects, and their meshes if no other object has them."""
+    """Remove objects, and their meshes that no other object uses."""
     meshes = {item.data for item in objects if item.data is not None}
     bpy.data.batch_remove(objects)
     bpy.data.batch_remove([mesh for mesh in meshes if not mesh.users])

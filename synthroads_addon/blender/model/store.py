@@ -18,12 +18,12 @@ BUILT_FROM = "synthroads_built_from"
 
 
 def roads(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """Return the roots of all roads of a scene that anything is left of, by name."""
+    """Return the roots of a scene's roads with a stored parameter set and at least one part left, by name."""
     return [root for root in roots(scene) if PARAMETERS in root and has_parts(root, scene)]
 
 
 def find_road(scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """Return the root of the road that is meant in a scene; None if there is no road or nothing is left of it.
+    """Return the root of the scene's current road; None if there is no road or no part of it is left.
 
     It is the one that the active object belongs to, else the scene's only one, else the chosen one (`choose_road`).
     """
@@ -34,7 +34,7 @@ def find_road(scene: bpy.types.Scene) -> bpy.types.Object | None:
 
 
 def road_named(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object | None:
-    """Return the root of a scene's road by its root's name; the road that is meant if None.
+    """Return the root of a scene's road by its name, or of the current road if None; upgrades older roads, ids.
 
     Raises:
         InputError: no road has this name.
@@ -50,24 +50,24 @@ def road_named(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object | N
 
 
 def remember(root: bpy.types.Object, parameters: RoadParameters, scenario: Scenario, built_from: str) -> None:
-    """Keep what a road was built from."""
+    """Store in a road's root the parameter set, the scenario, and the text of the settings it was built from."""
     root[PARAMETERS] = parameters.to_json()
     root[SCENARIO] = scenario.to_json()
     root[BUILT_FROM] = built_from
 
 
 def objects_of(root: bpy.types.Object, scene: bpy.types.Scene | None = None) -> dict[str, bpy.types.Object]:
-    """Return a road's objects by role; those of the current scene if None is given."""
+    """Return a road's parts by role in a scene, the current one if None."""
     return parts_and_copies(root, scene or bpy.context.scene)[0]
 
 
 def recall(root: bpy.types.Object) -> tuple[RoadParameters, Scenario]:
-    """Return what a road was built from; raise `InputError` if that can't be read."""
+    """Return the parameter set and scenario stored in a road's root; raise `InputError` if they are damaged."""
     return recall_parameters(root), Scenario.from_dict(_stored(root, SCENARIO), "Road")
 
 
 def recall_parameters(root: bpy.types.Object) -> RoadParameters:
-    """Return the parameter set of a road; raise `InputError` if it can't be read."""
+    """Return the parameter set stored in a road's root; raise `InputError` if it is damaged."""
     return RoadParameters.from_dict(_stored(root, PARAMETERS), "Road")
 
 

@@ -56,7 +56,7 @@ _SURFACE = ("Road", "Backbone")
 
 @dataclass(frozen=True)
 class EditedRoad:
-    """A road as its scene shows it.
+    """A road read back from its scene: parameters as edited, and what they can't describe.
 
     Attributes:
         parameters: what is known of it; of a road whose surface was edited by hand, what was known before.
@@ -73,13 +73,13 @@ class EditedRoad:
     axis: AxisFit | None = None
 
     def known(self) -> RoadParameters:
-        """Return the parameter set; raise `InputError` if the road as a whole isn't known."""
+        """Return the edited parameter set; raise `InputError` if the road's surface was edited by hand."""
         if self.lost:
             raise InputError("Road", None, f"its surface was edited by hand ({self.lost}): no parameter set says it")
         return self.parameters
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what a report says of the edits, as JSON data; nothing if there is nothing to say."""
+        """Return the parts edited by hand and the axis' fit as a report's JSON data; empty if there are none."""
         told: dict[str, Any] = {}
         if self.by_hand:
             told["edited_by_hand"] = [edit.to_dict() for edit in self.by_hand]
@@ -89,7 +89,7 @@ class EditedRoad:
 
 
 def read_road(root: bpy.types.Object, scene: bpy.types.Scene | None = None) -> EditedRoad:
-    """Return a road as a scene shows it now; nothing in the scene changes.
+    """Read a road back from its scene with all edits; nothing in the scene changes.
 
     Args:
         root: of the road.
@@ -105,7 +105,7 @@ def read_road(root: bpy.types.Object, scene: bpy.types.Scene | None = None) -> E
 
 @dataclass(frozen=True)
 class OpenRoad:
-    """A road in the open scene.
+    """Name, id and edited state of a road in the open scene.
 
     Attributes:
         name: of its root.
@@ -119,7 +119,7 @@ class OpenRoad:
 
 
 def open_road(name: str | None = None) -> OpenRoad | None:
-    """Return a road of the open scene, if there is one: by its root's name, or the one that is meant if None.
+    """Read the open scene's road of a name, or its current road if None; None if the scene has no road.
 
     Raises:
         InputError: no road has this name; or as `read_road`.
@@ -130,7 +130,7 @@ def open_road(name: str | None = None) -> OpenRoad | None:
 
 @dataclass
 class _Reading:
-    """One reading of a road.
+    """A reading of a road from its scene, with what was found on the way.
 
     Attributes:
         by_hand: parts that were found to be edited by hand.
@@ -149,7 +149,7 @@ class _Reading:
         self._ids = {"Terrain": next(iter(self._base.of_type(Terrain)), "")}
 
     def result(self) -> EditedRoad:
-        """Return the road."""
+        """Return the road with all edits read back."""
         self.by_hand += _released(self.root, self.scene)
         if lost := self._lost():
             self.by_hand.append(HandEdit("Road", self.root.name, lost))
@@ -175,12 +175,12 @@ class _Reading:
         return EditedRoad(whole, tuple(self.by_hand), "", tuple(self.stale), axis.fit if axis else None)
 
     def _place(self, item: bpy.types.Object) -> Float:
-        """Return an object's place (4, 4) in the road's frame."""
+        """Return an object's matrix (4, 4) in the road's frame; exactly the identity if it nearly is."""
         place = self._into @ world_matrix(item)
         return np.eye(4) if np.allclose(place, np.eye(4), rtol=0.0, atol=1e-9) else place
 
     def _lost(self) -> str:
-        """Return why the road as a whole isn't known; empty if it is."""
+        """Return the reason, in words, why the road as a whole can't be read back; empty if it can."""
         if reason := place_reason(displacement(self.root)):
             return reason
         for role in _SURFACE:
@@ -198,14 +198,14 @@ class _Reading:
         return ""
 
     def _built(self) -> list[str]:
-        """Return the roles of all parts that were built."""
+        """Return the roles of all parts as built, as kept by the root; empty if that is damaged."""
         try:
             return [str(role) for role in json.loads(self.root.get(BUILT_PARTS, "[]"))]
         except (TypeError, ValueError):
             return []
 
     def _is_fine(self, role: str, item: bpy.types.Object) -> bool:
-        """Return whether a part is what its parameters say; note it if it was edited by hand."""
+        """Return whether parameters still describe a part; else add it to `by_hand`."""
         reason = self._reason(role, item)
         if not reason and role == "Terrain" and "Ground" in self._built():
             ground = self._parts.get("Ground")
@@ -215,7 +215,7 @@ class _Reading:
         return not reason
 
     def _reason(self, role: str, item: bpy.types.Object) -> str:
-        """Return what was done to a part that no parameter says; empty if nothing."""
+        """Return the reason, in words, why no parameters describe a part; empty if they do."""
         thing = self._base.objects.get(role)
         modifier = own_modifier(item)
         carried = read_inputs(self._base, role, modifier) if modifier is not None else frozenset()
@@ -231,7 +231,7 @@ class _Reading:
     def _moved(
         self, parameters: RoadParameters, axes: RoadAxes, fine: dict[str, bpy.types.Object]
     ) -> Iterator[tuple[str, RoadObject]]:
-        """Yield the objects that are still there and known, where they are now."""
+        """Yield (id, object) of the parameter set's objects that are still there, with their present places."""
         gone = self._gone(fine)
         for name, item in parameters.objects.items():
             if name in gone:
@@ -249,7 +249,7 @@ class _Reading:
                 yield from self._posts(parameters, axes, fine[role], kind)
 
     def _gone(self, fine: dict[str, bpy.types.Object]) -> set[str]:
-        """Return the ids of what was deleted or edited by hand, and of what can't be without it."""
+        """Return the ids of objects deleted or edited by hand, and of those that depend on them."""
         roles = {role for role in (*self._built(), *self._parts) if role not in fine}
         gone = {self._ids.get(role, role) for role in roles} & set(self._base.objects)
         if self._ids["Terrain"] in gone:
@@ -263,7 +263,7 @@ class _Reading:
         return gone | self._without_face(fine, gone)
 
     def _without_face(self, fine: dict[str, bpy.types.Object], gone: set[str]) -> set[str]:
-        """Return gantries whose signs have lost their faces; each is noted."""
+        """Return the ids of gantries with a deleted or edited sign face, adding each to `by_hand`."""
         found: set[str] = set()
         for role in [*self._built(), *self._parts]:
             owner = role.partition("/")[0]
@@ -276,7 +276,7 @@ class _Reading:
     def _updated(
         self, item: RoadObject, before: RoadObject, part: bpy.types.Object, axes: RoadAxes
     ) -> RoadObject | None:
-        """Return an object where its part is now; None, and a note, if no parameter says it."""
+        """Return an object with its part's present place; None, added to `by_hand`, if no parameters describe it."""
         place = self._place(part)
         try:
             update, stale = _update(item, before, part, place, axes)
@@ -290,7 +290,7 @@ class _Reading:
     def _posts(
         self, parameters: RoadParameters, axes: RoadAxes, part: bpy.types.Object, kind: type[PointObject]
     ) -> Iterator[tuple[str, RoadObject]]:
-        """Yield the things that the vertices of one object stand for."""
+        """Yield (id, thing) of each vertex of one object that holds many things, with their present places."""
         known = {item.instance: name for name, item in self._base.of_type(kind).items()}
         place, vertices = self._place(part), vertices_of(part.data)
         numbers = attribute_of(part.data, "instance", -1).astype(np.int64) % 2**32
@@ -311,7 +311,7 @@ class _Reading:
     def _copied(
         self, parameters: RoadParameters, objects: dict[str, RoadObject], axes: RoadAxes
     ) -> dict[str, RoadObject]:
-        """Return what copies of parts stand for, with ids and numbers of their own."""
+        """Return the user's copies of parts as new road objects by new ids, with new instance numbers."""
         found: dict[str, RoadObject] = {}
         largest = max(item.instance for item in self._base.objects.values())
         for copy in sorted(self._copies, key=lambda item: item.name_full):
@@ -335,7 +335,7 @@ class _Reading:
         return found
 
     def _placed(self, parameters: RoadParameters) -> RoadParameters:
-        """Return the road moved and turned as its root was."""
+        """Return the parameter set with the transform and alignment moved and turned as the user moved its root."""
         moved = displacement(self.root)
         if np.array_equal(moved, np.eye(4)):
             return parameters
@@ -357,14 +357,14 @@ class _Reading:
 
 
 def role_of(part: bpy.types.Object) -> str:
-    """Return what a part is in its road."""
+    """Return a part's role in its road; empty if it has none."""
     return str(part.get(ROLE, ""))
 
 
 def _update(
     item: RoadObject, before: RoadObject, part: bpy.types.Object, place: Float, axes: RoadAxes
 ) -> tuple[dict[str, Any], bool]:
-    """Return what changed of an object by its part's place, and whether the scene must be built again to show it."""
+    """Return an object's changed fields by its part's place, and whether showing them needs a rebuild."""
     if isinstance(before, Asset):
         return asset_update(axes, before, place), False
     if isinstance(before, Gantry | Overpass):
@@ -379,12 +379,12 @@ def _update(
 
 
 def _on_a_vertex(item: RoadObject | None) -> bool:
-    """Return whether a thing's object is one vertex at its place."""
+    """Return whether a thing is modelled as one vertex at its place, from which nodes make its shape."""
     return isinstance(item, PointObject) and not isinstance(item, Asset | Gantry | Overpass | Arrow)
 
 
 def _on_axis(parameters: RoadParameters, axis: EditedAxis) -> RoadParameters:
-    """Return a road along another axis: what isn't moved itself goes along with the axis, at its offset."""
+    """Return the road on another axis: all stations are carried over, offsets stay."""
     data = parameters.to_dict()
     for name, item in data["objects"].items():
         if item["type"] == "Alignment":
@@ -395,7 +395,7 @@ def _on_axis(parameters: RoadParameters, axis: EditedAxis) -> RoadParameters:
 
 
 def _carry_stations(data: Any, carried: Callable[[float], float], length: float) -> None:
-    """Carry all stations in JSON data of an object to another axis; none gets negative."""
+    """Map all stations in an object's JSON data to another axis, in place; positive ones never get negative."""
     if isinstance(data, list):
         for entry in data:
             _carry_stations(entry, carried, length)
@@ -410,7 +410,7 @@ def _carry_stations(data: Any, carried: Callable[[float], float], length: float)
 
 
 def _released(root: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[HandEdit]:
-    """Yield what was a part of a road until it was edited by hand and the road built again."""
+    """Yield the hand edits kept by objects that were parts until the road was rebuilt without them."""
     for item in scene.objects:
         if BY_HAND in item and root_above(item) == root:
             try:
@@ -421,7 +421,7 @@ def _released(root: bpy.types.Object, scene: bpy.types.Scene) -> Iterator[HandEd
 
 
 def _kept_numbers(before: RoadParameters, now: RoadParameters) -> dict[str, Any]:
-    """Return the numbers of parts that the scene shows, of the objects that are still there."""
+    """Return the instance numbers of parts as built, of the objects that are still in the road."""
     return {name: parts for name, parts in InstanceNumbers(before).parts.items() if name in now.objects}
 
 

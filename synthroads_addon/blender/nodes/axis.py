@@ -12,7 +12,7 @@ _CURVE = "Curve that it follows, if no backbone is given: its first spline, from
 
 
 class AxisInputs(Inputs):
-    """Inputs of a group that follows the backbone.
+    """Inputs of a node group that follows a backbone or a curve.
 
     Attributes:
         curve: what is followed where no backbone is given.
@@ -23,13 +23,13 @@ class AxisInputs(Inputs):
     backbone = socket("Object", "Object that it follows: a curve, or the backbone of a road")
 
     def axis(self) -> Value:
-        """Return the geometry of the backbone."""
+        """Add nodes for the backbone's geometry, from the object or the curve; return their output."""
         given = op.object_geometry(self.backbone)
         return self.tree.call(axis_group(), curve=self.curve, backbone=given).value
 
 
 def rows_along(curve: Value) -> Value:
-    """Return the backbone that a geometry is, or one along its curve."""
+    """Add nodes that pass a backbone through or make one along a curve; return their output."""
     return curve.tree.call(axis_group(), curve=curve).value
 
 
@@ -104,7 +104,7 @@ def axis_from_curve_group(tree: Tree) -> None:
 
 
 def _curvature(tree: Tree, line: Value, smoothing: Value) -> Value:
-    """Return the curvature at every row, averaged over some rows."""
+    """Add nodes for the curvature (1/m) at every row, averaged over `smoothing` rows; return their output."""
     last = op.point_count(line) - 1
     inner = op.clip(op.index(tree), 1, last - 1)
     before, behind = op.maximum(inner - 1, 0), op.minimum(inner + 1, last)

@@ -16,7 +16,7 @@ FOLD_SHARE = 0.98
 
 
 def row(backbone: Value, number: Value) -> tuple[Value, Value, Value]:
-    """Return axis point, left vector and curvature of the backbone's row `number`."""
+    """Add nodes for the axis point (m), left vector and curvature (1/m) of the backbone's row `number`."""
     tree = backbone.tree
     axis = op.sample_index(backbone, op.position(tree), number)
     left = op.sample_index(backbone, op.named_attribute(tree, "left", "FLOAT_VECTOR"), number)
@@ -24,12 +24,12 @@ def row(backbone: Value, number: Value) -> tuple[Value, Value, Value]:
 
 
 def limit_offset(offset: Value, curvature: Value) -> Value:
-    """Return the offset, cut where its curve would fold."""
+    """Add nodes that limit an offset (m) to 0.98 of the curve's radius, where its parallel curve would fold."""
     return op.switch(offset * curvature > FOLD_SHARE, offset, FOLD_SHARE / curvature)
 
 
 def station_ribbon(backbone: Value, numbers: tuple[str, ...] = ()) -> Value:
-    """Return a flat ribbon along x = station for `look_up`.
+    """Add nodes for a flat ribbon mesh along x = station, on which `look_up` samples the backbone's attributes.
 
     It carries the backbone's position (``axis``), ``left``, ``station`` and ``curvature``, and the attributes named.
     """
@@ -46,14 +46,14 @@ def station_ribbon(backbone: Value, numbers: tuple[str, ...] = ()) -> Value:
 
 
 def look_up(ribbon: Value, name: str, station: Value) -> Value:
-    """Return the backbone's attribute (``axis`` is its position) at any station, linear between its rows."""
+    """Add nodes for a backbone's attribute (``axis``: its position) at any station (m), linear between its rows."""
     tree = ribbon.tree
     kind = "FLOAT_VECTOR" if name in ("axis", "left") else "FLOAT"
     return op.sample_surface(ribbon, op.named_attribute(tree, name, kind), op.vector(tree, station))
 
 
 def height_on(road: Value, terrain: Value, place: Value) -> Value:
-    """Return the z of the surface above or below `place`, see `surface_height_group`."""
+    """Add nodes for the z (m) of the road or else the terrain above or below `place`; the place's where is neither."""
     return place.tree.call(surface_height_group(), road=road, terrain=terrain, place=place).value
 
 
@@ -89,15 +89,15 @@ def surface_height_group(tree: Tree) -> None:
 
 
 def first_station(backbone: Value) -> Value:
-    """Return the station of the backbone's first point."""
+    """Add nodes for the station (m) of the backbone's first point."""
     return op.sample_index(backbone, op.named_attribute(backbone.tree, "station"), 0)
 
 
 def last_station(backbone: Value) -> Value:
-    """Return the station of the backbone's last point."""
+    """Add nodes for the station (m) of the backbone's last point."""
     return op.sample_index(backbone, op.named_attribute(backbone.tree, "station"), op.point_count(backbone) - 1)
 
 
 def raise_place(place: Value, height: Operand) -> Value:
-    """Return `place` moved up by `height`."""
+    """Add nodes for `place` moved up by `height` (m)."""
     return place + op.vector(place.tree, 0.0, 0.0, height)

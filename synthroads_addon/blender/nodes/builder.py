@@ -41,7 +41,7 @@ _TAGS = {"GEOMETRY": "GEOMETRY", "VECTOR": "VECTOR"}
 
 
 def _calculation(operation: str, turned: bool = False) -> Callable[[Value, Operand], Value]:
-    """Return the method of an arithmetic operator; `turned` is that of the right one of its operands."""
+    """Return the method of an arithmetic operator of `Value`, of its reflected form (``__radd__`` ...) if `turned`."""
 
     def calculate(value: Value, other: Operand) -> Value:
         return value._math(operation, other, value) if turned else value._math(operation, value, other)
@@ -57,7 +57,7 @@ def _comparison(operation: str) -> Callable[[Value, Operand], Value]:
 
 
 class Value:
-    """An output socket that can be calculated with; vectors take numbers component-wise."""
+    """An output socket in a node tree; arithmetic and comparisons with it add nodes, for vectors component-wise."""
 
     def __init__(self, tree: Tree, socket: bpy.types.NodeSocket | None, kind: str) -> None:
         self.tree = tree
@@ -65,7 +65,7 @@ class Value:
         self.kind = kind  # VALUE, INT, BOOLEAN, VECTOR, ROTATION, GEOMETRY, OBJECT, MATERIAL, STRING
 
     def source(self) -> bpy.types.NodeSocket:
-        """Return the socket to link from."""
+        """Return the output socket to link from."""
         assert self.socket is not None
         return self.socket
 
@@ -117,7 +117,7 @@ class Value:
         return self.tree.node("FunctionNodeBooleanMath", self, operation="NOT").value
 
     def equals(self, other: Operand) -> Value:
-        """Return whether two whole numbers are the same."""
+        """Add a node that compares for equality (exact: for whole numbers); return its output."""
         return self._compare("EQUAL", other)
 
 
@@ -132,7 +132,7 @@ class GroupInput(Value):
         self.name = name
 
     def source(self) -> bpy.types.NodeSocket:
-        """Return the socket of the current frame's Group Input node."""
+        """Return the input's socket on the current frame's Group Input node, added if there is none."""
         return self.tree.group_input_node().outputs[self.name]
 
 
@@ -149,7 +149,7 @@ class Node:
 
     @property
     def value(self) -> Value:
-        """Return the first output."""
+        """Return the node's first enabled output as a value."""
         socket = next(s for s in self.raw.outputs if s.enabled)
         return Value(self.tree, socket, socket.type)
 
@@ -177,36 +177,36 @@ class Tree:
     def number(
         self, name: str, default: float, limits: tuple[float, float], *, unit: str = "", description: str
     ) -> Value:
-        """Declare a number; `unit` "m" and "rad" let Blender show the scene's units."""
+        """Declare a float input of the group, shown as its unit asks ("m", "rad", "share"); return its value."""
         socket = self._socket(name, "NodeSocketFloat", description + (f" ({unit})" if unit else ""))
         socket.subtype = {"m": "DISTANCE", "rad": "ANGLE", "share": "FACTOR"}.get(unit, "NONE")
         socket.default_value, (socket.min_value, socket.max_value) = default, limits
         return GroupInput(self, name, "VALUE")
 
     def integer(self, name: str, default: int, limits: tuple[int, int], *, description: str) -> Value:
-        """Declare a whole number."""
+        """Declare an integer input of the group; return its value."""
         socket = self._socket(name, "NodeSocketInt", description)
         socket.default_value, (socket.min_value, socket.max_value) = default, limits
         return GroupInput(self, name, "INT")
 
     def boolean(self, name: str, default: bool, *, description: str) -> Value:
-        """Declare a choice of yes or no."""
+        """Declare a boolean input of the group; return its value."""
         self._socket(name, "NodeSocketBool", description).default_value = default
         return GroupInput(self, name, "BOOLEAN")
 
     def input(self, name: str, kind: str, *, description: str) -> Value:
-        """Declare an input of another kind: ``Geometry``, ``Object``, ``Material``, ``Vector``, ..."""
+        """Declare an input of a socket kind (``Geometry``, ``Object``, ``Vector``, ...); return its value."""
         self._socket(name, f"NodeSocket{kind}", description)
         return GroupInput(self, name, kind.upper())
 
     def material(self, name: str, usual: str = "", *, description: str) -> Value:
-        """Declare a material; `usual` is the entry of the material table that the model gives it if nothing else."""
+        """Declare a material input of the group; `usual` names its default in the material table; return its value."""
         if usual:
             self.materials[name] = usual
         return self.input(name, "Material", description=description)
 
     def output(self, name: str, value: Value, *, description: str = "") -> None:
-        """Declare an output and link it."""
+        """Declare an output of the group and link a value to it."""
         kind = {"VALUE": "Float", "INT": "Int", "BOOLEAN": "Bool"}.get(value.kind, value.kind.title())
         socket = self.group.interface.new_socket(name, in_out="OUTPUT", socket_type=f"NodeSocket{kind}")
         socket.description = description
@@ -217,7 +217,7 @@ class Tree:
 
     @contextmanager
     def panel(self, name: str) -> Iterator[None]:
-        """Put the inputs declared inside under one heading of the modifier, which may lie under another."""
+        """Context in which declared inputs are put into a panel of the modifier; panels nest."""
         interface, outer = self.group.interface, self._panel
         self._panel = interface.new_panel(name, default_closed=True)
         if outer is not None:
@@ -231,7 +231,7 @@ class Tree:
         return socket
 
     def group_input_node(self) -> bpy.types.Node:
-        """Return the Group Input node of the current frame."""
+        """Return the current frame's Group Input node, added if there is none."""
         key = self._frame.name if self._frame else ""
         if key not in self._inputs:
             self._inputs[key] = self._new("NodeGroupInput")
@@ -241,7 +241,7 @@ class Tree:
 
     @contextmanager
     def frame(self, label: str) -> Iterator[None]:
-        """Put the nodes made inside into one labelled frame."""
+        """Context in which added nodes are put into a labelled frame (63 bytes at most)."""
         outer, self._frame = self._frame, self.group.nodes.new("NodeFrame")
         self._frame.label = label
         # Blender cuts labels after 63 bytes without a word.
@@ -250,7 +250,7 @@ class Tree:
         self._frame = outer
 
     def node(self, kind: str, *operands: Operand, **settings: Any) -> Node:
-        """Add a node.
+        """Add a node to the tree with its properties and inputs set or linked; return it.
 
         Args:
             kind: Blender's name of the node's class.
@@ -274,7 +274,7 @@ class Tree:
         return Node(self, raw)
 
     def call(self, group: bpy.types.NodeTree, **inputs: Operand) -> Node:
-        """Add another group as a node; its inputs by name in snake case."""
+        """Add a node of another group, its inputs (names in snake case) set or linked; return it."""
         raw = self._new("GeometryNodeGroup")
         raw.node_tree = group
         named = {socket.name.lower().replace(" ", "_"): socket for socket in raw.inputs}
@@ -315,7 +315,7 @@ def _kind(operand: Operand) -> str:
 
 @cache
 def _sources() -> bytes:
-    """Return a digest of the sources of all node groups: a change to any of them makes new groups."""
+    """Return a SHA-256 digest of the source files of all node groups: a change to any makes new groups; cached."""
     digest, blender = hashlib.sha256(), Path(__file__).parents[1]
     # Of the materials one has the colour's attribute, one groups of its own, which are written in the road's field.
     names = ("nodes/*.py", "things/**/*.py", "materials/looks.py", "materials/pavement.py", "../road/pavement/*.py")
@@ -325,7 +325,7 @@ def _sources() -> bytes:
 
 
 def remove_unused_groups() -> None:
-    """Remove the groups made here that nothing uses any more, and those that only they used."""
+    """Remove the project's node groups without users from the file, repeatedly."""
     while unused := [group for group in bpy.data.node_groups if KEY in group and not group.users]:
         for group in unused:
             bpy.data.node_groups.remove(group)
@@ -338,7 +338,7 @@ def node_group(
     description: str = "",
     kind: str = "GeometryNodeTree",
 ) -> bpy.types.NodeTree:
-    """Return the node group `name`, from this file if it holds the same version, else built anew.
+    """Return the node group of a name and arguments, reused from the open file if its version is the same, else built.
 
     Args:
         name: as shown in Blender; an older version of that name is renamed.
@@ -373,17 +373,17 @@ CATALOGUES: dict[str, dict[str, Make]] = {}
 
 
 def usual_materials(group: bpy.types.NodeTree) -> dict[str, str]:
-    """Return the entries of the material table that a group's inputs usually have, by the inputs' names."""
+    """Return the default material-table entries of a group's material inputs, by the inputs' names."""
     return dict(group.get(MATERIALS, {}))
 
 
 def offer_group(catalogue: str, name: str, make: Make) -> None:
-    """Offer users a group by hand that a function of arguments makes, see `CATALOGUES`."""
+    """Register a function that makes a node group, for the asset library's catalogue."""
     CATALOGUES.setdefault(catalogue, {})[name] = make
 
 
 def makes_group(name: str, catalogue: str = "") -> Callable[[Callable[[Tree], None]], Make]:
-    """Turn a function that builds a node group into one that returns the node group `name`, see `node_group`.
+    """Return a decorator that turns a building function into one that returns the node group `name`, reused or built.
 
     Args:
         name: of the group.

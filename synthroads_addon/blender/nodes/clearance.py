@@ -13,7 +13,7 @@ _NOTHING = -1e5
 
 
 def pavement_near(road: Value, reach: Value) -> Value:
-    """Return the paved faces of the road within `reach` (m) of the origin in plan."""
+    """Add nodes for the paved faces of a road's mesh within `reach` (m) of the origin in plan."""
     tree = road.tree
     place = op.position(tree)
     flat = op.vector(tree, op.component(place, "X"), op.component(place, "Y"))
@@ -23,7 +23,7 @@ def pavement_near(road: Value, reach: Value) -> Value:
 
 
 def highest_below(pavement: Value, start: Value, end: Value, depth: tuple[Value, Value], shear: Operand = 0.0) -> Value:
-    """Return the z of the pavement's highest point below a rectangle, a single number; 0 where there is none.
+    """Add nodes for the z (m) of the pavement's highest point below a rectangle, a single number; 0 if there is none.
 
     The rectangle lies between x = `start` and x = `end`, and between the two y of `depth`; `shear` moves it by
     `shear` * x in y.

@@ -10,7 +10,7 @@ from .inputs import FAR, Inputs, backbone_socket, metres, socket
 
 
 def foot_at(backbone: Value, surfaces: tuple[Value, Value], station: Value, offset: Operand) -> tuple[Value, Value]:
-    """Return the point on the surface at stations and offsets (fields), and the vector to the left.
+    """Add nodes for the surface points at stations and offsets (fields, m), and the unit vectors to the left.
 
     Args:
         backbone: geometry of the backbone.
@@ -24,7 +24,7 @@ def foot_at(backbone: Value, surfaces: tuple[Value, Value], station: Value, offs
 
 
 class Lengthwise(AxisInputs):
-    """Inputs of a group that puts something along the road.
+    """Inputs of a node group that puts something along the road.
 
     Attributes:
         road, terrain: objects that it stands on.
@@ -39,7 +39,7 @@ class Lengthwise(AxisInputs):
     offset = metres(0.0, (-100.0, 100.0), "Offset of its axis, positive to the left")
 
     def geometry(self) -> tuple[Value, tuple[Value, Value]]:
-        """Return the geometry of the backbone, and that of road and terrain; from then on the end is given."""
+        """Add nodes for the geometries backbone, (road, terrain); resolves an end station of 0 to the last one."""
         with self.tree.frame("Geometry, and the end"):
             axis = self.axis()
             end = self.end_station

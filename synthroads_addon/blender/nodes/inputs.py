@@ -20,7 +20,7 @@ FAR = (-1000.0, 1000.0)
 
 
 class Input:
-    """A field of `Inputs`: as a value of the group where one has been declared.
+    """Descriptor of a field of `Inputs`: reading it gives the value of the group's input.
 
     Args:
         declare: method of `Tree` that declares it.
@@ -68,62 +68,62 @@ class Inputs:
 
     @classmethod
     def fields(cls) -> Iterator[Input]:
-        """Yield the fields in order; one that a subclass declares anew keeps its place."""
+        """Yield the class's input fields in order, bases first; one that a subclass redeclares keeps its place."""
         fields = {name: item for base in reversed(cls.__mro__) for name, item in vars(base).items()}
         yield from (item for item in fields.values() if isinstance(item, Input))
 
 
 def inputs_class(name: str, fields: Mapping[str, Input]) -> type[Inputs]:
-    """Return a class of inputs whose fields are only known when a group is made."""
+    """Create a subclass of `Inputs` with fields that are only known when a group is made."""
     return type(name, (Inputs,), dict(fields))
 
 
 def input_name(field: str, words: str = "") -> str:
-    """Return the name of the input that a field stands for, after the words that tell it from others."""
+    """Return a field's input name, its words in title case, after `words`: "post_spacing" -> "Post Spacing"."""
     name = field.rstrip("_").replace("_", " ").title()
     return f"{words} {name}" if words else name
 
 
 def number(default: float, limits: tuple[float, float], description: str, *, unit: str = "", panel: str = "") -> Input:
-    """Return a number's field, see `Tree.number`."""
+    """Return the field of a float input."""
     return Input(Tree.number, panel, default=default, limits=limits, unit=unit, description=description)
 
 
 def metres(default: float, limits: tuple[float, float], description: str) -> Input:
-    """Return a length's field, m."""
+    """Return the field of a float input that is a length, m."""
     return number(default, limits, description, unit="m")
 
 
 def share(default: float, limits: tuple[float, float], description: str, *, panel: str = "") -> Input:
-    """Return a share's field."""
+    """Return the field of a float input that is a share, shown as a slider."""
     return number(default, limits, description, unit="share", panel=panel)
 
 
 def integer(default: int, limits: tuple[int, int], description: str, *, panel: str = "") -> Input:
-    """Return a whole number's field."""
+    """Return the field of an integer input."""
     return Input(Tree.integer, panel, default=default, limits=limits, description=description)
 
 
 def boolean(default: bool, description: str, *, panel: str = "") -> Input:
-    """Return the field of a choice of yes or no."""
+    """Return the field of a boolean input."""
     return Input(Tree.boolean, panel, default=default, description=description)
 
 
 def socket(kind: str, description: str, *, panel: str = "") -> Input:
-    """Return the field of an input of another kind: ``Geometry``, ``Object``, ``Vector``, ``String``, ..."""
+    """Return the field of an input of a socket kind: ``Geometry``, ``Object``, ``Vector``, ``String``, ..."""
     return Input(Tree.input, panel, kind=kind, description=description)
 
 
 def material_of(what: str, usual: str = "", *, panel: str = "") -> Input:
-    """Return the field of a part's material, see `Tree.material`."""
+    """Return the field of a material input described as "Material of `what`", with its default material's entry."""
     return Input(Tree.material, panel, usual=usual, description=f"Material of {what}")
 
 
 def instance_number() -> Input:
-    """Return the field of the faces' instance number."""
+    """Return the field of the integer input for the faces' instance number."""
     return integer(0, INSTANCES, "Instance number of the faces")
 
 
 def backbone_socket(kind: str = "Geometry") -> Input:
-    """Return the field of the backbone, as geometry or as an object."""
+    """Return the field of the input for a road's backbone or a curve, as ``Geometry`` or ``Object``."""
     return socket(kind, "Backbone of a road, or any curve")

@@ -10,7 +10,7 @@ FRAME_GAP = 90.0
 
 
 def arrange(group: bpy.types.NodeTree) -> None:
-    """Give every node its place, and hide unused sockets of the Group Input nodes."""
+    """Lay out a group's nodes in the node editor, in place; hide unused sockets of its Group Input nodes."""
     incoming: dict[str, list[bpy.types.Node]] = {node.name: [] for node in group.nodes}
     for link in group.links:
         incoming[link.to_node.name].append(link.from_node)
@@ -34,7 +34,7 @@ def arrange(group: bpy.types.NodeTree) -> None:
 
 
 def _depth(node: bpy.types.Node, incoming: dict[str, list[bpy.types.Node]], depths: dict[str, int]) -> int:
-    """Return the node's depth: the longest way to it, counted within its own frame."""
+    """Return the length of the longest link path to a node within its own frame, kept in `depths`."""
     if node.name not in depths:
         same = [before for before in incoming[node.name] if before.parent == node.parent]
         depths[node.name] = 1 + max((_depth(before, incoming, depths) for before in same), default=-1)
@@ -44,7 +44,7 @@ def _depth(node: bpy.types.Node, incoming: dict[str, list[bpy.types.Node]], dept
 def _arrange_block(
     block: list[bpy.types.Node], depths: dict[str, int], top: float, places: dict[str, tuple[float, float]]
 ) -> float:
-    """Place the nodes of one frame from `top` downwards and return the block's height."""
+    """Write the places of one frame's nodes, from `top` downwards, into `places`; return the block's height."""
     heights: dict[int, float] = {}
     for node in block:
         depth = depths[node.name]
@@ -55,7 +55,7 @@ def _arrange_block(
 
 
 def _height(node: bpy.types.Node) -> float:
-    """Return about how high a node is drawn: a vector that isn't linked shows its three components."""
+    """Return a node's estimated height in the node editor, from its sockets and settings."""
     lines = sum(1 for socket in node.outputs if socket.enabled and not socket.hide)
     for socket in node.inputs:
         if socket.enabled and not socket.hide:

@@ -12,103 +12,103 @@ _SWITCH_TYPES = {"VALUE": "FLOAT", "INT": "INT", "BOOLEAN": "BOOLEAN", "VECTOR":
 
 
 def index(tree: Tree) -> Value:
-    """Return the element's index."""
+    """Add a node for the element's index (a field)."""
     return tree.node("GeometryNodeInputIndex").value
 
 
 def position(tree: Tree) -> Value:
-    """Return the point's position."""
+    """Add a node for the point's position (a field), m."""
     return tree.node("GeometryNodeInputPosition").value
 
 
 def named_attribute(tree: Tree, name: str, data_type: str = "FLOAT") -> Value:
-    """Return the attribute `name` of the geometry that the field is evaluated on."""
+    """Add a node for the attribute `name` of the geometry that the field is evaluated on."""
     return tree.node("GeometryNodeInputNamedAttribute", name, data_type=data_type).value
 
 
 def attribute_or(usual: Value, name: str) -> Value:
-    """Return the attribute `name`, a whole number or a number as `usual` is, which stands in where there is none."""
+    """Add nodes for the attribute `name` of the type of `usual`, which is taken where the attribute is missing."""
     kind = _DATA_TYPES[usual.kind]
     node = usual.tree.node("GeometryNodeInputNamedAttribute", name, data_type=kind)
     return switch(node["Exists"], usual, node.value)
 
 
 def minimum(a: Value, b: Operand) -> Value:
-    """Return the smaller of two numbers."""
+    """Add a node for the smaller of two numbers."""
     return a.tree.node("ShaderNodeMath", a, b, operation="MINIMUM").value
 
 
 def maximum(a: Value, b: Operand) -> Value:
-    """Return the larger of two numbers."""
+    """Add a node for the larger of two numbers."""
     return a.tree.node("ShaderNodeMath", a, b, operation="MAXIMUM").value
 
 
 def clip(a: Value, low: Operand, high: Operand) -> Value:
-    """Return the number, at least `low` and at most `high`."""
+    """Add nodes that clamp a number to `low` to `high`."""
     return minimum(maximum(a, low), high)
 
 
 def unary(operation: str, a: Value) -> Value:
-    """Return a function of one number: ``ABSOLUTE``, ``CEIL``, ``FLOOR``, ``SQRT``, ``SINE``, ..."""
+    """Add a math node of one number by its operation: ``ABSOLUTE``, ``CEIL``, ``FLOOR``, ``SQRT``, ``SINE``, ..."""
     return a.tree.node("ShaderNodeMath", a, operation=operation).value
 
 
 def power(a: Value, exponent: Operand) -> Value:
-    """Return `a` to the power of `exponent`."""
+    """Add a node for `a` to the power of `exponent`."""
     return a.tree.node("ShaderNodeMath", a, exponent, operation="POWER").value
 
 
 def round_up(a: Value) -> Value:
-    """Return the least whole number that is not less than `a`."""
+    """Add a node that rounds a number up to an integer."""
     return a.tree.node("FunctionNodeFloatToInt", a, rounding_mode="CEILING").value
 
 
 def dot(a: Value, b: Operand) -> Value:
-    """Return the dot product of two vectors."""
+    """Add a node for the dot product of two vectors."""
     return a.tree.node("ShaderNodeVectorMath", a, b, operation="DOT_PRODUCT").value
 
 
 def length(a: Value) -> Value:
-    """Return the length of a vector."""
+    """Add a node for the length of a vector."""
     return a.tree.node("ShaderNodeVectorMath", a, operation="LENGTH")["Value"]
 
 
 def normalize(a: Value) -> Value:
-    """Return the vector at a length of 1."""
+    """Add a node for the vector scaled to length 1."""
     return a.tree.node("ShaderNodeVectorMath", a, operation="NORMALIZE").value
 
 
 def upright(along: Value) -> Value:
-    """Return the rotation whose z points up and whose x points along a vector in plan."""
+    """Add a node for the rotation whose z points up and whose x points along a vector in plan."""
     return along.tree.node(
         "FunctionNodeAxesToRotation", (0.0, 0.0, 1.0), along, primary_axis="Z", secondary_axis="X"
     ).value
 
 
 def vector(tree: Tree, x: Operand = 0.0, y: Operand = 0.0, z: Operand = 0.0) -> Value:
-    """Return a vector from its components."""
+    """Add a node for a vector from its components."""
     return tree.node("ShaderNodeCombineXYZ", x, y, z).value
 
 
 def component(a: Value, axis: str) -> Value:
-    """Return the component "X", "Y" or "Z" of a vector."""
+    """Add a node for the component "X", "Y" or "Z" of a vector."""
     return a.tree.node("ShaderNodeSeparateXYZ", a)[axis]
 
 
 def switch(condition: Value, false: Operand, true: Operand) -> Value:
-    """Return `true` where the condition holds, else `false`."""
+    """Add a switch node: `true` where the condition holds, else `false`."""
     kinds = [value.kind for value in (false, true) if isinstance(value, Value)]
     kind = _SWITCH_TYPES.get(kinds[0] if kinds else "VALUE", kinds[0] if kinds else "FLOAT")
     return condition.tree.node("GeometryNodeSwitch", condition, false, true, input_type=kind).value
 
 
 def only_if(condition: Value, geometry: Value) -> Value:
-    """Return the geometry if the (single) condition holds, else nothing."""
+    """Add a switch node: the geometry if the single condition holds, else an empty one."""
     return condition.tree.node("GeometryNodeSwitch", input_type="GEOMETRY", switch=condition, true=geometry).value
 
 
 def choose(index: Value, items: list[tuple[float, float, float]]) -> Value:
-    """Return the vector of the table `items` that stands at `index`."""
+    """Add an index switch node for the vector at `index` in the table `items`."""
     node = index.tree.node("GeometryNodeIndexSwitch", data_type="VECTOR")
     for _ in items[2:]:
         node.raw.index_switch_items.new()
@@ -120,7 +120,7 @@ def choose(index: Value, items: list[tuple[float, float, float]]) -> Value:
 
 
 def random(tree: Tree, low: Operand, high: Operand, seed: Operand, identifier: Value | None = None) -> Value:
-    """Return a uniform random number (or vector, if `low` is one) per element."""
+    """Add a node for a uniform random number (or vector, if `low` is one) per element, by seed and identifier."""
     kind = "FLOAT_VECTOR" if isinstance(low, tuple) else "FLOAT"
     settings: dict[str, Operand] = {"min": low, "max": high, "seed": seed}
     if identifier is not None:
@@ -129,23 +129,23 @@ def random(tree: Tree, low: Operand, high: Operand, seed: Operand, identifier: V
 
 
 def point_count(geometry: Value) -> Value:
-    """Return the number of points of a mesh."""
+    """Add a node for the number of points of a mesh."""
     return geometry.tree.node("GeometryNodeAttributeDomainSize", geometry, component="MESH")["Point Count"]
 
 
 def face_count(geometry: Value) -> Value:
-    """Return the number of faces of a mesh."""
+    """Add a node for the number of faces of a mesh."""
     return geometry.tree.node("GeometryNodeAttributeDomainSize", geometry, component="MESH")["Face Count"]
 
 
 def sample_index(geometry: Value, value: Value, index: Operand) -> Value:
-    """Return `value`, evaluated on the points of another geometry, at `index`."""
+    """Add a node for `value` evaluated on another geometry's point `index`, clamped to its points."""
     kind = _DATA_TYPES[value.kind]
     return geometry.tree.node("GeometryNodeSampleIndex", geometry, value, index, data_type=kind, clamp=True).value
 
 
 def sample_surface(mesh: Value, value: Value, place: Value) -> Value:
-    """Return `value`, interpolated on the point of the mesh's surface nearest to `place`."""
+    """Add a node for `value` interpolated at the point of a mesh's surface nearest to `place`."""
     kind = _DATA_TYPES[value.kind]
     return mesh.tree.node(
         "GeometryNodeSampleNearestSurface", data_type=kind, mesh=mesh, value=value, sample_position=place
@@ -153,12 +153,12 @@ def sample_surface(mesh: Value, value: Value, place: Value) -> Value:
 
 
 def object_geometry(item: Value) -> Value:
-    """Return an object's evaluated geometry in the space of the modified object."""
+    """Add a node for an object's evaluated geometry, in the space of the modified object."""
     return item.tree.node("GeometryNodeObjectInfo", item, transform_space="RELATIVE")["Geometry"]
 
 
 def grid(tree: Tree, columns: Operand, rows: Operand) -> tuple[Value, Value, Value]:
-    """Return a mesh of columns x rows vertices and the fields of their column and row.
+    """Add nodes for a mesh of columns x rows vertices, and the fields of their column and row numbers.
 
     Column 0 is the left one for an observer who looks from row 0 along the rows; then its faces look up.
     """
@@ -171,12 +171,12 @@ def grid(tree: Tree, columns: Operand, rows: Operand) -> tuple[Value, Value, Val
 
 
 def set_position(geometry: Value, place: Value) -> Value:
-    """Move all points to `place`."""
+    """Add a node that sets all points' positions to `place`; return the geometry."""
     return geometry.tree.node("GeometryNodeSetPosition", geometry, position=place).value
 
 
 def store(geometry: Value, name: str, value: Operand, domain: str = "POINT") -> Value:
-    """Store a named attribute."""
+    """Add a node that stores a named attribute of the value's type; return the geometry."""
     kind = _DATA_TYPES[value.kind] if isinstance(value, Value) else ("INT" if isinstance(value, int) else "FLOAT")
     return geometry.tree.node(
         "GeometryNodeStoreNamedAttribute", geometry, data_type=kind, domain=domain, name=name, value=value
@@ -184,28 +184,28 @@ def store(geometry: Value, name: str, value: Operand, domain: str = "POINT") -> 
 
 
 def delete_faces(geometry: Value, selection: Value) -> Value:
-    """Delete faces, and the points that only they used."""
+    """Add a node that deletes the selected faces and the points that only they used; return the geometry."""
     return geometry.tree.node("GeometryNodeDeleteGeometry", geometry, selection, domain="FACE", mode="ALL").value
 
 
 def delete_points(geometry: Value, selection: Value) -> Value:
-    """Delete points."""
+    """Add a node that deletes the selected points; return the geometry."""
     return geometry.tree.node("GeometryNodeDeleteGeometry", geometry, selection, domain="POINT", mode="ALL").value
 
 
 def separate(geometry: Value, selection: Value, domain: str = "POINT") -> Value:
-    """Return the selected part of the geometry."""
+    """Add a node for the selected part of a geometry."""
     return geometry.tree.node("GeometryNodeSeparateGeometry", geometry, selection, domain=domain)["Selection"]
 
 
 def delete_degenerate(geometry: Value) -> Value:
-    """Delete faces without area."""
+    """Add nodes that delete faces smaller than 1e-7 m2; return the geometry."""
     area = geometry.tree.node("GeometryNodeInputMeshFaceArea").value
     return delete_faces(geometry, area < SMALLEST_AREA)
 
 
 def join(*geometries: Value) -> Value:
-    """Join geometries; the first comes first."""
+    """Add a node that joins geometries in the given order; return the geometry."""
     tree = geometries[0].tree
     node = tree.node("GeometryNodeJoinGeometry")
     tree.link_all(node.raw.inputs[0], list(geometries))
@@ -213,7 +213,7 @@ def join(*geometries: Value) -> Value:
 
 
 def label(geometry: Value, class_id: Operand, instance: Operand, material: Value | None = None) -> Value:
-    """Give every face its class, its instance and, if given, its material."""
+    """Add nodes that store class and instance on all faces and set the material, if given; return the geometry."""
     labelled = store(geometry, "class_id", class_id, "FACE")
     labelled = store(labelled, "instance_id", instance, "FACE")
     if material is None:
@@ -222,20 +222,20 @@ def label(geometry: Value, class_id: Operand, instance: Operand, material: Value
 
 
 def transform(geometry: Value, **changes: Operand) -> Value:
-    """Return the geometry scaled (``scale``), turned (``rotation``) and moved (``translation``) as a whole."""
+    """Add a node that transforms a whole geometry by ``scale``, ``rotation`` and ``translation``."""
     return geometry.tree.node("GeometryNodeTransform", geometry, **changes).value
 
 
 def realize(geometry: Value) -> Value:
-    """Turn instances into real geometry; their attributes go to it."""
+    """Add a node that realizes instances, with their attributes; return the geometry."""
     return geometry.tree.node("GeometryNodeRealizeInstances", geometry).value
 
 
 def turn(tree: Tree, x: Operand = 0.0, y: Operand = 0.0, z: Operand = 0.0) -> Value:
-    """Return the rotation about x, then y, then z (rad)."""
+    """Add nodes for the rotation about x, then y, then z (rad)."""
     return tree.node("FunctionNodeEulerToRotation", vector(tree, x, y, z)).value
 
 
 def random_turn(tree: Tree, low: tuple[float, float, float], high: tuple[float, float, float], seed: Operand) -> Value:
-    """Return a random rotation whose Euler angles (rad) lie between `low` and `high`."""
+    """Add nodes for a random rotation per element whose Euler angles (rad) lie between `low` and `high`."""
     return tree.node("FunctionNodeEulerToRotation", random(tree, low, high, seed)).value

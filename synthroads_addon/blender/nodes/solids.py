@@ -11,22 +11,22 @@ Point = tuple[float, float, float]
 
 
 def box(tree: Tree, size: Operand, middle: Operand = (0.0, 0.0, 0.0)) -> Value:
-    """Return a box of a size (vector) around its middle."""
+    """Add nodes for a box of a size (vector, m) around its middle."""
     return move_geometry(tree.node("GeometryNodeMeshCube", size=size).value, middle)
 
 
 def move_geometry(geometry: Value, by: Operand) -> Value:
-    """Return the geometry moved as a whole."""
+    """Add a node that translates a whole geometry by a vector, m."""
     return op.transform(geometry, translation=by)
 
 
 def paint_faces(geometry: Value, material: Value, selection: Value | bool = True) -> Value:
-    """Give all faces, or those selected, a material."""
+    """Add a node that sets the material of all or the selected faces; return the geometry."""
     return geometry.tree.node("GeometryNodeSetMaterial", geometry, selection, material=material).value
 
 
 def flip_faces(geometry: Value) -> Value:
-    """Turn all faces round."""
+    """Add a node that flips the normals of all faces; return the geometry."""
     return geometry.tree.node("GeometryNodeFlipFaces", geometry).value
 
 
@@ -38,7 +38,7 @@ def loft(
     place: Callable[[Value, Value], Value],
     stored: Mapping[str, Callable[[Value], Value]] | None = None,
 ) -> Value:
-    """Return a solid between outlines that stand one behind the other.
+    """Add nodes for a closed solid lofted through copies of an outline, one per row, with lids at both ends.
 
     Args:
         outline: gives the outline's points by number, 0 to `columns` - 1. Seen along the rows they run clockwise.
@@ -61,7 +61,7 @@ def loft(
 
 
 def prism(tree: Tree, outline: list[tuple[float, float]], size: Operand = (1.0, 1.0, 1.0)) -> Value:
-    """Return an upright solid on an outline from z = 0 to 1, scaled by `size`; from above it runs anticlockwise."""
+    """Add nodes for a prism on an outline (anticlockwise from above) from z = 0 to 1, scaled by `size`."""
 
     def place(point: Value, row: Value) -> Value:
         raised = point + op.vector(tree, 0.0, 0.0, row)
@@ -72,7 +72,7 @@ def prism(tree: Tree, outline: list[tuple[float, float]], size: Operand = (1.0, 
 
 
 def bars(points: Value, start: Value, end: Value, width: Operand) -> Value:
-    """Return a square bar for every point of a mesh, from one place to another (fields on its points)."""
+    """Add nodes for a square bar of `width` (m) per point of a mesh, from `start` to `end` (fields on its points)."""
     tree = points.tree
     along = end - start
     length = op.length(along)
@@ -89,14 +89,14 @@ def bars(points: Value, start: Value, end: Value, width: Operand) -> Value:
 
 
 def row_of_points(tree: Tree, count: Operand) -> Value:
-    """Return points for `put_on_points` and `bars`."""
+    """Add a node for a mesh of `count` points, to put bodies or bars on."""
     return tree.node("GeometryNodeMeshLine", count=count).value
 
 
 def put_on_points(
     points: Value, body: Value, place: Value, scale: Operand = 1.0, rotation: Operand | None = None
 ) -> Value:
-    """Return a copy of the body (as an instance) at a place on every point (a field)."""
+    """Add nodes for an instance of a body per point, at a place given as a field on the points."""
     settings = {} if rotation is None else {"rotation": rotation}
     return points.tree.node(
         "GeometryNodeInstanceOnPoints", op.set_position(points, place), instance=body, scale=scale, **settings
@@ -104,13 +104,13 @@ def put_on_points(
 
 
 def tube(tree: Tree, radius: Operand, height: Value | float, sides: int = 12) -> Value:
-    """Return an upright closed tube from z = 0 on."""
+    """Add nodes for an upright closed cylinder from z = 0 to `height`, m, smoothly shaded."""
     cylinder = tree.node("GeometryNodeMeshCylinder", vertices=sides, radius=radius, depth=height)
     smooth = tree.node("GeometryNodeSetShadeSmooth", cylinder["Mesh"], cylinder["Side"]).value
     return move_geometry(smooth, op.vector(tree, 0.0, 0.0, height * 0.5))
 
 
 def cone(tree: Tree, bottom: Operand, top: Operand, height: Operand, sides: int = 16) -> Value:
-    """Return an upright closed cone, cut off, from z = 0 on."""
+    """Add nodes for an upright closed truncated cone from z = 0 to `height`, with bottom and top radius, m."""
     body = tree.node("GeometryNodeMeshCone", vertices=sides, radius_top=top, radius_bottom=bottom, depth=height)
     return tree.node("GeometryNodeSetShadeSmooth", body["Mesh"], body["Side"]).value

@@ -9,7 +9,7 @@ from .inputs import Inputs, instance_number, socket
 
 
 class OnSurface(Inputs):
-    """Inputs of a group that puts something on points.
+    """Inputs of a node group that puts things on points of the surface.
 
     Attributes:
         points: places in plan, with ``heading`` (rad, the turn about z) and ``elevation`` (m above the surface).
@@ -21,12 +21,12 @@ class OnSurface(Inputs):
     terrain = socket("Object", "Surface beside the road")
 
     def places(self) -> Value:
-        """Return the points on the surface."""
+        """Add nodes for the points moved onto the surfaces of road or terrain."""
         return on_surface(self.points, self.road, self.terrain)
 
 
 class Standing(OnSurface):
-    """Those of one thing.
+    """Inputs of a node group that puts one thing, with its instance number, on points of the surface.
 
     Attributes:
         instance: instance number of the faces.
@@ -35,17 +35,17 @@ class Standing(OnSurface):
     instance = instance_number()
 
     def put_labelled(self, parts: list[Value], class_id: int) -> Value:
-        """Return the parts on every point of the surface, labelled."""
+        """Add nodes for the joined parts on every point of the surface, labelled with class and instance."""
         places = self.places()
         return self.label(put_on(places, op.join(*parts)), class_id)
 
     def label(self, mesh: Value, class_id: int) -> Value:
-        """Give every face its class and its instance."""
+        """Add nodes that store class and instance number on all faces; return the geometry."""
         return op.label(mesh, class_id, self.instance)
 
 
 def on_surface(points: Value, road: Value, terrain: Value) -> Value:
-    """Put points onto the surfaces of two objects, and up by their attribute ``elevation``."""
+    """Add nodes that move points onto the surface of road or terrain, plus their ``elevation``; return the points."""
     tree = points.tree
     place = op.position(tree)
     height = height_on(op.object_geometry(road), op.object_geometry(terrain), place)
@@ -54,7 +54,7 @@ def on_surface(points: Value, road: Value, terrain: Value) -> Value:
 
 
 def put_on(points: Value, body: Value, scale: Operand = 1.0) -> Value:
-    """Return the body on every point, turned by the point's ``heading``; attributes of the points go with it."""
+    """Add nodes for a realized copy of the body on every point, turned by its ``heading``, with its attributes."""
     tree = points.tree
     turn = op.turn(tree, z=op.named_attribute(tree, "heading"))
     return op.realize(

@@ -32,7 +32,7 @@ _DAMAGE = "damage"
 
 
 class StripFaces(Inputs):
-    """Inputs of a strip that don't say where it lies."""
+    """Inputs of a strip of the road other than its place: class, instance, material, detail."""
 
     class_ = integer(0, (0, 255), "Semantic class of the faces")
     instance = instance_number()

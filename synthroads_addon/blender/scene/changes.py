@@ -8,7 +8,7 @@ import bpy
 
 
 class Changes:
-    """Notes whether geometry or a place in the scene changed, while it is open.
+    """Context manager that notes whether any geometry, transform or frame changes in the scene while it is entered.
 
     Attributes:
         seen: something changed since the last `forget`.
@@ -18,7 +18,7 @@ class Changes:
         self.seen = False
 
     def forget(self) -> None:
-        """Begin anew."""
+        """Reset `seen` to False."""
         self.seen = False
 
     def __enter__(self) -> Changes:

@@ -49,7 +49,7 @@ def scene_mesh(
     class_ids: Mapping[str, int] | None = None,
     road: str = "",
 ) -> SceneMesh:
-    """Return the triangles of the evaluated scene: everything that is visible in it and has faces.
+    """Return all visible faces of the evaluated scene as labelled triangles in its local frame.
 
     A face's class is its attribute ``class_id``, else its object's custom property ``synthroads_class``, else the class
     that a collection of the object is named after, else unlabelled; names can have classes as well, see `ClassMapping`.
@@ -87,7 +87,7 @@ def scanned_scene(
     class_ids: Mapping[str, int] | None = None,
     road: str = "",
 ) -> ScannedScene:
-    """Return the evaluated scene as `scene_mesh` does, but what moves apart from what stands.
+    """Return the evaluated scene as labelled triangles: standing ones as one mesh, moving bodies each with its motion.
 
     Vehicles of the road's model move along their lanes, see `LaneMotion`; those with a speed of 0 stand. One that the
     user moved is at the time 0 where he put it, and drives on from there as far beside its lane as it is now. Anything
@@ -124,7 +124,7 @@ def scanned_scene_steps(
     class_ids: Mapping[str, int] | None = None,
     road: str = "",
 ) -> Generator[float, None, CopiedScene]:
-    """Read the evaluated scene as `scanned_scene` does, in steps in the main thread between which the window may live.
+    """Generator that copies the evaluated scene in short main-thread steps; its value is the copy.
 
     Each mesh is copied in a step of its own. If the user changes something meanwhile, it begins again; if he goes on
     changing things, all is read in one step. After an undo, or when another file was opened, it must be closed.
@@ -167,7 +167,7 @@ def _put_together(reading: _SceneWalk, origin: Float, number_objects: bool) -> S
 
 @dataclass(frozen=True)
 class CopiedScene:
-    """Copy of a scene that `scanned_scene_steps` has read.
+    """Copy of an evaluated scene, ready to be put together without Blender.
 
     Attributes:
         materials: the scene's, in the order of the indices in its meshes.
@@ -179,7 +179,7 @@ class CopiedScene:
 
 
 def _moving(reading: _SceneWalk, carrier: Hashable, motion: BodyMotion, tables: SceneTables) -> MovingMesh:
-    """Return what one carrier moves, in the motion's own frame."""
+    """Return the mesh that one carrier moves, in the motion's own frame, with the motion and pass numbers."""
     rotation, translation, _ = motion.pose(np.zeros(1))
     into = np.eye(4)
     into[:3, :3] = rotation[0].T
@@ -195,7 +195,7 @@ def _moving(reading: _SceneWalk, carrier: Hashable, motion: BodyMotion, tables: 
 
 @dataclass(frozen=True)
 class _MeshUse:
-    """Properties that all uses of one mesh by one object have in common.
+    """Part, label and motion that all uses of one mesh by one object have in common.
 
     Attributes:
         part: key of the mesh's part.
@@ -214,7 +214,7 @@ class _MeshUse:
 
 @dataclass(frozen=True)
 class _QueuedMesh:
-    """A mesh that has not been copied yet: that of an object, after its modifiers.
+    """An object's evaluated mesh that is queued to be copied.
 
     Attributes:
         name: of the object, for messages.
@@ -230,7 +230,7 @@ class _QueuedMesh:
 
 
 class _SceneWalk:
-    """One walk through an evaluated scene: its meshes, and who uses them where.
+    """Reader of an evaluated scene: walks its instances, queues their meshes and copies them.
 
     What the walk finds is looked at at once. Objects' own meshes are found again at any time, and are copied
     afterwards, one by one, by `copies`.
@@ -272,7 +272,7 @@ class _SceneWalk:
         self._walk(depsgraph)
 
     def copies(self) -> Iterator[float]:
-        """Copy the meshes that wait, one in each step; yield the share of them that is done.
+        """Copy the queued meshes one by one, yielding the share done after each.
 
         It ends early where a mesh is no longer what it was.
         """
@@ -289,16 +289,16 @@ class _SceneWalk:
 
     @property
     def materials(self) -> tuple[str, ...]:
-        """Return the names of the materials, in the order of their indices."""
+        """Return the scene's material names in the order of their indices."""
         return tuple(self._materials)
 
     @property
     def complete(self) -> bool:
-        """Return whether no mesh waits."""
+        """Return whether all queued meshes are copied."""
         return not self._queued
 
     def copy_all(self) -> None:
-        """Copy the meshes that wait."""
+        """Copy all queued meshes at once, as far as they are unchanged."""
         for _ in self.copies():
             pass
 
@@ -309,7 +309,7 @@ class _SceneWalk:
         self._copied[key] = copy_mesh(name, mesh, slots, self._materials, self.labels.by_name, asked, undeformed)
 
     def pairs(self, carrier: Hashable) -> list[tuple[MeshPart, Places]]:
-        """Return the parts that a carrier moves (that stand, for None) and their places; only once for each."""
+        """Return and forget the mesh parts that a carrier moves (that stand, for None), with their places."""
         pairs = [(self._part(key), places) for key, places in self._uses.pop(carrier, {}).items()]
         if not self._uses:
             self._parts.clear()  # what is placed needn't be held twice
@@ -321,7 +321,7 @@ class _SceneWalk:
         return self._parts[key]
 
     def tables(self, origin: Float, number_objects: bool) -> SceneTables:
-        """Return what all meshes have in common."""
+        """Return the scene's labels, materials and origin (3,), m; with numbers for unnumbered objects if asked."""
         labels = self._numbered() if number_objects else self._labels
         return SceneTables(labels, self.materials, origin, self.labels.reserved)
 
@@ -349,7 +349,7 @@ class _SceneWalk:
                 places.objects.append(about.values.rows(random_number(use), (matrix[3], matrix[7], matrix[11])))
 
     def _look(self, item: bpy.types.Object, owner: bpy.types.Object) -> _MeshUse | None:
-        """Return what is known of an evaluated object and its owner; None if they aren't scanned."""
+        """Queue or copy an evaluated object's mesh; return its part, label and motion, None if it isn't scanned."""
         original, shown_by = item.original, owner.original
         if not len(item.data.polygons) or SUPPORT in shown_by:
             return None
@@ -377,7 +377,7 @@ class _SceneWalk:
         return _MeshUse(part, len(self._labels) - 1, lane, self._velocity(original, shown_by), values)
 
     def _velocity(self, item: bpy.types.Object, owner: bpy.types.Object) -> tuple[Hashable, Float] | None:
-        """Return the key of what moves an original object, and its velocity; None if nothing does."""
+        """Return (key of the moving object, velocity (3,), m/s) of an original object; None if nothing moves it."""
         inside = velocity_of(item) if item != owner else None
         moved = inside or velocity_of(owner)
         if not moved or not self._speed_factor or not moved[1].any():
@@ -386,7 +386,7 @@ class _SceneWalk:
         return (moved[0].name_full, owner.name_full if inside else ""), moved[1] * self._speed_factor
 
     def _carrier(self, known: _MeshUse, matrix: list[float]) -> Hashable:
-        """Return the key of what moves a use, whose motion is in `motions` then; its own velocity counts first."""
+        """Return the key in `motions` of the motion of a mesh's use, added if new; its own velocity counts first."""
         if known.velocity is not None:
             key, velocity = known.velocity
             if key not in self.motions:
@@ -406,7 +406,7 @@ class _SceneWalk:
         return key
 
     def _numbered(self) -> list[Label]:
-        """Return the labels with a number for each object that has none."""
+        """Return a copy of the labels with a free instance number for each unnumbered object, in order of names."""
         taken = {label.instance for label in self._labels}
         for copied in self._copied.values():
             if copied.instance_id is not None:

@@ -39,7 +39,7 @@ SUFFIXES = (".blend", *_IMPORTERS)
 
 
 def check_scene_file(path: Path, up: UpAxis | None = None) -> None:
-    """Refuse a file that can't be a scene, without opening it.
+    """Raise an error if a file can't be opened as a scene, judged by its path and ending alone.
 
     Raises:
         MissingFileError: there is no such file.
@@ -55,7 +55,7 @@ def check_scene_file(path: Path, up: UpAxis | None = None) -> None:
 
 
 def open_scene(path: Path, up: UpAxis | None = None) -> None:
-    """Open a .blend, or import another file into a new, empty one. What was open is lost; the file is only read.
+    """Open a .blend file, or import another format into a new empty file, discarding the open one.
 
     Scripts in a .blend aren't run.
 
@@ -87,7 +87,7 @@ def open_scene(path: Path, up: UpAxis | None = None) -> None:
 
 
 def _try_in_a_process(path: Path, importer: str) -> None:
-    """Import a file in a process of its own first; InputError if that crashes.
+    """Import a file in a separate process as a trial; raise `InputError` if that process crashes.
 
     Args:
         path: the file.
@@ -103,7 +103,7 @@ def _try_in_a_process(path: Path, importer: str) -> None:
 
 
 def open_scene_warnings() -> list[str]:
-    """Return what may make a scan of the open scene other than was meant, in sentences."""
+    """Return warnings about missing linked files and a unit scale other than 1 m in the open scene, as sentences."""
     warnings = [
         f"the linked file {library.filepath} is missing: what it holds is not scanned"
         for library in bpy.data.libraries

@@ -32,7 +32,7 @@ _IDENTITY = array("d", np.eye(4).ravel().tolist())
 
 @dataclass
 class MeshPart:
-    """Triangles of one mesh in its own frame.
+    """Labelled triangles of one mesh in its own frame.
 
     Attributes:
         vertices: (V, 3) float32.
@@ -59,7 +59,7 @@ class MeshPart:
 
 @dataclass
 class Places:
-    """Where a part stands: per use a matrix of 16 numbers, row by row, the number of a label, and its object's values.
+    """Placements of a mesh part: per use a matrix (16 numbers, row by row), a label's index and its object's values.
 
     The values are there only where materials ask for them.
     """
@@ -71,7 +71,7 @@ class Places:
 
 @dataclass(frozen=True)
 class SceneTables:
-    """Tables that the meshes of a scene have in common.
+    """Labels, materials and origin that the meshes of a scene share.
 
     Attributes:
         labels: of all objects.
@@ -87,7 +87,7 @@ class SceneTables:
 
 
 def slot_names(item: bpy.types.Object) -> list[str]:
-    """Return the names of an evaluated object's materials by slot, at least one."""
+    """Return the material-table names of an evaluated object's material slots, at least one."""
     names = [table_name(material) for material in item.data.materials]
     for index, slot in enumerate(item.material_slots[: len(names)]):
         if slot.link == "OBJECT":
@@ -97,7 +97,7 @@ def slot_names(item: bpy.types.Object) -> list[str]:
 
 @dataclass
 class MeshCopy:
-    """Copy of an evaluated mesh, as fast as memory allows; `part` makes the rest of it without Blender.
+    """Raw arrays of an evaluated mesh, copied fast; `part` converts them without Blender.
 
     Attributes:
         name: of its object, for messages.
@@ -125,7 +125,7 @@ class MeshCopy:
     values: dict[SurfaceInput, MeshValues] = field(default_factory=dict)
 
     def part(self) -> MeshPart:
-        """Return the mesh's triangles; raise `InputError` if its vertices aren't finite."""
+        """Return the mesh as labelled triangles; raise `InputError` if its vertices aren't finite."""
         if not np.isfinite(self.vertices).all():
             raise InputError(f"{self.name}: vertices", None, "must be finite numbers")
         corners, face, label, number = self.corners, self.face, self.class_id, self.instance_id
@@ -159,7 +159,7 @@ def copy_mesh(
     asked: frozenset[SurfaceInput] = frozenset(),
     undeformed: bool = False,
 ) -> MeshCopy:
-    """Return what is needed of an evaluated mesh.
+    """Copy an evaluated mesh's geometry, face labels, materials and the values its materials read.
 
     Args:
         name: of its object, for messages.
@@ -198,7 +198,7 @@ def copy_mesh(
 
 
 def triangle_corners(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
-    """Return the corners (T, 3) of a mesh's triangles, which must have been calculated.
+    """Return the corner indices (T, 3) int32 of a mesh's calculated loop triangles, copied as a block of memory.
 
     Blender has them as an array of three 32-bit numbers each but hands them out one by one, a hundred times slower
     than they can be copied. So they are copied from where it says that they are, if that is laid out as expected.
@@ -234,7 +234,7 @@ def _material_classes(
 
 
 def _face_values(mesh: bpy.types.Mesh, name: str) -> NDArray[Any] | None:
-    """Return the (F,) int32 values of a face attribute, or None."""
+    """Return an integer or boolean face attribute (F,) as int32; None if the mesh has none of that name."""
     attribute = mesh.attributes.get(name)
     if attribute is None or attribute.domain != "FACE" or attribute.data_type not in ("INT", "INT8", "BOOLEAN"):
         return None
@@ -244,7 +244,7 @@ def _face_values(mesh: bpy.types.Mesh, name: str) -> NDArray[Any] | None:
 
 
 def join_parts(pairs: list[tuple[MeshPart, Places]], tables: SceneTables, frame: Float | None = None) -> SceneMesh:
-    """Return parts at their places as one mesh, without triangles that have no area.
+    """Return all placed parts as one mesh, without triangles of no area; empties `pairs`.
 
     Args:
         pairs: parts and where they stand; emptied, so that no part is held longer than it is needed.
@@ -290,7 +290,7 @@ def join_parts(pairs: list[tuple[MeshPart, Places]], tables: SceneTables, frame:
 
 
 def _part_values(part: MeshPart, places: Places, first: int, frame: Float | None) -> PartValues:
-    """Return the values of a part at its places, whose first triangle has the number ``first``."""
+    """Return a part's material input values at all its places; its first triangle has the index ``first``."""
     assert part.corners is not None
     matrices = np.frombuffer(places.matrices).reshape(-1, 4, 4)
     values = dict(part.values)
@@ -308,7 +308,7 @@ def _part_values(part: MeshPart, places: Places, first: int, frame: Float | None
 
 
 def _blocks(part: MeshPart, places: Places) -> Iterator[tuple[Float, array[int]]]:
-    """Yield matrices (N, 4, 4) and labels of so many places at a time that their arrays stay small."""
+    """Yield a part's places in blocks of bounded size: matrices (N, 4, 4) and label indices (N,)."""
     matrices = np.frombuffer(places.matrices).reshape(-1, 4, 4)
     size = max(1, _BLOCK // max(len(part.vertices), len(part.triangles), 1))
     for start in range(0, len(matrices), size):
@@ -318,7 +318,7 @@ def _blocks(part: MeshPart, places: Places) -> Iterator[tuple[Float, array[int]]
 def _place(
     part: MeshPart, matrices: Float, vertices: NDArray[np.float32], triangles: NDArray[np.int32], first: int
 ) -> None:
-    """Fill in the vertices and triangles of a part at N places, as (N, 4, 4) matrices."""
+    """Write a part's vertices and triangles at N places (matrices (N, 4, 4)) into the given arrays, in place."""
     count, size = len(matrices), len(part.vertices)
     into = vertices.reshape(count, size, 3)
     step = max(1, _BLOCK // count)
@@ -333,7 +333,7 @@ def _place(
 
 
 def _label(part: MeshPart, labels: list[Label], reserved: frozenset[int], into: dict[str, NDArray[Any]]) -> None:
-    """Fill in class, instance and material (N * T,) of a part at N places."""
+    """Write class, instance and material (N * T,) of a part's triangles at N places into arrays, in place."""
     count = len(labels)
     into["material"].reshape(count, -1)[...] = part.material
     number = into["instance_id"].reshape(count, -1)
@@ -353,7 +353,7 @@ def _label(part: MeshPart, labels: list[Label], reserved: frozenset[int], into: 
 
 
 def _with_area(vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> NDArray[np.bool_] | None:
-    """Return which triangles have an area (T,); None if all have."""
+    """Return a mask (T,) of the triangles larger than 1e-12 m2; None if all are."""
     keep = np.empty(len(triangles), bool)
     for start in range(0, len(triangles), _BLOCK):
         corner = vertices[triangles[start : start + _BLOCK]]

@@ -34,7 +34,7 @@ _DOMAINS = {"POINT": "point", "CORNER": "corner", "FACE": "face"}
 
 
 def asked_by_material() -> dict[str, frozenset[SurfaceInput]]:
-    """Return what the open file's materials ask of surfaces, by the names that they have in a scene's mesh."""
+    """Return the surface inputs that the open file's materials read, by material-table name."""
     asked: dict[str, frozenset[SurfaceInput]] = {}
     for item in bpy.data.materials:
         if inputs := asked_inputs(item):
@@ -45,7 +45,7 @@ def asked_by_material() -> dict[str, frozenset[SurfaceInput]]:
 def mesh_values(
     mesh: bpy.types.Mesh, asked: Iterable[SurfaceInput], undeformed: bool
 ) -> dict[SurfaceInput, MeshValues]:
-    """Return what there is of the asked inputs on an evaluated mesh; values of faces are by face.
+    """Return the values of the asked inputs that an evaluated mesh has, by input; those of faces are by face.
 
     Args:
         mesh: the mesh.
@@ -86,7 +86,7 @@ def _mesh_value(mesh: bpy.types.Mesh, what: SurfaceInput, undeformed: bool) -> M
 
 
 def _attribute(mesh: bpy.types.Mesh, name: str, mean: bool = False) -> MeshValues | None:
-    """Return an attribute as renderers see it: one number is grey, of two the third is 0, and the rest is opaque.
+    """Return a mesh attribute as RGBA, as renderers see it; None if it is missing or of another type or domain.
 
     Args:
         mesh: the mesh.
@@ -111,7 +111,7 @@ def _attribute(mesh: bpy.types.Mesh, name: str, mean: bool = False) -> MeshValue
 
 
 def _four(values: np.ndarray) -> Float32:
-    """Return one to four numbers (n, c) as colour and alpha (n, 4)."""
+    """Return values (n, c), c from 1 to 4, as RGBA (n, 4): one number is grey, missing ones are 0, alpha 1."""
     result = np.zeros((len(values), 4), np.float32)
     result[:, 3] = 1.0
     if values.shape[1] == 1:
@@ -123,7 +123,7 @@ def _four(values: np.ndarray) -> Float32:
 
 @dataclass(frozen=True)
 class ObjectValues:
-    """Values of one object that materials ask for, and of a copy of it.
+    """Reader of the values of one object, and of its instances, that materials read.
 
     Attributes:
         item: the object.
@@ -134,7 +134,7 @@ class ObjectValues:
     asked: tuple[SurfaceInput, ...]
 
     def rows(self, random: int, location: tuple[float, float, float]) -> dict[SurfaceInput, tuple[float, ...]]:
-        """Return red, green, blue and alpha by input, of a copy with this number of chance at this place."""
+        """Return (red, green, blue, alpha) by input for an instance with this random number and location."""
         rows = {}
         for what in self.asked:
             row = self._row(what, random, location)
@@ -155,7 +155,7 @@ class ObjectValues:
 
 
 def _property(item: bpy.types.Object, what: SurfaceInput) -> tuple[float, ...] | None:
-    """Return an object's custom property, or its data's, as a colour; None if it has none of that name."""
+    """Return a custom property of an object or its data as RGBA; None if neither has a fitting one."""
     for owner in (item, item.data):
         value = owner.get(what.name)
         if isinstance(value, int | float):
@@ -169,7 +169,7 @@ def _property(item: bpy.types.Object, what: SurfaceInput) -> tuple[float, ...] |
 
 
 def random_number(use: bpy.types.DepsgraphObjectInstance) -> int:
-    """Return the number of 32 bits that Cycles takes for an object's chance: an instance's own, else of its name."""
+    """Return the 32-bit number that Cycles uses for *Object Info > Random*: an instance's, else the name's hash."""
     if use.is_instance:
         return int(use.random_id) % 2**32
     number = 0
@@ -197,7 +197,7 @@ def _mixed(number: int) -> int:
 def object_values(
     item: bpy.types.Object, names: Iterable[str], asked: Mapping[str, frozenset[SurfaceInput]]
 ) -> ObjectValues | None:
-    """Return what an object's materials ask of it; None if that is nothing."""
+    """Return a reader of the object inputs that an object's materials read; None if they read none."""
     inputs = frozenset().union(*(asked.get(name, frozenset()) for name in names))
     mine = tuple(sorted(what for what in inputs if what.kind in OF_OBJECT))
     return ObjectValues(item, mine) if mine else None

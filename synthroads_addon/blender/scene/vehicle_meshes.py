@@ -25,7 +25,7 @@ _COLOR = SurfaceInput("attribute", COLOR)
 
 
 class VehicleMeshes:
-    """Meshes of vehicles by model, each made when it is first needed; must be used on Blender's main thread.
+    """Cache of vehicle meshes by model, each built when first needed; must be used on Blender's main thread.
 
     Materials have one number in all the scenes that one of these put together.
     """
@@ -41,7 +41,7 @@ class VehicleMeshes:
         motions: Mapping[str, BodyMotion],
         passes: Mapping[str, PassNumbers],
     ) -> ScannedScene:
-        """Return what stands together with vehicles that drive.
+        """Return a scene to scan of a static mesh and moving vehicles, with common material indices.
 
         Args:
             static: what stands.
@@ -67,7 +67,7 @@ class VehicleMeshes:
 
 
 def _model_mesh(model: str) -> SceneMesh:
-    """Return a model in the frame of `LaneMotion`: its middle at 0 on the road, x forward, y left, z up."""
+    """Build a vehicle model; return its mesh centred on 0 on the road, x forward, y left, z up, m."""
     item = bpy.data.objects.new("SR Vehicle", bpy.data.meshes.new("SR Vehicle"))
     bpy.context.scene.collection.objects.link(item)
     try:
@@ -92,7 +92,7 @@ def _model_mesh(model: str) -> SceneMesh:
 
 
 def _as_vehicle(mesh: SceneMesh, vehicle: Vehicle) -> SceneMesh:
-    """Return a model as a vehicle: with its instance number, and its colour, which in Blender is on its point."""
+    """Return a model's mesh with a vehicle's instance number and colour."""
     surface = mesh.surface
     if surface is not None:
         color = MeshValues(np.array([[*vehicle.color, 1.0]], np.float32), "object")
@@ -102,7 +102,7 @@ def _as_vehicle(mesh: SceneMesh, vehicle: Vehicle) -> SceneMesh:
 
 
 def _with_materials(mesh: SceneMesh, names: Sequence[str]) -> SceneMesh:
-    """Return a mesh whose materials are counted by names that hold all of its own."""
+    """Return a mesh with its material indices mapped to those of `names`, which must hold all of its materials."""
     if mesh.materials == tuple(names):
         return mesh
     numbers = np.array([names.index(name) for name in mesh.materials], np.uint16)

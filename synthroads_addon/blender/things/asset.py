@@ -28,7 +28,7 @@ KEY = "synthroads_asset"
 
 @model_part("assets", 170, on_the_road=True)
 def build_assets(builder: ModelBuilder) -> None:
-    """Add an instance of its asset's collection for every asset of the set.
+    """Add one collection instance per asset of the parameter set to the model, reading the assets' files.
 
     Raises:
         MissingFileError, InputError: a library or an asset's file is missing or cannot be read.
@@ -47,7 +47,7 @@ def build_assets(builder: ModelBuilder) -> None:
 
 
 def _foot(builder: ModelBuilder, item: Asset) -> Vector:
-    """Return the place in the scene where an asset stands: on the road or beside it on the terrain."""
+    """Return an asset's foot point in the scene's frame, m: on the road or terrain, plus its elevation."""
     place = on_plan(builder.geometry, [item])[0]
     surface = surface_elevation(builder.geometry, np.array([item.station]), np.array([item.offset]))
     place[2] = surface[0] + item.elevation
@@ -55,7 +55,7 @@ def _foot(builder: ModelBuilder, item: Asset) -> Vector:
 
 
 def _collection(path: Path, asset: LibraryAsset) -> bpy.types.Collection:
-    """Return the collection of an asset's objects, read from its file if this scene doesn't have it yet."""
+    """Return the collection of an asset's objects, read from its file unless the open file has it already."""
     key = f"{path}:{asset.object or ''}"
     for existing in bpy.data.collections:
         if existing.get(KEY) == key:
@@ -93,7 +93,7 @@ def _read_obj(path: Path, _: str | None) -> list[bpy.types.Object]:
 
 
 def _import_objects(run: Callable[[], object]) -> list[bpy.types.Object]:
-    """Return the objects that an importer adds."""
+    """Run an importer; return the objects that it added to the file."""
     before = set(bpy.data.objects)
     run()
     return [item for item in bpy.data.objects if item not in before]

@@ -71,7 +71,7 @@ def beacon_group(tree: Tree) -> None:
 
 
 def _foot(tree: Tree) -> Value:
-    """Return the foot: a slab with chamfered corners and edges, a little sunk."""
+    """Add nodes for a beacon's foot: a slab with chamfered corners and edges, a little sunk."""
     outline, (share, smaller) = [(x, y) for x, y in sizes.foot_outline().tolist()], sizes.LEVELS
     slab = prism(tree, outline, (1.0, 1.0, sizes.FOOT[2] * share + sizes.SUNK))
     upper = prism(tree, outline, (*smaller, sizes.FOOT[2]))
@@ -79,7 +79,7 @@ def _foot(tree: Tree) -> Value:
 
 
 def _blade(tree: Tree, red: Value, white: Value, side: int) -> Value:
-    """Return a blade of width 1 and height 1 on z = 0, whose stripes fall to the left (side 1) or to the right (-1)."""
+    """Add nodes for a blade of 1 m x 1 m on z = 0 whose stripes fall to the left (side 1) or right (-1)."""
     stripes = _blade_face(tree)
     faces = []
     for front in (True, False):
@@ -96,7 +96,7 @@ def _blade(tree: Tree, red: Value, white: Value, side: int) -> Value:
 
 
 def _blade_face(tree: Tree) -> Value:
-    """Return the face of a blade, towards -y, in triangles with the number of their ``stripe``, which rises with x."""
+    """Add nodes for a blade's face towards -y, triangles with their ``stripe``'s number, which rises with x."""
     columns, rows = CELLS
     halves = []
     for upper in (0, 1):
@@ -114,7 +114,7 @@ def _blade_face(tree: Tree) -> Value:
 
 
 def _lamp(tree: Tree, housing: Value, lens: Value) -> Value:
-    """Return a warning lamp that shines both ways."""
+    """Add nodes for a warning lamp that shines both ways."""
     radius, deep = sizes.LENS
     body = paint_faces(box(tree, sizes.HOUSING, (0.0, 0.0, sizes.HOUSING_MIDDLE)), housing)
     middle = (0.0, 0.0, sizes.LENS_MIDDLE)
@@ -129,7 +129,7 @@ def _lamp(tree: Tree, housing: Value, lens: Value) -> Value:
 
 @model_part("beacons", 80)
 def build_beacons(builder: ModelBuilder) -> None:
-    """Make all beacons as one object."""
+    """Add all beacons to the model as one object, a point each; none if there are no beacons."""
     beacons = list(builder.parameters.of_type(ConstructionBeacon).values())
     if not beacons:
         return
@@ -142,6 +142,6 @@ def build_beacons(builder: ModelBuilder) -> None:
 
 
 def _passing_side(beacon: ConstructionBeacon) -> int:
-    """Return +1 where traffic passes a beacon on its own left, -1 on its right: one turned round has them swapped."""
+    """Return +1 if traffic passes a beacon on the beacon's own left, -1 if right; its rotation may swap them."""
     with_stations = math.cos(math.radians(beacon.rotation_deg)) > 0.0
     return 1 if (beacon.pass_side == "left") == with_stations else -1

@@ -77,13 +77,13 @@ def cabinet_group(tree: Tree) -> None:
 
 
 def _block(tree: Tree, cabinet: _Cabinet, inset: float, low: Value | float, high: Value | float) -> Value:
-    """Return a box between two heights, so much smaller than the cabinet all around."""
+    """Add nodes for a box of the cabinet's plan, smaller by `inset` (m) all around, between two heights (m)."""
     size = op.vector(tree, cabinet.width - 2.0 * inset, cabinet.depth - 2.0 * inset, high - low)
     return box(tree, size, op.vector(tree, 0.0, 0.0, (high + low) * 0.5))
 
 
 def _on_highest_ground(tree: Tree, cabinet: _Cabinet) -> tuple[Value, Value, Value]:
-    """Return the points on the surface, and by how much the ground below a cabinet there is higher and lower (m)."""
+    """Add nodes for the points on the surface, and the ground's highest and lowest z below a cabinet, relative, m."""
     places = cabinet.places()
     surfaces = op.object_geometry(cabinet.road), op.object_geometry(cabinet.terrain)
     heading = op.named_attribute(tree, "heading")
@@ -101,14 +101,14 @@ def _on_highest_ground(tree: Tree, cabinet: _Cabinet) -> tuple[Value, Value, Val
 
 
 def _raised(places: Value, by: Value) -> Value:
-    """Return points raised by a height (a field)."""
+    """Add nodes that raise points by a height (a field, m)."""
     tree = places.tree
     return op.set_position(places, op.position(tree) + op.vector(tree, 0.0, 0.0, by))
 
 
 @model_part("cabinets", 150)
 def build_cabinets(builder: ModelBuilder) -> None:
-    """Make one object per emergency phone and utility cabinet."""
+    """Add one object per emergency phone and utility cabinet to the model."""
     for name, cabinet in builder.parameters.of_type(Cabinet).items():
         group = emergency_phone_group() if cabinet.kind == "emergency_phone" else cabinet_group()
         builder.add_thing(name, cabinet, group)

@@ -16,7 +16,7 @@ from .registry import model_part
 
 
 def _outline(profile: str) -> list[tuple[float, float, float]]:
-    """Return a profile, clockwise as seen along the road: x to the left, y 0, z; the two buried points have z = -1."""
+    """Return a barrier profile's relative points, clockwise along the road: x left, y 0, z; buried ones at z = -1."""
     left = [(1.0, -1.0), *sizes.FLANKS[profile]]
     return [(x, 0.0, z) for x, z in left] + [(-x, 0.0, z) for x, z in reversed(left)]
 
@@ -56,7 +56,7 @@ def concrete_barrier_group(tree: Tree) -> None:
 
 
 def _rows(tree: Tree, barrier: _Barrier, begin: Value, end: Value, ramp: Value) -> Value:
-    """Return points with their station, evenly spaced from its start on but for the two at the ends of the ramps.
+    """Add nodes for points with their station, evenly spaced along the barrier, two of them moved to the ramps' ends.
 
     Those beyond the backbone's ends collapse there.
     """
@@ -92,7 +92,7 @@ def _sweep_profile(tree: Tree, line: Value, barrier: _Barrier) -> Value:
 
 @model_part("concrete_barriers", 50)
 def build_concrete_barriers(builder: ModelBuilder) -> None:
-    """Make one object per concrete barrier."""
+    """Add one object per concrete barrier to the model."""
     for name, barrier in builder.parameters.of_type(ConcreteBarrier).items():
         builder.add_thing(
             name,

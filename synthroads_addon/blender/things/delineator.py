@@ -68,7 +68,7 @@ def _body(tree: Tree, white: Value, black: Value) -> Value:
 
 
 def _front(tree: Tree, glass: Value) -> Value:
-    """Return the reflector on the face that approaching drivers see (-y)."""
+    """Add nodes for the upright reflector on the face that approaching drivers see (-y)."""
     mesh, column, row = op.grid(tree, 2, 2)
     x = column * _WIDE - _WIDE / 2
     place = op.vector(tree, x, -_flank(x), row * _HIGH - _HIGH / 2 + _MIDDLE)
@@ -76,7 +76,7 @@ def _front(tree: Tree, glass: Value) -> Value:
 
 
 def _behind(tree: Tree, glass: Value, above: float) -> Value:
-    """Return one of the round reflectors on the other face."""
+    """Add nodes for a round reflector on the other face, `above` (m) from the reflectors' middle height."""
     disc = tree.node("GeometryNodeMeshCircle", vertices=16, radius=0.03, fill_type="NGON").value
     place = op.position(tree)
     x = op.component(place, "X")
@@ -85,19 +85,19 @@ def _behind(tree: Tree, glass: Value, above: float) -> Value:
 
 
 def _flank(x: Value) -> Value:
-    """Return the y of the flank behind, which runs from (-0.045, 0.055) to (0.05, 0.014), just under its surface."""
+    """Add nodes for the y (m) of the rear flank at x, 1 mm below its surface: (-0.045, 0.055) to (0.05, 0.014)."""
     return (x + 0.045) * (-0.041 / 0.095) + (0.055 - _UNDER)
 
 
 def _reflector_body(face: Value, glass: Value) -> Value:
-    """Return a reflector as thick as it stands out of the post."""
+    """Add nodes that extrude a face to a reflector's body, 1 mm in the post and 4 mm out of it."""
     solid = face.tree.node("GeometryNodeExtrudeMesh", face, offset_scale=_UNDER + _PROUD, individual=False).value
     return paint_faces(solid, glass)
 
 
 @model_part("delineators", 160, on_the_road=True)
 def build_delineators(builder: ModelBuilder) -> None:
-    """Make all delineator posts as one object."""
+    """Add all delineator posts to the model as one object, a point each; none if there are no posts."""
     posts = list(builder.parameters.of_type(Delineator).values())
     if not posts:
         return

@@ -59,7 +59,7 @@ def emergency_phone_group(tree: Tree) -> None:
 
 
 def _pillar(tree: Tree, phone: _Phone, rows: tuple[tuple[float, float], ...]) -> Value:
-    """Return a solid through rows of height (a share, or m below the surface) and width (a share)."""
+    """Add nodes for a solid through rows of (height as a share, or m if below 0; width as a share)."""
 
     def place(point: Value, row: Value) -> Value:
         level = op.choose(row, [(z, share, 0.0) for z, share in rows])
@@ -72,7 +72,7 @@ def _pillar(tree: Tree, phone: _Phone, rows: tuple[tuple[float, float], ...]) ->
 
 
 def _writing(tree: Tree, phone: _Phone) -> Value:
-    """Return the letters on the four sides above the speech panel."""
+    """Add nodes for the letters SOS on the four sides above the speech panel."""
     sides = []
     for turns in range(4):
         wide, deep = (phone.width, phone.depth) if turns % 2 == 0 else (phone.depth, phone.width)

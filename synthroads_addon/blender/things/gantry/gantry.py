@@ -90,12 +90,12 @@ def gantry_group(tree: Tree) -> None:
 
 
 def _thickness(signs: Value) -> Value:
-    """Return the depth of a sign's body (a field on the signs' points)."""
+    """Add nodes for the depth (m) of a sign's body, a field on the signs' points."""
     return op.switch(op.named_attribute(signs.tree, "display", "INT").equals(1), sizes.BOARD, sizes.DISPLAY)
 
 
 def _levels(tree: Tree, gantry: _Gantry, road: Value) -> tuple[Value, Value]:
-    """Return z of the lowest part, and of the beam's lower edge."""
+    """Add nodes for z (m) of the gantry's lowest part, clear of the pavement below, and of the beam's lower edge."""
 
     def most(value: Value) -> Value:
         return tree.node("GeometryNodeAttributeStatistic", gantry.signs, attribute=value, data_type="FLOAT")["Max"]
@@ -113,7 +113,7 @@ def _levels(tree: Tree, gantry: _Gantry, road: Value) -> tuple[Value, Value]:
 
 
 def _posts(tree: Tree, gantry: _Gantry, surfaces: tuple[Value, Value], bottom: Value) -> Value:
-    """Return the posts: those at the ends enclose the beam's end, the middle one ends in it."""
+    """Add nodes for the posts: those at the ends enclose the beam's end, the middle one ends in it."""
     parts = []
     for present, place, outer in (
         (gantry.left_post, gantry.left_end, True),
@@ -135,7 +135,7 @@ def _posts(tree: Tree, gantry: _Gantry, surfaces: tuple[Value, Value], bottom: V
 
 
 def _catwalk(tree: Tree, gantry: _Gantry, surfaces: tuple[Value, Value], top: Value) -> Value:
-    """Return the catwalk on the beam, and the ladder at the right post, or at the left one if there is no right."""
+    """Add nodes for the catwalk on the beam and its ladder at the right post, or at the left without a right one."""
     clear = gantry.post_width * 0.5 + sizes.CATWALK_CLEAR
     length = op.maximum(gantry.left_end - gantry.right_end - clear * 2.0, 1.0)
     walk = tree.call(gantry_catwalk_group(), length=length, beam_depth=gantry.beam_depth).value
@@ -158,7 +158,7 @@ def _catwalk(tree: Tree, gantry: _Gantry, surfaces: tuple[Value, Value], top: Va
 
 
 def _place_signs(tree: Tree, gantry: _Gantry, low: Value, bottom: Value) -> Value:
-    """Put the signs' points into the middles of their faces: lower edges in line, or small ones before the beam."""
+    """Add nodes that move the signs' points to their faces' middles: lower edges in line, small ones on the beam."""
     tall = op.named_attribute(tree, "height")
     behind = low + tall < bottom + gantry.beam_height
     z = op.switch(behind, low + tall * 0.5, bottom + gantry.beam_height * 0.5)
@@ -170,7 +170,7 @@ def _place_signs(tree: Tree, gantry: _Gantry, low: Value, bottom: Value) -> Valu
 
 
 def _boards(tree: Tree, gantry: _Gantry, signs: Value) -> tuple[Value, Value]:
-    """Return the bodies of boards and displays behind the signs' points, and their hangers."""
+    """Add nodes for the bodies of boards and displays behind the signs' points, and for their hangers."""
     wide, tall, thick = (op.named_attribute(tree, name) for name in ("width", "height", "thickness"))
     facing = op.turn(tree, z=op.switch(op.named_attribute(tree, "facing") > 0.0, math.pi, 0.0))
     body = box(tree, 1.0, (0.0, 0.5, 0.0))
@@ -202,7 +202,7 @@ _LIT = 0.9
 
 @model_part("gantries", 90)
 def build_gantries(builder: ModelBuilder) -> None:
-    """Make one object per gantry, and one per face of its signs."""
+    """Add one object per gantry, and one per face of its signs, to the model."""
     for name, gantry in builder.parameters.of_type(Gantry).items():
         cantilever = gantry.kind == "cantilever"
         builder.add_thing(
@@ -225,7 +225,7 @@ def build_gantries(builder: ModelBuilder) -> None:
 
 
 def _add_face(builder: ModelBuilder, name: str, gantry: Gantry, place: int, sign: GantrySign) -> None:
-    """Make the face of one sign; a display that shows nothing has none."""
+    """Add the object of one sign's face to the model; none for a display that shows nothing."""
     shown = any(line.strip() for line in sign.text)
     if sign.kind == "display" and not shown:
         return
@@ -245,7 +245,7 @@ def _board_inputs(sign: GantrySign) -> dict[str, Any]:
 
 
 def _display_inputs(sign: GantrySign) -> dict[str, Any]:
-    """Return the lights of a display: a speed limit's ring if it shows a number, else lines of writing."""
+    """Return the face inputs of a lit display: a speed limit with ring if it shows a number, else lines of text."""
     side = _LIT * min(sign.width, sign.height)
     if "".join(sign.text).isdigit():
         inputs = face_inputs(FaceStyle("black", "red", "white"), "round", side, side, sign.text)
@@ -258,7 +258,7 @@ def _display_inputs(sign: GantrySign) -> dict[str, Any]:
 
 
 def _signs_mesh(gantry: Gantry) -> bpy.types.Mesh:
-    """Return one vertex per sign in the gantry's frame, with the attributes that its group reads."""
+    """Create a mesh with one vertex per sign in the gantry's frame, with the attributes that its node group reads."""
     mesh = bpy.data.meshes.new("SR Gantry")
     across = np.array([gantry.offset - sign.offset for sign in gantry.signs])
     fill(mesh, np.column_stack([across, np.zeros((len(across), 2))]))

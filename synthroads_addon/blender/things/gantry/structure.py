@@ -44,7 +44,7 @@ def gantry_beam_group(tree: Tree) -> None:
 
 
 def _chord(height: Value) -> Value:
-    """Return the width of the truss's chords."""
+    """Add nodes for the width (m) of a truss's chords."""
     share, least, most = sizes.TRUSS_CHORD
     return op.minimum(op.maximum(height * share, least), most)
 
@@ -65,7 +65,7 @@ def _chords(tree: Tree, length: Value, height: Value, depth: Value) -> Value:
 
 
 def _lattice(tree: Tree, length: Value, height: Value, depth: Value) -> Value:
-    """Return posts, cross bars and diagonals; every second bay is turned upside down."""
+    """Add nodes for a truss's posts, cross bars and diagonals; every second bay is upside down."""
     width = _chord(height)
     bays = op.round_up(length / (op.maximum(height, sizes.TRUSS_BAY[0]) * sizes.TRUSS_BAY[1]))
     points = row_of_points(tree, bays * len(sizes.TRUSS_BARS) + sizes.TRUSS_FRAME)
@@ -82,7 +82,7 @@ def _lattice(tree: Tree, length: Value, height: Value, depth: Value) -> Value:
 
 
 def _joints(tree: Tree, kind: Value, length: Value, height: Value, depth: Value) -> Value:
-    """Return pairs of flanges, no higher than the beam."""
+    """Add nodes for the flanges of the bolted joints of a box or tube beam, no higher than it."""
     pieces = op.round_up(length / _JOINT_SPACING)
     points = row_of_points(tree, pieces - 1)
     place = op.vector(tree, (op.index(tree) + 1) * (length / pieces), 0.0, height * 0.5)
@@ -182,7 +182,7 @@ def gantry_post_group(tree: Tree) -> None:
 
 
 def _bolts(tree: Tree, width: Value, depth: Value) -> Value:
-    """Return bolts around the post, on the base plate."""
+    """Add nodes for the bolts around a post, on its base plate."""
     half = op.vector(tree, width * 0.5 + sizes.PLATE_MARGIN * 0.55, depth * 0.5 + sizes.PLATE_MARGIN * 0.55, 0.0)
     place = op.choose(op.index(tree), _BOLTS) * half + (0.0, 0.0, sizes.PLINTH + 0.03)
     return put_on_points(row_of_points(tree, len(_BOLTS)), prism(tree, _BOLT, (1.0, 1.0, 0.06)), place)
