@@ -200,7 +200,7 @@ def models(runs: Sequence[str]) -> dict[str, list[Model]]:
     for text in runs:
         name, _, folder = text.partition("=")
         run = Run.open(Path(folder))
-        predictor = remembering(import_module("ml.centerline.task").predictor(run))
+        predictor = remembering(import_module("ml.centerline.task").load_predictor(run))
         alike = (kind_of(run), learned_by(run), _part(run, SliceSettings).half_width)
         found.setdefault(name, {}).setdefault(alike, []).append(predictor)
     return {

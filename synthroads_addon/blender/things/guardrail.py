@@ -26,7 +26,7 @@ POST_DEPTH = _HALF
 
 
 class _Rail(Lengthwise):
-    """The group's inputs, and where the rail's foot and top are at any station."""
+    """Inputs of the guardrail's node group, with nodes for the rail's foot and top at any station."""
 
     offset = metres(0.0, (-100.0, 100.0), "Offset of the posts' axis")
     left_beam = boolean(True, "A beam on the left of the posts")
@@ -40,21 +40,21 @@ class _Rail(Lengthwise):
     material = material_of("beams and posts", "galvanised_steel")
 
     def beams(self) -> tuple[tuple[float, Value], ...]:
-        """Return the sides, +1 for the left and -1 for the right, and whether there is a beam."""
+        """Return (side, whether it has a beam) for the left, +1, and the right side, -1."""
         return (1.0, self.left_beam), (-1.0, self.right_beam)
 
     def ramp(self) -> Value:
-        """Return the length of the ramp at either end."""
+        """Add nodes for the length (m) of the ramp at either end, at most half the rail's."""
         return op.minimum(self.terminal_length, (self.end_station - self.start_station) * 0.5)
 
     def top_at(self, station: Value, ramp: Value) -> Value:
-        """Return the height of the beam's top edge above the surface."""
+        """Add nodes for the height (m) of the beam's top edge above the surface at a station (field)."""
         inside = op.minimum(station - self.start_station, self.end_station - station) / op.maximum(ramp, 1e-3)
         share = op.switch(ramp > 1e-3, 1.0, op.minimum(inside, 1.0))
         return self.height * share + sizes.TIP * (1.0 - share)
 
     def foot_at(self, station: Value, ribbon: Value, surfaces: tuple[Value, Value]) -> tuple[Value, Value]:
-        """Return the point on the surface under the posts' axis, and the vector to the left."""
+        """Add nodes for the surface point under the posts' axis at a station (field), and the vector to the left."""
         left = look_up(ribbon, "left", station)
         place = look_up(ribbon, "axis", station) + left * self.offset
         rise = height_on(*surfaces, place) - op.component(place, "Z")
@@ -97,7 +97,7 @@ def guardrail_group(tree: Tree) -> None:
 
 
 def _post_rows(tree: Tree, rail: _Rail) -> Value:
-    """Return one point per post with its station."""
+    """Add nodes for one point per post with its ``station``, evenly spaced from the rail's start."""
     number = (rail.end_station - rail.start_station) / rail.post_spacing + 1e-4
     count = tree.node("FunctionNodeFloatToInt", number, rounding_mode="FLOOR").value + 1
     posts = row_of_points(tree, count)
@@ -105,7 +105,7 @@ def _post_rows(tree: Tree, rail: _Rail) -> Value:
 
 
 def _rows(tree: Tree, rail: _Rail, ramp: Value) -> Value:
-    """Return points with their station: no piece is longer than the step, and the ramps end at a point.
+    """Add nodes for the beams' rows as points with their ``station``, no farther apart than the beam's step.
 
     Between the ramps the rows are whole parts of the post spacing from the start on, as the posts are.
     """
@@ -127,7 +127,7 @@ def _rows(tree: Tree, rail: _Rail, ramp: Value) -> Value:
 
 
 def _beam(tree: Tree, line: Value, side: float, spacer: Value) -> Value:
-    """Sweep the beam's profile along the line of its top edge."""
+    """Add nodes that sweep the beam's profile along the line of its top edge; return the mesh."""
     mesh, column, number = op.grid(tree, len(BEAM_PROFILE), op.point_count(line))
     profile = op.choose(column, BEAM_PROFILE)
     top = op.sample_index(line, op.named_attribute(tree, "top", "FLOAT_VECTOR"), number)
@@ -140,7 +140,7 @@ def _beam(tree: Tree, line: Value, side: float, spacer: Value) -> Value:
 
 
 def _instances(tree: Tree, posts: Value, rail: _Rail) -> list[Value]:
-    """Put a post on every point, and beside it the spacers of the beams that there are."""
+    """Add nodes for an instance of a post on every point, and of a spacer per beam beside it."""
     left, tall = op.named_attribute(tree, "left", "FLOAT_VECTOR"), op.named_attribute(tree, "tall")
     upright = op.upright(left)
 
@@ -165,7 +165,7 @@ def _instances(tree: Tree, posts: Value, rail: _Rail) -> list[Value]:
 
 
 def _post(tree: Tree) -> Value:
-    """Return a post of height 1; x is across the road, y along it."""
+    """Add nodes for a post of 1 m height; x is across the road, y along it."""
     mesh, column, number = op.grid(tree, len(_POST), 2)
     section = op.choose(column, [(x, y, 0.0) for x, y in _POST])
     return op.set_position(mesh, section + op.vector(tree, 0.0, 0.0, number))
@@ -173,7 +173,7 @@ def _post(tree: Tree) -> Value:
 
 @model_part("guardrails", 40, on_the_road=True)
 def build_guardrails(builder: ModelBuilder) -> None:
-    """Make one object per guardrail."""
+    """Add one object per guardrail to the model."""
     for name, rail in builder.parameters.of_type(Guardrail).items():
         builder.add_thing(
             name,

@@ -57,7 +57,7 @@ def kilometre_board_group(tree: Tree) -> None:
 
 @model_part("kilometre_boards", 120)
 def build_kilometre_boards(builder: ModelBuilder) -> None:
-    """Make one object per kilometre board."""
+    """Add one object per kilometre board to the model."""
     for name, board in builder.parameters.of_type(KilometreBoard).items():
         face = face_inputs(_STYLE, "rectangle", board.width, board.height, (board.text,))
         group = kilometre_board_group()

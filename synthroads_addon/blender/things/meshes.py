@@ -22,7 +22,7 @@ def points_mesh(
     attributes: Mapping[str, NDArray[Any]],
     origin: Float,
 ) -> bpy.types.Mesh:
-    """Return one vertex per object, exact in plan, at the axis's elevation, less the scene's origin (3,).
+    """Create a mesh with one vertex per point object, at the axis's elevation, relative to `origin` (3,), m.
 
     Attributes of its points: ``heading`` (rad, the turn about z of something that was made facing traffic along +y),
     ``elevation`` (m above the surface), ``instance``, and those given: whole numbers, numbers, or vectors (N, 3).
@@ -40,7 +40,7 @@ def points_mesh(
 
 
 def on_plan(geometry: RoadGeometry, items: Sequence[PointObject]) -> Float:
-    """Return the local places (N, 3) of point objects, exact in plan, at the axis's elevation."""
+    """Return local places (N, 3), m, of point objects: exact in plan, at the elevation of the road's axis."""
     station = np.array([item.station for item in items])
     offset = np.array([item.offset for item in items])
     position, heading, _ = geometry.alignment.frame(station)
@@ -49,7 +49,7 @@ def on_plan(geometry: RoadGeometry, items: Sequence[PointObject]) -> Float:
 
 
 def signed_instance(instances: Sequence[int] | NDArray[np.integer]) -> NDArray[np.int32]:
-    """Return instance numbers as the nodes hold them: they have 32 bits and no sign, the nodes' numbers have one."""
+    """Return unsigned 32-bit instance numbers reinterpreted as signed ones, as node groups hold them."""
     return np.array(instances, dtype=np.uint32).astype(np.int32)
 
 
@@ -59,7 +59,7 @@ def fill(
     edges: NDArray[np.intp] | None = None,
     faces: NDArray[np.intp] | None = None,
 ) -> None:
-    """Give an empty mesh its vertices (V, 3) and edges (E, 2) or faces (F, 4)."""
+    """Fill an empty mesh, in place, with vertices (V, 3) and edges (E, 2) or faces (F, 4)."""
     mesh.vertices.add(len(vertices))
     mesh.vertices.foreach_set("co", vertices.astype(np.float32).ravel())
     if edges is not None:
@@ -70,7 +70,7 @@ def fill(
 
 
 def fill_polygons(mesh: bpy.types.Mesh, vertices: Float, sizes: Sequence[int]) -> None:
-    """Give an empty mesh vertices (V, 3) and the faces that they make one after the other, of these sizes."""
+    """Fill an empty mesh, in place, with polygons of the given sizes whose vertices (V, 3) follow one another."""
     fill(mesh, vertices)
     _add_faces(mesh, np.arange(len(vertices)), np.asarray(sizes))
 
@@ -84,7 +84,7 @@ def _add_faces(mesh: bpy.types.Mesh, corners: NDArray[np.intp], sizes: NDArray[n
 
 
 def attribute(mesh: bpy.types.Mesh, name: str, values: NDArray[Any]) -> None:
-    """Store a value per point: whole numbers (N,), numbers (N,) or vectors (N, 3)."""
+    """Store a new point attribute in a mesh: integers (N,), floats (N,) or vectors (N, 3), in 32 bits."""
     whole = np.issubdtype(values.dtype, np.integer)
     kind = "FLOAT_VECTOR" if values.ndim == 2 else "INT" if whole else "FLOAT"
     data = mesh.attributes.new(name, kind, "POINT").data

@@ -39,7 +39,7 @@ _KINDS: dict[str, tuple[type, ...]] = {
 
 
 class ModelBuilder:
-    """Makes a model's objects one by one.
+    """Builder that adds a road model's objects one by one, and what they need to know of the road.
 
     Attributes:
         parameters: the road, with only those objects that stand on the stretch.
@@ -81,7 +81,7 @@ class ModelBuilder:
         self._collection, self._root = collection, root
 
     def lay_out(self) -> None:
-        """Find the rows of the surface, and with them what stands on the stretch; comes before everything else."""
+        """Compute the surface's rows and cut the parameters to the stretch; must be called before anything is added."""
         self.stations = run_aside(lambda: sample_stations(self.geometry, self.tolerance, *self._given))
         if not self._whole:
             self.stretch = (float(self.stations[0]), float(self.stations[-1]))
@@ -90,7 +90,7 @@ class ModelBuilder:
 
     @cached_property
     def step(self) -> float:
-        """Longest straight piece (m) of what follows the road, so that it keeps the tolerance in the curves.
+        """Longest straight piece (m) of things along the road that keeps the tolerance in its curves; cached.
 
         It is that of the whole road, 4 m halved as often as need be: pieces of a stretch are the whole road's.
         """
@@ -100,19 +100,19 @@ class ModelBuilder:
 
     @cached_property
     def widest(self) -> float:
-        """A distance from the axis (m) that the whole road's verges don't reach, wider ones by hand included."""
+        """Distance from the axis (m) beyond all of the road's verges, with 5 m to spare for edits; cached."""
         sections, length = self.geometry.sections.values(), self.geometry.length
         edges = [section.road_edge([0.0, *section.kinks(), length]).max() for section in sections]
         return float(np.ceil(max(edges)) + _ROOM)
 
     def along(self, station: float) -> float:
-        """Return a station as the nodes count it."""
+        """Return a station, m, relative to the one that the nodes count from."""
         return station - self.zero
 
     def points(
         self, name: str, items: Sequence[PointObject], attributes: Mapping[str, NDArray[Any]] | None = None
     ) -> bpy.types.Mesh:
-        """Return a mesh with one vertex per point object, see `meshes.points_mesh`."""
+        """Create a mesh with one vertex per point object, its heading, elevation, instance and given attributes."""
         return points_mesh(name, self.geometry, items, attributes or {}, self.origin)
 
     def add_thing(
@@ -123,7 +123,7 @@ class ModelBuilder:
         mesh: bpy.types.Mesh | None = None,
         **inputs: Any,
     ) -> None:
-        """Add a thing of the road as an object. Inputs of its group that are named as its fields have their values.
+        """Add a thing of the road as an object with its node group, inputs set from the fields of the same names.
 
         Args:
             name: its id.
@@ -147,7 +147,7 @@ class ModelBuilder:
         inputs: Mapping[str, Any] | None = None,
         support: bool = False,
     ) -> None:
-        """Add an object to the model, with its modifier if it has a group.
+        """Add an object with a mesh to the model, and a Geometry Nodes modifier if a group is given.
 
         Args:
             role: what it is in the model.
@@ -179,7 +179,7 @@ class ModelBuilder:
         self._added(role, item)
 
     def stand(self, role: str, item: PointObject, rotation_deg: float = 0.0) -> None:
-        """Put an added object to a point object's place in plan, at the axis's elevation, turned by `rotation_deg`.
+        """Place an added object at a point object's station and offset, at the axis's elevation, facing along the road.
 
         Its frame then has x to the right of traffic with the stations, y along it, and z up.
         """
@@ -189,7 +189,7 @@ class ModelBuilder:
         added.rotation_euler = (0.0, 0.0, float(heading - np.pi / 2 + np.deg2rad(rotation_deg)))
 
     def add_instance(self, role: str, collection: bpy.types.Collection) -> bpy.types.Object:
-        """Add an empty that shows a collection."""
+        """Add an empty that instances a collection to the model; return it."""
         item = bpy.data.objects.new(role, None)
         item[ROLE], item.parent = role, self._root
         item.instance_type, item.instance_collection = "COLLECTION", collection
@@ -207,14 +207,14 @@ class ModelBuilder:
 
 
 def group_inputs(group: bpy.types.NodeTree) -> Iterator[bpy.types.NodeTreeInterfaceSocket]:
-    """Yield the sockets of a group's inputs."""
+    """Yield the interface sockets of a node group's inputs."""
     for item in group.interface.items_tree:
         if item.item_type == "SOCKET" and item.in_out == "INPUT":
             yield item
 
 
 def named_fields(item: RoadObject, group: bpy.types.NodeTree) -> dict[str, str]:
-    """Return the inputs of a group that are named as numbers and choices of a thing, and these fields of it."""
+    """Return the numeric and boolean fields of a thing by the names of the group's inputs that match them."""
     fields = {}
     for socket in group_inputs(group):
         field = _RENAMED.get(socket.name, socket.name.lower().replace(" ", "_"))
@@ -224,7 +224,7 @@ def named_fields(item: RoadObject, group: bpy.types.NodeTree) -> dict[str, str]:
 
 
 def _to_input(name: str, kind: str, value: Any) -> Any:
-    """Return a value as the modifier takes it."""
+    """Return a value converted for a modifier's input: signed instance numbers, materials by their table names."""
     if name.endswith("Instance"):
         return int(signed_instance([value])[0])
     return material(value) if kind == "NodeSocketMaterial" and isinstance(value, str) else value

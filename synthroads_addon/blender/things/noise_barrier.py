@@ -24,7 +24,7 @@ _SUNK = 0.003  # m: faces that coincide have no first hit
 
 @dataclass(frozen=True)
 class _Relief:
-    """Slats on a panel's face: cassettes, ribs or boards.
+    """Dimensions of the slats (cassettes, ribs or boards) on a panel's face.
 
     Attributes:
         lying: whether they run along the panel; they stand otherwise.
@@ -98,7 +98,7 @@ def noise_barrier_group(tree: Tree) -> None:
 
 
 def _posts(tree: Tree, wall: _Wall, count: Value, axis: Value, surfaces: tuple[Value, Value]) -> Value:
-    """Return the posts as instances; those beyond the backbone, and on an end that the wall passes, are left out."""
+    """Add nodes for the posts as instances; those beyond the backbone, or on an end the wall passes, are left out."""
     posts = row_of_points(tree, count + 1)
     number = op.index(tree)
     posts = op.store(
@@ -114,7 +114,7 @@ def _posts(tree: Tree, wall: _Wall, count: Value, axis: Value, surfaces: tuple[V
 
 
 def _post(tree: Tree) -> Value:
-    """Return an HEA profile of width and height 1 on z = 0: x is across the wall, y along it."""
+    """Add nodes for an HEA profile of 1 m width and height on z = 0: x is across the wall, y along it."""
     flange = (sizes.FLANGE - sizes.INSIDE, 1.0, 1.0)
     beside = (sizes.FLANGE + sizes.INSIDE) / 2
     web = box(tree, (2.0 * sizes.INSIDE + 0.01, 2.0 * sizes.WEB, 1.0), (0.0, 0.0, 0.5))
@@ -122,7 +122,7 @@ def _post(tree: Tree) -> Value:
 
 
 def _bays(tree: Tree, wall: _Wall, count: Value, axis: Value, surfaces: tuple[Value, Value]) -> Value:
-    """Return one point per bay with its number and the ``start`` and ``end`` of its foot, cut with the backbone."""
+    """Add nodes for one point per bay with its number and its foot's ``start`` and ``end``, cut at the backbone."""
     bays = row_of_points(tree, count)
     number = op.index(tree)
     start = wall.start_station + number * wall.post_spacing
@@ -139,7 +139,7 @@ def _bays(tree: Tree, wall: _Wall, count: Value, axis: Value, surfaces: tuple[Va
 
 
 def _fill_bays(tree: Tree, wall: _Wall, bays: Value, gaps: tuple[Value, Value], bodies: tuple[Value, Value]) -> Value:
-    """Put a panel, and a plinth below it, into every bay, level at the lower one of its posts."""
+    """Add nodes for a panel on a plinth in every bay, level at the lower one of its posts' feet."""
     (gap, plinth), (panel, block) = gaps, bodies
     start, end = (op.named_attribute(tree, name, "FLOAT_VECTOR") for name in ("start", "end"))
     low = op.minimum(op.component(start, "Z"), op.component(end, "Z"))
@@ -187,7 +187,7 @@ def _panel_group(tree: Tree) -> None:
 
 
 def _slatted_wall(tree: Tree, panel: _Panel, kind: str) -> Value:
-    """Return a wall with slats on its face."""
+    """Add nodes for a panel with slats on its face, and a cap where its kind has one."""
     relief = _RELIEFS[kind]
     out = op.minimum(panel.thickness * sizes.RELIEF_SHARE, sizes.RELIEFS[kind])
     tall = panel.height - (sizes.CAP if relief.cap else 0.0)
@@ -219,7 +219,7 @@ def _slatted_wall(tree: Tree, panel: _Panel, kind: str) -> Value:
 
 
 def _glass_pane(tree: Tree, panel: _Panel) -> Value:
-    """Return a pane in a frame."""
+    """Add nodes for a glass pane in a frame."""
     deep, tall = panel.thickness, panel.height
     level = box(tree, op.vector(tree, panel.length, deep, sizes.FRAME))
     upright = box(tree, op.vector(tree, sizes.FRAME, deep, tall - 2.0 * sizes.FRAME))
@@ -245,7 +245,7 @@ def _glass_pane(tree: Tree, panel: _Panel) -> Value:
 
 @model_part("noise_barriers", 60)
 def build_noise_barriers(builder: ModelBuilder) -> None:
-    """Make one object per noise barrier."""
+    """Add one object per noise barrier to the model."""
     for name, wall in builder.parameters.of_type(NoiseBarrier).items():
         face, frame = sizes.MATERIALS[wall.panel]
         builder.add_thing(

@@ -75,7 +75,7 @@ def damaged_area_group(tree: Tree) -> None:
 
 
 def _lay(area: _Outlines) -> Value:
-    """Return the outlines laid on the road, each point as far above it as its ``film`` says."""
+    """Add nodes that lay outlines in station and offset on the road, each point its ``film`` (m) above it."""
     tree = area.tree
     with tree.frame("Place in plan"):
         ribbon = station_ribbon(op.object_geometry(area.backbone))
@@ -90,7 +90,7 @@ def _lay(area: _Outlines) -> Value:
 
 @model_part("painted_areas", 30, on_the_road=True)
 def build_painted_areas(builder: ModelBuilder) -> None:
-    """Make all painted areas as one object."""
+    """Add all hatchings and arrows to the model as one object; none if there are none."""
     outlines = run_aside(lambda: list(_outlines(builder)))
     if not outlines:
         return
@@ -104,7 +104,7 @@ def build_painted_areas(builder: ModelBuilder) -> None:
 
 @model_part("damaged_areas", 31, on_the_road=True)
 def build_damaged_areas(builder: ModelBuilder) -> None:
-    """Make all patches and cracks as one object."""
+    """Add all patches and cracks of the pavement to the model as one object; none if there are none."""
     areas = run_aside(lambda: list(_damaged(builder)))
     if not areas:
         return
@@ -117,7 +117,7 @@ def build_damaged_areas(builder: ModelBuilder) -> None:
 
 
 class _Area(NamedTuple):
-    """A face of a patch or crack: its outline (K, 2), height above the pavement (m), and what the materials read."""
+    """A face of a patch or crack: outline (K, 2) in station and offset, film (m), instance, damage code, concrete."""
 
     outline: NDArray[np.float64]
     film: float
@@ -146,7 +146,7 @@ def _damaged(builder: ModelBuilder) -> Iterator[_Area]:
 
 
 def _polygons_mesh(name: str, polygons: list[NDArray[np.float64]], zero: float) -> tuple[bpy.types.Mesh, list[int]]:
-    """Return a mesh of outlines (K, 2) in stations and offsets, the former from a station (m) on, and their sizes."""
+    """Create a mesh of outlines (K, 2) in station minus `zero` and offset, m; return it and the outlines' sizes."""
     sizes, corners = [len(polygon) for polygon in polygons], np.concatenate(polygons)
     mesh = bpy.data.meshes.new(name)
     fill_polygons(mesh, np.column_stack([corners - [zero, 0.0], np.zeros(len(corners))]), sizes)
@@ -165,7 +165,7 @@ def _outlines(builder: ModelBuilder) -> Iterator[tuple[NDArray[np.float64], Hatc
 
 
 def _pieces(outline: NDArray[np.float64], start: float, end: float) -> Iterator[NDArray[np.float64]]:
-    """Cut a convex outline (K, 2) into pieces that are short along the road; yield what of them is on a stretch."""
+    """Yield the pieces, 1 m long at most, of a convex outline (K, 2) between two stations, m."""
     if len(outline) < 3:  # a patch whose corners lie on one line
         return
     low, high = outline[:, 0].min(), outline[:, 0].max()

@@ -30,7 +30,7 @@ class _Pole(Standing):
     glass_material = material_of("lamps and lenses", "lamp_glass")
 
     def rise(self) -> Value:
-        """Return how much higher the arm ends than it begins."""
+        """Add nodes for the rise (m) of the arm from the mast to its end."""
         return self.arm_length * sizes.ARM_RISE
 
 
@@ -52,7 +52,7 @@ def pole_group(tree: Tree) -> None:
 
 
 def _mast(tree: Tree, pole: _Pole, top: Value) -> Value:
-    """Return the mast with its foot below the surface and a door for the cables."""
+    """Add nodes for the mast up to `top` (m), with its buried foot and a door for the cables."""
     radius = pole.diameter * 0.5
     mast = cone(tree, radius, radius * sizes.MAST_TAPER, top, sizes.MAST_SIDES)
     foot = move_geometry(tube(tree, radius, BURIED, sizes.MAST_SIDES), (0.0, 0.0, -BURIED))
@@ -61,7 +61,7 @@ def _mast(tree: Tree, pole: _Pole, top: Value) -> Value:
 
 
 def _arm(tree: Tree, pole: _Pole, end: Value) -> Value:
-    """Return a quarter of an ellipse from the mast's axis to the left and up to its end's height."""
+    """Add nodes for the arm: a quarter of an ellipse from the mast to the left, up to the height `end` (m)."""
     line = row_of_points(tree, sizes.ARM_POINTS)
     turn = op.index(tree) * (math.pi / 2.0 / (sizes.ARM_POINTS - 1))
     across = (op.unary("COSINE", turn) - 1.0) * pole.arm_length
@@ -75,7 +75,7 @@ def _arm(tree: Tree, pole: _Pole, end: Value) -> Value:
 
 
 def _luminaire(tree: Tree, pole: _Pole) -> Value:
-    """Return the street light at the end of the arm; its top is the pole's."""
+    """Add nodes for the street light at the end of the arm; its top is the pole's height."""
     body = paint_faces(prism(tree, list(sizes.LUMINAIRE), (1.0, 1.0, sizes.LUMINAIRE_DEPTH)), pole.housing_material)
     glass = paint_faces(prism(tree, _GLASS, (1.0, 1.0, 0.01)), pole.glass_material)
     parts = op.join(body, move_geometry(glass, (0.0, 0.0, -0.01)))
@@ -83,7 +83,7 @@ def _luminaire(tree: Tree, pole: _Pole) -> Value:
 
 
 def _cameras(tree: Tree, pole: _Pole, mount: Value) -> Value:
-    """Return a camera along the road either way, a dome camera at the end of the arm, and a cabinet on the mast."""
+    """Add nodes for a camera along the road either way, a dome camera at the arm's end, and a cabinet on the mast."""
     front = move_geometry(_camera(tree, pole), op.vector(tree, 0.0, (pole.diameter + sizes.CAMERA[1]) * -0.5))
     behind = op.transform(front, rotation=(0.0, 0.0, math.pi))
     pair = move_geometry(op.join(front, behind), op.vector(tree, 0.0, 0.0, mount - sizes.CAMERA_BELOW))
@@ -101,7 +101,7 @@ def _cameras(tree: Tree, pole: _Pole, mount: Value) -> Value:
 
 
 def _camera(tree: Tree, pole: _Pole) -> Value:
-    """Return a camera under its sunshield around the origin, looking along -y and down."""
+    """Add nodes for a camera under its sunshield around the origin, looking along -y and down."""
     (across, along, high), (wider, longer, thick) = sizes.CAMERA, sizes.CAMERA_SHIELD
     shield = box(tree, (across + wider, along + longer, thick), (0.0, -0.03, high / 2 + 0.012))
     lens = tube(tree, 0.045, 0.02)
@@ -115,7 +115,7 @@ def _camera(tree: Tree, pole: _Pole) -> Value:
 
 @model_part("poles", 130)
 def build_poles(builder: ModelBuilder) -> None:
-    """Make one object per pole."""
+    """Add one object per pole to the model."""
     for name, pole in builder.parameters.of_type(Pole).items():
         builder.add_thing(
             name,

@@ -16,7 +16,7 @@ _LAST = 1000
 
 
 class ModelPart(NamedTuple):
-    """Part of a model.
+    """A registered part of a road model: its building function and order.
 
     Attributes:
         order, name: its place in the order of building, and its name.
@@ -34,7 +34,7 @@ _PARTS: dict[str, ModelPart] = {}
 
 
 def model_part(name: str, order: int = _LAST, on_the_road: bool = False) -> Callable[[Build], Build]:
-    """Register a function that builds a part of a model.
+    """Return a decorator that registers a function as the builder of a part, in the order of building.
 
     Raises:
         ValueError: another part has this name.
@@ -51,13 +51,13 @@ def model_part(name: str, order: int = _LAST, on_the_road: bool = False) -> Call
 
 @cache
 def model_parts() -> dict[str, ModelPart]:
-    """Return all parts by name, in the order in which they are built."""
+    """Import all part modules and return the parts by name, in the order of building; cached."""
     for file in walk_packages(import_module(__package__).__path__, f"{__package__}."):
         import_module(file.name)
     return {part.name: part for part in sorted(_PARTS.values(), key=lambda part: part[:2])}
 
 
 def required_parts(wanted: set[str]) -> set[str]:
-    """Return the parts that must be there for those wanted: what they stand on, too."""
+    """Return the wanted parts' names, with the road and the terrain where they stand on them."""
     standing = any(not model_parts()[name].on_the_road for name in wanted)
     return wanted | ({"road"} if wanted else set()) | ({"terrain"} if standing else set())

@@ -60,7 +60,7 @@ def temporary_barrier_group(tree: Tree) -> None:
 
 
 def _elements(tree: Tree, barrier: _TemporaryBarrier, begin: Value, end: Value) -> Value:
-    """Return one point per element with its number and the stations that it lies between."""
+    """Add nodes for one point per element with its ``number`` and the stations ``from`` and ``to``."""
     whole = (barrier.end_station - barrier.start_station) / barrier.segment_length - SHORTEST_ELEMENT
     count = op.round_up(op.maximum(whole, 1.0))
     points = op.store(row_of_points(tree, count), "number", op.index(tree))
@@ -72,13 +72,13 @@ def _elements(tree: Tree, barrier: _TemporaryBarrier, begin: Value, end: Value) 
 
 
 def _offset(barrier: _TemporaryBarrier, station: Value) -> Value:
-    """Return the offset at a station."""
+    """Add nodes for the barrier's offset (m) at a station, linear from its beginning to its end."""
     share = (station - barrier.start_station) / op.maximum(barrier.end_station - barrier.start_station, 1e-3)
     return barrier.offset + (barrier.end_offset - barrier.offset) * share
 
 
 def _body(tree: Tree, barrier: _TemporaryBarrier) -> Value:
-    """Return an element from x = 0 to 1."""
+    """Add nodes for an element's body from x = 0 to 1, of steel or plastic profile."""
     outlines = [
         [(0.0, x, z) for x, z in flank] + [(0.0, -x, z) for x, z in reversed(flank)] for flank in (_STEEL, _PLASTIC)
     ]
@@ -95,7 +95,7 @@ def _body(tree: Tree, barrier: _TemporaryBarrier) -> Value:
 
 
 def _reflectors(tree: Tree, barrier: _TemporaryBarrier) -> Value:
-    """Return a reflector on either flank, around x = 0."""
+    """Add nodes for a reflector on either flank, around x = 0."""
     beside = barrier.base_width * (0.5 * _STEEL[5][0]) + sizes.REFLECTOR[1] * 0.25
     up = barrier.height * 0.82
     sides = [box(tree, sizes.REFLECTOR, op.vector(tree, 0.0, beside * side, up)) for side in (1.0, -1.0)]
@@ -103,7 +103,7 @@ def _reflectors(tree: Tree, barrier: _TemporaryBarrier) -> Value:
 
 
 def _put_on_elements(tree: Tree, points: Value, body: Value, whole: bool) -> Value:
-    """Put a body on every element: along the whole of it, or in its middle."""
+    """Add nodes for an instance of a body on every element: stretched along the `whole` of it, or in its middle."""
     start, end = (op.named_attribute(tree, f"{name}_foot", "FLOAT_VECTOR") for name in ("from", "to"))
     turned = tree.node("FunctionNodeAxesToRotation", end - start, (0.0, 0.0, 1.0), primary_axis="X", secondary_axis="Z")
     if not whole:
@@ -114,7 +114,7 @@ def _put_on_elements(tree: Tree, points: Value, body: Value, whole: bool) -> Val
 
 @model_part("temporary_barriers", 70)
 def build_temporary_barriers(builder: ModelBuilder) -> None:
-    """Make one object per movable barrier."""
+    """Add one object per movable barrier to the model."""
     for name, barrier in builder.parameters.of_type(TemporaryBarrier).items():
         plastic = barrier.plastic
         builder.add_thing(

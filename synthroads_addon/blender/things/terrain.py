@@ -121,7 +121,7 @@ def _side_group(tree: Tree) -> None:
 
 
 def _toe(tree: Tree, inputs: _TerrainInputs) -> Value:
-    """Return how far from the edge the batter meets the ground (a field on the edge's points)."""
+    """Add nodes for the distance (m) from the edge at which the batter meets the ground; a field on its points."""
     start = op.position(tree)
     _, left, _ = row(inputs.backbone, op.index(tree))
     rises = op.switch(_ground_above(tree, inputs.ground, start) > 0.0, -1.0, 1.0)
@@ -137,7 +137,7 @@ def _toe(tree: Tree, inputs: _TerrainInputs) -> Value:
 
 
 def _ground_above(tree: Tree, ground: Value, place: Value) -> Value:
-    """Return how far the ground lies above `place`; 0 where there is no ground."""
+    """Add nodes for the ground's height (m) above `place`, negative below; 0 where there is no ground."""
     above = place + (0.0, 0.0, 1000.0)
     ray = tree.node("GeometryNodeRaycast", target_geometry=ground, source_position=above, ray_length=2000.0)
     return op.switch(ray["Is Hit"], 0.0, 1000.0 - ray["Hit Distance"])
@@ -145,7 +145,7 @@ def _ground_above(tree: Tree, ground: Value, place: Value) -> Value:
 
 @model_part("terrain", 20)
 def build_terrain(builder: ModelBuilder) -> None:
-    """Make the ground as it was, and the terrain that joins it to the road."""
+    """Add the terrain to the model, with the original ground as a hidden support object; none without terrain."""
     terrain = builder.parameters.terrain
     if terrain is None:
         return
@@ -158,7 +158,7 @@ def build_terrain(builder: ModelBuilder) -> None:
 def _ground_mesh(
     geometry: RoadGeometry, terrain: Terrain, tolerance: float, stretch: tuple[float, float], origin: Float
 ) -> bpy.types.Mesh:
-    """Return the ground before the road was built: a grid of stations and offsets, wider than the terrain."""
+    """Create the mesh of the original ground: a grid of stations and offsets, wider than the terrain."""
     vertices, faces = run_aside(lambda: _ground_grid(geometry, terrain, tolerance, stretch))
     mesh = bpy.data.meshes.new("SR Ground")
     fill(mesh, vertices - origin, faces=faces)
@@ -168,7 +168,7 @@ def _ground_mesh(
 def _ground_grid(
     geometry: RoadGeometry, terrain: Terrain, tolerance: float, stretch: tuple[float, float]
 ) -> tuple[Float, NDArray[np.intp]]:
-    """Return the local vertices (V, 3) of the ground and its faces (F, 4)."""
+    """Return the original ground's local vertices (V, 3), m, and faces (F, 4), spaced by its undulation."""
     bend = terrain.undulation * (2.0 * np.pi / terrain.wavelength) ** 2
     spacing = float(np.clip(np.sqrt(8.0 * tolerance / max(bend, 1e-9)), 1.5, 4.0))
 

@@ -29,7 +29,7 @@ class _Light(Standing):
     green_material = material_of("the green light", "lamp_green")
 
     def level(self, number: Value) -> Value:
-        """Return the height of a light's middle above the surface, 0 being the uppermost."""
+        """Add nodes for the height (m) of a light's middle above the surface; number 0 is the uppermost."""
         return self.height - sizes.MARGIN - (number + 0.5) * self.light_diameter * sizes.CHAMBER[2]
 
 
@@ -61,7 +61,7 @@ def traffic_light_group(tree: Tree) -> None:
 
 
 def _front(light: _Light) -> Value:
-    """Return the y of the housing's front."""
+    """Add nodes for the y (m) of the housing's front."""
     return light.light_diameter * -sizes.CHAMBER[1] - (sizes.POST / 2 + 0.01)
 
 
@@ -92,7 +92,7 @@ def _housing(tree: Tree, light: _Light) -> list[Value]:
 
 
 def _lamps(tree: Tree, light: _Light) -> Value:
-    """Return the domed glasses."""
+    """Add nodes for the lights' domed glasses: red on top, then yellow, green, yellow."""
     wide = light.light_diameter
     dome = cone(tree, wide * 0.5, wide * 0.22, wide * 0.12)
     dome = op.transform(dome, rotation=(math.pi / 2, 0.0, 0.0))
@@ -111,7 +111,7 @@ def _lamps(tree: Tree, light: _Light) -> Value:
 
 
 def _visor(tree: Tree, diameter: Value) -> Value:
-    """Return a sheet bent over a light, open below, that reaches forward; the light's middle is the origin."""
+    """Add nodes for a light's visor, a bent sheet open below that reaches forward; the light's middle is the origin."""
     share, thick, ahead, more = sizes.VISOR
     # Clockwise as seen along -y, from outside over the top and back inside.
     outer = [(math.cos(t), 0.0, math.sin(t)) for t in sizes.VISOR_TURNS]
@@ -133,6 +133,6 @@ def _visor(tree: Tree, diameter: Value) -> Value:
 
 @model_part("traffic_lights", 140)
 def build_traffic_lights(builder: ModelBuilder) -> None:
-    """Make one object per traffic light."""
+    """Add one object per traffic light to the model."""
     for name, light in builder.parameters.of_type(TrafficLight).items():
         builder.add_thing(name, light, traffic_light_group())

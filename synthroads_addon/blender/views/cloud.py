@@ -27,7 +27,7 @@ _STILL = 0.3
 
 
 class CloudView:
-    """The cloud that is drawn over the 3D views of one scene.
+    """Drawing of a point cloud over the 3D views of one scene.
 
     Attributes:
         cloud: the points; None while there is nothing to draw.
@@ -48,20 +48,20 @@ class CloudView:
         self._pace = Pace()
 
     def show(self, cloud: DisplayCloud, scene: bpy.types.Scene) -> None:
-        """Draw a cloud in a scene, in place of the one before."""
+        """Start drawing a cloud over a scene's 3D views, replacing the one before."""
         self.remove()
         self.cloud, self._scene, self.visible, self._pace = cloud, scene.session_uid, True, Pace()
         self._handler = bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_VIEW")
 
     def remove(self) -> None:
-        """Draw nothing any more, and free the memory."""
+        """Stop drawing and free the memory."""
         self.cloud = self._positions = self._batch = None
         if self._handler is not None:
             bpy.types.SpaceView3D.draw_handler_remove(self._handler, "WINDOW")
             self._handler = None
 
     def offset(self, scene: bpy.types.Scene) -> NDArray[np.float64]:
-        """Return what is added (3,) to the cloud's coordinates to have those of the scene, m.
+        """Return the offset (3,), m, from the cloud's coordinates to the scene's.
 
         That is 0 unless a road with another origin was built since the cloud was read.
         """
@@ -69,7 +69,7 @@ class CloudView:
         return np.zeros(3) if origin is None or self.cloud is None else self.cloud.origin - origin
 
     def is_drawn(self, context: bpy.types.Context) -> bool:
-        """Return whether the cloud is drawn in a 3D view: it is an overlay, as *Show Overlays* says."""
+        """Return whether the cloud is drawn in the context's 3D view: visible, its scene, overlays shown."""
         if self.cloud is None or not self.visible or context.scene.session_uid != self._scene:
             return False
         return bool(context.space_data.overlay.show_overlays)
@@ -97,7 +97,7 @@ class CloudView:
             gpu.state.depth_mask_set(depth_mask)
 
     def _coloured(self, shader: gpu.types.GPUShader) -> gpu.types.GPUBatch:
-        """Return the points on the graphics card; they go there once, and four bytes of each when colours change."""
+        """Return the GPU batch of coloured points, cached; positions are uploaded once, colours when `by` changes."""
         assert self.cloud
         if self._batch and self._batch[0] == self.by:
             return self._batch[1]
@@ -117,7 +117,7 @@ class CloudView:
 
 
 class Pace:
-    """How many points to draw, so that turning a view stays fluent however slow the graphics are.
+    """Limiter of the points drawn while a view is turned, by the measured drawing speed.
 
     Where the graphics card draws, handing over the points takes no time and all are drawn; software does the work at
     once, and it is measured.
@@ -129,7 +129,7 @@ class Pace:
         self._waiting: bpy.types.Region | None = None
 
     def points(self, count: int, region: bpy.types.Region, view: Matrix) -> int:
-        """Return how many of ``count`` points to draw in a region whose view is this one."""
+        """Return how many of ``count`` points to draw: fewer if the view moved and drawing is slow, all soon after."""
         key, fluent = region.as_pointer(), int(_FLUENT * self._rate)
         moved = key in self._views and self._views[key] != view
         self._views[key] = view.copy()
@@ -139,7 +139,7 @@ class Pace:
         return max(fluent, min(count, 10_000))
 
     def measure(self, seconds: float, count: int) -> None:
-        """Learn how long drawing took."""
+        """Update the drawing speed from the seconds that ``count`` points took."""
         self._rate = count / max(seconds, 1e-6)
 
     def _draw_all_soon(self, region: bpy.types.Region) -> None:
@@ -157,7 +157,7 @@ class Pace:
 
 
 def _nearer(view: bpy.types.RegionView3D) -> Matrix:
-    """Return what brings points nearer to the eye without moving them in the picture."""
+    """Return the matrix that brings points slightly nearer to the eye without moving them in the picture."""
     if view.is_perspective:
         return Matrix.Diagonal((1.0 - _NEARER, 1.0 - _NEARER, 1.0 - _NEARER, 1.0))
     return Matrix.Translation((0.0, 0.0, _NEARER * view.view_distance))

@@ -17,7 +17,7 @@ _MATERIAL = "SR Cloud"
 
 
 def add_cloud_object(cloud: DisplayCloud, by: ColourBy, radius: float, offset: NDArray[np.float64]) -> bpy.types.Object:
-    """Add a cloud to the open scene as a point cloud; return the object.
+    """Add a cloud to the open scene as a Blender point cloud object with attributes; return the object.
 
     Its points have the attributes ``class_id`` (integer), ``intensity`` (float), ``color`` (the points' own, where they
     have one) and ``shown`` (what the material shows). Scans leave it out.
@@ -45,19 +45,19 @@ def add_cloud_object(cloud: DisplayCloud, by: ColourBy, radius: float, offset: N
 
 
 def color_cloud_object(item: bpy.types.Object, cloud: DisplayCloud, by: ColourBy) -> None:
-    """Colour the points of a cloud's object anew."""
+    """Recolour the points of a cloud's object by another attribute, in place."""
     _fill(item.data, SHOWN, "BYTE_COLOR", "color", _linear(cloud.colors(by)))
     item.data.update_tag()
 
 
 def cloud_objects(scene: bpy.types.Scene, cloud: DisplayCloud) -> list[bpy.types.Object]:
-    """Return a scene's objects that show a cloud's file with as many points."""
+    """Return a scene's objects made from a cloud's file that have as many points as the cloud."""
     path = str(cloud.header.path)
     return [item for item in scene.objects if item.get(CLOUD) == path and len(item.data.points) == len(cloud)]
 
 
 def _new_points(name: str, xyz: NDArray[np.float32]) -> bpy.types.Object:
-    """Return a new object of the scene with a point cloud."""
+    """Add an object with a new point cloud of points (N, 3) to the scene; return it."""
     points = bpy.data.pointclouds.new(name)
     if not hasattr(points, "resize"):  # Blender 4.5 makes point clouds of meshes only
         bpy.data.pointclouds.remove(points)
@@ -70,7 +70,7 @@ def _new_points(name: str, xyz: NDArray[np.float32]) -> bpy.types.Object:
 
 
 def _converted(name: str, xyz: NDArray[np.float32]) -> bpy.types.Object:
-    """Return a new object whose mesh of vertices alone Blender has converted; the selection stays as it was."""
+    """Add a point cloud object converted from a vertex mesh, for Blender 4.5; the selection is restored."""
     mesh = bpy.data.meshes.new(name)
     mesh.vertices.add(len(xyz))
     mesh.vertices.foreach_set("co", np.ascontiguousarray(xyz, dtype=np.float32).ravel())
@@ -98,7 +98,7 @@ def _fill(points: Any, name: str, kind: str, field: str, values: NDArray[Any]) -
 
 
 def _linear(colors: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Return sRGB colours (N, 4) as Blender's attributes take them: linear, 0 to 1."""
+    """Return sRGB colours (N, 4) uint8 as linear float32, 0 to 1, alpha unchanged."""
     share = colors.astype(np.float32) / 255.0
     low = share[:, :3] <= 0.04045
     share[:, :3] = np.where(low, share[:, :3] / 12.92, ((share[:, :3] + 0.055) / 1.055) ** 2.4)
@@ -106,7 +106,7 @@ def _linear(colors: NDArray[np.uint8]) -> NDArray[np.float32]:
 
 
 def _material() -> bpy.types.Material:
-    """Return the material that shines in the colours that are shown, whatever the light."""
+    """Return the file's unlit material that shows the points' colour attribute, created if missing."""
     material = bpy.data.materials.get(_MATERIAL) or bpy.data.materials.new(_MATERIAL)
     if material.node_tree is None:
         material.use_nodes = True

@@ -29,7 +29,7 @@ _REACH, _HEIGHT = 2500.0, 300.0
 
 
 def add_views(scene: bpy.types.Scene, parameters: RoadParameters, matrix: Matrix) -> None:
-    """Give a scene a road's sun, sky, haze and cameras; those that it has of an earlier call are replaced.
+    """Add a road's sun, sky, haze and cameras to a scene, replacing those of an earlier call.
 
     Other lights and cameras stay. The driver's camera becomes the scene's if it has none, or one of ours.
 
@@ -53,7 +53,7 @@ def add_views(scene: bpy.types.Scene, parameters: RoadParameters, matrix: Matrix
 
 
 def remove_views(scene: bpy.types.Scene) -> None:
-    """Remove what `add_views` gave a scene, but for the world's data-block."""
+    """Remove the sun, haze and cameras of `add_views` from a scene, with their data; the world stays."""
     items = list(views_of(scene).values())
     data = [item.data for item in items if item.data is not None]
     bpy.data.batch_remove(items)
@@ -61,12 +61,12 @@ def remove_views(scene: bpy.types.Scene) -> None:
 
 
 def views_of(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
-    """Return what `add_views` gave a scene, by what it is."""
+    """Return the scene's objects made by `add_views`, by kind: sun, haze, driver, aerial."""
     return {str(item[VIEW]): item for item in scene.objects if VIEW in item}
 
 
 def cameras_of(scene: bpy.types.Scene) -> Iterator[tuple[str, bpy.types.Object]]:
-    """Yield the names and the cameras that `add_views` gave a scene."""
+    """Yield (name, object) of the scene's cameras made by `add_views`: driver, aerial."""
     views = views_of(scene)
     yield from ((name, views[name]) for name in _VIEWS if name in views)
 
@@ -78,7 +78,7 @@ def _mark(kind: str, item: bpy.types.Object, scene: bpy.types.Scene) -> bpy.type
 
 
 def _world(scene: bpy.types.Scene, environment: Environment) -> bpy.types.World:
-    """Return the scene's world if it is one of ours, else a new one: the user's own stays in the file."""
+    """Return a world with the environment's sky: the scene's if made here, else a new one; the user's is kept."""
     world = scene.world
     if world is None or VIEW not in world:
         world = bpy.data.worlds.new(_NAMES[SKY])
@@ -91,7 +91,7 @@ def _world(scene: bpy.types.Scene, environment: Environment) -> bpy.types.World:
 
 
 def _go_on_below_horizon(world: bpy.types.World) -> None:
-    """Have the sky's lowest colour go on below the horizon, where a model's ground ends and the sky would be black."""
+    """Change a world's nodes so that the sky's lowest colour continues below the horizon, where it would be black."""
     nodes, links = world.node_tree.nodes, world.node_tree.links
     kinds = ("TexCoord", "SeparateXYZ", "Math", "CombineXYZ")
     place, parts, height, joined = (nodes.new(f"ShaderNode{kind}") for kind in kinds)
@@ -117,7 +117,7 @@ def _camera(name: str, view: Viewpoint, matrix: Matrix) -> bpy.types.Object:
 
 
 def _haze(visibility: float, middle: Vector) -> bpy.types.Object:
-    """Return a wide, flat body of scattering air around a place; it is no part of any scan, and can't be selected."""
+    """Create an object of scattering air for a visibility (m) around a place; scans and selection leave it out."""
     mesh = bpy.data.meshes.new(_NAMES[HAZE])
     corners = [(x, y, z) for z in (-60.0, _HEIGHT) for y in (-_REACH, _REACH) for x in (-_REACH, _REACH)]
     faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]

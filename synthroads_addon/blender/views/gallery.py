@@ -41,18 +41,18 @@ _NOT_SHOWN = ("Alignment", "Carriageway", "Median", "Terrain", "LineMarking")
 
 @dataclass(frozen=True)
 class Quality:
-    """Size and samples of the pictures."""
+    """Size (pixels) and samples of the gallery's pictures."""
 
     size: tuple[int, int] = (1280, 720)
     samples: int = 48
 
     def half(self) -> Quality:
-        """Return the quality of small pictures."""
+        """Return the quality with half the width and height."""
         return Quality((self.size[0] // 2, self.size[1] // 2), self.samples)
 
 
 def make_gallery(folder: Path, quality: Quality, only: str, say: Callable[[str], None]) -> list[Path]:
-    """Render all pictures whose name contains `only` into a folder; return their paths."""
+    """Render the gallery's pictures whose names contain `only` to PNG files, discarding the open file; return paths."""
     preset = read_json(PRESET)
     made: list[Path] = []
     closed_up: set[str] = set()
@@ -106,7 +106,7 @@ def _build_scene(scene: dict[str, Any]) -> RoadParameters:
 
 
 def _far_ground() -> None:
-    """Add ground up to the horizon below the lowest point of ground and road, so that the pictures have one."""
+    """Add a ground plane up to the horizon, 1.5 m below the lowest point of ground and road, to the scene."""
     corners = [corner for name in ("Ground", "Backbone") for corner in bpy.data.objects[name].bound_box]
     bpy.ops.mesh.primitive_plane_add(size=20_000.0, location=(0.0, 0.0, min(z for _, _, z in corners) - 1.5))
     bpy.context.object.data.materials.append(material("grass_ground"))
@@ -117,7 +117,7 @@ def _look(view: Viewpoint) -> None:
 
 
 def _kinds(parameters: RoadParameters) -> Iterator[tuple[str, str]]:
-    """Yield (kind, id) of what can be shown close up: the type, and what of it there are several kinds of."""
+    """Yield (kind, id) of the objects to show close up; a kind is the type and its species, model or variant."""
     for key, item in parameters.objects.items():
         name = type(item).__name__
         if name in _NOT_SHOWN or isinstance(item, AlignmentObject):
@@ -135,7 +135,7 @@ def _kinds(parameters: RoadParameters) -> Iterator[tuple[str, str]]:
 
 
 def _close_up(parameters: RoadParameters, mesh: SceneMesh, name: str) -> bool:
-    """Aim at the faces of an object from the road, at a distance that suits their size; False if it has none."""
+    """Aim the camera at an object's faces from the road, at a distance by their size; return False if it has none."""
     geometry = RoadGeometry(parameters)
     corners = mesh.vertices[mesh.triangles[geometry.numbers.belong(name, mesh.instance_id)]].reshape(-1, 3)
     if not len(corners):
@@ -163,7 +163,7 @@ def _close_up(parameters: RoadParameters, mesh: SceneMesh, name: str) -> bool:
 
 
 def _material_pictures(folder: Path, quality: Quality, only: str, say: Callable[[str], None]) -> list[Path]:
-    """Render a cube of every material: lit, and each layer as a plain colour."""
+    """Render pictures of cubes of all materials, lit and one per layer as plain colour; return the paths."""
     layers = [layer for layer in ("lit", *LAYERS) if only in f"materials-{layer}"]
     if not layers:
         return []
@@ -189,7 +189,7 @@ def _material_pictures(folder: Path, quality: Quality, only: str, say: Callable[
 
 
 def _cube(name: str, column: int, row: int) -> None:
-    """Add a cube of one material with its name below it, all in one wall."""
+    """Add a cube of one material, with its name below, at a column and row of the wall to the scene."""
     place = Vector((_PITCH * column, 0.0, -_PITCH * row))
     bpy.ops.mesh.primitive_cube_add(size=1.0, location=place)
     bpy.context.object.data.materials.append(material(name))
@@ -199,7 +199,7 @@ def _cube(name: str, column: int, row: int) -> None:
 
 
 def _show_layer(layer: str) -> None:
-    """Let every material shine in the values of one of its layers."""
+    """Make every material of the file emit the values of one of its layers, in place."""
     for name in materials():
         for item in bpy.data.materials:
             if item.name != f"SR {name}":

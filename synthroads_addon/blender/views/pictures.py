@@ -17,7 +17,7 @@ CAMERA = "SR Camera"
 
 
 def light(environment: Environment) -> None:
-    """Give the scene a sun and a sky; those of an earlier call are replaced."""
+    """Add a sun and a sky to the current scene, replacing those of an earlier call."""
     scene = bpy.context.scene
     remove(SUN)
     scene.collection.objects.link(new_sun(SUN, environment))
@@ -26,7 +26,7 @@ def light(environment: Environment) -> None:
 
 
 def camera(place: ArrayLike, target: ArrayLike, lens: float = 35.0) -> bpy.types.Object:
-    """Put the camera at a local place (m), looking at a target; focal length in mm on 36 mm."""
+    """Add the scene's camera at a place (m), looking at a target, `lens` in mm on 36 mm; replaces it; return it."""
     remove(CAMERA)
     data = bpy.data.cameras.new(CAMERA)
     data.lens, data.clip_start, data.clip_end = lens, 0.05, 5000.0
@@ -40,7 +40,7 @@ def camera(place: ArrayLike, target: ArrayLike, lens: float = 35.0) -> bpy.types
 
 
 def render(path: Path, size: tuple[int, int] = (1280, 720), samples: int = 48) -> None:
-    """Render the scene through its camera to a PNG file."""
+    """Render the scene through its camera to a PNG file with Cycles, changing the scene's render settings."""
     scene = bpy.context.scene
     scene.render.engine = "CYCLES"
     scene.cycles.device = "CPU"
@@ -59,7 +59,7 @@ def render(path: Path, size: tuple[int, int] = (1280, 720), samples: int = 48) -
 
 
 def remove(name: str) -> None:
-    """Remove an object made here, with its data."""
+    """Remove an object by its name, with its camera or lamp data; nothing if there is none."""
     item = bpy.data.objects.get(name)
     if item is None:
         return

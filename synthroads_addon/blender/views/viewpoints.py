@@ -15,7 +15,7 @@ EYE = 1.2
 
 @dataclass(frozen=True)
 class Viewpoint:
-    """A place of a camera.
+    """Place, target and focal length of a camera.
 
     Attributes:
         place, target: local coordinates (3,) of the camera and of what it looks at, m.
@@ -28,14 +28,14 @@ class Viewpoint:
 
 
 def aerial_view(parameters: RoadParameters) -> Viewpoint:
-    """Return a view along a quarter of the road on, from 26 m up on the right."""
+    """Return a view ahead from a quarter of the road's length, 46 m to the right of the axis and 26 m above."""
     station = 0.25 * parameters.alignment.length
     place, target = (station, -46.0, 26.0), (min(station + 95.0, parameters.alignment.length), 2.0, 0.0)
     return Viewpoint(place_on_road(parameters, *place), place_on_road(parameters, *target), 28.0)
 
 
 def driver_view(parameters: RoadParameters) -> Viewpoint:
-    """Return the view of a driver in the innermost lane, some 60 m ahead; of the right carriageway if there is one."""
+    """Return a driver's view 60 m ahead from the outermost lane of the right carriageway, else of the only one."""
     length = parameters.alignment.length
     carriageway = parameters.carriageway("right") or next(iter(parameters.of_type(Carriageway).values()))
     section = RoadGeometry(parameters).sections[carriageway.side]
@@ -55,7 +55,7 @@ def driver_view(parameters: RoadParameters) -> Viewpoint:
 
 
 def place_on_road(parameters: RoadParameters, station: float, offset: float, height: float) -> NDArray[np.float64]:
-    """Return the local place (3,) above the surface at a station and offset, m; beside the road, above its edge."""
+    """Return the local point (3,), m, at a height above the surface; beside the road, above its edge's height."""
     geometry = RoadGeometry(parameters)
     offsets = geometry.offsets(station)[0]
     point = geometry.point(station, np.clip(offset, float(offsets[-1]), float(offsets[0])))[0]

@@ -66,7 +66,7 @@ def _deck(tree: Tree, ends: tuple[Value, Value], width: Value, height: Value) ->
 
 
 def _edge_beam(tree: Tree, ends: tuple[Value, Value], width: Value, height: Value) -> Value:
-    """Return the edge beam on the left of an observer who looks along x."""
+    """Add nodes for the deck's edge beam on the left of an observer who looks along x."""
     share, most = sizes.HANG
     hang = op.minimum(height * share, most)
 

@@ -35,14 +35,14 @@ class _Bank(Inputs):
     ground_material = material_of("the slopes")
 
     def crown(self, along: Value, across: Value) -> Value:
-        """Return the point of the crown so far behind the abutment's face, and so far from its middle."""
+        """Add nodes for the crown's point `along` m behind the abutment's face and `across` m from its middle."""
         x = self.face + self.side * along
         beyond = op.maximum(along - self.wing_length, 0.0)
         z = self.top - beyond * beyond * _GRADE / (beyond + _ROUNDING)
         return op.vector(self.tree, x, across + x * self.shear, z)
 
     def away(self, across: float, angle: Value, share: Value) -> Value:
-        """Return the horizontal direction in which one side's slope falls.
+        """Add nodes for the horizontal unit direction in which the slope of one side (`across` +1 or -1) falls.
 
         It is square to the embankment, turned by an angle towards the bridge in the cones. With the share of the way to
         the embankment's end it swings round to +-y, within the slope's plane: the end is a section along y.
@@ -92,7 +92,7 @@ def _crown(tree: Tree, bank: _Bank) -> Value:
 
 
 def _slope(tree: Tree, bank: _Bank, across: float) -> Value:
-    """Return one side's slope: columns from the cone's foot at the abutment to the embankment's end."""
+    """Add nodes for one side's slope, from the cone's foot at the abutment to the embankment's end."""
     mesh, column, row = op.grid(tree, _CONE + _EDGE, 2)
     turn = op.maximum(1.0 - column / float(_CONE), 0.0) * (math.pi / 2)
     share = op.maximum((column - _CONE) / (_EDGE - 1.0), 0.0)
@@ -119,7 +119,7 @@ def _slope(tree: Tree, bank: _Bank, across: float) -> Value:
 
 
 def _end(tree: Tree, left: Value, right: Value) -> Value:
-    """Return the face that closes the embankment at its end, between the last columns of both slopes."""
+    """Add nodes for the face that closes the embankment at its end, between the last columns of both slopes."""
     last = 2 * (_CONE + _EDGE - 1)
     mesh = tree.node("GeometryNodeMeshCircle", vertices=4, fill_type="NGON").value
     number = op.index(tree)

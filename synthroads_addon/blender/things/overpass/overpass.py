@@ -45,7 +45,7 @@ class _Overpass(Inputs):
     instance = instance_number()
 
     def __init__(self, tree: Tree) -> None:
-        """Declare the inputs; x of the abutments' faces by side: -1 left (-x), +1 right."""
+        """Declare the inputs, and add nodes for `faces`: x (m) of the abutments' faces by side, -1 left, +1 right."""
         super().__init__(tree)
         self.faces = {-1.0: -self.left_abutment, 1.0: -self.right_abutment}
 
@@ -85,7 +85,7 @@ def overpass_group(tree: Tree) -> None:
 
 
 def _lowest(bridge: _Overpass, surfaces: tuple[Value, Value], shear: Value, face: Value) -> Value:
-    """Return z of the lower end of the ground along an abutment's face."""
+    """Add nodes for the lower z (m) of the ground at both ends of an abutment's face."""
     ends = [
         height_on(*surfaces, op.vector(bridge.tree, face, bridge.width * half + face * shear)) for half in (0.5, -0.5)
     ]
@@ -93,7 +93,7 @@ def _lowest(bridge: _Overpass, surfaces: tuple[Value, Value], shear: Value, face
 
 
 def _wing_length(bridge: _Overpass, low: Value, foot: Value) -> Value:
-    """Return the length of the wing walls, so that the embankment's cones reach the abutment's face."""
+    """Add nodes for the wing walls' length (m), such that the embankment's cones reach the abutment's face."""
     needed = (low + bridge.deck_thickness - foot) * bridge.slope
     return op.clip(needed, *sizes.WINGS)
 
@@ -177,7 +177,7 @@ _APPROACH_ALONE = 20.0
 
 @model_part("overpasses", 100)
 def build_overpasses(builder: ModelBuilder) -> None:
-    """Make one object per overpass."""
+    """Add one object per overpass to the model."""
     terrain = builder.parameters.terrain
     for name, bridge in builder.parameters.of_type(Overpass).items():
         approaches = {}

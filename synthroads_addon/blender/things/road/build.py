@@ -24,7 +24,7 @@ Float = NDArray[np.float64]
 
 @model_part("road", 10, on_the_road=True)
 def build_surface(builder: ModelBuilder) -> None:
-    """Make the backbone and the road's surface."""
+    """Add the road's surface to the model, with its backbone and damage details as hidden support objects."""
     station = builder.stations
     backbone = backbone_mesh(builder.geometry, station, builder.origin, builder.zero)
     builder.add("Backbone", backbone, support=True)
@@ -47,7 +47,7 @@ def build_surface(builder: ModelBuilder) -> None:
 def _road_inputs(
     parameters: RoadParameters, geometry: RoadGeometry, zero: float = 0.0
 ) -> dict[str, float | int | bool]:
-    """Return the values of the group's inputs, without objects and materials.
+    """Return the road group's numeric inputs (widths, lines, turnouts, instances) by name, without objects, materials.
 
     Args:
         parameters: the road, or what of it is on a stretch.
@@ -92,7 +92,7 @@ def _road_inputs(
 
 
 def _first_dash(name: str, line: LineMarking, geometry: RoadGeometry) -> int:
-    """Return the instance number of the first dash of a line that may be cut to a stretch."""
+    """Return the instance number of a line's first dash on the stretch, counted along the whole road."""
     whole = geometry.parameters.objects[name]
     assert isinstance(whole, LineMarking)
     period = line.dash_length + line.gap_length
@@ -101,7 +101,7 @@ def _first_dash(name: str, line: LineMarking, geometry: RoadGeometry) -> int:
 
 
 def backbone_mesh(geometry: RoadGeometry, station: Float, origin: Float, zero: float = 0.0) -> bpy.types.Mesh:
-    """Return a polyline with one vertex per station (N,) and the attributes that `nodes.backbone` lists.
+    """Create the backbone's polyline mesh: a vertex per station (N,), with the attributes that `nodes.backbone` lists.
 
     Args:
         geometry: the road.

@@ -36,7 +36,7 @@ _CROSSFALL = "Fall of the pavement to the right (m/m), which may be a field"
 
 
 class Section(Inputs):
-    """Inputs that are the same all over a carriageway."""
+    """Inputs of a carriageway's cross section: side, edge of the pavement, pivot, crossfall, verge's slope."""
 
     left_side = boolean(False, "On the left of the axis, else on its right")
     paved_edge = metres(14.0, _FAR, "Distance of the axis from where the verge begins")
@@ -123,14 +123,14 @@ def pavement_place_group(tree: Tree) -> None:
 
 
 def carriageway_group(lanes: int, turnouts: bool = False) -> bpy.types.NodeTree:
-    """Return the group SR Carriageway of so many lanes, with the strips that turnouts make if it has any."""
+    """Return the node group SR Carriageway for a number of lanes, with the turnouts' strips if it has any."""
     name = f"SR Carriageway {lanes} Lane{'s' if lanes > 1 else ''}{' and Turnouts' if turnouts else ''}"
     description = "Pavement and verge of one side, live from their widths, which may be fields on the backbone's points"
     return node_group(name, _build, lanes, turnouts, description=description)
 
 
 def width_fields(lanes: int, turnouts: bool = False, varying: tuple[str, ...] = ()) -> dict[str, Input]:
-    """Return the inputs that say how wide a carriageway is; of those that vary the description says so."""
+    """Return the input fields of a carriageway's strip widths, from the inner offset outwards, by field name."""
     inner = "Distance of the inner paved edge from the axis"
     about = {"Inner Offset": inner} | {strip: f"Width of the {strip.lower()}" for strip in strips_of(lanes, turnouts)}
     about["Lane 1"] += "; 1 is the outermost lane"
@@ -141,7 +141,7 @@ def width_fields(lanes: int, turnouts: bool = False, varying: tuple[str, ...] = 
 
 
 class SideInputs(Inputs):
-    """Inputs of a carriageway beside its widths."""
+    """Inputs of a carriageway other than its widths: slope, rotation axis, instance, pavement, stations."""
 
     verge_slope = number(0.08, (0.0, 0.15), "Fall of the verge away from the pavement (m/m)")
     turns_about_inner_edge = boolean(
@@ -235,7 +235,7 @@ def _kind(strip: str) -> str:
 def _boundaries(
     strips: list[str], widths: Inputs, side: SideInputs, turnouts: _Turnouts | None
 ) -> tuple[list[Value], Value, Value]:
-    """Return the boundaries' distances from the axis, innermost first; where the plane ends, and its pivot."""
+    """Add nodes for the strips' boundaries, the pavement plane's end and its pivot, as distances from the axis, m."""
     inner = main = widths.values["inner_offset"]
     distances = [inner]
     for strip in strips:

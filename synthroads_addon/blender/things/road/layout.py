@@ -25,24 +25,24 @@ TURNOUT_NAMES = tuple(kind.replace("_", " ").title() for kind in TURNOUT_STRIPS)
 
 
 def strips_of(lanes: int, turnouts: bool) -> list[str]:
-    """Return the names of a carriageway's strips, from the median outwards."""
+    """Return the names of a carriageway's strips from the median outwards: "Inner Edge Strip", "Lane 2", ..."""
     numbers = [f"Lane {number}" for number in range(lanes, 0, -1)]
     return ["Inner Edge Strip", *numbers, "Outer Edge Strip", "Hard Shoulder", *TURNOUT_NAMES * turnouts, "Verge"]
 
 
 def width_field(strip: str) -> str:
-    """Return the field of a strip's width, or of the inner offset."""
+    """Return the input field name of a strip's width, or of the inner offset: "Lane 1" -> "lane_1_width"."""
     return strip.lower().replace(" ", "_") + ("" if strip == "Inner Offset" else "_width")
 
 
 def detail_field(strip: str) -> str:
-    """Return the field of the points that make a strip finer."""
+    """Return the input field name of the points that refine a strip: "Lane 1" -> "lane_1_detail"."""
     return f"{strip.lower().replace(' ', '_')}_detail"
 
 
 @dataclass(frozen=True)
 class MarkingLayout:
-    """Properties of a line marking that its nodes depend on.
+    """Properties of a line marking that the road's node group is built by.
 
     Attributes:
         name: what its inputs call it, without the side: ``Lane Line 1``.
@@ -61,7 +61,7 @@ class MarkingLayout:
 
 @dataclass(frozen=True)
 class SideLayout:
-    """Properties of one carriageway that its nodes depend on.
+    """Properties of one carriageway that the road's node group is built by.
 
     Attributes:
         side: ``Left`` or ``Right``.
@@ -81,12 +81,12 @@ class SideLayout:
 
     @property
     def left(self) -> bool:
-        """Return whether it is the left one."""
+        """Return whether it is the left carriageway."""
         return self.side == "Left"
 
 
 def road_layout(parameters: RoadParameters) -> tuple[SideLayout, ...]:
-    """Return what the group's nodes depend on, left side first."""
+    """Return the layout of each carriageway by which the road's node group is built, left side first."""
     sides, sections, words = [], sections_of(parameters), names_in_words(parameters)
     for name, carriageway in sorted(parameters.of_type(Carriageway).items(), key=lambda item: -item[1].sign):
         lines = [(key, line) for key, line in parameters.of_type(LineMarking).items() if line.carriageway == name]
@@ -124,7 +124,7 @@ _TURNOUTS = {"emergency_bay": "Emergency Bay", "exit": "Exit", "entry": "Entry"}
 
 
 def names_in_words(parameters: RoadParameters) -> dict[str, str]:
-    """Return what the inputs call a road's lines and turnouts, by id: ``Lane Line 1``, after the side's name.
+    """Return the names in words of a road's lines and turnouts by id, as inputs use them after the side: "Lane Line 1".
 
     They are counted in their order where a side has several of a kind.
     """
@@ -140,14 +140,14 @@ def names_in_words(parameters: RoadParameters) -> dict[str, str]:
 
 
 def side_of(parameters: RoadParameters, item: LineMarking | Turnout) -> str:
-    """Return the side that a line or a turnout lies on, as the inputs name it."""
+    """Return the side, "Left" or "Right", of the carriageway that a line or turnout lies on."""
     carriageway = parameters.objects[item.carriageway]
     assert isinstance(carriageway, Carriageway)
     return carriageway.side.title()
 
 
 def strip_widths(carriageway: Carriageway) -> Iterator[tuple[str, AnyWidth]]:
-    """Yield (name, width) of the inner offset and of the strips, from the median outwards."""
+    """Yield (name, width, m or by station) of the inner offset and the strips, from the median outwards."""
     yield "Inner Offset", carriageway.inner_offset
     yield "Inner Edge Strip", carriageway.inner_edge_strip_width
     for number in range(len(carriageway.lanes), 0, -1):
@@ -158,12 +158,12 @@ def strip_widths(carriageway: Carriageway) -> Iterator[tuple[str, AnyWidth]]:
 
 
 def attribute_name(side: str, strip: str) -> str:
-    """Return the name of the backbone's attribute that a strip's width changes with."""
+    """Return the backbone attribute's name for a strip of varying width: "Left", "Lane 1" -> "left_lane_1"."""
     return f"{side}_{strip}".lower().replace(" ", "_")
 
 
 def varying_widths(geometry: RoadGeometry, station: Float) -> dict[str, Float]:
-    """Return the backbone's attributes (N,) that widths change with at stations (N,).
+    """Return the backbone's attributes (N,) of varying widths at stations (N,), by name: shares of the input, or m.
 
     A strip whose width changes has its share of the width that the input holds; the hard shoulder beside turnouts also
     ``..._main``, the share without them. Turnouts' strips have their widths, and the verge its ``..._extra``.
@@ -205,7 +205,7 @@ def _turnout_widths(side: str, section: CarriagewaySection, station: Float) -> d
 
 @dataclass(frozen=True)
 class DetailPoints:
-    """Points of a damaged strip's grid, (columns * rows,) each, row by row within a column, columns from the left.
+    """Arrays of a damaged strip's grid points, (columns * rows,): row by row within a column, columns from the left.
 
     Attributes:
         share: of the strip's width, 1 at its left edge.
@@ -219,7 +219,7 @@ class DetailPoints:
 
 
 def detail_points(geometry: RoadGeometry, station: Float, tolerance: float) -> dict[str, DetailPoints]:
-    """Return the points of the damaged strips' grids by the strips' names (``Right Lane 1``); rows are the stations."""
+    """Return the grid points of all damaged strips, by strip ("Right Lane 1"), with a row at each station."""
     points = {}
     ids = {id(item): name for name, item in geometry.parameters.objects.items()}
     for section in geometry.sections.values():
@@ -247,7 +247,7 @@ def detail_points(geometry: RoadGeometry, station: Float, tolerance: float) -> d
 
 
 def _damage_of_cells(section: CarriagewaySection, station: Float, offset: Float) -> Int:
-    """Return the damage of each cell between stations (N,) and offsets (C, N) at its first corner; -1 for none.
+    """Return the index (C, N) of the damage in each grid cell, stored at its first corner; -1 for none.
 
     A cell is of the damage that is deepest in its middle.
     """
@@ -259,13 +259,13 @@ def _damage_of_cells(section: CarriagewaySection, station: Float, offset: Float)
 
 
 def _steps(station: Float, edges: Float) -> NDArray[np.bool_]:
-    """Return at which of the stations (N,) a strip with these edges (N, 2) steps to one side."""
+    """Return a mask (N,) of the stations at which a strip's edges (N, 2) jump sideways, steeper than 45 degrees."""
     skew = np.abs(np.diff(edges, axis=0)).max(axis=1) > np.diff(station)
     return np.append(skew, False) | np.insert(skew, 0, False)
 
 
 def strip_names(section: CarriagewaySection) -> list[str]:
-    """Return the names that inputs and attributes give a section's strips, innermost first."""
+    """Return the names of a section's strips as inputs and attributes use them, innermost first."""
     names, lane = [], len(section.carriageway.lanes)
     for kind in section.kinds:
         names.append(f"Lane {lane}" if kind == "lane" else kind.replace("_", " ").title())

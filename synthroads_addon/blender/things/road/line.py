@@ -17,7 +17,7 @@ SNAP = 1e-3
 
 
 class Dashes(Inputs):
-    """Inputs of a line that don't say where it lies across the road."""
+    """Inputs of a line along the road: dashes, stations, film thickness, instances."""
 
     dash_length = metres(6.0, (0.0, 100.0), "Length of a dash; 0 for a solid line")
     gap_length = metres(12.0, (0.0, 100.0), "Length of a gap")
@@ -29,7 +29,7 @@ class Dashes(Inputs):
 
 
 class LinePaint(Inputs):
-    """Inputs of a line that say what it is made of."""
+    """Inputs of a line's class and material."""
 
     class_ = integer(class_id("road_marking"), (0, 255), "Semantic class of the faces")
     material = material_of("the line", "paint_white")
@@ -84,7 +84,7 @@ def marking_group(tree: Tree) -> None:
 
 
 def _with_ends(tree: Tree, backbone: Value, dashes: tuple[Value, Value, Value, Value, Value]) -> Value:
-    """Return the backbone with a row more at both ends of every dash."""
+    """Add nodes that insert a row into the backbone at both ends of every dash; return it sorted by station."""
     first, end, length, period, count = dashes
     ribbon = station_ribbon(backbone, _EDGES)
     with tree.frame("Ends of the dashes as rows of their own"):

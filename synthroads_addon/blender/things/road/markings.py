@@ -21,7 +21,7 @@ class _Width(Inputs):
 
 
 class LineInputs(Dashes, _Width):
-    """Inputs of a line whose middle is given."""
+    """Inputs of a line on a boundary: its dashes and width."""
 
 
 LINE_FIELDS = tuple(field.name for field in LineInputs.fields() if not field.name.endswith("instance"))
@@ -29,7 +29,7 @@ LINE_FIELDS = tuple(field.name for field in LineInputs.fields() if not field.nam
 
 
 class Distance(Inputs):
-    """Where a line lies."""
+    """Input for a line's distance from the axis."""
 
     distance = metres(5.0, _FAR, "Distance of the line's middle from the axis, which may be a field")
 
@@ -64,20 +64,20 @@ def carriageway_marking_group(tree: Tree) -> None:
 
 
 def markings_group(lanes: int, turnouts: bool, lines: tuple[MarkingLayout, ...]) -> bpy.types.NodeTree:
-    """Return the group SR Markings for these lines of a carriageway."""
+    """Return the node group SR Markings for a carriageway's lanes, turnouts and lines."""
     description = "Line markings of one side, each on its boundary"
     return node_group("SR Markings", _build, lanes, turnouts, lines, description=description)
 
 
 def declare_line(tree: Tree, line: MarkingLayout, words: str) -> dict[str, Value]:
-    """Declare the inputs of a line under a heading of its own; return them by field."""
+    """Declare the inputs of a line in a panel of its own; return their values by field."""
     kind = LineOnItsOwn if line.kind == "free" else LineInputs
     solid = {} if line.kind == "lane" else {"dash_length": 0.0, "gap_length": 0.0}
     return kind(tree, words, words, solid).values
 
 
 class LineOnItsOwn(LineInputs, Distance):
-    """Inputs of a line that follows no boundary."""
+    """Inputs of a free line, which follows no boundary, with its distance from the axis."""
 
 
 def _build(tree: Tree, lanes: int, turnouts: bool, lines: tuple[MarkingLayout, ...]) -> None:
@@ -108,7 +108,7 @@ def _build(tree: Tree, lanes: int, turnouts: bool, lines: tuple[MarkingLayout, .
 
 
 def _boundary(line: MarkingLayout, lanes: int, strips: list[str]) -> int:
-    """Return the number of the boundary that a line lies on, counted from the median; -1 for one that lies on none."""
+    """Return the index, from the median, of the strip boundary that a line lies on; -1 for a free line."""
     if line.kind == "free":
         return -1
     if line.kind in ("turnout_edge", "gore_edge"):
@@ -118,7 +118,7 @@ def _boundary(line: MarkingLayout, lanes: int, strips: list[str]) -> int:
 
 
 def _middle(line: MarkingLayout, values: dict[str, Value], boundary: Value | None) -> Value:
-    """Return the distance of a line's middle from the axis."""
+    """Add nodes for the distance (m) of a line's middle from the axis."""
     if boundary is None:
         return values["distance"]
     outwards = _OUTWARDS.get(line.kind)

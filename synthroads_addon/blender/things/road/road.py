@@ -26,7 +26,7 @@ MARKINGS = "Markings"
 
 @dataclass
 class _Side:
-    """One side: its inputs, those of its lines in order, and the node of its surface."""
+    """One carriageway in the road's node group: its layout, inputs, lines' inputs and surface node."""
 
     layout: SideLayout
     widths: Inputs
@@ -36,16 +36,16 @@ class _Side:
     surface: Node | None = None
 
     def output(self, name: str) -> Value:
-        """Return an output of the surface's node."""
+        """Return the surface node's output of a name."""
         assert self.surface is not None
         return self.surface[name]
 
     def attribute(self, name: str) -> Value:
-        """Return an attribute of the backbone that is this side's."""
+        """Add a node for this side's backbone attribute of a strip or line, a field."""
         return op.named_attribute(self.inputs.tree, attribute_name(self.layout.side, name))
 
     def width(self, strip: str) -> Value:
-        """Return a strip's width (or the inner offset), a field on the backbone where it changes along the road."""
+        """Return the value of a strip's width or the inner offset (m), a field on the backbone where it varies."""
         if strip in TURNOUT_NAMES:
             return self.attribute(strip)
         width = self.widths.values[width_field(strip)]
@@ -60,7 +60,7 @@ class _RoadMaterials(Inputs):
 
 
 def road_group(layout: tuple[SideLayout, ...]) -> bpy.types.NodeTree:
-    """Return the group SR Road for these lanes, turnouts and markings."""
+    """Return the node group SR Road for a layout of lanes, turnouts and markings."""
     return node_group(
         "SR Road",
         _build,
@@ -119,7 +119,7 @@ def _declare_side(tree: Tree, layout: SideLayout) -> _Side:
 
 
 def turnout_fields(turnout: str) -> dict[str, Input]:
-    """Return the inputs of a turnout by their fields: where it begins and ends, and its instance number."""
+    """Return the input fields of a turnout by name: start station, end station, instance number."""
     field = turnout.lower().replace(" ", "_")
     return {
         f"{field}_start_station": metres(0.0, (-1e6, 1e6), "Beginning of the turnout"),
@@ -129,7 +129,7 @@ def turnout_fields(turnout: str) -> dict[str, Input]:
 
 
 def _surface(tree: Tree, side: _Side, backbone: Value, verge: Value) -> Node:
-    """Add the carriageway of a side."""
+    """Add the carriageway node of a side to the tree; return it."""
     layout = side.layout
     turnouts = bool(layout.turnouts)
     strips = ["Inner Offset", *strips_of(layout.lanes, turnouts)]
@@ -153,7 +153,7 @@ def _surface(tree: Tree, side: _Side, backbone: Value, verge: Value) -> Node:
 
 
 def _turnout_instance(side: _Side) -> Value:
-    """Return the instance number of the turnout that a face of the strips beside the main road belongs to."""
+    """Add nodes for the instance number, by station, of the turnout that a face beside the main road belongs to."""
     station, result = op.named_attribute(side.inputs.tree, "station"), side.inputs.instance
     for turnout in side.layout.turnouts:
         start, end, instance = (side.details.values[field] for field in turnout_fields(turnout))
@@ -199,7 +199,7 @@ def _median(tree: Tree, backbone: Value, sides: list[_Side], instance: Value, ma
 
 
 def _edges(tree: Tree, backbone: Value, sides: list[_Side]) -> Iterator[Value]:
-    """Return the left-most and the right-most edge as points with the attribute ``edge`` = +1 and -1."""
+    """Add nodes for the leftmost and the rightmost edge; yield each as points with ``edge`` = +1 or -1."""
     for sign in (1.0, -1.0):
         side = sides[0] if sign > 0 else sides[-1]
         which = "Outer" if side.layout.left == (sign > 0) else "Inner"

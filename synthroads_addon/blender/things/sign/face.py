@@ -25,7 +25,7 @@ _TEXT_BORDER, _DRAWING_BORDER = "Border of the writing's box on the face", "Bord
 
 
 class Face(Inputs):
-    """Inputs of a group that has a face."""
+    """Inputs of a node group with a sign's face: outline, border, writing, pictogram, materials."""
 
     shape = integer(2, (0, len(SHAPES) - 1), ", ".join(f"{i} {name}" for i, name in enumerate(SHAPES)))
     width = metres(1.0, (0.01, 20.0), "Width of the face")
@@ -97,12 +97,12 @@ def sign_face_group(tree: Tree) -> None:
 
 
 def _fill_curves(curve: Value) -> Value:
-    """Return the area inside of curves, less what is inside of two of them."""
+    """Add a node that fills closed curves (even-odd: inside of two is a hole); return the mesh."""
     return curve.tree.node("GeometryNodeFillCurve", curve).value
 
 
 def _draw_writing(tree: Tree, face: Face) -> list[Value]:
-    """Return writing and pictogram in the xy plane."""
+    """Add nodes for the meshes of writing and pictogram in the xy plane."""
     lines = {f"line_{number}": face.values[f"line_{number}"] for number in range(1, LINES + 1)}
     low, high = _box(tree, face, "text")
     writing = tree.call(
@@ -121,7 +121,7 @@ def _draw_writing(tree: Tree, face: Face) -> list[Value]:
 
 
 def _box(tree: Tree, face: Face, prefix: str) -> tuple[Value, Value]:
-    """Return the lower left and the upper right corner of a box that is given in shares of the face."""
+    """Add nodes for the lower left and upper right corner (m) of a box given in shares of the face."""
 
     def corner(x: str, y: str) -> Value:
         right, up = face.values[f"{prefix}_{x}"] - 0.5, face.values[f"{prefix}_{y}"] - 0.5

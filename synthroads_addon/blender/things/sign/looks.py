@@ -22,7 +22,7 @@ Box = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class FaceStyle:
-    """Content of a sign's face.
+    """Colours and pictogram of a sign's face.
 
     Attributes:
         ground, border, writing: colours, as `presets/signs.json` names them.
@@ -75,7 +75,7 @@ _ACROSS: dict[str, Box] = {"end": (0.02, 0.98, 0.02, 0.98)}
 
 
 def sign_face_inputs(sign: TrafficSign) -> dict[str, Any]:
-    """Return the face's inputs for a sign, by the catalogue if that has its code."""
+    """Return the face inputs by name for a traffic sign, from the catalogue if it has the code, else by shape."""
     known = sign_type(sign)
     style = FaceStyle(known.ground, known.border, known.writing, known.pictogram) if known else _OF_SHAPE[sign.shape]
     inputs = face_inputs(style, sign.shape, sign.width, sign.height, sign.text)
@@ -83,7 +83,7 @@ def sign_face_inputs(sign: TrafficSign) -> dict[str, Any]:
 
 
 def face_inputs(style: FaceStyle, shape: str, width: float, height: float, text: Sequence[str]) -> dict[str, Any]:
-    """Return the inputs of a group with a face.
+    """Return the inputs by name of a node group with a sign's face.
 
     Args:
         style: colours and pictogram.

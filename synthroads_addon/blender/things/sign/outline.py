@@ -50,7 +50,7 @@ def sign_outline_group(tree: Tree) -> None:
 
 
 def _directions(tree: Tree, before: Value, after: Value, share: Value) -> tuple[Value, Value]:
-    """Return the outward direction on a share of the corner's arc, and how its middle moves per metre inwards.
+    """Add nodes for the outward unit direction at a share of a corner's arc, and its centre's move per metre inset.
 
     `before` and `after` are the sides that meet there.
     """
@@ -68,7 +68,7 @@ def _table() -> list[tuple[float, float, float]]:
 
 
 def _corners_of(tree: Tree, shape: Value) -> tuple[Value, Value, Value]:
-    """Return where the shape's corners start in the table, their number, and the number of points on each."""
+    """Add nodes for a shape's first corner in the table, its number of corners, and the points on each."""
     starts, total = {}, 0
     for name, corners in SIGN_OUTLINES.items():
         starts[name], total = total, total + len(corners)
@@ -83,6 +83,6 @@ def _corners_of(tree: Tree, shape: Value) -> tuple[Value, Value, Value]:
 
 
 def _normal(side: Value) -> Value:
-    """Return the unit normal on the right of a vector in the xy plane: outwards, seen along the outline."""
+    """Add nodes for the unit normal to the right of a vector in the xy plane: outwards along the outline."""
     right = op.vector(side.tree, op.component(side, "Y"), -op.component(side, "X"))
     return side.tree.node("ShaderNodeVectorMath", right, operation="NORMALIZE").value

@@ -53,7 +53,7 @@ def pictogram_group(tree: Tree) -> None:
 
 
 def _tables() -> tuple[list[Row], list[Row]]:
-    """Return per pictogram where its corners start, their number and that of its red polygons; and all corners.
+    """Return per pictogram (first corner, number of corners, number of red polygons), and the table of all corners.
 
     A corner is x, y and the number of its polygon.
     """
@@ -67,5 +67,5 @@ def _tables() -> tuple[list[Row], list[Row]]:
 
 
 def _fill_curves(curves: Value) -> Value:
-    """Return the areas of curves that may overlap."""
+    """Add a node that fills closed curves one by one, so that they may overlap; return the mesh."""
     return curves.tree.node("GeometryNodeFillCurve", curves, group_id=op.index(curves.tree)).value

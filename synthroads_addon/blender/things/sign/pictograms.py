@@ -13,13 +13,13 @@ Polygon = list[Point]
 
 
 def _stroke(line: list[Point], width: float) -> Polygon:
-    """Return a band along a line, mitred at its corners."""
+    """Return the polygon of a band along a line, mitred at its corners."""
     left, right = _sides(np.array(line), width)
     return _polygon([*right, *left[::-1]])
 
 
 def _arrow(line: list[Point], width: float, head: float = 3.0) -> Polygon:
-    """Return a band along a line that ends in an arrow's barbed head, `head` widths wide."""
+    """Return the polygon of an arrow along a line, with a barbed head `head` times as wide as the shaft."""
     points = np.array(line)
     tip, along = points[-1].copy(), points[-1] - points[-2]
     along /= np.hypot(*along)
@@ -32,7 +32,7 @@ def _arrow(line: list[Point], width: float, head: float = 3.0) -> Polygon:
 
 
 def _sides(points: NDArray[np.float64], width: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the left and the right border of a band along points (N, 2)."""
+    """Return the left and the right border (N, 2) of a mitred band along points (N, 2)."""
     along = np.diff(points, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     before, after = along[[0, *range(len(along))]], along[[*range(len(along)), -1]]
@@ -55,14 +55,14 @@ def _disc(middle: Point, radius: float, corners: int = 10) -> Polygon:
 
 
 def _bars(count: int) -> list[Polygon]:
-    """Return slanted bars one above the other."""
+    """Return the polygons of slanted bars one above the other, as on an exit's countdown markers."""
     thick, rise, pitch = 0.2, 0.3, 0.42
     lowest = [-(thick + rise + pitch * (count - 1)) / 2.0 + pitch * i for i in range(count)]
     return [[(-0.5, z), (0.5, z + rise), (0.5, z + rise + thick), (-0.5, z + thick)] for z in lowest]
 
 
 def _stripes() -> list[Polygon]:
-    """Return the five stripes that cross out a round sign."""
+    """Return the polygons of the five stripes that cross out a round sign."""
     result = []
     for across in (-0.15, -0.075, 0.0, 0.075, 0.15):
         along = math.sqrt(0.25 - across**2) - 0.01
@@ -72,7 +72,7 @@ def _stripes() -> list[Polygon]:
 
 
 def _car(middle: float) -> list[Polygon]:
-    """Return a car from behind, its window left out."""
+    """Return the polygons of a car seen from behind around x = `middle`, its window left out."""
     parts = [
         [(-0.2, -0.17), (-0.12, -0.17), (-0.12, -0.11), (0.12, -0.11), (0.12, -0.17), (0.2, -0.17), (0.2, 0.02),
          (-0.2, 0.02)],

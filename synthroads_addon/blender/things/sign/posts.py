@@ -56,7 +56,7 @@ def sign_posts_group(tree: Tree) -> None:
 
 
 def _lattice(tree: Tree, radius: Value, height: Value) -> Value:
-    """Return three chords on a circle with diagonals between them."""
+    """Add nodes for a lattice post of 1 m height: three chords on a circle with diagonals between them."""
     turns = [math.pi / 2.0 + 2.0 * math.pi * i / 3.0 for i in range(3)]
     corners = [(math.cos(turn), math.sin(turn), 0.0) for turn in turns]
 

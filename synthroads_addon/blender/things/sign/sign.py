@@ -65,7 +65,7 @@ def sign_group(tree: Tree) -> None:
 
 
 def _mounting(tree: Tree, face: Face, sign: _SignInputs, spread: Value, long: Value) -> Value:
-    """Return the rails behind the face, and the clamps that hold them to the posts."""
+    """Add nodes for the rails behind the face and the clamps that hold them to the posts."""
     with tree.frame("Rails behind the face, one above the other"):
         count = op.round_up(op.maximum(face.height / _RAIL_SPACING, 2.0))
 
@@ -88,7 +88,7 @@ def _mounting(tree: Tree, face: Face, sign: _SignInputs, spread: Value, long: Va
 
 @model_part("signs", 110)
 def build_signs(builder: ModelBuilder) -> None:
-    """Make one object per traffic sign."""
+    """Add one object per traffic sign to the model."""
     for name, sign in builder.parameters.of_type(TrafficSign).items():
         builder.add_thing(
             name,

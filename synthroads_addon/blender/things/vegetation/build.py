@@ -25,7 +25,7 @@ _GROUPS = {"grass": grass_group, "shrub": shrub_group, "tree": tree_group}
 
 @model_part("vegetation", 190)
 def build_vegetation(builder: ModelBuilder) -> None:
-    """Make one object per stand of plants."""
+    """Add one object per stand of plants to the model; none without terrain or at detail 0."""
     terrain = builder.parameters.terrain
     if terrain is None or "Terrain" not in builder.objects or builder.detail == 0.0:
         return
@@ -47,7 +47,7 @@ def build_vegetation(builder: ModelBuilder) -> None:
 
 
 def _places_mesh(builder: ModelBuilder, plants: Vegetation, terrain: Terrain) -> bpy.types.Mesh:
-    """Return a vertex for each place of a stand on the stretch, see `plants.decided_places`."""
+    """Create a mesh with a vertex per candidate place of a stand, carrying whether a plant grows there and why."""
     places = run_aside(lambda: plant_places(builder.geometry, plants, terrain, *builder.stretch))
     mesh = bpy.data.meshes.new("SR Places")
     fill(mesh, np.zeros((len(places.number), 3)))
@@ -61,7 +61,7 @@ def _places_mesh(builder: ModelBuilder, plants: Vegetation, terrain: Terrain) ->
 
 
 def _further_inputs(plants: Vegetation, builder: ModelBuilder) -> dict[str, Any]:
-    """Return the inputs that only one kind of plant has: materials, and the density on verges and median."""
+    """Return a stand's inputs that depend on its kind: for grass densities on verge and median, else materials."""
     if plants.kind == "grass":
         roadside = plants.density * ROADSIDE_SHARE * (plants.species not in WILD_GRASSES)
         median = next((item.instance for item in builder.parameters.of_type(Median).values()), 0)

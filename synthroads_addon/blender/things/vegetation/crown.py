@@ -16,7 +16,7 @@ _LEAF = [(0.0, -0.5, 0.0), (0.5, 0.3, 0.0), (-0.42, 0.5, 0.0)]
 
 
 class Crown(Inputs):
-    """Inputs that shape a crown; lengths are for a plant of height 1."""
+    """Inputs for the shape of a plant's crown; lengths are for a plant of height 1."""
 
     crown_bottom = metres(0.2, (0.0, 0.9), "Height at which the crown begins")
     crown_radius = metres(0.3, (0.02, 2.0), "Radius of the crown where it is widest")
@@ -33,12 +33,12 @@ class Crown(Inputs):
     leaves = integer(2300, (1, 50_000), "Number of leaves, at full detail")
 
     def crown(self) -> dict[str, Value]:
-        """Return the inputs of the crown itself, without those that a subclass adds."""
+        """Return the values of the crown's own inputs by field, without those that a subclass adds."""
         return {field.name: self.values[field.name] for field in Crown.fields()}
 
 
 class PlantMaterials(Inputs):
-    """Materials of one plant, or of a stand."""
+    """Inputs for the bark and leaf materials of a plant or a stand."""
 
     bark_material = material_of("trunk, branches and stems", "maple_bark")
     leaves_material = material_of("the leaves", "maple_leaves")
@@ -50,7 +50,7 @@ class _Growth(Inputs):
 
 
 class Plant(PlantMaterials, _Growth):
-    """Inputs of one plant beside its shape."""
+    """Inputs of one plant other than its shape: materials, seed, detail."""
 
 
 class _Branches(Inputs):
@@ -81,7 +81,7 @@ def crown_group(tree: Tree) -> None:
 
 
 def _ends(tree: Tree, shape: Crown, seed: Value) -> tuple[Value, Value, Value]:
-    """Return where the branches end, and how far up (0 to 1) and how wide (0 to 1) the crown is there."""
+    """Add nodes for the branches' ends, and for the crown's relative height and width (0 to 1) there; fields."""
     number = op.index(tree)
     share = (number + 0.5) / (shape.branches * 1.0)
     # The power of the height that makes the sine's maximum lie where the crown is widest.
@@ -170,14 +170,14 @@ def _leaf(tree: Tree, length: Value, width: Value) -> Value:
 
 
 def _in_ball(tree: Tree, seed: Value, identifier: Value) -> Value:
-    """Return a random point of the unit ball, rather on its outside."""
+    """Add nodes for a random point per element in the unit ball, denser towards its surface."""
     direction = op.random(tree, (-1.0, -1.0, -1.0), (1.0, 1.0, 1.0), seed, identifier)
     direction = tree.node("ShaderNodeVectorMath", direction, operation="NORMALIZE").value
     return direction * op.power(op.random(tree, 0.0, 1.0, seed + 100, identifier), 0.4)
 
 
 def bend_stems(tree: Tree, plant: Value, seed: Value) -> Value:
-    """Return the plant with its stems bent a little, and exactly 1 high."""
+    """Add nodes that bend a plant's stems a little by noise and scale it to height 1; return the plant."""
     place = op.position(tree)
     bent = tree.node("ShaderNodeTexNoise", place, noise_dimensions="4D", w=seed, scale=2.5, detail=1.0)
     aside = (bent["Color"] - (0.5, 0.5, 0.5)) * (op.minimum(op.component(place, "Z") * 4.0, 1.0) * (2.0 * _CROOKED))

@@ -68,12 +68,12 @@ def grass_group(tree: Tree) -> None:
 
 
 def _on_right(tree: Tree) -> Value:
-    """Return 1 for points on the right of the axis, 0 for those on its left."""
+    """Add nodes for 1 at points on the right of the axis, 0 at those on its left; a field."""
     return op.switch(op.named_attribute(tree, "offset") < 0.0, 0, 1)
 
 
 def _in_median(tree: Tree, faces: Value, roadside: _Roadside) -> Value:
-    """Return whether points on the verges and the median are on the median."""
+    """Add nodes for whether points on verges and median lie on the median, by the faces' instance; a field."""
     at = tree.node(
         "GeometryNodeSampleNearestSurface",
         data_type="INT",
@@ -115,7 +115,7 @@ def _shape_blade(face: Value, outline: list[Point], width: Value) -> Value:
 
 
 def _around(tree: Tree, blade: Value, count: Value, spread: Value, lean: Value, seed: Value) -> Value:
-    """Return blades on a disc, each turned to lean away from its middle, the more the further out."""
+    """Add nodes for `count` blades on a disc, each leaning away from its middle, the more the farther out."""
     number = op.index(tree)
     out = op.unary("SQRT", (number + 0.5) / (count * 1.0))
     around = number * _GOLDEN_ANGLE + op.random(tree, -0.6, 0.6, seed)

@@ -24,7 +24,7 @@ _NEEDED_NO_MORE = ("distance", "station", "offset", "edge", "share", "id", "stri
 
 
 class Stand(Inputs):
-    """Inputs of a stand of plants, common to all kinds."""
+    """Inputs of a stand of plants that all kinds share: surfaces, density, band, heights, seed, detail."""
 
     backbone = backbone_socket("Object")
     terrain = socket("Object", "Terrain whose points carry their distance")
@@ -47,13 +47,13 @@ DECIDED = ("density", "band_start", "band_end", "reach")
 
 
 def decided_places(tree: Tree) -> Value:
-    """Declare the places of a stand that are decided already, by which model and twin have the same plants."""
+    """Declare the input "Places", candidate places of a stand that are decided beforehand; return its value."""
     about = "Places decided already: points with id, stands (0 or 1) and the inputs that this holds for; may be empty"
     return tree.input("Places", "Geometry", description=about)
 
 
 def points_in_band(tree: Tree, stand: Stand, density: Operand, places: Value | None = None) -> Value:
-    """Return points spread at random over the terrain in the band; `places` may say where none grows."""
+    """Add nodes for random points on the terrain within the stand's band; `places` may decide which grow."""
     surface = op.object_geometry(stand.terrain)
     band = stand.band_start, stand.band_end
     return points_on(tree, stand, surface, density, stand.reach, stand.seed, band, places)
@@ -69,7 +69,7 @@ def points_on(
     band: tuple[Value, Value] | None = None,
     places: Value | None = None,
 ) -> Value:
-    """Return points spread at random over a surface, as many per area of it everywhere.
+    """Add nodes for random points on a surface at a uniform density per area, identified by metre of road.
 
     Args:
         surface: its points carry their ``distance``.
@@ -118,7 +118,7 @@ def points_on(
 
 
 def _decisions(stand: Stand, places: Value, identity: Value) -> tuple[Value, Value]:
-    """Return whether all places were decided for the stand as it is, and whether a plant grows at each."""
+    """Add nodes for whether the places were decided for these very inputs, and whether a plant grows at each."""
     tree = places.tree
     decided = op.sample_index(places, op.named_attribute(tree, "seed", "INT"), 0).equals(stand.seed)
     decided = decided & (op.point_count(places) > 0)
@@ -131,17 +131,17 @@ def _decisions(stand: Stand, places: Value, identity: Value) -> tuple[Value, Val
 
 
 def _integer(value: Value, least: int) -> Value:
-    """Return a whole number that is at least so large."""
+    """Add a node for an integer that is at least `least`."""
     return value.tree.node("FunctionNodeIntegerMath", value, least, operation="MAXIMUM").value
 
 
 def own_numbers(tree: Tree, stand: Stand) -> Value:
-    """Return the instance number of each plant, by the number of its place."""
+    """Add nodes for each plant's instance number: the stand's first plus the place's number; a field."""
     return stand.instance + op.named_attribute(tree, "id", "INT")
 
 
 def sizes(tree: Tree, stand: Stand, kind: str) -> Value:
-    """Return the scale of each plant: its height, and across it more or less."""
+    """Add nodes for each plant's random scale (vector): its height, m, and a breadth relative to it; a field."""
     tall = op.random(tree, stand.smallest_height, stand.largest_height, stand.seed + HEIGHT)
     across = tall * op.random(tree, *BREADTHS[kind], stand.seed + BREADTH)
     return op.vector(tree, across, across, tall)
@@ -150,7 +150,7 @@ def sizes(tree: Tree, stand: Stand, kind: str) -> Value:
 def plant_points(
     tree: Tree, points: Value, variants: list[Value], scale: Value, lean: float, seed: Value, number: Value
 ) -> Value:
-    """Put one of the variants (of height 1) on each point, turned and leant at random, and make it real.
+    """Add nodes that put a random variant on each point, turned, leant and scaled; return the realized mesh.
 
     Args:
         tree: the group.
@@ -183,7 +183,7 @@ def plant_points(
 
 
 def one_high(plant: Value) -> Value:
-    """Return a plant scaled along z so that its top is at 1."""
+    """Add nodes that scale a plant along z so that its top is at 1; return the plant."""
     tree = plant.tree
     top = op.component(tree.node("GeometryNodeBoundBox", plant)["Max"], "Z")
     size = op.vector(tree, 1.0, 1.0, 1.0 / top)

@@ -12,7 +12,7 @@ from ...nodes.solids import Point, box, move_geometry, paint_faces, put_on_point
 
 
 class VehicleMaterials(Inputs):
-    """Materials of a vehicle."""
+    """Inputs for the materials of a vehicle's parts."""
 
     paint_material = material_of("paint, in the vehicle's colour", "car_paint")
     glass_material = material_of("windows", "glass")
@@ -25,7 +25,7 @@ class VehicleMaterials(Inputs):
     cover_material = material_of("tarpaulin or box of a truck", "tarpaulin")
 
     def __getitem__(self, name: str) -> Value:
-        """Return a material by the name that parts have it by, such as ``paint``."""
+        """Return the value of a material input by its short name, such as ``paint``."""
         return self.values[f"{name}_material"]
 
 
@@ -41,7 +41,7 @@ _SHARP = math.radians(38.0)
 def wheels(
     tree: Tree, materials: VehicleMaterials, radius: float, width: float, axles: Iterable[tuple[float, float]]
 ) -> Value:
-    """Return wheels that stand on z = 0 and look away from x = 0.
+    """Add nodes for wheels that stand on z = 0, their outer sides away from x = 0.
 
     Args:
         tree: the group.
@@ -66,7 +66,7 @@ def wheels(
 def boxes(
     tree: Tree, materials: VehicleMaterials, items: Iterable[tuple[str, Point, Point]], mirrored: bool = False
 ) -> Value:
-    """Return boxes: material, middle, size. Mirrored ones stand on both sides."""
+    """Add nodes for boxes given by (material, middle, size), m; if mirrored, also on the other side of x = 0."""
     group = _box_group()
     parts = [
         tree.call(group, middle=middle, size=size, both_sides=mirrored, material=materials[material]).value
@@ -84,7 +84,7 @@ def rod(
     radii: tuple[float, float],
     mirrored: bool = False,
 ) -> Value:
-    """Return a round, tapered, closed rod between two places."""
+    """Add nodes for a round, tapered, closed rod between two places, m; if mirrored, also beyond x = 0."""
     radius, end_radius = radii
     return tree.call(
         _rod_group(),
@@ -98,13 +98,13 @@ def rod(
 
 
 def ball(tree: Tree, materials: VehicleMaterials, material: str, middle: Point, size: Point) -> Value:
-    """Return an ellipsoid of half axes `size`."""
+    """Add nodes for an ellipsoid of half axes `size`, m, around its middle."""
     sphere = tree.node("GeometryNodeMeshUVSphere", segments=12, rings=8, radius=1.0).value
     return paint_faces(op.transform(sphere, translation=middle, scale=size), materials[material])
 
 
 def smooth(vehicle: Value) -> Value:
-    """Return the vehicle, shaded smoothly but for its sharp edges."""
+    """Add nodes that shade a vehicle smoothly but for edges sharper than 38 degrees; return the vehicle."""
     tree = vehicle.tree
     angle = tree.node("GeometryNodeInputMeshEdgeAngle")["Unsigned Angle"]
     rounded = tree.node("GeometryNodeSetShadeSmooth", vehicle, shade_smooth=True).value

@@ -17,7 +17,7 @@ Float = NDArray[np.float64]
 
 
 class HullPatch(NamedTuple):
-    """Faces of another material than the paint.
+    """Region of a hull's faces with another material than the paint.
 
     Attributes:
         material: its name.
@@ -33,7 +33,7 @@ class HullPatch(NamedTuple):
 
 
 class Hull(NamedTuple):
-    """A body.
+    """Shape of a vehicle's body: cross-sections, wheel arches and patches of other materials.
 
     Attributes:
         sections: cross-sections (S, 9), symmetric about x = 0, from rear to front; the first and the last have no
@@ -66,7 +66,7 @@ _ARCH_STEPS = 6
 
 
 def hull(tree: Tree, materials: VehicleMaterials, patches: Iterable[tuple[Any, ...]], **fields: Any) -> Value:
-    """Return the body, closed, its faces outwards; `fields` are those of `Hull`."""
+    """Add nodes for a vehicle's closed body, faces outwards; `fields` are the other fields of `Hull`."""
     shape = Hull(patches=tuple(HullPatch(*patch) for patch in patches), **fields)
     table = _rows(shape)
     mesh, column, row = op.grid(tree, 2 * _BANDS + 1, len(table))
@@ -109,7 +109,7 @@ def _in_patch(patch: HullPatch, places: Float, face_row: Value, band: Value) -> 
 
 
 def _rows(shape: Hull) -> Float:
-    """Return the rows (R, 12): half widths; floor, low, belt; upper, edge, ridge; y and two zeros."""
+    """Return the hull's rows (R, 12), m: half widths; floor, low, belt; upper, edge, ridge; y and two zeros."""
     sections = np.array(shape.sections)
     angles = np.linspace(np.pi, 0.0, _ARCH_STEPS + 1)
     # Just outside an arch the underside is where it would be without it.

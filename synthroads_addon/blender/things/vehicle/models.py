@@ -24,7 +24,7 @@ _PARTS: dict[str, Callable[..., Value]] = {"hull": hull, "wheels": wheels, "boxe
 
 
 def model_group(model: str) -> bpy.types.NodeTree:
-    """Return the group of a model of vehicle, e.g. SR Car."""
+    """Return the node group of one vehicle of a model, e.g. SR Car."""
     description = f"A {model}, its wheels on the ground, facing along +y"
     return node_group(f"SR {model.title()}", _build, model, description=description)
 
@@ -48,7 +48,7 @@ def _models() -> dict[str, list[dict[str, Any]]]:
 
 
 def _settings(part: dict[str, Any]) -> dict[str, Any]:
-    """Return a part's arguments, lists as tuples: nodes take vectors as such."""
+    """Return a preset part's arguments without its "part", lists as tuples as nodes take vectors."""
     return {name: _as_tuples(value) for name, value in part.items() if name != "part"}
 
 

@@ -26,7 +26,7 @@ _POINTS = (
 
 
 def vehicle_group(model: str) -> bpy.types.NodeTree:
-    """Return the group that places vehicles of a model, e.g. SR Vehicles Car."""
+    """Return the node group that puts vehicles of a model on points, e.g. SR Vehicles Car."""
     description = f"A {model} on each point; points carry heading (rad), {COLOR} and instance"
     return node_group(f"SR Vehicles {model.title()}", _build, model, description=description)
 
@@ -92,7 +92,7 @@ def _on_wheels_group(tree: Tree) -> None:
 
 
 def _axle(tree: Tree, road: Value, along: Value, track: Value) -> tuple[Value, Value]:
-    """Return the middle between the road's points below an axle's wheels, and the way from the left to the right."""
+    """Add nodes for the midpoint of the road below an axle's wheels, and the vector from the left to the right one."""
     heading = op.named_attribute(tree, "heading")
     sine, cosine = op.unary("SINE", heading), op.unary("COSINE", heading)
     way, right = op.vector(tree, -sine, cosine), op.vector(tree, cosine, sine)
@@ -103,7 +103,7 @@ def _axle(tree: Tree, road: Value, along: Value, track: Value) -> tuple[Value, V
 
 
 def _on_road(road: Value, place: Value, way: Value) -> Value:
-    """Return the road's point above or below `place`; beyond its ends it goes on at the vehicle's grade."""
+    """Add nodes for the road's point above or below `place`; beyond its ends it goes on at the vehicle's grade."""
     tree = road.tree
     ray = tree.node(
         "GeometryNodeRaycast", target_geometry=road, source_position=place + (0.0, 0.0, 500.0), ray_length=1000.0
@@ -117,7 +117,7 @@ def _on_road(road: Value, place: Value, way: Value) -> Value:
 
 @model_part("vehicles", 180)
 def build_vehicles(builder: ModelBuilder) -> None:
-    """Make one object per vehicle, so that each can be moved on its own."""
+    """Add one object per vehicle to the model, so that each can be moved by itself."""
     lines: dict[tuple[str, int], LaneLine] = {}
     for name, vehicle in builder.parameters.of_type(Vehicle).items():
         lane = (vehicle.carriageway, vehicle.lane)
@@ -130,7 +130,7 @@ def build_vehicles(builder: ModelBuilder) -> None:
 
 
 def vehicle_place(line: LaneLine, vehicle: Vehicle) -> PointObject:
-    """Return where a vehicle is at the time 0: its middle on its lane's line, looking along it with the traffic."""
+    """Return a vehicle's place at the time 0 as a point object: on its lane's line, heading with the traffic."""
     station = np.array([vehicle.station])
     turn = float(np.rad2deg(line.turn(station, CHASSIS[vehicle.model].wheel_base / 2.0)[0]))
     return PointObject(
