@@ -54,7 +54,7 @@ _FOLLOWED_BY = {"SR Axis from Curve": strip_group, "SR Points along Axis": delin
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Write the library, or draw; return the exit code."""
+    """Write the asset library or draw its pictures, as the command line says; return the exit code 0."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("library", nargs="?", type=Path, metavar="LIBRARY.blend", help="file to write")
     parser.add_argument("--draw", nargs="*", metavar="NAME", help="draw the pictures of all groups, or of some")
@@ -69,7 +69,7 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def draw_pictures(names: set[str]) -> None:
-    """Draw the picture of each group, or of those named."""
+    """Render the pictures of all node groups, or of those named, to `PICTURES`, discarding the open file."""
     empty_file()
     scene = _studio()
     for catalogue, group in user_groups():
@@ -103,7 +103,7 @@ def _studio() -> bpy.types.Scene:
 
 
 def _example(catalogue: str, group: bpy.types.NodeTree) -> bpy.types.Object:
-    """Return an object that shows the group: along a curve, on a point, or by itself."""
+    """Add an object to the scene that shows a node group, along a curve or on a point; return it."""
     inputs = {item.name for item in group.interface.items_tree if item.item_type == "SOCKET" and item.in_out == "INPUT"}
     data = _curve(_LENGTHS.get(catalogue, 14.0)) if inputs & {"Curve", "Backbone"} else _point()
     item = bpy.data.objects.new(group.name, data)
@@ -137,7 +137,7 @@ def _point() -> bpy.types.Mesh:
 
 
 def _aim(scene: bpy.types.Scene, item: bpy.types.Object) -> None:
-    """Put the camera so that the object fills the picture, seen from its front on the right."""
+    """Place the scene's camera so that the object fills the picture, seen from its front on the right."""
     graph = bpy.context.evaluated_depsgraph_get()
     corners = []
     for shown in graph.object_instances:

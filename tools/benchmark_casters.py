@@ -55,7 +55,7 @@ Flight: TypeAlias = tuple[NDArray[np.float64], float, float]
 
 
 def demo_scene() -> tuple[SceneMesh, Flight]:
-    """Return the demo's mesh at standard fidelity, and the flight over it."""
+    """Build the scenario `rq31-600m`; return its mesh, and the flight over it."""
     from synthroads_addon.blender.files import empty_file
     from synthroads_addon.blender.model.build import build_road
     from synthroads_addon.blender.scene.evaluated import scene_mesh
@@ -74,7 +74,7 @@ def demo_scene() -> tuple[SceneMesh, Flight]:
 
 
 def waves_scene() -> tuple[SceneMesh, Flight]:
-    """Return 2 million triangles over 100 m x 100 m, z = 0.2 sin x cos y, and the flight over them."""
+    """Return a mesh of 2 million triangles over 100 m x 100 m, z = 0.2 sin x cos y, and the flight over it."""
     vertices, triangles = waves()
     mesh = bare_mesh(vertices, triangles)
     station = np.arange(-40.0, 40.0, LINE_SPACING)
@@ -86,7 +86,7 @@ SCENES: dict[str, Callable[[], tuple[SceneMesh, Flight]]] = {"demo": demo_scene,
 
 
 def bare_mesh(vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> SceneMesh:
-    """Return a mesh (V, 3), (T, 3) of which only the shape matters."""
+    """Return a scene mesh of vertices (V, 3) and triangles (T, 3) with zero labels and an unknown material."""
     count = len(triangles)
     labels = (np.zeros(count, np.uint8), np.zeros(count, np.uint32), np.zeros(count, np.uint16))
     return SceneMesh(vertices, triangles, *labels, materials=("unknown",), origin=np.zeros(3))
@@ -118,7 +118,7 @@ def survey_rays(flight: Flight, count: int) -> tuple[NDArray[np.float32], NDArra
 
 
 def measure(caster_name: str, files: Path) -> dict[str, Any]:
-    """Measure one caster on the mesh and the rays in a folder; its faces are left there too."""
+    """Measure one caster on the mesh and rays in a folder, saving its faces there; return the rates as JSON data."""
     mesh = bare_mesh(np.load(files / "vertices.npy"), np.load(files / "triangles.npy"))
     origins, directions = np.load(files / "origins.npy"), np.load(files / "directions.npy")
     order = stream(0, "order of rays").permutation(len(origins))
@@ -143,7 +143,7 @@ def measure(caster_name: str, files: Path) -> dict[str, Any]:
 
 
 def compare(files: Path, row: dict[str, Any]) -> None:
-    """Add to a row how well its caster agrees with the reference."""
+    """Add the agreement of a row's caster with the reference caster, and the share of hits, to the row, in place."""
     mesh = bare_mesh(np.load(files / "vertices.npy"), np.load(files / "triangles.npy"))
     origins, directions = np.load(files / "origins.npy"), np.load(files / "directions.npy")
     found, expected = (np.load(files / f"faces {name}.npy") for name in (row["caster"], REFERENCE))
@@ -152,7 +152,7 @@ def compare(files: Path, row: dict[str, Any]) -> None:
 
 
 def table(rows: list[dict[str, Any]]) -> Iterator[str]:
-    """Yield the lines of the table in Markdown."""
+    """Yield the lines of two Markdown tables: casters' rates and agreement, and rates by rays per call."""
     yield (
         "| caster | threads | coherent (M rays/s) | random (M rays/s) | build (s) | memory (B/triangle) "
         "| same face (%) | the others' gap (mm) |"
@@ -204,7 +204,7 @@ def _prepare(scene: str, files: Path, count: int) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Parse the command line and measure."""
+    """Measure all casters on the scenes of the command line and print Markdown tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scene", choices=tuple(SCENES), action="append", help="default: all")
     parser.add_argument("--rays", type=int, default=1_000_000, metavar="N", help="rays to cast (1000000)")

@@ -36,7 +36,7 @@ def held_mb() -> float:
 
 
 def measure(path: Path, triangles: int) -> None:
-    """Open the scene in this process and print a row per stage."""
+    """Open a scene in this process; print a Markdown table of seconds and memory per triangle, a row per stage."""
     before, last = held_mb(), (time.perf_counter(), time.process_time())
     begin = last
     print(f"\nBlender {bpy.app.version_string}\n")
@@ -62,7 +62,7 @@ def measure(path: Path, triangles: int) -> None:
 
 
 def main() -> None:
-    """Write the scene in a process of its own, whose memory is then given back, and measure."""
+    """Write the scene in a separate process, so that its memory is freed, and measure its opening here."""
     if len(sys.argv) > 1:
         print(write_waves(Path(sys.argv[1])), flush=True)
         os._exit(0)  # Blender's own way out can crash

@@ -35,7 +35,7 @@ MANIFEST = ROOT / "blender_manifest.toml"
 
 @dataclass(frozen=True)
 class Extension:
-    """One of the extensions.
+    """Sources, manifest, wheels and lock of one Blender extension.
 
     Attributes:
         name: id in Blender.
@@ -106,7 +106,7 @@ class BuildError(Exception):
 
 
 def current_platform() -> str:
-    """Return Blender's name of the platform we run on."""
+    """Return Blender's name of this machine's platform, such as linux-x64."""
     system = {"Linux": "linux", "Windows": "windows", "Darwin": "macos"}.get(platform.system(), platform.system())
     machine = {"x86_64": "x64", "amd64": "x64", "aarch64": "arm64"}.get(
         platform.machine().lower(), platform.machine().lower()
@@ -129,18 +129,18 @@ def blender_tool() -> Path:
 
 
 def normal_name(name: str) -> str:
-    """Return a distribution's name as the packaging rules compare it."""
+    """Return a distribution's normalised name (PEP 503): lower case, runs of -, _ and . as one -."""
     return re.sub(r"[-_.]+", "-", name).lower()
 
 
 def read_wheel_list(path: Path) -> list[str]:
-    """Return the lines `name==version` of a list of wheels."""
+    """Read the lines `name==version` of a list of wheels, without comments and blank lines."""
     lines = (line.split("#")[0].strip() for line in path.read_text(encoding="utf-8").splitlines())
     return [line for line in lines if line]
 
 
 def fetch_wheels(extension: Extension, target: str, cache: Path) -> list[Path]:
-    """Return an extension's wheels of all Pythons for one platform, sorted by name; download what the cache lacks."""
+    """Return the paths of an extension's wheels for one platform and all Pythons, downloading what the cache lacks."""
     lock = extension.lock.read_text(encoding="utf-8")
     wheels: dict[str, Path] = {}
     for version in PYTHON_VERSIONS:
@@ -157,7 +157,7 @@ def fetch_wheels(extension: Extension, target: str, cache: Path) -> list[Path]:
 
 
 def download(lock: Path, version: str, target: str, folder: Path) -> None:
-    """Download the wheels of one Python and platform, whatever Python and platform this is; others' files are refused.
+    """Download the locked wheels of one Python version and platform into a folder, checking their hashes.
 
     Raises:
         BuildError: pip can't get one, or got one whose hash isn't in the lock.
@@ -175,7 +175,7 @@ def download(lock: Path, version: str, target: str, folder: Path) -> None:
 
 
 def wheel_metadata(wheel: Path) -> Message:
-    """Return the fields of a wheel's METADATA file."""
+    """Return the fields of a wheel's METADATA file as an email message."""
     with zipfile.ZipFile(wheel) as archive:
         name = next(name for name in archive.namelist() if re.fullmatch(r"[^/]+\.dist-info/METADATA", name))
         return email.parser.Parser().parsestr(archive.read(name).decode("utf-8"))
@@ -215,7 +215,7 @@ def third_party_notice(wheels: list[Path]) -> str:
 
 
 def bill_of_materials(extension: Extension, wheels: list[Path]) -> dict[str, object]:
-    """Return what an extension's zip brings, by the standard CycloneDX 1.6: each wheel with its hash and licence."""
+    """Return a CycloneDX 1.6 bill of materials as JSON data: each bundled wheel with its hash and licence."""
     components = []
     for wheel in wheels:
         fields = wheel_metadata(wheel)
@@ -247,7 +247,7 @@ def bill_of_materials(extension: Extension, wheels: list[Path]) -> dict[str, obj
 
 
 def stage(extension: Extension, target: str, wheels: list[Path], folder: Path) -> None:
-    """Fill an empty folder with all that an extension holds."""
+    """Fill an empty folder with an extension's source, licences, wheels, asset library and completed manifest."""
     shutil.copytree(extension.source, folder, ignore=LEFT_OUT, dirs_exist_ok=True)
     shutil.copy(ROOT / "LICENSE", folder)
     (folder / "THIRD_PARTY.txt").write_text(third_party_notice(wheels), encoding="utf-8", newline="\n")
@@ -261,7 +261,7 @@ def stage(extension: Extension, target: str, wheels: list[Path], folder: Path) -
 
 
 def asset_library(cache: Path) -> Path:
-    """Return the library of node groups as it is now; what the cache has of older sources is removed."""
+    """Return the path of the asset library built from the present sources, cached; older cached ones are removed."""
     digest = hashlib.sha256(str(blender_tool()).encode())
     tools = ROOT / "tools"
     sources = [*PACKAGE.rglob("*"), *(tools / "asset_previews").glob("*.png"), *tools.glob("*_library.py")]
@@ -278,7 +278,7 @@ def asset_library(cache: Path) -> Path:
 
 
 def write_asset_library(path: Path) -> None:
-    """Write the library of node groups in a Blender of its own, without the user's settings."""
+    """Write the asset library of node groups to a file, in a separate Blender process without the user's settings."""
     command = [sys.executable, "-B", str(ROOT / "tools" / "asset_library.py"), str(path)]
     with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
         environment = {**os.environ, "BLENDER_USER_RESOURCES": folder}
@@ -288,12 +288,12 @@ def write_asset_library(path: Path) -> None:
 
 
 def version() -> str:
-    """Return the project's version."""
+    """Return the project's version, as the extension's manifest has it."""
     return str(tomllib.loads(MANIFEST.read_text(encoding="utf-8"))["version"])
 
 
 def complete_manifest(extension: Extension, target: str, wheels: list[str]) -> str:
-    """Return the text of the manifest with what it lacks added, before the first table as TOML wants."""
+    """Return the text of an extension's manifest with version, platform and wheels added before its first table."""
     committed = extension.manifest.read_text(encoding="utf-8")
     tables = re.search(r"^\[", committed, flags=re.MULTILINE)
     split = tables.start() if tables else len(committed)
@@ -327,7 +327,7 @@ def build(extension: Extension, target: str, output_dir: Path, cache: Path) -> P
 
 
 def make_reproducible(archive: Path) -> None:
-    """Write a zip anew with its files in the order of their names, and without their dates and modes."""
+    """Rewrite a zip in place with its files sorted by name, and with fixed dates and modes."""
     renewed = archive.with_suffix(".part")
     with zipfile.ZipFile(archive) as source, zipfile.ZipFile(renewed, "w") as target:
         for name in sorted(set(source.namelist())):
@@ -339,7 +339,7 @@ def make_reproducible(archive: Path) -> None:
 
 
 def run_tool(*arguments: str) -> None:
-    """Run Blender's tool; its output is shown only if it fails."""
+    """Run Blender's extension tool; raise `BuildError` with its output if it fails."""
     answer = subprocess.run(
         [sys.executable, "-B", str(blender_tool()), *arguments],
         capture_output=True,
@@ -351,7 +351,7 @@ def run_tool(*arguments: str) -> None:
 
 
 def parse_arguments(argv: list[str] | None) -> argparse.Namespace:
-    """Return the options of the command line."""
+    """Return the parsed options of the command line."""
     parser = argparse.ArgumentParser(description="Build the Blender extensions, a zip of each per platform.")
     parser.add_argument(
         "--platform", choices=[*PLATFORM_TAGS, "all"], default=current_platform(), help="default: the current one"
@@ -364,7 +364,7 @@ def parse_arguments(argv: list[str] | None) -> argparse.Namespace:
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Build for the platforms asked for; return 0, or 1 with one message if that failed."""
+    """Build all extensions for the chosen platforms; return 0, 1 if a build failed, 2 for an unknown platform."""
     options = parse_arguments(argv)
     if options.platform not in (*PLATFORM_TAGS, "all"):
         print(f"no wheels are known for {options.platform}: choose --platform {'|'.join(PLATFORM_TAGS)}|all")

@@ -32,13 +32,13 @@ DEBIAN_PACKAGES = {
 
 
 def missing_libraries(ldd_output: str) -> list[str]:
-    """Return the names of the libraries that `ldd` did not find, each once, in its order."""
+    """Return the names of the libraries that the output of `ldd` reports as not found, each once, in its order."""
     lines = (line.strip() for line in ldd_output.splitlines())
     return list(dict.fromkeys(line.split(" =>")[0] for line in lines if line.endswith("=> not found")))
 
 
 def advice(libraries: list[str]) -> str:
-    """Say what to install so that these libraries are there."""
+    """Return a text that says which Debian packages to install for missing libraries."""
     packages = sorted({DEBIAN_PACKAGES[name] for name in libraries if name in DEBIAN_PACKAGES})
     others = [name for name in libraries if name not in DEBIAN_PACKAGES]
     lines = [f"bpy needs shared libraries that this machine lacks: {', '.join(libraries)}"]
@@ -50,7 +50,7 @@ def advice(libraries: list[str]) -> str:
 
 
 def import_error() -> str:
-    """Try to load bpy in a process of its own and return why it failed, or an empty string."""
+    """Try to import bpy in a separate process; return its error message, or an empty string if it loads."""
     with tempfile.TemporaryDirectory() as folder:
         answer = subprocess.run(
             [sys.executable, "-c", "import os, bpy; os._exit(0)"],  # bpy's own way out can crash

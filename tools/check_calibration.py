@@ -38,7 +38,7 @@ ASKEW = 24.0
 
 
 def build() -> None:
-    """Make the plane of asphalt and, 3 mm above it, the lines: dashes of 6 m every 12 m."""
+    """Build the scene in a new file: a plane of asphalt, and 3 mm above it dashes of white paint, 6 m every 12 m."""
     empty_file()
     _rectangle("road", "asphalt", [(0.0, LENGTH, -HALF, HALF)], 0.0)
     dashes = [
@@ -60,7 +60,7 @@ def _rectangle(kind: str, name: str, spans: list[tuple[float, float, float, floa
 
 
 def scan(table: Path, output: Path, rays: int, height: float) -> Path:
-    """Scan the plane from the air with the table's materials; return the cloud."""
+    """Scan the open scene from the air with a table's materials; return the cloud's path."""
     scenario = Scenario.from_dict(
         {
             "fidelity": "standard",
@@ -85,7 +85,7 @@ def scan(table: Path, output: Path, rays: int, height: float) -> Path:
 
 
 def compare(table: Path, output: Path, cloud: Path) -> Calibration:
-    """Return what is expected of the table beside the cloud; only the gain is free."""
+    """Return the calibration that compares a cloud with what a table's materials predict; only the gain is fitted."""
     axis = output / "axis.csv"
     axis.write_text("x,y,z\n" + "".join(f"{x},0,0\n" for x in range(int(LENGTH) + 1)), encoding="utf-8")
     return calibrate(
@@ -101,14 +101,14 @@ def compare(table: Path, output: Path, cloud: Path) -> Calibration:
 
 
 def checked(table: Path, output: Path, rays: int = 19, height: float = 700.0) -> Calibration:
-    """Build, scan and compare."""
+    """Build the plane, scan it and compare the cloud with the table; return the calibration."""
     output.mkdir(parents=True, exist_ok=True)
     build()
     return compare(table, output, scan(table, output, rays, height))
 
 
 def main() -> None:
-    """Run the check and print each class's errors."""
+    """Run the check of the command line's table, save its plot and print each class's errors as JSON lines."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("table", type=Path, metavar="TABLE")
     parser.add_argument("--output", type=Path, required=True, metavar="DIR")

@@ -36,18 +36,18 @@ _STREET = np.array([[-75.0, -6.0], [-30.0, 2.0], [20.0, 2.0], [75.0, -10.0]])
 
 
 def ground(x: Float, y: Float) -> Float:
-    """Return the ground's elevation (m) at places of one shape."""
+    """Return the ground's elevation (m) at x and y (m), arrays of one shape."""
     return np.asarray(1.6 * np.sin(x / 38.0) + 1.1 * np.cos(y / 23.0 + 0.5))
 
 
 def street(x: Float) -> Float:
-    """Return where the street's middle is, y at x."""
+    """Return y (m) of the street's middle at x (m), both (N,)."""
     smooth = np.linspace(-6.0, 6.0, 13)[:, None]
     return np.asarray(np.interp(x[None] + smooth, _STREET[:, 0], _STREET[:, 1]).mean(axis=0))
 
 
 def add(name: str, vertices: Float, faces: list[list[int]], material: str) -> None:
-    """Add an object of vertices (V, 3)."""
+    """Add a mesh object of vertices (V, 3), m, and faces to the scene."""
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(vertices.tolist(), [], faces)
     mesh.materials.append(bpy.data.materials[material])
@@ -55,7 +55,7 @@ def add(name: str, vertices: Float, faces: list[list[int]], material: str) -> No
 
 
 def sheet(name: str, x: Float, y: Float, lift: float, material: str) -> None:
-    """Add a surface that lies ``lift`` above the ground, from grids x and y of one shape (R, C)."""
+    """Add a surface ``lift`` (m) above the ground to the scene, from grids x and y (R, C), m."""
     rows, columns = x.shape
     vertices = np.stack([x, y, ground(x, y) + lift], axis=-1).reshape(-1, 3)
     corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
@@ -64,14 +64,14 @@ def sheet(name: str, x: Float, y: Float, lift: float, material: str) -> None:
 
 
 def strip(name: str, low: float, high: float, offset: float, width: float, lift: float, material: str) -> None:
-    """Add a strip beside the street's middle, between two x."""
+    """Add a strip along the street to the scene, between two x, `offset` and `width` (m) from its middle."""
     x = np.arange(low, high + 0.25, 0.5)
     across = np.linspace(offset - width / 2.0, offset + width / 2.0, max(2, int(width * 2)))
     sheet(name, np.repeat(x[None], len(across), axis=0), street(x)[None] + across[:, None], lift, material)
 
 
 def house(number: int, x: float, y: float, size: tuple[float, float, float], turn: float) -> None:
-    """Add walls and a gable roof of length, width and height (m)."""
+    """Add a house's walls and gable roof of (length, width, height), m, to the scene, turned by `turn` (rad)."""
     length, width, height = size
     cosine, sine = np.cos(turn), np.sin(turn)
     base = float(ground(np.array(x), np.array(y))) - 0.5
@@ -98,7 +98,7 @@ def house(number: int, x: float, y: float, size: tuple[float, float, float], tur
 
 
 def column(name: str, x: float, y: float, radius: float, height: float, material: str) -> None:
-    """Add an upright cylinder."""
+    """Add an upright cylinder (m) on the ground to the scene."""
     turn = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
     ring = np.column_stack([x + radius * np.cos(turn), y + radius * np.sin(turn)])
     base = float(ground(np.array(x), np.array(y)))
@@ -108,7 +108,7 @@ def column(name: str, x: float, y: float, radius: float, height: float, material
 
 
 def tree(number: int, x: float, y: float, height: float, random: np.random.Generator) -> None:
-    """Add a trunk and a crown of loose leaves."""
+    """Add a trunk and a crown of 900 random triangles as leaves to the scene."""
     column(f"Trunk.{number:02}", x, y, 0.16, 0.5 * height, "Bark")
     count = 900
     way = random.normal(size=(count, 3))
@@ -121,7 +121,7 @@ def tree(number: int, x: float, y: float, height: float, random: np.random.Gener
 
 
 def box(name: str, x: float, y: float, size: tuple[float, float, float], lift: float, material: str) -> None:
-    """Add a box that stands ``lift`` above the ground."""
+    """Add a box of (length, width, height), m, standing ``lift`` (m) above the ground, to the scene."""
     length, width, height = size
     base = float(ground(np.array(x), np.array(y))) + lift
     corners = [[x + i * length / 2, y + j * width / 2] for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
@@ -131,7 +131,7 @@ def box(name: str, x: float, y: float, size: tuple[float, float, float], lift: f
 
 
 def village() -> None:
-    """Fill the open file."""
+    """Add the whole village, with its materials, to the open file."""
     random = stream(3, "village")
     for name, colour in COLOURS.items():
         made = bpy.data.materials.new(name)

@@ -36,7 +36,7 @@ LINE, LETTER = 0.165, 0.0725
 
 @dataclass(frozen=True)
 class Rules:
-    """Packages as the contracts name them.
+    """Layers and forbidden imports of packages, as the contracts in pyproject.toml have them.
 
     Attributes:
         floors: of the add-on from top to bottom, each the packages side by side on it.
@@ -50,7 +50,7 @@ class Rules:
 
 
 def read_rules() -> Rules:
-    """Return what pyproject.toml says of who may import whom."""
+    """Read the layers and forbidden imports from the import contracts in pyproject.toml."""
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     contracts: list[dict[str, Any]] = settings["tool"]["importlinter"]["contracts"]
     layers = next(one["layers"] for one in contracts if one.get("containers") == [ADDON])
@@ -66,7 +66,7 @@ def read_rules() -> Rules:
 
 @dataclass(frozen=True)
 class Box:
-    """A package as it is drawn.
+    """A package's box in the picture: text, colour and place.
 
     Attributes:
         name: of the package.
@@ -85,17 +85,17 @@ class Box:
 
     @property
     def lines(self) -> list[str]:
-        """Return the text, wrapped to the box's width."""
+        """Return the text as lines wrapped to the box's width."""
         letters = int((self.width - 2 * GAP) / LETTER)
         return [line for part in self.text.splitlines() for line in textwrap.wrap(part, letters) or [""]]
 
     @property
     def height(self) -> float:
-        """Return how high the box must be for its text, inches."""
+        """Return the box's height that its text needs, inches."""
         return LINE * (len(self.lines) + 1) + 3 * GAP
 
     def draw(self, axes: Axes, top: float, height: float) -> None:
-        """Draw the box with its upper edge at `top`."""
+        """Draw the box with its upper edge at `top` and the given height (inches) into the axes."""
         corner = (self.left, top - height)
         style = "round,pad=0,rounding_size=0.05"
         axes.add_patch(
@@ -108,7 +108,7 @@ class Box:
 
 
 def make_box(folder: Path, color: str, left: float, width: float, more: Sequence[str] = ()) -> Box:
-    """Return the box of a package; `more` are lines below what it holds."""
+    """Return a package's box from its docstring, folders and number of files; `more` are lines below."""
     tree = ast.parse((folder / "__init__.py").read_text(encoding="utf-8"))
     lines = [(ast.get_docstring(tree) or "").split("\n\n")[0].replace("`", "")]
     if parts := sorted(path.parent.name for path in folder.glob("*/__init__.py")):
@@ -133,7 +133,7 @@ def floor_boxes(rules: Rules) -> Iterator[list[Box]]:
 
 
 def draw(axes: Axes, rules: Rules) -> float:
-    """Draw all boxes from 0 downwards; return how far they reach, inches."""
+    """Draw all boxes and the legend from 0 downwards into the axes; return their depth, inches."""
     head = make_box(ROOT / "headless", COLORS["commands"], 0.0, WIDTH)
     head.draw(axes, 0.0, head.height)
     top = -head.height - GAP - LINE
@@ -158,7 +158,7 @@ def draw(axes: Axes, rules: Rules) -> float:
 
 
 def main() -> None:
-    """Draw the picture."""
+    """Write the picture docs/pictures/layout.png."""
     rules = read_rules()
     figure, axes = plt.subplots()
     depth = draw(axes, rules)

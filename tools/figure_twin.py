@@ -47,7 +47,7 @@ SPAN = 45.0
 
 
 def surfaces(data: dict[str, Any]) -> Iterator[tuple[str, Float]]:
-    """Yield what every polygon of a file is, and its corners (K, 3) in metres from the file's origin."""
+    """Yield (kind, corners (K, 3), m from the file's origin) of every polygon of a CityJSON file's data."""
     vertices = np.array(data["vertices"]) * np.array(data["transform"]["scale"])
     for item in data["CityObjects"].values():
         kind = {"CityFurniture": "furniture", "BridgeConstructiveElement": "bridge"}.get(item["type"], "")
@@ -63,7 +63,7 @@ def surfaces(data: dict[str, Any]) -> Iterator[tuple[str, Float]]:
 
 
 def axis_of(data: dict[str, Any]) -> Float:
-    """Return the centreline (N, 3), m from the file's origin."""
+    """Return the first line string of a CityJSON file, the centreline (N, 3), m from the file's origin."""
     for item in data["CityObjects"].values():
         for shape in item.get("geometry", ()):
             if shape["type"] == "MultiLineString":
@@ -73,7 +73,7 @@ def axis_of(data: dict[str, Any]) -> Float:
 
 
 def along_road(points: Float, middle: Float, heading: float) -> Float:
-    """Return points (..., 3) with x along the road and y to its left, from a point of it."""
+    """Return points (..., 3) in a frame at a point of the road: x along `heading` (rad), y to the left, m."""
     moved = points - middle
     c, s = np.cos(heading), np.sin(heading)
     plan = np.stack([moved[..., 0] * c + moved[..., 1] * s, moved[..., 1] * c - moved[..., 0] * s], axis=-1)
@@ -81,7 +81,7 @@ def along_road(points: Float, middle: Float, heading: float) -> Float:
 
 
 def draw(data: dict[str, Any], station: float, target: Path) -> None:
-    """Draw 220 m of the road from above, and what a driver sees."""
+    """Write a picture of 220 m of the road about a station from above, and of the view ahead."""
     axis = axis_of(data)
     run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(axis[:, :2], axis=0), axis=1))])
     at = int(np.searchsorted(run, station))
@@ -106,7 +106,7 @@ def _from_above(axes: Any, placed: list[tuple[str, Float]]) -> None:
 
 
 def _ahead(axes: Any, placed: list[tuple[str, Float]]) -> None:
-    """Draw the polygons before a camera 6 m above the road, the farthest first; markings after what they lie on."""
+    """Draw the polygons before a camera 9 m above the road, the farthest first; markings after what they lie on."""
     eye = np.array([-110.0, -8.0, 9.0])
     shown = []
     for kind, ring in placed:
@@ -122,7 +122,7 @@ def _ahead(axes: Any, placed: list[tuple[str, Float]]) -> None:
 
 
 def main() -> None:
-    """Draw the file that is named on the command line."""
+    """Draw the CityJSON file that the command line names."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("file", type=Path)
     parser.add_argument("picture", type=Path)

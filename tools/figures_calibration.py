@@ -35,7 +35,7 @@ GIVES_GAIN = "als_dual4lane_t338-369"
 
 
 def command(folder: Path, name: str, gain: float | None, tables: Path, pictures: Path) -> list[str]:
-    """Return the arguments of `synthroads calibrate` for a cloud."""
+    """Return the words of the command `synthroads calibrate` for one of `CLOUDS`."""
     beside = name.startswith("als_")
     words = ["calibrate", "--real", str(folder / f"{name}.laz")]
     words += ["--axis", str(folder / f"{name}_axis.csv")] if beside else []
@@ -50,7 +50,7 @@ def command(folder: Path, name: str, gain: float | None, tables: Path, pictures:
 
 
 def calibrated(words: list[str]) -> dict[str, Any]:
-    """Run the command; return its report."""
+    """Run a `synthroads` command; return its JSON report, or exit with its code if it fails."""
     said = io.StringIO()
     with contextlib.redirect_stdout(said):
         code = synthroads([*words, "--overwrite", "--json"])
@@ -61,7 +61,7 @@ def calibrated(words: list[str]) -> dict[str, Any]:
 
 
 def rows(name: str, report: dict[str, Any]) -> list[str]:
-    """Return the lines of the table for one cloud."""
+    """Return the Markdown table's lines, one per material, for one cloud's report."""
     lines = []
     for entry in report["classes"]:
         errors = entry["error_of_interquartile_range"].values()
@@ -82,7 +82,7 @@ def rows(name: str, report: dict[str, Any]) -> list[str]:
 
 
 def main() -> None:
-    """Calibrate against every cloud."""
+    """Calibrate against every real cloud; print the table, gains and commands."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("real", type=Path, metavar="REAL_FOLDER")
     parser.add_argument("--output", type=Path, required=True, metavar="DIR", help="folder for the pictures")

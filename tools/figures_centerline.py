@@ -90,7 +90,7 @@ OTHER = "other-scanner"
 
 @dataclass(frozen=True)
 class Model:
-    """A model of some name, trained once per seed.
+    """A named centreline model, trained once per seed.
 
     Attributes:
         kind: of the truth that it learned.
@@ -107,7 +107,7 @@ class Model:
 
 @dataclass(frozen=True)
 class GridSearch:
-    """Variants tried for the baseline, and the best.
+    """Result of the skeleton baseline's grid search: the settings tried, and the best.
 
     Attributes:
         best: of the settings that find at least `FOUND` of the slices, the one with the smallest mean distance.
@@ -126,7 +126,7 @@ BINS = (1.0, 5.0, 10.0)
 
 
 def grid_search(shown: Sequence[Case], masks: Sequence[str]) -> GridSearch:
-    """Return the baseline's best settings on the cases of one road, to be frozen for all others."""
+    """Try all settings of the skeleton baseline on one road's cases; return the figures of each and the best."""
     rows: list[tuple[SkeletonSettings, dict[str, float]]] = []
     for mask, raster, branch in product(masks, RASTERS, BRANCHES):
         tried = [SkeletonSettings(raster, branch, mask, width) for width in BINS]
@@ -172,7 +172,7 @@ def road_table(measured: Measured, roads: Mapping[str, str], columns: tables.Col
 
 
 class RememberingPredictor(CenterlinePredictor):
-    """A predictor that doesn't find twice what it found on the same points in the same frames.
+    """A centreline predictor that caches its results by points and frames.
 
     Those that `calibrate` makes of it share its memory.
     """
@@ -188,14 +188,14 @@ class RememberingPredictor(CenterlinePredictor):
 
 
 def remembering(plain: CenterlinePredictor) -> RememberingPredictor:
-    """Return a predictor that has a memory."""
+    """Return a caching copy of a centreline predictor, with an empty cache."""
     other = RememberingPredictor(plain.model, plain.settings, plain.use, plain.calibration)
     other.memory = {}
     return other
 
 
 def models(runs: Sequence[str]) -> dict[str, list[Model]]:
-    """Return the trained models by name, given as NAME=FOLDER; those of one name, truth and real roads are one."""
+    """Load trained runs given as NAME=FOLDER; return models by name, merging those of one truth and real roads."""
     found: dict[str, dict[tuple[TruthKind, frozenset[str], float], list[Predictor]]] = {}
     for text in runs:
         name, _, folder = text.partition("=")
@@ -210,7 +210,7 @@ def models(runs: Sequence[str]) -> dict[str, list[Model]]:
 
 
 def kind_of(run: Run[Any]) -> TruthKind:
-    """Return the kind of truth that a run learned."""
+    """Return the kind of truth, road or carriageway, that a run learned."""
     return _part(run, SliceSettings).truth
 
 
@@ -229,7 +229,7 @@ def _part(run: Run[Any], kind: type[AnyPart]) -> AnyPart:
 def of_kind(
     trained: Mapping[str, Sequence[Model]], kind: TruthKind, seeds: int, road: str = ""
 ) -> dict[str, list[Predictor]]:
-    """Return the models that learned one kind of truth, but not a real road: one version, or as many as seeds.
+    """Return by name the predictors that learned one kind of truth and not the named road: one, or one per seed.
 
     Without a road, as for synthetic ones, all versions of a name count, and the first of them are taken.
     """
@@ -247,13 +247,13 @@ def of_kind(
 
 
 def seen_by(trained: Mapping[str, Sequence[Model]], kind: TruthKind) -> float:
-    """Return how far to either side the models of a kind see, m: what learns nothing sees as far."""
+    """Return the largest half-width (m) of the slices of the models of one kind of truth, for the baselines."""
     widths = [model.half_width for several in trained.values() for model in several if model.kind == kind]
     return max(widths, default=HALF_WIDTH)
 
 
 def baselines(search: GridSearch, half_width: float = HALF_WIDTH) -> dict[str, list[Predictor]]:
-    """Return the skeleton with the best settings and with the reference system's, and what learns nothing."""
+    """Return the untrained predictors by name: the skeleton with the best and the reference settings, trivial ones."""
     best = search.best
     reference = replace(REFERENCE, mask=best.mask)
     tuned, plain = (f"skeleton, {one.raster:g} m, {one.branch:g} m, {one.bin:g} m" for one in (best, reference))
@@ -266,14 +266,14 @@ def baselines(search: GridSearch, half_width: float = HALF_WIDTH) -> dict[str, l
 
 
 def synthetic_roads(texts: Sequence[str], kind: TruthKind) -> list[LearningRoad]:
-    """Return the roads of data sets' splits, given as FOLDER or FOLDER:SPLIT."""
+    """Read the roads of data sets given as FOLDER or FOLDER:SPLIT (test if not given)."""
     parts = [text.partition(":") for text in texts]
     scenes = [scene for folder, _, split in parts for scene in scene_folders(Path(folder), split or "test")]
     return [road for scene in scenes for road in read_scene(scene, kind)]
 
 
 def searched(shown: Sequence[Case], masks: Sequence[str], file: Path) -> GridSearch:
-    """Run the baseline's grid search and write down what it tried."""
+    """Run the skeleton baseline's grid search and write its settings and figures to a JSON file; return it."""
     search = grid_search(shown, masks)
     rows = [{"raster": s.raster, "branch": s.branch, "mask": s.mask, "bin": s.bin, **row} for s, row in search.rows]
     text = json.dumps({"best": vars(search.best), "road": shown[0].road.name, "tried": rows}, indent=1)
@@ -282,12 +282,12 @@ def searched(shown: Sequence[Case], masks: Sequence[str], file: Path) -> GridSea
 
 
 def shown_by(roads: Sequence[LearningRoad], cropping: Cropping | None, estimated: bool) -> Callable[[int], list[Case]]:
-    """Return what shows the roads as a seed has them."""
+    """Return a function from a seed to the roads' evaluation cases."""
     return lambda seed: [make_case(road, seed, cropping=cropping, estimated=estimated) for road in roads]
 
 
 def synthetic(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Model]]) -> dict[str, str]:
-    """Measure on the synthetic data sets; return the document's tables."""
+    """Measure on the synthetic data sets; return the document's Markdown tables by name."""
     result: dict[str, str] = {}
     for kind in arguments.truths:
         if arguments.in_domain:
@@ -298,7 +298,7 @@ def synthetic(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Mode
 
 
 def in_domain(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Model]], kind: TruthKind) -> dict[str, str]:
-    """Measure on roads of the scanner that was trained on, the baseline tuned on the first of them."""
+    """Measure on roads of the training's scanner, write tables and pictures; return Markdown tables by name."""
     name, roads = f"in-domain-{kind}", synthetic_roads(arguments.in_domain, kind)
     cases = shown_by(roads, None, estimated=False)
     search = searched(cases(arguments.seeds[0])[:1], ["classes"], arguments.output / f"skeleton-{name}.json")
@@ -313,7 +313,7 @@ def in_domain(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Mode
 def other_scanners(
     arguments: argparse.Namespace, trained: Mapping[str, Sequence[Model]], kind: TruthKind
 ) -> dict[str, str]:
-    """Measure on roads of other scanners, each with columns of its own; the baseline is tuned on the very first."""
+    """Measure on roads of other scanners and write tables; return Markdown tables by name, columns per scanner."""
     name, learned = f"{OTHER}-{kind}", of_kind(trained, kind, len(arguments.seeds))
     again, sets = by_title(arguments.recalibrate), by_title(arguments.other)
     roads = {title: synthetic_roads(texts, kind) for title, texts in sets.items()}
@@ -337,7 +337,7 @@ def other_scanners(
 
 
 def by_title(texts: Sequence[str]) -> dict[str, list[str]]:
-    """Return data sets, given as TITLE=FOLDER[:SPLIT], by their titles."""
+    """Return the FOLDER[:SPLIT] texts of arguments TITLE=FOLDER[:SPLIT] by title; exit if one isn't of that form."""
     found: dict[str, list[str]] = {}
     for text in texts:
         title, equals, folder = text.partition("=")
@@ -350,7 +350,7 @@ def by_title(texts: Sequence[str]) -> dict[str, list[str]]:
 def recalibrated(
     seeds: Sequence[int], learned: Mapping[str, Sequence[Predictor]], roads: Sequence[LearningRoad]
 ) -> dict[str, list[Predictor]]:
-    """Return the models with one factor each on their deviations, found on a few roads of another scanner."""
+    """Return copies of the models with deviations recalibrated on some roads, by "NAME, recalibrated"."""
     found: dict[str, list[Predictor]] = {}
     for name, versions in learned.items():
         for seed, version in zip(seeds, versions, strict=False):
@@ -366,7 +366,7 @@ def corridor_table(
     learned: Mapping[str, Sequence[Predictor]],
     cases: Callable[[int], Sequence[Case]],
 ) -> dict[str, str]:
-    """Return the table of what models say of the corridor, if there are any."""
+    """Measure the models' corridors and write tables; return one Markdown table by name, none without models."""
     if not learned:
         return {}
     corridor = measure_corridor(learned, cases, arguments.seeds)
@@ -377,7 +377,7 @@ def corridor_table(
 def measure_corridor(
     learned: Mapping[str, Sequence[Predictor]], cases: Callable[[int], Sequence[Case]], seeds: Sequence[int]
 ) -> Measured:
-    """Return mean errors and coverage of everything that the models say of the corridor, by model and target."""
+    """Return mean errors and coverage of each corridor target over seeds, by "MODEL: TARGET"."""
     corridor_figures = import_module("ml.centerline.measuring").corridor_figures
     rows: dict[str, list[dict[str, float]]] = {}
     for index, seed in enumerate(seeds):
@@ -391,7 +391,7 @@ def measure_corridor(
 
 
 def real(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Model]]) -> dict[str, str]:
-    """Measure on the real roads, cropped in several ways; return the document's tables."""
+    """Measure on the real roads, cropped in several ways, write tables; return Markdown tables by name."""
     if arguments.real is None:
         return {}
     roads = {
@@ -421,7 +421,7 @@ def measure_painted(
     trained: Mapping[str, Sequence[Model]],
     search: GridSearch,
 ) -> Measured:
-    """Return the figures of all predictors, and of the measured axis, against the line that is painted beside it."""
+    """Return the figures of all predictors and of the measured axis against the painted line beside it."""
     line, kind = with_painted_line(road), REAL_ROADS[road.name][1]
     predictors = of_kind(trained, kind, len(seeds), road.name) | baselines(search, seen_by(trained, kind))
     predictors["the measured axis"] = [axis_predictor(road)]
@@ -437,7 +437,7 @@ def measure_painted(
 
 
 def axis_predictor(known: LearningRoad) -> Predictor:
-    """Return what predicts a road's measured axis."""
+    """Return a predictor that gives a road's measured axis as the centre."""
     return lambda road, frames: known.known_truth.axis.crossing(frames.position, frames.direction)[0][:, None]
 
 
@@ -448,7 +448,7 @@ def measure_real(
     trained: Mapping[str, Sequence[Model]],
     search: GridSearch,
 ) -> Measured:
-    """Return the figures of all predictors on the roads whose kind of truth they know and that they didn't learn."""
+    """Return the figures of all predictors on the real roads of their kind of truth that they didn't learn from."""
     merged: Measured = {name: {} for name in (*trained, *baselines(search))}
     for road, (_, kind) in REAL_ROADS.items():
         predictors = of_kind(trained, kind, len(seeds), road) | baselines(search, seen_by(trained, kind))
@@ -461,7 +461,7 @@ def measure_real(
 def draw_synthetic(
     arguments: argparse.Namespace, road: LearningRoad, versions: Mapping[str, Sequence[Predictor]], search: GridSearch
 ) -> None:
-    """Draw centrelines and a corridor over a synthetic road."""
+    """Write pictures of centrelines and of one corridor over a synthetic road."""
     shown = make_case(road, arguments.seeds[0], cropping=None, estimated=False)
     learned = {name: several[0] for name, several in versions.items()}
     view = middle(road, 160.0)
@@ -476,7 +476,7 @@ def draw_synthetic(
 def draw_real(
     arguments: argparse.Namespace, road: LearningRoad, trained: Mapping[str, Sequence[Model]], search: GridSearch
 ) -> None:
-    """Draw centrelines over a real road with cropped slices."""
+    """Write a picture of centrelines over a real road with cropped slices."""
     kind = REAL_ROADS[road.name][1]
     shown = make_case(road, arguments.seeds[0], cropping=CROPPINGS["real-slices"], estimated=True)
     fit = of_kind(trained, kind, len(arguments.seeds), road.name)
@@ -494,7 +494,7 @@ def draw_lines(
     view: pictures.PictureView,
     title: str,
 ) -> None:
-    """Draw the learned lines, the tuned baseline and the best known trivial one."""
+    """Write a picture of the learned lines, the tuned skeleton and the middle of the extent over a road."""
     tuned, _, *_ = baselines(search).items()
     trivial = ("middle of the extent", trivial_predictors()["middle of the extent"])
     lines = {name: predictor(shown.road, shown.frames)[:, 0] for name, predictor in learned.items()}
@@ -505,13 +505,13 @@ def draw_lines(
 
 
 def middle(road: LearningRoad, length: float) -> pictures.PictureView:
-    """Return the view of some metres in the middle of a road."""
+    """Return the view of `length` (m) in the middle of a road."""
     whole = road.reference.length
     return pictures.PictureView(max(0.0, (whole - length) / 2.0), min(whole, (whole + length) / 2.0))
 
 
 def arguments_of(words: Sequence[str] | None) -> argparse.Namespace:
-    """Return the command line's arguments."""
+    """Return the parsed arguments of the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--run", action="append", default=[], metavar="NAME=FOLDER", help="a trained run (repeatable)")
     parser.add_argument(
@@ -541,7 +541,7 @@ def arguments_of(words: Sequence[str] | None) -> argparse.Namespace:
 
 
 def expected(arguments: argparse.Namespace) -> list[str]:
-    """Return the names of the tables that will be made."""
+    """Return the names of the tables that the arguments ask for."""
     names = [f"in-domain-{kind}" for kind in arguments.truths if arguments.in_domain]
     others = [f"{OTHER}-{kind}" for kind in arguments.truths if arguments.other]
     if arguments.run:
@@ -551,13 +551,13 @@ def expected(arguments: argparse.Namespace) -> list[str]:
 
 
 def measured_tables(arguments: argparse.Namespace) -> dict[str, str]:
-    """Measure everything that is given; return the document's tables."""
+    """Measure on all data that are given; return the document's Markdown tables by name."""
     trained = models(arguments.run)
     return synthetic(arguments, trained) | real(arguments, trained)
 
 
 def main(words: Sequence[str] | None = None) -> None:
-    """Command line."""
+    """Measure as the command line says, fill the document's tables and print them."""
     arguments = arguments_of(words)
     try:
         found = fill(arguments.document, expected(arguments), lambda: measured_tables(arguments))

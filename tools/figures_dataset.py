@@ -23,7 +23,7 @@ HEAD = ("group", "scenes", "points", "classes", "images (s)", "scan and LAZ (s)"
 
 
 def rows(folder: Path) -> list[tuple[str, ...]]:
-    """Return the table's cells, a row per group of scenes and one for all; times and memory are ranges over scenes.
+    """Return a data set's table as rows of cells: one per group of scenes and one for all, with ranges over scenes.
 
     Raises:
         MissingFileError, InputError: the folder holds no readable data set.
@@ -57,7 +57,7 @@ def _range(values: list[float]) -> str:
 
 
 def costs(folder: Path, scenes: int, cores: int) -> list[tuple[str, str, str]]:
-    """Return what so many scenes like those of a data set cost: rows of what, per scene, and of all together.
+    """Return the cost of `scenes` scenes like a data set's, as rows (what, per scene, in all): hours, bytes, files.
 
     The time is that of the whole run, from its recipe, which is written first, to its manifest, which is last; so the
     run must not have been stopped in between, and nothing else have used its cores.
@@ -88,7 +88,7 @@ def _changed(path: Path) -> float:
 
 
 def main() -> None:
-    """Command line."""
+    """Print the table of the data set that the command line names, or its cost."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="finished data set")
     parser.add_argument("--scenes", type=int, help="print what so many scenes cost instead")

@@ -54,7 +54,7 @@ SEED = 2
 
 
 class Turned:
-    """A road whose points are turned so that a stretch of it runs to the right, from the stretch's middle."""
+    """An OpenDRIVE road in a frame at the middle of a stretch, x along it: the stretch runs to the right."""
 
     def __init__(self, road: OpenDrive, stretch: tuple[float, float]) -> None:
         self.road = road
@@ -65,17 +65,17 @@ class Turned:
         self.origin = road.point(middle, np.zeros(1))[0, :2]
 
     def at(self, s: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """Return points (N, 2) at stations and offsets."""
+        """Return the points (N, 2), m, at stations s and offsets t (N,) in the turned frame."""
         return (self.road.point(s, t)[:, :2] - self.origin) @ self.turn.T
 
     def place(self, item: ElementTree.Element) -> tuple[np.ndarray, float]:
-        """Return where an object is and the road's heading there."""
+        """Return an object's place (2,), m, and the road's heading there, rad, in the turned frame."""
         s = np.array([number(item, "s")])
         return self.at(s, np.array([number(item, "t")]))[0], float(self.road.reference(s)[1][0]) - self.heading
 
 
 def lanes(axes: Axes, map_: Turned, span: tuple[float, float]) -> set[str]:
-    """Fill the lanes between two stations; return their types."""
+    """Draw the lanes between two stations by type into the axes; return their types."""
     types, road = set(), map_.road
     for section in road.sections:
         start, end = max(section.start, span[0]), min(section.end, span[1])
@@ -93,7 +93,7 @@ def lanes(axes: Axes, map_: Turned, span: tuple[float, float]) -> set[str]:
 
 
 def paint(axes: Axes, map_: Turned, span: tuple[float, float]) -> None:
-    """Fill the road marks and the painted areas in their true widths."""
+    """Draw the road marks and painted areas between two stations in true width into the axes."""
     faces, colours, road = [], [], map_.road
     for mark in road.marks():
         if mark.end < span[0] or mark.start > span[1]:
@@ -112,7 +112,7 @@ def paint(axes: Axes, map_: Turned, span: tuple[float, float]) -> None:
 
 
 def furniture(axes: Axes, map_: Turned, span: tuple[float, float]) -> None:
-    """Draw barriers along their axes, other objects by their outlines or as dots, and where signals face."""
+    """Draw barriers as lines, other objects as outlines or dots, and signals as arrows into the axes."""
     walls, road = [], map_.road
     for item in road.objects().values():
         for repeat in item.findall("repeat"):

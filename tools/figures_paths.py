@@ -44,7 +44,7 @@ COLORS = ("#d1495b", "#00798c")
 
 
 def curved_road() -> RoadGuide:
-    """Return 850 m of motorway with two curves."""
+    """Return the guide of a sampled motorway of 850 m with two curves."""
     rows = (
         (60.0, 0.0, 0.0),
         (90.0, 0.0, 1 / 300),
@@ -69,7 +69,7 @@ def curved_road() -> RoadGuide:
 
 
 def draw_road(axes: Axes, guide: RoadGuide) -> None:
-    """Fill the paved carriageways and draw the centreline."""
+    """Draw the paved carriageways and the centreline into the axes."""
     station = np.linspace(0.0, guide.length, 800)
     plan, heading, _, _ = guide.frame(station)
     left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
@@ -81,7 +81,7 @@ def draw_road(axes: Axes, guide: RoadGuide) -> None:
 
 
 def draw_path(axes: Axes, guide: RoadGuide, platform: Platform) -> None:
-    """Draw a platform's strips with arrows in the direction of travel."""
+    """Draw a platform's strips with arrows in the direction of travel into the axes."""
     path = platform.make_path(guide)
     for strip in path.strips:
         position, _ = path.pose(strip, strip.start_time + np.linspace(0.0, strip.duration, 1200))
@@ -94,7 +94,7 @@ def draw_path(axes: Axes, guide: RoadGuide, platform: Platform) -> None:
 
 
 def draw_tripods(axes: Axes, guide: RoadGuide) -> None:
-    """Mark the usual positions of a tripod."""
+    """Draw the default positions of a tripod, numbered, into the axes."""
     path = make_platform("tripod").make_path(guide)
     place = np.array([path.pose(strip, np.array([strip.start_time]))[0][0] for strip in path.strips])
     axes.plot(*place[:, :2].T, ls="", marker="^", color="#222222", ms=6)
@@ -104,7 +104,7 @@ def draw_tripods(axes: Axes, guide: RoadGuide) -> None:
 
 
 def main() -> None:
-    """Draw the picture."""
+    """Write the picture docs/pictures/scan-paths.png."""
     guide = curved_road()
     figure, grid = plt.subplots(2, 2, figsize=(13.0, 4.1), layout="constrained", sharex=True, sharey=True)
     for axes, (title, options) in zip(grid.ravel(), PANELS, strict=True):

@@ -31,7 +31,7 @@ TARGET = ROOT / "docs" / "pictures" / "scan-patterns.png"
 
 
 def generic(pattern: dict[str, object], rate_khz: float, view_deg: float, lines: float, **other: object) -> Device:
-    """Return a device that is made to be looked at: few pulses per line."""
+    """Return a device with a scan pattern, few pulses per line so that they can be told apart in a picture."""
     return Device.from_dict(
         load_device("generic-polygon").to_dict()
         | {
@@ -44,7 +44,7 @@ def generic(pattern: dict[str, object], rate_khz: float, view_deg: float, lines:
 
 
 def wedges(*turns: int) -> dict[str, object]:
-    """Return wedges like those of the presets."""
+    """Return the JSON data of a pattern of one or two rotating wedge prisms, by the ratio of their turns."""
     angle, index = (33.582, 1.509) if len(turns) == 1 else (25.39, 1.51)
     return {
         "type": "wedge_prism",
@@ -60,7 +60,7 @@ CROSSED = [{"yaw_deg": 45.0}, {"yaw_deg": -45.0}]
 
 @dataclass(frozen=True)
 class Panel:
-    """One part of the picture: a device above flat ground; half is half the width shown, m."""
+    """One panel of the picture: a device above flat ground, its height, speed (m/s), duration (s), half-width (m)."""
 
     title: str
     device: Device
@@ -109,7 +109,7 @@ PANELS = [
 
 
 def on_ground(panel: Panel) -> tuple[Float, Float]:
-    """Return where the pulses hit flat ground: to the right and ahead (N,), m."""
+    """Return where a panel's pulses hit flat ground: offsets to the right and ahead, both (N,), m."""
     setting = setting_of(panel.device, ScanScenario())
     shot = shots(setting, 0, shot_count(setting, panel.duration))
     forward, left, up = shot.direction
@@ -119,7 +119,7 @@ def on_ground(panel: Panel) -> tuple[Float, Float]:
 
 
 def main(target: Path = TARGET) -> None:
-    """Write the picture."""
+    """Write the picture of all patterns' points on the ground to a PNG file."""
     figure, axes = plt.subplots(2, 5, figsize=(16, 7.4), layout="constrained")
     for axis, panel in zip(axes.flat, PANELS, strict=True):
         right, ahead = on_ground(panel)

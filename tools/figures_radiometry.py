@@ -63,7 +63,7 @@ ANGLES = np.linspace(0.0, 89.9, 400)
 
 
 def main() -> None:
-    """Make the pictures, or print the tables."""
+    """Write the pictures or print the tables, as the command line says."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--output", type=Path, help="folder of the pictures")
     parser.add_argument("--tables", action="store_true", help="print the tables of docs/radiometry.md")
@@ -80,7 +80,7 @@ def main() -> None:
 
 
 def beam_patterns() -> Any:
-    """Draw the rays of the patterns from across, and a cone and a cylinder on a step from the side."""
+    """Return a figure of the beam patterns' rays across the beam, and of a conical and a cylindrical beam on a step."""
     figure: Any = pyplot.figure(figsize=(10.5, 6.4), layout="constrained")
     upper, lower = figure.subfigures(2, 1, height_ratios=[1.0, 1.35])
     chosen = {rays: rings for rays, rings in RINGS.items() if rays > 1} | {21: (10, 10)}
@@ -110,7 +110,7 @@ def _pattern(axes: Any, rings: tuple[int, ...]) -> None:
 
 
 def _step(axes: Any, beam: str) -> None:
-    """Draw the rays of one pulse, 150 mrad wide to be seen, from 60 m above the ground beside a roof at 20 m."""
+    """Draw one pulse's rays, 150 mrad wide, from 60 m above the ground beside a roof at 20 m, into the axes."""
     divergence, height, roof = (0.15, 0.15), 60.0, 20.0
     east, north, up = (np.eye(3)[axis][:, None] for axis in range(3))
     down = -up
@@ -140,7 +140,7 @@ def _step(axes: Any, beam: str) -> None:
 
 
 def weather() -> Any:
-    """Draw what comes back over the range, and the extinction over the visibility."""
+    """Return a figure of the light left over the range by weather, and of the extinction over the visibility."""
     figure, (left, right) = pyplot.subplots(1, 2, figsize=(10.5, 4.4), layout="constrained")
     ranges = np.linspace(0.0, 250.0, 300)
     for label, condition, color in CONDITIONS:
@@ -165,7 +165,7 @@ def weather() -> Any:
 
 
 def reflection_models() -> Any:
-    """Draw the brightness over the incidence angle: of facets, and of the table's materials."""
+    """Return a figure of brightness over incidence angle, of Oren-Nayar facets and of the table's materials."""
     figure, (left, right) = pyplot.subplots(1, 2, figsize=(10.5, 4.4), layout="constrained")
     cosine = np.cos(np.deg2rad(ANGLES))
     shades = pyplot.get_cmap("viridis")(np.linspace(0.0, 0.85, 6))
@@ -209,7 +209,7 @@ def _brightness(material: Material, cosine: Any) -> Any:
 
 
 def print_tables() -> None:
-    """Print the tables of the documentation."""
+    """Print the tables of weathers' extinction and of materials' reflection as Markdown."""
     print("| weather | measure | extinction at 905 nm (1/km) | at 1550 nm | left over 50 m at 905 nm | over 100 m |")
     print("|---|---|---|---|---|---|")
     for condition, model in WEATHERS.items():

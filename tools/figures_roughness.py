@@ -46,7 +46,7 @@ STRIP: tuple[tuple[str, float, str], ...] = (
 
 @dataclass(frozen=True)
 class Cloud:
-    """Points on a strip of road.
+    """Points on a strip of road, with their surfaces.
 
     Attributes:
         xyz: (N, 3) along, across and height above the mean surface, m.
@@ -59,7 +59,7 @@ class Cloud:
 
 
 def strip_points(low: tuple[float, float], high: tuple[float, float], density: float) -> Cloud:
-    """Return points at random on a smooth, level strip of several surfaces; density in points/m2."""
+    """Return uniform random points on a smooth, level strip of several surfaces; density in points/m2."""
     random = stream(SEED, "points", round(density))
     count = round(density * (high[0] - low[0]) * (high[1] - low[1]))
     plan = random.uniform(low, high, (count, 2))
@@ -68,7 +68,7 @@ def strip_points(low: tuple[float, float], high: tuple[float, float], density: f
 
 
 def with_relief(cloud: Cloud, strength: float, noise: float = 0.0, octaves: int = 4) -> Cloud:
-    """Return the cloud with the relief of its surfaces and a scanner's noise, m, seen from straight above."""
+    """Return the cloud with its surfaces' relief (times `strength`) and Gaussian noise (m) added to the heights."""
     table = np.array([RELIEF[name] for name, _, _ in STRIP])
     amplitude, wavelength = table[cloud.surface].T
     height = strength * amplitude * noise_field(cloud.xyz, wavelength, SEED, octaves)
@@ -77,14 +77,14 @@ def with_relief(cloud: Cloud, strength: float, noise: float = 0.0, octaves: int 
 
 
 def thinned(xyz: Float, size: float = GRID) -> Float:
-    """Return the first point of each cell of a grid."""
+    """Return the first point of each occupied cell of a cubic grid, in order, (K, 3)."""
     cell = np.floor((xyz - xyz.min(axis=0)) / size).astype(np.int64)
     _, first = np.unique(cell, axis=0, return_index=True)
     return xyz[np.sort(first)]
 
 
 def measure(xyz: Float) -> dict[str, float]:
-    """Return statistics of one surface's points: residual about planes (mm) and surface variation."""
+    """Return one surface's medians of residual about planes (mm) and surface variation, with points and patches."""
     xyz = thinned(xyz)
     residual, _ = plane_residuals(xyz, PATCH)
     chosen = stream(SEED, "chosen").choice(len(xyz), min(SAMPLE, len(xyz)), replace=False)
@@ -101,7 +101,7 @@ LAGS = np.array([0.0, 0.1, 0.2, 0.4, 0.7, 1.0])
 
 
 def semivariogram(xyz: Float) -> Float:
-    """Return the root of the semivariance (mm) of heights about planes of 2 m patches, by `LAGS` between points."""
+    """Return the root semivariance (mm) of heights about quadratic surfaces of 2 m patches, per bin of `LAGS` (m)."""
     from scipy.spatial import cKDTree
 
     height = residuals(xyz, 2.0)
@@ -115,7 +115,7 @@ def semivariogram(xyz: Float) -> Float:
 
 
 def residuals(xyz: Float, size: float) -> Float:
-    """Return heights above the quadratic surface through each patch; NaN where there are too few points."""
+    """Return heights (N,), m, above the quadratic surface fitted to each patch of `size` (m); NaN below 20 points."""
     cell = np.floor(xyz[:, :2] / size).astype(np.int64)
     _, patch = np.unique(cell, axis=0, return_inverse=True)
     result = np.full(len(xyz), np.nan)
@@ -127,7 +127,7 @@ def residuals(xyz: Float, size: float) -> Float:
 
 
 def above_surface(xyz: Float, base: Float) -> Float:
-    """Return heights above the quadratic surface fitted to `base`."""
+    """Return the points' heights (N,), m, above the quadratic surface fitted to the points `base` by least squares."""
     centre = base.mean(axis=0)
 
     def terms(points: Float) -> Float:
@@ -139,7 +139,7 @@ def above_surface(xyz: Float, base: Float) -> Float:
 
 
 def read_real(arguments: argparse.Namespace) -> Cloud:
-    """Return a real cloud as (along, across, height) with its asphalt apart.
+    """Read a real cloud as (along, across, height), m, with the points of its asphalt selected.
 
     Asphalt is what was selected, lies between the offsets (on either side) or distances given, and is no brighter than
     the median of that by a twelfth: paint is. Points of intensity 0 are left out.
@@ -164,7 +164,7 @@ def read_real(arguments: argparse.Namespace) -> Cloud:
 
 
 def along_axis(plan: Float, file: Path) -> Float:
-    """Return station and offset (positive to the left) of points from an axis's CSV with columns s, x, y."""
+    """Return station and offset (N, 2), m, left positive, of points (N, 2) along an axis' CSV with columns s, x, y."""
     table = np.genfromtxt(file, delimiter=",", names=True)
     axis = np.column_stack([table["x"], table["y"]])
     start, run = axis[:-1], np.diff(axis, axis=0)
@@ -183,7 +183,7 @@ def along_axis(plan: Float, file: Path) -> Float:
 
 
 def hillshade(axes: Any, xyz: Float, low: Float, high: Float, cell: float, exaggeration: float) -> None:
-    """Draw the mean height per cell, lit from the upper left at 45 degrees; white where there are no points."""
+    """Draw a hillshade of the mean height per cell into the axes, lit from the upper left at 45 degrees."""
     shape = np.round((high - low) / cell).astype(int)
     place = np.floor((xyz[:, :2] - low) / cell).astype(int)
     inside = ((place >= 0) & (place < shape)).all(axis=1)
@@ -199,7 +199,7 @@ def hillshade(axes: Any, xyz: Float, low: Float, high: Float, cell: float, exagg
 
 
 def filled(raster: Float) -> Float:
-    """Return the raster with empty (NaN) cells at the mean of their neighbours; larger holes stay empty inside."""
+    """Return the raster with NaN cells set to the mean of their 8 neighbours; larger holes stay NaN inside."""
     padded = np.pad(raster, 1, constant_values=np.nan)
     around = np.lib.stride_tricks.sliding_window_view(padded, (3, 3)).reshape(*raster.shape, 9)
     number = np.isfinite(around).sum(axis=2)
@@ -208,14 +208,14 @@ def filled(raster: Float) -> Float:
 
 
 def section(axes: Any, cloud: Cloud, station: float, depth: float) -> None:
-    """Draw heights across the road of the points within `depth` along it."""
+    """Draw the heights (mm) across the road of the points within `depth` (m) about a station into the axes."""
     near = np.abs(cloud.xyz[:, 0] - station) < 0.5 * depth
     colors = np.array([color for _, _, color in STRIP] + ["#c9c9c9"])[cloud.surface[near]]
     axes.scatter(cloud.xyz[near, 1], 1e3 * cloud.xyz[near, 2], s=5, c=colors, linewidths=0)
 
 
 def statistics(real: Cloud | None) -> Rows:
-    """Print roughness by strength, noise-free and with the device's noise, and that of the real asphalt."""
+    """Print the roughness by relief strength and of the real asphalt; return it without and with range noise."""
     plain = strip_points((0.0, -1.6), (400.0, 4.0), 18.0)
     plain = Cloud(plain.xyz, np.full(len(plain.xyz), 2))
     rows: Rows = ([], [])
@@ -244,7 +244,7 @@ def statistics(real: Cloud | None) -> Rows:
 
 
 def footprints() -> None:
-    """Print the standard deviation of the relief's means over Gaussian footprints (diameters at 1/e2), strength 1."""
+    """Print the share of the relief's deviation that is left of its means over Gaussian footprints, by diameters."""
     random = stream(SEED, "footprint")
     centres = np.column_stack([random.uniform(-300, 300, (1500, 2)), np.zeros(1500)])
     for name in ("asphalt", "verge", "grass_ground"):
@@ -259,7 +259,7 @@ def footprints() -> None:
 
 
 def timing(count: int = 1_000_000) -> None:
-    """Print the processor time per million points, by fidelity."""
+    """Print the micro-relief's processor seconds per million points, by fidelity."""
     size = 2**15  # points that a scan works on at once
     blocks = [
         point_block(stream(SEED, "timing", part).uniform(-300, 300, (size, 3)) * np.array([1.0, 0.25, 0.01]))
@@ -277,7 +277,7 @@ def timing(count: int = 1_000_000) -> None:
 
 
 def point_block(position: Float) -> PointBlock:
-    """Return points of one material on level ground, seen from straight above."""
+    """Return a block of points (N, 3) of one material on level ground, seen from straight above."""
     count = len(position)
     return PointBlock(
         xyz=position,
@@ -298,7 +298,7 @@ def point_block(position: Float) -> PointBlock:
 
 
 def draw(output: Path, real: Cloud | None, station: float | None, rows: Rows) -> None:
-    """Write the picture: close-ups, then top views and sections as a scanner's points show them."""
+    """Write the picture: hillshaded close-ups, roughness curves, then top views and sections of sparse points."""
     import matplotlib as mpl
 
     mpl.use("Agg")
@@ -335,7 +335,7 @@ def draw(output: Path, real: Cloud | None, station: float | None, rows: Rows) ->
 
 
 def sparse_columns(real: Cloud | None, noise: float, station: float | None) -> list[tuple[str, Cloud]]:
-    """Return titles and clouds of 18 points/m2: smooth, with relief, with noise as well, real."""
+    """Return (title, cloud) of 18 points/m2: smooth, with relief, with relief and noise, and the real one if given."""
     sparse = strip_points((0.0, -4.0), (8.0, 4.0), 18.0)
     columns = [
         ("18 points/m², smooth, no noise", sparse),
@@ -348,7 +348,7 @@ def sparse_columns(real: Cloud | None, noise: float, station: float | None) -> l
 
 
 def window(real: Cloud, station: float | None) -> Cloud:
-    """Return 8 m of a real road about a station, asphalt in the middle, as heights above its asphalt's surface."""
+    """Return 8 m x 8 m of a real road about a station, asphalt in the middle, heights above its asphalt's surface."""
     along = real.asphalt[:, 0]
     middle = np.array([np.median(along) if station is None else station, np.median(real.asphalt[:, 1])])
     part, base = (xyz[(np.abs(xyz[:, :2] - middle) < 4.0).all(axis=1)] for xyz in (real.xyz, real.asphalt))
@@ -360,7 +360,7 @@ def window(real: Cloud, station: float | None) -> Cloud:
 
 
 def curves(axes: Any, rows: Rows, real: float | None) -> None:
-    """Draw the residual against the strength."""
+    """Draw the residual in patches against the relief's strength into the axes."""
     labels = ("relief alone", f"relief and range noise, {1e3 * DEVICE_NOISE:.0f} mm")
     for row, label, style in zip(rows, labels, ("o-", "s--"), strict=True):
         axes.loglog(STRENGTHS[1:], [values["residual"] for values in row[1:]], style, color="#1f4e79", label=label)
@@ -372,7 +372,7 @@ def curves(axes: Any, rows: Rows, real: float | None) -> None:
 
 
 def main() -> None:
-    """Command line."""
+    """Print the roughness, and write the picture or time the relief, as the command line says."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--output", type=Path, help="picture to write; none if not given")
     parser.add_argument("--real", type=Path, help="LAS or LAZ file of a real road")

@@ -43,7 +43,7 @@ PLATFORMS = {
 
 
 def main() -> None:
-    """Make all of them."""
+    """Write the figures that the command line names (all if none) to its folder."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--output", type=Path, required=True)
     parser.add_argument("--only", choices=FIGURES, nargs="+", default=list(FIGURES))
@@ -54,14 +54,14 @@ def main() -> None:
 
 
 def scan(scenario: str, changes: list[str], folder: Path) -> laspy.LasData:
-    """Generate a cloud and read it."""
+    """Generate a scenario's cloud in draft fidelity into a folder; return its points."""
     wanted = ["fidelity=draft", 'outputs=["cloud"]', *changes]
     generate(Job(load_scenario(scenario, wanted), folder, overwrite=True, new_file=True))
     return laspy.read(folder / "cloud.laz")
 
 
 def platforms(output: Path) -> None:
-    """Draw the cloud of each platform from above, by class."""
+    """Write a picture of each platform's cloud from above, coloured by class."""
     figure, axes = pyplot.subplots(len(PLATFORMS), 1, figsize=(9, 3.9 * len(PLATFORMS)), layout="constrained")
     with tempfile.TemporaryDirectory() as folder:
         for axis, (title, (name, changes)) in zip(axes, PLATFORMS.items(), strict=True):
@@ -72,7 +72,7 @@ def platforms(output: Path) -> None:
 
 
 def _trajectory(folder: Path, name: str, changes: list[str]) -> list[str]:
-    """Write a trajectory that weaves about the road's beginning; return the changes that fly it."""
+    """Write a trajectory file that weaves about the road; return the scenario changes that fly it."""
     scenario = load_scenario(name, changes)
     geometry = RoadGeometry(sample_road(scenario.road, scenario.seed))
     station = np.linspace(0.0, geometry.length, 400)
@@ -90,7 +90,7 @@ def _trajectory(folder: Path, name: str, changes: list[str]) -> list[str]:
 
 
 def _draw(axis: Any, cloud: laspy.LasData, title: str) -> None:
-    """Draw a cloud from above along its longer side: the class of each pixel's highest point."""
+    """Draw a cloud from above along its longer side into the axes, coloured by each pixel's highest point's class."""
     colors = np.full((256, 3), 128, dtype=np.uint8)
     for row in classes():
         colors[row.id] = row.color
@@ -101,7 +101,7 @@ def _draw(axis: Any, cloud: laspy.LasData, title: str) -> None:
 def _draw_colors(
     axis: Any, cloud: laspy.LasData, which: NDArray[np.bool_], color: NDArray[np.uint8], title: str
 ) -> None:
-    """Draw chosen points from above along the cloud's longer side, the highest on top.
+    """Draw a mask's points from above along the cloud's longer side into the axes, the highest on top.
 
     Args:
         which: mask of the cloud's points.
@@ -122,7 +122,7 @@ def _draw_colors(
 
 
 def clouds(output: Path) -> None:
-    """Draw the colours of two strips of one scan, between which the clouds' shadows have drifted."""
+    """Write a picture of two strips of one scan, between which the clouds' shadows have drifted."""
     changes = ["road.length=200", "road.half_width=40", "scan.lines_per_second=50"]
     changes += ['road.environment.cloud_cover={"minimum":0.45,"maximum":0.45}']
     with tempfile.TemporaryDirectory() as folder:
@@ -139,7 +139,7 @@ def clouds(output: Path) -> None:
 
 
 def intensity_histograms(output: Path) -> None:
-    """Draw the intensities of both reflection models on one road, asphalt, markings and grass."""
+    """Write histograms of range-corrected intensity by reflection model, for road, markings and vegetation."""
     figure, axes = pyplot.subplots(1, 3, figsize=(13, 3.6))
     clouds = {}
     with tempfile.TemporaryDirectory() as folder:
@@ -160,7 +160,7 @@ def intensity_histograms(output: Path) -> None:
 
 
 def cloud_scale(cloud: laspy.LasData) -> float:
-    """Return 16-bit steps per unit of intensity."""
+    """Return a cloud's 16-bit steps per unit of intensity, from its LAS header's note."""
     import json
 
     note = next(vlr for vlr in cloud.header.vlrs if vlr.user_id == "SynthRoads")
@@ -168,7 +168,7 @@ def cloud_scale(cloud: laspy.LasData) -> float:
 
 
 def convergence(output: Path) -> None:
-    """Print the error of the mean range on a slanted plane against rays per pulse."""
+    """Print a Markdown table: errors of mean range and spread on a slanted plane (mm) by rays per pulse."""
     print("| rays per pulse | error of the mean range (mm) | of the spread within the pulse (mm) |\n|---|---|---|")
     distance, tilt, sigma = 300.0, np.deg2rad(75.0), np.tan(1e-3) / 2.0
     nodes, weights = np.polynomial.hermite_e.hermegauss(80)

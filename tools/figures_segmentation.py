@@ -42,7 +42,7 @@ _WHOLE = 1000.0
 
 
 def small(folder: Path) -> str:
-    """Return the scores of a trained run's first test, and what its training took."""
+    """Return a Markdown table of a trained run's first test, with weights and training time below."""
     metrics = read_json(folder / METRICS)
     if not metrics["tests"]:
         raise InputError(str(folder), None, "has no test")
@@ -53,7 +53,7 @@ def small(folder: Path) -> str:
 
 
 def experiment(folder: Path) -> str:
-    """Return the tables of an experiment, one per test, with the seconds that its trainings took."""
+    """Return Markdown tables of an experiment, one per test, with the trainings' seconds in the first."""
     results: dict[str, dict[str, Any]] = read_json(folder / RESULTS)
     seconds = {
         name: [training_seconds(folder / name / f"seed-{seed}") for seed in seeds] for name, seeds in results.items()
@@ -63,7 +63,7 @@ def experiment(folder: Path) -> str:
 
 
 def training_seconds(run: Path) -> float:
-    """Return how long the training of a run took, that of what it began with included; NaN if it wasn't trained."""
+    """Return the seconds that a run's training took, its pretraining included; NaN if it wasn't trained."""
     parts = [path for path in (run / HISTORY, run / PRETRAINING / HISTORY) if path.is_file()]
     if not parts:
         return float("nan")
@@ -71,7 +71,7 @@ def training_seconds(run: Path) -> float:
 
 
 def real(runs: Sequence[Path], folder: Path, pictures: Path) -> dict[str, str]:
-    """Score the runs on the labelled real clouds; return their tables and draw the first run's classes."""
+    """Score runs on the labelled real clouds, write pictures of the first run's classes; return Markdown tables."""
     found: dict[str, list[dict[str, Any]]] = {name: [] for name in REAL_CLOUDS}
     for place, path in enumerate(runs):
         run = Run.open(path)
@@ -90,7 +90,7 @@ def real(runs: Sequence[Path], folder: Path, pictures: Path) -> dict[str, str]:
 
 
 def prediction(file: Path) -> str:
-    """Return what `tools/measure_prediction.py` found as a table."""
+    """Return a Markdown table of the result file of `tools/measure_prediction.py`."""
     told = read_json(file)
     changed = ", ".join(told["changed"]) or "none"
     head = ("points", "LAZ (MB)", "points/s", "seconds", "peak memory (MB)", "attributes", "changed")
@@ -99,7 +99,7 @@ def prediction(file: Path) -> str:
 
 
 def packed(file: Path) -> str:
-    """Return what a packed file holds as a table."""
+    """Return a Markdown table of a packed file's size, roads, tiles and points."""
     told = pack_summary(PackReader(file).notes, file.stat().st_size)
     head = ("file (MB)", "roads", "tiles", "points", "bytes per point", f"crops of {CROP:,} points")
     cells = (f"{told['bytes'] / 1e6:.1f}", *(f"{told[name]:,}" for name in ("scenes", "tiles", "points")))
@@ -107,7 +107,7 @@ def packed(file: Path) -> str:
 
 
 def forecast(file: Path) -> str:
-    """Return what `synthroads forecast` found as a table."""
+    """Return a Markdown table of the result file of `synthroads forecast`."""
     told = read_json(file)
     head = ("tiles", "points of a batch", "s per step", "threads", "steps", "hours in all", "peak memory (MB)")
     numbers = (told["threads"], told["steps"], told["hours"], told["peak_memory_mb"])
@@ -131,19 +131,19 @@ READERS = {
 
 
 def expected(arguments: argparse.Namespace) -> list[str]:
-    """Return the names of the tables that will be made."""
+    """Return the names of the tables that the arguments ask for."""
     names = [name for name in READERS if getattr(arguments, name)]
     return names + ([f"real-{name}" for name in REAL_CLOUDS] if arguments.real else [])
 
 
 def tables(arguments: argparse.Namespace) -> Mapping[str, str]:
-    """Return the document's tables by name."""
+    """Make the document's Markdown tables that the arguments ask for, by name."""
     found = {name: read(getattr(arguments, name)) for name, read in READERS.items() if getattr(arguments, name)}
     return found | (real(arguments.run, arguments.real, arguments.pictures) if arguments.real else {})
 
 
 def arguments_of(words: Sequence[str] | None) -> argparse.Namespace:
-    """Return the command line's arguments."""
+    """Return the parsed arguments of the command line; exits if --run and --real aren't given together."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--small", type=Path, metavar="RUN", help="the small training, `segmentation-small`")
     parser.add_argument("--mixing", type=Path, metavar="DIR", help="the experiment on real, synthetic and mixed data")
@@ -162,7 +162,7 @@ def arguments_of(words: Sequence[str] | None) -> argparse.Namespace:
 
 
 def main(words: Sequence[str] | None = None) -> None:
-    """Command line."""
+    """Make the tables that the command line asks for, fill the document's and print them."""
     arguments = arguments_of(words)
     try:
         found = fill(arguments.document, expected(arguments), lambda: tables(arguments))

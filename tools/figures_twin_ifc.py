@@ -56,7 +56,7 @@ _BIAS = {"IfcGeographicElement": 12.0, "IfcEarthworksFill": 6.0, "IfcCourse": 6.
 
 
 def main(folder: Path) -> None:
-    """Draw the figure."""
+    """Write an IFC file of a sampled road and draw it to twin-ifc.png in the folder."""
     parameters = sample_road(RoadScenario.from_dict(SCENARIO), SEED)
     with tempfile.TemporaryDirectory() as temporary:
         path = Path(temporary) / "twin.ifc"
@@ -71,7 +71,7 @@ def main(folder: Path) -> None:
 
 
 def _triangles(file: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the (T, 3, 3) triangles of all products, their (T, 3) colours, shaded, and what to move them back by."""
+    """Return all elements' triangles (T, 3, 3), m, shaded colours (T, 3), and offsets of depth for sorting (T,), m."""
     settings = ifcopenshell.geom.settings()
     settings.set("use-world-coords", True)
     corners, colours, bias = [], [], []
@@ -94,7 +94,7 @@ def _triangles(file: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _draw(mesh: tuple[np.ndarray, np.ndarray, np.ndarray], eye: np.ndarray, target: np.ndarray, path: Path) -> None:
-    """Draw triangles in perspective, the farthest first."""
+    """Write a picture of triangles in perspective from `eye` to `target`, sorted by depth, the farthest first."""
     triangles, colours, bias = mesh
     ahead = (target - eye) / np.linalg.norm(target - eye)
     right = np.cross(ahead, (0.0, 0.0, 1.0))

@@ -86,7 +86,7 @@ TRAJECTORY = "time,x,y,z,roll,pitch,heading\n" + "".join(
 
 @dataclass(frozen=True)
 class GoldenJob:
-    """A job: commands that run one after the other in a folder of its own, beside those of the jobs before.
+    """Commands that run one after the other in a folder of their own, beside those of the jobs before.
 
     Attributes:
         commands: sub-commands of `synthroads` with their words.
@@ -100,12 +100,12 @@ class GoldenJob:
 
 
 def generate(scenario: str, *changes: str) -> tuple[str, ...]:
-    """Return the words that generate a scenario with changes into the folder ``out``."""
+    """Return the words of `synthroads generate` for a scenario with changes, into the folder ``out``."""
     return ("generate", "--scenario", scenario, "--output", "out", *settings(*changes))
 
 
 def settings(*changes: str) -> tuple[str, ...]:
-    """Return changes as words of the command line."""
+    """Return changes as words ``--set CHANGE`` of the command line."""
     return tuple(word for change in changes for word in ("--set", change))
 
 
@@ -201,7 +201,7 @@ def run_job(tree: Path, side: Path, name: str) -> None:
 
 
 def content(path: Path) -> bytes:
-    """Return what is compared of a file."""
+    """Return the bytes that are compared of a file: without times, archives unpacked, .blend files dumped."""
     if path.suffix == ".blend":
         return blend_dump(path)
     if path.suffix in (".npz", ".pt"):  # archives, whose entries carry the time of day
@@ -213,7 +213,7 @@ def content(path: Path) -> bytes:
 
 
 def plain_text(text: str) -> str:
-    """Return a text without what differs from run to run."""
+    """Return a JSON text, perhaps after an exit code, without fields that differ from run to run; others as is."""
     head, separator, rest = text.partition("\n") if text.startswith("exit code") else ("", "", text)
     try:
         return head + separator + json.dumps(without_times(json.loads(rest)), indent=0)
@@ -222,14 +222,14 @@ def plain_text(text: str) -> str:
 
 
 def without_times(value: Any) -> Any:
-    """Return JSON data without the fields that say how long something took, or on which machine."""
+    """Return a copy of JSON data without the fields (`TIMES`) of durations, memory, machine and versions."""
     if isinstance(value, dict):
         return {key: without_times(entry) for key, entry in value.items() if not TIMES.search(key)}
     return [without_times(entry) for entry in value] if isinstance(value, list) else value
 
 
 def blend_dump(path: Path) -> bytes:
-    """Return objects, node trees, attributes and everything else of a .blend file as text."""
+    """Return a text dump of everything in a .blend file, made in a separate Blender; the file itself if that fails."""
     with tempfile.TemporaryDirectory() as folder:
         source = (ROOT / SCENE_DUMP).read_text(encoding="utf-8")
         (Path(folder) / "golden_dump.py").write_text(source, encoding="utf-8")
@@ -243,7 +243,7 @@ SCENE_DUMP = Path("tests", "helpers", "scenes", "scene_hash.py")
 
 
 def differences(base: Path, head: Path) -> list[str]:
-    """Return a line for each file of a job that one side lacks or that differs."""
+    """Return a line for each file below two folders that one side lacks or whose compared content differs."""
     names = sorted({str(path.relative_to(side)) for side in (base, head) for path in side.rglob("*") if path.is_file()})
     found = []
     for name in names:
@@ -255,7 +255,7 @@ def differences(base: Path, head: Path) -> list[str]:
 
 
 def main() -> int:
-    """Run the jobs in both trees and print what differs; return 0 if nothing does."""
+    """Compare the working tree with the command line's base commit; return 0 if nothing differs, else 1."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--base", required=True, metavar="COMMIT", help="what the working tree is compared with")
     parser.add_argument("--jobs", nargs="+", choices=JOBS, default=list(JOBS), metavar="NAME", help="these alone")
@@ -272,7 +272,7 @@ def main() -> int:
 
 
 def compare(tree: Path, files: Path, arguments: argparse.Namespace) -> int:
-    """Run the jobs in the base's tree and in ours, and print what differs; return the exit code."""
+    """Run the jobs in the base's tree and in this one, print what differs; return 0 if nothing does, else 1."""
     failed = False
     with ThreadPoolExecutor(2) as pool:
         for name in arguments.jobs:

@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def print_what_docstrings() -> bool:
-    """Print where a docstring begins with "What", which says neither what is done nor what is returned."""
+    """Print where a docstring begins with "What"; return whether one does."""
     print("-- docstrings", flush=True)
     found = [
         f"{path.relative_to(ROOT)}:{number}: a docstring begins with What: say in one sentence what is done or returned"
@@ -29,7 +29,7 @@ def print_what_docstrings() -> bool:
 
 
 def print_late_imports() -> bool:
-    """Print the imports within functions that don't say why they aren't at the module's top.
+    """Print the imports within functions that give no reason for their place; return whether there are any.
 
     Reasons are a comment beside or above, or an `except ImportError`: the package is optional. In `headless` all
     commands load what they need when they run, so that ``--help`` and completion come at once.
@@ -46,7 +46,7 @@ def print_late_imports() -> bool:
 
 
 def late_imports(source: str) -> list[int]:
-    """Return the line of the first import within each function that says no reason for any of them."""
+    """Return the first import's line number of each function whose imports all lack a comment with a reason."""
     lines, found = source.splitlines(), []
     functions = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.FunctionDef)]
     for function in functions:
@@ -67,7 +67,7 @@ def late_imports(source: str) -> list[int]:
 
 
 def commands() -> dict[str, list[str]]:
-    """Return the programs that check the source, by what they are called in the output."""
+    """Return the command lines of the programs that check the source, by name; mypy on Python 3.11 only."""
     scripts = Path(sys.executable).parent
     audit = [str(scripts / "pip-audit"), "--dry-run", "--disable-pip", "--require-hashes", "--requirement"]
     checks = {}
@@ -88,7 +88,7 @@ def commands() -> dict[str, list[str]]:
 
 
 def run_together(checks: dict[str, list[str]]) -> list[str]:
-    """Run programs at the same time, print what each says, and return the names of those that found something."""
+    """Run programs in parallel, print their output in order; return the names of those that failed."""
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
         answers = pool.map(partial(subprocess.run, cwd=ROOT, text=True, stdout=PIPE, stderr=STDOUT), checks.values())
         failed = []
@@ -99,7 +99,7 @@ def run_together(checks: dict[str, list[str]]) -> list[str]:
 
 
 def main() -> int:
-    """Run every check, also after one has failed, and return 0 if all passed."""
+    """Run every check, also after one has failed; return 0 if all passed, else 1."""
     own = {"docstrings": print_what_docstrings, "imports within functions": print_late_imports}
     failed = [name for name, print_faults in own.items() if print_faults()]
     failed += run_together(commands())

@@ -43,7 +43,7 @@ HEAD = "# Written by `nox -s lock`: the versions that are installed, with the ha
 
 
 def environment_inputs(name: str) -> list[str]:
-    """Return the requirements of an environment, as pyproject.toml has them, with those of the package's build."""
+    """Return an environment's requirements from pyproject.toml, with those of the package's build."""
     settings = tomllib.loads(PYPROJECT.read_text(encoding="utf-8"))
     extras = settings["project"]["optional-dependencies"]
     chosen = [requirement for extra in EXTRAS[name].split(",") for requirement in extras[extra]]
@@ -51,7 +51,7 @@ def environment_inputs(name: str) -> list[str]:
 
 
 def resolve(requirements: list[str], python: str, present: Path, *options: str) -> str:
-    """Return the lock's text for one Python on all systems; versions that `present` holds are kept where they fit.
+    """Resolve requirements with uv; return the lock's text for one Python on all systems, keeping `present` versions.
 
     Raises:
         subprocess.CalledProcessError: there is no such set of packages; uv has said why.
@@ -73,7 +73,7 @@ def resolve(requirements: list[str], python: str, present: Path, *options: str) 
 
 
 def blocks_for(python: str, lock: str) -> Iterator[str]:
-    """Yield the lines of each package of a lock that this Python needs, less those that users choose themselves."""
+    """Yield a lock's block of text for each package that a Python version needs, without PyTorch and CUDA."""
     for block in re.split(r"(?m)^(?=[A-Za-z0-9])", lock):
         if not block[:1].isalnum() or CHOSEN_BY_USERS.match(block):
             continue
@@ -83,12 +83,12 @@ def blocks_for(python: str, lock: str) -> Iterator[str]:
 
 
 def python_names(python: str) -> dict[str, str]:
-    """Return the names under which markers ask for the Python."""
+    """Return the environment-marker variables of a Python version."""
     return {"python_version": python, "python_full_version": f"{python}.0"}
 
 
 def all_locks() -> Iterator[tuple[Path, str]]:
-    """Yield each lock's file and the text that it should have."""
+    """Yield (lock file, text resolved anew) of every environment and extension."""
     for name in EXTRAS:
         for python in [name.rpartition("-")[2]] if "-" in name else BLENDER:
             path = ROOT / lock_of(name, python)
@@ -99,7 +99,7 @@ def all_locks() -> Iterator[tuple[Path, str]]:
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Write the locks, or only compare them; return 0 if they are as they should be."""
+    """Write the locks that changed, or with --check only name them; return 1 if checking found any, else 0."""
     parser = argparse.ArgumentParser(description="Write the locks of the environments and of the extensions.")
     parser.add_argument("--check", action="store_true", help="write nothing; 1 if one would change")
     options = parser.parse_args(argv)

@@ -32,20 +32,20 @@ COLOURS = {
 
 
 class Model:
-    """Faces with materials."""
+    """A polygon model with materials, to be written as OBJ."""
 
     def __init__(self) -> None:
         self.vertices: list[Float] = []
         self.faces: dict[str, list[list[int]]] = {}
 
     def face(self, material: str, corners: Float) -> None:
-        """Add a polygon (K, 3), counter-clockwise seen from outside."""
+        """Add a polygon of corners (K, 3), m, counter-clockwise seen from outside."""
         first = sum(len(part) for part in self.vertices)
         self.vertices.append(corners)
         self.faces.setdefault(material, []).append(list(range(first, first + len(corners))))
 
     def box(self, material: str, low: tuple[float, float, float], high: tuple[float, float, float]) -> None:
-        """Add a box between two corners, m."""
+        """Add an axis-aligned box between its lowest and highest corner, m."""
         (a, b, c), (d, e, f) = low, high
         for corners in (
             [(a, b, c), (a, e, c), (d, e, c), (d, b, c)],
@@ -58,7 +58,7 @@ class Model:
             self.face(material, np.array(corners))
 
     def tube(self, material: str, begin: Float, end: Float, radii: tuple[float, float], sides: int = 12) -> None:
-        """Add a closed tube, or a cone, between two points (3,), m."""
+        """Add a closed tube or cone between two points (3,) with a radius at each, m."""
         axis = (end - begin) / np.linalg.norm(end - begin)
         across = np.cross(axis, [0.0, 1.0, 0.0] if abs(axis[1]) < 0.9 else [1.0, 0.0, 0.0])
         across /= np.linalg.norm(across)
@@ -73,7 +73,7 @@ class Model:
         self.face(material, high)
 
     def write(self, path: Path) -> None:
-        """Write OBJ and MTL; OBJ has y up and -z to the north."""
+        """Write the model as an OBJ file, y up and -z to the north, and its materials as an MTL file beside it."""
         points = np.concatenate(self.vertices)
         lines = [f"mtllib {path.stem}.mtl", f"o {path.stem}"]
         lines += [f"v {x:.4f} {z:.4f} {-y + 0.0:.4f}" for x, y, z in points]
@@ -87,7 +87,7 @@ class Model:
 
 
 def transformer_station() -> Model:
-    """A compact station of a distribution network: 3.0 x 2.4 x 2.5 m, with doors and vents."""
+    """Return a compact transformer station of 3.0 x 2.4 x 2.5 m, with doors and vents."""
     model = Model()
     model.box("concrete_wall", (-1.5, -1.2, 0.0), (1.5, 1.2, 2.35))
     model.box("roof", (-1.6, -1.3, 2.35), (1.6, 1.3, 2.5))
@@ -101,7 +101,7 @@ def transformer_station() -> Model:
 
 
 def site_container() -> Model:
-    """A 20-foot site office: 6.06 x 2.44 x 2.6 m, corrugated, with door and windows."""
+    """Return a corrugated 20-foot site office of 6.06 x 2.44 x 2.6 m, with door and windows."""
     model = Model()
     model.box("container_blue", (-3.0, -1.19, 0.1), (3.0, 1.19, 2.5))
     model.box("steel", (-3.03, -1.22, 0.0), (3.03, 1.22, 0.16))
@@ -122,7 +122,7 @@ def site_container() -> Model:
 
 
 def grit_bin() -> Model:
-    """A grit bin for winter service, 700 l: 1.35 x 0.98 x 1.0 m, with a sloping lid."""
+    """Return a grit bin for winter service, 700 l, of 1.35 x 0.98 x 1.0 m, with a sloping lid."""
     model = Model()
     model.box("grit_bin_yellow", (-0.62, -0.42, 0.05), (0.62, 0.42, 0.62))
     lid = np.array([(-0.68, -0.49, 0.62), (0.68, -0.49, 0.62), (0.68, 0.49, 0.95), (-0.68, 0.49, 0.95)])
@@ -140,7 +140,7 @@ def grit_bin() -> Model:
 
 
 def windsock() -> Model:
-    """A windsock on a mast of 6 m, as beside viaducts: red and white, 2 m long, hanging at 20 degrees."""
+    """Return a red and white windsock, 2 m long and hanging at 20 degrees, on a mast of 6 m."""
     model = Model()
     model.tube("pole_white", np.array([0.0, 0.0, 0.0]), np.array([0.0, 0.0, 6.0]), (0.06, 0.04))
     direction = np.array([np.cos(np.radians(20.0)), 0.0, -np.sin(np.radians(20.0))])
@@ -153,7 +153,7 @@ def windsock() -> Model:
 
 
 def wildlife_fence() -> Model:
-    """A stretch of wildlife fence, 12 m along the road and 2 m high: timber posts and wires."""
+    """Return a stretch of wildlife fence, 12 m along the road and 2 m high: timber posts and wires."""
     model = Model()
     for post in range(5):
         y = -6.0 + 3.0 * post
@@ -176,7 +176,7 @@ MODELS = {
 
 
 def main() -> None:
-    """Write all models."""
+    """Write all models as OBJ and MTL files to the command line's folder."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     default = ROOT / "synthroads_addon" / "presets" / "assets" / "roadside"
     parser.add_argument("--output", type=Path, default=default, metavar="DIR")

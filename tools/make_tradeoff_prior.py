@@ -66,7 +66,7 @@ def _expected(errors: Mapping[str, tuple[float, float]]) -> dict[str, float]:
 
 
 def measured(platform: str) -> dict[str, Any]:
-    """Return a platform's row."""
+    """Measure a platform's scene; return the table's row of costs (microseconds) and errors as JSON data."""
     name, changes = SCENES[platform]
     scenario = load_scenario(name, [*changes, "cloud.point_spacing=null"])
     empty_file()
@@ -105,7 +105,7 @@ def measured(platform: str) -> dict[str, Any]:
 
 
 def octave_seconds(trial: Trial, octaves: int) -> float:
-    """Return the microseconds that the micro-relief takes per point."""
+    """Return the processor microseconds per point that the micro-relief takes with a number of octaves."""
     results = [one for one in trial.scan_lines(RINGS[1]) if len(one.points)]
     begin = trial.clock()
     places = shift_points(results, trial.plan, octaves)
@@ -113,7 +113,7 @@ def octave_seconds(trial: Trial, octaves: int) -> float:
 
 
 def image_seconds(trial: Trial, changes: Mapping[str, Any]) -> tuple[float, float, float]:
-    """Render a few images; return seconds before the first, of each image, and of each megapixel."""
+    """Render a few images; return processor seconds before the first, per image, and per megapixel (fitted)."""
     sizes: list[float] = []
 
     def pick(views: list[View]) -> list[View]:
@@ -134,7 +134,7 @@ def image_seconds(trial: Trial, changes: Mapping[str, Any]) -> tuple[float, floa
 
 
 def _saving(area: float) -> float:
-    """Return microseconds per square metre of saving the open file."""
+    """Return the processor microseconds per square metre of `area` that saving the open file takes."""
     with tempfile.TemporaryDirectory() as folder:
         begin = time.process_time()
         save_scene(Path(folder) / "scene.blend")
@@ -142,7 +142,7 @@ def _saving(area: float) -> float:
 
 
 def main() -> None:
-    """Command line."""
+    """Measure the command line's platforms and write the table after each."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("platforms", nargs="*", metavar="PLATFORM", help=f"{', '.join(SCENES)}; without any, all")
     platforms = parser.parse_args().platforms or list(SCENES)

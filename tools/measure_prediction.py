@@ -51,7 +51,7 @@ _HEADER_FIELDS = (
 
 
 def tile_cloud(source: Path, target: Path, points: int) -> int:
-    """Write copies of a cloud side by side, as square as can be, the last one cut; return how many copies.
+    """Write copies of a cloud side by side until there are `points`, the last one cut; return the number of copies.
 
     Records are copied bit by bit but for x and y; memory holds one block of them.
 
@@ -88,7 +88,7 @@ def tile_cloud(source: Path, target: Path, points: int) -> int:
 
 
 def differences(before: Path, after: Path) -> list[str]:
-    """Return the names of attributes and header fields that a labelled file doesn't hold as the file it was made from.
+    """Return the sorted names of attributes, header fields and records that differ in a labelled copy of a LAS file.
 
     The attribute for the class is looked at only if the first file has it not: it must be there.
     """
@@ -110,14 +110,14 @@ def differences(before: Path, after: Path) -> list[str]:
 
 
 def _records(file: laspy.LasReader) -> Counter[tuple[str, int, bytes]]:
-    """Return a file's variable-length records but for the list of extra attributes and LAZ's own, which grow."""
+    """Return a multiset of a LAS file's records, without the extra-attribute list and LAZ's own, which grow."""
     every = [*file.header.vlrs, *(file.evlrs or [])]
     kept = [record for record in every if (record.user_id, record.record_id) not in _GROWING]
     return Counter((record.user_id, record.record_id, record.record_data_bytes()) for record in kept)
 
 
 def measure(run: Path, source: Path, folder: Path, points: int) -> dict[str, Any]:
-    """Return what labelling so many points takes, as JSON data; the files stay in the folder.
+    """Label a cloud enlarged to `points` in a separate process; return time, memory and changes as JSON data.
 
     Raises:
         SynthRoadsError: the labelling failed, with its message.
@@ -147,7 +147,7 @@ def measure(run: Path, source: Path, folder: Path, points: int) -> dict[str, Any
 
 
 def main(words: list[str] | None = None) -> None:
-    """Command line."""
+    """Measure the prediction as the command line says, write prediction.json and print it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("run", type=Path, help="folder of a trained segmentation")
     parser.add_argument("cloud", type=Path, help="LAS or LAZ file that is laid side by side")

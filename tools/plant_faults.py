@@ -50,7 +50,7 @@ SECONDS = 1200.0
 
 @dataclass(frozen=True)
 class Fault:
-    """One change of one expression of a file."""
+    """A planted fault: one mutation of one expression in a file, by Cosmic-ray's operator and its occurrence."""
 
     area: str
     file: str
@@ -59,13 +59,13 @@ class Fault:
     occurrence: int
 
     def planted(self, code: str) -> str | None:
-        """Return the code of the file with the fault in it, or None where the operator changes nothing."""
+        """Return a file's source code with the fault in it; None where the operator changes nothing."""
         changed = mutate_code(code, get_operator(self.operator)(), self.occurrence)
         return changed if changed != code else None
 
 
 def draw_faults(each: int, seed: int) -> list[Fault]:
-    """Return `each` faults of every area: a line is drawn first and then one of its faults."""
+    """Return `each` random faults of every area: a line is drawn first, then one of its faults."""
     rng = random.Random(seed)
     names = [name for name in sorted(operator_names()) if not any(part in name for part in (*HARMLESS, "NoOp"))]
     drawn = []
@@ -92,7 +92,7 @@ def _faults(area: str, file: str, names: list[str]) -> Iterator[Fault]:
 
 
 def covering_tests(coverage: list[Path], fault: Fault) -> list[str]:
-    """Return the tests that run a fault's line, and those that share a fixture which runs it.
+    """Return the ids of the tests that run a fault's line, by coverage records, and of those sharing such a fixture.
 
     A line that the import alone runs names a constant or a field: the lines that use the name stand in its place, or
     else the whole file.
@@ -122,7 +122,7 @@ def _tests_on(lines: set[int], data: CoverageData, measured: str) -> set[str]:
 
 
 def run_tests(tests: list[str], options: list[str]) -> tuple[bool, str]:
-    """Return whether one of the tests fails, and which; Blender's tests have a process of their own."""
+    """Run tests with pytest, Blender's in their own process; return whether one fails, and the first one's line."""
     blender = [test for test in tests if test.split("/")[1] in BLENDER_TESTS]
     for part in ([test for test in tests if test not in blender], blender):
         if not part:
@@ -140,7 +140,7 @@ def run_tests(tests: list[str], options: list[str]) -> tuple[bool, str]:
 
 
 def judge(fault: Fault, coverage: list[Path], options: list[str]) -> dict[str, object]:
-    """Return what the tests say of the source with a fault in it."""
+    """Plant a fault, run the tests that reach it and restore the file; return the outcome as JSON data."""
     tests = covering_tests(coverage, fault)
     path = ROOT / fault.file
     code = path.read_text(encoding="utf-8")
@@ -157,7 +157,7 @@ def judge(fault: Fault, coverage: list[Path], options: list[str]) -> dict[str, o
 
 
 def main() -> int:
-    """Draw faults, or plant them."""
+    """Draw faults, or plant them one by one and record what the tests find, as the command line says."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     steps = parser.add_subparsers(dest="step", required=True)
     drawing = steps.add_parser("draw", help="draw the faults")

@@ -14,7 +14,7 @@ from synthroads_addon.scanning.scene.mesh import SceneMesh
 
 
 class RaycastNodesCaster:
-    """Casts rays with the *Raycast* node, on Blender's main thread; the node itself uses every core.
+    """Ray caster on the *Raycast* node, on Blender's main thread; the node itself uses every core.
 
     It lives in a scene of its own, whose data `close` removes from the open file.
     """
@@ -34,7 +34,7 @@ class RaycastNodesCaster:
     def cast(
         self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float
     ) -> NDArray[np.int32]:
-        """Return the (N,) indices of the faces hit, -1 for none; see `scanning.scene.caster.Caster.cast`."""
+        """Return the index (N,) of the first face that each ray hits within the range (m), -1 for none."""
         if not len(origins):
             return np.empty(0, np.int32)
         points = self._rays.data
@@ -54,11 +54,11 @@ class RaycastNodesCaster:
     def occluded(
         self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float
     ) -> NDArray[np.bool_]:
-        """Return whether (N,) something is hit, see `Caster.occluded`."""
+        """Return a mask (N,) of the rays that hit anything within the range (m)."""
         return self.cast(origins, directions, maximum_range) >= 0
 
     def close(self) -> None:
-        """Remove all data of its own from the open file."""
+        """Remove the caster's scene, meshes and node group from the open file."""
         meshes = [self._rays.data, self._target.data]
         for item in (self._rays, self._target):
             bpy.data.objects.remove(item)
@@ -74,7 +74,7 @@ class RaycastNodesCaster:
 
 
 def _target_mesh(mesh: SceneMesh) -> bpy.types.Mesh:
-    """Return Blender's mesh of the triangles, with each face's number, from 1, as the attribute ``number``."""
+    """Create a Blender mesh of the triangles, each face's index plus 1 as its attribute ``number``."""
     target = bpy.data.meshes.new("SR Target")
     target.vertices.add(len(mesh.vertices))
     target.vertices.foreach_set("co", mesh.vertices.ravel())
@@ -93,7 +93,7 @@ def _store(mesh: bpy.types.Mesh, name: str, kind: str, domain: str, field: str, 
 
 
 def _cast_group() -> bpy.types.NodeTree:
-    """Return the group that casts a ray from each point along its ``direction`` and stores the ``face`` it meets.
+    """Create a node group that casts a ray from each point along its ``direction`` and stores the ``face`` hit.
 
     The face's number is the only output of *Raycast* that is used, so that each ray is cast once.
     """

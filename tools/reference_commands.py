@@ -11,7 +11,7 @@ _WIDTH = 82
 
 
 def commands() -> str:
-    """Return every sub-command with its usage and arguments, as Markdown."""
+    """Return Markdown with the usage and arguments of every sub-command of `synthroads`."""
     _, (_, parsers) = _split(build_parser())
     return "\n\n".join(text for name, parser in parsers.items() for text in _command(name, parser, "#"))
 
@@ -20,7 +20,7 @@ Choices = tuple[dict[str, str], dict[str, argparse.ArgumentParser]]
 
 
 def _split(parser: argparse.ArgumentParser) -> tuple[list[argparse.Action], Choices]:
-    """Return a parser's own arguments, and of its sub-commands (none: empty) the summaries and parsers by name."""
+    """Return a parser's own visible arguments, and (summaries, parsers) of its sub-commands by name."""
     own: list[argparse.Action] = []
     summaries: dict[str, str] = {}
     parsers: dict[str, argparse.ArgumentParser] = {}
@@ -34,7 +34,7 @@ def _split(parser: argparse.ArgumentParser) -> tuple[list[argparse.Action], Choi
 
 
 def _command(name: str, parser: argparse.ArgumentParser, level: str, summary: str = "") -> Iterator[str]:
-    """Yield the parts of a command's text, and of its own sub-commands'."""
+    """Yield the Markdown blocks of a command, heading first, and recursively of its sub-commands."""
     arguments, (summaries, parsers) = _split(parser)
     yield f"{level} {name}"
     yield _escaped(parser.description or f"{summary[:1].upper()}{summary[1:]}.")
@@ -67,13 +67,13 @@ def _metavar(action: argparse.Action) -> str:
 
 
 def _meaning(action: argparse.Action, parser: argparse.ArgumentParser) -> str:
-    """Return an argument's help with whether it must be given, as ``--help`` would show it."""
+    """Return an argument's help as escaped Markdown, with "(required)" where an option must be given."""
     text = parser._get_formatter()._expand_help(action) if action.help else ""
     return _escaped(text + (" **(required)**" if action.required and action.option_strings else ""))
 
 
 def _escaped(text: str) -> str:
-    """Return help text so that Markdown shows it as it stands."""
+    """Return help text escaped so that Markdown shows it literally."""
     for sign in "\\|<[_":
         text = text.replace(sign, f"\\{sign}")
     return text.replace("``", "`")

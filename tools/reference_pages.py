@@ -44,7 +44,7 @@ _WORDING = Wording(lambda text: f"`{text}`", lambda name: f"[{name}](#{name.lowe
 
 
 def fields(classes: Sequence[str]) -> str:
-    """Return the fields of classes and of all that they are made of, as Markdown, one table each.
+    """Return Markdown with a table of fields for each class and for every class that they contain.
 
     Args:
         classes: ``MODULE:NAME`` each.
@@ -65,7 +65,7 @@ def _model(module: str, name: str) -> type[Model]:
 
 
 def _section(name: str, parts: dict[str, dict[str, Any]]) -> str:
-    """Return a class's heading, description and table; ``parts`` has all of the page's by name."""
+    """Return Markdown of one class: heading, description and table of fields; ``parts`` are the schemas by name."""
     schema = parts[name]
     text = schema.get("description", "").split("\n\nAttributes:")[0]
     rows = []
@@ -78,7 +78,7 @@ def _section(name: str, parts: dict[str, dict[str, Any]]) -> str:
 
 
 def _plain(docstring: str) -> str:
-    """Return a docstring's text as Markdown: code is the only markup that both have, with two ticks there."""
+    """Return a docstring's text as Markdown: double backticks become single ones, < is escaped."""
     return docstring.replace("``", "`").replace("<", "\\<")
 
 
@@ -90,7 +90,7 @@ def _row(field: str, rule: dict[str, Any], required: bool) -> str:
 
 
 def _default(rule: dict[str, Any]) -> str:
-    """Return a default as JSON; of parts with a table of their own nothing, as it says all."""
+    """Return a field's default as Markdown code; empty for None, for objects but ranges, and for long ones."""
     value = rule.get("default")
     if value is None:
         return ""
@@ -101,7 +101,7 @@ def _default(rule: dict[str, Any]) -> str:
 
 
 def presets() -> str:
-    """Return tables of everything that is shipped under a name; links are those of a page in docs/reference."""
+    """Return Markdown tables of everything that is shipped under a name, linked as from docs/reference."""
     return "\n\n".join(map(_table, KINDS.values()))
 
 
@@ -112,7 +112,7 @@ def _table(kind: Kind) -> str:
 
 
 def _what(one: Entry) -> str:
-    """Return what a thing is: its title with the key figures of those that are made of others."""
+    """Return a catalogue entry's description: its title, with the key figures of those made of others."""
     if "scenes" in one.figures:
         return f"{one.title}: {one.figures['scenes']} scenes. {one.note}"
     for parts in ("assets", "materials"):
@@ -131,12 +131,12 @@ GENERATED: dict[str, Callable[[], str]] = {
 
 @cache
 def generated(name: str) -> str:
-    """Return the text for a mark, its headings of the first level; raise `KeyError` if there is none of that name."""
+    """Return the Markdown generated for a mark's name, headings from level 1, cached; KeyError for unknown names."""
     return GENERATED[name]()
 
 
 def filled(page: str) -> str:
-    """Return a page with the generated text in place of its marks, headings one level below the one before a mark."""
+    """Return a page with its marks replaced by generated text, headings one level below the one before each mark."""
 
     def text(mark: re.Match[str]) -> str:
         levels = re.findall(r"^(#+) ", page[: mark.start()], re.MULTILINE) or [""]

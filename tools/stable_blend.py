@@ -27,7 +27,7 @@ class _Block:
 
 
 class _File:
-    """A .blend file (not compressed, little-endian), with headers of Blender 4 or 5."""
+    """Reader of the blocks of an uncompressed, little-endian .blend file of Blender 4 or 5."""
 
     def __init__(self, content: bytes) -> None:
         if content[:7] != b"BLENDER":
@@ -39,7 +39,7 @@ class _File:
 
     @cached_property
     def blocks(self) -> list[_Block]:
-        """All blocks in their order."""
+        """All blocks of the file in their order; cached."""
         layout, old_at = ("<4sIQQQ", 8) if self._long else ("<4siQii", 8)
         found, position = [], self._begin
         while position < len(self.content):
@@ -54,7 +54,7 @@ class _File:
         return found
 
     def groups(self) -> Iterator[list[_Block]]:
-        """Yield the blocks of one data-block after the other, its own first."""
+        """Yield the list of blocks of each data-block: its own first, then its data."""
         group: list[_Block] = []
         for block in self.blocks:
             if block.code != _DATA and group:
@@ -65,7 +65,7 @@ class _File:
 
 
 class _Structs:
-    """The structs that a .blend file describes in its block DNA1."""
+    """Layouts of the structs that a .blend file describes in its block DNA1."""
 
     def __init__(self, data: bytes) -> None:
         self._data = data
@@ -87,21 +87,21 @@ class _Structs:
         self._known: dict[int, list[int]] = {}
 
     def size(self, number: int) -> int:
-        """Return the bytes that a struct takes."""
+        """Return the size of the struct of a number, bytes."""
         return int(self._sizes[self._structs[number][0]])
 
     def name(self, number: int) -> str:
-        """Return the name of a struct."""
+        """Return the name of the struct of a number."""
         return self._types[self._structs[number][0]]
 
     def pointers(self, number: int) -> list[int]:
-        """Return where in a struct its pointers are."""
+        """Return the byte offsets of all pointers in a struct, nested ones included; cached."""
         if number not in self._known:
             self._known[number] = list(self._find_pointers(number))
         return self._known[number]
 
     def field(self, number: int, way: tuple[str, ...]) -> tuple[int, int]:
-        """Return where in a struct a field is, by the names on the way to it, and the bytes that it takes."""
+        """Return byte offset and size of a struct's field, given by the names on the path to it; KeyError if none."""
         position = 0
         for kind, index in self._structs[number][1]:
             length = self._length(kind, self._names[index])
@@ -152,7 +152,7 @@ _CHANGING: dict[str, list[tuple[str, ...]]] = {
 
 
 def make_stable(content: bytes) -> bytes:
-    """Return a .blend file with addresses counted from its beginning on, and nodes numbered in their order.
+    """Return a .blend file's bytes with sequential addresses and node numbers, independent of memory layout.
 
     Pointers to what isn't in the file become 0, as Blender takes them when it reads it. The numbers by which nodes are
     known from outside of their tree are random ones; nothing in a library refers to them.
@@ -176,7 +176,7 @@ def make_stable(content: bytes) -> bytes:
 
 
 def _rewrite(result: bytearray, structs: _Structs, block: _Block, places: dict[int, int], nodes: int) -> int:
-    """Rewrite one block; return how many nodes there have been."""
+    """Rewrite one block's addresses and node numbers in `result`, in place; return the count of nodes so far."""
     if block.old:
         struct.pack_into("<Q", result, block.old_at, places[block.old])
     if block.code in (b"DNA1", b"ENDB"):
@@ -199,7 +199,7 @@ def _rewrite(result: bytearray, structs: _Structs, block: _Block, places: dict[i
 
 
 def _readdress(result: bytearray, places: dict[int, int], where: Iterable[int], *, keep: bool) -> None:
-    """Replace addresses; unknown ones stay, or become 0."""
+    """Replace the addresses at some byte positions, in place; unknown ones stay if `keep`, else become 0."""
     for position in where:
         (old,) = struct.unpack_from("<Q", result, position)
         if old:

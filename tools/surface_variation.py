@@ -13,7 +13,7 @@ _QUERIES = 2048
 
 
 def surface_variation(xyz: Float, radius: float, at: Index | None = None, least: int = 8) -> Float:
-    """Return the surface variation l0 / (l0 + l1 + l2) around points (Pauly, Gross, Kobbelt 2002).
+    """Return the surface variation l0 / (l0 + l1 + l2) (K,) around points (Pauly, Gross, Kobbelt 2002), 0 to 1/3.
 
     l0 <= l1 <= l2 are the eigenvalues of the covariance of all points within a sphere. A plane with noise of standard
     deviation s along its normal has about 2 s^2 / radius^2, whatever the density of the points, as long as s is small.
@@ -58,7 +58,7 @@ def _variation(query: Index, shift: Float, count: int, least: int) -> Float:
 
 
 class _Grid:
-    """Points sorted by the square columns, one radius wide, that they stand in."""
+    """Spatial index of points by square columns one radius wide."""
 
     def __init__(self, xyz: Float, radius: float) -> None:
         column = np.floor((xyz[:, :2] - xyz[:, :2].min(axis=0)) / radius).astype(np.int64) + 1
@@ -68,7 +68,7 @@ class _Grid:
         self.sorted = self.key[self.order]
 
     def pairs(self, chosen: Index) -> tuple[Index, Index]:
-        """Return (query, point) of all points in the nine columns around the chosen ones; query indexes `chosen`."""
+        """Return candidate pairs: positions in `chosen` and indices of all points in the nine columns around each."""
         steps = np.array([row * self.stride for row in (-1, 0, 1)])
         low = (self.key[chosen][:, None] + steps - 1).ravel()
         start = np.searchsorted(self.sorted, low, "left")
@@ -80,7 +80,7 @@ class _Grid:
 
 
 def plane_residuals(xyz: Float, size: float, least: int = 10) -> tuple[Float, Float]:
-    """Return the standard deviation of heights about each patch's best plane, and how many points it has.
+    """Return per square patch the standard deviation of heights about its least-squares plane, m, and its points.
 
     Patches are squares of a level grid; the deviation has n - 3 degrees of freedom. Left out are patches with too few
     points, and those whose points spread less than an eighth of the size in some direction: a single scan line doesn't

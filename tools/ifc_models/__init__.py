@@ -4,8 +4,8 @@ from __future__ import annotations
 
 
 def register() -> None:
-    """Blender wants it; the wheels are all that matters."""
+    """Do nothing: Blender requires this function, but the extension only brings wheels."""
 
 
 def unregister() -> None:
-    """Blender wants it."""
+    """Do nothing: Blender requires this function."""
