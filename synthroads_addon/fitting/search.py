@@ -324,7 +324,7 @@ def split_chains(fit: ChainFit) -> list[Chain]:
 
 
 def _split_element(chain: Chain, freed: Int, e: int, knot: float) -> Chain:
-    """Return the chain with a knot in element e, both parts of which are free."""
+    """Return the chain with a knot at a station (m) in element e, both parts of which are free."""
     values = np.insert(chain.values, e + 1, np.interp(knot, chain.knots, chain.values))
     return replace(chain, knots=np.insert(chain.knots, e + 1, knot), values=values, kinds=np.insert(freed, e, FREE))
 
@@ -339,7 +339,7 @@ def _square_gain(columns: list[Float], q: Float, rest: Float) -> float:
 
 
 def improve_fit(fit: ChainFit, goal: Goal, steps: int = 60) -> ChainFit:
-    """Return a fit that no single edit improves: grown until the bounds are met, then changed while the rank falls."""
+    """Return a fit grown until the bounds are met, then edited while its rank falls, in at most ``steps`` rounds."""
     for _ in range(steps):
         while goal.is_met(fit):
             ways = [edit for _, edit in rank_edits(fit, True, goal)[: 3 * _TRIALS]]

@@ -168,7 +168,7 @@ def _has_lane(section: CarriagewaySection, rut: Rut) -> bool:
 
 
 def _cells_of_cosine(depth: float, tolerance: float) -> int:
-    """Return the number n of chords that follow half a cosine wave (m): depth pi^2 / (16 n^2) off at most."""
+    """Return how many chords follow half a cosine wave of a depth (m); n are off by depth pi^2 / (16 n^2) at most."""
     return int(np.ceil(np.pi / 4.0 * np.sqrt(depth / (0.5 * tolerance)))) + 1
 
 

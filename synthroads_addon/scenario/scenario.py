@@ -266,7 +266,7 @@ def _with_value(data: Any, path: str, value: Any, above: str = "") -> Any:
 
 
 def drop_misfits(data: dict[str, Any], before: Mapping[str, Any], named: AbstractSet[str]) -> dict[str, Any]:
-    """Return a changed scenario's JSON data without what it said itself and doesn't fit the changes any more.
+    """Return a changed scenario's JSON data without its former settings that don't fit the changes any more.
 
     Of a design class and a standard cross-section that don't fit each other, the one that no change names is left out;
     and of a device that a change names, the settings that it can't do and no change names. What the changes name stays,

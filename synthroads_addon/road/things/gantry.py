@@ -165,7 +165,7 @@ class Gantry(StandingThing):
         return TwinTypes("IfcElementAssembly.SIGNALASSEMBLY.SITE", f"gantry.{self.kind}", kind=f"Gantry {self.kind}")
 
     def part_models(self) -> dict[str, GantrySign]:
-        """Return its signs by name: sign-1, sign-2, ..."""
+        """Return the parameters of its signs by name: sign-1, sign-2, ..."""
         return {f"sign-{number}": sign for number, sign in enumerate(self.signs, 1)}
 
     def signals(self) -> dict[str, Signal]:
