@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
 
+from ..base.main_thread import MainThreadCalls
 from ..materials.table import Material
-from ..scanning.colour.colour import LayerSource
+from ..scanning.colour.colour import LayerSource, takes_nodes
 from ..scanning.colour.request import LayerRequest, material_layers
 from ..scanning.finish import OF_INTENSITY
 from ..scanning.scene.caster import Caster
 from ..scanning.scene.mesh import SceneMesh
-from .cameras import layer_source
+from .cameras import HAS_RETURN_CAMERA, MaterialSnapshot, layer_source, snapshot_layers, varying_materials
 from .cameras.surfaces import scene_constants
 from .casters import make_caster
 from .materials import constants
@@ -38,14 +40,24 @@ class BlenderServices:
 
 
 class SnapshotServices:
-    """A scan's services with a snapshot of the open file's materials: usable in any thread, nothing is rendered.
+    """A scan's services with a snapshot of the open file's materials: usable in any thread, whatever becomes of the file.
 
     Args:
         names: materials of the scene that is scanned.
+        calls: those that the main thread makes while the materials' nodes are worked out; None where they aren't to be.
+        folder: for files, as long as the services are used; needed with calls.
     """
 
-    def __init__(self, names: Sequence[str]) -> None:
+    def __init__(self, names: Sequence[str], calls: MainThreadCalls | None = None, folder: Path | None = None) -> None:
         self._means, self._constants = list(constants(names).values()), scene_constants(names)
+        self._calls, self._snapshot = calls, None
+        if calls is not None and folder is not None:
+            self._snapshot = MaterialSnapshot(names, varying_materials(self._constants), folder)
+
+    @property
+    def needs_renderer(self) -> bool:
+        """Return whether this Blender would render a pixel per return of materials that can't be worked out."""
+        return self._snapshot is not None and bool(self._snapshot.obstacles) and HAS_RETURN_CAMERA
 
     def caster(self, name: str, mesh: SceneMesh) -> Caster:
         """Return a ray caster over a mesh, see `make_caster`."""
@@ -56,10 +68,14 @@ class SnapshotServices:
         return list(self._means)
 
     def reflectance_varies(self, names: Sequence[str]) -> bool:
-        """Return False: without rendering, materials count as constant."""
-        return False
+        """Return whether some of the materials reflect otherwise at other places."""
+        return bool(self._constants.varying_layers(OF_INTENSITY))
 
     @contextmanager
     def layers(self, request: LayerRequest, progress: Callable[[float], None]) -> Iterator[LayerSource]:
-        """Context of a source of layers that are the materials' constants."""
-        yield material_layers(request, self._constants)
+        """Yield colours and layers by the materials' nodes as they were read, else the materials' own values."""
+        if self._snapshot is None or self._calls is None or not takes_nodes(request.settings):
+            yield material_layers(request, self._constants)
+            return
+        with snapshot_layers(request, self._constants, self._snapshot, self._calls) as source:
+            yield source

@@ -5,7 +5,8 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import replace
 from itertools import islice
-from typing import Any, Protocol
+from threading import current_thread, main_thread
+from typing import Any, Protocol, TypeAlias, TypeVar
 
 from ..base.machine import available_cores
 from ..base.progress import StageTimer
@@ -17,10 +18,12 @@ from .scan import BlockResult, BlockScan, join_results
 
 RETURNS_AT_ONCE = 400_000
 """Points that are rendered together: each rendering takes a tenth of a second whatever their number."""
-
-
 _AHEAD = 12
 """Blocks that are computed ahead while others are rendered: about as many points as are rendered together."""
+_FINISHED_AT_ONCE = 2
+"""So many of these lots of points are finished side by side: one while another is rendered."""
+T = TypeVar("T")
+Wait: TypeAlias = Callable[[Future[BlockResult]], BlockResult]
 
 
 class Sink(Protocol):
@@ -94,29 +97,49 @@ def _open_layers(plan: ScanPlan, stack: ExitStack, timer: StageTimer) -> LayerSo
 def scan_blocks(plan: ScanPlan, source: LayerSource | None = None) -> Iterator[BlockResult]:
     """Yield the blocks of a scan in their order, computed side by side; only a few are held at a time.
 
-    Where colours are rendered return by return, several blocks come as one.
+    Where materials are worked out or rendered return by return, several blocks come as one.
 
     Args:
         plan: the scan.
-        source: of colours and layers; where it renders, that happens in the calling thread. Without it the blocks are
-            as they were measured.
+        source: of colours and layers; what it renders, the main thread renders. Without it the blocks are as they were
+            measured.
     """
-    scan, finish = BlockScan(plan), None if source is None else Finish(plan, source)
-    renders = source is not None and source.main_thread_only
+    workers, block_scan = plan.threads or available_cores(), BlockScan(plan)
 
-    def work(block: Block) -> BlockResult:
-        result = scan.block(*block)
-        return result if finish is None or renders else finish.block(result)
+    def scan(block: Block) -> BlockResult:
+        return block_scan.block(*block)
 
+    if source is None:
+        yield from _computed(scan, plan, workers, 1, Future.result)
+        return
+    if source.calls is None:
+        finish = Finish(plan, source)
+        yield from _computed(lambda block: finish.block(scan(block)), plan, workers, 1, Future.result)
+        return
+    calls = source.calls
+    blocks = _computed(scan, plan, workers, _AHEAD, calls.result_of)
+    stop: Callable[[], None] = _nothing
+    if current_thread() is main_thread():  # else, in the panel, the window's thread makes the calls to the end
+        calls.open()
+        stop = calls.close
+    finishers = min(workers, _FINISHED_AT_ONCE)
+    yield from _map_side_by_side(
+        Finish(plan, source).block, _join_into_batches(blocks), finishers, 0, calls.result_of, stop
+    )
+
+
+def _nothing() -> None:
+    """Do nothing."""
+
+
+def _computed(
+    work: Callable[[Block], BlockResult], plan: ScanPlan, workers: int, ahead: int, wait: Wait
+) -> Iterator[BlockResult]:
+    """Yield the results of a plan's blocks in their order, see `_map_side_by_side`."""
     blocks = plan.blocks()
     if plan.target.caster.main_thread_only:
-        results: Iterator[BlockResult] = map(work, blocks)
-    else:
-        results = _map_side_by_side(work, blocks, plan.threads or available_cores(), _AHEAD if renders else 1)
-    if finish is None or not renders:
-        yield from results
-    else:
-        yield from map(finish.block, _join_into_batches(results))
+        return map(work, blocks)
+    return _map_side_by_side(work, blocks, workers, ahead, wait)
 
 
 def _join_into_batches(results: Iterator[BlockResult]) -> Iterator[BlockResult]:
@@ -132,22 +155,30 @@ def _join_into_batches(results: Iterator[BlockResult]) -> Iterator[BlockResult]:
 
 
 def _map_side_by_side(
-    work: Callable[[Block], BlockResult], blocks: Iterator[Block], workers: int, ahead: int
+    work: Callable[[T], BlockResult],
+    items: Iterator[T],
+    workers: int,
+    ahead: int,
+    wait: Wait,
+    stop: Callable[[], None] = _nothing,
 ) -> Iterator[BlockResult]:
-    """Yield the results of blocks in their order, of which as many as there are workers are computed at once.
+    """Yield the results of items in their order, of which as many as there are workers are computed at once.
 
     Args:
-        work: computes a block.
-        blocks: the blocks.
+        work: computes an item.
+        items: blocks, or results of several.
         workers: threads.
-        ahead: blocks beyond these that may wait until they are taken.
+        ahead: items beyond these that may wait until they are taken.
+        wait: waits for a result.
+        stop: called before the threads are waited for in the end: they may wait for this one.
     """
     pool = ThreadPoolExecutor(workers)
     try:
-        pending: list[Future[BlockResult]] = [pool.submit(work, block) for block in islice(blocks, workers + ahead)]
+        pending: list[Future[BlockResult]] = [pool.submit(work, item) for item in islice(items, workers + ahead)]
         while pending:
-            yield pending.pop(0).result()
-            pending += [pool.submit(work, block) for block in islice(blocks, 1)]
+            yield wait(pending.pop(0))
+            pending += [pool.submit(work, item) for item in islice(items, 1)]
     finally:
+        stop()
         # Where the work is stopped, what has not begun is dropped.
         pool.shutdown(wait=True, cancel_futures=True)

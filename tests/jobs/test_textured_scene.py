@@ -11,19 +11,23 @@ import numpy as np
 import pytest
 
 from synthroads_addon.blender.files import empty_file
+from synthroads_addon.jobs.scan.files import CloudFiles
 from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
 from synthroads_addon.materials.reflectance import reflectivity
+from synthroads_addon.scanning import record
 from synthroads_addon.scenario.scenario import load_scenario
-from tests.helpers.scenes.checkered_scene import build_checkered_scene, expected_colors
+from tests.helpers.scenes.checkered_scene import APART, build_checkered_scene, expected_colors
 
-SCAN = ["scan.lines_per_second=200", "scan.noise.range_sigma=0", "scan.relief=0"]
+PLACE = (15.0, -9.0, 7.0)
+"""Place of the scanner: it does not see what is straight below it."""
+SCAN = ["scan.lines_per_second=80", "scan.noise.range_sigma=0", "scan.relief=0"]
 SCAN += ["scan.rays_per_pulse=1", 'outputs=["cloud"]', "colour.mode=unlit", "cloud.intensity=range_corrected"]
 SCAN += ["scan.reflection=lambert", 'cloud.attributes=["incidence","color_source"]']
 
 
 def scanned(folder: Path, scene: Path | None, *changes: str) -> tuple[dict[str, Any], laspy.LasData]:
     scenario = load_scenario("tripod-200m", [*SCAN, *changes])
-    job = SceneScan(scenario, folder, scene, tripods=((10.0, 0.0, 8.0),))
+    job = SceneScan(scenario, folder, scene, tripods=(PLACE,))
     report = scan_scene(job)
     return report, laspy.read(folder / "cloud.laz")
 
@@ -39,10 +43,11 @@ def test_points_have_their_fields_colour_and_its_luminance(tmp_path: Path, suffi
         bpy.ops.export_scene.gltf(filepath=str(path))
     report, cloud = scanned(tmp_path / "out", path)
     place = np.asarray(cloud.xyz)
-    assert len(place) > 3000
+    assert len(place) > 10_000
     assert report["counts"]["points_by_colour_source"] == {"nodes": 1.0}
     expected, edge = expected_colors(place)
     inside = edge > 0.02
+    assert (np.bincount(np.round(place[inside, 0] / APART).astype(int)) > 200).all(), "all boards are seen"
     stored = np.stack([np.asarray(cloud[name]) for name in ("red", "green", "blue")], axis=1) / 65535.0
     linear = np.where(stored <= 0.04045, stored / 12.92, ((stored + 0.055) / 1.055) ** 2.4)
     assert np.abs(linear - expected)[inside].max() < 0.002
@@ -54,7 +59,7 @@ def test_points_have_their_fields_colour_and_its_luminance(tmp_path: Path, suffi
     assert wanted[inside].std() > 0.2 * wanted[inside].mean(), "fields differ"
 
 
-LIT = ["colour.mode=lit", "scan.lines_per_second=420"]
+LIT = ["colour.mode=lit", "scan.lines_per_second=150"]
 
 
 def shaded_scene(folder: Path) -> None:
@@ -65,12 +70,26 @@ def shaded_scene(folder: Path) -> None:
 
 
 @pytest.mark.any_blender
-def test_threads_change_no_byte(tmp_path: Path) -> None:
+def test_threads_change_no_byte(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lots of points are finished while others are rendered, which they wait for in a thread."""
+    monkeypatch.setattr(record, "RETURNS_AT_ONCE", 15_000)
     shaded_scene(tmp_path)
     one, three = (scanned(tmp_path / name, None, *LIT, f"scan.threads={name}")[1] for name in ("1", "3"))
+    assert len(one) > 60_000
     assert one.points.array.tobytes() == three.points.array.tobytes()
     dark = np.asarray(one.green, float) < 0.75 * np.median(np.asarray(one.green))
     assert dark.any(), "the cube throws a shadow"
+
+
+@pytest.mark.any_blender
+def test_an_error_while_others_wait_to_be_rendered_ends_the_scan(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(record, "RETURNS_AT_ONCE", 4_000)
+    monkeypatch.setattr(CloudFiles, "write", lambda *_: 1 / 0)
+    shaded_scene(tmp_path)
+    with pytest.raises(ZeroDivisionError):
+        scanned(tmp_path / "out", None, *LIT, "scan.threads=3")
 
 
 @pytest.mark.slow

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 
 import bpy
 
 from ...base.errors import InputError
+from ...base.main_thread import MainThreadCalls
 from ...scanning.colour.colour import (
     MATERIAL_LAYERS,
     ColourSettings,
@@ -24,21 +25,25 @@ from ...scanning.colour.views import View, scene_sample, views_along
 from ..materials.calculable import material_needs
 from .calculator import calculator
 from .images import RenderedLayers
-from .light import Daylight, daylight
+from .light import Daylight, daylight, measured_light
 from .nodes import NodeLayers
 from .returns import ReturnCamera
+from .snapshot import MaterialSnapshot
 from .stage import Passes, RenderStage, stage
 from .surfaces import numbered_materials, scene_constants
 from .versions import HAS_RETURN_CAMERA
 
 __all__ = [
     "HAS_RETURN_CAMERA",
+    "MaterialSnapshot",
     "RenderedLayers",
     "ReturnCamera",
     "check_colour",
     "image_views",
     "layer_source",
     "renders_returns",
+    "snapshot_layers",
+    "varying_materials",
 ]
 
 _BOUNCES = 3
@@ -77,7 +82,7 @@ def layer_source(
 ) -> Iterator[LayerSource]:
     """Context of a source of the points' colours and layers; renders images on entry, restores the scene on exit.
 
-    Must be called on Blender's main thread. `ReturnCamera` must be used there as well; the others by any threads.
+    Must be called on Blender's main thread; what it yields may be used by any threads.
 
     Args:
         request: what is wanted.
@@ -134,14 +139,11 @@ def _node_layers(
     source: bpy.types.Scene | None,
 ) -> LayerSource:
     """Return a source of layers from materials' nodes; materials that can't be evaluated use a pixel per return."""
-    constants, names = fallback.constants, request.mesh.materials
-    needed = needed_layers(request.wanted, request.settings.mode)
-    if request.lit:
-        needed |= set(MATERIAL_LAYERS)  # the light that they throw back depends on all
-    layers = constants.varying_layers(frozenset(needed))
+    calls, constants, names = MainThreadCalls(), fallback.constants, request.mesh.materials
+    layers = node_layers(request, constants)
     if not layers and not request.lit:
         return fallback
-    varying = {index for name in layers for index in constants.varies[name].nonzero()[0].tolist()}
+    varying = varying_materials(constants, layers)
     items = {index: item for index, item in numbered_materials(names) if index in varying}
     needs = {index: material_needs(item) for index, item in items.items()}
     obstacles = {index: need.obstacles for index, need in needs.items() if need.obstacles}
@@ -149,10 +151,51 @@ def _node_layers(
     rest = None
     if obstacles and HAS_RETURN_CAMERA:
         set_up = _lit_stage(stack, request, _passes(request, constants, by_return=True), day, source)
-        rest = ReturnCamera(set_up, fallback, day.exposure if day else 1.0)
+        rest = ReturnCamera(set_up, fallback, day.exposure if day else 1.0, calls)
     work = stack.enter_context(calculator(easy, layers)) if easy else None
     surfaces = SceneSurfaces(request.mesh, request.moving)
-    return NodeLayers(work, surfaces, fallback, rest, obstacles, names, request.frame)
+    return NodeLayers(calls, work, surfaces, fallback, rest, obstacles, names, request.frame)
+
+
+def node_layers(request: LayerRequest, constants: SurfaceConstants) -> tuple[str, ...]:
+    """Return the layers that materials' nodes must be asked for: those wanted that some material varies."""
+    needed = needed_layers(request.wanted, request.settings.mode)
+    if request.lit:
+        needed |= set(MATERIAL_LAYERS)  # the light that they throw back depends on all
+    return constants.varying_layers(frozenset(needed))
+
+
+def varying_materials(constants: SurfaceConstants, layers: Sequence[str] = tuple(MATERIAL_LAYERS)) -> set[int]:
+    """Return the indices of the materials that vary some of these layers."""
+    return {index for name in layers for index in constants.varies[name].nonzero()[0].tolist()}
+
+
+@contextmanager
+def snapshot_layers(
+    request: LayerRequest, constants: SurfaceConstants, snapshot: MaterialSnapshot, calls: MainThreadCalls
+) -> Iterator[LayerSource]:
+    """Yield what gives the points their layers from materials' nodes as they were; any thread may open it.
+
+    What can't be worked out has its materials' means.
+
+    Args:
+        request: what is wanted.
+        constants: of the scene's materials.
+        snapshot: of these materials.
+        calls: those that the main thread makes.
+    """
+    light = SunAndSky()
+    if request.lit:
+        light = calls.call(lambda: measured_light(request.environment))
+    fallback, layers = material_layers(request, constants, light), node_layers(request, constants)
+    if not layers and not request.lit:
+        yield fallback
+        return
+    varying = varying_materials(constants, layers)
+    obstacles = {index: names for index, names in snapshot.obstacles.items() if index in varying}
+    surfaces = SceneSurfaces(request.mesh, request.moving)
+    work = snapshot.calculator(varying, layers)
+    yield NodeLayers(calls, work, surfaces, fallback, None, obstacles, request.mesh.materials, request.frame)
 
 
 def image_views(request: LayerRequest) -> list[View]:

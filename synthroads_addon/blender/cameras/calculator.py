@@ -28,7 +28,7 @@ _ABOVE = 10.0
 
 
 @dataclass
-class _Copy:
+class ReadingCopy:
     """A copy of a material whose inputs (positions, normals, attributes) are read from images.
 
     Attributes:
@@ -46,17 +46,15 @@ class Calculator:
     Attributes:
         stage: what renders.
         layers: names of the layers that come back.
+        at_once: places that are worked out at once.
     """
 
-    def __init__(self, stage: RenderStage, copies: dict[int, _Copy], layers: Sequence[str]) -> None:
+    at_once = 1 << 20
+
+    def __init__(self, stage: RenderStage, copies: dict[int, ReadingCopy], layers: Sequence[str]) -> None:
         self.stage, self.layers, self._copies = stage, tuple(layers), copies
         self._images: dict[SurfaceInput, bpy.types.Image] = {}
         self._size = 0, 0
-
-    @property
-    def inputs(self) -> frozenset[SurfaceInput]:
-        """Return all inputs (positions, normals, attributes, ...) that the materials' nodes read."""
-        return frozenset(what for copy in self._copies.values() for what, _ in copy.readers)
 
     def inputs_of(self, material: int) -> frozenset[SurfaceInput]:
         """Return the inputs that the nodes of the material with this index read."""
@@ -150,8 +148,15 @@ def calculator(items: dict[int, bpy.types.Material], layers: Sequence[str]) -> I
         layers: those that are asked for.
     """
     with ExitStack() as stack:
+        copies = {number: stack.enter_context(reading_copy(item, layers)) for number, item in items.items()}
+        yield stack.enter_context(opened_calculator(copies, layers))
+
+
+@contextmanager
+def opened_calculator(copies: dict[int, ReadingCopy], layers: Sequence[str]) -> Iterator[Calculator]:
+    """Yield a calculator with copies of materials, by their index; afterwards nothing of it is left but these."""
+    with ExitStack() as stack:
         folder = stack.enter_context(scratch_folder())
-        copies = {number: stack.enter_context(_reading_copy(item, layers)) for number, item in items.items()}
         set_up = stack.enter_context(new_stage(Passes(layers, lit=False), folder))
         set_up.scene.render.use_persistent_data = False  # else images that change would be kept
         result = Calculator(set_up, copies, layers)
@@ -160,7 +165,7 @@ def calculator(items: dict[int, bpy.types.Material], layers: Sequence[str]) -> I
 
 
 @contextmanager
-def _reading_copy(item: bpy.types.Material, layers: Sequence[str]) -> Iterator[_Copy]:
+def reading_copy(item: bpy.types.Material, layers: Sequence[str]) -> Iterator[ReadingCopy]:
     """Context of a copy of a material that outputs only the layers, its inputs read from images; removed on exit."""
     copied = item.copy()
     groups: list[bpy.types.NodeTree] = []
@@ -184,7 +189,7 @@ def _reading_copy(item: bpy.types.Material, layers: Sequence[str]) -> Iterator[_
         readers = list(replace_inputs(search.sites))
         glow, end = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeOutputMaterial")
         tree.links.new(glow.outputs[0], end.inputs["Surface"])
-        yield _Copy(copied, readers)
+        yield ReadingCopy(copied, readers)
     finally:
         bpy.data.materials.remove(copied)
         for group in reversed(groups):

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...road.surroundings import Environment
 from ...scanning.colour.light import SunAndSky, expose_light, sun_direction
-from ..sky import SUN_ANGLE, SUN_COLOR, fill_sky, new_sun
+from ..sky import SUN_ANGLE, SUN_COLOR, SUN_STRENGTH, fill_sky, new_sun
 from .stage import SUN_GROUP, Passes, stage
 
 _PROBE_SAMPLES = 128
@@ -45,17 +45,27 @@ def daylight(environment: Environment, sharp: bool) -> Iterator[Daylight]:
         environment: the road's.
         sharp: the sun is a point, so that one sample gives its shadows without noise.
     """
-    towards, sky = sun_direction(environment), _Sky.of(environment)
+    sky = _Sky.of(environment)
     with ExitStack() as stack:
         sun = new_sun("SR Stage Sun", environment, 0.0 if sharp else SUN_ANGLE)
         lamp = sun.data
         stack.callback(lambda: bpy.data.lights.remove(lamp))
         stack.callback(lambda: bpy.data.objects.remove(sun))
         world = stack.enter_context(_world(sky))
-        # A lamp's irradiance falls on a matt surface, which spreads it over pi.
-        facing = np.array(SUN_COLOR) * lamp.energy / math.pi
-        light, exposure = expose_light(towards, facing, np.array(_sky_radiance(sky)))
+        light, exposure = _exposed(environment)
         yield Daylight(sun, world, light, exposure)
+
+
+def measured_light(environment: Environment) -> SunAndSky:
+    """Return sun and sky as white surfaces see them, exposed; the sky is rendered once. In Blender's main thread."""
+    return _exposed(environment)[0]
+
+
+def _exposed(environment: Environment) -> tuple[SunAndSky, float]:
+    """Return sun and sky as white surfaces see them, exposed, and the exposure, see `expose_light`."""
+    # A lamp's irradiance, which it keeps as 32 bits, falls on a matt surface, which spreads it over pi.
+    facing = np.array(SUN_COLOR) * float(np.float32(SUN_STRENGTH * environment.sun_strength)) / math.pi
+    return expose_light(sun_direction(environment), facing, np.array(_sky_radiance(_Sky.of(environment))))
 
 
 class _Sky(NamedTuple):

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from threading import Lock
+from typing import Any, Protocol
 
 import numpy as np
 
 from ...base.arrays import AnyArray, Bool, Float32, Index, UInt16
+from ...base.main_thread import MainThreadCalls
 from ...scanning.colour.colour import (
     FROM_NODES,
     LayerSource,
@@ -19,20 +21,38 @@ from ...scanning.colour.reflection import reflected_sunlight
 from ...scanning.colour.surfaces import SceneSurfaces
 from ...scanning.scene.surface_values import SurfaceInput
 from ..materials.inputs import INCOMING, POSITION, TRUE_NORMAL
-from .calculator import Calculator
 
 _OF_POINT: dict[SurfaceInput, Callable[[SeenPoints], AnyArray]] = {
     TRUE_NORMAL: lambda points: points.normal,
     INCOMING: lambda points: points.towards_scanner,
 }
-AT_ONCE = 1 << 20
-"""Returns that are worked out at once."""
+
+
+class LayerCalculator(Protocol):
+    """Works out layers of materials at places.
+
+    Attributes:
+        layers: names of the layers that come back.
+        at_once: places that are worked out at once.
+    """
+
+    layers: tuple[str, ...]
+    at_once: int
+
+    def inputs_of(self, material: int) -> frozenset[SurfaceInput]:
+        """Return what a material asks for, by its index."""
+        ...
+
+    def calculate(self, material: Index, values: dict[SurfaceInput, Float32]) -> dict[str, Float32]:
+        """Return the layers (N, C) of N places, see `Calculator.calculate`; in Blender's main thread."""
+        ...
 
 
 class NodeLayers:
-    """Source of each return's layers, evaluated from its material's nodes; on Blender's main thread if it renders.
+    """Source of each return's layers, evaluated from its material's nodes; the main thread renders them.
 
     Args:
+        calls: those that it has the main thread make.
         calculator: of the materials that vary; None where none does.
         surfaces: what materials ask of the places.
         fallback: the materials' means.
@@ -40,14 +60,12 @@ class NodeLayers:
         obstacles: names of nodes that stand in the way, by material.
         materials: names of the scene's materials.
         frame: (3,) where the scene's local frame begins in that of the whole road, of which it may be a section, m.
-
-    Attributes:
-        main_thread_only: whether it renders.
     """
 
     def __init__(
         self,
-        calculator: Calculator | None,
+        calls: MainThreadCalls,
+        calculator: LayerCalculator | None,
         surfaces: SceneSurfaces,
         fallback: MaterialLayers,
         rest: LayerSource | None,
@@ -58,22 +76,22 @@ class NodeLayers:
         self._frame = np.array(frame)
         self._calculator, self._surfaces, self.material, self._rest = calculator, surfaces, fallback, rest
         self._obstacles, self._materials = obstacles, materials
-        self._left_out = np.zeros(len(materials), np.int64)
+        self._left_out, self._worked_out, self._counting = np.zeros(len(materials), np.int64), 0, Lock()
         known = np.zeros(len(materials), bool)
         known[list(obstacles)] = True
         self._hard: Bool = known
         self._varying = np.zeros(len(materials), bool)
         for name in calculator.layers if calculator else ():
             self._varying |= fallback.constants.varies[name]
-        self.main_thread_only = calculator is not None or rest is not None
+        self._calls = calls
+        self.calls = calls if calculator is not None or rest is not None else None
 
     @property
     def report(self) -> dict[str, Any]:
-        """Return images, pixels and layers rendered, and materials left out with why and their points, as JSON data."""
+        """Return returns and layers evaluated, and materials left out with why and their points, as JSON data."""
         result: dict[str, Any] = {}
         if self._calculator is not None:
-            stage = self._calculator.stage
-            result = {"images": stage.images, "pixels": stage.pixels, "layers": list(self._calculator.layers)}
+            result = {"returns": self._worked_out, "layers": list(self._calculator.layers)}
         if self._obstacles:
             result["left_out"] = {
                 self._materials[index]: {"because_of": list(names), "points": int(self._left_out[index])}
@@ -86,7 +104,8 @@ class NodeLayers:
         hard = self._hard[points.material]
         if not hard.any():
             return self._work_out(points, wanted)
-        self._left_out += np.bincount(points.material[hard], minlength=len(self._left_out))
+        with self._counting:
+            self._left_out += np.bincount(points.material[hard], minlength=len(self._left_out))
         easy, other = np.flatnonzero(~hard), np.flatnonzero(hard)
         rest = self._rest or self.material
         parts = [
@@ -110,20 +129,25 @@ class NodeLayers:
             varying = np.flatnonzero(self._varying[points.material])
             parts = {name: (len(points), 3 if name == "base_color" else 1) for name in self._calculator.layers}
             channels = {name: np.zeros(shape, np.float32) for name, shape in parts.items()}
-            for start in range(0, len(varying), AT_ONCE):
-                self._calculate(points, varying[start : start + AT_ONCE], channels)
+            most = self._calculator.at_once
+            for start in range(0, len(varying), most):
+                self._calculate(points, varying[start : start + most], channels)
+            with self._counting:
+                self._worked_out += len(varying)
         if "rgb" in wanted and self.material.mode == "lit":
             channels["sun"] = self._sunlight(points, channels)
         return self.material.layer_values(points, channels, source, wanted)
 
     def _calculate(self, points: SeenPoints, rows: Index, channels: dict[str, Float32]) -> None:
-        """Render the layers of the points of `rows` and write them into the channels, in place."""
-        assert self._calculator is not None
+        """Evaluate the layers of the points of `rows` and write them into the channels, in place."""
+        calculator = self._calculator
+        assert calculator is not None
         material = points.material[rows]
         order = np.argsort(material, kind="stable")
         rows, material = rows[order], material[order]
         values = self._inputs(points, rows, material)
-        for name, array in self._calculator.calculate(material.astype(np.intp), values).items():
+        worked_out = self._calls.call(lambda: calculator.calculate(material.astype(np.intp), values))
+        for name, array in worked_out.items():
             channels[name][rows] = array
 
     def _inputs(self, points: SeenPoints, rows: Index, material: UInt16) -> dict[SurfaceInput, Float32]:

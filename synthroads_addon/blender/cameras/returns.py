@@ -12,6 +12,7 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
+from ...base.main_thread import MainThreadCalls
 from ...scanning.colour.colour import FROM_MATERIAL, FROM_RETURN, LayerValues, MaterialLayers, SeenPoints
 from .exr import write_image
 from .stage import SKY_GROUP, SUN_GROUP, RenderStage
@@ -49,21 +50,22 @@ shader sr_return_camera(
 
 
 class ReturnCamera:
-    """Source of each return's layers by rendering one pixel per return; must be used on Blender's main thread.
+    """Source of each return's layers by rendering one pixel per return; the main thread renders them.
 
     A return's ray starts a little before the place that was hit, along the scanner's ray, so that what the pulse
     came through on its way doesn't hide it. Pixels that show another place or another material than the return's
     are given up for the material's means.
 
     Attributes:
-        main_thread_only: it renders, which only Blender's main thread may.
+        calls: those that it has the main thread make.
         worst: largest distance between a return and what its pixel shows, of those used, m.
     """
 
-    main_thread_only = True
-
-    def __init__(self, stage: RenderStage, fallback: MaterialLayers, exposure: float) -> None:
+    def __init__(
+        self, stage: RenderStage, fallback: MaterialLayers, exposure: float, calls: MainThreadCalls | None = None
+    ) -> None:
         self._stage, self.material, self._exposure = stage, fallback, exposure
+        self.calls = calls or MainThreadCalls()
         self._blocks = 0
         self.worst = 0.0
 
@@ -83,7 +85,10 @@ class ReturnCamera:
         return LayerValues(arrays, np.concatenate([part.source for part in parts]))
 
     def _block(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
-        channels, matching = self._render_points(points) if len(points) else ({}, np.zeros(0, bool))
+        channels: dict[str, NDArray[np.float32]] = {}
+        matching = np.zeros(0, bool)
+        if len(points):
+            channels, matching = self.calls.call(lambda: self._render_points(points))
         source = np.where(matching, FROM_RETURN, FROM_MATERIAL).astype(np.uint8)
         return self.material.layer_values(points, channels, source, wanted)
 

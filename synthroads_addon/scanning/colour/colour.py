@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import AnyArray, ArrayRows, Bool, Float, Float32, Index, UInt8, UInt16
+from ...base.main_thread import MainThreadCalls
 from ...cloud.points import NO_MATERIAL
 from ...materials.table import Material
 from .light import CloudShadows, SunAndSky
@@ -127,11 +128,12 @@ class SeenPoints(ArrayRows):
 class LayerSource(Protocol):
     """Source of the points' colours and material layers: images, a pixel per return, or the materials' means.
 
-    Attributes:
-        main_thread_only: it renders, which only Blender's main thread may; else any threads, side by side.
+    Any threads may use it side by side.
     """
 
-    main_thread_only: bool
+    @property
+    def calls(self) -> MainThreadCalls | None:
+        """Return the calls that it has the main thread make, which alone may render; None if it makes none."""
 
     @property
     def report(self) -> dict[str, Any]:
@@ -229,7 +231,7 @@ class MaterialLayers:
     light: SunAndSky = field(default_factory=SunAndSky)
     clouds: CloudShadows | None = None
     report: dict[str, Any] = field(default_factory=dict)
-    main_thread_only = False
+    calls = None
 
     def sample(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
         """Return the wanted layers of N points; see `LayerSource.sample`."""

@@ -49,7 +49,7 @@ class ImageLayers:
     it nor what lies behind an edge mixes in, and grazing views stay usable.
     """
 
-    main_thread_only = False
+    calls = None
 
     def __init__(self, images: Sequence[RenderedImage], channels: dict[str, int], material: MaterialLayers) -> None:
         """Take images with these channels (name and components, in order), and what to take where none shows a point.

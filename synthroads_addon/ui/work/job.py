@@ -20,6 +20,7 @@ from threading import Event, Thread
 from typing import Any, Generic, TypeAlias, TypeVar
 
 from ...base.errors import Cancelled
+from ...base.main_thread import MainThreadCalls
 
 T = TypeVar("T")
 Report: TypeAlias = Callable[[float], None]
@@ -77,12 +78,14 @@ class Aside:
         work: gets a `Report` to call now and then; touches no data-block of Blender.
         state: what it does, in words for the window.
         first, last: the shares of the job at its begin and end.
+        calls: what the thread has the main thread do meanwhile; each of them leaves nothing in the file.
     """
 
     work: Callable[[Report], Any]
     state: str = ""
     first: float = 0.0
     last: float = 1.0
+    calls: MainThreadCalls | None = None
 
 
 @dataclass(frozen=True)
@@ -186,6 +189,7 @@ class PanelJob(Generic[T]):
                     self._thread.join(patience)
                     self._is_new = False
                 if self._thread.is_alive():
+                    self._make_calls(deadline, idle_until)
                     break
                 self._take_over()
             self._advance(self._begin_thread)
@@ -204,9 +208,22 @@ class PanelJob(Generic[T]):
         if not wait or self._ended:
             return
         if self._thread is not None:
+            if self._aside is not None and self._aside.calls is not None:
+                self._aside.calls.close()  # or the thread would wait for this one
             self._thread.join()
             self._take_over()
         self._close(Cancelled(f"{self.title} was cancelled"))
+
+    def _make_calls(self, deadline: float, idle_until: float) -> None:
+        """Do what the thread asks the main thread for, until a time; where there is nothing, wait until another."""
+        calls = None if self._aside is None else self._aside.calls
+        while calls is not None:
+            idle = not calls.make_next()
+            now = time.perf_counter()
+            if now >= deadline or (idle and now >= idle_until):
+                return
+            if idle:
+                time.sleep(_LOOK_AGAIN)
 
     def _advance(self, begin: Callable[[Aside], None]) -> None:
         """Do one step."""

@@ -1,7 +1,8 @@
 """The button that scans: a scan of the open scene's road into a folder.
 
-Where nothing is rendered the scene is read in the window's thread, and the rest needs a thread. Rendering needs the
-main thread of a Blender: that is another one, which works on a copy of the file.
+The scene is read in the window's thread, and scanned in another, which has the window's work out materials' nodes.
+Where the scene itself must be rendered, that takes the main thread of a Blender for long: that of another one, which
+works on a copy of the file.
 """
 
 from __future__ import annotations
@@ -16,8 +17,6 @@ from typing import Any, TypeAlias
 
 import bpy
 
-from ...base.files import output_folder
-from ...base.progress import StageTimer
 from ...blender.files import save_scene
 from ...blender.model.build import RoadModel
 from ...blender.model.roads import ROAD
@@ -25,7 +24,6 @@ from ...blender.model.settle import settle_steps
 from ...blender.model.store import find_road, recall
 from ...blender.model.truth import EditedRoad, read_road
 from ...blender.scene.evaluated import scanned_scene_steps
-from ...blender.services import SnapshotServices
 from ...jobs.generate import Job as PipelineJob
 from ...jobs.generate import check
 from ...jobs.job_files import JobFiles, empty_scan_warnings
@@ -38,7 +36,15 @@ from .common import is_free
 from .job import Aside, PanelJob, Report, Step, Work
 from .long_operator import LongOperator
 from .rendered_scan import save_open_scene
-from .scan_steps import READ, Written, follow_scan, pass_on_reading
+from .scan_steps import (
+    READ,
+    Workplace,
+    Written,
+    follow_scan,
+    pass_on_reading,
+    renders_scene,
+    snapshot_services,
+)
 from .scene_scan import VisibleScan, class_mapping, route_of, visible_scan_work
 
 
@@ -78,48 +84,52 @@ def scan_work(scan: RoadScan) -> Work[Written]:
     """
     scenario = scan.scenario
     check(PipelineJob(scenario, scan.target, overwrite=scan.overwrite))
-    timer, renders = StageTimer(), scenario.may_render
-    with output_folder(scan.target, JobFiles(scenario).names, scan.overwrite) as folder:
+    with Workplace.opened(scan.target, JobFiles(scenario).names, scan.overwrite) as work:
         if scan.edited.stale and not scan.edited.lost:
             yield Step(0.0, "Building")
             yield from _no_share(settle_steps(scan.road_id, scan.edited))
         yield Step(0.0, "Reading")
-        measure = yield from (_save_copy if renders else _read_open_scene)(scan, folder, timer)
+        measure = None if renders_scene(scenario) else (yield from _read_open_scene(scan, work))
+        state = "Scanning" if measure else "Rendering"
+        if measure is None:
+            measure = yield from _save_copy(scan, work)
         if "scene" in scenario.outputs:
-            with timer.stage("scene file"):
-                save_scene(folder / "scene.blend")
+            with work.timer.stage("scene file"):
+                save_scene(work.folder / "scene.blend")
 
         def write(report: Report) -> int:
-            return _write_files(scan, folder, timer, lambda: measure(report))
+            return _write_files(scan, work, lambda: measure(report))
 
-        points = yield Aside(write, "Rendering" if renders else "Scanning", READ, 1.0)
+        points = yield Aside(write, state, READ, 1.0, work.calls)
     return Written(points, scan.target)
 
 
-def _save_copy(scan: RoadScan, folder: Path, timer: StageTimer) -> Generator[Step, None, _Measure]:
+def _save_copy(scan: RoadScan, work: Workplace) -> Generator[Step, None, _Measure]:
     """Save a copy of the open file; return what has another Blender scan it."""
-    with timer.stage("scene copy"):
-        saved = save_open_scene(
-            scan.scenario, folder, {"parameters": json.loads(scan.edited.parameters.to_json()), "road": scan.road_id}
-        )
+    scanned = {"parameters": json.loads(scan.edited.parameters.to_json()), "road": scan.road_id}
+    with work.timer.stage("scene copy"):
+        saved = save_open_scene(scan.scenario, work.folder, scanned)
     yield Step(READ)
 
     def measure(report: Report) -> dict[str, Any]:
         done = saved.scan(report)
-        timer.stages.update(done.stages)
+        work.timer.stages.update(done.stages)
         return done.counts
 
     return measure
 
 
-def _read_open_scene(scan: RoadScan, folder: Path, timer: StageTimer) -> Generator[Step, None, _Measure]:
-    """Read the open scene; return what scans it."""
+def _read_open_scene(scan: RoadScan, work: Workplace) -> Generator[Step, None, _Measure | None]:
+    """Read the open scene; return what scans it, or None if it must be rendered for some of its materials."""
+    timer = work.timer
     speed_factor, class_ids = scan.scenario.scan.traffic_speed_factor, scan.scenario.cloud.scheme().source_ids()
     with timer.stage("scene mesh"):
         geometry, road = scan.road, scan.road_id
         steps = scanned_scene_steps(geometry=geometry, speed_factor=speed_factor, class_ids=class_ids, road=road)
         copied = yield from pass_on_reading(steps)
-    services = SnapshotServices(copied.materials)
+    services = snapshot_services(scan.scenario, copied.materials, work)
+    if services is None:
+        return None
 
     def measure(report: Report) -> dict[str, Any]:
         site = Site.of_road(scan.scenario, scan.road)
@@ -130,7 +140,7 @@ def _read_open_scene(scan: RoadScan, folder: Path, timer: StageTimer) -> Generat
             plan = site.plan(scene, services)
         del scene
         follow_scan(timer, report)
-        return record_to_files([plan], site.files(folder, plan.target.origin), timer)
+        return record_to_files([plan], site.files(work.folder, plan.target.origin), timer)
 
     return measure
 
@@ -144,8 +154,9 @@ def _no_share(steps: Generator[float | None, None, RoadModel]) -> Generator[Step
         bpy.ops.ed.undo_push(message="Build as Edited")
 
 
-def _write_files(scan: RoadScan, folder: Path, timer: StageTimer, measure: Callable[[], dict[str, Any]]) -> int:
+def _write_files(scan: RoadScan, work: Workplace, measure: Callable[[], dict[str, Any]]) -> int:
     """Write all files; return the number of points. Runs in a thread: it touches no data of Blender."""
+    folder, timer = work.folder, work.timer
     files = JobFiles(scan.scenario)
     files.write_road(folder, scan.road, timer)
     told: dict[str, Any] = {"counts": measure()} if set(files.outputs) & set(OF_POINTS) else {}

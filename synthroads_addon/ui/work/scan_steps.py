@@ -1,12 +1,19 @@
 """Parts that scans of roads and of other scenes share: what they have written, and how far they are."""
 
-from collections.abc import Generator
-from contextlib import closing
-from dataclasses import dataclass
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Self
 
+from ...base.files import output_folder
+from ...base.main_thread import MainThreadCalls
 from ...base.progress import StageTimer
+from ...base.scratch.folders import scratch_folder
 from ...blender.scene.evaluated import CopiedScene
+from ...blender.services import SnapshotServices
+from ...scanning.colour.colour import takes_nodes
+from ...scenario.scenario import Scenario
 from .job import Report, Step
 
 READ = 0.1
@@ -15,11 +22,40 @@ _SHARES = {"images": (0.05, 0.05), "scan": (0.05, 1.0), "files": (1.0, 1.0)}
 
 
 @dataclass(frozen=True)
+class Workplace:
+    """Folders and calls that a scan works with.
+
+    Attributes:
+        folder: where its files are made.
+        scratch: for files that are needed as long as it lasts.
+        calls: those that it has the main thread make.
+        timer: of its stages.
+    """
+
+    folder: Path
+    scratch: Path
+    calls: MainThreadCalls = field(default_factory=MainThreadCalls)
+    timer: StageTimer = field(default_factory=StageTimer)
+
+    @classmethod
+    @contextmanager
+    def opened(cls, target: Path, names: Sequence[str], overwrite: bool) -> Iterator[Self]:
+        """Yield one; in the end the files are in the target folder, or nothing is left, see `output_folder`."""
+        with output_folder(target, names, overwrite) as folder, scratch_folder() as scratch:
+            yield cls(folder, scratch)
+
+
+@dataclass(frozen=True)
 class Written:
     """Result of a scan: so many points into a folder."""
 
     points: int
     target: Path
+
+
+def renders_scene(scenario: Scenario) -> bool:
+    """Return whether the scene itself may have to be rendered for a scan, whatever its materials are."""
+    return scenario.may_render and not takes_nodes(scenario.colour.settings(scenario.fidelity))
 
 
 def pass_on_reading(steps: Generator[float, None, CopiedScene]) -> Generator[Step, None, CopiedScene]:
@@ -31,6 +67,18 @@ def pass_on_reading(steps: Generator[float, None, CopiedScene]) -> Generator[Ste
             except StopIteration as end:
                 return end.value
             yield Step(READ * share)
+
+
+def snapshot_services(scenario: Scenario, materials: Sequence[str], work: Workplace) -> SnapshotServices | None:
+    """Return services for a scan of a scene that was read; None if the scene must be rendered for some materials.
+
+    Args:
+        scenario: the job.
+        materials: the scene's.
+        work: the scan's.
+    """
+    services = SnapshotServices(materials, work.calls if scenario.may_render else None, work.scratch)
+    return None if services.needs_renderer else services
 
 
 def follow_scan(timer: StageTimer, report: Report) -> None:

@@ -10,12 +10,9 @@ import numpy as np
 
 from ...base.class_mapping import ClassMapping
 from ...base.errors import InputError
-from ...base.files import output_folder
-from ...base.progress import StageTimer
 from ...base.schema import read_json
 from ...blender.scene.evaluated import scanned_scene_steps
 from ...blender.scene.foreign import open_scene_warnings
-from ...blender.services import SnapshotServices
 from ...jobs.job_files import JobFiles
 from ...jobs.scan.files import record_to_files
 from ...jobs.scan_scene import route_site, warnings_of_counts
@@ -23,7 +20,15 @@ from ...scanning.platforms.over_scene import SceneRoute
 from ...scenario.scenario import OF_POINTS, Scenario
 from .job import Aside, Report, Step, Work
 from .rendered_scan import save_open_scene
-from .scan_steps import READ, Written, follow_scan, pass_on_reading
+from .scan_steps import (
+    READ,
+    Workplace,
+    Written,
+    follow_scan,
+    pass_on_reading,
+    renders_scene,
+    snapshot_services,
+)
 
 _MOST_POSES = 100
 """Places that are taken of a moving camera, however many frames it moves."""
@@ -54,33 +59,39 @@ def visible_scan_work(scan: VisibleScan) -> Work[Written]:
     Raises:
         InputError: a setting is wrong, the folder can't be written, or nothing that could be scanned is visible.
     """
-    files, timer = JobFiles(scan.scenario, road=False), StageTimer()
+    files = JobFiles(scan.scenario, road=False)
     if not set(files.outputs) & set(OF_POINTS):
         raise InputError("Outputs", None, f"must name at least one of {', '.join(OF_POINTS)}: the scene has no road")
-    with output_folder(scan.target, files.names, scan.overwrite) as folder:
+    with Workplace.opened(scan.target, files.names, scan.overwrite) as work:
         yield Step(0.0, "Reading")
         warnings = open_scene_warnings()
-        measure = yield from (_save_copy if scan.scenario.may_render else _read)(scan, folder, timer)
+        measure = None if renders_scene(scan.scenario) else (yield from _read(scan, work))
+        state = "Scanning" if measure else "Rendering"
+        if measure is None:
+            measure = yield from _save_copy(scan, work)
 
         def write(report: Report) -> int:
             counts = measure(report)
             told = {"scene": bpy.path.basename(bpy.data.filepath) or None, "counts": counts}
             told["warnings"] = warnings + warnings_of_counts(counts)
-            files.write_report(folder, told, timer)
+            files.write_report(work.folder, told, work.timer)
             return int(counts["points"])
 
-        points = yield Aside(write, "Scanning", READ, 1.0)
+        points = yield Aside(write, state, READ, 1.0, work.calls)
     return Written(points, scan.target)
 
 
-def _read(scan: VisibleScan, folder: Path, timer: StageTimer) -> Generator[Step, None, Callable[[Report], Any]]:
-    """Read the open scene; return what scans it."""
+def _read(scan: VisibleScan, work: Workplace) -> Generator[Step, None, Callable[[Report], Any] | None]:
+    """Read the open scene; return what scans it, or None if it must be rendered for some of its materials."""
     settings, class_ids = scan.scenario.scan, scan.scenario.cloud.scheme().source_ids()
+    timer = work.timer
     with timer.stage("scene mesh"):
         factor = settings.traffic_speed_factor
         steps = scanned_scene_steps(classes=scan.classes, speed_factor=factor, number_objects=True, class_ids=class_ids)
         copied = yield from pass_on_reading(steps)
-    services = SnapshotServices(copied.materials)
+    services = snapshot_services(scan.scenario, copied.materials, work)
+    if services is None:
+        return None
 
     def measure(report: Report) -> dict[str, Any]:
         with timer.stage("scene mesh"):
@@ -91,21 +102,21 @@ def _read(scan: VisibleScan, folder: Path, timer: StageTimer) -> Generator[Step,
         with timer.stage("caster"):
             plan = site.plan(scene, services)
         follow_scan(timer, report)
-        return record_to_files([plan], site.files(folder, plan.target.origin), timer)
+        return record_to_files([plan], site.files(work.folder, plan.target.origin), timer)
 
     return measure
 
 
-def _save_copy(scan: VisibleScan, folder: Path, timer: StageTimer) -> Generator[Step, None, Callable[[Report], Any]]:
+def _save_copy(scan: VisibleScan, work: Workplace) -> Generator[Step, None, Callable[[Report], Any]]:
     """Save a copy of the open file; return what has another Blender scan it."""
-    with timer.stage("scene copy"):
-        classes = scan.classes.to_dict() if scan.classes else None
-        saved = save_open_scene(scan.scenario, folder, {"route": scan.route.to_dict(), "classes": classes})
+    classes = scan.classes.to_dict() if scan.classes else None
+    with work.timer.stage("scene copy"):
+        saved = save_open_scene(scan.scenario, work.folder, {"route": scan.route.to_dict(), "classes": classes})
     yield Step(READ)
 
     def measure(report: Report) -> dict[str, Any]:
         done = saved.scan(report)
-        timer.stages.update(done.stages)
+        work.timer.stages.update(done.stages)
         return done.counts
 
     return measure

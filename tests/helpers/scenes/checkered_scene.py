@@ -40,12 +40,14 @@ def _image(folder: Path) -> bpy.types.Image:
     return image
 
 
-def _board(name: str, number: int, maps: dict[str, np.ndarray], item: bpy.types.Material) -> bpy.types.Object:
-    """Add a board of two by two faces with UV maps: (2, 3) from places (x, y, 1) of the board to u and v."""
-    half = SIDE / 2.0
-    steps = np.linspace(-half, half, 3)
+def _board(
+    name: str, number: int, maps: dict[str, np.ndarray], item: bpy.types.Material, count: int = 2
+) -> bpy.types.Object:
+    """Add a board of faces, so many in each direction, with UV maps: (2, 3) from places (x, y, 1) of it to u and v."""
+    half, row = SIDE / 2.0, count + 1
+    steps = np.linspace(-half, half, row)
     corners = [(x, y, 0.0) for y in steps for x in steps]
-    faces = [(i, i + 1, i + 4, i + 3) for i in (0, 1, 3, 4)]
+    faces = [(i, i + 1, i + row + 1, i + row) for y in range(count) for i in range(y * row, y * row + count)]
     mesh = bpy.data.meshes.new(name)
     mesh.from_pydata(corners, [], faces)
     for key, matrix in maps.items():
@@ -85,21 +87,42 @@ def textured(name: str, image: bpy.types.Image, uv: str = "", linear: bool = Fal
     return item
 
 
+def _painted_material() -> bpy.types.Material:
+    """Return a material whose base colour is an attribute."""
+    item = bpy.data.materials.new("Painted")
+    if item.node_tree is None:
+        item.use_nodes = True
+    nodes, links = item.node_tree.nodes, item.node_tree.links
+    shader = next(node for node in nodes if node.type == "BSDF_PRINCIPLED")
+    source = nodes.new("ShaderNodeVertexColor")
+    source.layer_name = "Paint"
+    links.new(source.outputs["Color"], shader.inputs["Base Color"])
+    shader.inputs["Specular IOR Level"].default_value = 0.0
+    return item
+
+
 def build_checkered_scene(folder: Path) -> None:
-    """Build three boards: UV turned by 30 degrees; by the second map; and mirrored."""
+    """Build four boards: UV turned by 30 degrees; by the second map; mirrored; and colours of the faces' corners."""
     image = _image(folder)
     _board("Turned", 0, {"UVMap": TURNED}, textured("Turned", image))
     _board("Second", 1, {"UVMap": STRAIGHT, "Other": SMALL}, textured("Second", image, "Other"))
     mirrored = _board("Mirrored", 2, {"UVMap": TURNED}, textured("Mirrored", image))
     mirrored.scale = (-1.0, 1.0, 1.0)
+    item = _painted_material()
+    painted = _board("Painted", 3, {}, item, FIELDS)
+    colors = painted.data.color_attributes.new("Paint", "FLOAT_COLOR", "CORNER")
+    for face in painted.data.polygons:
+        color = field_color(*np.array([face.index % FIELDS, face.index // FIELDS])[:, None])[0]
+        for corner in face.loop_indices:
+            colors.data[corner].color = (*color, 1.0)
 
 
 def expected_colors(place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the linear colours (N, 3) of places on the boards, and how far (N,) a field's edge is, in fields."""
-    number = np.clip(np.round(place[:, 0] / APART), 0, 2).astype(int)
+    number = np.clip(np.round(place[:, 0] / APART), 0, 3).astype(int)
     local = np.column_stack([place[:, 0] - APART * number, place[:, 1], np.ones(len(place))])
     local[number == 2, 0] *= -1.0
-    matrices = np.array([TURNED, SMALL, TURNED])
+    matrices = np.array([TURNED, SMALL, TURNED, STRAIGHT])
     uv = np.einsum("nij,nj->ni", matrices[number], local)
     scaled = uv % 1.0 * FIELDS
     column, row = np.floor(scaled).astype(int).T % FIELDS
@@ -109,14 +132,9 @@ def expected_colors(place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def add_vertex_colored(number: int, mixed: bool = False) -> bpy.types.Object:
     """Add a board whose colour rises along x in red and along y in green, by an attribute; or with grey mixed in."""
-    item = bpy.data.materials.new("Painted")
-    if item.node_tree is None:
-        item.use_nodes = True
+    item = _painted_material()
     nodes, links = item.node_tree.nodes, item.node_tree.links
     shader = next(node for node in nodes if node.type == "BSDF_PRINCIPLED")
-    source = nodes.new("ShaderNodeVertexColor")
-    source.layer_name = "Paint"
-    links.new(source.outputs["Color"], shader.inputs["Base Color"])
     if mixed:
         end = next(node for node in nodes if node.type == "OUTPUT_MATERIAL")
         other, mix = nodes.new("ShaderNodeBsdfDiffuse"), nodes.new("ShaderNodeMixShader")

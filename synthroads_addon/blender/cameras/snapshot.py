@@ -1,0 +1,145 @@
+"""Materials as they were at one moment, kept in a file: worked out later, without a trace in the open file.
+
+A scan in the panel goes on while the user works. Between two turns of it the open file must hold nothing of it, as each
+step that can be undone, and each save, would keep it; and what the user changes mustn't change the scan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import bpy
+
+from ...base.arrays import Float32, Index
+from ...base.errors import InputError
+from ...scanning.colour.colour import MATERIAL_LAYERS
+from ...scanning.scene.surface_values import SurfaceInput
+from ..materials.calculable import material_needs
+from .calculator import ReadingCopy, opened_calculator, reading_copy
+from .surfaces import numbered_materials
+
+_INPUT, _IMAGE = "synthroads_input", "synthroads_image"
+"""Properties of nodes in the file: the input that one reads, and Blender's number of the image that one shows."""
+
+
+class MaterialSnapshot:
+    """Copies of materials that read images of returns' values, in a file.
+
+    Attributes:
+        obstacles: names of nodes that stand in the way, of the materials that can't be worked out, by index.
+    """
+
+    def __init__(self, names: Sequence[str], varying: Collection[int], folder: Path) -> None:
+        """Write the file; in Blender's main thread.
+
+        Args:
+            names: the scene mesh's materials.
+            varying: indices of those that are to be worked out.
+            folder: for the file, as long as materials are worked out.
+        """
+        self._path = folder / "materials.blend"
+        items = {index: item for index, item in numbered_materials(names) if index in varying}
+        needs = {index: material_needs(item) for index, item in items.items()}
+        self.obstacles = {index: need.obstacles for index, need in needs.items() if need.obstacles}
+        self._names: dict[int, str] = {}
+        self._inputs: dict[int, frozenset[SurfaceInput]] = {}
+        with ExitStack() as stack:
+            copies = {
+                index: stack.enter_context(reading_copy(item, tuple(MATERIAL_LAYERS)))
+                for index, item in items.items()
+                if index not in self.obstacles
+            }
+            for index, copy in copies.items():
+                self._names[index] = copy.item.name
+                self._inputs[index] = frozenset(what for what, _ in copy.readers)
+                _mark_nodes(copy)
+            bpy.data.libraries.write(str(self._path), {copy.item for copy in copies.values()})
+
+    def calculator(self, materials: Collection[int], layers: Sequence[str]) -> SnapshotCalculator | None:
+        """Return what works out layers of materials, by index; None if none of these can be worked out."""
+        easy = sorted(index for index in materials if index in self._names)
+        return SnapshotCalculator(self, easy, layers) if easy else None
+
+    def inputs_of(self, material: int) -> frozenset[SurfaceInput]:
+        """Return what a material asks for, by its index."""
+        return self._inputs[material]
+
+    @contextmanager
+    def loaded(self, materials: Sequence[int]) -> Iterator[dict[int, ReadingCopy]]:
+        """Yield the copies of materials, by index; afterwards they are gone again. In Blender's main thread."""
+        # Not linked: what is linked can't show images of this file.
+        with bpy.data.libraries.load(str(self._path), link=False) as (_, wanted):
+            wanted.materials = [self._names[index] for index in materials]
+        items = list(wanted.materials)
+        trees = [tree for item in items for tree in _groups_below(item.node_tree)]
+        try:
+            yield {index: _loaded_copy(item) for index, item in zip(materials, items, strict=True)}
+        finally:
+            here = [library for library in bpy.data.libraries if library.filepath == str(self._path)]
+            bpy.data.batch_remove([*items, *trees, *here])
+
+
+class SnapshotCalculator:
+    """Works out layers of a snapshot's materials; all that it needs of Blender is made and removed each time.
+
+    Attributes:
+        layers: names of the layers that come back.
+        at_once: places that are worked out at once: the window stands still meanwhile.
+    """
+
+    at_once = 1 << 16
+
+    def __init__(self, snapshot: MaterialSnapshot, materials: Sequence[int], layers: Sequence[str]) -> None:
+        self._snapshot, self._materials, self.layers = snapshot, materials, tuple(layers)
+
+    def inputs_of(self, material: int) -> frozenset[SurfaceInput]:
+        """Return what a material asks for, by its index."""
+        return self._snapshot.inputs_of(material)
+
+    def calculate(self, material: Index, values: dict[SurfaceInput, Float32]) -> dict[str, Float32]:
+        """Return the layers (N, C) of N places, see `Calculator.calculate`; in Blender's main thread."""
+        with self._snapshot.loaded(self._materials) as copies, opened_calculator(copies, self.layers) as calculator:
+            return calculator.calculate(material, values)
+
+
+def _mark_nodes(copy: ReadingCopy) -> None:
+    """Note on a copy's nodes what they read or show, and take their images away, which the file isn't to hold."""
+    for what, node in copy.readers:
+        node[_INPUT] = list(what)
+    for node in _nodes_below(copy.item.node_tree):
+        if node.type == "TEX_IMAGE" and node.image is not None:
+            node[_IMAGE], node.image = node.image.session_uid, None
+
+
+def _loaded_copy(item: bpy.types.Material) -> ReadingCopy:
+    """Return a copy from a file, with the images of the open file as these are now.
+
+    Raises:
+        InputError: one of them was removed.
+    """
+    images = {image.session_uid: image for image in bpy.data.images}
+    readers: list[tuple[SurfaceInput, bpy.types.Node]] = []
+    for node in _nodes_below(item.node_tree):
+        if _INPUT in node:
+            readers.append((SurfaceInput(*node[_INPUT]), node))
+        elif _IMAGE in node:
+            if node[_IMAGE] not in images:
+                raise InputError("Scene", None, f"an image of the material {item.name!r} was removed during the scan")
+            node.image = images[node[_IMAGE]]
+    return ReadingCopy(item, readers)
+
+
+def _nodes_below(tree: bpy.types.NodeTree) -> Iterator[bpy.types.Node]:
+    """Yield the nodes of a tree and of the groups in it."""
+    for one in (tree, *_groups_below(tree)):
+        yield from one.nodes
+
+
+def _groups_below(tree: bpy.types.NodeTree) -> Iterator[bpy.types.NodeTree]:
+    """Yield the groups in a tree, of which each stands in one place alone."""
+    for node in tree.nodes:
+        if node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None:
+            yield node.node_tree
+            yield from _groups_below(node.node_tree)
