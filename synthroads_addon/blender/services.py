@@ -40,7 +40,7 @@ class BlenderServices:
 
 
 class SnapshotServices:
-    """A scan's services with a snapshot of the open file's materials: usable in any thread, whatever becomes of the file.
+    """A scan's services with a snapshot of the open file's materials: usable in any thread, whatever the file becomes.
 
     Args:
         names: materials of the scene that is scanned.
