@@ -140,7 +140,8 @@ class SYNTHROADS_OT_export_cloud(FileOperator, bpy.types.Operator):
         """Return the writing; the file browser has asked whether a file that is there may be replaced."""
         source, output = cloud_path(context, self.source), Path(bpy.path.abspath(self.filepath))
         classes = None if self.classes == "own" else self.classes
-        return PanelJob.aside("Export", partial(export_cloud, source, output, classes, exact(self.spacing, None)))
+        work = partial(export_cloud, source, output, classes, exact(self.spacing, None))
+        return PanelJob.aside("Export", work, "Exporting")
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[dict[str, Any]]) -> str:
         """Return the number of points and the file."""
@@ -192,10 +193,12 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
         return has_road(cls, context) and is_free(cls, context)
 
     def suggest(self, context: bpy.types.Context) -> None:
-        """Suggest the output folder, where the cloud is."""
+        """Suggest the output folder, where the cloud is, and the formats that scans write."""
         folder = context.scene.synthroads.folder_to_open()
         if folder is not None and not self.directory:
             self.directory = f"{folder}{os.sep}"
+        if context.scene.synthroads.twin:
+            self.formats = context.scene.synthroads.twin
         with suppress(InputError):  # a setting of the panel is wrong, which is its own buttons' business
             if chosen := context.scene.synthroads.scenario().ifc:
                 self.ifc_placement = chosen.placement
@@ -223,7 +226,7 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
         folder, tolerance = Path(bpy.path.abspath(self.directory)), exact(self.tolerance, None)
         ifc = IfcSettings(placement=self.ifc_placement)
         work = partial(export_twin, parameters, folder, formats, tolerance, ifc, self.overwrite)
-        return PanelJob.aside("Export", work)
+        return PanelJob.aside("Export", work, "Exporting")
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[tuple[str, ...]]) -> str:
         """Return the names of the files and their folder."""
@@ -235,7 +238,7 @@ class SYNTHROADS_OT_install_ifc(FileChooser, bpy.types.Operator):
     """Install the extension SynthRoads IFC from its file, synthroads_ifc-….zip: it brings what writes IFC"""
 
     bl_idname = "synthroads.install_ifc"
-    bl_label = "Install SynthRoads IFC"
+    bl_label = "Install IFC"  # the button of Blender's file browser has no room for more
 
     filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     filter_glob: bpy.props.StringProperty(default="*.zip", options={"HIDDEN"})
@@ -299,6 +302,6 @@ def _draw_missing_packages(layout: bpy.types.UILayout, missing: Mapping[str, str
     for name, package in missing.items():
         if package == IFC_PACKAGE and RUNS_AS_EXTENSION:
             draw_text(layout, f"{name} needs the extension SynthRoads IFC, which comes beside this one", "INFO")
-            layout.operator(SYNTHROADS_OT_install_ifc.bl_idname, icon="IMPORT")
+            layout.operator(SYNTHROADS_OT_install_ifc.bl_idname, text="Install SynthRoads IFC", icon="IMPORT")
             continue
         draw_text(layout, f"{name} needs the package {package}: pip install {package}, with Blender's Python")

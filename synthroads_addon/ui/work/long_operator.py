@@ -198,8 +198,8 @@ def _draw_status(header: bpy.types.Header, context: bpy.types.Context) -> None:
     layout.separator(factor=2.0)
     layout.label(text=f"Cancel {job.title}")
     layout.separator_spacer()
-    layout.label(text="SynthRoads")
-    layout.progress(factor=job.share, text=job.state)
+    layout.label(text=f"SynthRoads: {job.state}")  # Blender cuts texts off that stand on this bar
+    layout.progress(factor=job.share)
     layout.separator_spacer()
 
 

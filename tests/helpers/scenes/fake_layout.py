@@ -84,8 +84,11 @@ class FakeLayout:
     def box(self) -> FakeLayout:
         return self._child("box")
 
-    def separator(self) -> None:
+    def separator(self, factor: float = 1.0) -> None:
         self._say("separator")
+
+    def separator_spacer(self) -> None:
+        self._say("spacer")
 
     def label(self, text: str = "", icon: str = "NONE", icon_value: int | None = None) -> None:
         self._say(f"label {text!r}{_icon(icon)}{'' if icon_value is None else ' <swatch>'}", text, _has(icon))

@@ -10,10 +10,13 @@ import synthroads_addon
 from synthroads_addon.blender.compat import set_modifier_input
 from synthroads_addon.ui.fields import room
 from synthroads_addon.ui.panels import calibration, cloud_view, edit, panels, rules
+from synthroads_addon.ui.work.long_operator import FileChooser
 from tests.helpers.scenes.fake_layout import drawn
 from tests.helpers.scenes.panel_road import choose
 
 WIDTHS = (200.0, 300.0, 450.0)
+BROWSER_BUTTON = 120.0
+"""Width of the text on the button of Blender's file browser that begins the work, pixels at a resolution scale of 1."""
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -83,3 +86,17 @@ def test_long_words_are_broken_and_none_is_lost(monkeypatch: pytest.MonkeyPatch)
     assert "".join(lines).replace(" ", "") == text.replace(" ", "")
     assert len(lines) > 2
     assert all(room.fits(line) for line in lines)
+
+
+def choosers(base: type = FileChooser) -> Iterator[type]:
+    for found in base.__subclasses__():
+        yield from choosers(found)
+        if hasattr(found, "bl_label"):
+            yield found
+
+
+@pytest.mark.keep_scene
+def test_the_file_browsers_button_has_room_for_what_it_does() -> None:
+    labels = {found.bl_label for found in choosers()}  # type: ignore[attr-defined]
+    assert len(labels) > 8
+    assert [label for label in labels if room.text_width(label) > BROWSER_BUTTON] == []

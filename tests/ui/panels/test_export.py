@@ -156,6 +156,9 @@ def test_the_model_goes_where_the_cloud_is(settings: Any, tmp_path: Path) -> Non
         assert operator.directory == expected
     export.SYNTHROADS_OT_export_twin.suggest(chosen := SimpleNamespace(directory="/mine/"), bpy.context)
     assert chosen.directory == "/mine/"
+    settings.twin = {"ifc", "geojson"}
+    export.SYNTHROADS_OT_export_twin.suggest(chosen, bpy.context)
+    assert chosen.formats == {"ifc", "geojson"}
 
 
 def test_a_format_that_fails_leaves_no_other(settings: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

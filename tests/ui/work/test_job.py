@@ -5,8 +5,10 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 
+import bpy
 import pytest
 
 import synthroads_addon
@@ -25,6 +27,8 @@ from synthroads_addon.ui.work.job import (
     running_job,
     stop_job,
 )
+from synthroads_addon.ui.work.long_operator import _draw_status
+from tests.helpers.scenes.fake_layout import FakeLayout
 
 
 @pytest.fixture(autouse=True)
@@ -77,6 +81,8 @@ def test_in_the_window_the_long_part_has_a_thread() -> None:
     assert running_job() is job
     assert job.running
     assert (job.share, job.state) == (0.1, "Reading 10%")
+    _draw_status(SimpleNamespace(layout=(bar := FakeLayout())), bpy.context)
+    assert bar.lines[-3:] == ["label 'SynthRoads: Reading 10%'", "progress ''", "spacer"]
     while job.touches_scene:
         job.tick(0.0)
     begin = time.perf_counter()
