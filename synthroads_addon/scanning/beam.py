@@ -21,7 +21,7 @@ RINGS: dict[int, tuple[int, ...]] = {1: (), 7: (6,), 19: (6, 12), 37: (6, 12, 18
 
 @dataclass(frozen=True)
 class BeamPattern:
-    """Rays of one pulse, the central one first.
+    """Deflections and energy weights of the K rays that sample one pulse's beam, the central ray first.
 
     Attributes:
         across: (K, 2) deflections in units of the beam's radius at 1/e^2: in the scan plane, and across it.
@@ -38,7 +38,7 @@ class BeamPattern:
 
 @cache
 def beam_pattern(rings: tuple[int, ...]) -> BeamPattern:
-    """Return a central ray and rays on rings around it; both arrays are read-only.
+    """Return the central ray and rings of weighted rays that sample a Gaussian beam; cached, arrays are read-only.
 
     With u = 2 r^2 / w^2 a Gaussian beam's energy is distributed as exp(-u). The rings' radii and weights are the nodes
     and weights of the Gauss-Radau-Laguerre rule with a node at 0: with R rings the mean of every polynomial in u up to
@@ -60,7 +60,7 @@ def beam_pattern(rings: tuple[int, ...]) -> BeamPattern:
     nodes, weights = _radau_laguerre(len(rings))
     radii = np.sqrt(nodes[1:] / 2.0)
     across, shares = [np.zeros((1, 2))], [weights[:1]]
-    for count, radius, weight, turn in zip(rings, radii, weights[1:], _turns(rings, radii, weights[1:]), strict=True):
+    for count, radius, weight, turn in zip(rings, radii, weights[1:], _phases(rings, radii, weights[1:]), strict=True):
         angle = 2.0 * np.pi * (np.arange(count) + turn) / count
         across.append(radius * np.stack([np.cos(angle), np.sin(angle)], axis=1))
         shares.append(np.full(count, weight / count))
@@ -71,7 +71,7 @@ def beam_pattern(rings: tuple[int, ...]) -> BeamPattern:
 
 
 def _radau_laguerre(rings: int) -> tuple[Float, Float]:
-    """Return nodes and weights (rings + 1,) of the Radau rule for the weight exp(-u) on [0, inf) with the node 0.
+    """Return the Gauss-Radau-Laguerre nodes and weights (rings + 1,) for exp(-u) on [0, inf), with the node 0 fixed.
 
     The other nodes are those of the Gauss rule for u exp(-u), the eigenvalues of its Jacobi matrix (Golub & Welsch
     1969; its lower half is enough), and their weights that rule's, divided by the node. The node 0 weighs
@@ -86,8 +86,8 @@ def _radau_laguerre(rings: int) -> tuple[Float, Float]:
     return np.concatenate([[0.0], nodes]), weights / weights.sum()
 
 
-def _turns(rings: tuple[int, ...], radii: Float, weights: Float) -> Float:
-    """Return by how many of its own steps each ring is turned: 0 or a half.
+def _phases(rings: tuple[int, ...], radii: Float, weights: Float) -> Float:
+    """Return each ring's rotation, 0 or half a step of its rays, so that the rings' residual moments cancel.
 
     A ring of n rays has one wrong moment of order n, of the size ``weight radius^n``; half a step turns its sign. Rings
     of different numbers of rays take turns, so that their rays don't line up.
@@ -105,14 +105,14 @@ def _turns(rings: tuple[int, ...], radii: Float, weights: Float) -> Float:
 
 
 def beam_radii(divergence: Sequence[float]) -> tuple[float, float]:
-    """Return the beam's radii at 1/e^2 per metre of distance of two full divergences (rad)."""
+    """Return a beam's two radii at 1/e^2, m per metre of distance, from its two full divergence angles (rad)."""
     return math.tan(divergence[0] / 2.0), math.tan(divergence[1] / 2.0)
 
 
 def conical_directions(
     direction: Float, in_plane: Float, across: Float, pattern: BeamPattern, divergence: Sequence[float]
 ) -> Float:
-    """Return the directions of rays that diverge from the aperture.
+    """Return the unit directions (3, K, P) of the K rays of each pulse, which diverge from the aperture.
 
     A ray points along ``axis + tan(D / 2) deflection``, normalised. On a plane at a right angle to the axis the rays
     meet the points of the pattern, scaled to the footprint: all moments that `beam_pattern` keeps are exact there.
@@ -138,7 +138,7 @@ def conical_directions(
 def cylindrical_offsets(
     in_plane: Float, across: Float, pattern: BeamPattern, divergence: Sequence[float], distance: Float
 ) -> Float:
-    """Return by how much the origins of parallel rays are displaced, so that they cover the footprint at a distance.
+    """Return the offsets (3, K, P), m, of parallel rays' origins that cover the footprint at a distance.
 
     The rays keep the axis's direction; on a plane at a right angle to it all moments that `beam_pattern` keeps are
     exact at ``distance``, and the footprint is as large before and behind.

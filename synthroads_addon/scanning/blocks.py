@@ -18,7 +18,7 @@ Block = tuple[Strip, int]
 
 @dataclass(frozen=True)
 class Blocks:
-    """The blocks of a scan.
+    """Division of a scan's strips into blocks of a fixed number of pulses.
 
     Attributes:
         setting: the scanner's.
@@ -35,27 +35,27 @@ class Blocks:
         """Return the fixed number of pulses of a block."""
         return max(1, min(RAYS_PER_BLOCK // self.rays_per_pulse, shot_count(self.setting, SECONDS_PER_BLOCK)))
 
-    def pulses(self, strip: Strip) -> int:
-        """Return how many pulses a strip has."""
+    def pulse_count(self, strip: Strip) -> int:
+        """Return the number of pulses fired during a strip, all heads together."""
         return shot_count(self.setting, strip.duration, strip.ends)
 
     def block_numbers(self, strip: Strip) -> range:
-        """Return the numbers of a strip's blocks."""
-        return range(-(-self.pulses(strip) // self.size))
+        """Return the range of the numbers of a strip's blocks, from 0."""
+        return range(-(-self.pulse_count(strip) // self.size))
 
     def all(self) -> Iterator[Block]:
-        """Yield every block, in the order of time."""
+        """Yield (strip, number of the block within it) of every block, in the order of time."""
         return ((strip, block) for strip in self.path.strips for block in self.block_numbers(strip))
 
     def count(self) -> int:
-        """Return how many blocks there are."""
+        """Return the number of blocks of all strips."""
         return sum(len(self.block_numbers(strip)) for strip in self.path.strips)
 
-    def pulses_of(self, strip: Strip, block: int) -> tuple[int, int]:
-        """Return the first pulse of a block, counted within its strip, and how many it has."""
+    def pulse_span(self, strip: Strip, block: int) -> tuple[int, int]:
+        """Return the number, within its strip, of a block's first pulse, and how many pulses the block has."""
         first = block * self.size
-        return first, min(self.size, self.pulses(strip) - first)
+        return first, min(self.size, self.pulse_count(strip) - first)
 
     def time(self, strip: Strip, pulse: int) -> float:
-        """Return when a pulse of a strip leaves, s since the first strip's start."""
+        """Return the time at which a strip's pulse is fired, s since the first strip's start."""
         return strip.start_time + float(shots(self.setting, pulse, 1, False).time[0])

@@ -77,7 +77,7 @@ class EchoEffect(Protocol):
         ...
 
     def change_echoes(self, hits: PulseHits, random: np.random.Generator) -> EchoChanges:
-        """Return the changes for a block of pulses.
+        """Return the echoes to be added to a block of pulses, and the factors that weaken what its rays meet.
 
         Args:
             hits: what the pulses meet; of one block, pulses that meet nothing included.
@@ -95,7 +95,7 @@ def apply_effect(
     traced: TracedRays,
     signals: BothSignals,
 ) -> tuple[TracedRays, BothSignals]:
-    """Return what the rays of a block meet, and its signals, after an effect.
+    """Return a block's traced rays and signals after an effect has added echoes and weakened what they meet.
 
     Echoes that are added join what lies behind permeable surfaces, with the face -1.
 
@@ -142,7 +142,7 @@ def _pulse_hits(
 def _add_echoes(
     setting: ScannerSetting, attenuation: float, traced: TracedRays, signals: BothSignals, changes: EchoChanges
 ) -> tuple[TracedRays, BothSignals]:
-    """Return hits and signals with those echoes of an effect that the scanner records."""
+    """Return traced rays and signals with an effect's echoes added, less those out of the scanner's range."""
     distance = np.asarray(changes.distance, dtype=np.float64)
     here = np.flatnonzero((distance >= setting.minimum_range) & (distance <= setting.maximum_range))
     distance, brightness = distance[here], np.asarray(changes.brightness, dtype=np.float64)[here]
@@ -159,7 +159,7 @@ def _add_echoes(
 
 
 def _brightness(signals: HitSignals, attenuation: float) -> Float:
-    """Return the brightness of surfaces from the intensities that are received of them; 0 where there is none."""
+    """Return the brightness of surfaces (1: ideal white target) from received intensities; 0 where nothing is hit."""
     white = received_intensity(1.0, signals.distance, attenuation)
     return np.divide(signals.intensity, white, out=np.zeros_like(white), where=white > 0.0)
 
@@ -175,7 +175,7 @@ def _check(name: str, changes: EchoChanges, shape: tuple[int, ...]) -> None:
 
 
 def _weaken(traced: TracedRays, signals: BothSignals, transmission: Float) -> tuple[TracedRays, BothSignals]:
-    """Return hits and signals with factors (K, P) on the brightness; hits that send no light back are left out."""
+    """Return traced rays and signals with brightness times factors (K, P); hits behind that become 0 drop out."""
     first, behind = signals
     left = transmission.ravel()[traced.ray]
     seen = np.flatnonzero(left > 0.0)

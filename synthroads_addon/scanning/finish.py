@@ -36,8 +36,8 @@ class Finish:
     plan: ScanPlan
     source: LayerSource
 
-    def block(self, result: BlockResult) -> BlockResult:
-        """Return a block, or several joined, as the sink gets it."""
+    def finish_block(self, result: BlockResult) -> BlockResult:
+        """Return a block, or several joined, with colours, layers, micro-relief and final intensities, for the sink."""
         plan = self.plan
         if result.seen is not None and (plan.colour_layers or plan.detects_after_layers):
             result = self._with_layers(result, result.seen)
@@ -74,7 +74,7 @@ class Finish:
 def layer_brightness(
     means: Surfaces, surfaces: Surfaces, points: PointBlock, seen: SeenPoints, values: LayerValues
 ) -> Float:
-    """Return the factors (N,) by which points are brighter by their own layers than by their materials' means.
+    """Return factors (N,) by which points are brighter by their own layers than by their materials' means.
 
     A return has the layers of what gave most of it. What beads and prisms send back doesn't depend on them, nor does
     what comes from the air.
@@ -103,7 +103,7 @@ def layer_brightness(
 
 
 def detect_echoes(result: BlockResult, setting: ScannerSetting) -> BlockResult:
-    """Return what the detector makes of echoes in a block, or several joined, that were kept for it until now.
+    """Return a block as the detector records it: weak and surplus echoes lost, the rest renumbered and saturated.
 
     Weak echoes are lost, those beyond the device's largest number as well, and what is left is numbered anew and
     saturates. The returns of a pulse have one time and lie side by side.

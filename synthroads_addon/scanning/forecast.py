@@ -33,7 +33,7 @@ class ScanForecast:
     scene_memory: float
 
     def text(self) -> str:
-        """Return the forecast in words. Most pulses have one point, or none."""
+        """Return the forecast in words: pulses, LAZ size, computing time and memory."""
         size = self.pulses * _POINT / 1e9
         return (
             f"{self.pulses:,} pulses, so up to about as many points ({size:,.1f} GB as LAZ), in about "
@@ -42,14 +42,14 @@ class ScanForecast:
 
 
 def forecast_scan(cut: Blocks, triangles: int, threads: int = 0) -> ScanForecast:
-    """Return what a scan will take.
+    """Return the expected pulses, computing time (s) and memory (bytes) of a scan on this machine.
 
     Args:
         cut: its pulses.
         triangles: of the scene.
         threads: blocks that are worked on at once; 0 for every core.
     """
-    pulses = sum(cut.pulses(strip) for strip in cut.path.strips)
+    pulses = sum(cut.pulse_count(strip) for strip in cut.path.strips)
     workers = threads or available_cores()
     seconds = pulses * (_PULSE + _RAY * cut.rays_per_pulse) / workers
     scene = _TRIANGLE * triangles
@@ -57,8 +57,8 @@ def forecast_scan(cut: Blocks, triangles: int, threads: int = 0) -> ScanForecast
     return ScanForecast(pulses, seconds, _BASE + scene + _THREAD * busy, scene)
 
 
-def refuse_large(forecast: ScanForecast, most_pulses: int | None = None) -> None:
-    """Refuse a scan that is larger than it may be.
+def check_scan_size(forecast: ScanForecast, most_pulses: int | None = None) -> None:
+    """Raise `InputError` if a scan has more pulses than it may or its scene exceeds the machine's memory.
 
     Args:
         forecast: of the scan.

@@ -17,7 +17,7 @@ _KEPT = 16
 
 @dataclass(frozen=True)
 class Track:
-    """Poses at evenly spaced times.
+    """Poses of a body at evenly spaced times (knots), linearly interpolated between them.
 
     Between two knots position and rotation matrix are linear: for knots that are near enough the matrix stays a
     rotation within rounding (its error is an eighth of the squared angle between two knots).
@@ -38,7 +38,7 @@ class Track:
 
     @classmethod
     def between(cls, pose: Callable[[Float], Any], begin: float, end: float, spacing: float) -> Self:
-        """Return the track of ``pose(time (K,)) -> (rotation (K, 3, 3), position (K, 3), present (K,))``.
+        """Sample ``pose(time (K,)) -> (rotation (K, 3, 3), position (K, 3), present (K,))`` at knots, begin to end, s.
 
         Knots are whole multiples of the spacing, so that no result depends on where a block begins.
         """
@@ -46,7 +46,7 @@ class Track:
 
     @classmethod
     def _at_knots(cls, pose: Callable[[Float], Any], first: int, last: int, spacing: float) -> Self:
-        """Return the poses at knots ``first`` to ``last``."""
+        """Return the poses at knots ``first`` to ``last``, inclusive, numbered in multiples of the spacing."""
         times = np.arange(first, last + 1) * spacing
         rotation, position, present = pose(times)
         count = len(times)
@@ -59,24 +59,24 @@ class Track:
         )
 
     def at(self, times: Float) -> tuple[Float, Float, Bool]:
-        """Return rotation (9, N), position (3, N) and presence (N,) at times within the track."""
-        index, share = _knots(self, times)
-        rotation = _between(self.rotation, index, share)
-        position = _between(self.position, index, share)
+        """Return interpolated rotations (9, N), positions (3, N) and presence (N,) at times within the track."""
+        index, share = _locate(self, times)
+        rotation = _interpolate(self.rotation, index, share)
+        position = _interpolate(self.position, index, share)
         if self.present.all():
             return rotation, position, np.ones(len(times), dtype=bool)
         return rotation, position, self.present[index] & self.present[index + 1]
 
     def way_of(self, point: Float) -> Float:
-        """Return the local places (3, K), m, at the knots of a point (3,) that is fixed to the body, m."""
+        """Return the local positions (3, K), m, at the knots, of a point (3,) fixed in the body frame."""
         return np.asarray(np.einsum("ijk,j->ik", self.rotation.reshape(3, 3, -1), point) + self.position)
 
     def along(self, way: Float, times: Float) -> Float:
         """Interpolate values (C, K), one for each knot, at times (N,) within the track; return them (C, N)."""
-        return _between(way, *_knots(self, times))
+        return _interpolate(way, *_locate(self, times))
 
     def swept_box(self, centre: Float, radius: float) -> Float | None:
-        """Return the smallest and largest corner (2, 3) that a sphere reaches on the way; None where it is never there.
+        """Return the box (2, 3), m, that a sphere fixed to the body sweeps through; None where the body is never there.
 
         Args:
             centre: (3,) of the sphere in the body frame, m.
@@ -90,7 +90,7 @@ class Track:
 
 
 class PoseCache:
-    """Poses of one body, kept for other blocks that ask for the same knots; any threads may share it.
+    """Cache of one body's poses at knots, for all blocks that ask for the same ones; thread-safe.
 
     Args:
         pose: see `Track.between`.
@@ -104,7 +104,7 @@ class PoseCache:
         self._stretch = stretch
 
     def track(self, begin: float, end: float, spacing: float) -> Track:
-        """Return the track between two times, s, as `Track.between` does."""
+        """Return the track of poses at knots that span two times, s, from cached stretches."""
         first, last = _knot_numbers(begin, end, spacing)
         before = first // _AT_ONCE
         stretches = [self._stretch(number, spacing) for number in range(before, last // _AT_ONCE + 1)]
@@ -115,7 +115,7 @@ class PoseCache:
 
 
 def track_knots(begin: float, end: float, spacing: float) -> Float:
-    """Return the knots (K,), at least two, that span two times: whole multiples of ``spacing``."""
+    """Return the times (K,) of the knots, at least two, that span two times, s: whole multiples of ``spacing``."""
     first, last = _knot_numbers(begin, end, spacing)
     return np.arange(first, last + 1) * spacing
 
@@ -126,7 +126,7 @@ def _knot_numbers(begin: float, end: float, spacing: float) -> tuple[int, int]:
     return first, max(int(np.ceil(end / spacing)), first + 1)
 
 
-def _knots(track: Track, times: Float) -> tuple[Index, Float]:
+def _locate(track: Track, times: Float) -> tuple[Index, Float]:
     """Return the indices (N,) of the knots before times (N,), and the shares (N,) of the way to the next."""
     knot = (times - track.begin) / track.spacing
     index = np.clip(knot.astype(np.intp), 0, track.position.shape[1] - 2)
@@ -134,8 +134,8 @@ def _knots(track: Track, times: Float) -> tuple[Index, Float]:
     return index, knot
 
 
-def _between(values: Float, index: Index, share: Float) -> Float:
-    """Return (C, N) values between knots ``index`` and ``index + 1``."""
+def _interpolate(values: Float, index: Index, share: Float) -> Float:
+    """Return values (C, N), interpolated linearly at shares (N,) of the way from knot ``index`` to the next."""
     step = np.diff(values, axis=1)
     result = np.take(step, index, axis=1)
     result *= share

@@ -63,7 +63,7 @@ class Noise(ClosedModel):
 
 
 def trajectory_errors(noise: Noise, seed: int, strip: Strip, time: Float) -> tuple[Float, Float]:
-    """Return the errors of a strip at times (K,) since the first strip's start; before its start they are as there.
+    """Return position (m) and attitude (rad) errors, (K, 3) each, of a strip's measured trajectory at times (K,), s.
 
     Args:
         noise: standard deviations and correlation time.
@@ -93,7 +93,7 @@ def trajectory_errors(noise: Noise, seed: int, strip: Strip, time: Float) -> tup
 
 
 def _process_block(seed: int, strip: Strip, number: int) -> Float:
-    """Return the process of unit variance (`BLOCK` + 1, 6) at a block's knots and the first of the next one."""
+    """Return the unit-variance process (`BLOCK` + 1, 6) at a block's knots and the first of the next one."""
     parts = [(number - 1, BLOCK)] if number > 0 else []
     parts += [(number, BLOCK), (number + 1, 1)]
     streams = ((stream(seed, "trajectory noise", strip.index, part), count) for part, count in parts)
@@ -102,7 +102,7 @@ def _process_block(seed: int, strip: Strip, number: int) -> Float:
 
 
 def speckle_factors(random: np.random.Generator, sigma: float, shape: tuple[int, ...]) -> Float32:
-    """Return factors on intensities: gamma distributed with mean 1 and standard deviation sigma.
+    """Draw speckle factors on intensities: gamma distributed with mean 1 and standard deviation sigma.
 
     The light of a rough surface within one pulse is the sum of m = 1 / sigma^2 independent speckles (Goodman 2007,
     Speckle Phenomena in Optics, chapter 4).
@@ -112,7 +112,7 @@ def speckle_factors(random: np.random.Generator, sigma: float, shape: tuple[int,
 
 
 def measured_pose(position: Float, rotation: Float, errors: tuple[Float, Float]) -> tuple[Float, Float]:
-    """Return poses as they are measured.
+    """Return positions (K, 3), m, and rotations (K, 3, 3) as measured: the true ones with errors added.
 
     Roll and pitch have one standard deviation, so their errors tilt the platform about the local x axis and the local
     -y axis whatever its heading; a scanner that turns on a tripod is tilted with the tripod and not with its own turn.
@@ -127,7 +127,7 @@ def measured_pose(position: Float, rotation: Float, errors: tuple[Float, Float])
 
 
 def _weights(share: Float) -> tuple[Float, Float]:
-    """Return the weights (K,) of two neighbouring knots at shares (K,) of the way between them."""
+    """Return the weights (K,) of the knots before and after, at shares of the way, that keep the unit variance."""
     h = 1.0 / KNOTS_PER_CORRELATION_TIME
     before, after = np.sinh((1.0 - share) * h), np.sinh(share * h)
     norm = np.sqrt(before**2 + after**2 + 2.0 * before * after * np.exp(-h))

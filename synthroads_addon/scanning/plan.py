@@ -32,22 +32,22 @@ _SPARE = 2
 
 
 class SceneServices(Protocol):
-    """Services of the program that shows the scene: Blender's own, or stand-ins where nothing is rendered."""
+    """Interface to the program that shows the scene, Blender or a stand-in: casters, materials, rendered layers."""
 
     def caster(self, name: str, mesh: SceneMesh) -> Caster:
         """Return a ray caster over a mesh by its name in `ScanScenario.caster`."""
         ...
 
     def materials(self, names: Sequence[str]) -> list[Material]:
-        """Return the means of the scene's materials, in the order of the names."""
+        """Return the mean properties of the scene's materials, in the order of the names."""
         ...
 
     def reflectance_varies(self, names: Sequence[str]) -> bool:
-        """Return whether some of these materials reflect otherwise at other places."""
+        """Return whether any of these materials has a reflectance that varies from place to place."""
         ...
 
     def layers(self, request: LayerRequest, progress: Callable[[float], None]) -> AbstractContextManager[LayerSource]:
-        """Open a source of colours and layers; images are rendered first, and progress gets the share of them."""
+        """Return a context that renders images first (progress 0 to 1) and gives the request's layer source."""
         ...
 
 
@@ -69,13 +69,13 @@ class ScanConditions:
 
     @classmethod
     def of(cls, road: RoadParameters | None) -> Self:
-        """Return the conditions of a road."""
+        """Return the conditions that a road's parameters set; the defaults, clear and dry, for None."""
         return cls() if road is None else cls(road.environment, road.materials, road.metadata.epsg, road)
 
 
 @dataclass(frozen=True)
 class ScanPlan:
-    """Everything that the blocks of one scan share.
+    """Inputs and settings of one scan, all resolved, that its blocks share.
 
     Attributes:
         target: the scene with its casters.
@@ -143,7 +143,7 @@ class ScanPlan:
 
     @property
     def sun(self) -> Float | None:
-        """Return the unit vector (3,) towards the sun where points need to know whether it reaches them."""
+        """Return the unit vector (3,) towards the sun; None unless points need to know whether it reaches them."""
         request = self.request
         if request is None or not request.lit or not (self.services is None or takes_nodes(request.settings)):
             return None
@@ -151,37 +151,37 @@ class ScanPlan:
 
     @property
     def rays_per_pulse(self) -> int:
-        """Return how many rays sample a pulse."""
+        """Return the number of rays that sample one pulse."""
         return len(self.pattern.weights)
 
     @property
     def most_returns(self) -> int:
-        """Return how many returns of a pulse are kept at most."""
+        """Return the largest number of returns kept of one pulse; twice the device's until the layers are known."""
         return self.setting.device.maximum_returns * (_SPARE if self.detects_after_layers else 1)
 
     @property
     def cut(self) -> Blocks:
-        """Return how the pulses are cut into blocks."""
+        """Return the division of the scan's pulses into blocks."""
         return Blocks(self.setting, self.path, self.rays_per_pulse)
 
-    def pulses(self, strip: Strip) -> int:
-        """Return how many pulses a strip has."""
-        return self.cut.pulses(strip)
+    def pulse_count(self, strip: Strip) -> int:
+        """Return the number of pulses fired during a strip, all heads together."""
+        return self.cut.pulse_count(strip)
 
     def blocks(self) -> Iterator[Block]:
         """Yield (strip, number) of every block that is scanned, in the order of time."""
         return self.cut.all() if self.chosen_blocks is None else iter(self.chosen_blocks)
 
     def forecast(self) -> ScanForecast:
-        """Return what the scan of the whole path will take."""
+        """Return the expected pulses, computing time and memory of scanning the whole path."""
         return forecast_scan(self.cut, self.target.triangles, self.threads)
 
     def block_count(self) -> int:
-        """Return how many blocks are scanned."""
+        """Return the number of blocks that are scanned."""
         return self.cut.count() if self.chosen_blocks is None else len(self.chosen_blocks)
 
     def summary(self) -> dict[str, Any]:
-        """Return the figures that are known before the scan begins, as JSON data."""
+        """Return triangles, vertices, caster and attenuation (1/m), known before the scan begins, as JSON data."""
         return {
             "triangles": self.target.triangles,
             "vertices": self.target.vertices,

@@ -42,7 +42,7 @@ FILLERS: dict[str, Filler] = {}
 
 
 def fills(array: str) -> Callable[[Filler], Filler]:
-    """Register the function that fills a `PointBlock` array."""
+    """Return a decorator that registers a function as the one that fills a `PointBlock` array."""
 
     def register(filler: Filler) -> Filler:
         FILLERS[array] = filler
@@ -52,7 +52,7 @@ def fills(array: str) -> Callable[[Filler], Filler]:
 
 
 def fill_layers(points: MeasuredPoints, wanted: frozenset[str]) -> dict[str, AnyArray]:
-    """Return the arrays that are wanted of points, by name."""
+    """Return the wanted per-point layers that the scan itself fills, as arrays by name."""
     return {array: filler(points) for array, filler in FILLERS.items() if array in wanted}
 
 

@@ -15,8 +15,7 @@ from .scene.target import Target
 
 @dataclass(frozen=True)
 class Errors:
-    """Random errors of a block's pulses; they don't depend on what else is met, so that one more return leaves the
-    others' errors alone.
+    """Random errors of a block's P pulses in range, angle and intensity, and which returns are lost, whatever is met.
 
     Attributes:
         range: (2, P) float32 of the block, or as many as a pulse can have returns if these are more, in units of one
@@ -53,7 +52,7 @@ class Errors:
 
 @dataclass(frozen=True)
 class Poses:
-    """Where everything is during a block.
+    """Tracks of the scanner, true and measured, and of the target's moving parts, during a block.
 
     Attributes:
         true: of the scanner.
@@ -90,7 +89,7 @@ class Pulses:
     measured_direction: Float
 
     def select(self, pulses: Index) -> Pulses:
-        """Return chosen pulses."""
+        """Return the pulses of these indices."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         chosen: dict[str, Any] = {
             name: None if array is None else np.take(array, pulses, axis=-1) for name, array in values.items()
@@ -102,7 +101,7 @@ class Pulses:
 
 
 def turn_vectors(rotation: Float, vectors: Float) -> Float:
-    """Return vectors (3, N) turned by rotations (9, N)."""
+    """Return vectors (3, N), each rotated by its matrix (9, N), row by row."""
     result = np.empty_like(vectors)
     product = np.empty(vectors.shape[1])
     for i in range(3):
@@ -113,7 +112,7 @@ def turn_vectors(rotation: Float, vectors: Float) -> Float:
 
 
 def may_hit_scene(setting: ScannerSetting, target: Target, pulses: Pulses, motions: list[Track]) -> Bool | None:
-    """Return which pulses (P,) may hit anything at all, and so aren't sent into the sky; None if all may."""
+    """Return a mask (P,) of the pulses that may hit anything, by bounding boxes; None if all may."""
     boxes = [] if target.bounds is None else [target.bounds]
     boxes += target.moving_bounds(motions)
     if not boxes:

@@ -35,7 +35,7 @@ def received_intensity(share: ArrayLike, distance: ArrayLike, attenuation: float
 
 
 def saturate(intensity: Float, limit: float) -> tuple[Float, int]:
-    """Return the intensities (N,) that a detector gives, and how many of them it clipped.
+    """Return intensities (N,) clipped at the detector's limit, and the number of those that were clipped.
 
     Args:
         intensity: (N,) that reach the detector.

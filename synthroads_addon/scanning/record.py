@@ -27,10 +27,10 @@ Wait: TypeAlias = Callable[[Future[BlockResult]], BlockResult]
 
 
 class Sink(Protocol):
-    """Takes the blocks of a scan in their order: files, a view, a measurement."""
+    """Interface of what takes a scan's blocks in their order: files, a view, a measurement."""
 
     def write(self, result: BlockResult) -> None:
-        """Take a block, or several joined."""
+        """Take the result of a block, or of several joined."""
         ...
 
 
@@ -45,12 +45,12 @@ class CollectedBlocks:
         self.results: list[BlockResult] = []
 
     def write(self, result: BlockResult) -> None:
-        """Keep a block."""
+        """Append a block's result to `results`."""
         self.results.append(result)
 
 
 def record(plan: ScanPlan, sink: Sink, timer: StageTimer | None = None) -> dict[str, Any]:
-    """Scan a plan into a sink: directions, rays, hits, returns, layers, intensities, noise, block by block.
+    """Scan a plan block by block into a sink, with layers and noise, and return a summary of what was rendered.
 
     Where something is rendered, it must run in the main thread.
 
@@ -75,7 +75,7 @@ def record(plan: ScanPlan, sink: Sink, timer: StageTimer | None = None) -> dict[
 
 
 def record_as_measured(plan: ScanPlan) -> list[BlockResult]:
-    """Return the blocks of a plan without layers or relief, with normals, materials and the places that were seen."""
+    """Scan a plan without layers or relief; return its blocks, with normals, materials and seen points."""
     blocks = CollectedBlocks()
     record(
         replace(
@@ -107,14 +107,14 @@ def scan_blocks(plan: ScanPlan, source: LayerSource | None = None) -> Iterator[B
     workers, block_scan = plan.threads or available_cores(), BlockScan(plan)
 
     def scan(block: Block) -> BlockResult:
-        return block_scan.block(*block)
+        return block_scan.scan_block(*block)
 
     if source is None:
         yield from _computed(scan, plan, workers, 1, Future.result)
         return
     if source.calls is None:
         finish = Finish(plan, source)
-        yield from _computed(lambda block: finish.block(scan(block)), plan, workers, 1, Future.result)
+        yield from _computed(lambda block: finish.finish_block(scan(block)), plan, workers, 1, Future.result)
         return
     calls = source.calls
     blocks = _computed(scan, plan, workers, _AHEAD, calls.result_of)
@@ -124,7 +124,7 @@ def scan_blocks(plan: ScanPlan, source: LayerSource | None = None) -> Iterator[B
         stop = calls.close
     finishers = min(workers, _FINISHED_AT_ONCE)
     yield from _map_side_by_side(
-        Finish(plan, source).block, _join_into_batches(blocks), finishers, 0, calls.result_of, stop
+        Finish(plan, source).finish_block, _join_into_batches(blocks), finishers, 0, calls.result_of, stop
     )
 
 

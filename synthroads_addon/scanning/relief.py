@@ -70,7 +70,7 @@ class MicroRelief:
 
 
 def micro_relief(names: Sequence[str], rows: Sequence[Material]) -> MicroRelief:
-    """Return the relief of materials: `RELIEF`'s, or that of the roughness where the name isn't in the material table.
+    """Return the micro-relief of M materials: `RELIEF`'s, or by their roughness if the material table lacks them.
 
     Args:
         names: of the M materials.
@@ -89,7 +89,7 @@ def _relief(name: str, row: Material) -> Relief:
 
 
 def relief_of_roughness(row: Material) -> Relief:
-    """Return the relief of a surface of which only a renderer's properties are known.
+    """Return a relief estimated from a material's roughness; smooth up to 0.5, for metals and for glass.
 
     None up to a roughness of 0.5, then growing with the square; asphalt's at asphalt's. None for metals and for what
     light goes through.

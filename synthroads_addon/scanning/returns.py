@@ -50,7 +50,7 @@ BothSignals = tuple[HitSignals, HitSignals]
 
 
 def group_returns(first: HitSignals, behind: HitSignals, pulse: Index, resolution: float) -> Echoes:
-    """Group the hits of every pulse into returns.
+    """Return the echoes of pulses: hits of one pulse merge where no gap in range exceeds the resolution (m).
 
     Sorted by range, a hit that lies farther than ``resolution`` behind the one before begins a new return. A return's
     range is the mean of its hits by weight, so that the mean over all returns by their summed weights is the mean over
@@ -94,7 +94,7 @@ def _whole_pulses(pulse: Index, nearest: Float, first: HitSignals) -> Echoes:
 
 
 def _brightest_ray(energy: Float) -> Index:
-    """Return the first ray (P,) of those with the most energy (K, P); ``argmax`` takes three times as long."""
+    """Return the index (P,) of each pulse's ray with the most energy (K, P), the first of equals."""
     most, result = energy[0].copy(), np.zeros(energy.shape[1], dtype=np.intp)
     for ray, row in enumerate(energy[1:], 1):
         np.copyto(result, ray, where=row > most)
@@ -126,7 +126,7 @@ def _split_pulses(chosen: Index, first: HitSignals, behind: HitSignals, pulse: I
 
 
 def _values_of_hits(first: Float, behind: Float, hit: Index) -> Float:
-    """Return the values of hits, see `Echoes.hit`."""
+    """Return the values of hits, of the first ones (K, P) or of those behind (B,), by numbers as `Echoes.hit`."""
     result = np.take(first.ravel(), hit, mode="clip")
     late = np.flatnonzero(hit >= first.size)
     result[late] = behind[hit[late] - first.size]
@@ -134,7 +134,7 @@ def _values_of_hits(first: Float, behind: Float, hit: Index) -> Float:
 
 
 def _strongest(energy: Float, group: Index, starts: Index) -> Index:
-    """Return of each group the first of its members that have the most energy."""
+    """Return the index of each group's member with the most energy, the first of equals."""
     brightest = np.flatnonzero(energy == np.maximum.reduceat(energy, starts)[group])
     owner = group[brightest]
     first = np.ones(len(owner), dtype=bool)
@@ -143,13 +143,13 @@ def _strongest(energy: Float, group: Index, starts: Index) -> Index:
 
 
 def _merge_echoes(one: Echoes, several: Echoes) -> Echoes:
-    """Return both in the order of pulses; no pulse is in both."""
+    """Return both sets of echoes joined, in the order of pulses; no pulse is in both."""
     echoes = Echoes.join([one, several])
     return echoes.select(np.argsort(echoes.pulse, kind="stable"))
 
 
 def number_returns(pulse: Index, maximum: int) -> tuple[Bool, UInt8, UInt8]:
-    """Return which echoes are recorded, and for these the return number and the number of returns.
+    """Return a mask (N,) of the echoes that are recorded, and for these the return number and number of returns.
 
     Args:
         pulse: (N,) pulse of each echo, non-decreasing; within a pulse ordered by range.

@@ -33,7 +33,7 @@ become four times as bright as its material's mean makes it."""
 
 @dataclass(frozen=True)
 class BlockResult:
-    """The points of one block and what was counted on the way.
+    """Points of one block, or of several joined, and counts of pulses, rays and lost returns.
 
     Attributes:
         points: as measured.
@@ -55,7 +55,7 @@ class BlockResult:
 
 
 def join_results(results: list[BlockResult]) -> BlockResult:
-    """Join the results of several blocks, which aren't finished yet, to one in their order."""
+    """Return the results of several blocks, none of them finished yet, joined into one in their order."""
     seen = [result.seen for result in results if result.seen is not None]
 
     def total(name: str) -> int:
@@ -74,7 +74,7 @@ def join_results(results: list[BlockResult]) -> BlockResult:
 
 @dataclass(frozen=True)
 class BlockScan:
-    """The stages that blocks of pulses go through, in any order and by any worker.
+    """Simulation of the blocks of a plan, from pulses to points, in any order and by any thread.
 
     Attributes:
         plan: the scan.
@@ -82,12 +82,12 @@ class BlockScan:
 
     plan: ScanPlan
 
-    def block(self, strip: Strip, block: int) -> BlockResult:
-        """Scan one block."""
-        return self.pulses(strip, *self.plan.cut.pulses_of(strip, block), block)
+    def scan_block(self, strip: Strip, block: int) -> BlockResult:
+        """Scan the block of a strip with this number; return its points and counts."""
+        return self.scan_pulses(strip, *self.plan.cut.pulse_span(strip, block), block)
 
-    def pulses(self, strip: Strip, first: int, count: int, key: int = 0) -> BlockResult:
-        """Scan pulses ``first`` to ``first + count`` of a strip at once; ``key`` is that of their random numbers.
+    def scan_pulses(self, strip: Strip, first: int, count: int, key: int = 0) -> BlockResult:
+        """Scan ``count`` pulses of a strip from ``first`` on; return points and counts; ``key`` seeds random streams.
 
         A block isn't cut any smaller, though its arrays leave the processor's cache: blocks are scanned side by side in
         threads that take turns in Python, so that few long calls beat many short ones.
@@ -127,11 +127,11 @@ class BlockScan:
 
     @property
     def _in_air(self) -> bool:
-        """Return whether some echoes come from no surface."""
+        """Return whether effects may add echoes that come from no surface."""
         return bool(self.plan.effects and self.plan.target.triangles)
 
     def draw_errors(self, strip: Strip, count: int, key: int) -> Errors:
-        """Draw the errors of a block."""
+        """Draw the random errors of a block of ``count`` pulses; ``key`` keys their random streams."""
         plan = self.plan
 
         def source(purpose: str) -> np.random.Generator:
@@ -147,7 +147,7 @@ class BlockScan:
         )
 
     def poses_between(self, strip: Strip, begin: float, end: float) -> Poses:
-        """Return the scanner's poses, and those of what moves in the target, between two times."""
+        """Return the tracks of the scanner and of the target's moving parts between two times, s."""
         path, noise, spacing = self.plan.path, self.plan.noise, self.plan.path.knot_spacing
 
         def true(time: Float) -> tuple[Float, Float, Float]:
@@ -169,7 +169,7 @@ class BlockScan:
         )
 
     def emit(self, strip: Strip, poses: Poses, angle: Float | None, first: int, count: int) -> Pulses:
-        """Return pulses ``first`` to ``first + count`` of a strip.
+        """Return ``count`` pulses of a strip from ``first`` on, as they leave the scanner, in local coordinates.
 
         Args:
             angle: (2, P) pointing errors in the scan plane and across it, rad; None without.
@@ -194,7 +194,7 @@ class BlockScan:
         return Pulses(time, shot.scan_angle, origin, direction, in_plane, across, measured_origin, measured_direction)
 
     def rays(self, pulses: Pulses, motions: list[Track]) -> Rays:
-        """Return the rays that sample the pulses' footprints."""
+        """Return the K rays that sample each pulse's footprint; a cylindrical beam is cast once to find its range."""
         pattern, setting = self.plan.pattern, self.plan.setting
         origin, share = pulses.origin[:, None, :], pattern.weights[:, None]
         if len(pattern) == 1:
@@ -214,7 +214,7 @@ class BlockScan:
         return self._signals(traced.first), self._signals(traced.behind)
 
     def _signals(self, hits: Hits) -> HitSignals:
-        """Return the signals that hits send back."""
+        """Return the signals that hits send back: ranges, their weights in mean ranges, and received intensities."""
         surfaces, material = self.plan.surfaces, hits.material.ravel()
         brightness = brightness_of(surfaces, material, np.abs(hits.along.ravel())).reshape(hits.face.shape)
         brightness *= hits.share
@@ -223,7 +223,7 @@ class BlockScan:
         return HitSignals(hits.distance, weight, received_intensity(brightness, hits.distance, self.plan.attenuation))
 
     def vary_brightness(self, traced: TracedRays, echoes: Echoes, motions: list[Track]) -> Echoes:
-        """Return the echoes as bright as the places are that gave most of them, see `materials.surfaces`."""
+        """Return the echoes with intensities scaled by how their materials' reflectance varies in space."""
         surfaces, target = self.plan.surfaces, self.plan.target
         material = traced.pick("material", echoes.hit)
         uneven = np.flatnonzero(np.take(surfaces.uneven, material, mode="clip"))
@@ -251,7 +251,7 @@ class BlockScan:
         number_in_block: Index,
         motions: list[Track],
     ) -> tuple[PointBlock, SeenPoints | None, int]:
-        """Return the points of the echoes, where they were seen, and how many of them saturated the detector."""
+        """Return the points of the echoes, where they were seen (None if not asked for), and how many saturated."""
         plan, setting, target = self.plan, self.plan.setting, self.plan.target
         keep, number, returns = number_returns(echoes.pulse, plan.most_returns)
         if not keep.all():
@@ -294,7 +294,7 @@ class BlockScan:
     def _seen_targets(
         self, rays: Rays, ray: Index, reach: Float, face: Index, normal: Float, motions: list[Track]
     ) -> SeenPoints:
-        """Return where the points were seen, in the scene as it stands at the time 0: as it is rendered.
+        """Return the surface points that gave the returns, in the scene at time 0, as it is rendered.
 
         That is on the surface that gave most of the return: the mean of all its hits may lie in the air between them.
         """
@@ -315,24 +315,24 @@ class BlockScan:
         )
 
     def _sunlit(self, face: Index, position: Float, normal: Float, time: Float, motions: list[Track]) -> Bool:
-        """Return whether the sun reaches points (N,), seen from the side that their normals (3, N) point to."""
+        """Return a mask (N,) of the points that the sun reaches, on the side that their normals (3, N) point to."""
         sun = self.plan.sun
         assert sun is not None
         result = sun @ normal > 0.0
         towards = np.flatnonzero(result & (face >= 0))
         begin = position[:, towards] + _OFF_SURFACE * normal[:, towards]
-        result[towards] = self.plan.target.sees(begin, sun, time[towards], motions)
+        result[towards] = self.plan.target.unobstructed(begin, sun, time[towards], motions)
         return result
 
 
 def _ray_ends(rays: Rays, ray: Index, reach: Float) -> tuple[Float, Float]:
-    """Return where rays end after ``reach``, and where they began, (3, N) local, m."""
+    """Return the ends of rays after ``reach`` (m) and their origins, (3, N) each, local, m."""
     scanner = np.take(rays.origin.reshape(3, -1), ray if rays.origin.shape[1] > 1 else ray % len(rays.time), axis=1)
     return scanner + reach * np.take(rays.direction.reshape(3, -1), ray, axis=1), scanner
 
 
 def _speckle_echoes(echoes: Echoes, factors: Float32) -> Echoes:
-    """Return the echoes with their intensities as speckle and detector change them, by their number in the pulse.
+    """Return the echoes with intensities times speckle factors (P, returns), by their return numbers.
 
     Those beyond the last number that is recorded are left as they are.
     """
@@ -344,7 +344,7 @@ def _speckle_echoes(echoes: Echoes, factors: Float32) -> Echoes:
 
 
 def _drop_lost_echoes(echoes: Echoes, lost: Bool) -> Echoes:
-    """Return the echoes that are not lost at random, by their number within the pulse."""
+    """Return the echoes without those lost at random, by a mask (P, returns) over their return numbers."""
     keep, number, _ = number_returns(echoes.pulse, lost.shape[1])
     chosen = np.flatnonzero(keep)
     chosen = chosen[~lost[echoes.pulse[chosen], number - 1]]

@@ -61,7 +61,7 @@ class RoadSection:
 
 
 def sections(cut: Blocks, geometry: RoadGeometry, length: float, shadows: float = 0.0) -> Iterator[RoadSection]:
-    """Yield the sections of a scan from the road's start to its end; without those that no block is of.
+    """Yield the parts of a road to be built and scanned in turn, from its start on, that have any blocks.
 
     Args:
         cut: the scan's blocks.
@@ -72,10 +72,10 @@ def sections(cut: Blocks, geometry: RoadGeometry, length: float, shadows: float 
     count = max(1, int(np.ceil(geometry.length / length - 1e-9)))
     owned: list[list[Block]] = [[] for _ in range(count)]
     for strip in cut.path.strips:
-        station = _middles(cut, geometry, strip)
+        station = _block_stations(cut, geometry, strip)
         for block, owner in enumerate(np.clip(station // length, 0, count - 1).astype(int)):
             owned[owner].append((strip, block))
-    beyond = BORDER + shadows + _skew(geometry)
+    beyond = BORDER + shadows + _overpass_reach(geometry)
     for number, blocks in enumerate(owned):
         if blocks:
             low, high = reached_stations(cut, geometry, blocks)
@@ -84,11 +84,11 @@ def sections(cut: Blocks, geometry: RoadGeometry, length: float, shadows: float 
 
 
 def reached_stations(cut: Blocks, geometry: RoadGeometry, blocks: list[Block]) -> tuple[float, float]:
-    """Return the stations between which the rays of some blocks can meet anything."""
+    """Return the smallest and largest station, m, at which rays of some blocks can meet anything."""
     stations = []
     for strip, numbers in _by_strip(blocks):
         chosen = np.unique(np.linspace(0, len(numbers) - 1, _PLACES).astype(int))
-        rays = [_rays(cut, strip, numbers[i]) for i in chosen]
+        rays = [_sample_rays(cut, strip, numbers[i]) for i in chosen]
         origin, direction = (np.concatenate(parts) for parts in zip(*rays, strict=True))
         stations.append(_stations_of_rays(cut, geometry, origin, direction))
     return min(low for low, _ in stations), max(high for _, high in stations)
@@ -99,8 +99,8 @@ def strip_parts(cut: Blocks, blocks: Sequence[Block]) -> tuple[Strip, ...]:
     parts = []
     for strip, numbers in _by_strip(blocks):
         for run in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1):
-            first, _ = cut.pulses_of(strip, int(run[0]))
-            last, count = cut.pulses_of(strip, int(run[-1]))
+            first, _ = cut.pulse_span(strip, int(run[0]))
+            last, count = cut.pulse_span(strip, int(run[-1]))
             begin, end = cut.time(strip, first), cut.time(strip, last + count - 1)
             parts.append(Strip(strip.index, begin, end - begin))
     return tuple(parts)
@@ -109,7 +109,7 @@ def strip_parts(cut: Blocks, blocks: Sequence[Block]) -> tuple[Strip, ...]:
 def vehicles_through(
     section: RoadSection, cut: Blocks, motions: Mapping[str, LaneMotion], speed_factor: float
 ) -> dict[str, LaneMotion]:
-    """Return the vehicles that drive through a section while its blocks are scanned.
+    """Return the motions, by id, of the vehicles that pass a section while its blocks are scanned.
 
     Args:
         section: of the scan.
@@ -135,21 +135,21 @@ def _by_strip(blocks: Sequence[Block]) -> list[tuple[Strip, list[int]]]:
 
 
 def shadow_length(geometry: RoadGeometry) -> float:
-    """Return how far the shadows of a road's tallest things fall, m."""
+    """Return the length, m, of the shadow of a road's tallest thing, at a sun of 10 degrees or more."""
     elevation = np.deg2rad(max(geometry.parameters.environment.sun_elevation_deg, 10.0))
     return float(_tallest(geometry) / np.tan(elevation))
 
 
-def _middles(cut: Blocks, geometry: RoadGeometry, strip: Strip) -> Float:
-    """Return the stations (B,) of the scanner in the middle of a strip's blocks."""
-    borders = [cut.pulses_of(strip, block) for block in cut.block_numbers(strip)]
+def _block_stations(cut: Blocks, geometry: RoadGeometry, strip: Strip) -> Float:
+    """Return the scanner's stations (B,), m, at the middle pulse of each of a strip's blocks."""
+    borders = [cut.pulse_span(strip, block) for block in cut.block_numbers(strip)]
     times = np.array([cut.time(strip, first + count // 2) for first, count in borders])
     return geometry.alignment.project(cut.path.pose(strip, times)[0][:, :2])[0]
 
 
-def _rays(cut: Blocks, strip: Strip, block: int) -> tuple[Float, Float]:
-    """Return where some of a block's pulses begin (N, 3) and their directions (N, 3): its ends are among them."""
-    first, count = cut.pulses_of(strip, block)
+def _sample_rays(cut: Blocks, strip: Strip, block: int) -> tuple[Float, Float]:
+    """Return local origins (N, 3), m, and directions (N, 3) of a sample of a block's pulses, its ends included."""
+    first, count = cut.pulse_span(strip, block)
     starts = sorted({first, first + max(0, (count - _RUN) // 2), first + max(0, count - _RUN)})
     origins, directions = [], []
     for start in starts:
@@ -163,10 +163,10 @@ def _rays(cut: Blocks, strip: Strip, block: int) -> tuple[Float, Float]:
 
 
 def _stations_of_rays(cut: Blocks, geometry: RoadGeometry, origin: Float, direction: Float) -> tuple[float, float]:
-    """Return the smallest and the largest station at which rays can meet anything."""
+    """Return the smallest and largest station, m, at which rays can meet anything."""
     farthest = cut.setting.maximum_range
     begin, _ = geometry.alignment.project(origin[:, :2])
-    lowest, highest = _heights(geometry, float(begin.min()) - farthest, float(begin.max()) + farthest)
+    lowest, highest = _elevation_range(geometry, float(begin.min()) - farthest, float(begin.max()) + farthest)
     rise = direction[:, 2]
     with np.errstate(divide="ignore", invalid="ignore"):
         down, up = (lowest - origin[:, 2]) / rise, (highest - origin[:, 2]) / rise
@@ -188,7 +188,7 @@ def _stations_of_rays(cut: Blocks, geometry: RoadGeometry, origin: Float, direct
     return float(every.min()) - footprint, float(every.max()) + footprint
 
 
-def _skew(geometry: RoadGeometry) -> float:
+def _overpass_reach(geometry: RoadGeometry) -> float:
     """Return how far along the road an overpass reaches at most from where it crosses, m."""
     bridges = geometry.parameters.of_type(Overpass).values()
     lengths = [abs(np.sin(np.deg2rad(item.rotation_deg))) * _BRIDGE_SIDE + item.width for item in bridges]
@@ -196,14 +196,14 @@ def _skew(geometry: RoadGeometry) -> float:
 
 
 def _corridor(geometry: RoadGeometry) -> float:
-    """Return the largest offset at which there is anything, m."""
+    """Return the largest offset from the axis, m, at which there is anything."""
     parameters = geometry.parameters
     edges = [float(section.road_edge([0.0, *section.kinks()]).max()) for section in geometry.sections.values()]
     reach = [*edges, parameters.terrain.half_width if parameters.terrain else 0.0]
     return max(reach) + (_BRIDGE_SIDE if parameters.of_type(Overpass) else 0.0)
 
 
-def _heights(geometry: RoadGeometry, start: float, end: float) -> tuple[float, float]:
+def _elevation_range(geometry: RoadGeometry, start: float, end: float) -> tuple[float, float]:
     """Return the lowest and the highest local elevation of what there is between two stations, m."""
     station = np.linspace(max(start, 0.0), min(end, geometry.length), 60)
     wide = _corridor(geometry)

@@ -22,7 +22,7 @@ _AXES = 6
 
 
 class Motion(ClosedModel):
-    """How the platform sways about its path, one sigma each; 0 is not at all."""
+    """Random sway of the platform about its path: standard deviations (0 is none) and range of periods."""
 
     position_sigma: float = quantity(0.0, "m", "Aside and in height, each axis.", (0, 10), title="Position")
     attitude_sigma_deg: float = quantity(0.0, "deg", "Roll and pitch.", (0, 10), title="Roll, Pitch (°)")
@@ -42,14 +42,14 @@ class Motion(ClosedModel):
 
     @property
     def sigma(self) -> Float:
-        """Return the standard deviations of x, y, z, m, and of roll, pitch and heading, rad: (6,)."""
+        """Return the standard deviations (6,) of x, y, z, m, and of roll, pitch and heading, rad."""
         attitude, heading = np.deg2rad([self.attitude_sigma_deg, self.heading_sigma_deg])
         return np.array([self.position_sigma] * 3 + [attitude, attitude, heading])
 
 
 @dataclass(frozen=True)
 class SwayingPath:
-    """A path that a platform sways about; see `platforms.path.Path`.
+    """A path with random sway about a planned one; see `platforms.path.Path`.
 
     Attributes:
         planned: the path.
@@ -73,7 +73,7 @@ class SwayingPath:
 
     @property
     def knot_spacing(self) -> float:
-        """Return the largest time between two knots, s: the bends of path and swaying add up, and so do 1 / h^2."""
+        """Return the largest time between two knots, s, by the bends of path and sway together."""
         # Acceleration of a place at KNOT_RANGE where all sines are at their crests would be sqrt(2 N) sigma; 4 sigma is
         # what a Gaussian process hardly ever exceeds.
         reach = np.array([1.0] * 3 + [KNOT_RANGE] * 3)
@@ -81,12 +81,12 @@ class SwayingPath:
         return float((self.planned.knot_spacing**-2 + knot_spacing_for(sway) ** -2) ** -0.5)
 
     def pose(self, strip: Strip, time: Float) -> tuple[Float, Float]:
-        """Return the poses of the path with the swaying; see `platforms.path.Path.pose`."""
-        return measured_pose(*self.planned.pose(strip, time), swaying(self.motion, self.seed, strip.index, time))
+        """Return the planned path's positions (K, 3), m, and rotations (K, 3, 3), with sway, at times (K,), s."""
+        return measured_pose(*self.planned.pose(strip, time), sway_offsets(self.motion, self.seed, strip.index, time))
 
 
-def swaying(motion: Motion, seed: int, strip: int, time: Float) -> tuple[Float, Float]:
-    """Return how a platform is off its path at times (K,), s since the first strip's start.
+def sway_offsets(motion: Motion, seed: int, strip: int, time: Float) -> tuple[Float, Float]:
+    """Return a platform's random deviations from its path at times (K,), s since the first strip's start.
 
     Returns:
         position (K, 3), m, along the local axes; roll, pitch and heading (K, 3), rad.
@@ -101,5 +101,5 @@ def swaying(motion: Motion, seed: int, strip: int, time: Float) -> tuple[Float, 
 
 
 def with_motion(path: Path, motion: Motion, seed: int) -> Path:
-    """Return a path with a platform's swaying; the path itself where it doesn't sway."""
+    """Return a path with a platform's random sway added; the path itself if there is none."""
     return SwayingPath(path, motion, seed) if motion.sigma.any() else path

@@ -58,7 +58,7 @@ class Hits(ArrayRows):
 
 @dataclass(frozen=True)
 class TracedRays:
-    """All that the rays of a block meet.
+    """Hits of a block's rays: the first of each ray, and those behind permeable surfaces.
 
     Attributes:
         rays: the rays.
@@ -74,18 +74,18 @@ class TracedRays:
 
     @property
     def pulse(self) -> Index:
-        """Return the pulses (B,) of what lies behind."""
+        """Return the pulse (B,) of each hit behind a permeable surface."""
         return np.asarray(self.ray % self.first.face.shape[1])
 
     def ray_of(self, hits: Index) -> Index:
-        """Return the rays of hits, numbered as in `returns.Echoes`."""
+        """Return the ray k * P + p of each hit, by hit numbers as in `returns.Echoes`."""
         late = np.flatnonzero(hits >= self.first.face.size)
         result = hits.copy()
         result[late] = self.ray[hits[late] - self.first.face.size]
         return result
 
     def pick(self, name: str, hits: Index) -> AnyArray:
-        """Return an attribute of chosen hits, numbered as in `returns.Echoes`."""
+        """Return the named attribute of chosen hits, by hit numbers as in `returns.Echoes`."""
         first, behind = getattr(self.first, name).ravel(), getattr(self.behind, name)
         if not len(behind):
             return np.asarray(np.take(first, hits))
@@ -98,7 +98,7 @@ class TracedRays:
 def trace(
     target: Target, surfaces: Surfaces, rays: Rays, motions: list[Track], nearest: float, farthest: float
 ) -> TracedRays:
-    """Follow rays to what they meet between two ranges (m).
+    """Return what rays meet between two ranges (m), through permeable surfaces, and the light that each hit takes.
 
     The shares taken along one ray never add up to more than its own.
     """
@@ -139,7 +139,7 @@ def trace(
 
 
 def _gather_hits(rays: Rays, first: Hits, layers: list[Hits], on: list[Index]) -> TracedRays:
-    """Return all hits; behind permeable surfaces only those within reach."""
+    """Return first hits and those of all layers behind as one; of those behind only what is within reach."""
     if not layers:
         none, nothing = np.empty(0, dtype=np.intp), np.empty(0)
         return TracedRays(rays, first, Hits(none, none, nothing, nothing, nothing), none)
@@ -149,7 +149,7 @@ def _gather_hits(rays: Rays, first: Hits, layers: list[Hits], on: list[Index]) -
 
 
 def _within(distance: Float, nearest: float, farthest: float) -> Float:
-    """Return ranges; inf where nothing is recorded: what lies there has taken its share of the light all the same.
+    """Return ranges (m) with inf where they are out of the limits and so not recorded.
 
     What rays meet first is never farther than they were cast, so there ``farthest`` is inf.
     """

@@ -193,7 +193,7 @@ def test_points_in_the_air_go_through_colours_and_relief(by_layers: bool) -> Non
             relief_strength=1.0,
             relief_octaves=2,
         )
-        points = Finish(scan, MaterialLayers(surface_constants(rows))).block(line(scan)).points
+        points = Finish(scan, MaterialLayers(surface_constants(rows))).finish_block(line(scan)).points
         air = points.material == NO_MATERIAL
         assert 50 < air.sum() < 150
         assert not points.rgb[air].any()

@@ -38,7 +38,7 @@ class Striped:
 
 def finish_of(scan: ScanPlan, source: Any, corrected: bool = False) -> Callable[[BlockResult], BlockResult]:
     plan = replace(scan, material_means=scan.surfaces, range_corrected=corrected, kept_layers=KEPT)
-    return Finish(plan, source).block
+    return Finish(plan, source).finish_block
 
 
 def detected_later(scan: ScanPlan) -> ScanPlan:

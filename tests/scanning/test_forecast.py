@@ -9,7 +9,7 @@ import pytest
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.scanning import forecast as module
 from synthroads_addon.scanning.blocks import Blocks
-from synthroads_addon.scanning.forecast import MOST_PULSES, forecast_scan, refuse_large
+from synthroads_addon.scanning.forecast import MOST_PULSES, check_scan_size, forecast_scan
 from synthroads_addon.scanning.platforms.path import Strip
 from synthroads_addon.scenario.scan import scanner_setting
 from synthroads_addon.scenario.scenario import load_scenario
@@ -26,7 +26,7 @@ def test_a_scan_of_the_demo_s_size_is_told_within_a_factor_of_two() -> None:
     """On one core it took 127 s and 2.7 GB; see docs/benchmark.md."""
     cut = blocks(180.0)
     told = forecast_scan(cut, 1_500_000, threads=1)
-    assert told.pulses == cut.pulses(cut.path.strips[0]) == pytest.approx(18e6, rel=0.5)
+    assert told.pulses == cut.pulse_count(cut.path.strips[0]) == pytest.approx(18e6, rel=0.5)
     assert 63 < told.seconds < 254
     assert 1.3e9 < told.memory < 5.4e9
     assert f"{told.pulses:,} pulses" in told.text()
@@ -38,22 +38,22 @@ def test_what_nobody_can_have_meant_is_refused_and_a_field_lets_it_be_done() -> 
     large = forecast_scan(blocks(1e6), 1000)
     assert large.pulses > MOST_PULSES
     with pytest.raises(InputError, match=r"scan.most_pulses is 5000000000: .* pulses, .* (days|hours) .*--allow-large"):
-        refuse_large(large)
-    refuse_large(large, large.pulses)
+        check_scan_size(large)
+    check_scan_size(large, large.pulses)
     with pytest.raises(InputError, match="most_pulses"):
-        refuse_large(large, large.pulses - 1)
+        check_scan_size(large, large.pulses - 1)
     small = forecast_scan(blocks(10.0), 1000)
-    refuse_large(small)
+    check_scan_size(small)
     with pytest.raises(InputError, match="most_pulses is 5: "):
-        refuse_large(small, 5)
+        check_scan_size(small, 5)
 
 
 def test_a_scene_that_does_not_fit_into_memory_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "physical_memory", lambda: 8_000_000_000)
     scan = forecast_scan(blocks(1.0), 100_000_000)
     with pytest.raises(InputError, match="triangles take about 35 GB of memory, this machine has 8 GB"):
-        refuse_large(scan)
-    refuse_large(scan, MOST_PULSES)
-    refuse_large(replace(scan, scene_memory=1e9))
+        check_scan_size(scan)
+    check_scan_size(scan, MOST_PULSES)
+    check_scan_size(replace(scan, scene_memory=1e9))
     monkeypatch.setattr(module, "physical_memory", lambda: None)
-    refuse_large(scan)
+    check_scan_size(scan)

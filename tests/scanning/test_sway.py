@@ -9,7 +9,7 @@ from scipy import stats
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.scanning.knots import Track
 from synthroads_addon.scanning.platforms.path import KNOT_ERROR, KNOT_RANGE, Strip
-from synthroads_addon.scanning.sway import Motion, SwayingPath, swaying, with_motion
+from synthroads_addon.scanning.sway import Motion, SwayingPath, sway_offsets, with_motion
 
 STRIP = Strip(0, 100.0, 60.0)
 MOTION = Motion(position_sigma=0.4, attitude_sigma_deg=0.3, heading_sigma_deg=0.5, shortest_period=0.5)
@@ -30,7 +30,7 @@ class Level:
 
 def off_path(seed: int, time: np.ndarray, strip: int = 0) -> np.ndarray:
     """Return the six values (K, 6) in units of sigma."""
-    return np.concatenate(swaying(MOTION, seed, strip, time), axis=1) / SIGMA
+    return np.concatenate(sway_offsets(MOTION, seed, strip, time), axis=1) / SIGMA
 
 
 def test_it_is_normally_distributed_with_the_stated_deviation() -> None:

@@ -88,7 +88,7 @@ class _Search:
         self.rays, self.octaves = choices.rays_choices(self.scenario), choices.octave_choices(self.scenario)
         colours = choices.colour_choices(self.scenario, self.site.path.typical_range, HAS_RETURN_CAMERA)
         self.colours = colours if _COLOURS & set(self.limits) or self.scenario.may_render else {}
-        pulses = sum(map(self.site.cut.pulses, self.site.path.strips))
+        pulses = sum(map(self.site.cut.pulse_count, self.site.path.strips))
         self.times = JobTimes(table_of(self.scenario.scan.platform.kind), scene.area, pulses)
         models = choices.model_knobs(self.scenario, self.limits) if scene.area else (None,)
         self.models: list[ModelKnobs | None] = [*models]

@@ -79,7 +79,7 @@ class Trial:
     @property
     def pulses(self) -> int:
         """Return how many pulses the whole path has."""
-        return sum(map(self.plan.pulses, self.plan.path.strips))
+        return sum(map(self.plan.pulse_count, self.plan.path.strips))
 
     def scan_lines(self, rings: tuple[int, ...], lines: int = 0) -> list[BlockResult]:
         """Scan the stretches that errors are taken of with a beam; return the points of each, and where they are."""
@@ -161,4 +161,4 @@ class Trial:
             record_to_files([plan], files, StageTimer(), announce=False)
             seconds = self.clock() - begin
         # Pulses come in whole lines, so that stretches hold fewer of them than their duration says.
-        return sum(map(self.plan.pulses, path.strips)), seconds, files.counts.points
+        return sum(map(self.plan.pulse_count, path.strips)), seconds, files.counts.points

@@ -110,7 +110,7 @@ def _cast_beside(plan: ScanPlan) -> Rate:
     keeping: Any = SimpleNamespace(name=caster.name, main_thread_only=False, cast=cast_and_keep)
     target._parts = [replace(part, caster=keeping), *target._parts[1:]]
     for block in blocks:
-        BlockScan(replace(plan, target=target)).block(*block)
+        BlockScan(replace(plan, target=target)).scan_block(*block)
     origins, directions = map(np.concatenate, zip(*kept, strict=True))
     few = replace(plan, chosen_blocks=tuple(blocks), threads=threads)
 

@@ -22,7 +22,7 @@ from ...scanning.blocks import Blocks
 from ...scanning.colour.colour import takes_nodes
 from ...scanning.colour.request import LayerRequest
 from ...scanning.finish import OF_INTENSITY
-from ...scanning.forecast import forecast_scan, refuse_large
+from ...scanning.forecast import check_scan_size, forecast_scan
 from ...scanning.plan import ScanConditions, ScanPlan, SceneServices
 from ...scanning.platforms.guides import RoadGuide
 from ...scanning.platforms.path import Path as ScanPath
@@ -88,7 +88,7 @@ def plan_scan(
     setting, loss = scanner_setting(scan), scan.attenuation
     weather = scan.weather or weather_of(conditions.environment)
     cut = Blocks(setting, path, 1 + sum(rings))
-    refuse_large(forecast_scan(cut, len(scene.static), scan.threads), scan.most_pulses)
+    check_scan_size(forecast_scan(cut, len(scene.static), scan.threads), scan.most_pulses)
     means = services.materials(materials)
     road = conditions.road
     damages = InstanceNumbers(road).damages() if road is not None and "damage" in kept else {}

@@ -21,7 +21,7 @@ Lighting = Literal["direct", "path"]
 
 @dataclass(frozen=True)
 class ColourSettings:
-    """How colours and layers are rendered.
+    """Settings of the points' colours and material layers: their source, the renderer, images, RGB mode and lighting.
 
     Attributes:
         image_spacing: distance between two images along the path, m.
@@ -46,7 +46,7 @@ class ColourSettings:
 
 
 def takes_nodes(settings: ColourSettings) -> bool:
-    """Return whether colours and layers come from the materials' nodes at the very returns."""
+    """Return whether colours and layers are evaluated from the materials' nodes at the returns, without images."""
     direct = settings.engine == "cycles" and settings.lighting == "direct"
     return settings.source == "nodes" or (settings.source == "auto" and direct)
 
@@ -61,7 +61,7 @@ _FALSE_COLOUR = ("roughness", "metallic", "specular")
 
 @dataclass(frozen=True)
 class LayerValues:
-    """Layers of N points, and which source each point took them from.
+    """Colour and material layers of N points, with the code of the source that each point's values come from.
 
     Attributes:
         arrays: by layer: ``rgb`` (N, 3) uint16 sRGB, ``base_color`` (N, 3) float32 linear, the others (N,) float32.
@@ -73,13 +73,13 @@ class LayerValues:
 
 
 def source_name(number: int) -> str:
-    """Return what a `LayerValues.source` is called in reports."""
+    """Return the name that reports use for a code of `LayerValues.source`, such as "image" or "nearby"."""
     names = {FROM_MATERIAL: "material", 1: "image", FROM_NODES: "nodes", NEARBY: "nearby", FROM_RETURN: "return"}
     return names.get(number, "next image")
 
 
 def shares_by_source(counts: NDArray[np.integer]) -> dict[str, float]:
-    """Return the share of the points that took their values from each source, by `source_name`.
+    """Return the fraction of the points, 0 to 1, that took their layers from each source, by the source's name.
 
     Args:
         counts: (256,) points by source.
@@ -94,7 +94,7 @@ def shares_by_source(counts: NDArray[np.integer]) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class SeenPoints(ArrayRows):
-    """N points as the scanner saw them: on the surface, without any error.
+    """N points on the surface where the scanner's beam met it, without measurement errors.
 
     Attributes:
         position: (N, 3) where the surface was hit, in the scene as it was rendered: local, m.
@@ -119,14 +119,14 @@ class SeenPoints(ArrayRows):
 
     @property
     def towards_scanner(self) -> Float32:
-        """Return unit vectors (N, 3) to where the points were seen from."""
+        """Return the unit vectors (N, 3) from the points to the scanner."""
         towards = (self.scanner - self.position).astype(np.float32)
         towards /= np.maximum(np.sqrt(np.einsum("ij,ij->i", towards, towards)), 1e-9)[:, None]
         return np.asarray(towards)
 
 
 class LayerSource(Protocol):
-    """Source of the points' colours and material layers: images, a pixel per return, or the materials' means.
+    """Interface of what gives points colours and material layers: nodes, images, a pixel per return, or means.
 
     Any threads may use it side by side.
     """
@@ -137,10 +137,10 @@ class LayerSource(Protocol):
 
     @property
     def report(self) -> dict[str, Any]:
-        """Return what was rendered, as JSON data; empty without."""
+        """Return a summary of what was rendered, as JSON data; empty if nothing was."""
 
     def sample(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
-        """Return the wanted layers of N points.
+        """Return the wanted colour and material layers of N points.
 
         Args:
             points: none of which lies in the air.
@@ -151,7 +151,7 @@ class LayerSource(Protocol):
 
 @dataclass(frozen=True)
 class SurfaceConstants:
-    """Means of M materials, and which of their layers vary over the surface.
+    """Mean layer values of M materials, and flags of the layers that vary over a material's surface.
 
     Attributes:
         values: by layer of `MATERIAL_LAYERS`: (M, 3) or (M,) float32.
@@ -162,12 +162,12 @@ class SurfaceConstants:
     varies: dict[str, Bool]
 
     def varying_layers(self, wanted: frozenset[str]) -> tuple[str, ...]:
-        """Return those of the wanted layers that some material varies, in the order of `MATERIAL_LAYERS`."""
+        """Return the names of the wanted layers that vary in some material, in the order of `MATERIAL_LAYERS`."""
         return tuple(name for name in MATERIAL_LAYERS if name in wanted and bool(self.varies[name].any()))
 
 
 def surface_constants(rows: Sequence[Material], varies: dict[str, Bool] | None = None) -> SurfaceConstants:
-    """Return the constants of materials in the order of the scene mesh's; nothing varies if not said so."""
+    """Return the mean layer values of materials, in the given order; without `varies` no layer counts as varying."""
     values = {
         name: np.array([getattr(row, name) for row in rows], np.float32).reshape((-1, 3) if parts == 3 else (-1,))
         for name, parts in MATERIAL_LAYERS.items()
@@ -177,7 +177,7 @@ def surface_constants(rows: Sequence[Material], varies: dict[str, Bool] | None =
 
 
 def needed_layers(wanted: frozenset[str], mode: ColourMode) -> frozenset[str]:
-    """Return the layers of the surface that the wanted ones are computed from, in a mode of RGB."""
+    """Return the names of the surface layers from which the wanted ones are computed, `rgb` by its mode."""
     needed = wanted - {"rgb"}
     if "rgb" in wanted:
         needed |= set(_FALSE_COLOUR) if mode == "false_colour" else {"base_color"}
@@ -185,7 +185,7 @@ def needed_layers(wanted: frozenset[str], mode: ColourMode) -> frozenset[str]:
 
 
 def decode_srgb(stored: Float) -> Float:
-    """Return linear values of sRGB's (IEC 61966-2-1), 0 to 1."""
+    """Return the linear values of sRGB-encoded ones (IEC 61966-2-1), both 0 to 1."""
     return np.where(stored <= 0.04045, stored / 12.92, ((stored + 0.055) / 1.055) ** 2.4)
 
 
@@ -198,7 +198,7 @@ def encode_srgb(linear: NDArray[np.floating]) -> UInt16:
 
 
 def sample_points(source: LayerSource, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
-    """Return the wanted layers of points; zeros for points in the air, whose source counts as the material."""
+    """Return the wanted layers of N points; those in the air get zeros and `FROM_MATERIAL` as their source."""
     solid = np.flatnonzero(points.material != NO_MATERIAL)
     on = points if len(solid) == len(points) else points.select(solid)
     values = source.sample(on, wanted)
@@ -216,7 +216,7 @@ def sample_points(source: LayerSource, points: SeenPoints, wanted: frozenset[str
 
 @dataclass(frozen=True)
 class MaterialLayers:
-    """Each material's means, under sun and sky without shadows of objects. Can be used by many threads at once.
+    """Layer source of the materials' mean values, lit by sun and sky without shadows of objects; thread-safe.
 
     Attributes:
         constants: of the scene's materials.
@@ -234,13 +234,13 @@ class MaterialLayers:
     calls = None
 
     def sample(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
-        """Return the wanted layers of N points; see `LayerSource.sample`."""
+        """Return the wanted layers of N points from their materials' mean values."""
         return self.layer_values(points, {}, np.full(len(points), FROM_MATERIAL, np.uint8), wanted)
 
     def layer_values(
         self, points: SeenPoints, channels: dict[str, Float32], source: UInt8, wanted: frozenset[str]
     ) -> LayerValues:
-        """Return the wanted layers: rendered ones where there are any and the material varies, else the means.
+        """Return the wanted layers of N points: rendered values where given and the material varies, else the means.
 
         Args:
             points: N points; their times are those at which they were seen.

@@ -19,7 +19,7 @@ def cie_lab(rgb: UInt16) -> Float:
 
 
 def ciede2000(one: Float, other: Float) -> Float:
-    """Return the colour differences (N,) of L*a*b* values (N, 3) by CIE 142-2001, in the form of Sharma et al. 2005."""
+    """Return the CIEDE2000 differences (N,) of L*a*b* colours (N, 3) (CIE 142-2001, form of Sharma et al. 2005)."""
     (l1, a1, b1), (l2, a2, b2) = one.T, other.T
     mean_chroma = (np.hypot(a1, b1) + np.hypot(a2, b2)) / 2.0
     stretch = 1.5 - 0.5 * np.sqrt(mean_chroma**7 / (mean_chroma**7 + 25.0**7))
@@ -50,16 +50,16 @@ def ciede2000(one: Float, other: Float) -> Float:
 
 
 def known_rows(truth: LayerValues) -> Bool:
-    """Return which points (N,) the truth was rendered for."""
+    """Return a mask (N,) of the points whose layers were rendered at the very point, not means nor taken nearby."""
     return ~np.isin(truth.source, (FROM_MATERIAL, NEARBY))
 
 
 def colour_difference(mine: LayerValues, truth: LayerValues, rows: Bool) -> Float:
-    """Return CIEDE2000 between the colours of chosen points (N,)."""
+    """Return the CIEDE2000 differences (n,) between two sets' RGB at the n points chosen by a mask."""
     return ciede2000(cie_lab(mine.arrays["rgb"][rows]), cie_lab(truth.arrays["rgb"][rows]))  # type: ignore[arg-type]
 
 
 def squared_error(name: str, mine: LayerValues, truth: LayerValues, rows: Bool) -> Float:
-    """Return the squared errors of a material layer at chosen points (N, components)."""
+    """Return the squared errors (n, components) of a material layer at the n points chosen by a mask."""
     difference = mine.arrays[name][rows].astype(np.float64) - truth.arrays[name][rows].astype(np.float64)
     return np.square(difference).reshape(len(difference), -1)

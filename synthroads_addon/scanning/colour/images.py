@@ -39,7 +39,7 @@ _MARGIN = 24
 
 
 class ImageLayers:
-    """Layers from images along the path, else from the materials. Can be used by many threads at once.
+    """Layer source that samples images rendered along the path, else the materials' means; thread-safe.
 
     A point takes the image whose ray differs least from the scanner's: the angle between both, plus `DISTANCE_WEIGHT`
     times the logarithm of how much farther away the camera is. Where the point is hidden there, the next best, and so
@@ -52,7 +52,7 @@ class ImageLayers:
     calls = None
 
     def __init__(self, images: Sequence[RenderedImage], channels: dict[str, int], material: MaterialLayers) -> None:
-        """Take images with these channels (name and components, in order), and what to take where none shows a point.
+        """Take rendered images, their channels (name -> components, in order), and the source where none shows a point.
 
         The channels are those of `MATERIAL_LAYERS` that vary, and ``sun`` and ``sky``: the light of each that the
         surface reflects, exposed.
@@ -67,7 +67,7 @@ class ImageLayers:
         self._locate()
 
     def _locate(self) -> None:
-        """Fill in the images' places, and how points are grouped by where their scanner stood."""
+        """Set the cameras' positions, the numbers of candidate images, and the cell size for scanner positions."""
         self._places = np.array([image.view.position for image in self.images]).reshape(-1, 3)
         places, count = np.unique(self._places, axis=0, return_counts=True)
         most = int(count.max(initial=0))
@@ -77,29 +77,29 @@ class ImageLayers:
         self._cell = max(float(np.median(spacing)) / 2.0, 0.5)
 
     def sample(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
-        """Return the wanted layers of N points; see `LayerSource.sample`."""
+        """Return the wanted layers of N points from the best image that shows each, else nearby, else the means."""
         points = replace(points, time=np.array(points.time, np.float64))  # the images' times are written into it
         source = np.full(len(points), FROM_MATERIAL, np.uint8)
         taken = np.zeros((len(points), sum(part.stop - part.start for part in self.channels.values())), np.float32)
         if len(points) and self.images:
-            self._take_all(points, taken, source)
+            self._fill_all(points, taken, source)
         return self.material.layer_values(
             points, {name: taken[:, part] for name, part in self.channels.items()}, source, wanted
         )
 
-    def _take_all(self, points: SeenPoints, taken: Float32, source: UInt8) -> None:
-        """Fill in values, sources, and times of the points that an image shows."""
+    def _fill_all(self, points: SeenPoints, taken: Float32, source: UInt8) -> None:
+        """Fill in, in place, values, sources and times of the points that an image shows, by scanner position."""
         cube = np.floor(points.scanner / self._cell).astype(np.int64)
         if (cube == cube[0]).all():
-            self._take(points, np.arange(len(points)), taken, source)
+            self._fill_group(points, np.arange(len(points)), taken, source)
             return
         _, group = np.unique(cube @ np.array([1, 1 << 20, 1 << 40]), return_inverse=True)
         order = np.argsort(group, kind="stable")
         for rows in np.split(order, np.flatnonzero(np.diff(group[order])) + 1):
-            self._take(points, rows, taken, source)
+            self._fill_group(points, rows, taken, source)
 
-    def _take(self, points: SeenPoints, rows: Index, taken: Float32, source: UInt8) -> None:
-        """Fill in rows of points that the scanner saw from about one place."""
+    def _fill_group(self, points: SeenPoints, rows: Index, taken: Float32, source: UInt8) -> None:
+        """Fill in, in place, the rows of points that the scanner saw from about one place, from their best images."""
         seen = points.select(rows)
         chosen, misfit = self._misfits(seen, self._candidates)
         order = np.argsort(misfit, axis=0, kind="stable")[:TRIES]
@@ -117,10 +117,10 @@ class ImageLayers:
                 taken[into], source[into], points.time[into] = values, rank + 1, image.view.time
                 hidden[part] = False
         if hidden.any():
-            self._take_hidden(points, rows[hidden], taken, source)
+            self._fill_hidden(points, rows[hidden], taken, source)
 
-    def _take_hidden(self, points: SeenPoints, rows: Index, taken: Float32, source: UInt8) -> None:
-        """Fill in what any image around shows of points that the best ones don't, and then what it shows close by.
+    def _fill_hidden(self, points: SeenPoints, rows: Index, taken: Float32, source: UInt8) -> None:
+        """Fill in, in place, rows that the best images don't show: from any image around, else from close by.
 
         These are few: it is quicker to look at all of them in image by image than to go by their own order.
         """
@@ -148,10 +148,10 @@ class ImageLayers:
             taken[into], source[into], points.time[into] = values, NEARBY, image.view.time
             away[part] = distance
         near = rows[source[rows] == NEARBY]
-        taken[near] = light_nearby(self.material, points.select(near), taken[near], self.channels)
+        taken[near] = relight_nearby(self.material, points.select(near), taken[near], self.channels)
 
     def _misfits(self, points: SeenPoints, candidates: int) -> tuple[Index, Float32]:
-        """Return the images (C,) nearest to the scanner and how badly they suit each point (C, N)."""
+        """Return the indices (C,) of the images nearest to the scanner, and their misfits (C, N) to the points, rad."""
         away = np.linalg.norm(self._places - points.scanner.mean(axis=0), axis=1)
         chosen = np.argsort(away, kind="stable")[:candidates]
         middle = points.position.mean(axis=0)
@@ -166,7 +166,7 @@ class ImageLayers:
 
 
 def _misfit(view: View, at: Float32, middle: Float, scanned: Float32, reach: Float32, normal: Float32) -> Float32:
-    """Return how badly (N,) an image suits points; `_NOWHERE` where it doesn't show them."""
+    """Return an image's misfit (N,) to points, rad: angle between the rays plus a term of range; 1e9 if not shown."""
     towards = (view.position - middle).astype(np.float32) - at
     away = np.maximum(_length(towards), np.float32(1e-6))
     cosine = np.einsum("nk,nk->n", towards, scanned) / (away * reach)
@@ -180,7 +180,7 @@ def _misfit(view: View, at: Float32, middle: Float, scanned: Float32, reach: Flo
 
 
 def sample_image(image: RenderedImage, points: SeenPoints) -> tuple[Float32, Bool]:
-    """Return an image's layers (n, C) of those n of N points that it shows, and which those are (N,).
+    """Return an image's layers (n, C), interpolated, at the n of N points that it shows, and their mask (N,).
 
     Bilinear over the pixels around a point that show its surface: the same material, at the depth of the plane
     through the point within `TOLERANCE` and half a pixel's width there.
@@ -188,7 +188,7 @@ def sample_image(image: RenderedImage, points: SeenPoints) -> tuple[Float32, Boo
     view = image.view
     x, y, depth = view.project(points.position)
     column, row = np.floor(x - 0.5), np.floor(y - 0.5)
-    plane = _plane(view, points)
+    plane = _plane_depth(view, points)
     slack = TOLERANCE + 0.5 * depth / view.focal
     width, height = view.size
     values = np.zeros((len(points), image.layers.shape[2]), np.float32)
@@ -211,8 +211,8 @@ def sample_image(image: RenderedImage, points: SeenPoints) -> tuple[Float32, Boo
     return values[shown] / total[shown, None], shown
 
 
-def _plane(view: View, points: SeenPoints) -> Callable[[Index, Index], Float]:
-    """Return the function that gives the depths (N,) at which pixels' rays meet the planes through the points."""
+def _plane_depth(view: View, points: SeenPoints) -> Callable[[Index, Index], Float]:
+    """Return a function of pixel indices: depths (N,), m, at which the pixels' rays meet the planes of the points."""
     normal = np.asarray(points.normal, np.float64) @ view.rotation
     constant = np.einsum("nk,nk->n", normal, (points.position - view.position) @ view.rotation)
 
@@ -228,7 +228,7 @@ def _length(vectors: Float32) -> Float32:
 
 
 def sample_nearby(image: RenderedImage, position: Float, material: UInt16, limit: Float) -> tuple[Float32, Bool, Float]:
-    """Return what an image shows close to points: its layers (n, C), of which points (N,), and how far away (n,), m.
+    """Return an image's layers (n, C) close to points, the mask (N,) of the points that got any, and distances (n,), m.
 
     Of the pixels around a point's projection those count that show its material, and of these the one that shows the
     nearest place in space. What hides the point is thus never taken, unless it is of the same material and as close.
@@ -255,8 +255,8 @@ def sample_nearby(image: RenderedImage, position: Float, material: UInt16, limit
     return image.layers[j[best], i[best]][near].astype(np.float32), near, away[best][near]
 
 
-def light_nearby(fallback: MaterialLayers, points: SeenPoints, taken: Float32, channels: dict[str, slice]) -> Float32:
-    """Return channels (N, C) taken at places close by, with the sun's light as the points' own slope has it.
+def relight_nearby(fallback: MaterialLayers, points: SeenPoints, taken: Float32, channels: dict[str, slice]) -> Float32:
+    """Return channels (N, C) that were taken close by, their sunlight recomputed for the points' own normals.
 
     Leaves, blades and sheets that touch lean every way. Whether the sun reaches a place is therefore all that is kept
     of its light; without a base colour there is nothing to shine on, and the light stays as it is.
@@ -274,7 +274,7 @@ def light_nearby(fallback: MaterialLayers, points: SeenPoints, taken: Float32, c
 
 
 def views_near(views: Sequence[View], lines: Sequence[SeenPoints]) -> list[View]:
-    """Return what the nearest images show of the points of each scan line: parts of them."""
+    """Return the views nearest to each scan line's scanner, each cropped to the part that shows the line's points."""
     parts: list[View | None] = []
     for line in lines:
         away = np.array([np.linalg.norm(view.position - line.scanner.mean(axis=0)) for view in views])

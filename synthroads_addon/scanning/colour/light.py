@@ -63,7 +63,7 @@ class SunAndSky:
 
 
 def expose_light(direction: Float, sun: Float, sky: Float) -> tuple[SunAndSky, float]:
-    """Return sun and sky as a camera sees them that is set for a horizontal surface in the sun, and its exposure.
+    """Return sun and sky, scaled so that a white horizontal surface in the sun has the value `WHITE`, and the factor.
 
     Args:
         direction: (3,) unit vector towards the sun.
@@ -84,7 +84,7 @@ class CloudShadows:
     """
 
     def __init__(self, environment: Environment, seed: int, frame: ArrayLike = (0.0, 0.0, 0.0)) -> None:
-        """Take where (3,) the local frame begins, m: that of a section of a road in the whole road's."""
+        """Build the field of clouds from a seed; `frame` (3,) is the local frame's origin in the whole road's, m."""
         self.environment = environment
         self._frame = np.asarray(frame, dtype=np.float64)
         self._cell = environment.cloud_size * _CELL
@@ -110,7 +110,7 @@ class CloudShadows:
 
 
 def _cloud_field(cover: float, seed: int) -> Float32:
-    """Return the transmission of the direct sun on a periodic lattice (C, C)."""
+    """Return the transmission of the direct sun, `SHADE` to 1, on a periodic lattice (C, C) with a cover of clouds."""
     random = stream(seed, "cloud shadows")
     total = np.zeros((_CELLS, _CELLS))
     for cells, weight in _OCTAVES:

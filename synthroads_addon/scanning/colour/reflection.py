@@ -27,7 +27,7 @@ _MATT_F0 = 0.08
 def reflected_sunlight(
     color: Float32, roughness: Float32, metallic: Float32, specular: Float32, normal: Float32, view: Float32, sun: Float
 ) -> Float32:
-    """Return what surfaces throw back of the sun (N, 3), as a share of what a white matt one that faces it does.
+    """Return the sunlight (N, 3) that surfaces reflect to the scanner, relative to a white matt one facing the sun.
 
     Args:
         color: (N, 3) linear base colours.
@@ -43,7 +43,7 @@ def reflected_sunlight(
     across, between = np.einsum("ij,ij->i", normal, half), np.einsum("ij,ij->i", view, half)
     rough = np.maximum(roughness, _SMOOTHEST)
     gloss = _gloss(rough, towards_sun, towards_view, np.clip(across, 0.0, 1.0))
-    bounced = _bounced_light(rough, towards_view)
+    bounced = _one_bounce_albedo(rough, towards_view)
     level = np.minimum(_MATT_F0 * specular, 0.999)
     albedo, average = _layer_albedo(rough, towards_view, level)
     again = _compensation(average, bounced)
@@ -66,7 +66,7 @@ _Bounced = tuple[Float32, Float32]
 
 
 def _gloss(rough: Float32, sun: Float32, view: Float32, across: Float32) -> Float32:
-    """Return pi * D * G2 / (4 * cosine of view) of mirrors: distribution and masking of GGX, times the sun's cosine."""
+    """Return pi * D * G2 / (4 * cosine of the view) of GGX microfacets (N,): the specular lobe without Fresnel."""
     square = rough**4
     spread = across * across * (square - 1.0) + 1.0
     distribution = square / (spread * spread)  # times pi
@@ -75,13 +75,13 @@ def _gloss(rough: Float32, sun: Float32, view: Float32, across: Float32) -> Floa
 
 
 def _smith(square: NDArray[np.floating], cosine: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Return Smith's lambda of GGX with a squared width at a cosine."""
+    """Return Smith's masking function lambda of GGX, of squared widths alpha^2, at cosines to the normal."""
     squared = np.maximum(cosine * cosine, 1e-9)
     return 0.5 * (np.sqrt(1.0 + square * (1.0 - squared) / squared) - 1.0)
 
 
 def _dielectric(level: NDArray[np.floating], cosine: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Return Fresnel's reflectance of a surface whose reflectance at a right angle is ``level``."""
+    """Return a dielectric's Fresnel reflectance at cosines of incidence; ``level`` is that at a right angle."""
     root = np.sqrt(level)
     eta = (1.0 + root) / (1.0 - root)
     c = np.clip(cosine, 0.0, 1.0)
@@ -102,22 +102,22 @@ def _compensation(mean: NDArray[np.floating], bounced: _Bounced) -> NDArray[np.f
     return np.asarray(1.0 + missing * mean * mean * average / (1.0 - mean * (1.0 - average)))
 
 
-def _bounced_light(rough: Float32, view: Float32) -> _Bounced:
-    """Return the shares that surfaces throw out at once (N,), and their means over all directions (N,)."""
+def _one_bounce_albedo(rough: Float32, view: Float32) -> _Bounced:
+    """Return the directional albedo of GGX mirrors after one bounce (N,), and its mean over all directions (N,)."""
     tables = _tables()
     return tables.once(rough, view), tables.average(rough)
 
 
 def _layer_albedo(rough: Float32, view: Float32, level: Float32) -> tuple[Float32, Float32]:
-    """Return what a gloss throws back in all (N,), and its reflectance over all directions (N,)."""
+    """Return a gloss's directional albedo relative to a mirror's (N,), and its mean Fresnel reflectance (N,)."""
     root = np.sqrt(level)
     eta = (1.0 + root) / (1.0 - root)
     average = np.where(level > 0.0, (eta - 1.0) / (4.08567 + 1.00071 * eta), 0.0)
     return _tables().albedo(rough, view, root), np.asarray(average, np.float32)
 
 
-class _Tables:
-    """Means over microfacets, on a grid: they are smooth."""
+class _AlbedoTables:
+    """Tables of GGX albedos over cosine, roughness and reflectance, integrated once and interpolated."""
 
     def __init__(self) -> None:
         u, v = ((np.arange(_SAMPLES) + 0.5) / _SAMPLES for _ in range(2))
@@ -140,33 +140,33 @@ class _Tables:
         )
 
     def once(self, rough: Float32, view: Float32) -> Float32:
-        """Return the share of light that microfacets throw out at once, (N,)."""
-        return _bilinear(self._once, _place(rough, self._rough), _place(view, self._cosine))
+        """Return the directional albedo (N,) of GGX mirrors after one bounce, interpolated."""
+        return _bilinear(self._once, _grid_position(rough, self._rough), _grid_position(view, self._cosine))
 
     def average(self, rough: Float32) -> Float32:
-        """Return its mean over all directions, (N,)."""
-        low, share = _place(rough, self._rough)
+        """Return the one-bounce albedo's cosine-weighted mean over all directions (N,), interpolated."""
+        low, share = _grid_position(rough, self._rough)
         return np.asarray(self._average[low] * (1.0 - share) + self._average[low + 1] * share, np.float32)
 
     def albedo(self, rough: Float32, view: Float32, root: Float32) -> Float32:
-        """Return the share of light that a gloss throws back, (N,)."""
-        low, share = _place(root, self._root)
-        places = _place(rough, self._rough), _place(view, self._cosine)
+        """Return a dielectric gloss's albedo relative to a mirror's (N,); `root` squared is its normal reflectance."""
+        low, share = _grid_position(root, self._root)
+        places = _grid_position(rough, self._rough), _grid_position(view, self._cosine)
         below = _bilinear(self._albedo, *places, low)
         above = _bilinear(self._albedo, *places, low + 1)
         return np.asarray(below * (1.0 - share) + above * share, np.float32)
 
 
 @lru_cache(maxsize=1)
-def _tables() -> _Tables:
-    return _Tables()
+def _tables() -> _AlbedoTables:
+    return _AlbedoTables()
 
 
 _Axis = tuple[float, float, int]
 
 
-def _place(values: Float32, axis: _Axis) -> tuple[NDArray[np.intp], Float32]:
-    """Return the steps of a grid's axis below values, and how far values are above them, as a share."""
+def _grid_position(values: Float32, axis: _Axis) -> tuple[NDArray[np.intp], Float32]:
+    """Return the index of the grid step below each value (N,), and the fraction of the way to the next (N,)."""
     first, scale, last = axis
     scaled = np.clip((values - np.float32(first)) * np.float32(scale), 0.0, last)
     low = np.minimum(scaled.astype(np.intp), last - 1)
@@ -186,7 +186,7 @@ def _bilinear(
 
 
 def _visible_facets(width: float, cosine: float, u: Float, v: Float) -> tuple[Float, Float]:
-    """Return weights and cosines against the view of GGX microfacets that are seen (Heitz 2018).
+    """Return weights G2 / G1 and cosines to the view of GGX microfacets, sampled by visible normals (Heitz 2018).
 
     The mean of the weights is the share of the light that comes out after one bounce.
     """

@@ -14,7 +14,7 @@ from .views import View
 
 @dataclass(frozen=True)
 class LayerRequest:
-    """Colours and layers that are wanted of a scene.
+    """Request for a scan's colours and material layers: which ones, of what scene, along which path, in what light.
 
     Attributes:
         settings: how they are rendered.
@@ -49,7 +49,7 @@ class LayerRequest:
 def material_layers(
     request: LayerRequest, constants: SurfaceConstants, light: SunAndSky | None = None
 ) -> MaterialLayers:
-    """Return the materials' own values: all of it where nothing is rendered, else for what no image shows.
+    """Return the layer source of the materials' mean values, with drifting cloud shadows if lit and cloudy.
 
     Args:
         request: colours and layers that are wanted.

@@ -14,7 +14,7 @@ from .colour import SeenPoints
 
 
 class SceneSurfaces:
-    """The surfaces of a scene, as it stands at the time 0.
+    """Values that a scene's surfaces hold for their materials, such as UV and attributes, with all at time 0.
 
     Args:
         static: what stands.
@@ -23,11 +23,11 @@ class SceneSurfaces:
 
     def __init__(self, static: SceneMesh, moving: Sequence[MovingMesh] = ()) -> None:
         self._meshes = [static, *(part.mesh for part in moving)]
-        self._poses = [(np.eye(3), np.zeros(3)), *(_begin(part) for part in moving)]
+        self._poses = [(np.eye(3), np.zeros(3)), *(_initial_pose(part) for part in moving)]
         self._firsts = np.cumsum([0, *(len(mesh) for mesh in self._meshes)])
 
     def read(self, inputs: Iterable[SurfaceInput], points: SeenPoints) -> dict[SurfaceInput, Float32]:
-        """Return inputs' values (N, 4) at points; 0 where a surface hasn't such, as renderers have it."""
+        """Return each surface input's values (N, 4) at N points; 0 where the surface lacks it, as renderers have it."""
         result = {what: np.zeros((len(points), 4), np.float32) for what in sorted(inputs)}
         if points.face is None or not result:
             return result
@@ -41,7 +41,7 @@ class SceneSurfaces:
     def _read_mesh(
         self, number: int, mesh: SceneMesh, points: SeenPoints, rows: Index, result: dict[SurfaceInput, Float32]
     ) -> None:
-        """Fill in the rows of the points that lie on one of the meshes."""
+        """Fill in, in place, the surface inputs' values of the points that lie on one of the meshes."""
         assert points.face is not None
         faces = points.face - self._firsts[number]
         rotation, begin = self._poses[number]
@@ -57,7 +57,7 @@ class SceneSurfaces:
                 values[rows[~found], :3] = points.normal[~found]
 
 
-def _begin(part: MovingMesh) -> tuple[Float, Float]:
-    """Return how a part is turned and where it is at the time 0."""
+def _initial_pose(part: MovingMesh) -> tuple[Float, Float]:
+    """Return a moving part's rotation (3, 3) and position (3,), m, at time 0."""
     rotation, place, _ = part.motion.pose(np.zeros(1))
     return rotation[0], place[0]

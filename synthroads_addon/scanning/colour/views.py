@@ -66,7 +66,7 @@ class View:
         return np.asarray(self.position + depth.astype(np.float64)[..., None] * ray)
 
     def crop_to(self, points: Float, margin: int) -> View | None:
-        """Return the part of the image that shows points (N, 3), with a margin, px; None if it shows none of them."""
+        """Return the camera cropped to the pixels that show points (N, 3), plus a margin, px; None if it shows none."""
         x, y, depth = self.project(points)
         shown = (depth > 0.0) & (x >= 0.0) & (x <= self.size[0]) & (y >= 0.0) & (y <= self.size[1])
         if not shown.any():
@@ -80,13 +80,13 @@ class View:
 
     @property
     def pixels(self) -> int:
-        """Return the number of pixels."""
+        """Return the number of pixels of the image."""
         return self.size[0] * self.size[1]
 
 
 @dataclass(frozen=True)
 class RenderedImage:
-    """One camera's image, rows from the top.
+    """One camera's rendered image: layers, depths and materials of its pixels, rows from the top.
 
     Attributes:
         view: the camera.
@@ -118,8 +118,8 @@ def views_along(path: Path, points: Float, settings: ColourSettings, field_of_vi
         return []
     views: list[View | None] = []
     for strip in path.strips:
-        times = _times(path, strip, settings.image_spacing)
-        position, heading = _level(path, strip, times)
+        times = _image_times(path, strip, settings.image_spacing)
+        position, heading = _travel_directions(path, strip, times)
         for place, forward, time in zip(position, heading, times, strict=True):
             level = np.array([[*forward, 0.0], [-forward[1], forward[0], 0.0], [0.0, 0.0, 1.0]]).T
             focal, limits, cameras = _cameras(points - place, level, path.typical_range, settings, field_of_view)
@@ -143,8 +143,8 @@ def scene_sample(mesh: SceneMesh) -> Float:
     return np.concatenate([used.astype(np.float64), inside])
 
 
-def _times(path: Path, strip: Strip, spacing: float) -> Float:
-    """Return the times of a strip's images: evenly spaced, each in the middle of its share of the way."""
+def _image_times(path: Path, strip: Strip, spacing: float) -> Float:
+    """Return the times (K,), s, of a strip's images: each in the middle of an equal share of the way."""
     knots = strip.start_time + np.linspace(0.0, strip.duration, 257)
     position, _ = path.pose(strip, knots)
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(position, axis=0), axis=1))])
@@ -154,8 +154,8 @@ def _times(path: Path, strip: Strip, spacing: float) -> Float:
     return np.interp((np.arange(count) + 0.5) / count * way[-1], way, knots)
 
 
-def _level(path: Path, strip: Strip, times: Float) -> tuple[Float, Float]:
-    """Return positions (K, 3) and the horizontal directions (K, 2) of travel; of the scanner's axis where it stands."""
+def _travel_directions(path: Path, strip: Strip, times: Float) -> tuple[Float, Float]:
+    """Return positions (K, 3), m, and horizontal unit directions of travel (K, 2), of the scanner's axis if still."""
     position, rotation = path.pose(strip, times)
     step = min(0.05, strip.duration / 4.0)
     low, high = strip.start_time, strip.start_time + strip.duration
@@ -171,7 +171,7 @@ def _level(path: Path, strip: Strip, times: Float) -> tuple[Float, Float]:
 def _cameras(
     near: Float, level: Float, typical_range: float, settings: ColourSettings, field_of_view: float
 ) -> tuple[float, tuple[float, float], Sequence[Float]]:
-    """Return focal length, limits (tangents aside and along) and axes of the cameras at one place.
+    """Return the focal length (px), limits (tangents aside and along) and axes of the cameras at one place.
 
     Args:
         near: (N, 3) places on the scene's surfaces from there, m.
@@ -190,7 +190,7 @@ def _cameras(
 
 
 def _turned_ahead(cos: float, sin: float) -> Float:
-    """Return the axes of a camera that looks ahead, turned about the vertical, in a level frame."""
+    """Return the axes (3, 3) of a level camera that looks ahead, turned about the vertical by an angle's cos, sin."""
     ahead = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
     return np.asarray(np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]) @ ahead)
 

@@ -24,7 +24,7 @@ _Lines = Annotated[float, Field(strict=True, gt=0, le=10_000)]
 
 
 class DeviceChoice(ClosedModel):
-    """A device and how it is set. What isn't given is the device's own value."""
+    """Choice of a laser scanner and its settings; a setting that isn't given is the device's own."""
 
     device: str = Field("riegl-minivux-3uav", description="Device preset or file.")
     pulse_rate_khz: float | None = quantity(
@@ -53,7 +53,7 @@ class DeviceChoice(ClosedModel):
 
 
 class PulseMode(Model):
-    """A pulse repetition rate and what goes with it.
+    """A pulse repetition rate, with the field of view and the maximum range that go with it.
 
     The pulse rate counts every pulse of one head: a rotating head's beams together. Each head of a device with
     several fires at this rate, so that a scan has heads x pulse rate pulses per second.
@@ -65,7 +65,7 @@ class PulseMode(Model):
 
 
 class Head(Model):
-    """How one of several equal scanning heads sits on the device: roll (left side up), pitch (nose up), then yaw."""
+    """Mounting angles of one of several equal scanning heads: roll (left side up), pitch (nose up), then yaw."""
 
     roll_deg: float = quantity(0.0, "deg", "About the forward axis.", (-180, 180))
     pitch_deg: float = quantity(0.0, "deg", "Nose up.", (-90, 90))
@@ -73,7 +73,7 @@ class Head(Model):
 
 
 class Device(Model):
-    """A laser scanner, from its data sheet."""
+    """Specification of a laser scanner, from its data sheet."""
 
     type: Literal["Device"] = "Device"
     version: Literal["1.0"] = "1.0"
@@ -118,7 +118,7 @@ class Device(Model):
         return len(self.heads) * self.pattern.beams
 
     def unambiguous_range(self, pulse_rate: float) -> float:
-        """Return the range (m) beyond which a return is taken for a later pulse's, at a head's pulse rate in 1/s.
+        """Return the unambiguous range, m, at a head's pulse rate, 1/s: beyond, a return counts as a later pulse's.
 
         c / 2 x the time between two pulses of the same beam x the pulses that may be in the air.
         """
@@ -206,7 +206,7 @@ class ScannerSetting:
 
     @property
     def timing(self) -> PulseTiming:
-        """Return how fast each head fires and scans."""
+        """Return one head's pulse timing: pulse rate, lines per second, field of view, angle step, pulses per line."""
         lines, view = self.lines_per_second, self.field_of_view
         return PulseTiming(self.pulse_rate, lines, view, self.angle_step, self.pulses_per_line, self.free_mirror)
 
@@ -223,7 +223,7 @@ def load_device(name_or_file: str) -> Device:
 
 
 def setting_of(device: Device, scan: DeviceChoice, range_sigma: float | None = None) -> ScannerSetting:
-    """Return a device with the settings of a choice, whichever device the choice names.
+    """Return a device's setting for a scan, in SI units and rad; the device named by the choice is ignored.
 
     What the choice leaves open is the device's: its first mode, the mode's field of view, the fastest scan.
 
@@ -237,7 +237,7 @@ def setting_of(device: Device, scan: DeviceChoice, range_sigma: float | None = N
     """
     mode = _mode(device, scan.pulse_rate_khz)
     view = _field_of_view(device, mode, scan.field_of_view_deg)
-    lines = _lines(device, mode, math.radians(view), scan)
+    lines = _lines_per_second(device, mode, math.radians(view), scan)
     rate = mode.pulse_rate_khz * 1e3
     threshold = 0.2 / mode.maximum_range**2
     setting = ScannerSetting(
@@ -269,7 +269,7 @@ def _mode(device: Device, pulse_rate_khz: float | None) -> PulseMode:
 
 
 def _field_of_view(device: Device, mode: PulseMode, view: float | None) -> float:
-    """Return the field of view in degrees."""
+    """Return the field of view, deg: the chosen one if the device allows it, else the mode's."""
     if view is None:
         return mode.field_of_view_deg
     if device.pattern.fixed_view and not math.isclose(view, mode.field_of_view_deg):
@@ -281,8 +281,8 @@ def _field_of_view(device: Device, mode: PulseMode, view: float | None) -> float
     return view
 
 
-def _lines(device: Device, mode: PulseMode, view: float, scan: DeviceChoice) -> float:
-    """Return the lines per second; from the angle step where only that is given."""
+def _lines_per_second(device: Device, mode: PulseMode, view: float, scan: DeviceChoice) -> float:
+    """Return the scan lines per second: as chosen, else from the chosen angle step, else the device's fastest."""
     slowest, fastest = device.lines_per_second
     step_of_a_line = math.degrees(device.pattern.sweep(view)) / (mode.pulse_rate_khz * 1e3)
     at = f"at {mode.pulse_rate_khz:g} kHz"
@@ -309,7 +309,7 @@ def _lines(device: Device, mode: PulseMode, view: float, scan: DeviceChoice) -> 
 
 
 def _check_step(setting: ScannerSetting, scan: DeviceChoice) -> None:
-    """Refuse angles that are too fine for the device, and lines without a pulse."""
+    """Raise `InputError` if the angle step is too fine for the device or a line holds no pulse."""
     device, step = setting.device, math.degrees(setting.angle_step)
     by_angle = scan.lines_per_second is None and scan.angle_step_deg is not None
     field = "scan.angle_step_deg" if by_angle else "scan.lines_per_second"

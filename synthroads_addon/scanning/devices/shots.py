@@ -35,7 +35,7 @@ def shot_count(setting: ScannerSetting, duration: float, ends: bool = False) -> 
 
 
 def shots(setting: ScannerSetting, first: int, count: int, with_frame: bool = False) -> PulseRays:
-    """Return pulses ``first`` to ``first + count`` in the scanner's frame: x forward, y left, z up.
+    """Return ``count`` pulses from number ``first`` on in the scanner's frame: x forward, y left, z up.
 
     They are the same, to the bit, as that slice of all pulses. Shot i is pulse i // H of head i mod H of a device with
     H heads; head h fires h / H of a pulse interval late, so that times increase. Times are products of whole numbers
@@ -54,13 +54,13 @@ def shots(setting: ScannerSetting, first: int, count: int, with_frame: bool = Fa
     if length > _LARGEST_TABLE:
         chosen = _shots(setting, number, with_frame)
     else:
-        chosen = _look_up_shots(_table(setting, with_frame), number)
+        chosen = _look_up_shots(_cycle_table(setting, with_frame), number)
     chosen.time[:] += cycle * lines / setting.lines_per_second
     return chosen
 
 
 def _look_up_shots(table: PulseRays, number: Numbers) -> PulseRays:
-    """Return shots of a table by their numbers (P,)."""
+    """Return the shots at numbers (P,) of a table of shots."""
     in_plane, across = (None if axis is None else _columns(axis, number) for axis in (table.in_plane, table.across))
     beam = None if table.beam is None else table.beam[number]
     direction = _columns(table.direction, number)
@@ -68,7 +68,7 @@ def _look_up_shots(table: PulseRays, number: Numbers) -> PulseRays:
 
 
 def _columns(vectors: Float, number: Numbers) -> Float:
-    """Return columns of vectors (3, M), row by row, which is thrice as fast as all at once."""
+    """Return the columns ``number`` (P,) of vectors (3, M), taken row by row: thrice as fast as all at once."""
     result = np.empty((3, len(number)))
     for row, chosen in zip(vectors, result, strict=True):
         np.take(row, number, out=chosen, mode="clip")
@@ -76,14 +76,14 @@ def _columns(vectors: Float, number: Numbers) -> Float:
 
 
 @lru_cache(maxsize=4)
-def _table(setting: ScannerSetting, with_frame: bool) -> PulseRays:
-    """Return the shots of one cycle: mirrors and heads repeat themselves, and looking up is cheaper than a sine."""
+def _cycle_table(setting: ScannerSetting, with_frame: bool) -> PulseRays:
+    """Return the shots of one scan cycle, cached: cycles repeat, and looking up is cheaper than a sine."""
     length = setting.device.pattern.cycle_lines * setting.pulses_per_line * len(setting.device.heads)
     return _shots(setting, np.arange(length, dtype=np.int64), with_frame)
 
 
 def _shots(setting: ScannerSetting, number: Numbers, with_frame: bool) -> PulseRays:
-    """Return shots by their numbers (P,)."""
+    """Compute the shots of all heads by their numbers (P,), in the scanner's frame."""
     heads = len(setting.device.heads)
     pulse, head = np.divmod(number, heads) if heads > 1 else (number, None)
     part = setting.device.pattern.rays(setting.timing, pulse, with_frame)

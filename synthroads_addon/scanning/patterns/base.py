@@ -23,7 +23,7 @@ FULL_TURN = 2.0 * math.pi
 
 @dataclass(frozen=True)
 class PulseTiming:
-    """How fast one head fires and scans; angles in radians.
+    """Timing of one head's pulses and scan lines; angles in radians.
 
     Attributes:
         pulse_rate: pulses per second, all beams together.
@@ -42,7 +42,7 @@ class PulseTiming:
     free_mirror: bool = False
 
     def delays(self, line: Numbers) -> Float | None:
-        """Return how many steps after a line's begin its first pulse is fired (P,), 0 to 1; None if at once.
+        """Return how late (P,) each line's first pulse is, 0 to 1 pulse intervals, pseudo-random; None if never late.
 
         Clocks that run free of each other drift by many steps from line to line, so that a line's delay says nothing of
         the next one's: it is a hash of the line's number.
@@ -52,7 +52,7 @@ class PulseTiming:
 
 @dataclass(frozen=True)
 class PulseRays:
-    """Directions of P pulses of a head, in its frame, or of a whole scanner, in the scanner's; see `devices.shots`.
+    """Times and directions of P pulses, in a head's frame or a whole scanner's; see `devices.shots`.
 
     Attributes:
         time: (P,) s since the head, or the strip, began to be scanned.
@@ -75,7 +75,7 @@ class PulseRays:
 
 
 def hashed_shares(number: Numbers) -> Float:
-    """Return numbers (P,) as shares, even over 0 to 1 and without any order (Steele et al. 2014, SplitMix64)."""
+    """Return pseudo-random numbers (P,), uniform over 0 to 1, hashed from integers (SplitMix64, Steele et al. 2014)."""
     bits = (np.asarray(number, dtype=np.uint64) + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15)
     for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
         bits = (bits ^ (bits >> np.uint64(shift))) * np.uint64(factor)
@@ -96,7 +96,7 @@ class Pattern(Model):
 
     @property
     def name(self) -> str:
-        """Return the name that presets call it by."""
+        """Return the pattern's name in presets, the value of its field ``type``."""
         return str(type(self).model_fields["type"].default)
 
     @property
@@ -120,7 +120,7 @@ class Pattern(Model):
         return ""
 
     def rays(self, timing: PulseTiming, pulse: Numbers, with_frame: bool) -> PulseRays:
-        """Return pulses (P,) of a head by their numbers from 0.
+        """Return times and directions, in the head's frame, of a head's pulses by their numbers (P,) from 0.
 
         Args:
             timing: the head's.

@@ -19,16 +19,16 @@ class LinePattern(Pattern):
     )
 
     def sweep(self, field_of_view: float) -> float:
-        """Return the field of view: a line is swept with every pulse."""
+        """Return the angle swept per line, rad: the field of view, as the laser fires all along the line."""
         return field_of_view
 
     def fault(self, field_of_view_deg: float, pulse_rate: float) -> str:
-        """Refuse angles beyond the zenith."""
+        """Return a message if the field of view reaches beyond the zenith, else an empty string."""
         largest = abs(self.centre_from_nadir_deg) + field_of_view_deg / 2.0
         return f"reaches {largest:g} deg from the nadir, beyond 180" if largest > 180.0 + 1e-9 else ""
 
     def rays(self, timing: PulseTiming, pulse: Numbers, with_frame: bool) -> PulseRays:
-        """Return pulses of lines across the forward direction.
+        """Return times and directions of the pulses with numbers (P,), in lines across the forward direction.
 
         Line k begins at k / lines per second, and its N pulses follow at the pulse rate. Pulse j is j - (N - 1) / 2
         steps from the middle of the field of view; where the mirror goes by a clock of its own, up to half a step to
@@ -73,15 +73,15 @@ class RotatingMirror(LinePattern):
     )
 
     def sweep(self, field_of_view: float) -> float:
-        """Return the turn per line."""
+        """Return the angle by which the beam turns per line, rad."""
         return math.radians(self.turn_per_line_deg)
 
     def firing_share(self, field_of_view: float) -> float:
-        """Return the share of the turn that lies within the field of view."""
+        """Return the share of the time, 0 to 1, in which the beam is within the field of view and the laser fires."""
         return field_of_view / math.radians(self.turn_per_line_deg)
 
     def fault(self, field_of_view_deg: float, pulse_rate: float) -> str:
-        """Refuse a field of view wider than the turn."""
+        """Return a message if the field of view exceeds the turn per line or passes the zenith, else an empty text."""
         if field_of_view_deg > self.turn_per_line_deg + 1e-9:
             return f"is wider than the {self.turn_per_line_deg:g} deg that the beam turns per line"
         return super().fault(field_of_view_deg, pulse_rate)
@@ -105,15 +105,15 @@ class OscillatingMirror(LinePattern):
 
     @property
     def cycle_lines(self) -> int:
-        """Return the lines of a period: the swings alternate."""
+        """Return 2, the lines after which the directions repeat: the swings alternate."""
         return 2
 
     def sweep(self, field_of_view: float) -> float:
-        """Return the field of view; a sine is pi / 2 times as fast in the middle as on average."""
+        """Return the angle per line at mid-line speed, rad: the field of view, or pi / 2 times it for a sine."""
         return field_of_view * (0.5 * math.pi if self.motion == "sinusoidal" else 1.0)
 
     def angles(self, timing: PulseTiming, line: Numbers, place: Float) -> Float:
-        """Return the angles (P,) of the mirror's motion, every second line in the other direction, rad."""
+        """Return the angles (P,) from the field's middle, rad, every second line reversed; overwrites `place`."""
         np.negative(place, where=line % 2 == 1, out=place)
         if self.motion == "triangular":
             return super().angles(timing, line, place)
@@ -133,7 +133,7 @@ class Grid(LinePattern):
 
     @property
     def cycle_lines(self) -> int:
-        """Return the rows of a frame."""
+        """Return the rows of a frame, after which the directions repeat."""
         return self.rows
 
     def tilts(self, line: Numbers) -> Float:

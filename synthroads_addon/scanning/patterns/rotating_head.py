@@ -43,22 +43,22 @@ class RotatingHead(Pattern):
         return len(self.elevations_deg)
 
     def sweep(self, field_of_view: float) -> float:
-        """Return a turn for each beam, as the pulses of a sequence share a step."""
+        """Return a full turn (rad) times the number of beams, as all pulses of a sequence share an angle step."""
         return FULL_TURN * self.beams
 
     def firing_share(self, field_of_view: float) -> float:
-        """Return the share of the turn that lies within the field of view."""
+        """Return the share of the time, 0 to 1, in which the head fires: field of view / full turn."""
         return field_of_view / FULL_TURN
 
     def fault(self, field_of_view_deg: float, pulse_rate: float) -> str:
-        """Refuse firing times that don't fit into the sequence."""
+        """Return a message if a beam would fire after the end of its firing sequence, else an empty string."""
         sequence = self.beams / pulse_rate * 1e6
         if self.firing_times_us and max(self.firing_times_us) >= sequence:
             return f"goes with a firing sequence of {sequence:.4g} us: a beam fires after its end"
         return ""
 
     def rays(self, timing: PulseTiming, pulse: Numbers, with_frame: bool) -> PulseRays:
-        """Return pulses of a rotating head.
+        """Return times, directions and beams of a rotating head's pulses by their numbers (P,).
 
         Turn k begins at k / lines per second. Its S firing sequences begin a step apart, from S / 2 steps left of the
         forward direction on; the head turns on while the beams of a sequence fire. A head that goes by a clock of its

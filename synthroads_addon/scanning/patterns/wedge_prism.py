@@ -42,11 +42,11 @@ class WedgePrism(Pattern):
         return 0
 
     def sweep(self, field_of_view: float) -> float:
-        """Return a turn of the first wedge."""
+        """Return the angle that the first wedge turns by per line, rad: a full turn."""
         return FULL_TURN
 
     def largest_deflection(self) -> float:
-        """Return the largest angle (rad) between beam and axis: all wedges deflect to the same side; NaN if none does.
+        """Return the largest angle between beam and axis, rad, all wedges deflecting alike; NaN at total reflection.
 
         In that plane, with a wedge's angle a and index n, a beam at d to the axis leaves at
         asin(n sin(a + asin(sin d / n))) - a (Snell's law at both faces).
@@ -61,7 +61,7 @@ class WedgePrism(Pattern):
         return deflection
 
     def fault(self, field_of_view_deg: float, pulse_rate: float) -> str:
-        """Refuse total reflection, beams beyond the horizon, and a field of view that isn't the wedges'."""
+        """Return a message if the wedges let no beam through or have another field of view, else an empty string."""
         view = 2.0 * math.degrees(self.largest_deflection())
         if not view < 180.0:
             return "can't be seen through these wedges: they reflect the beam or turn it back"
@@ -70,7 +70,7 @@ class WedgePrism(Pattern):
         return ""
 
     def rays(self, timing: PulseTiming, pulse: Numbers, with_frame: bool) -> PulseRays:
-        """Return pulses of one or two rotating wedges.
+        """Return times and directions of pulses by their numbers (P,), behind one or two rotating wedges.
 
         Pulse p is fired at p / pulse rate. Wedge i has then turned by p x lines/s x turns_i / (turns_1 x pulse rate)
         turns.
@@ -91,7 +91,7 @@ class WedgePrism(Pattern):
 
 
 def _refract(forward: Float, right: Float, phase: Float, apex: float, index: float) -> tuple[Float, Float]:
-    """Return the components across the axis of unit vectors that have passed a wedge.
+    """Return the components across the axis (forward, right) of unit vectors after refraction by a rotated wedge.
 
     Snell's law in vector form: at a face with unit normal N (along the light), u in a medium of index n1 becomes v with
     n2 v = n1 u + k N, k = sqrt(n2^2 - n1^2 + (n1 u.N)^2) - n1 u.N. The first face lies across the axis, so that the
@@ -106,7 +106,7 @@ def _refract(forward: Float, right: Float, phase: Float, apex: float, index: flo
 
 
 def _carry_axes(forward: Float, right: Float, down: Float) -> tuple[Float, Float]:
-    """Return the right and the forward axis, carried from the nadir to the beam by the shortest turn (3, P).
+    """Return the right and the forward axis (3, P), rotated from the nadir to each beam by the shortest turn.
 
     A wedge deflects a beam without turning its cross-section. A vector e across the axis a becomes
     e - (e.d) / (1 + a.d) (a + d) for the direction d.

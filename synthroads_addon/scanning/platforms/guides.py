@@ -47,15 +47,15 @@ class Guide:
         return plan, heading, curvature, np.ones(len(station))
 
     def elevation(self, station: Float) -> Float:
-        """Return the local elevation (K,) of the line itself."""
+        """Return the local elevation (K,), m, of the line itself at stations (K,), m."""
         return self.profile.elevation(station)
 
     def ground(self, station: Float, offset: Float, damaged: bool) -> Float:
-        """Return the local elevation (K,) of the ground below, with or without ruts and potholes; NaN where unknown."""
+        """Return the ground's local elevation (K,), m, below, with or without ruts and potholes; NaN where unknown."""
         return self.elevation(station)
 
     def known_ground(self, station: Float, offset: Float, damaged: bool) -> Float:
-        """Return `ground`; raise `InputError`, which names an offset, where it is unknown."""
+        """Return the ground's local elevation (K,), m; raise `InputError`, naming an offset, where it is unknown."""
         ground = self.ground(station, offset, damaged)
         unknown = np.flatnonzero(~np.isfinite(ground))
         if len(unknown):
@@ -65,27 +65,27 @@ class Guide:
         return ground
 
     def project(self, plan: Float) -> tuple[Float, Float]:
-        """Return stations (K,) and offsets (K,) of local points (K, 2) beside the alignment."""
+        """Return stations (K,) and offsets (K,), m, of local plan points (K, 2) beside the alignment."""
         return self.alignment.project(plan)
 
     def driving_offsets(self) -> tuple[float, ...]:
-        """Return the offset of the outermost lane's middle for each carriageway, m."""
+        """Return the offsets, m, in which a vehicle drives, one per carriageway: here the line itself."""
         return (0.0,)
 
     def roadside_offsets(self, station: Float) -> Float:
-        """Return the offsets (K,) at which a tripod stands at stations (K,), m."""
+        """Return the offsets (K,), m, at which a tripod stands at stations (K,), m: here on the line itself."""
         return np.zeros(len(station))
 
 
 class RoadGuide(Guide):
-    """The centreline of a road."""
+    """Guide along a road's centreline; it knows the road's surface, its lanes and its pavement's edges."""
 
     def __init__(self, geometry: RoadGeometry) -> None:
         super().__init__(geometry.alignment, geometry.profile, geometry.parameters.transform.translate)
         self.geometry = geometry
 
     def ground(self, station: Float, offset: Float, damaged: bool) -> Float:
-        """Return the local elevation (K,) of the road, its batter or the ground; NaN beyond an elevation model."""
+        """Return the local elevation (K,), m, of the road, its batter or the ground; NaN beyond an elevation model."""
         height = surface_elevation(self.geometry, station, offset)
         if not damaged:
             for section in self.geometry.sections.values():
@@ -152,17 +152,17 @@ class SmoothedGuide(Guide):
         return np.stack([x, y], axis=1) + self._mean, np.arctan2(dy, dx), curvature, stretch
 
     def ground(self, station: Float, offset: Float, damaged: bool) -> Float:
-        """Return the local elevation (K,) of what lies beneath the polynomials' offset points."""
+        """Return the guide's ground elevation (K,), m, below points at offsets from the smoothed line."""
         plan, heading, _, _ = self.frame(station)
         left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
         return self._guide.ground(*self._guide.project(plan + offset[:, None] * left), damaged)
 
     def driving_offsets(self) -> tuple[float, ...]:
-        """Return the driving offsets beside the guide, m."""
+        """Return the driving offsets of the guide that is smoothed, m."""
         return self._guide.driving_offsets()
 
     def roadside_offsets(self, station: Float) -> Float:
-        """Return the roadside offsets (K,) beside the guide, m."""
+        """Return the roadside offsets (K,), m, of the guide that is smoothed, at stations (K,)."""
         return self._guide.roadside_offsets(station)
 
 

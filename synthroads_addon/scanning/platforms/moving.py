@@ -48,7 +48,7 @@ class MovingPlatform(Platform):
     zigzag_wavelength: float = quantity(100.0, "m", "Length of a sway.", (5, 5000), only_with={"path": ("zigzag",)})
 
     def make_path(self, guide: Guide, origin: Sequence[float] | None = None) -> MovingPath:
-        """Return the strips; see `Platform.make_path`."""
+        """Return the path of strips along a guide, at constant speed over ground; `origin` isn't used."""
         return MovingPath(self, guide)
 
     def runs_forward(self, strip: int, offset: float) -> bool:
@@ -62,11 +62,11 @@ class AerialPlatform(MovingPlatform):
     there_and_back: bool = Field(True, description="Every second strip against the stations.")
 
     def runs_forward(self, strip: int, offset: float) -> bool:
-        """Return whether a strip is flown along with the stations."""
+        """Return whether a strip is flown in the direction of the stations: all are, or every other one."""
         return strip % 2 == 0 or not self.there_and_back
 
     def as_single_strip(self) -> AerialPlatform:
-        """Return the platform with one strip on its guide, unless offsets are given."""
+        """Return a copy with one strip, on the guide itself; the platform as it is if offsets are given."""
         return self if self.lateral_offsets is not None else self.model_copy(update={"lateral_offsets": (0.0,)})
 
 
@@ -142,7 +142,7 @@ class MovingPath:
         return StripTrack(self._guide, self._offsets[index], self._sway, self._forward[index], field)
 
     def _eased_functions(self, track: StripTrack) -> tuple[EasedFunction, EasedFunction]:
-        """Return height (K, 1) and heading, pitch, roll (K, 3) as functions of the distance travelled."""
+        """Return height (K, 1), m, and heading, pitch, roll (K, 3), rad, as smooth functions of the distance."""
         step = min(_ATTITUDE_STEP, self._sway.wavelength / 40.0) if self._sway else _ATTITUDE_STEP
         return (
             EasedFunction(lambda distance: self.heights(track, distance)[:, None], track.length, _HEIGHT_STEP, False),
@@ -154,12 +154,12 @@ class MovingPath:
         return self.height + self._guide.elevation(track.stations(distance))
 
     def attitudes(self, track: StripTrack, distance: Float) -> Float:
-        """Return heading, pitch, roll (K, 3), rad, at distances travelled (K,), m."""
+        """Return heading, pitch, roll (K, 3), rad, at distances travelled (K,), m: level, along the course."""
         course = track.place(distance)[1]
         return np.column_stack([course, np.zeros((len(course), 2))])
 
     def surface(self, track: StripTrack, distance: Float, left: float) -> Float:
-        """Return the undamaged surface's elevation (K,) so far (m) to the left of a strip, in the direction of travel.
+        """Return the undamaged surface's elevation (K,), m, at ``left`` metres to the left in the direction of travel.
 
         Raises:
             InputError: there is no ground known.
@@ -180,7 +180,7 @@ class MovingPath:
 
 
 def _guide_and_sway(platform: MovingPlatform, guide: Guide) -> tuple[Guide, Sway | None]:
-    """Return the guide that the strips lie beside, and their sway."""
+    """Return the guide that the strips follow, smoothed if asked for, and their zigzag; None without."""
     if platform.path == "smoothed":
         return SmoothedGuide(guide, platform.polynomial_degree), None
     if platform.path == "direct" or platform.zigzag_amplitude == 0.0:

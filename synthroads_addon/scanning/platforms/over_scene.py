@@ -21,7 +21,7 @@ from .tripod import Tripod, TripodPath
 
 @dataclass(frozen=True)
 class SceneRoute:
-    """A scanner's way in a scene's own coordinates.
+    """Route of a scanner over a scene: its kind, and points in the scene's local coordinates.
 
     Attributes:
         kind: ``extent``, straight over the scene's middle; ``line``, along points that a platform keeps its height
@@ -33,11 +33,11 @@ class SceneRoute:
     points: list[list[float]] = field(default_factory=list)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as JSON data."""
+        """Return the route's kind and points as JSON data."""
         return {"kind": self.kind, "points": self.points}
 
     def path(self, platform: Platform, mesh: SceneMesh) -> Path:
-        """Return a platform's path.
+        """Return a platform's path along the route, over or through a scene.
 
         Raises:
             InputError: the platform is no tripod and is to stand at places, or see `Platform.make_path`.
@@ -86,14 +86,14 @@ def path_over(
 
 
 def as_tripod(platform: Platform) -> Tripod:
-    """Return a platform that is a tripod; raise `InputError` if it is another."""
+    """Return the same platform, typed as a tripod; raise `InputError` if it is of another kind."""
     if not isinstance(platform, Tripod):
         raise InputError("scan.platform.kind", platform.kind, "must be tripod where its positions are given")
     return platform
 
 
 def _scanner_place(tripod: Tripod, place: Sequence[float], mesh: SceneMesh) -> list[float]:
-    """Return the local place (3,) of a tripod's scanner: above the highest surface unless it has a z."""
+    """Return the local position (3,), m, of a tripod's scanner: above the highest surface unless z is given."""
     local = [value - base for value, base in zip(place, mesh.origin, strict=False)]
     if len(local) == 3:
         return local

@@ -40,7 +40,7 @@ class Strip:
 
 
 class Path(Protocol):
-    """Where the scanner is, and how it is turned, at any time."""
+    """Interface of a scanner's path: its strips, and its position and orientation at any time."""
 
     @property
     def strips(self) -> tuple[Strip, ...]:
@@ -62,7 +62,7 @@ class Path(Protocol):
         ...
 
     def pose(self, strip: Strip, time: Float) -> tuple[Float, Float]:
-        """Return where the scanner is at times of a strip.
+        """Return the scanner's local positions (K, 3), m, and rotations (K, 3, 3), at times (K,) of a strip.
 
         Args:
             strip: one of `strips`.
@@ -88,7 +88,7 @@ def make_strips(durations: list[float]) -> tuple[Strip, ...]:
 
 
 def knot_spacing_for(bend: float, jump: float = 0.0) -> float:
-    """Return the knots' spacing, s, that keeps `KNOT_ERROR`.
+    """Return the spacing of knots, s, at which linear interpolation of poses errs by at most `KNOT_ERROR`.
 
     Args:
         bend: largest second derivative by time of the place of a point at `KNOT_RANGE`, m/s2: between knots h apart

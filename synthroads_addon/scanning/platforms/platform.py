@@ -31,7 +31,7 @@ class Platform(ClosedModel):
     yaw_deg: float = quantity(0.0, "deg", "Mounting of the scanner: counter-clockwise from above.", (-180, 180))
 
     def make_path(self, guide: Guide, origin: Sequence[float] | None = None) -> Path:
-        """Return the way of the scanner.
+        """Return the scanner's path along a guide line.
 
         Args:
             guide: the line that it follows, e.g. a road's centreline.
@@ -56,7 +56,7 @@ class Platform(ClosedModel):
         return height if self.usual_range is None else max(self.usual_range, height)
 
     def as_single_strip(self) -> Self:
-        """Return the platform with one strip on its guide, unless offsets are given or it keeps to lanes."""
+        """Return the platform reduced to one strip on its guide, if it may choose its offsets; else itself."""
         return self
 
     def mounting(self) -> Float:

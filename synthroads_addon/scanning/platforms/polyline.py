@@ -74,7 +74,7 @@ class PolylineGuide(Guide):
     def read(
         cls, path: str | os.PathLike[str], origin: Sequence[float] | None = None, tolerance: float = MEASURED
     ) -> Self:
-        """Return the guide of a CSV or GeoJSON file, as `read_axis` reads it.
+        """Read a line in map coordinates from CSV or GeoJSON, by `read_axis`, and return its guide.
 
         Args:
             path: the file, in map coordinates.
@@ -90,7 +90,7 @@ class PolylineGuide(Guide):
 
 
 def _thin_points(points: Float, tolerance: float) -> Index:
-    """Return the indices of the points that make the line: without repetitions, and thinned in three dimensions."""
+    """Return the indices of the points that are kept: without repetitions, thinned to the tolerance (m) in 3D."""
     distinct = np.concatenate(([True], np.hypot(*np.diff(points[:, :2], axis=0).T) > _REPEATED))[: len(points)]
     kept = np.flatnonzero(distinct)
     if len(kept) < 2:
@@ -116,7 +116,7 @@ def _thin_points(points: Float, tolerance: float) -> Index:
 
 
 def _clothoid_lengths(turn: Float, reach: Float) -> Float:
-    """Return how long each of a corner's two clothoids is, (C,) m.
+    """Return the length (C,), m, of either clothoid at corners of turns (C,), rad, that begin `reach` before.
 
     With the deflection f and unit length, one clothoid ends at x = int cos(f u^2 / 2), y = int sin(f u^2 / 2); the
     tangent from the corner is x + y tan(f / 2) long.
@@ -140,7 +140,7 @@ def _refuse_sharp(points: Float, kept: Index, turn: Float, lengths: Float) -> No
 
 
 def _elements(span: Float, reach: Float, turn: Float, lengths: Float) -> list[Element]:
-    """Return straights with two clothoids at each corner between them."""
+    """Return the alignment's elements: straights, and two clothoids at each corner between them."""
     straight = span - np.concatenate(([0.0], reach)) - np.concatenate((reach, [0.0]))
     elements = [Element(float(straight[0]), 0.0, 0.0)]
     for angle, length, after in zip(turn, lengths, straight[1:], strict=True):

@@ -22,7 +22,7 @@ class _Carrier(ClosedModel):
 
 
 def make_platform(kind: str = next(iter(PLATFORMS)), **values: Any) -> Platform:
-    """Return a platform with some of its fields.
+    """Return a platform of a kind with these field values; other fields keep their defaults.
 
     Raises:
         InputError: there is no such kind, it has no such field, or a value is out of its limits.

@@ -34,18 +34,18 @@ class PathStretches:
 
     @property
     def share(self) -> float:
-        """Return how much of the path's duration the stretches are."""
+        """Return the share of the whole path's duration that the stretches take, 0 to 1."""
         return sum(strip.duration for strip in self.strips) / sum(strip.duration for strip in self.whole.strips)
 
     def pose(self, strip: Strip, time: Float) -> tuple[Float, Float]:
-        """Return the poses of the whole path in this frame; see `platforms.path.Path.pose`."""
+        """Return the whole path's positions (K, 3), m, in this frame, and rotations (K, 3, 3), at times (K,)."""
         of = next(whole for whole in self.whole.strips if whole.index == strip.index)
         position, rotation = self.whole.pose(of, time)
         return position - self.origin, rotation
 
 
 def spread_stretches(path: Path, count: int, duration: float) -> PathStretches:
-    """Return stretches of a duration (s) spread evenly over each strip, from its start to its end.
+    """Return a path of ``count`` stretches of a duration (s) on each strip, spread evenly from end to end.
 
     A strip that is shorter than all its stretches together is taken whole.
     """
@@ -60,7 +60,7 @@ def spread_stretches(path: Path, count: int, duration: float) -> PathStretches:
 
 
 def scatter_stretches(path: Path, count: int, duration: float, phase: float = 0.5, most: float = 0.25) -> PathStretches:
-    """Return stretches of a duration (s) scattered evenly over all strips together, however many there are.
+    """Return a path of ``count`` stretches of a duration (s), spread evenly over all strips taken together.
 
     Args:
         path: of one strip or more.

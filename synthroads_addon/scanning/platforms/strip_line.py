@@ -22,7 +22,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 
 @dataclass(frozen=True)
 class Sway:
-    """A triangular wave with rounded turning points; 0 and rising to the left at station 0.
+    """A zigzag by station: a triangular wave with rounded turning points; 0 and rising to the left at station 0.
 
     Around a turning point the slope goes over from one leg's to the other's as a sine, along `ROUNDED` of the
     wavelength, so that slope and curvature are continuous.
@@ -56,7 +56,7 @@ class Sway:
 
 @dataclass(frozen=True)
 class _Table:
-    """C cells along a track in the direction of the stations.
+    """Stations, distances, rates and courses at the borders of C cells along a track, to look up and interpolate.
 
     Attributes:
         station, distance: (C + 1,) of the cells' borders, m.
@@ -71,7 +71,7 @@ class _Table:
 
 
 class StripTrack:
-    """A line beside a guide, by the distance travelled along it.
+    """A line at an offset beside a guide, parametrised by the distance travelled along it.
 
     Every place lies exactly beside the guide. The station at a distance is interpolated by cubics in a table whose
     distances come from Gauss-Legendre quadrature.
@@ -104,7 +104,7 @@ class StripTrack:
         return self.offset + sway, slope
 
     def stations(self, distance: Float) -> Float:
-        """Return stations (K,) at distances (K,) from 0 to `length`."""
+        """Return the guide's stations (K,), m, at distances travelled (K,), m, from 0 to `length`."""
         table = self._table
         run = distance if self.forward else self.length - distance
         cell = np.clip(np.searchsorted(table.distance, run, side="right") - 1, 0, len(table.rate) - 1)
@@ -127,7 +127,7 @@ class StripTrack:
 
     @cached_property
     def bend(self) -> tuple[float, float]:
-        """Return the largest curvature, 1/m, and the largest jump of the course, rad."""
+        """Return the largest curvature, 1/m, and the largest jump of the course, rad; computed once."""
         table = self._table
         turn = np.abs(wrap_angle(table.course[:, 1] - table.course[:, 0])) / np.diff(table.distance)
         jump = np.abs(wrap_angle(table.course[1:, 0] - table.course[:-1, 1]))
@@ -191,7 +191,7 @@ Function = Callable[[Float], Float]
 
 
 class EasedFunction:
-    """Functions of the distance, taken at even steps and joined by Catmull-Rom cubics.
+    """A function of the distance, sampled at even steps and interpolated smoothly by Catmull-Rom cubics.
 
     What is quadratic in the distance (grades, parabolas, the heading along straights, arcs and clothoids) is kept
     exactly; where slope or curvature jump, the jump is spread over two steps to either side. So rates are continuous
@@ -208,7 +208,7 @@ class EasedFunction:
         self._function, self._length, self.step, self._angles = function, length, step, angles
 
     def __call__(self, distance: Float) -> Float:
-        """Return values (K, C) at distances (K,)."""
+        """Return the interpolated values (K, C) at distances (K,), m."""
         cell = np.floor(distance / self.step)
         numbers = np.unique(cell[:, None] + np.arange(-1.0, 3.0))
         nodes = self._at_nodes(numbers)
@@ -219,7 +219,7 @@ class EasedFunction:
         return start + t * (m0 + t * (3.0 * rise - 2.0 * m0 - m1 + t * (m0 + m1 - 2.0 * rise)))
 
     def bends(self) -> tuple[Float, Float]:
-        """Return the largest first and second derivatives (C,) by the distance, without their signs."""
+        """Return the largest absolute first and second derivatives (C,) by the distance."""
         last = int(np.floor(self._length / self.step)) + 1
         rate: Float = np.zeros(1)
         bend: Float = np.zeros(1)

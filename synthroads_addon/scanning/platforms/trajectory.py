@@ -39,7 +39,7 @@ class RecordedTrajectory(Platform):
     file: str | None = Field(None, title="Trajectory", description="CSV with time, x, y, z, roll, pitch, heading.")
 
     def make_path(self, guide: Guide, origin: Sequence[float] | None = None) -> TrajectoryPath:
-        """Return the file's strip; see `Platform.make_path`."""
+        """Return the path through the poses of the platform's file, as one strip."""
         return TrajectoryPath(self, guide, origin)
 
 
@@ -140,7 +140,7 @@ class Trajectory:
 
 
 def read_trajectory(path: str | os.PathLike[str]) -> Trajectory:
-    """Return the poses of a CSV file with the columns `COLUMNS`.
+    """Read poses from a CSV file with the columns time, x, y, z, roll, pitch and heading (s, m, deg).
 
     The first line that is neither empty nor a comment (``#``) is the header; columns are separated by commas,
     semicolons, tabs or spaces.

@@ -58,7 +58,7 @@ class Tripod(Platform):
     )
 
     def make_path(self, guide: Guide, origin: Sequence[float] | None = None) -> TripodPath:
-        """Return the positions along the guide, in the order of the stations; see `Platform.make_path`.
+        """Return the path of one strip at each position along the guide, in the order of the stations.
 
         The scanner begins facing along the guide. Without stations, positions are a spacing apart, and what is left of
         the length is shared between both ends.

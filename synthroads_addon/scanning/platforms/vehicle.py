@@ -30,11 +30,11 @@ class Vehicle(MovingPlatform):
     kind: Literal["vehicle"] = Field("vehicle", title="Platform", description="Platform.")
 
     def make_path(self, guide: Guide, origin: Sequence[float] | None = None) -> DrivenPath:
-        """Return the strips; see `Platform.make_path`."""
+        """Return the path of strips driven on the guide's ground, in its lanes unless offsets are given."""
         return DrivenPath(self, guide)
 
     def runs_forward(self, strip: int, offset: float) -> bool:
-        """Return whether a strip is driven along with the stations: traffic keeps to the right."""
+        """Return whether a strip is driven in the direction of the stations: right of the centreline and on it."""
         return offset <= 0.0
 
 
@@ -42,7 +42,7 @@ class DrivenPath(MovingPath):
     """Strips driven on the undamaged surface, on which the vehicle stands with four wheels."""
 
     def heights(self, track: StripTrack, distance: Float) -> Float:
-        """Return the scanner's local elevation (K,) above the surface."""
+        """Return the scanner's local elevation (K,), m: its height above the undamaged surface below."""
         return self.height + self.surface(track, distance, 0.0)
 
     def attitudes(self, track: StripTrack, distance: Float) -> Float:

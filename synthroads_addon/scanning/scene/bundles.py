@@ -42,7 +42,7 @@ class Bundles:
 
     @classmethod
     def gather(cls, origins: Float, directions: Float, times: Float, reach: Float) -> Self:
-        """Gather rays."""
+        """Group rays, in their order, into bundles, and find the cone and ball that bound each bundle."""
         starts = np.arange(0, len(times), RAYS)
         time, delay = _box(times[None], starts)
         apex, ball = _box(origins, starts)
@@ -55,7 +55,7 @@ class Bundles:
         return cls(origins, directions, times, reach, time[0], delay, apex, ball, axis, angle + _SLACK, farthest)
 
     def rays_near(self, track: Track, centre: Float, radius: float) -> Index:
-        """Return the rays that come nearer to a moving ball than its radius before the end of their reach.
+        """Return the indices of the rays that come nearer to a moving ball than its radius within their reach.
 
         Args:
             track: of the body.
@@ -73,7 +73,7 @@ class Bundles:
         return rays[np.einsum("in,in->n", towards, towards) <= radius**2]
 
     def _bundles_near(self, track: Track, way: Float, radius: float) -> Index:
-        """Return the bundles whose cone touches the ball, whose centre at the knots is ``way`` (3, K)."""
+        """Return the indices of the bundles whose cone touches a ball with centres ``way`` (3, K) at the knots."""
         towards = track.along(way, self.time) - self.apex
         fastest = float(np.sqrt(np.square(np.diff(way, axis=1)).sum(axis=0).max())) / track.spacing
         away = np.sqrt(np.einsum("ib,ib->b", towards, towards))
@@ -86,6 +86,6 @@ class Bundles:
 
 
 def _box(values: Float, starts: Index) -> tuple[Float, Float]:
-    """Return the middles (C, B) of the boxes around bundles of values (C, N), and half their diagonals (B,)."""
+    """Return the centres (C, B) of the bounding boxes of bundles of values (C, N), and their half diagonals (B,)."""
     low, high = (np.stack([ends.reduceat(row, starts) for row in values]) for ends in (np.minimum, np.maximum))
     return (low + high) / 2.0, np.sqrt(np.square(high - low).sum(axis=0)) / 2.0

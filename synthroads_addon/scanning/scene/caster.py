@@ -10,7 +10,7 @@ from .mesh import SceneMesh
 
 
 class Caster(Protocol):
-    """Finds the first face that each ray meets.
+    """Interface of ray casters, which find the first face that each ray meets.
 
     Attributes:
         name: as `scan.caster` in a scenario.
@@ -31,7 +31,7 @@ class Caster(Protocol):
         ...
 
     def occluded(self, origins: Float32, directions: Float32, maximum_range: float) -> Bool:
-        """Return whether (N,) something is hit within ``maximum_range`` (m), whatever it is; arguments as of `cast`."""
+        """Return a mask (N,) of the rays that hit anything within ``maximum_range`` (m); arguments as of `cast`."""
         ...
 
 
@@ -59,7 +59,7 @@ class FacePlanes:
         self.planes[3, block] = np.einsum("ij,ij->j", normal, a)
 
     def intersect(self, faces: Index, origins: Float, directions: Float) -> tuple[Float, Float]:
-        """Return where rays meet the planes of ``faces``: range (m) and n . d, whose size is the cosine of incidence.
+        """Return rays' ranges (m) to the planes of ``faces``, and n . d, the signed cosine of incidence.
 
         Args:
             faces: (...); where negative the result has no meaning.

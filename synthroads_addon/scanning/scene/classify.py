@@ -24,7 +24,7 @@ _TYPES: dict[str, type[RoadObject]] = {
 
 
 def check_selectors(scheme: ClassScheme, source: str) -> None:
-    """Refuse selectors of things that there aren't; raise `InputError` naming what there is.
+    """Raise `InputError` if a class scheme's selector names an unknown type of thing or a field it hasn't.
 
     Args:
         scheme: of classes.
@@ -43,7 +43,7 @@ def check_selectors(scheme: ClassScheme, source: str) -> None:
 
 
 def check_asset_classes(scheme: ClassScheme, road: RoadParameters) -> None:
-    """Refuse free assets of classes that a scheme doesn't have; raise `InputError` naming the asset."""
+    """Raise `InputError`, naming the asset, if a road's free asset has a class that the scheme lacks."""
     known = scheme.source_ids()
     for name, item in road.of_type(Asset).items():
         if item.class_name not in known:
@@ -54,7 +54,7 @@ def check_asset_classes(scheme: ClassScheme, road: RoadParameters) -> None:
 
 
 def classify_scene(scene: ScannedScene, scheme: ClassScheme, road: RoadParameters | None) -> ScannedScene:
-    """Return a scene whose faces have the classes that a scheme's selectors find; of several that fit the first counts.
+    """Return a scene whose faces have the classes of a scheme's selectors; the first that fits a face counts.
 
     Args:
         scene: its faces have classes of the full table.
@@ -65,14 +65,14 @@ def classify_scene(scene: ScannedScene, scheme: ClassScheme, road: RoadParameter
     if not selectors:
         return scene
     numbers = InstanceNumbers(road) if road else None
-    rules = [_Rule(number, selector, _names_of(selector, road), numbers) for number, selector in selectors]
+    rules = [_Rule(number, selector, _object_ids(selector, road), numbers) for number, selector in selectors]
     moving = tuple(replace(body, mesh=_classify(body.mesh, rules)) for body in scene.moving)
     return replace(scene, static=_classify(scene.static, rules), moving=moving)
 
 
 @dataclass(frozen=True)
 class _Rule:
-    """A selector at work.
+    """A class selector bound to a road's objects, with the class id that it gives.
 
     Attributes:
         number: ``class_id`` of what it finds.
@@ -87,7 +87,7 @@ class _Rule:
     numbers: InstanceNumbers | None
 
     def fits(self, mesh: SceneMesh) -> NDArray[np.bool_]:
-        """Return which faces (T,) it finds."""
+        """Return a mask (T,) of the mesh's faces that the selector matches."""
         found = np.ones(len(mesh), dtype=bool)
         if self.selector.class_name is not None:
             found &= mesh.class_id == class_id(self.selector.class_name)
@@ -108,8 +108,8 @@ def _classify(mesh: SceneMesh, rules: Iterable[_Rule]) -> SceneMesh:
     return replace(mesh, class_id=class_ids)
 
 
-def _names_of(selector: ClassSelector, road: RoadParameters | None) -> frozenset[str] | None:
-    """Return the ids of the objects that a selector means; None if it says nothing of objects."""
+def _object_ids(selector: ClassSelector, road: RoadParameters | None) -> frozenset[str] | None:
+    """Return the ids of the road's objects that a selector matches; None if it says nothing of objects."""
     if selector.thing is None and selector.asset is None:
         return None
     items = road.objects.items() if road else ()

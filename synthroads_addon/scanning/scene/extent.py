@@ -21,7 +21,7 @@ def bounds(mesh: SceneMesh) -> Float:
 
 
 def body_bounds(mesh: SceneMesh) -> Float:
-    """Return the bounds (2, 3) of the triangles, m, without stray vertices where the scene is wider than `WIDE`."""
+    """Return the bounds (2, 3), m, of the triangles, without stray vertices if the scene is wider than `WIDE`."""
     strays = strays_of(mesh)
     if strays is None:
         return bounds(mesh)
@@ -31,7 +31,7 @@ def body_bounds(mesh: SceneMesh) -> Float:
 
 
 def strays_of(mesh: SceneMesh) -> Strays | None:
-    """Return which vertices of a scene lie far from all others; None where it isn't wider than `WIDE` or all do.
+    """Return the stray vertices of a scene wider than `WIDE`, far from all others; None if there are none.
 
     In a smaller scene the far corners of a large face are as good as any others.
     """
@@ -76,7 +76,7 @@ def median_elevation(mesh: SceneMesh) -> float:
 
 
 def elevation_at(mesh: SceneMesh, x: float, y: float) -> float | None:
-    """Return the elevation (local, m) of the highest surface at a place in plan (local, m); None if there is none."""
+    """Return the local elevation, m, of the highest surface at a plan position (local, m); None if there is none."""
     highest = -np.inf
     for start in range(0, len(mesh), _BLOCK):
         corners = mesh.vertices[mesh.triangles[start : start + _BLOCK]].astype(np.float64)

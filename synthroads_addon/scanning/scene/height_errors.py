@@ -15,7 +15,7 @@ _BESIDE_STEPS = 0.01
 def mesh_height_errors(
     mesh: SceneMesh, geometry: RoadGeometry, samples: int = 100_000, names: tuple[str, ...] = ("road", "roadside")
 ) -> Float:
-    """Return signed height errors (N,) in metres of random points of the mesh's road surface.
+    """Return signed height errors (N,), m, of random points of a mesh's road against the analytic surface.
 
     Without the centimetres along which the pavement changes at once, at noses and ends of ramps: faces there go
     slantwise from one cross-section to quite another one.

@@ -23,7 +23,7 @@ _SHAPES: dict[str, tuple[type, tuple[int | None, ...]]] = {
 
 @dataclass(frozen=True)
 class SceneMesh:
-    """Triangles of a scene in its local frame.
+    """Triangle mesh of a scene in its local frame, with class, instance and material of each triangle.
 
     Attributes:
         vertices: (V, 3) float32, local coordinates, m.
@@ -68,7 +68,7 @@ class SceneMesh:
         self._check_indices("material", len(self.materials), "materials")
 
     def _check_extent(self) -> None:
-        """Refuse vertices that lie on no map: a file in another unit, or a vertex that a converter forgot."""
+        """Raise `InputError` if a vertex lies beyond any map, as in a wrong unit or astray."""
         if self.vertices.size and (worst := float(max(self.vertices.max(), -self.vertices.min()))) > FARTHEST:
             allowed = f"must lie within {FARTHEST:g} m of the scene's origin: is its unit another, or a vertex astray?"
             raise InputError("scene mesh: vertices", worst, allowed)

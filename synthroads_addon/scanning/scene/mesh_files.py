@@ -40,7 +40,7 @@ _Property = tuple[str, str, str]
 
 
 def check_mesh_file(path: Path) -> None:
-    """Refuse a mesh file that is truncated, or whose faces name vertices that aren't there.
+    """Raise `InputError` if a mesh file is truncated, inconsistent, or points outside of its folder.
 
     Args:
         path: a .ply, .stl, .glb or .gltf that exists; files of other kinds aren't looked into.
@@ -63,7 +63,7 @@ def check_mesh_file(path: Path) -> None:
 
 
 def _check_stl(path: Path) -> None:
-    """Refuse a binary STL that ends before its triangles do: a header of 80 bytes, their number, 50 bytes each."""
+    """Raise ValueError if a binary STL is shorter than its triangles take: 84 bytes and 50 for each."""
     size = path.stat().st_size
     with path.open("rb") as file:
         head = file.read(84)
@@ -87,7 +87,7 @@ def _check_ply(path: Path) -> None:
 
 
 def _ply_header(file: BinaryIO) -> tuple[str, list[tuple[str, int, list[_Property]]]]:
-    """Return the file's kind, and name, number and properties of its elements."""
+    """Read a PLY's header; return its format, and name, number and properties of each element."""
     kind, elements = "", list[tuple[str, int, list[_Property]]]()
     while (line := file.readline(_LONGEST_HEADER).decode("ascii", errors="replace")) and file.tell() < _LONGEST_HEADER:
         words = line.split()
@@ -105,12 +105,12 @@ def _ply_header(file: BinaryIO) -> tuple[str, list[tuple[str, int, list[_Propert
 
 
 def _ply_type(word: str) -> str:
-    """Return a type of numbers, without the order of its bytes, by its name in the header."""
+    """Return the NumPy type code, without byte order, of a PLY type's name."""
     return PLY_TYPES[word].lstrip("<")
 
 
 def _ply_text(file: BinaryIO, elements: list[tuple[str, int, list[_Property]]]) -> Iterator[AnyArray]:
-    """Yield the vertices of each face of a PLY as text."""
+    """Yield the vertex indices of each face of a text PLY."""
     for name, count, properties in elements:
         for _ in range(count):
             words = file.readline().split()
@@ -124,7 +124,7 @@ def _ply_text(file: BinaryIO, elements: list[tuple[str, int, list[_Property]]]) 
 def _ply_bytes(
     path: Path, file: BinaryIO, kind: str, elements: list[tuple[str, int, list[_Property]]]
 ) -> Iterator[AnyArray]:
-    """Yield the vertices of faces of a binary PLY: of all at once where all have as many, else of one by one."""
+    """Yield the vertex indices of a binary PLY's faces, as one array for each run of faces of equal size."""
     order = {"binary_little_endian": "<", "binary_big_endian": ">"}[kind]
     data, at = np.memmap(path, np.uint8, "r"), file.tell()
     for name, count, properties in elements:
@@ -144,7 +144,7 @@ def _ply_bytes(
 
 
 def _ply_lists(data: UInt8, at: int, count: int, properties: list[_Property]) -> Iterator[tuple[AnyArray, int]]:
-    """Yield the lists of an element's entries, and where the entries end that they belong to."""
+    """Yield runs of an element's lists of equal length (n, length), and the byte offset at which each run ends."""
     place = next(place for place, (length, _, _) in enumerate(properties) if length)
     before = sum(np.dtype(kind).itemsize for _, kind, _ in properties[:place])
     after = sum(np.dtype(kind).itemsize for _, kind, _ in properties[place + 1 :])
@@ -186,7 +186,7 @@ def _check_gltf(path: Path) -> None:
 
 
 def _check_content(path: Path, content: dict[str, Any], binary: int) -> None:
-    """Refuse a glTF whose content can't be read.
+    """Raise an error if a glTF's buffers, images, views, accessors or nodes can't be read.
 
     Args:
         path: the file.
@@ -205,7 +205,7 @@ def _check_content(path: Path, content: dict[str, Any], binary: int) -> None:
 
 
 def _part_size(path: Path, address: str, optional: bool = False) -> int:
-    """Return the size, bytes, of what a glTF's address holds or names; of one that isn't there 0 if it is optional.
+    """Return the size, bytes, of a glTF's data URI or of the file that it names; 0 if missing and optional.
 
     Raises:
         InputError: it leaves the folder, links that are followed included, or names no regular file.
@@ -226,7 +226,7 @@ def _part_size(path: Path, address: str, optional: bool = False) -> int:
 
 
 def _check_views(content: dict[str, Any]) -> None:
-    """Refuse views beyond their buffers and accessors beyond their views."""
+    """Raise ValueError if a glTF's view exceeds its buffer or an accessor its view."""
     buffers, views = content.get("buffers", []), content.get("bufferViews", [])
     for view in views:
         if view.get("byteOffset", 0) + view["byteLength"] > buffers[view["buffer"]]["byteLength"]:
@@ -245,7 +245,7 @@ def _check_views(content: dict[str, Any]) -> None:
 
 
 def _check_nodes(nodes: list[dict[str, Any]]) -> None:
-    """Refuse nodes below themselves."""
+    """Raise ValueError if a glTF's nodes form cycles, have several parents, or are nested too deeply."""
     parents = {}
     for number, node in enumerate(nodes):
         for child in node.get("children", []):

@@ -26,7 +26,7 @@ centreline by which it was placed."""
 
 
 class BodyMotion(Protocol):
-    """Where a rigid body is at any time."""
+    """Interface of a rigid body's motion: its pose, and whether it is there, at any time."""
 
     def pose(self, time: Float) -> Pose:
         """Return rotation (K, 3, 3), translation (K, 3) and whether (K,) the body is there, at times (K,), s.
@@ -36,12 +36,12 @@ class BodyMotion(Protocol):
         """
 
     def passes(self, time: Float) -> Int:
-        """Return how often the body has left and come in again before times (K,), s."""
+        """Return how many times (K,) the body has left and come in again before times (K,), s."""
 
 
 @dataclass(frozen=True)
 class MovingMesh:
-    """A body that moves.
+    """A rigid body that moves: its mesh, its motion, and its instance numbers on later passes.
 
     Attributes:
         mesh: its triangles in the body frame; ``origin`` has no meaning there and is 0.
@@ -56,7 +56,7 @@ class MovingMesh:
 
 @dataclass(frozen=True)
 class ScannedScene:
-    """Scene that a scan meets. All meshes have the same tuple of materials.
+    """Scene to be scanned: a static mesh and moving bodies, all with the same tuple of materials.
 
     Attributes:
         static: what stands, in the local frame.
@@ -82,19 +82,19 @@ class LinearMotion:
         self.place = finite_array("place", place).reshape(3)
 
     def pose(self, time: Float) -> Pose:
-        """Return the poses at times (K,), see `BodyMotion`."""
+        """Return identity rotations (K, 3, 3), positions (K, 3), m, and presence (K,), all true, at times (K,), s."""
         time = np.asarray(time, dtype=np.float64)
         rotation = np.broadcast_to(np.eye(3), (len(time), 3, 3))
         return rotation, self.place + time[:, None] * self.velocity, np.ones(len(time), dtype=bool)
 
     def passes(self, time: Float) -> Int:
-        """Return 0: it never comes again."""
+        """Return zeros (K,): the body never comes in again."""
         return np.zeros(len(time), dtype=np.int64)
 
 
 @dataclass(frozen=True)
 class ShiftedMotion:
-    """A motion in a frame that begins elsewhere; see `BodyMotion`.
+    """A motion expressed in a local frame with another origin; see `BodyMotion`.
 
     Attributes:
         whole: the motion in the road's local frame.
@@ -105,17 +105,17 @@ class ShiftedMotion:
     origin: Float
 
     def pose(self, time: Float) -> Pose:
-        """Return the motion's pose in this frame."""
+        """Return rotations (K, 3, 3), positions (K, 3) in this frame, m, and presence (K,), at times (K,), s."""
         rotation, place, present = self.whole.pose(time)
         return rotation, place - self.origin, present
 
     def passes(self, time: Float) -> Int:
-        """Return the motion's passes."""
+        """Return how many times (K,) the body has left and come in again before times (K,), s."""
         return self.whole.passes(time)
 
 
 class LaneMotion:
-    """A vehicle in its lane, with its carriageway's traffic.
+    """Motion of a vehicle along its lane at its speed, beginning anew where the lane ends.
 
     Its middle keeps to the lane's centre, at its speed along that line in plan. It looks along the line (where lanes
     widen or narrow, along the chord between its axles' places) and stands on the road with its axles' wheels, so that
@@ -153,31 +153,31 @@ class LaneMotion:
         self._chassis = CHASSIS[vehicle.model]
         self._origin = finite_array("origin", origin)
         self._low, self._high = self.line.distance(np.array(self.line.range_at(vehicle.station))).tolist()
-        self._way = way or (_ways([vehicle], self.line)[0] if vehicle.speed > 0.0 else None)
+        self._way = way or (_passes_in_lane([vehicle], self.line)[0] if vehicle.speed > 0.0 else None)
 
     @property
     def stands(self) -> bool:
-        """Return whether it is always at the same place."""
+        """Return whether the vehicle stands still all the time."""
         return self._way is None or self.speed_factor == 0.0
 
     def station(self, time: Float) -> Float:
-        """Return the stations (K,) of its middle at times (K,), m."""
+        """Return the stations (K,), m, of the vehicle's middle at times (K,), s."""
         return self._place(np.asarray(time, dtype=np.float64))[0]
 
     def pose(self, time: Float) -> Pose:
-        """Return the poses at times (K,), see `BodyMotion`."""
+        """Return rotations (K, 3, 3), positions (K, 3), m, and presence (K,), of a vehicle at times (K,), s."""
         station, present = self._place(np.asarray(time, dtype=np.float64))
         rotation, place = wheel_pose(self.line, self._chassis, station)
         return rotation, place - self._origin, present
 
     def passes(self, time: Float) -> Int:
-        """Return how often it has come in again before times (K,)."""
+        """Return how many times (K,) the vehicle has left and come in again before times (K,), s."""
         if self._way is None or self.speed_factor == 0.0:
             return np.zeros(len(time), dtype=np.int64)
         return self._way.passes(np.asarray(time, dtype=np.float64) * self.speed_factor)
 
     def from_elsewhere(self, place: Float) -> LaneMotion:
-        """Return the motion of the same vehicle if it is beside a place (3,) of the local frame at the time 0."""
+        """Return the same vehicle's motion if at time 0 it is beside a place (3,) of the local frame, m."""
         plan = (place + self._origin)[None, :2]
         station = float(np.clip(self._alignment.project(plan)[0][0], 0.0, self._alignment.length))
         vehicle = self.vehicle.model_copy(update={"station": station})
@@ -187,7 +187,7 @@ class LaneMotion:
         return moved
 
     def _place(self, time: Float) -> tuple[Float, Bool]:
-        """Return the vehicle's stations (K,) at times, and whether it is on the road then."""
+        """Return the vehicle's stations (K,), m, and whether (K,) it is on the road, at times (K,), s."""
         if self._way is None or self.speed_factor == 0.0:
             return np.full(time.shape, self.vehicle.station), np.ones(time.shape, dtype=bool)
         along, present = self._way.at(time * self.speed_factor)
@@ -222,20 +222,20 @@ def lane_motions(
     motions: dict[str, LaneMotion] = {}
     for (road, number, _), vehicles in groups.items():
         line = lines[road, number]
-        for (name, vehicle), way in zip(vehicles.items(), _ways(list(vehicles.values()), line), strict=True):
+        for (name, vehicle), way in zip(vehicles.items(), _passes_in_lane(list(vehicles.values()), line), strict=True):
             motions[name] = LaneMotion(geometry, vehicle, speed_factor, origin=origin, line=line, way=way)
     return motions
 
 
 def checked_factor(speed_factor: float) -> float:
-    """Return a factor of speeds; InputError unless it is a number >= 0."""
+    """Return a factor of speeds as a float; raise `InputError` unless it is a finite number >= 0."""
     if not (np.isfinite(speed_factor) and speed_factor >= 0.0):
         raise InputError("speed_factor", speed_factor, "must be 0 or more")
     return float(speed_factor)
 
 
-def _ways(vehicles: list[Vehicle], line: LaneLine) -> list[VehiclePasses]:
-    """Return the passes of vehicles on one open range of a lane."""
+def _passes_in_lane(vehicles: list[Vehicle], line: LaneLine) -> list[VehiclePasses]:
+    """Return the passes of vehicles that share one open range of a lane, in their order."""
     low, high = line.distance(np.array(line.range_at(vehicles[0].station))).tolist()
     middle = line.distance(np.array([vehicle.station for vehicle in vehicles]))
     start = middle - low if line.carriageway.traffic > 0 else high - middle
@@ -265,7 +265,7 @@ class VehiclePasses:
 
     @property
     def leave(self) -> float:
-        """Return when its middle reaches the lane's end, s."""
+        """Return the time, s, at which the vehicle's middle first reaches the lane's end."""
         return max(0.0, (self.whole - self.start) / self.speed)
 
     def at(self, time: Float) -> tuple[Float, Bool]:
@@ -280,12 +280,12 @@ class VehiclePasses:
         return distance, (distance >= half) & (distance <= self.whole - half)
 
     def passes(self, time: Float) -> Int:
-        """Return which of its passes it is on at times (K,): 0 the one that it is on at the time 0."""
+        """Return the number (K,) of the pass that the vehicle is on at times (K,), s; 0 is that at time 0."""
         again = 1 + np.floor_divide(time - self.entry, self.period)
         return np.where(time <= self.leave, 0, np.maximum(again, 0)).astype(np.int64)
 
     def from_elsewhere(self, start: float) -> VehiclePasses:
-        """Return the same for a vehicle that is elsewhere at the time 0; it comes in as much later as it leaves."""
+        """Return the passes if it is at ``start`` (m) at time 0; its entry is delayed as its leaving is."""
         moved = replace(self, start=start)
         return replace(moved, entry=self.entry + max(0.0, moved.leave - self.leave))
 
@@ -309,7 +309,7 @@ def lane_passes(
     leave = [max(0.0, (whole - x) / v) for x, v in zip(start, speed, strict=True)]
 
     def behind(ahead: int, entry: float, follower: int) -> float:
-        """Return when the follower may come in behind one whose middle came in at ``entry``."""
+        """Return the time, s, at which the follower may come in behind one whose middle came in at ``entry``."""
         gap = (length[ahead] + length[follower]) / 2.0 + VEHICLE_GAP
         at_end = whole / speed[ahead] - (whole - gap) / speed[follower]
         return entry + max(gap / speed[ahead], at_end)

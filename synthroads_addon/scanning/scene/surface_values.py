@@ -15,7 +15,7 @@ from ...base.arrays import AnyArray, Bool, Float, Float32, Index
 
 
 class SurfaceInput(NamedTuple):
-    """Something that a material can ask of the place that it is seen at.
+    """A quantity that a material reads of the surface it is on, such as a UV map, an attribute or a normal.
 
     Attributes:
         kind: what it is, such as ``attribute`` or ``uv``; see `blender.materials.inputs`.
@@ -28,7 +28,7 @@ class SurfaceInput(NamedTuple):
 
 @dataclass(frozen=True)
 class MeshValues:
-    """Values of one input on one mesh.
+    """Values of one surface input on one mesh, and the mesh elements that they belong to.
 
     Attributes:
         values: (n, 4) float32: x, y, z or red, green, blue, and alpha.
@@ -41,7 +41,7 @@ class MeshValues:
 
 @dataclass(frozen=True)
 class PartValues:
-    """Values of one mesh at all its places in a scene's mesh.
+    """Values of surface inputs on one mesh, at all the places where a scene's mesh has it.
 
     Attributes:
         first: its first triangle there, before triangles without area were left out.
@@ -68,7 +68,7 @@ _NORMALS = ("normal", "object_normal")
 
 @dataclass(frozen=True)
 class SurfaceValues:
-    """Values of the surfaces of a scene's mesh.
+    """Values of surface inputs on a scene's mesh, kept once for each of the meshes that it is made of.
 
     Attributes:
         parts: those that have any, in the order of their first triangles.
@@ -81,7 +81,7 @@ class SurfaceValues:
     def read(
         self, what: SurfaceInput, faces: Index, shares: Float, place: Float, normal: Float
     ) -> tuple[Float32, Bool]:
-        """Return an input's values (N, 4) on triangles, and which of these (N,) have it; zeros elsewhere.
+        """Return an input's values (N, 4) on triangles, and a mask (N,) of those that have it; zeros elsewhere.
 
         Args:
             what: the input.
@@ -101,14 +101,14 @@ class SurfaceValues:
             else:
                 values = _interpolate(part, what, use, triangle, shares[mine])
                 if values is not None and what.kind in _NORMALS:
-                    values[:, :3] = _turned(part, use, values[:, :3], normal[mine], what.kind == "normal")
+                    values[:, :3] = _oriented_normals(part, use, values[:, :3], normal[mine], what.kind == "normal")
             if values is not None:
                 result[mine], found[mine] = values, True
         return result, found
 
 
 def _in_frame(part: PartValues, use: Index, place: Float) -> Float32 | None:
-    """Return places (H, 3) in the frame of the part itself as (H, 4)."""
+    """Return places (H, 3), m, in the part's own frame as (H, 4), the last 0; None if its frames aren't kept."""
     if part.frames is None:
         return None
     result = np.zeros((len(use), 4), np.float32)
@@ -117,8 +117,8 @@ def _in_frame(part: PartValues, use: Index, place: Float) -> Float32 | None:
     return result
 
 
-def _turned(part: PartValues, use: Index, normal: Float32, towards: Float, into_mesh: bool) -> Float:
-    """Return normals (H, 3) of the part on the side that ``towards`` (H, 3), in the mesh's frame, points to.
+def _oriented_normals(part: PartValues, use: Index, normal: Float32, towards: Float, into_mesh: bool) -> Float:
+    """Return unit normals (H, 3) of the part, flipped to the side that ``towards`` (H, 3), in the mesh's frame, points.
 
     Args:
         part: the part.
@@ -136,7 +136,7 @@ def _turned(part: PartValues, use: Index, normal: Float32, towards: Float, into_
 
 
 def _interpolate(part: PartValues, what: SurfaceInput, use: Index, triangle: Index, shares: Float) -> Float32 | None:
-    """Return the values (H, 4) of one of the part's own inputs; None if it has no such."""
+    """Return an input's values (H, 4), interpolated in the part's triangles; None if the part lacks it."""
     entry = part.values.get(what)
     if entry is None:
         return None
@@ -175,7 +175,7 @@ class ValuesBuilder:
     parts: list[PartValues] = field(default_factory=list)
 
     def table(self, kept: Bool | None) -> SurfaceValues | None:
-        """Return the table; None if no part has values."""
+        """Return the values gathered, with triangles renumbered by the mask ``kept``; None if there are none."""
         if not self.parts:
             return None
         number = None if kept is None else np.flatnonzero(kept).astype(np.int32)

@@ -26,7 +26,7 @@ _NO_FACE = {"class_id": UNLABELLED, "instance_id": 0, "material": NO_MATERIAL, "
 
 @dataclass(frozen=True)
 class _TargetPart:
-    """A mesh of the target.
+    """One mesh of the target, static or moving, with its caster, its face planes and its bounds.
 
     Attributes:
         first: number of its first face among all.
@@ -58,7 +58,7 @@ class FirstHits(NamedTuple):
 
 
 class Target:
-    """The scene as rays meet it.
+    """A scene to cast rays at: a static mesh and moving ones, their faces numbered one after the other.
 
     Args:
         scene: static mesh and moving ones.
@@ -101,7 +101,7 @@ class Target:
         self.bounds = static.vertex_bounds()
 
     def face_values(self, name: str, faces: Index) -> AnyArray:
-        """Return ``class_id``, ``instance_id``, ``material``, ``damage`` of faces (H,); of -1 what stands for none."""
+        """Return ``class_id``, ``instance_id``, ``material`` or ``damage`` of faces (H,); that of no face for -1."""
         values = getattr(self, name)
         if not len(faces) or faces.min() >= 0:
             return np.asarray(values[faces])
@@ -110,7 +110,7 @@ class Target:
         return np.asarray(result)
 
     def instances(self, faces: Index, times: Float) -> AnyArray:
-        """Return the instance numbers of faces (H,) met at times (H,), s: what comes in again has another one."""
+        """Return the instance numbers of faces (H,) met at times (H,), s; on later passes a vehicle has another."""
         result = np.array(self.face_values("instance_id", faces), dtype=np.uint32)
         for part, moving in zip(self._parts[1:], self.moving, strict=True):
             if moving.again is None:
@@ -122,7 +122,7 @@ class Target:
         return result
 
     def motions(self, begin: float, end: float, spacing: float, driven: Track | None = None) -> list[Track]:
-        """Return the moving parts' poses between two times, on knots ``spacing`` (s) apart.
+        """Return the tracks of the moving parts between two times, on knots ``spacing`` (s) apart.
 
         Args:
             driven: the scanner's, if a vehicle carries it. What drives through this vehicle isn't there meanwhile:
@@ -135,7 +135,7 @@ class Target:
         return [_clear_scanner(track, part, scanner) for track, part in zip(tracks, self._parts[1:], strict=True)]
 
     def moving_bounds(self, motions: list[Track]) -> list[Float]:
-        """Return (2, 3) smallest and largest corner that each moving part reaches on its way, if it is there."""
+        """Return the box (2, 3), m, that each moving part sweeps through, less parts that are never there."""
         moving = zip(self._parts[1:], motions, strict=True)
         boxes = (track.swept_box(part.centre, part.radius) for part, track in moving)
         return [box for box in boxes if box is not None]
@@ -143,7 +143,7 @@ class Target:
     def cast(
         self, origins: Float, directions: Float, maximum_range: float, times: Float, motions: list[Track]
     ) -> FirstHits:
-        """Return what each ray meets first.
+        """Return the first hit of each ray (face, range, n . d), on the static mesh or a moving one.
 
         Args:
             origins: (3, ...) float64, local; of the directions' shape, or one that spreads to it.
@@ -166,10 +166,10 @@ class Target:
         to = shape[1:]
         return FirstHits(nearest.face.reshape(to), nearest.distance.reshape(to), nearest.along.reshape(to))
 
-    def sees(
+    def unobstructed(
         self, origins: Float, direction: Float, times: Float, motions: list[Track], reach: float = SUN_REACH
     ) -> Bool:
-        """Return whether nothing (N,) stands between places and what lies in one direction from all of them.
+        """Return a mask (N,) of the places from which nothing blocks the view in a direction within ``reach`` (m).
 
         Args:
             origins: (3, N) local, m, a little off the surfaces that they lie on.
@@ -179,19 +179,19 @@ class Target:
             reach: how far is looked, m.
         """
         towards = np.broadcast_to(direction[:, None], origins.shape)
-        free = ~self.caster.occluded(_rows(origins), _rows(towards), reach)
+        free = ~self.caster.occluded(_as_rows(origins), _as_rows(towards), reach)
         if not self.moving or not len(times):
             return free
         rays = Bundles.gather(origins, towards, times, np.full(len(times), reach))
         for part, track in zip(self._parts[1:], motions, strict=True):
             if track.present.any():
-                _hide(part, track, rays, reach, free)
+                _clear_blocked(part, track, rays, reach, free)
         return free
 
     def at_time_zero(
         self, faces: Index, places: Float, times: Float, motions: list[Track], vectors: tuple[Float, ...] = ()
     ) -> tuple[Float, ...]:
-        """Return places on faces, and directions there, as they are in the scene at the time 0.
+        """Return places on faces (3, H), m, and vectors there, moved to where the scene has them at time 0.
 
         Args:
             faces: (H,).
@@ -207,14 +207,14 @@ class Target:
                 continue
             rotation, place, _ = track.at(times[mine])
             begin_rotation, begin_place, _ = moving.motion.pose(np.zeros(1))
-            local = _inverse(rotation, places[:, mine] - place)
+            local = _unrotate(rotation, places[:, mine] - place)
             results[0][:, mine] = begin_rotation[0] @ local + begin_place[0][:, None]
             for result, vector in zip(results[1:], vectors, strict=True):
-                result[:, mine] = begin_rotation[0] @ _inverse(rotation, vector[:, mine])
+                result[:, mine] = begin_rotation[0] @ _unrotate(rotation, vector[:, mine])
         return results
 
     def normals(self, faces: Index, along: Float, times: Float, motions: list[Track]) -> Float:
-        """Return (3, H) unit normals, local, turned towards the rays that met the faces."""
+        """Return the local unit normals (3, H) of faces at times (H,), turned towards the rays that met them."""
         result = np.empty((3, len(faces)))
         for number, part in enumerate(self._parts):
             mine = np.flatnonzero((faces >= part.first) & (faces < part.first + part.count))
@@ -242,16 +242,16 @@ def _part(mesh: SceneMesh, caster: Caster, first: int) -> _TargetPart:
 
 
 def _clear_scanner(track: Track, part: _TargetPart, scanner: Float) -> Track:
-    """Return a part's track on which it isn't there where the scanner's vehicle is; places (3, K) at its knots."""
-    offset = _inverse(track.rotation, scanner - track.position)
+    """Return a moving part's track, absent where it meets the scanner's vehicle, whose places are (3, K)."""
+    offset = _unrotate(track.rotation, scanner - track.position)
     away = (np.abs(offset.T - part.centre) > part.half + CLEARANCE).any(axis=1)
     return replace(track, present=track.present & away)
 
 
 def _cast(part: _TargetPart, origins: Float, directions: Float, maximum_range: float) -> FirstHits:
-    """Cast rays at one part in its body frame; face numbers are those of all parts."""
+    """Return rays' first hits on one part, in its body frame; faces are numbered among those of all parts."""
     shape = directions.shape[1:]
-    begin, towards = (np.broadcast_to(_rows(array), (*shape, 3)).reshape(-1, 3) for array in (origins, directions))
+    begin, towards = (np.broadcast_to(_as_rows(array), (*shape, 3)).reshape(-1, 3) for array in (origins, directions))
     found = part.caster.cast(begin, towards, maximum_range)
     face = found.reshape(shape).astype(np.intp)
     if not part.count:
@@ -269,8 +269,8 @@ def _cast(part: _TargetPart, origins: Float, directions: Float, maximum_range: f
     return FirstHits(face, distance, along)
 
 
-def _rows(vectors: Float) -> Float32:
-    """Return vectors (3, ...) as casters take them, (..., 3)."""
+def _as_rows(vectors: Float) -> Float32:
+    """Return vectors (3, ...) as float32 rows (..., 3), the layout that casters take."""
     result = np.empty((*vectors.shape[1:], 3), dtype=np.float32)
     for i in range(3):
         result[..., i] = vectors[i]
@@ -278,38 +278,38 @@ def _rows(vectors: Float) -> Float32:
 
 
 def _cast_moving(part: _TargetPart, track: Track, rays: Bundles, maximum_range: float, nearest: FirstHits) -> None:
-    """Put a moving part's hits in place of farther ones; all arrays are flat."""
+    """Replace, in place, farther hits in ``nearest`` by those on a moving part; all arrays are flat."""
     near = rays.rays_near(track, part.centre, part.radius)
     if not len(near):
         return
     rotation, place, present = track.at(rays.times[near])
     near, rotation, place = near[present], rotation[:, present], place[:, present]
     begin, towards = rays.origins[:, near] - place, rays.directions[:, near]
-    met = _cast(part, _inverse(rotation, begin), _inverse(rotation, towards), maximum_range)
+    met = _cast(part, _unrotate(rotation, begin), _unrotate(rotation, towards), maximum_range)
     closer = np.flatnonzero(met.distance < nearest.distance[near])
     for values, closer_values in zip(nearest, met, strict=True):
         values[near[closer]] = closer_values[closer]
 
 
-def _hide(part: _TargetPart, track: Track, rays: Bundles, reach: float, free: Bool) -> None:
-    """Set rays that a moving part is in the way of as not free."""
+def _clear_blocked(part: _TargetPart, track: Track, rays: Bundles, reach: float, free: Bool) -> None:
+    """Clear, in place, ``free`` of the rays that a moving part blocks within their reach (m)."""
     near = rays.rays_near(track, part.centre, part.radius)
     near = near[free[near]]
     if not len(near):
         return
     rotation, place, present = track.at(rays.times[near])
     near, rotation, place = near[present], rotation[:, present], place[:, present]
-    begin, towards = _inverse(rotation, rays.origins[:, near] - place), _inverse(rotation, rays.directions[:, near])
-    free[near[part.caster.occluded(_rows(begin), _rows(towards), reach)]] = False
+    begin, towards = _unrotate(rotation, rays.origins[:, near] - place), _unrotate(rotation, rays.directions[:, near])
+    free[near[part.caster.occluded(_as_rows(begin), _as_rows(towards), reach)]] = False
 
 
-def _inverse(rotation: Float, vectors: Float) -> Float:
-    """Return vectors (3, N) turned back by rotations (9, N)."""
+def _unrotate(rotation: Float, vectors: Float) -> Float:
+    """Return vectors (3, N), each rotated by the inverse of its matrix (9, N)."""
     return np.asarray(np.einsum("jin,jn->in", rotation.reshape(3, 3, -1), vectors))
 
 
 def _damage_of(instance: NDArray[np.uint32], damages: Mapping[int, int]) -> UInt8:
-    """Return the damage (F,) of faces by their instance numbers."""
+    """Return the code of damage (F,) of faces by their instance numbers; 0 for none."""
     result = np.zeros(len(instance), np.uint8)
     if damages:
         numbers = np.array(sorted(damages), np.int64)

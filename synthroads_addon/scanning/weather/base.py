@@ -31,12 +31,12 @@ class Weather(ClosedModel):
         return visibility_extinction(visibility, wavelength_nm, self.exponent(visibility))
 
     def exponent(self, visibility: float) -> float:
-        """Return by which power of the wavelength the extinction falls at a visibility (m).
+        """Return the exponent by which extinction falls with the wavelength, at a visibility (m).
 
         0, the same at every wavelength, for drops that are larger than the wavelength.
         """
         return 0.0
 
     def effects(self) -> tuple[EchoEffect, ...]:
-        """Return what the weather does to the echoes besides attenuating them: usually nothing."""
+        """Return the effects that the weather has on echoes besides attenuation: here none."""
         return ()

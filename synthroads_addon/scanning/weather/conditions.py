@@ -19,7 +19,7 @@ class Clear(Weather):
     condition: Literal["clear"] = Field("clear", description="Weather.")
 
     def exponent(self, visibility: float) -> float:
-        """Return Kim's exponent."""
+        """Return the exponent of the wavelength at a visibility (m), by Kim, McArthur and Korevaar."""
         return kim_exponent(visibility)
 
 
@@ -32,7 +32,7 @@ class Haze(Weather):
     condition: Literal["haze"] = Field("haze", description="Weather.")
 
     def exponent(self, visibility: float) -> float:
-        """Return Kruse's exponent, made for small particles of haze and dust."""
+        """Return the exponent of the wavelength at a visibility (m), by Kruse, for particles of haze and dust."""
         return kruse_exponent(visibility)
 
 
@@ -54,7 +54,7 @@ class Dust(Weather):
     condition: Literal["dust"] = Field("dust", description="Weather.")
 
     def exponent(self, visibility: float) -> float:
-        """Return Kruse's exponent, made for small particles of haze and dust."""
+        """Return the exponent of the wavelength at a visibility (m), by Kruse, for particles of haze and dust."""
         return kruse_exponent(visibility)
 
 
@@ -72,13 +72,13 @@ class Precipitation(Weather):
         return self
 
     def extinction(self, wavelength_nm: float) -> float:
-        """Return the extinction of the rate if there is one, else of the visibility, 1/m of path."""
+        """Return the extinction coefficient, 1/m of path, by the rate if it is given, else by the visibility."""
         if self.rate_mm_h is None:
             return super().extinction(wavelength_nm)
         return self.rate_extinction(self.rate_mm_h, wavelength_nm)
 
     def rate_extinction(self, rate_mm_h: float, wavelength_nm: float) -> float:
-        """Return the extinction of a rate in mm of water per hour, 1/m of path."""
+        """Return the extinction coefficient, 1/m of path, at a rate in mm of water per hour."""
         raise NotImplementedError
 
 
@@ -107,5 +107,5 @@ class Snow(Precipitation):
     condition: Literal["snow"] = Field("snow", description="Weather.")
 
     def rate_extinction(self, rate_mm_h: float, wavelength_nm: float) -> float:
-        """Return the extinction of wet snow, 1/m."""
+        """Return the extinction coefficient of wet snow, 1/m of path, at a rate in mm of water per hour."""
         return snow_extinction(rate_mm_h, wavelength_nm)

@@ -31,7 +31,7 @@ def visibility_extinction(visibility: float, wavelength_nm: float, exponent: flo
 
 
 def kim_exponent(visibility: float) -> float:
-    """Return q of Kim, McArthur and Korevaar: 0 below 500 m, then growing to 1.3 at 6 km; 1.6 above 50 km."""
+    """Return Kim's exponent q at a visibility (m): 0 below 500 m, growing to 1.3 at 6 km; 1.6 above 50 km."""
     kilometres = visibility * _PER_KILOMETRE
     if kilometres < 0.5:
         return 0.0
@@ -43,7 +43,7 @@ def kim_exponent(visibility: float) -> float:
 
 
 def kruse_exponent(visibility: float) -> float:
-    """Return q of Kruse: 0.585 V^(1/3) below 6 km, with V in km, then 1.3, and 1.6 above 50 km."""
+    """Return Kruse's exponent q at a visibility V (m): 0.585 (V in km)^(1/3) below 6 km, 1.3, 1.6 above 50 km."""
     kilometres = visibility * _PER_KILOMETRE
     return 0.585 * kilometres ** (1.0 / 3.0) if kilometres < 6.0 else _clear_exponent(kilometres)
 
@@ -53,7 +53,7 @@ def _clear_exponent(kilometres: float) -> float:
 
 
 def per_metre(decibels_per_kilometre: float) -> float:
-    """Return the extinction (1/m) of an attenuation in dB/km."""
+    """Return the extinction coefficient, 1/m, of an attenuation in dB/km."""
     return decibels_per_kilometre * _PER_DECIBEL * _PER_KILOMETRE
 
 

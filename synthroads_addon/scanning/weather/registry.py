@@ -19,7 +19,7 @@ else:
 
 
 def weather_of(environment: Environment) -> Weather:
-    """Return the weather that a road has.
+    """Return the weather model of a road's environment, with its visibility or the condition's usual one.
 
     A visibility that its parameter set leaves at the default, that of a clear day, is the usual one of its condition:
     fog of 23 km is none.

@@ -102,12 +102,12 @@ def scan_of(mesh: SceneMesh, rays: int = 1, path: Standing | None = None, moving
 
 def scan_block(scan: ScanPlan, strip: Strip, block: int) -> BlockResult:
     """Scan one block."""
-    return BlockScan(scan).block(strip, block)
+    return BlockScan(scan).scan_block(strip, block)
 
 
 def scan_pulses(scan: ScanPlan, strip: Strip, first: int, count: int, key: int = 0) -> BlockResult:
     """Scan pulses of a strip."""
-    return BlockScan(scan).pulses(strip, first, count, key)
+    return BlockScan(scan).scan_pulses(strip, first, count, key)
 
 
 def emit_pulses(scan: ScanPlan, strip: Strip, begin: float, end: float, first: int, count: int) -> Pulses:

@@ -30,7 +30,7 @@ class MadeUpScans:
 
     def record(self, plans: Iterable[ScanPlan], files: CloudFiles, timer: StageTimer, announce: bool) -> dict[str, Any]:
         for plan in plans:
-            pulses = sum(map(plan.pulses, plan.path.strips))
+            pulses = sum(map(plan.pulse_count, plan.path.strips))
             self.now += self.each + RATE * pulses + (FIRST if self.first else 0.0)
             self.first = False
             files.counts.points += pulses // 2

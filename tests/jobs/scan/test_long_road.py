@@ -130,7 +130,7 @@ def errors_of_a_section(work: SectionScan, road: RoadGeometry, section: Any, mon
         MESH[id(scan)] = meshes[-1]
         triangles = exact_triangles(road, section.low, section.high, scan, scan.frame_origin)
         strip, block = section.blocks[len(section.blocks) // 2]
-        first, _ = work.cut.pulses_of(strip, block)
+        first, _ = work.cut.pulse_span(strip, block)
         result = scan_pulses(scan, strip, first, PULSES, block).points
         times = (work.cut.time(strip, number) for number in (first, first + PULSES - 1))
         pulses = emit_pulses(scan, strip, *times, first, PULSES)

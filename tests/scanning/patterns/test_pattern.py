@@ -14,7 +14,7 @@ from scipy import stats
 
 from synthroads_addon.base.rotations import rotation_matrix
 from synthroads_addon.scanning.devices.device import Device, PulseMode, ScannerSetting, device_names, load_device
-from synthroads_addon.scanning.devices.shots import _table, shot_count, shots
+from synthroads_addon.scanning.devices.shots import _cycle_table, shot_count, shots
 from synthroads_addon.scanning.patterns.base import PulseRays
 from tests.helpers.scenes.scanners import custom, mode, preset, wedges
 
@@ -234,11 +234,11 @@ def test_cycles_repeat(name: str) -> None:
 
 
 def test_long_cycles_are_not_kept() -> None:
-    _table.cache_clear()
+    _cycle_table.cache_clear()
     shots(finest(), 0, 10)
-    assert _table.cache_info().currsize == 0
+    assert _cycle_table.cache_info().currsize == 0
     shots(preset("generic-polygon"), 0, 10)
-    assert _table.cache_info().currsize == 1
+    assert _cycle_table.cache_info().currsize == 1
 
 
 @pytest.mark.parametrize("name", EVERY)

@@ -65,12 +65,12 @@ def test_no_pulse_leaves_after_the_trajectory_has_ended(tmp_path: Path) -> None:
     line = 1.0 / setting.lines_per_second
     for duration, count in ((1e-9, 1), (0.3 * line, None), (line, setting.pulses_per_line)):
         path = trajectory(tmp_path, rows_of(np.array([0.0, duration])))
-        pulses = Blocks(setting, path, 1).pulses(path.strips[0])
+        pulses = Blocks(setting, path, 1).pulse_count(path.strips[0])
         after = shots(setting, 0, pulses + 1).time
         assert after[-2] <= duration < after[-1] + 1e-12
         assert count in (None, pulses)
     path = trajectory(tmp_path, rows_of(np.array([0.0, 2.5 * line])))
-    assert Blocks(setting, path, 1).pulses(path.strips[0]) == 2 * setting.pulses_per_line
+    assert Blocks(setting, path, 1).pulse_count(path.strips[0]) == 2 * setting.pulses_per_line
 
 
 def test_the_blocks_of_a_flight_of_thirty_years_are_counted_and_not_listed(tmp_path: Path) -> None:

@@ -36,11 +36,11 @@ def shaded(place: Float, middle: Float | float = 0.0) -> np.ndarray:
 def test_what_stands_throws_its_shadow() -> None:
     target = Target(ScannedScene(plate(-1.0, 1.0)), BruteForce)
     place = ground(3000)
-    free = target.sees(place, SUN, np.zeros(place.shape[1]), [])
+    free = target.unobstructed(place, SUN, np.zeros(place.shape[1]), [])
     assert np.array_equal(~free, shaded(place))
     assert 5 < (~free).sum() < 60
-    assert target.sees(place, SUN, np.zeros(place.shape[1]), [], reach=1.0).all(), "nothing is as near as that"
-    assert len(target.sees(place[:, :0], SUN, np.zeros(0), [])) == 0
+    assert target.unobstructed(place, SUN, np.zeros(place.shape[1]), [], reach=1.0).all(), "nothing is as near as that"
+    assert len(target.unobstructed(place[:, :0], SUN, np.zeros(0), [])) == 0
 
 
 def test_what_moves_throws_its_shadow_where_it_is() -> None:
@@ -48,7 +48,7 @@ def test_what_moves_throws_its_shadow_where_it_is() -> None:
     target = Target(ScannedScene(plate(100.0, 101.0), (moving,)), BruteForce)
     place = ground(2000)
     times = np.linspace(0.0, 2.0, place.shape[1])
-    free = target.sees(place, SUN, times, target.motions(0.0, 2.0, 0.1))
+    free = target.unobstructed(place, SUN, times, target.motions(0.0, 2.0, 0.1))
     assert np.array_equal(~free, shaded(place, 5.0 * times))
     late = ~free & (times > 1.5)
     assert late.any()
