@@ -26,7 +26,7 @@ from ..scanning.radiometry import received_intensity
 
 @dataclass(frozen=True)
 class Texture:
-    """Factors on a material's reflectivity over a surface; the picture is repeated beyond its edges.
+    """Factors on a material's reflectivity over a surface, from a picture that repeats beyond its edges.
 
     Attributes:
         values: (height, width) reflectivity over the picture's mean.
@@ -39,7 +39,7 @@ class Texture:
     mean_color: tuple[float, float, float]
 
     def factor(self, x: Float, y: Float) -> Float:
-        """Return the factors at places (any shape), m: those of the pixels they lie in."""
+        """Return the reflectivity factors at places x, y (any shape), m: those of the pixels they lie in."""
         height, width = self.values.shape
         column = np.floor(x / self.size[0] * width).astype(np.intp) % width
         row = np.floor(y / self.size[1] * height).astype(np.intp) % height
@@ -47,7 +47,7 @@ class Texture:
 
 
 def texture_of(pixels: Float, width: float, material: Material) -> Texture:
-    """Return the texture of a picture's linear colours.
+    """Return the texture that a picture's linear colours give a material.
 
     Args:
         pixels: (height, width, 3) linear RGB, 0 to 1.
@@ -64,7 +64,7 @@ def texture_of(pixels: Float, width: float, material: Material) -> Texture:
 
 
 def read_texture(path: Path, width: float, material: Material) -> Texture:
-    """Return the texture of an image file in sRGB, see `texture_of`.
+    """Read an image file in sRGB and return the texture that it gives a material.
 
     Raises:
         MissingFileError: there is no such file.
@@ -92,7 +92,7 @@ _SEED = 1
 
 @dataclass(frozen=True)
 class Views:
-    """From where places are seen; (N,) arrays.
+    """Incidence angles and ranges at which N places are seen.
 
     Attributes:
         incidence: angle between beam and surface normal, rad.
@@ -105,7 +105,7 @@ class Views:
 
 @dataclass(frozen=True)
 class Receiver:
-    """Response of a device to the light that comes back.
+    """Model of a device's response: beam divergence, attenuation, range correction, and linear or dB storage.
 
     Attributes:
         divergence: full angles of the beam at 1/e^2, rad.
@@ -120,27 +120,27 @@ class Receiver:
     decibels: float | None = None
 
     def at_range(self, brightness: Float, distance: Float) -> Float:
-        """Return linear intensities (N,) of surfaces' brightness at ranges (N,), m."""
+        """Return linear intensities (N,) of surfaces' brightness at ranges (N,), m, as the device corrects them."""
         if self.range_corrected:
             return brightness
         return received_intensity(brightness, distance, self.attenuation)
 
     def to_stored(self, linear: Float) -> Float:
-        """Return what the device writes, without rounding, for linear intensities times its gain; -inf dB for 0."""
+        """Return the unrounded intensities that the device stores for linear ones times its gain; -inf for 0 in dB."""
         if self.decibels is None:
             return linear
         with np.errstate(divide="ignore"):
             return FULL_SCALE / self.decibels * 10.0 * np.log10(linear)
 
     def to_linear(self, stored: Float) -> Float:
-        """Return linear intensities times the gain: the inverse of `to_stored`."""
+        """Return the linear intensities, times the gain, of stored ones: the inverse of `to_stored`."""
         if self.decibels is None:
             return stored
         return np.asarray(10.0 ** (stored * self.decibels / (10.0 * FULL_SCALE)))
 
 
 class Expectation:
-    """The places of one class that are looked at; fixed, so that only the material makes a difference.
+    """Simulated samples of one class, with fixed random places, so that only the material makes a difference.
 
     Args:
         views: in an order of chance, again and again or only some of them: `SAMPLES` are taken.
@@ -173,7 +173,7 @@ class Expectation:
         self._texture = None if texture is None else self._of_texture(texture, rng)
 
     def linear_intensities(self, material: Material, beside: Material | None = None) -> Float:
-        """Return the linear intensities (`SAMPLES`,) that come back.
+        """Return the linear intensities (`SAMPLES`,) that a material gives at the sampled places.
 
         Args:
             material: of the class.
@@ -193,7 +193,7 @@ class Expectation:
         return self._receiver.at_range(brightness * (1.0 - material.transmission), self.distance)
 
     def _rays(self) -> tuple[Float, Float, Float]:
-        """Return where the footprint's rays (`SAMPLES`, K) fall, m: along the scan line, across it, and their shares.
+        """Return where the footprint's rays fall, m, along and across the scan line (`SAMPLES`, K), and weights (K,).
 
         The scan line runs across the strip, where a slanting beam's footprint is longest.
         """
@@ -203,19 +203,19 @@ class Expectation:
         return along, pattern.across[:, 1] * radius[1], pattern.weights
 
     def _share_on(self, width: float) -> Float:
-        """Return the share of each pulse that falls on the strip, the pulses' middles being spread over its width."""
+        """Return the share (`SAMPLES`,) of each pulse's energy on a strip, pulses being spread over its width (m)."""
         along, _, weight = self._rays()
         inside = np.abs(along + width * self._across[:, None]) <= width / 2.0
         return np.asarray((inside * weight).sum(axis=1))
 
     def _of_texture(self, texture: Texture, rng: np.random.Generator) -> Float:
-        """Return the texture's factor on the brightness, its mean over each footprint."""
+        """Return the texture's mean factor (`SAMPLES`,) over each footprint, at random places of the picture."""
         along, across, weight = self._rays()
         middle = rng.random((2, SAMPLES, 1)) * np.array(texture.size)[:, None, None]
         return np.asarray((texture.factor(middle[0] + along, middle[1] + across) * weight).sum(axis=1))
 
 
 def chosen_views(incidence_deg: tuple[float, ...], ranges: tuple[float, ...]) -> Views:
-    """Return views at every one of some incidence angles (deg) and ranges (m)."""
+    """Return the views at all combinations of incidence angles (deg) and ranges (m)."""
     incidence, distance = np.meshgrid(np.deg2rad(incidence_deg), np.array(ranges, dtype=np.float64))
     return Views(incidence.ravel(), distance.ravel())

@@ -35,7 +35,7 @@ _FEWEST_PAIRS = 50
 
 @dataclass(frozen=True)
 class Fit:
-    """Fitted material of a class.
+    """Fitted level and spreads of a class's material.
 
     Attributes:
         level: factor on the material's linear intensities: the device's gain times the change of the brightness.
@@ -48,7 +48,7 @@ class Fit:
 
 
 def interquartile_range(quantiles: Float) -> float:
-    """Return the interquartile range of `FITTED` quantiles (4,), at least a millionth of the median."""
+    """Return the interquartile range of `FITTED` quantiles (4,), at least a millionth of their median."""
     return max(float(quantiles[2] - quantiles[0]), 1e-6 * abs(float(quantiles[1])), 1e-300)
 
 
@@ -60,7 +60,7 @@ def fit_level_and_spreads(
     beside: tuple[Material, float] | None = None,
     spread: bool = True,
 ) -> Fit:
-    """Return level and spreads with which the expected quantiles come nearest to the cloud's.
+    """Return level and spreads at which the expected quantiles fit the cloud's best (least squares).
 
     Levenberg and Marquardt's method on the differences over the interquartile range.
 
@@ -90,7 +90,7 @@ def fit_level_and_spreads(
 
 
 def apply_gain(expectation: Expectation, material: Material, fit: Fit, beside: tuple[Material, float] | None) -> Float:
-    """Return linear intensities with a fit's spreads and level; what lies beside a strip keeps its own level."""
+    """Return linear intensities (`SAMPLES`,) by a fit's spreads, times its level; what is beside a strip keeps its."""
     uneven = material.model_copy(update={"spread_below": fit.below, "spread_above": fit.above})
     if beside is None:
         return fit.level * expectation.linear_intensities(uneven)
@@ -129,7 +129,7 @@ def _levenberg_marquardt(miss: Function, x: Float) -> Float:
 def common_gain(
     materials: Sequence[Material], levels: Sequence[float], hold: int | None = None, given: float | None = None
 ) -> float:
-    """Return the one gain of the device that explains the levels of all classes.
+    """Return the one gain of the device that explains the levels of all classes: given, held, or their mean.
 
     The given one, or that of the held material; else the one that changes the materials' brightness least (the mean of
     the levels' logarithms), but never so small that a material had to reflect more than `BRIGHTEST`.
@@ -148,7 +148,7 @@ def common_gain(
 
 
 def brighten_material(material: Material, change: float, limited: bool = True) -> Material:
-    """Return a material that gives back ``change`` times as much: reflectivity and retro-reflection alike.
+    """Return a material with reflectivity and retro-reflection multiplied by ``change``.
 
     The base colour is what the camera sees: it stays as long as a specular share of 0 to 1 can make the reflectivity.
 
@@ -174,7 +174,7 @@ def brighten_material(material: Material, change: float, limited: bool = True) -
 
 
 def fitted_slope(incidence: Float, linear: Float) -> float | None:
-    """Return the facet slope (rad) whose fall-off with the incidence angle is most like that of the medians of a class.
+    """Return the facet slope (rad) whose fall-off with incidence fits a class best; None if angles differ too little.
 
     Args:
         incidence: (N,) rad.
@@ -197,7 +197,7 @@ def fitted_slope(incidence: Float, linear: Float) -> float | None:
 
 
 def fitted_wavelength(place: Float, intensity: Float) -> float:
-    """Return the one of `WAVELENGTHS` whose field makes neighbours as alike as they are in a real class.
+    """Return that of `WAVELENGTHS`, m, whose random field correlates over distance most like a real class.
 
     Intensities are taken by rank, as normal scores, so that no model of the distribution is needed. What is compared
     are their variances within squares of several sizes, with the field's at the same places.
@@ -222,7 +222,7 @@ def _members(place: Float, size: float) -> Index:
 
 
 def _within(values: Float, squares: list[Index]) -> Float:
-    """Return the variance within squares of each size as a share of the whole; NaN where too few have two points."""
+    """Return the variance within squares of each size as a share of the total; NaN where too few pairs are in one."""
     result = []
     for owner in squares:
         count = np.bincount(owner)
@@ -234,7 +234,7 @@ def _within(values: Float, squares: list[Index]) -> Float:
 
 
 def _scores(values: Float) -> Float:
-    """Return normal scores (N,) of values by their ranks, by a rational approximation (Abramowitz & Stegun 26.2.23)."""
+    """Return normal scores (N,) of values by rank, by a rational approximation (Abramowitz & Stegun 26.2.23)."""
     rank = np.empty(len(values))
     rank[np.argsort(values, kind="stable")] = (np.arange(len(values)) + 0.5) / len(values)
     tail = np.sqrt(-2.0 * np.log(np.minimum(rank, 1.0 - rank)))

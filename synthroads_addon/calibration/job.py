@@ -40,7 +40,7 @@ _MOST_VIEWS = 60
 
 @dataclass(frozen=True)
 class MaterialTarget:
-    """A material and the class that it is compared with.
+    """A material of the table and the class of the real cloud that it is compared with.
 
     Attributes:
         material: name in the table.
@@ -57,7 +57,7 @@ class MaterialTarget:
 
 @dataclass(frozen=True)
 class CalibrationJob:
-    """Request for a calibration: what is to be compared, and how it was seen.
+    """Request for a calibration: what is compared with what, how it was seen, and what is fitted.
 
     Attributes:
         targets: materials with their classes; a strip's is compared after the one that lies beside it.
@@ -99,18 +99,18 @@ class CalibrationJob:
 
     @property
     def receiver(self) -> Receiver:
-        """Return the device."""
+        """Return the response model of the job's device, a ray without divergence if none is named."""
         mrad = load_device(self.device).divergence_mrad if self.device else (0.0, 0.0)
         return Receiver((mrad[0] * 1e-3, mrad[1] * 1e-3), self.attenuation, self.range_corrected, self.decibels)
 
     def start(self) -> dict[str, Material]:
-        """Return the material table that the calibration starts from."""
+        """Return the materials, by name, that the calibration starts from: shipped, the scene's, the user's table's."""
         return {**materials(), **self.scene, **(read_material_table(self.table) if self.table else {})}
 
 
 @dataclass(frozen=True)
 class ClassComparison:
-    """One material beside its class.
+    """Expected intensities of one material beside the real ones of its class.
 
     Attributes:
         target: the material and its class.
@@ -129,14 +129,14 @@ class ClassComparison:
     real: RealClass | None
 
     def errors(self) -> Float | None:
-        """Return the (4,) differences of the `FITTED` quantiles as shares of the real interquartile range."""
+        """Return the errors of the `FITTED` quantiles (4,) over the real interquartile range; None without a cloud."""
         if self.real is None:
             return None
         real = np.quantile(self.real.intensity, FITTED)
         return np.asarray((np.quantile(self.expected, FITTED) - real) / interquartile_range(real))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the figures as JSON data."""
+        """Return quantiles, errors, views and materials of the comparison as JSON data."""
         names = [f"{100 * share:g}" for share in SHOWN]
 
         def quantiles(values: Float) -> dict[str, float]:
@@ -161,7 +161,7 @@ class ClassComparison:
         return data | {"reflectivity": [_short(row.reflectivity) for row in (self.before, self.after)]}
 
     def _by_view(self) -> list[dict[str, float]]:
-        """Return the expected quartiles at each incidence angle and range, where these are few."""
+        """Return the expected quartiles at each incidence angle and range; empty if these are many."""
         views, owner = np.unique(np.stack([self.incidence, self.distance]), axis=1, return_inverse=True)
         if views.shape[1] > _MOST_VIEWS:
             return []
@@ -175,7 +175,7 @@ class ClassComparison:
 
 @dataclass(frozen=True)
 class Calibration:
-    """The result.
+    """Result of a calibration: gain, comparison of each class, and material table.
 
     Attributes:
         job: what was asked for.
@@ -190,7 +190,7 @@ class Calibration:
     table: Mapping[str, Material] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the figures as JSON data."""
+        """Return gain, settings and all classes' comparisons as JSON data."""
         job = self.job
         return {
             "type": "Calibration",
@@ -206,12 +206,12 @@ class Calibration:
 
 
 def calibrate(job: CalibrationJob) -> Calibration:
-    """Compare, and fit if asked to, in one go; see `steps`."""
+    """Run a calibration to its end, without progress, and return its result; see `steps`."""
     return exhaust(steps(job), lambda share: None)
 
 
 def steps(job: CalibrationJob) -> Generator[float, None, Calibration]:
-    """Compare, and fit if asked to; yield the share that is done, return the result.
+    """Run a calibration step by step: yield the share done, 0 to 1, and return the result.
 
     The classes share one gain. With a fit each takes the level that its quantiles need, and the gain is what they have
     in common, see `calibration.fit.common_gain`; without, it is the one with which the medians come nearest.
@@ -236,7 +236,7 @@ def steps(job: CalibrationJob) -> Generator[float, None, Calibration]:
 
 
 def save_fitted(result: Calibration, path: Path, overwrite: bool = False) -> None:
-    """Write the fitted materials into a user's table, beside the other materials of the job's table.
+    """Write the fitted materials, with the others of the job's own table, to a material table file.
 
     Raises:
         InputError: nothing was fitted, or the file can't be written, see `write_material_table`.
@@ -249,7 +249,7 @@ def save_fitted(result: Calibration, path: Path, overwrite: bool = False) -> Non
 
 
 def check(job: CalibrationJob) -> None:
-    """Refuse a job that can't be done, before any work."""
+    """Raise `InputError` if a job can't be done or contradicts itself, before any work."""
     table = job.start()
     if not job.targets:
         raise InputError("--material", None, "at least one is needed")
@@ -302,7 +302,7 @@ def _check_road(job: CalibrationJob, road: RoadClasses) -> None:
 
 @dataclass(frozen=True)
 class _FitInput:
-    """Everything that the fit of one class needs."""
+    """Inputs of one class's fit."""
 
     target: MaterialTarget
     before: Material
@@ -337,7 +337,7 @@ def _fit_input(job: CalibrationJob, target: MaterialTarget, before: Material, re
 
 
 def _with_facets(job: CalibrationJob, material: Material, real: RealClass, views: Views) -> Material:
-    """Return a material with the facet slope and the wavelength of the real class."""
+    """Return a material with the variation's wavelength and the facet slope fitted to a class, as the job asks."""
     update: dict[str, Any] = {}
     if "wavelength" in job.parts:
         update["spread_wavelength"] = fitted_wavelength(real.place, real.intensity)
@@ -350,7 +350,7 @@ def _with_facets(job: CalibrationJob, material: Material, real: RealClass, views
 
 
 def _views(job: CalibrationJob, real: RealClass | None) -> Views:
-    """Return how a class was seen: as its points say, from the scanner's place, or as chosen."""
+    """Return the incidence angles and ranges of a class: stored, computed from the scanner's place, or the job's."""
     if real is not None and job.scanner is not None:
         distance, incidence = ranges_and_incidences(real, np.array(job.scanner))
         return Views(incidence, distance)
@@ -362,7 +362,7 @@ def _views(job: CalibrationJob, real: RealClass | None) -> Views:
 def _beside(
     job: CalibrationJob, inputs: list[_FitInput], fits: list[Fit], number: int
 ) -> tuple[Material, float] | None:
-    """Return the material beside a strip and its level: the pavement's, which must come first."""
+    """Return the pavement's material and level, seen beside a strip; None if the class is no strip."""
     if not inputs[number].strip:
         return None
     for item, fit in zip(inputs, fits, strict=False):
@@ -405,7 +405,7 @@ def _result(
 def _compare_class(
     job: CalibrationJob, item: _FitInput, row: Material, gain: float, rows: list[Material], inputs: list[_FitInput]
 ) -> ClassComparison:
-    """Return a class with the intensities that its final material gives."""
+    """Return the comparison of a class with the intensities that its final material and the gain give."""
     pairs = zip(rows, inputs, strict=True)
     beside = next((material for material, other in pairs if other.target.real_class == "paved"), None)
     fit = Fit(gain, row.spread_below, row.spread_above)
@@ -417,7 +417,7 @@ def _compare_class(
 
 
 def _round_material(row: Material) -> Material:
-    """Return a material with as many digits as a table holds; refused if a limit of the table is broken."""
+    """Return a material rounded as a table holds it; raise `InputError` if it breaks the table's limits."""
     data = row.to_dict()
     for name in ("specular", "retroreflection", "facet_slope"):
         if name in data:
@@ -431,5 +431,5 @@ def _mean(levels: list[float]) -> float:
 
 
 def _short(value: float) -> float:
-    """Return a number with six digits."""
+    """Return a number rounded to six significant digits."""
     return float(f"{value:.6g}")

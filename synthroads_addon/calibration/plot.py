@@ -34,7 +34,7 @@ _ANGLES = np.linspace(0.0, 89.5, 180)
 
 
 def save_plot(result: Calibration, path: Path, overwrite: bool = False) -> None:
-    """Write the picture of a result as PNG.
+    """Draw a calibration's result and write it as PNG.
 
     Raises:
         InputError: the name doesn't end in ``.png``, or the file is there already or can't be written.
@@ -47,7 +47,7 @@ def save_plot(result: Calibration, path: Path, overwrite: bool = False) -> None:
 
 
 def calibration_picture(result: Calibration) -> Image.Image:
-    """Return the picture of a result: a diagram for each material, and one of all by incidence angle below."""
+    """Return a picture of a calibration: a histogram for each class, and brightness by incidence angle below."""
     rows = len(result.compared) + 1
 
     def paint(draw: ImageDraw.ImageDraw) -> None:
@@ -98,7 +98,7 @@ def _draw_class(
 
 
 def _words(entry: ClassComparison) -> list[str]:
-    """Return what stands beside a diagram."""
+    """Return the lines of text beside a class's diagram."""
     row = entry.after
     lines = ["expected (line)", f"reflectivity {row.reflectivity:.3f}"]
     if row.retroreflection:
@@ -115,7 +115,7 @@ def _words(entry: ClassComparison) -> list[str]:
 
 
 def _draw_fall_off(draw: ImageDraw.ImageDraw, top: float, result: Calibration) -> None:
-    """Draw the mean brightness of each material by incidence angle, as the scan's reflection model has it."""
+    """Draw each material's mean brightness by incidence angle, by the scan's reflection model."""
     rows = [entry.after for entry in result.compared]
     surfaces = surfaces_of(rows, result.job.reflection, spread=False)
     cosine, same = np.cos(np.deg2rad(_ANGLES)), np.zeros(len(_ANGLES), dtype=np.intp)
@@ -144,13 +144,13 @@ def _frame(draw: ImageDraw.ImageDraw, top: float, low: tuple[float, float], high
 
 
 def _steps(frame: PlotFrame, edges: Float, values: Float) -> list[tuple[float, float]]:
-    """Return the outline of a histogram, from the axis and back to it."""
+    """Return the pixels of a histogram's outline, from the axis up and back to it."""
     x, y = np.repeat(edges, 2), np.concatenate([[0.0], np.repeat(values, 2), [0.0]])
     return frame.at(x, y)
 
 
 def _draw_marks(frame: PlotFrame, quantiles: Float, color: Color, upper: float) -> None:
-    """Draw short bars on the axis at quantiles; the expected ones stand above the real ones."""
+    """Draw short bars on the axis at quantiles; those with ``upper`` 1 stand above those with 0."""
     left, right = 0.03 * (frame.high[1]) * upper, 0.03 * frame.high[1] * (upper + 1.0)
     for value in quantiles:
         frame.draw.line(frame.at(np.array([value, value]), np.array([left, right])), fill=color, width=3 * SCALE)

@@ -17,7 +17,7 @@ from .points import FIELDS, POINT_TYPES, PointBlock, make_block
 
 @dataclass(frozen=True)
 class Column:
-    """One number per point, as files name and store it.
+    """One number per point: its name in files, how it is stored, and the `PointBlock` array it comes from.
 
     Attributes:
         name: in LAS, PLY and E57.
@@ -45,7 +45,7 @@ class Column:
         return self.scale is None
 
     def values(self, block: PointBlock) -> AnyArray:
-        """Return the column (N,) of a block; KeyError if the block doesn't have it."""
+        """Return the column's values (N,) in a block; KeyError if the block lacks their array."""
         array = block.array(self.array)
         if array is None:
             raise KeyError(self.array)
@@ -69,7 +69,7 @@ LayerFiller = Literal["scan", "material", "colour"]
 
 @dataclass(frozen=True)
 class Layer:
-    """A layer that files hold where it is asked for.
+    """An optional per-point layer: its label, its columns in files, and what fills it.
 
     Attributes:
         label: for people.
@@ -174,17 +174,17 @@ def layer_arrays() -> dict[str, tuple[str, int]]:
 
 
 def columns(attributes: tuple[Attribute, ...]) -> tuple[Column, ...]:
-    """Return the columns that a file with these attributes has beyond the fields of LAS, in their order."""
+    """Return the columns of files with these attributes, beyond LAS's own fields, in the files' order."""
     return LABELS + tuple(column for name in ATTRIBUTES if name in attributes for column in LAYERS[name].columns)
 
 
 def attributes_of(names: set[str]) -> tuple[Attribute, ...]:
-    """Return the attributes all of whose columns are among a file's names."""
+    """Return the attributes of which all columns are among these names of a file's columns."""
     return tuple(name for name in ATTRIBUTES if {column.name for column in LAYERS[name].columns} <= names)
 
 
 def make_points(stored: dict[str, AnyArray], attributes: tuple[Attribute, ...], count: int) -> PointBlock:
-    """Return the block of N points that a file's arrays make up.
+    """Return the block of N points from a file's stored columns and arrays.
 
     Arrays that a block always has and the file hasn't are 0; range and incidence are NaN.
 

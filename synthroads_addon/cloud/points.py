@@ -75,7 +75,7 @@ class PointBlock:
         return make_block(**{name: array[keep] for name, array in self.attributes().items()})
 
     def attributes(self) -> dict[str, AnyArray]:
-        """Return the arrays that are there, by name."""
+        """Return the block's arrays by name, without those that are None."""
         named = {name: array for name in FIELDS if (array := getattr(self, name)) is not None}
         return named | dict(self.more)
 
@@ -84,7 +84,7 @@ class PointBlock:
         return getattr(self, name) if name in FIELDS else self.more.get(name)
 
     def with_arrays(self, arrays: Mapping[str, AnyArray | None]) -> PointBlock:
-        """Return the block with arrays put in place of those of the same names; None takes one away."""
+        """Return a copy of the block with these arrays replaced or added; None removes one."""
         kept = {name: array for name, array in {**self.attributes(), **arrays}.items() if array is not None}
         return make_block(**kept)
 
@@ -106,12 +106,12 @@ FIELDS = tuple(f.name for f in fields(PointBlock) if f.name != "more")
 
 
 def make_block(**arrays: AnyArray) -> PointBlock:
-    """Return the block that arrays make up, those of `cloud.layers` that have no field of their own included."""
+    """Return the block of these arrays; layers without a field of their own go into `more`."""
     more = {name: array for name, array in arrays.items() if name not in FIELDS}
     return PointBlock(**{name: array for name, array in arrays.items() if name in FIELDS}, more=more)
 
 
 def concatenate(blocks: list[PointBlock]) -> PointBlock:
-    """Return one block of all points, in order; at least one block is needed, and all have the same attributes."""
+    """Return one block of all points of one or more blocks that have the same attributes, in order."""
     parts = [block.attributes() for block in blocks]
     return make_block(**{name: np.concatenate([part[name] for part in parts]) for name in parts[0]})

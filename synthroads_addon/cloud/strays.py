@@ -26,7 +26,7 @@ _STEPS = [step for step in product((-1, 0, 1), repeat=3) if any(step)]
 
 
 class Strays:
-    """Places gathered block by block, and which of them stray from the rest."""
+    """Detector of outlying places: counts places in cubes, block by block, and finds those far from the rest."""
 
     def __init__(self) -> None:
         self._edge = EDGE
@@ -45,11 +45,11 @@ class Strays:
         self._body = None
 
     def count(self) -> int:
-        """Return how many of the places stray."""
+        """Return the number of places added that stray from the rest."""
         return int(self._counts.sum() - self._counts[np.isin(self._keys, self._of_body())].sum())
 
     def stay(self, xyz: NDArray[np.floating]) -> Bool:
-        """Return which of some of the places (N, 3) don't stray."""
+        """Return a mask (N,) of the places (N, 3), all of them added before, that don't stray."""
         return np.isin(self._keys_of(xyz), self._of_body())
 
     def _keys_of(self, xyz: NDArray[np.floating]) -> Keys:
@@ -60,7 +60,7 @@ class Strays:
         self._counts = np.bincount(owner.ravel(), counts, len(self._keys)).astype(np.int64)
 
     def _of_body(self) -> Keys:
-        """Return the cubes that don't stray."""
+        """Return the keys of the cubes that don't stray; cached until places are added."""
         if self._body is None:
             parts = self._parts()
             sizes = np.bincount(parts, self._counts, parts.max(initial=-1) + 1)
@@ -69,7 +69,7 @@ class Strays:
         return self._body
 
     def _parts(self) -> Index:
-        """Return the number of the part that each cube belongs to."""
+        """Return the number of the connected part (touching cubes) that each cube belongs to."""
         place = {int(key): number for number, key in enumerate(self._keys)}
         steps = _cube_keys(np.array(_STEPS)) - _cube_keys(np.zeros((1, 3), dtype=np.int64))
         part = np.full(len(self._keys), -1, dtype=np.intp)
@@ -87,6 +87,6 @@ class Strays:
 
 
 def _cube_keys(numbers: Int) -> Keys:
-    """Return one number (N,) for each cube's three (N, 3)."""
+    """Return one integer key (N,) for each cube's three numbers (N, 3)."""
     shifted = numbers + 2 ** (_BITS - 1)
     return np.asarray(shifted[:, 0] | shifted[:, 1] << _BITS | shifted[:, 2] << 2 * _BITS)

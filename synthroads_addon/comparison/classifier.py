@@ -35,7 +35,7 @@ _TREES = 100
 
 @dataclass(frozen=True)
 class Distinction:
-    """How well two sets of patches are told apart.
+    """Measures of how well two sets of patches are told apart: AUC of classifiers and features, and MMD.
 
     Attributes:
         patches: of each side.
@@ -50,7 +50,7 @@ class Distinction:
     mmd: float
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as JSON data."""
+        """Return patch count, AUC and squared maximum mean discrepancy as JSON data."""
         shown = {
             name: {key: round(value, 4) for key, value in getattr(self, name).items()} for name in ("auc", "features")
         }
@@ -58,7 +58,7 @@ class Distinction:
 
 
 def distinguish(one: Patches, other: Patches, seed: int, name: str) -> Distinction:
-    """Return how well two sets of patches are told apart, at equal densities.
+    """Return how well a classifier tells two sets of patches apart: AUC and discrepancy at equal densities.
 
     Args:
         one, other: the sets.
@@ -88,13 +88,13 @@ def distinguish(one: Patches, other: Patches, seed: int, name: str) -> Distincti
 
 
 def _blocks(patches: Patches, side: int) -> Index:
-    """Return the number of the square of `BLOCK` that each patch lies in; those of the two sides differ."""
+    """Return the id (P,) of the square of `BLOCK` that each patch lies in; the two sides share no id."""
     square = np.floor(patches.place / BLOCK).astype(np.int64)
     return np.asarray(np.unique(square, axis=0, return_inverse=True)[1].ravel() * 2 + side)
 
 
 def _auc(values: Float, truth: Bool, blocks: Index, seed: int) -> float:
-    """Return the mean AUC of a boosted tree's answers for blocks that it hasn't learned.
+    """Return the cross-validated mean AUC of gradient-boosted trees, with whole blocks held out.
 
     The mean over the folds, not that of all answers together: a fold that learned fewer of one kind would answer lower.
     """
@@ -109,13 +109,13 @@ def _auc(values: Float, truth: Bool, blocks: Index, seed: int) -> float:
 
 
 def _auc_alone(values: Float, truth: Bool) -> float:
-    """Return the AUC of a single statistic, whichever way it points (Mann and Whitney's U)."""
+    """Return the AUC of a single statistic, 0.5 to 1, whichever way it points (Mann and Whitney's U)."""
     auc = roc_auc_score(truth, values)
     return float(max(auc, 1.0 - auc))
 
 
 def squared_discrepancy(one: Float, other: Float) -> float:
-    """Return the squared maximum mean discrepancy (unbiased, about 0 for equal distributions) of rows (N, F), (M, F).
+    """Return the squared maximum mean discrepancy, unbiased, of two samples' rows (N, F) and (M, F).
 
     Statistics are replaced by their ranks among both, so that no unit and no outlier counts; the kernel is Gaussian,
     as wide as the median distance.

@@ -44,7 +44,7 @@ class ListedCloud(ClosedModel):
 
 
 class CloudList(ClosedModel):
-    """Clouds that are compared as one kind."""
+    """List of clouds that are compared as one kind, synthetic or real."""
 
     type: Literal["CloudList"] = "CloudList"
     version: Literal["1.0"] = "1.0"
@@ -53,7 +53,7 @@ class CloudList(ClosedModel):
 
 @dataclass(frozen=True)
 class ComparedCloud:
-    """A cloud with the classes that are compared.
+    """A cloud's points of the classes that are compared.
 
     Attributes:
         name: of the file.
@@ -65,7 +65,7 @@ class ComparedCloud:
 
 
 def find_clouds(path: Path) -> list[tuple[Path, ListedCloud]]:
-    """Return the clouds that a path stands for: a file, all below a folder, or those of a list.
+    """Return (file, how its classes are told) of each cloud that a path stands for: a file, a folder or a list.
 
     Raises:
         InputError: nothing is there, or a list is wrong.
@@ -80,7 +80,7 @@ def find_clouds(path: Path) -> list[tuple[Path, ListedCloud]]:
 
 
 def read_compared(path: Path, row: ListedCloud) -> ComparedCloud:
-    """Read a cloud's classes.
+    """Read a cloud file and return its points of the compared classes, with linear intensities.
 
     Raises:
         InputError: the file can't be read, or has too few points of the road.
@@ -96,7 +96,7 @@ def read_compared(path: Path, row: ListedCloud) -> ComparedCloud:
 
 
 def _other_classes(cloud: RealCloud, row: ListedCloud) -> dict[str, RealClass]:
-    """Return the classes beside the road that the cloud has enough points of."""
+    """Return the marking and vegetation points, by class, as far as the cloud has enough of them."""
     found = {}
     for name in CLASSES[1:]:
         code = getattr(row, name)
@@ -109,7 +109,7 @@ def _other_classes(cloud: RealCloud, row: ListedCloud) -> dict[str, RealClass]:
 
 
 def _with_view(points: RealClass, row: ListedCloud) -> RealClass:
-    """Return points with linear intensities, and with ranges where the list says where they were seen from."""
+    """Return a class's points with intensities made linear, and ranges, m, computed if the scanner's place is given."""
     intensity, distance = points.intensity, points.distance
     if row.decibels is not None:
         intensity = 10.0 ** (intensity / 65535.0 * row.decibels / 10.0)

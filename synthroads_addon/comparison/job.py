@@ -23,7 +23,7 @@ _FEWEST_OF_RING = 30
 
 @dataclass(frozen=True)
 class DescribedCloud:
-    """A cloud, its patches and its figures.
+    """A cloud with the patches of its pavement.
 
     Attributes:
         cloud: the cloud.
@@ -34,7 +34,7 @@ class DescribedCloud:
     patches: Patches
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the figures as JSON data."""
+        """Return the cloud's medians and the figures of its classes and ranges as JSON data."""
         middle = np.median(self.patches.values, axis=0)
         road = float(np.median(_level(self.cloud.classes[ROAD])))
         return {
@@ -49,7 +49,7 @@ class DescribedCloud:
 
 @dataclass(frozen=True)
 class CloudComparison:
-    """The result.
+    """Result of a comparison of synthetic clouds with real ones.
 
     Attributes:
         synthetic, real: the clouds.
@@ -63,11 +63,11 @@ class CloudComparison:
     yardstick: tuple[Distinction, ...]
 
     def realism(self) -> dict[str, float]:
-        """Return 1 - AUC as a share of the yardstick's, by group: 1 where real clouds are told apart as well."""
+        """Return by group 1 - AUC over that among real clouds: 1 if synthetic ones are as hard to tell apart."""
         return {group: _mean(self.told, group) / max(_mean(self.yardstick, group), 1e-9) for group in self.told[0].auc}
 
     def giveaways(self) -> dict[str, tuple[float, float]]:
-        """Return the mean AUC of each statistic alone, of synthetic clouds and of real ones, the largest first."""
+        """Return by statistic its mean AUC alone (synthetic, real), ordered from the largest synthetic one."""
         means = {
             name: tuple(float(np.mean([one.features[name] for one in rows])) for rows in (self.told, self.yardstick))
             for name in FEATURES
@@ -75,12 +75,12 @@ class CloudComparison:
         return dict(sorted(means.items(), key=lambda item: -item[1][0]))  # type: ignore[arg-type]
 
     def discrepancy(self) -> float:
-        """Return the mean of the synthetic clouds' squared discrepancies as a multiple of the yardstick's."""
+        """Return the mean squared discrepancy of synthetic clouds as a multiple of that among real ones."""
         told, real = (float(np.mean([max(one.mmd, 0.0) for one in rows])) for rows in (self.told, self.yardstick))
         return told / max(real, 1e-6)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the figures as JSON data."""
+        """Return the comparison's measures and all clouds' figures as JSON data."""
         return {
             "type": "CloudComparison",
             "realism": {group: round(value, 4) for group, value in self.realism().items()},
@@ -92,17 +92,17 @@ class CloudComparison:
 
 
 def _joined(clouds: tuple[DescribedCloud, ...], distinctions: tuple[Distinction, ...]) -> list[dict[str, Any]]:
-    """Return each cloud's figures together with how well it is told apart."""
+    """Return for each cloud its figures and its distinction from the others, merged, as JSON data."""
     return [one.to_dict() | told.to_dict() for one, told in zip(clouds, distinctions, strict=True)]
 
 
 def _mean(rows: Sequence[Distinction], group: str) -> float:
-    """Return the mean of 1 - AUC, AUC counted as 0.5 where the answers are worse than chance."""
+    """Return the mean of 1 - AUC in a group, with an AUC below 0.5, worse than chance, counted as 0.5."""
     return float(np.mean([1.0 - max(one.auc[group], 0.5) for one in rows]))
 
 
 def compare_steps(synthetic: Path, real: Path, seed: int = 1) -> Generator[float, None, CloudComparison]:
-    """Compare; yield the share that is done.
+    """Compare synthetic with real clouds step by step: yield the share done, 0 to 1, and return the result.
 
     Args:
         synthetic, real: a cloud, a folder of clouds, or a list of them, see `find_clouds`.
@@ -134,7 +134,7 @@ def compare_steps(synthetic: Path, real: Path, seed: int = 1) -> Generator[float
 
 
 def _against_others(one: DescribedCloud, others: list[DescribedCloud], seed: int) -> Distinction:
-    """Return how well a real cloud is told from the others; where there is none, from every other patch of itself."""
+    """Return the distinction of a real cloud from the other real ones, or of its halves if it is the only one."""
     if others:
         return distinguish(one.patches, join_patches([other.patches for other in others]), seed, one.cloud.name)
     dealt = np.random.default_rng(seed).permutation(len(one.patches))
@@ -143,12 +143,12 @@ def _against_others(one: DescribedCloud, others: list[DescribedCloud], seed: int
 
 
 def _level(points: RealClass) -> Float:
-    """Return intensities (N,) in dB."""
+    """Return a class's intensities (N,) in dB."""
     return np.asarray(10.0 * np.log10(points.intensity))
 
 
 def class_figures(points: RealClass, road: float) -> dict[str, float]:
-    """Return the figures of a class as JSON data; ``road`` is the pavement's median, dB."""
+    """Return counts, dB median over the pavement's (``road``, dB) and dB spread of a class as JSON data."""
     level = _level(points)
     low, middle, high = np.quantile(level, (0.25, 0.5, 0.75))
     total = len(level) + points.zeros
@@ -163,7 +163,7 @@ def class_figures(points: RealClass, road: float) -> dict[str, float]:
 
 
 def by_range(points: RealClass, road: float) -> list[dict[str, float]]:
-    """Return points and median intensity of each ring of `RINGS` as JSON data; empty where no range is known."""
+    """Return points and dB median over the pavement's in each ring of range as JSON data; empty without ranges."""
     rows = []
     for low, high in pairwise(RINGS):
         inside = (points.distance >= low) & (points.distance < high)

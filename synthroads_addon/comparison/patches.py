@@ -40,7 +40,7 @@ FEATURES = tuple(name for names in GROUPS.values() for name in names)
 
 @dataclass(frozen=True)
 class Patches:
-    """Statistics of a cloud's patches.
+    """Statistics of P square patches of a cloud's pavement.
 
     Attributes:
         place: (P, 2) corner of each, map, m.
@@ -56,12 +56,12 @@ class Patches:
         return len(self.place)
 
     def select(self, rows: Index) -> Patches:
-        """Return the chosen patches."""
+        """Return the patches at these rows."""
         return Patches(self.place[rows], self.density[rows], self.values[rows])
 
 
 def join_patches(parts: list[Patches]) -> Patches:
-    """Return the patches of several clouds as those of one; their places are kept apart."""
+    """Return the patches of several clouds as one set, their places shifted apart so that they share no block."""
     shifts = [np.array([1e7 * number, 0.0]) for number in range(len(parts))]
     return Patches(
         np.concatenate([part.place + shift for part, shift in zip(parts, shifts, strict=True)]),
@@ -71,7 +71,7 @@ def join_patches(parts: list[Patches]) -> Patches:
 
 
 def make_patches(road: RealClass, name: str) -> Patches:
-    """Return the patches of the pavement's points.
+    """Return the statistics of all patches of the pavement that points fill.
 
     Raises:
         InputError: no square of `EDGE` has enough points in all of its parts.
@@ -90,7 +90,7 @@ def make_patches(road: RealClass, name: str) -> Patches:
 
 
 def _is_whole(place: Float, corner: AnyArray) -> bool:
-    """Say whether a patch has points in all of its parts."""
+    """Return whether a patch has points in all of its `_PARTS` x `_PARTS` parts."""
     part = np.floor((place[:, :2] / EDGE - corner) * _PARTS).astype(np.int64)
     return len(np.unique(part[:, 0] * _PARTS + part[:, 1])) == _PARTS**2
 
@@ -115,7 +115,7 @@ class _Neighbourhood:
 
     @classmethod
     def of(cls, road: RealClass) -> _Neighbourhood:
-        """Find the neighbours of a cloud's points of the road."""
+        """Return the pavement points with their nearest neighbours in plan and intensities in dB."""
         place = road.place - road.place[0]
         distance, neighbour = cKDTree(place[:, :2]).query(place[:, :2], k=_NEIGHBOURS + 1)
         away = place[neighbour[:, 1], :2] - place[:, :2]
@@ -125,12 +125,12 @@ class _Neighbourhood:
         return cls(place, level - np.median(level), distance[:, 1:], neighbour[:, 1:], sector)
 
     def describe(self, rows: Index) -> list[float]:
-        """Return the `FEATURES` of the points of a patch."""
+        """Return the statistics of one patch's points, in the order of `FEATURES`."""
         residual, curvature = _fit_surface(self.place[rows])
         return [*self._pattern(rows), *self._geometry(rows, residual, curvature), *self._intensity(rows, residual)]
 
     def _pattern(self, rows: Index) -> list[float]:
-        """Return how the points are spread in plan.
+        """Return the statistics of how a patch's points are spread in plan.
 
         The ratio of Clark and Evans (1954) is 1 where points lie at random, 2 for a square lattice; the entropy of the
         directions to the nearest neighbours is 1 where all occur alike.
@@ -147,14 +147,14 @@ class _Neighbourhood:
         ]
 
     def _geometry(self, rows: Index, residual: Float, curvature: float) -> list[float]:
-        """Return how the points lie about their plane."""
+        """Return the statistics of how a patch's points lie about their plane; roughness in mm."""
         skew, kurtosis = _shape(residual)
         steps = self.place[self.neighbour[rows, 0], 2] - self.place[rows, 2]
         spread = max(float(residual.std()), 1e-6)
         return [1e3 * spread, skew, kurtosis, curvature, float(np.sqrt(np.mean(steps**2))) / spread]
 
     def _intensity(self, rows: Index, residual: Float) -> list[float]:
-        """Return how the intensities differ within the patch, and from the cloud's median."""
+        """Return the statistics of a patch's intensities, in dB, among each other and to the cloud's median."""
         level = self.level[rows]
         skew, kurtosis = _shape(level)
         low, middle, high = np.quantile(level, (0.25, 0.5, 0.75))
@@ -172,7 +172,7 @@ class _Neighbourhood:
 
 
 def _fit_surface(place: Float) -> tuple[Float, float]:
-    """Return the residuals (N,) of points (N, 3) about their plane, m, and the larger curvature of a parabola, 1/m."""
+    """Return the residuals (N,), m, of points (N, 3) about their plane, and a parabola's larger curvature, 1/m."""
     x, y, z = (place - place.mean(axis=0)).T
     plane = np.stack([np.ones_like(x), x, y], axis=1)
     parabola = np.concatenate([plane, np.stack([x * x, x * y, y * y], axis=1)], axis=1)
@@ -182,7 +182,7 @@ def _fit_surface(place: Float) -> tuple[Float, float]:
 
 
 def _shape(values: Float) -> tuple[float, float]:
-    """Return skewness and kurtosis; 0 of values that are all alike."""
+    """Return skewness and (non-excess) kurtosis of values (N,); 0 for both if all are alike."""
     spread = values.std()
     if spread < 1e-9:
         return 0.0, 0.0
@@ -191,14 +191,14 @@ def _shape(values: Float) -> tuple[float, float]:
 
 
 def _correlation(one: Float, other: Float) -> float:
-    """Return the correlation of two arrays (N,); 0 where one of them doesn't vary."""
+    """Return Pearson's correlation of two arrays (N,); 0 where one of them doesn't vary."""
     if one.std() < 1e-9 or other.std() < 1e-9:
         return 0.0
     return float(np.corrcoef(one, other)[0, 1])
 
 
 def match_density(one: Patches, other: Patches, seed: int, most: int) -> tuple[Patches, Patches]:
-    """Return as many patches of both, at most so many, whose densities are alike.
+    """Return equally many random patches of both, at most ``most``, with like densities (bins of 10 %).
 
     A denser cloud has other statistics for that alone. Which ones are taken is drawn by the seed.
     """

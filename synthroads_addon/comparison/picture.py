@@ -20,7 +20,7 @@ _INCHES = (15.0, 9.0)
 
 
 def save_picture(result: CloudComparison, path: Path, overwrite: bool = False) -> None:
-    """Write the picture of a result as PNG.
+    """Draw a comparison's result and write it as PNG.
 
     Raises:
         InputError: the file is there already or can't be written.
@@ -42,7 +42,7 @@ def save_picture(result: CloudComparison, path: Path, overwrite: bool = False) -
 
 
 def _draw_groups(axes: Any, result: CloudComparison) -> None:
-    """Draw the AUC of each group, of synthetic clouds and of real ones."""
+    """Draw bars of the mean AUC of each group, of synthetic clouds and of real ones."""
     groups = ["all", *GROUPS]
     for shift, rows, colour, label in (
         (-0.2, result.told, _SYNTHETIC, "synthetic"),
@@ -55,7 +55,7 @@ def _draw_groups(axes: Any, result: CloudComparison) -> None:
 
 
 def _draw_feature(axes: Any, result: CloudComparison, number: int, name: str) -> None:
-    """Draw how one statistic is distributed over the patches of both kinds."""
+    """Draw the histograms of one statistic over the patches of synthetic and real clouds."""
     sides = [_values(clouds, number) for clouds in (result.synthetic, result.real)]
     low, high = np.quantile(np.concatenate(sides), (0.005, 0.995))
     edges = np.linspace(low, max(high, low + 1e-9), _BINS)
@@ -68,5 +68,5 @@ def _draw_feature(axes: Any, result: CloudComparison, number: int, name: str) ->
 
 
 def _values(clouds: tuple[DescribedCloud, ...], number: int) -> Float:
-    """Return a statistic of all patches of some clouds."""
+    """Return one statistic, by its column number, of all patches of some clouds (P,)."""
     return np.concatenate([one.patches.values[:, number] for one in clouds])

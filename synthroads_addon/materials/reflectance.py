@@ -17,7 +17,7 @@ EDGE_ON = 1e-12
 
 
 def reflectivity(base_color: ArrayLike, metallic: ArrayLike, specular: ArrayLike) -> Float:
-    """Return R = (1 - m)(s + 0.5 L) + m L with L = 0.3 r + 0.59 g + 0.11 b of the linear base colour.
+    """Return the reflectivity R = (1 - m)(s + 0.5 L) + m L, with luma L = 0.3 r + 0.59 g + 0.11 b, linear.
 
     Args:
         base_color: (..., 3) linear RGB, 0 to 1.
@@ -30,7 +30,7 @@ def reflectivity(base_color: ArrayLike, metallic: ArrayLike, specular: ArrayLike
 
 
 def facet_slope(roughness: ArrayLike) -> Float:
-    """Return the standard deviation of the facets' slope angle, rad: sqrt(v) = atan(r^2 / sqrt 2).
+    """Return the standard deviation of the facets' slope angle, rad, from a renderer's roughness.
 
     A renderer's roughness r stands for the Beckmann distribution with alpha = r^2, whose slopes have a standard
     deviation of alpha / sqrt 2 along each axis (Beckmann & Spizzichino 1963; Walter et al. 2007).
@@ -39,7 +39,7 @@ def facet_slope(roughness: ArrayLike) -> Float:
 
 
 def facet_terms(slope: ArrayLike) -> tuple[Float, Float]:
-    """Return A = 1 - 0.5 v / (v + 0.33) and B = 0.45 v / (v + 0.09) of Oren and Nayar's qualitative model (1994).
+    """Return A = 1 - 0.5 v / (v + 0.33), B = 0.45 v / (v + 0.09) of Oren and Nayar's model, v being ``slope`` squared.
 
     Args:
         slope: (...,) standard deviation of the facets' slope angle sqrt(v), rad; for 0 they are exactly 1 and 0.
@@ -97,7 +97,7 @@ def _is_zero(value: Number) -> bool:
 
 
 def _add_retroreflection(result: Float, cosine: Float, retro: Number, inverse_lobe_squared: Number) -> None:
-    """Add the retro-reflection to (N,) brightnesses; only where there is one, as few surfaces have it."""
+    """Add, in place, the retro-reflective term to brightnesses (N,), where the material has one."""
     strength = np.broadcast_to(np.asarray(retro, dtype=np.float64), result.shape)
     which = np.flatnonzero(strength)
     if not len(which):

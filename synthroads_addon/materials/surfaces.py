@@ -34,7 +34,7 @@ _PURPOSE = 0x5F3D
 
 @dataclass
 class Surfaces:
-    """Materials in the order of the scene mesh's: (M,) arrays, ``base_color`` (M, 3).
+    """Properties of M materials as arrays (M,), in the order of the scene mesh's; ``base_color`` is (M, 3).
 
     Attributes:
         base_color: linear RGB.
@@ -75,7 +75,7 @@ class Surfaces:
 
 
 def surfaces_of(rows: Iterable[Material], reflection: Reflection = "lambert", spread: bool = True) -> Surfaces:
-    """Return the constants of materials; with Lambert's model no surface has facets, without spread none varies."""
+    """Return the properties of materials as arrays; "lambert" drops the facets, ``spread`` False the variation."""
     rows = list(rows)
 
     def column(name: str) -> Float:
@@ -98,7 +98,7 @@ def surfaces_of(rows: Iterable[Material], reflection: Reflection = "lambert", sp
 
 
 def brightness_of(surfaces: Surfaces, material: NDArray[np.integer], cosine: Float) -> Float:
-    """Return the brightness (N,) of surfaces before distance and attenuation, see `reflectance.returned_share`.
+    """Return the brightness (N,) of hits by material and cosine of incidence, before range and attenuation.
 
     Args:
         surfaces: the materials.
@@ -123,13 +123,13 @@ def brightness_of(surfaces: Surfaces, material: NDArray[np.integer], cosine: Flo
 
 
 def mean_over_median(below: Float | float, above: Float | float) -> Float:
-    """Return M = exp(b^2 / 2) P(-b) + exp(a^2 / 2) P(a), the mean of exp(sigma z); P is the normal distribution's."""
+    """Return exp(b^2 / 2) P(-b) + exp(a^2 / 2) P(a), mean over median of a two-piece lognormal distribution."""
     low, high = np.asarray(below, dtype=np.float64), np.asarray(above, dtype=np.float64)
     return np.exp(0.5 * low * low) * _normal(-low) + np.exp(0.5 * high * high) * _normal(high)
 
 
 def spread_factors(surfaces: Surfaces, material: NDArray[np.integer], position: Float, seed: int) -> Float:
-    """Return the factors (N,) at places of materials.
+    """Return the factors (N,), 1 on average, by which the brightness of materials varies from place to place.
 
     Args:
         surfaces: the materials.

@@ -38,7 +38,7 @@ _Share = Annotated[float, Field(strict=True, ge=0.0, le=1.0)]
 
 
 class Material(Model):
-    """Mean properties of one material."""
+    """Mean properties of one material, for renderer and scanner."""
 
     base_color: tuple[_Share, _Share, _Share] = Field(description="Linear red, green, blue.")
     roughness: float = quantity(..., "1", "Roughness as a renderer means it.", (0, 1))
@@ -64,30 +64,30 @@ class Material(Model):
 
     @property
     def reflectivity(self) -> float:
-        """Return R, see `materials.reflectance.reflectivity`; of the light that doesn't go through."""
+        """Return the reflectivity of the light that isn't transmitted, see `materials.reflectance.reflectivity`."""
         return float(reflectivity(self.base_color, self.metallic, self.specular))
 
     @property
     def slope(self) -> float:
-        """Return the standard deviation of the facets' slope, rad: the given one, else that of the roughness."""
+        """Return the standard deviation of the facets' slope, rad: as given, else derived from the roughness."""
         return float(facet_slope(self.roughness)) if self.facet_slope is None else self.facet_slope
 
 
 class MaterialTable(Model):
-    """The file's content."""
+    """Content of a material table file."""
 
     materials: dict[str, Material] = Field(description="Materials by name.")
 
 
 @cache
 def materials() -> dict[str, Material]:
-    """Return the shipped table by name."""
+    """Return the shipped materials by name, read once."""
     path = PRESETS / "materials.json"
     return MaterialTable.from_dict(read_json(path), source=str(path)).materials
 
 
 def material_table_path(name_or_file: str) -> Path:
-    """Return the file of a shipped table of materials (``shifted``), or the one named.
+    """Return the path of a shipped material table, given by its name (``shifted``), or of a ``.json`` file.
 
     Raises:
         InputError: it is neither a shipped table's name nor ends in ``.json``.
@@ -96,7 +96,7 @@ def material_table_path(name_or_file: str) -> Path:
 
 
 def read_material_table(name_or_file: str | Path) -> dict[str, Material]:
-    """Return the materials of a user's table by name; those that it doesn't name stay as the shipped table has them.
+    """Read the materials of a user's table, by name; those that it doesn't name aren't in the result.
 
     Args:
         name_or_file: a file, or a text that `material_table_path` takes.
@@ -110,7 +110,7 @@ def read_material_table(name_or_file: str | Path) -> dict[str, Material]:
 
 
 def write_material_table(path: Path, rows: Mapping[str, Material], overwrite: bool = False) -> None:
-    """Write a material table, a line per material, under a temporary name first; the same rows give the same bytes.
+    """Write a material table file, one line per material, atomically; the same rows give the same bytes.
 
     Args:
         path: ends in ``.json``; its folder is there.
@@ -128,7 +128,7 @@ def write_material_table(path: Path, rows: Mapping[str, Material], overwrite: bo
 
 
 def _line(row: Material) -> str:
-    """Return a material as one line: what it must have, and what differs from the defaults."""
+    """Return a material as a line of JSON: its required fields and those that differ from the defaults."""
     given = {
         name: value
         for name, value in row.to_dict().items()

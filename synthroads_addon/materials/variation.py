@@ -29,7 +29,7 @@ _DEFAULT = MaterialVariation()
 def vary_material(
     name: str, variation: MaterialVariation, environment: Environment, own: Mapping[str, Material] | None = None
 ) -> Material:
-    """Return a material of the table as a road with this variation and weather has it; KeyError for other names.
+    """Return a table's material as a road's variation (age, wear, dryness) and wetness change it; KeyError if unknown.
 
     Args:
         name: of the material.
@@ -43,7 +43,7 @@ def vary_material(
 
 
 def _wet(dry: Material, wet: float) -> Material:
-    """Return a porous material under a film of water; its facets get flatter as the roughness's would."""
+    """Return a porous material under a film of water, ``wet`` 0 to 1: darker, smoother, less retro-reflective."""
     smoother = 1.0 - WET_ROUGHNESS * wet
     result = _scale_color(dry, 1.0 - WET_BASE * wet, 1.0 - WET_SPECULAR * wet)
     return result.model_copy(
@@ -82,7 +82,7 @@ def _scale_color(mean: Material, factor: float, specular: float | None = None) -
 
 
 def _mix_materials(mean: Material, other: Material, share: float) -> Material:
-    """Return a material between two; a negative share goes beyond the first, away from the other.
+    """Return a material between two in colour, specular, facets and beads; a negative share extrapolates.
 
     Roughness, transmission, spread and the lobe of the retro-reflection stay the first's.
     """

@@ -35,7 +35,7 @@ _END = 5.0  # m: a barrier that ends so near to the road's end goes on beyond it
 
 @dataclass(frozen=True)
 class RoadMeasurements:
-    """All that a parameter set is made from.
+    """Measurements of a reconstructed road that a parameter set is made from.
 
     Attributes:
         fit: the alignment in local coordinates.
@@ -62,7 +62,7 @@ class RoadMeasurements:
 
 
 def assemble_parameters(measured: RoadMeasurements) -> RoadParameters:
-    """Return the parameter set of what was measured; the schema checks it.
+    """Return the parameter set of a measured road, validated against the schema.
 
     Raises:
         InputError: a value lies beyond what a parameter set allows.
@@ -111,7 +111,7 @@ def _carriageway(measured: RoadMeasurements, side: SideSection) -> Carriageway:
 
 
 def crossfall_points(stations: Float, fall: Float) -> tuple[CrossfallPoint, ...]:
-    """Return the corners of a chain of straight lines that the crossfall (K,), m/m, stays within 0.15 % of."""
+    """Return the corners of a polyline that the crossfall (K,), m/m, keeps within 0.15 % of, in percent."""
     known = np.isfinite(fall)
     if not known.any():
         return (CrossfallPoint(station=0.0, crossfall_percent=0.0),)
@@ -124,7 +124,7 @@ def crossfall_points(stations: Float, fall: Float) -> tuple[CrossfallPoint, ...]
 
 
 def _corners(station: Float, value: Float, tolerance: float) -> list[int]:
-    """Return the indices that Douglas and Peucker's method keeps."""
+    """Return the indices that Douglas and Peucker's line simplification keeps, ascending."""
     kept, stack = {0, len(station) - 1}, [(0, len(station) - 1)]
     while stack:
         low, high = stack.pop()
@@ -175,7 +175,7 @@ def _line_kind(number: int, last: int, closed: bool) -> LineKind:
 
 
 def _dashes(line: Line | None, length: float, edge: bool = False) -> dict[str, float]:
-    """Return dash, gap, start and end station of a marking as its fields."""
+    """Return dash and gap lengths and start and end stations, m, of a marking as fields of `LineMarking`."""
     dash, gap, start, end = (0.0, 0.0, 0.0, length) if edge else (6.0, 12.0, 0.0, length)
     if line is not None:
         dash, gap, start, end = line.dash, line.gap, max(0.0, line.start), min(length, line.end)
@@ -208,7 +208,7 @@ def _furniture(measured: RoadMeasurements) -> Iterator[tuple[str, RoadObject]]:
 
 
 def barrier_object(barrier: FoundBarrier, start: float, end: float, length: float) -> RoadObject:
-    """Return a found barrier between two stations as an object; it is ramped where it ends on the road."""
+    """Return a found barrier between two stations as an object of the road; ramped down where it ends on the road."""
     place = {"instance": 1, "start_station": start, "end_station": end, "offset": _length(barrier.offset)}
     inside = start > 0.0 or end < length
     terminal = round(min(_TERMINAL, (end - start) / 4.0), 2) if inside else 0.0

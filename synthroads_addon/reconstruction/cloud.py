@@ -35,7 +35,7 @@ _TILE, _MARGIN = 1024, 128
 
 
 class PointKind(IntEnum):
-    """Class of a point, as far as the reconstruction asks."""
+    """What a point lies on, as far as the reconstruction tells it apart."""
 
     OTHER = 0
     UNSORTED = 1
@@ -75,7 +75,7 @@ KIND_OF_CLASS = {
 
 @dataclass(frozen=True)
 class RoadCloud:
-    """The points that count.
+    """N points of a cloud that a road is reconstructed from, sorted by what they lie on.
 
     Attributes:
         xyz: (N, 3) m, less the origin.
@@ -103,21 +103,21 @@ class RoadCloud:
 
     @cached_property
     def surface(self) -> Index:
-        """Return the indices of the points that lie flat."""
+        """Return the indices of the points on ground, verge, pavement and markings; cached."""
         return np.flatnonzero(self.of(*SURFACE))
 
     def near(self, path: CloudPath, distance: float) -> Self:
-        """Return the points within a distance (m) of a path, roughly."""
+        """Return the cloud with only the points within a distance (m) of a path, to some 4 m."""
         kept = path.within(self.xyz[:, :2], distance)
         return replace(self, xyz=self.xyz[kept], intensity=self.intensity[kept], kind=self.kind[kept])
 
     def of(self, *kinds: PointKind) -> Bool:
-        """Return the mask (N,) of some kinds."""
+        """Return a mask (N,) of the points of these kinds."""
         return np.isin(self.kind, kinds)
 
 
 def read_road_cloud(path: FilePath) -> RoadCloud:
-    """Read the points of a cloud that a reconstruction looks at.
+    """Read those points of a cloud file that a reconstruction uses, sorted by what they lie on.
 
     Classes are those that the file itself says: the project's own, in any scheme whose names are known, or the LAS
     classification. A cloud that is for the most part unclassified is sorted into ground and what stands on it.
@@ -150,7 +150,7 @@ def read_road_cloud(path: FilePath) -> RoadCloud:
 
 
 def _kind_table(scheme: ClassScheme) -> NDArray[np.uint8]:
-    """Return the (256,) table from a scheme's ids to `PointKind`."""
+    """Return the table (256,) from a class scheme's ids to `PointKind`."""
     table = np.full(256, PointKind.OTHER, dtype=np.uint8)
     for number, name in scheme.names().items():
         table[number] = KIND_OF_CLASS.get(name, PointKind.OTHER)
@@ -158,7 +158,7 @@ def _kind_table(scheme: ClassScheme) -> NDArray[np.uint8]:
 
 
 def _sort_by_height(path: FilePath, points: _Points, epsg: int | None, classes: dict[str, int]) -> RoadCloud:
-    """Return the cloud of points (map coordinates, intensity, kind), those without a class sorted or left out."""
+    """Return the cloud, its unclassified points sorted by height above ground if most are such, else left out."""
     xyz, intensity, kind = points
     origin = np.round(np.append(xyz[:, :2].mean(axis=0), xyz[:, 2].min()))
     xyz = xyz - origin
@@ -180,7 +180,7 @@ def _sort_by_height(path: FilePath, points: _Points, epsg: int | None, classes: 
 
 
 def above_ground(xyz: Float) -> Float:
-    """Return the height (N,) of points (N, 3) above the ground below them, m.
+    """Return the heights (N,), m, of points (N, 3) above a ground surface estimated from them.
 
     The ground is the lowest point of each cell, opened by a window (so that cars, barriers and bushes fall off),
     gaps filled from the nearest cell, and smoothed. Memory is bounded by the cells that hold points, not by what lies
@@ -208,7 +208,7 @@ def above_ground(xyz: Float) -> Float:
 
 
 def _above_grid(xyz: Float) -> Float:
-    """Return the height (N,) of points above the ground of one grid."""
+    """Return the heights (N,), m, of points above the ground that one grid over them gives."""
     low = np.floor(xyz[:, :2].min(axis=0) / CELL)
     cell = (np.floor(xyz[:, :2] / CELL) - low).astype(np.int64)
     shape = tuple(cell.max(axis=0) + 1)

@@ -25,7 +25,7 @@ _BARRIERS = (Guardrail, ConcreteBarrier, NoiseBarrier)
 
 
 def compare(found: RoadParameters, truth: RoadParameters) -> dict[str, Any]:
-    """Return the differences of a reconstructed road from the true one as JSON data, m.
+    """Return the deviations, m, of a reconstructed road from the true one, as JSON data.
 
     Stations are the true ones, each metre; a place of the true road that the found one doesn't reach counts for
     ``covered`` alone. Barriers are compared metre by metre, delineators one to one.
@@ -52,7 +52,7 @@ def compare(found: RoadParameters, truth: RoadParameters) -> dict[str, Any]:
 
 
 def compare_axis(found: RoadParameters, axis: Float) -> dict[str, Any]:
-    """Return how far a reconstructed road's line passes from a known one's points (N, 3), m in map coordinates.
+    """Return the lateral offsets, m, of a known line's points (N, 3), map coordinates, from a found road, as JSON.
 
     As in `compare`: signed offsets of the points that the found road reaches, and their share as ``covered``.
     Elevations are left aside: lines of road networks often have none.
@@ -75,7 +75,7 @@ def _figures(difference: Float) -> dict[str, float]:
 def _carriageway(
     there: RoadGeometry, here: RoadGeometry, side: Side, same: bool, station: Float, at: Float
 ) -> dict[str, Any]:
-    """Return lane counts and widths of a true carriageway against the one on the same side of the road."""
+    """Return as JSON data the lanes and widths, m, of a found carriageway against the true one on the same side."""
     other: Side = side if same else ("left" if side == "right" else "right")
     if other not in here.sections:
         return {"found": False}
@@ -98,7 +98,7 @@ def _carriageway(
 def _surface(
     there: RoadGeometry, here: RoadGeometry, station: Float, truth: RoadParameters, found: RoadParameters
 ) -> Float:
-    """Return the differences of the heights (N,) of both surfaces, m, at places on the true pavement."""
+    """Return the height differences (N,), m, found less true surface, at places on the true pavement."""
     result = []
     for side in there.sections.values():
         for share in (0.1, 0.3, 0.5, 0.7, 0.9):
@@ -111,7 +111,7 @@ def _surface(
 
 
 def _barriers(there: RoadGeometry, here: RoadGeometry, apart: Float) -> dict[str, Any]:
-    """Return length, recall and precision of all barriers: shares of their metres with one of the other set near."""
+    """Return as JSON data the length, recall and precision of all barriers, metre by metre, and their offsets, m."""
     true, reconstructed = (
         [item for item in road.parameters.objects.values() if isinstance(item, _BARRIERS)] for road in (there, here)
     )
@@ -129,7 +129,7 @@ def _barriers(there: RoadGeometry, here: RoadGeometry, apart: Float) -> dict[str
 def _match_barriers(
     one: RoadGeometry, items: list[Any], other: RoadGeometry, others: list[Any], apart: Float
 ) -> tuple[Bool, Float]:
-    """Return of each metre of some barriers whether one of the others stands there, and how far beside (m)."""
+    """Return for each metre of some barriers whether another one stands there, and for hits how far beside, m."""
     hit: list[Float] = []
     for item in items:
         point = _along(one, item) + apart
@@ -152,7 +152,7 @@ def _along(road: RoadGeometry, item: LineObject) -> Float:
 
 
 def _posts(there: RoadGeometry, here: RoadGeometry, apart: Float) -> dict[str, Any]:
-    """Return count, recall and precision of delineators, matched one to one so that the distances add up to least."""
+    """Return as JSON data count, recall and precision of delineators, matched one to one by least distance."""
     points = []
     for road in (there, here):
         items = [item for item in road.parameters.of_type(Delineator).values() if item.station <= road.length]

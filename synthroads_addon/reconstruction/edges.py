@@ -22,7 +22,7 @@ _FEWEST_POINTS = 6
 
 @dataclass(frozen=True)
 class Edge:
-    """An edge of the pavement, stretch by stretch.
+    """Offsets of an edge of the pavement in each of K stretches, and how exactly points show it.
 
     Attributes:
         offsets: (K,) m; NaN where it isn't seen.
@@ -34,7 +34,7 @@ class Edge:
 
 
 def paved_edge(profiles: Profiles, paved: Grid, begin: Float, sign: int, farthest: float | Float = FARTHEST) -> Edge:
-    """Return where the pavement ends beyond given offsets (K,), m.
+    """Return in each of K stretches the offset, m, at which the pavement ends beyond a given one; NaN if unseen.
 
     Args:
         profiles: S rows along the path.
@@ -62,8 +62,7 @@ def paved_edge(profiles: Profiles, paved: Grid, begin: Float, sign: int, farthes
 
 
 def _between_points(points: SurfacePoints, stretch: int, edge: float, sign: int) -> tuple[float, float]:
-    """Return the offset of an edge that is known to half a metre, midway between the points on its two sides, and how
-    far these are apart."""
+    """Return an edge's offset, m, refined to midway between the points beside it, and the distance of these, m."""
     near = points.near(stretch, edge - _MIXED, edge + _MIXED)
     offset, paved = points.offset[near][::sign], points.paved[near][::sign]
     if len(offset) < _FEWEST_POINTS:
@@ -75,7 +74,7 @@ def _between_points(points: SurfacePoints, stretch: int, edge: float, sign: int)
 
 
 def _edge(share: Float, begin: float, sign: int) -> float:
-    """Return the offset of the edge in a profile (C,) of shares that begins in a bin with a middle."""
+    """Return the offset, m, of the edge in a profile (C,) of paved shares that starts at ``begin``; NaN if unseen."""
     known = np.isfinite(share)
     if known.sum() < 4:
         return float("nan")
@@ -101,7 +100,7 @@ def _mean(values: Grid) -> Float:
 
 @dataclass(frozen=True)
 class Surface:
-    """A carriageway's surface, stretch by stretch.
+    """Height and crossfall of a carriageway's surface in each of K stretches.
 
     Attributes:
         height: (K,) at the pivot line, m; NaN where too little was seen.
@@ -113,7 +112,7 @@ class Surface:
 
 
 def surface(profiles: Profiles, low: Float, high: Float, pivot: Float) -> Surface:
-    """Return the surface between two edges (K,), by a line across each stretch, robustly (bisquare).
+    """Return height and crossfall between two edges (K,), by a robust line (bisquare) across each stretch.
 
     Args:
         profiles: of the road.
@@ -138,7 +137,7 @@ def surface(profiles: Profiles, low: Float, high: Float, pivot: Float) -> Surfac
 
 
 def _grade(profiles: Profiles) -> Float:
-    """Return the grade (K,) of the surface along the path, m/m, so that a stretch can be levelled."""
+    """Return the grade (K,), m/m, of the surface along the path in each stretch."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # rows without points
         middle = np.nanmedian(profiles.height, axis=1)
@@ -148,7 +147,7 @@ def _grade(profiles: Profiles) -> Float:
 
 
 def _fit_line(across: Float, height: Float) -> Float:
-    """Return height at 0 and slope (2,) of a robust line through bins (N,)."""
+    """Return height at 0, m, and slope, m/m, (2,), of a robust line (bisquare) through bins (N,)."""
     matrix = np.column_stack([np.ones(len(across)), across])
     weight, solution = np.ones(len(across)), np.zeros(2)
     for _ in range(_ROUNDS):

@@ -38,7 +38,7 @@ _SHORTEST = 3  # stretches: a shorter doubt is a fault in the picture
 
 @dataclass(frozen=True)
 class Doubt:
-    """A stretch of the road whose axis is not to be trusted: its stations, m, and why."""
+    """A stretch of the road where the reconstructed axis isn't to be trusted: stations, m, and reasons."""
 
     start: float
     end: float
@@ -47,7 +47,7 @@ class Doubt:
 
 @dataclass(frozen=True)
 class Judgement:
-    """How far a reconstruction is to be trusted.
+    """Assessment of how far a reconstruction's axis is to be trusted, and where it isn't.
 
     Attributes:
         doubts: the stretches where it isn't, in order.
@@ -63,7 +63,7 @@ class Judgement:
     middles: Float
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as JSON data."""
+        """Return the assessment as JSON data; lengths and stations in m."""
         stretches = [{"start": doubt.start, "end": doubt.end, "why": list(doubt.reasons)} for doubt in self.doubts]
         names = ("mean", "rms", "largest")
         return {
@@ -75,7 +75,7 @@ class Judgement:
 
 
 def judge(profiles: Profiles, layout: RoadLayout, section: MeasuredSection) -> Judgement:
-    """Return where the axis of a reconstruction, which is the offset 0 of its profiles, is not to be trusted."""
+    """Assess where the axis of a reconstruction, offset 0 of its profiles, isn't to be trusted, and why."""
     guides = axis_guides(layout)
     lines = np.mean([guide.measured for guide in guides], axis=0)
     middles = np.mean(pavement_edges(profiles, section), axis=0)
@@ -98,7 +98,7 @@ def judge(profiles: Profiles, layout: RoadLayout, section: MeasuredSection) -> J
 
 
 def pavement_edges(profiles: Profiles, section: MeasuredSection) -> Float:
-    """Return the offsets (2, K) of the edges of the pavement around the axis, or of what lies between two, m.
+    """Return the right and left edge (2, K), m, of the pavement or median at the axis, found without lines or classes.
 
     They are found by brightness and height alone; NaN where an edge isn't seen.
     """
@@ -118,7 +118,7 @@ def pavement_edges(profiles: Profiles, section: MeasuredSection) -> Float:
 
 
 def _median_profile(values: Grid | Float, stretch: int) -> Float:
-    """Return the median (U,) of the rows about a stretch's middle; NaN where too few have points."""
+    """Return the median profile (U,) of the rows about a stretch's middle; NaN where too few have points."""
     middle = stretch * STRETCH + STRETCH // 2
     rows = values[max(0, middle - _ROWS) : middle + _ROWS + 1].astype(np.float64)
     with warnings.catch_warnings():
@@ -128,14 +128,14 @@ def _median_profile(values: Grid | Float, stretch: int) -> Float:
 
 
 def _level(height: Grid) -> Float:
-    """Return heights (S, U) less the median of their row, so that the road's grade doesn't count."""
+    """Return heights (S, U) less their row's median, which removes the road's grade."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # rows without points
         return np.asarray(height - np.nanmedian(height, axis=1)[:, None], dtype=np.float64)
 
 
 def _is_kerb(height: Float) -> Bool:
-    """Return at which bins (U,) of a profile the ground steps up or down by more than a crossfall would."""
+    """Return a mask (U,) of a profile's bins at which the ground steps up or down by more than a crossfall would."""
     if not np.isfinite(height).any():
         return np.zeros(len(height), dtype=bool)
     filled = ndimage.median_filter(fill_gaps(height), 3)
@@ -145,7 +145,7 @@ def _is_kerb(height: Float) -> Bool:
 
 
 def _core(profiles: Profiles, section: MeasuredSection) -> Bool:
-    """Return which bins (U,) lie about a carriageway's middle."""
+    """Return a mask (U,) of the bins about the carriageways' middles, which are paved for sure."""
     middles = [0.0]
     if section.kind == "dual":
         sides = section.sides.values()
@@ -154,7 +154,7 @@ def _core(profiles: Profiles, section: MeasuredSection) -> Bool:
 
 
 def _contrast(apart: Float, core: Float) -> float:
-    """Return the difference of brightness from which on ground is no pavement; infinite if brightness doesn't tell."""
+    """Return the threshold of brightness differences beyond which ground is unpaved; inf if brightness can't tell."""
     apart, core = apart[np.isfinite(apart)], core[np.isfinite(core)]
     if not len(apart) or not len(core):
         return np.inf
@@ -165,13 +165,13 @@ def _contrast(apart: Float, core: Float) -> float:
 
 
 def _close_cracks(inside: Bool) -> Bool:
-    """Return a mask (K, U) without narrow gaps across the road."""
+    """Return a mask (K, U) with gaps that are narrow across the road closed."""
     across = np.ones((1, _CRACK))
     return ndimage.binary_erosion(ndimage.binary_dilation(inside, across), across, border_value=1)
 
 
 def _run_at_axis(profiles: Profiles, inside: Bool, known: Bool) -> tuple[float, float]:
-    """Return the right and left end (m) of the run of bins (U,) nearest to the axis; NaN where the cloud ends it."""
+    """Return right and left end, m, of the run of bins (U,) nearest to the axis; NaN where the cloud ends it."""
     label, _ = ndimage.label(inside)
     near = label[(np.abs(profiles.offsets) < _CORE) & inside]
     if not len(near):
@@ -185,17 +185,17 @@ def _run_at_axis(profiles: Profiles, inside: Bool, known: Bool) -> tuple[float, 
 
 
 def _is_near(seen: Bool) -> Bool:
-    """Return where (K,) something is seen within some stretches."""
+    """Return a mask (K,) of the stretches that have something seen within `_NEAR` stretches."""
     return ndimage.binary_dilation(seen, iterations=_NEAR)
 
 
 def _without_short_runs(mask: Bool) -> Bool:
-    """Return a mask (K,) without runs that are shorter than a doubt can be."""
+    """Return a mask (K,) without runs shorter than `_SHORTEST` stretches."""
     return ndimage.binary_opening(mask, np.ones(_SHORTEST))
 
 
 def _doubts(profiles: Profiles, doubtful: Bool, masks: dict[str, Bool]) -> Iterator[Doubt]:
-    """Yield the runs of a mask (K,) with the reasons that hold within each."""
+    """Yield each run of a mask (K,) as a doubt with the reasons whose masks hold anywhere in it."""
     label, _ = ndimage.label(doubtful)
     half, length = 0.5 * STRETCH, float(profiles.stations[-1])
     for (run,) in ndimage.find_objects(label):

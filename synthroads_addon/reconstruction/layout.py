@@ -36,7 +36,7 @@ _ROUNDS = 4
 
 @dataclass(frozen=True)
 class Band:
-    """One carriageway as it lies in the profiles.
+    """One carriageway's strip of pavement in the profiles, with its lines.
 
     Attributes:
         low, high: offsets of its pavement's edges, m, from right to left.
@@ -53,18 +53,18 @@ class Band:
 
     @property
     def width(self) -> float:
-        """Return its width, m."""
+        """Return the pavement's width, m."""
         return self.high - self.low
 
     @property
     def middle(self) -> Line | None:
-        """Return the line in its middle, the most painted one if there are several; None if there is none."""
+        """Return the most painted of the lines near the band's middle; None if there is none."""
         middle = 0.5 * (self.low + self.high)
         near = [line for line in self.lines if abs(line.offset - middle) < _IN_THE_MIDDLE * self.width]
         return max(near, key=lambda line: line.length * line.width, default=None)
 
     def guide(self, sign: int) -> Line:
-        """Return its outermost line to the right (-1) or left (+1), or its edge there if it has no line near it."""
+        """Return the outermost line to the right (-1) or left (+1), or the pavement's edge if no line is near it."""
         edge = self.edges[0 if sign < 0 else 1]
         line = self.lines[0 if sign < 0 else -1] if self.lines else None
         return line if line is not None and abs(line.offset - edge.offset) < _NEAR_EDGE else edge
@@ -88,7 +88,7 @@ class RoadLayout:
 
 
 def find_layout(profiles: Profiles, lines: list[Line], wanted: RoadKind | None = None) -> RoadLayout:
-    """Return the layout of profiles with lines.
+    """Return the layout of carriageways and lanes that lines and pavement of the profiles show.
 
     Args:
         profiles: along a path parallel to the road.
@@ -120,12 +120,12 @@ def find_layout(profiles: Profiles, lines: list[Line], wanted: RoadKind | None =
 
 
 def covered_length(profiles: Profiles) -> float:
-    """Return the length (m) on which the profiles have points."""
+    """Return the length, m, of the path along which the profiles have points."""
     return float((profiles.count.sum(axis=1) > 0).sum())
 
 
 def paved_bands(profiles: Profiles, paved: Grid) -> list[tuple[float, float]]:
-    """Return (low, high) offsets, m, of what is paved along most of the road where it was seen."""
+    """Return the (low, high) offsets, m, of the strips that are paved along most of the road, wide ones only."""
     known = np.isfinite(paved)
     rows = known.sum(axis=0)
     share = np.where(known, paved, 0.0).sum(axis=0) / np.maximum(rows, 1)
@@ -137,7 +137,7 @@ def paved_bands(profiles: Profiles, paved: Grid) -> list[tuple[float, float]]:
 
 
 def paved_by_brightness(profiles: Profiles, lines: list[Line]) -> Grid:
-    """Return the share of pavement (S, U), 0 or 1, of a cloud without classes; NaN without points.
+    """Return a mask of pavement (S, U), 1 or 0, told by brightness near the lane lines; NaN without points.
 
     Pavement is what is about as bright as the strips on both sides of the lane lines, after a blur of some metres:
     grass, soil and gravel are mostly brighter. Otsu's threshold parts the differences from that brightness, if there
@@ -172,7 +172,7 @@ def paved_by_brightness(profiles: Profiles, lines: list[Line]) -> Grid:
 
 
 def _lane_lines(lines: list[Line]) -> list[Line]:
-    """Return dashed lines, or the longest lines if none is dashed."""
+    """Return the long dashed lines, or just the longest line if none is dashed."""
     dashed = [line for line in lines if not line.solid and line.dash < 10.0]
     longest = max((line.length for line in dashed), default=0.0)
     return [line for line in dashed if line.length > 0.5 * longest] or sorted(lines, key=lambda item: -item.length)[:1]
@@ -187,7 +187,7 @@ def _blur(values: Grid) -> Grid:
 
 
 def _band(profiles: Profiles, paved: Grid, span: tuple[float, float], lines: list[Line]) -> Band:
-    """Return a strip of pavement with its lines: of two too near for a lane the longer one, the more painted."""
+    """Return a strip of pavement with its lines; of two nearer than a lane the longer, more painted one is kept."""
     low, high = span
     inside = [line for line in lines if low - _BAND_MARGIN < line.offset < high + _BAND_MARGIN]
     kept: list[Line] = []
@@ -205,7 +205,7 @@ def _band(profiles: Profiles, paved: Grid, span: tuple[float, float], lines: lis
 
 
 def _edge_line(profiles: Profiles, paved: Grid, span: tuple[float, float], sign: int) -> Line:
-    """Return one edge of a strip of pavement as if it were a line."""
+    """Return one edge of a strip of pavement, smoothed, in the form of a line without paint."""
     low, high = span
     stations = profiles.middles
     begin = np.full(len(stations), 0.5 * (low + high))
@@ -225,7 +225,7 @@ def _edge_line(profiles: Profiles, paved: Grid, span: tuple[float, float], sign:
 
 
 def _pair(bands: list[Band]) -> tuple[Band, Band] | None:
-    """Return the two neighbouring bands with the most lines that a median can lie between."""
+    """Return the neighbouring bands with the most lines that a median may lie between; None if there are none."""
     pairs = [
         (right, left)
         for right, left in pairwise(bands)
@@ -235,13 +235,13 @@ def _pair(bands: list[Band]) -> tuple[Band, Band] | None:
 
 
 def _whole(band: Band) -> bool:
-    """Return whether a band can be a direction's carriageway."""
+    """Return whether a band may be one direction's carriageway, by its lines or its width."""
     return len(band.lines) >= 2 or band.width >= _UNMARKED_CARRIAGEWAY
 
 
 @dataclass(frozen=True)
 class FoundAxis:
-    """The axis beside the path, stretch by stretch.
+    """Offsets of the road's axis from the path in each of K stretches, with standard deviations.
 
     Attributes:
         stations: (K,) m along the path.
@@ -257,7 +257,7 @@ class FoundAxis:
 
 
 def axis_from_lines(layout: RoadLayout) -> FoundAxis:
-    """Return the axis of a layout.
+    """Return the axis of a layout, on whose movement along the road all lines vote.
 
     Of a dual carriageway it is the middle between its two innermost lines, of a single one the line in its middle; for
     want of lines the pavement's edges take their place. All lines vote for how it moves along the road: each tells the
@@ -291,7 +291,7 @@ def axis_from_lines(layout: RoadLayout) -> FoundAxis:
 
 
 def axis_guides(layout: RoadLayout) -> tuple[Line, ...]:
-    """Return the lines, or edges, whose mean is the axis."""
+    """Return the lines, or edges in their place, whose mean offset is the axis: one or two."""
     if layout.kind == "dual":
         right, left = layout.bands
         return right.guide(1), left.guide(-1)
@@ -300,7 +300,7 @@ def axis_guides(layout: RoadLayout) -> tuple[Line, ...]:
 
 
 def _vote_axis(lines: list[Line], axis: Float) -> Float:
-    """Return the axis (K,) by the votes of all lines, each relative to its mean distance from a first axis."""
+    """Return the axis offsets (K,), m, by a weighted vote of all lines, each less its mean distance from ``axis``."""
     offsets = np.array([line.measured for line in lines])
     std = np.array([line.std for line in lines])
     apart = offsets - axis
@@ -315,7 +315,7 @@ def _vote_axis(lines: list[Line], axis: Float) -> Float:
 
 
 def _shared_error(guides: tuple[Line, ...], scatter: float) -> float:
-    """Return the standard deviation of what all offsets of the axis share, see `hidden_std`, m."""
+    """Return the standard deviation, m, of the error that all offsets of the axis share, see `hidden_std`."""
     return float(np.sqrt(sum(hidden_std(line.apart, scatter) ** 2 for line in guides))) / len(guides)
 
 

@@ -33,7 +33,7 @@ _DASH_TOLERANCE = 0.6  # m
 
 @dataclass(frozen=True, eq=False)
 class Line:
-    """One line along the path.
+    """One line marking (or edge in its place) along the path: offsets by stretch, width, dashes.
 
     Attributes:
         stations: (K,) middles of the stretches, m; the same for every line.
@@ -67,28 +67,28 @@ class Line:
 
     @property
     def solid(self) -> bool:
-        """Return whether it has no dashes."""
+        """Return whether the line has no dashes."""
         return self.dash == 0.0
 
     @property
     def offset(self) -> float:
-        """Return its median offset, m."""
+        """Return the line's median offset, m."""
         return float(np.nanmedian(self.offsets))
 
     @property
     def length(self) -> float:
-        """Return the length that it was seen on, m."""
+        """Return the length along which the line was seen, m."""
         return self.end - self.start
 
 
 def find_lines(profiles: Profiles) -> list[Line]:
-    """Return the lines of profiles from right to left."""
+    """Return the line markings in profiles, from right to left."""
     lines = [_measure_line(profiles, *track) for track in _tracks(profiles)]
     return sorted((line for line in lines if line is not None), key=lambda line: line.offset)
 
 
 def _tracks(profiles: Profiles) -> list[tuple[Float, Float]]:
-    """Return (stations, offsets) of each line, roughly: peaks of mean profiles linked from window to window."""
+    """Return rough (stations, offsets) of each line, m: peaks of mean profiles, linked from window to window."""
     rows = len(profiles.stations)
     closed: list[_Track] = []
     running: list[_Track] = []
@@ -102,7 +102,7 @@ def _tracks(profiles: Profiles) -> list[tuple[Float, Float]]:
 
 
 def _peaks(profiles: Profiles, paint: Grid) -> list[float]:
-    """Return offsets of the narrow peaks of the mean of some profiles."""
+    """Return the offsets, m, of the narrow peaks in the mean of some rows of paint."""
     known = np.isfinite(paint)
     # Points may lie in rows along the road with empty bins between them: these must not thin out a line's peak.
     count = ndimage.gaussian_filter1d(known.sum(axis=0).astype(np.float64), 1.0)
@@ -113,14 +113,14 @@ def _peaks(profiles: Profiles, paint: Grid) -> list[float]:
 
 
 def _vertex(values: Float, at: int, places: Float) -> float:
-    """Return the place of the parabola's vertex through a peak and its neighbours."""
+    """Return the offset, m, of the vertex of the parabola through a peak and its two neighbours."""
     before, here, after = values[at - 1 : at + 2]
     bend = before - 2.0 * here + after
     return float(places[at] + (0.5 * ACROSS * (before - after) / bend if bend < 0.0 else 0.0))
 
 
 def _link_peaks(running: list[_Track], peaks: list[float], station: float) -> tuple[list[_Track], list[_Track]]:
-    """Return the tracks that go on, with the peaks that continue them or begin new ones, and those that ended."""
+    """Extend the tracks, in place, by peaks near to where they lead; return those that go on, and those that ended."""
     pairs = sorted(
         (abs(peak - _expected_place(track, station)), i, j)
         for i, track in enumerate(running)
@@ -140,7 +140,7 @@ def _link_peaks(running: list[_Track], peaks: list[float], station: float) -> tu
 
 
 def _expected_place(track: _Track, station: float) -> float:
-    """Return where a track should be at a station: straight on from its last 40 m."""
+    """Return the offset, m, at which a track is expected at a station: straight on from its last 40 m."""
     if len(track) < 3:
         return track[-1][1]
     (s0, u0), (s1, u1) = track[max(-5, -len(track))], track[-1]
@@ -149,7 +149,7 @@ def _expected_place(track: _Track, station: float) -> float:
 
 
 def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line | None:
-    """Return the line along a track; None where too little paint lies there."""
+    """Return the measured line along a rough track; None where too little paint lies there."""
     half = _WINDOW / 2.0
     start = max(profiles.stations[0], stations[0] - half)
     end = min(profiles.stations[-1], stations[-1] + half)
@@ -226,7 +226,7 @@ def _paint_near(profiles: Profiles, place: Float) -> tuple[Float, Float]:
 
 
 def _painted_share(cover: Float, usual: float) -> Float:
-    """Return the share (S,) of each row that is painted, from the paint's width (S,), m; NaN without points.
+    """Return the share (S,), 0 to 1, of each row that is painted, from the paint's width (S,), m; NaN if unknown.
 
     What counts as full is the width around a place: where points lie in rows along the road, a line may have two rows
     of them here and one there.
@@ -238,7 +238,7 @@ def _painted_share(cover: Float, usual: float) -> Float:
 
 
 def _stretches(profiles: Profiles, middle: Float, share: Float) -> tuple[Float, Float]:
-    """Return the paint's offset (K,) in each stretch, and its weight (0 without paint)."""
+    """Return the paint's weighted mean offset (K,), m, in each stretch, NaN without paint, and its weight."""
     count = profiles.stretches
     index = np.arange(len(middle)) // STRETCH
     weight = np.where(np.isfinite(middle) & np.isfinite(share), np.nan_to_num(share), 0.0)
@@ -251,8 +251,7 @@ def _stretches(profiles: Profiles, middle: Float, share: Float) -> tuple[Float, 
 
 
 def _between_points(profiles: Profiles, points: SurfacePoints, measured: Float, on: Bool) -> tuple[Float, Float, Float]:
-    """Return a line's middle and width (K,) in each stretch, m, from the points on it and beside it; and how far apart
-    the points are that its middle lies between.
+    """Return a line's middle and width, and the gap of the points at its edges (K,), m, refined by the points.
 
     A scanner that follows the road samples it in rows along it: within a bin all points may lie at one offset. A
     line's edge is between the outermost point on it and the next one that isn't.
@@ -284,7 +283,7 @@ def _between_points(profiles: Profiles, points: SurfacePoints, measured: Float, 
 
 
 def _best_span(marked: Bool) -> tuple[int, int]:
-    """Return the span (first, behind the last) of points in which most are marked, and outside of which most aren't."""
+    """Return the span (first, behind the last) of points with most marked ones inside and unmarked ones outside."""
     total = np.append(0, np.cumsum(np.where(marked, 1, -1)))
     lowest = np.minimum.accumulate(total)
     high = int((total - lowest).argmax())
@@ -292,7 +291,7 @@ def _best_span(marked: Bool) -> tuple[int, int]:
 
 
 def _cover(share: Float) -> Float:
-    """Return the share (K,) of the rows of each stretch that are painted; NaN where none has points."""
+    """Return the share (K,) of the rows of each stretch that are painted; NaN for stretches without points."""
     count = -(-len(share) // STRETCH)
     index = np.arange(len(share)) // STRETCH
     known = np.isfinite(share)
@@ -302,7 +301,7 @@ def _cover(share: Float) -> Float:
 
 
 def _dashes(stations: Float, cover: Float) -> tuple[float, float, float, float]:
-    """Return the painted share, dash and gap (m, 0 if solid) and where a dash begins, from the shares of rows (R,).
+    """Return painted share, dash and gap (m; 0 if solid) and the station of a dash, from rows' painted shares (R,).
 
     The period is the one whose wave the paint follows best; a common pattern is taken where it is that, within 0.6 m.
     """

@@ -55,7 +55,7 @@ _BEYOND = 4.0  # m outside of the verge, where the ground no longer is the road'
 
 @dataclass(frozen=True)
 class StandingPoints:
-    """Points of what stands, in the road's frame.
+    """N points on what stands beside the road, in the road's frame.
 
     Attributes:
         station, offset: (N,) m.
@@ -69,13 +69,13 @@ class StandingPoints:
     kind: NDArray[np.uint8]
 
     def select(self, mask: Bool | Index) -> StandingPoints:
-        """Return some of the points."""
+        """Return the points chosen by a mask or by indices."""
         return StandingPoints(self.station[mask], self.offset[mask], self.height[mask], self.kind[mask])
 
 
 @dataclass(frozen=True)
 class FoundBarrier:
-    """A barrier: kind, stations, offset of its axis, height (m), the side that a guardrail's beam is on, deviations."""
+    """A barrier that was found: stations, offset of its axis and height, m; beam's side; deviation; points."""
 
     kind: BarrierKind
     start: float
@@ -89,7 +89,7 @@ class FoundBarrier:
 
 @dataclass(frozen=True)
 class FoundPost:
-    """A delineator: station, offset, height (m), and standard deviations of station and offset."""
+    """A delineator that was found: station, offset, height and standard deviation of its place, m; points."""
 
     station: float
     offset: float
@@ -100,7 +100,7 @@ class FoundPost:
 
 @dataclass(frozen=True)
 class GroundShape:
-    """Ground beside the road: reach, mean height of the centreline above it, its spread, the verge's width (m)."""
+    """Shape of the ground beside the road: reach, height of the axis above it, spread, verge's width, all in m."""
 
     half_width: float
     embankment_height: float
@@ -110,7 +110,7 @@ class GroundShape:
 
 
 def find_barriers(standing: StandingPoints) -> tuple[list[FoundBarrier], Bool]:
-    """Return the barriers along the road, and which points (N,) belong to one."""
+    """Return the barriers along the road, and a mask (N,) of the points that belong to one."""
     barriers: list[FoundBarrier] = []
     used = np.zeros(len(standing.station), dtype=bool)
     for kind in (PointKind.GUARDRAIL, PointKind.BARRIER, PointKind.NOISE_BARRIER, PointKind.FURNITURE):
@@ -126,7 +126,7 @@ def find_barriers(standing: StandingPoints) -> tuple[list[FoundBarrier], Bool]:
 
 
 def _linear(station: Float, offset: Float) -> list[Index]:
-    """Return the points of each cluster that is long enough: connected cells, small holes along the road filled."""
+    """Return the point indices of each long cluster of connected cells; small holes along the road are bridged."""
     if len(station) < _FEWEST_OF_BARRIER:
         return []
     row = np.floor((station - station.min()) / CELL_ALONG).astype(np.int64)
@@ -143,7 +143,7 @@ def _linear(station: Float, offset: Float) -> list[Index]:
 
 
 def _pieces(part: StandingPoints) -> list[Bool]:
-    """Return masks of the pieces of a linear cluster along which its offset stays the same."""
+    """Return masks (N,) of the pieces of a linear cluster, split where its offset jumps."""
     index = np.floor((part.station - part.station.min()) / _STRETCH).astype(np.int64)
     order = np.argsort(index, kind="stable")
     begins = np.searchsorted(index[order], np.arange(index.max() + 1))
@@ -159,7 +159,7 @@ def _pieces(part: StandingPoints) -> list[Bool]:
 
 
 def _barrier(part: StandingPoints, kind: PointKind) -> FoundBarrier | None:
-    """Return the barrier of some points; None where they are too few, too short, or shaped otherwise."""
+    """Return the barrier that some points show; None if they are too few, too short or of another shape."""
     count = len(part.station)
     if count < _FEWEST_OF_BARRIER:
         return None
@@ -180,7 +180,7 @@ def _barrier(part: StandingPoints, kind: PointKind) -> FoundBarrier | None:
 
 
 def turn_beam(barrier: FoundBarrier, side: Literal["left", "right", "both"]) -> FoundBarrier:
-    """Return a guardrail whose beam is on a side: its axis, that of the posts, lies behind the beam that is seen."""
+    """Return a guardrail with its beam on a side and its axis shifted behind the beam, which alone is seen."""
     if barrier.kind != "guardrail" or side == "both":
         return barrier
     behind = -1.0 if side == "left" else 1.0
@@ -206,7 +206,7 @@ def find_posts(standing: StandingPoints, barrier_points: Bool) -> list[FoundPost
 
 
 def _clusters(part: StandingPoints) -> list[Index]:
-    """Return the points of each cluster that hangs together, in their order."""
+    """Return the point indices of each cluster of points nearer to each other than a post's size."""
     if not len(part.station):
         return []
     pairs = cKDTree(np.column_stack([part.station, part.offset])).query_pairs(_POST_APART, output_type="ndarray")
@@ -218,7 +218,7 @@ def _clusters(part: StandingPoints) -> list[Index]:
 
 
 def _post(part: StandingPoints, kind: PointKind) -> FoundPost | None:
-    """Return the post of a cluster, or None if it is no post's size."""
+    """Return the delineator that a cluster shows; None if the cluster hasn't a post's size."""
     count = len(part.station)
     top = float(part.height.max())
     low, high = _POST_HEIGHTS[kind]
@@ -237,7 +237,7 @@ def _stands_alone(tree: cKDTree, post: FoundPost, count: int) -> bool:
 
 
 def standing_points(cloud: RoadCloud, path: CloudPath, profiles: Profiles, section: MeasuredSection) -> StandingPoints:
-    """Return what stands within reach of the road, with heights above the surface below."""
+    """Return the standing points within reach of the road, with heights above the surface below them."""
     chosen = cloud.of(*STANDING)
     xyz, kind = cloud.xyz[chosen], cloud.kind[chosen]
     station, offset = path.project(xyz[:, :2])
@@ -251,7 +251,7 @@ def standing_points(cloud: RoadCloud, path: CloudPath, profiles: Profiles, secti
 
 
 def ground_below(profiles: Profiles, station: Float, offset: Float) -> Float:
-    """Return the height (N,) of the surface at stations and offsets (N,), m: medians of 5 m by 0.5 m, gaps filled."""
+    """Return the surface's height (N,), m, at stations and offsets (N,): medians of 5 m by 0.5 m, interpolated."""
     rows, columns = profiles.height.shape
     long, wide = -(-rows // _COARSE), -(-columns // _COARSE)
     padded = np.full((long * _COARSE, wide * _COARSE), np.nan)
@@ -268,7 +268,7 @@ def ground_below(profiles: Profiles, station: Float, offset: Float) -> Float:
 
 
 def face_guardrails(barriers: list[FoundBarrier], section: MeasuredSection) -> list[FoundBarrier]:
-    """Return barriers with guardrails' beams on the side of the traffic that they protect from."""
+    """Return the barriers, each guardrail with its beam towards the traffic, or on both sides near the axis."""
     return [turn_beam(barrier, _face(barrier.offset, section)) for barrier in barriers]
 
 
@@ -282,7 +282,7 @@ def _face(offset: float, section: MeasuredSection) -> Literal["left", "right", "
 
 
 def measure_ground(cloud: RoadCloud, path: CloudPath, section: MeasuredSection, axis_height: Float) -> GroundShape:
-    """Return what the ground beside the road is like.
+    """Return the shape of the ground beside the road; usual values where the cloud doesn't show it.
 
     Args:
         cloud: with ground beyond the verges, or without.
@@ -311,7 +311,7 @@ def measure_ground(cloud: RoadCloud, path: CloudPath, section: MeasuredSection, 
 
 
 def _usual(section: MeasuredSection, station: Float, offset: Float) -> Bool:
-    """Return which places (N,) lie where the pavement's edge on their side is the road's own."""
+    """Return a mask (N,) of places where the pavement's edge on their side is the road's own, not a turnout's."""
     result = np.zeros(len(station), dtype=bool)
     for side in section.sides.values():
         stretch = np.clip((station / (STRETCH * SPACING)).astype(np.int64), 0, len(side.usual) - 1)

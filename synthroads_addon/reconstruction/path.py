@@ -32,7 +32,7 @@ SHORTEST = 50.0
 
 @dataclass(frozen=True)
 class CloudPath:
-    """A line by running length, with a point each metre.
+    """A polyline along the road with a point and heading each metre: the frame of stations and offsets.
 
     Attributes:
         points: (M, 2) m.
@@ -46,7 +46,7 @@ class CloudPath:
 
     @property
     def stations(self) -> Float:
-        """Return the (M,) stations of the points."""
+        """Return the stations (M,) of the points, m."""
         return self.start + SPACING * np.arange(len(self.points))
 
     @property
@@ -70,7 +70,7 @@ class CloudPath:
         return np.asarray(position + np.asarray(offset, dtype=np.float64)[:, None] * left)
 
     def project(self, points: Float) -> tuple[Float, Float]:
-        """Return stations and offsets (N,) of points (N, 2); stations beyond the ends are those of the tangents."""
+        """Return stations and offsets (N,), m, of points (N, 2); beyond the ends along the tangents there."""
         frames = np.column_stack([self.points, self.heading])
         station, offset = np.empty(len(points)), np.empty(len(points))
         for begin in range(0, len(points), _BLOCK):
@@ -79,24 +79,24 @@ class CloudPath:
         return self.start + station, offset
 
     def within(self, points: Float, distance: float) -> Bool:
-        """Return which points (N, 2) lie within a distance (m) of the path, to the nearest cell of 4 m."""
+        """Return a mask (N,) of the points (N, 2) within a distance (m) of the path, to the nearest cell of 4 m."""
         middles, owner = _cells(points)
         away, _ = cKDTree(self.points).query(middles)
         return np.asarray((away < distance + _CELL)[owner])
 
     def _near(self, points: Float) -> Float:
-        """Return distances (N,) along the path near those of points (N, 2): of each cell of 4 m that of its middle."""
+        """Return rough distances (N,), m, along the path of points (N, 2): of each cell of 4 m that of its middle."""
         middles, owner = _cells(points)
         _, nearest = cKDTree(self.points).query(middles)
         return np.asarray(SPACING * nearest[owner].astype(np.float64))
 
     def shift_by(self, offset: Float) -> CloudPath:
-        """Return the path through what lies an offset (M,) to the left of each point."""
+        """Return a path whose points lie offsets (M,), m, to the left of this one's, spaced anew each metre."""
         return path_through(self.place(self.stations, offset))
 
 
 def _cells(points: Float) -> tuple[Float, Index]:
-    """Return the middles (C, 2) of the cells of 4 m that points (N, 2) lie in, and each point's cell."""
+    """Return the centres (C, 2) of the 4 m cells that points (N, 2) lie in, and each point's cell index (N,)."""
     cell = np.floor(points / _CELL).astype(np.int64)
     low = cell.min(axis=0)
     key = (cell[:, 0] - low[0]) * (cell[:, 1].max() - low[1] + 1) + (cell[:, 1] - low[1])
@@ -105,7 +105,7 @@ def _cells(points: Float) -> tuple[Float, Index]:
 
 
 def _project(frames: Float, points: Float, along: Float) -> tuple[Float, Float]:
-    """Return distances along a path of frames (M, 3: x, y, heading) and offsets (N,) of points near given distances."""
+    """Return distances along a path of frames (M, 3: x, y, heading), and offsets (N,), from rough distances."""
     last = len(frames) - 2
     offset = np.empty(0)
     for round_ in range(_ROUNDS):
@@ -127,7 +127,7 @@ def _project(frames: Float, points: Float, along: Float) -> tuple[Float, Float]:
 
 
 def path_through(points: Float) -> CloudPath:
-    """Return a path through a polyline (K, 2), a point each metre.
+    """Return a path with a point each metre along a polyline (K, 2).
 
     Raises:
         InputError: it is shorter than `SHORTEST`.
@@ -145,14 +145,14 @@ def path_through(points: Float) -> CloudPath:
 
 
 def alignment_path(alignment: Alignment) -> CloudPath:
-    """Return an alignment as a path, with the alignment's own stations; the last point may lie just beyond its end."""
+    """Return an alignment sampled each metre as a path; its last point may lie just beyond the end."""
     station = np.arange(0.0, np.ceil(alignment.length) + 0.5, SPACING)
     position, heading, _ = alignment.frame(station)
     return CloudPath(position, heading)
 
 
 def first_path(xy: Float) -> CloudPath:
-    """Return a path along the middle of a surface of which there are points (N, 2), in any order.
+    """Return a first path along the middle of the road's surface, from its points (N, 2), m, in any order.
 
     Metre cells, not points, count, so that neither density nor overlapping strips pull the path. It begins in the
     middle of the surface in its longest direction and is marched both ways in steps of 10 m; gaps of less than 90 m are
@@ -173,7 +173,7 @@ def first_path(xy: Float) -> CloudPath:
 
 
 def smooth_path(path: CloudPath, wavelength: float) -> CloudPath:
-    """Return a path without its swings that are shorter than a wavelength (m)."""
+    """Return a path smoothed so that swings shorter than a wavelength (m) vanish."""
     kept = path.points[::5]
     weights = np.ones(len(kept))
     smoothed = [smooth(kept[:, i], weights, 5.0 * SPACING, wavelength).values for i in range(2)]
@@ -181,7 +181,7 @@ def smooth_path(path: CloudPath, wavelength: float) -> CloudPath:
 
 
 def _begin(cells: Float, tree: cKDTree) -> tuple[Float, float, float]:
-    """Return the point that the march begins at, its direction (rad), and the surface's half width there (m)."""
+    """Return the point (2,) at which the march begins, its direction (rad), and the surface's half width there (m)."""
     _, middle = tree.query(np.median(cells, axis=0))
     for radius in _START_RADII:
         near = cells[tree.query_ball_point(cells[middle], radius)]
@@ -194,7 +194,7 @@ def _begin(cells: Float, tree: cKDTree) -> tuple[Float, float, float]:
 
 
 def _march(cells: Float, tree: cKDTree, start: Float, direction: float, half: float) -> list[Float]:
-    """Return the points of a march from a start in a direction, until the surface ends."""
+    """Return the points of a march along the surface's middle from a start in a direction (rad), to its end."""
     line, at, missing = [start], start, 0.0
     while missing <= _GAP:
         forward = np.array([np.cos(direction), np.sin(direction)])
@@ -216,7 +216,7 @@ def _march(cells: Float, tree: cKDTree, start: Float, direction: float, half: fl
 
 
 def _direction(line: list[Float], before: float) -> float:
-    """Return the direction of the last 50 m of a march, which turns by no more than a road does in a step."""
+    """Return the direction (rad) after a march's latest points, turned from the one before by 0.12 rad at most."""
     last = np.array(line[-6:])
     chord = last[-1] - last[max(0, len(last) - 4)] if len(last) > 2 else last[-1] - last[0]
     turn = float(np.angle(np.exp(1j * (np.arctan2(chord[1], chord[0]) - before))))

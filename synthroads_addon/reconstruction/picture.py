@@ -23,7 +23,7 @@ _BEYOND = 6.0  # m outside of the pavement
 
 
 def draw(found: Reconstruction, cloud: RoadCloud, path: FilePath) -> None:
-    """Write the picture (PNG)."""
+    """Draw a reconstruction (plan, detail, cross-section, heights) and write the picture as PNG."""
     import matplotlib  # takes half a second, and few ask for the picture
 
     matplotlib.use("Agg")
@@ -43,7 +43,7 @@ def draw(found: Reconstruction, cloud: RoadCloud, path: FilePath) -> None:
 
 
 def plan(axes: Any, found: Reconstruction, geometry: RoadGeometry, span: tuple[float, float]) -> None:
-    """Draw the road unrolled: offset over station, the cloud's brightness behind what was reconstructed."""
+    """Draw the road unrolled (offset over station), the reconstruction over the cloud's brightness."""
     profiles = found.profiles
     low, high = _reach(geometry)
     axes.imshow(
@@ -70,7 +70,7 @@ def plan(axes: Any, found: Reconstruction, geometry: RoadGeometry, span: tuple[f
 
 
 def across(axes: Any, found: Reconstruction, geometry: RoadGeometry) -> None:
-    """Draw heights across the road in its middle: the cloud's bins and the reconstructed surface."""
+    """Draw a cross-section at mid-length: heights of the cloud's bins and the reconstructed surface."""
     profiles = found.profiles
     row = len(profiles.stations) // 2
     rows = slice(max(0, row - 5), row + 5)
@@ -95,7 +95,7 @@ def across(axes: Any, found: Reconstruction, geometry: RoadGeometry) -> None:
 
 
 def heights(axes: Any, found: Reconstruction, geometry: RoadGeometry) -> None:
-    """Draw what was measured of both carriageways' heights against the profile."""
+    """Draw the measured heights of the carriageways, cm, less the reconstructed profile's."""
     stations = found.measured.stations
     level = geometry.profile.elevation(stations)
     for name, surface in found.surfaces.items():
@@ -106,7 +106,7 @@ def heights(axes: Any, found: Reconstruction, geometry: RoadGeometry) -> None:
 
 
 def _brightness(profiles: Profiles) -> Float:
-    """Return brightness from 0 to 1, so that even shares of the picture are dark and bright; NaN far from any point."""
+    """Return brightness (S, U), 0 to 1, equalised by percentiles; NaN far from any point."""
     known = np.isfinite(profiles.brightness)
     weight = ndimage.gaussian_filter(known.astype(np.float64), (0.3, 1.0))
     mean = ndimage.gaussian_filter(np.where(known, profiles.brightness, 0.0).astype(np.float64), (0.3, 1.0))

@@ -37,7 +37,7 @@ _EDGE = 0.3  # weight of the pavement's edges beside paint
 
 @dataclass(frozen=True)
 class SurfacePoints:
-    """The surface's points by stretch and, within one, from right to left.
+    """Points of the surface, grouped by stretch and sorted from right to left within each.
 
     Attributes:
         begins: (K + 1,) index of each stretch's first point.
@@ -52,7 +52,7 @@ class SurfacePoints:
     marked: Bool
 
     def near(self, stretch: int, low: float, high: float) -> slice:
-        """Return where the points of a stretch between two offsets (m) are."""
+        """Return the slice of a stretch's points between two offsets, m."""
         begin, end = self.begins[stretch], self.begins[stretch + 1]
         first, last = np.searchsorted(self.offset[begin:end], [low, high])
         return slice(int(begin + first), int(begin + last))
@@ -60,7 +60,7 @@ class SurfacePoints:
 
 @dataclass(frozen=True)
 class Profiles:
-    """Profiles of S metres along and U bins across a path. Bins without points hold NaN.
+    """Cross profiles of a cloud: values in S rows of a metre along a path and U bins across; NaN without points.
 
     Attributes:
         path: what they are measured along.
@@ -86,12 +86,12 @@ class Profiles:
 
     @property
     def stretches(self) -> int:
-        """Return the number K of stretches that the profiles are cut into."""
+        """Return the number K of stretches that the rows are grouped into, 5 m each."""
         return -(-len(self.stations) // STRETCH)
 
     @property
     def middles(self) -> Float:
-        """Return the (K,) middles of the stretches, m along the path."""
+        """Return the stations (K,) of the middles of the stretches, m."""
         first = self.stations[0] - 0.5 * SPACING
         return first + STRETCH * SPACING * (np.arange(self.stretches) + 0.5)
 
@@ -101,7 +101,7 @@ class Profiles:
 
 
 def make_profiles(cloud: RoadCloud, path: CloudPath, half_width: float, exact: bool = False) -> Profiles:
-    """Return the profiles of a cloud along a path, up to half a width (m) to either side.
+    """Return the cross profiles of a cloud's surface along a path, up to ``half_width`` (m) to either side.
 
     Args:
         cloud: whose surface's points count.
@@ -150,7 +150,7 @@ def _by_stretch(row: Int, station: Float, offset: Float, kind: NDArray[np.uint8]
 
 
 def paint_share(brightness: Grid, paved: Grid | None) -> Grid:
-    """Return how far towards paint (1) from the pavement around it (0) each bin (S, U) is, by its intensity.
+    """Return how far between pavement (0) and paint (1) each bin's intensity (S, U) lies; NaN where unknown.
 
     The pavement around is the median of 11 m by 2.5 m: lines are narrower than that, and verges wider. Where classes
     tell pavement from verge, only pavement counts.
@@ -168,7 +168,7 @@ def paint_share(brightness: Grid, paved: Grid | None) -> Grid:
 
 
 def _fill_bins(values: Grid, known: Bool) -> Grid:
-    """Return values (S, U) whose unknown bins hold the mean of what is known around, farther away the less is."""
+    """Return values (S, U) whose unknown bins hold the Gaussian-weighted mean of known ones around."""
     result = np.where(known, values, 0.0).astype(np.float32)
     done = known.copy()
     for sigma in (_BLUR, 2.0, 6.0, 20.0):
@@ -189,7 +189,7 @@ class _Fit:
 
 
 def register_path(path: CloudPath, profiles: Profiles) -> CloudPath:
-    """Return a path parallel to what its profiles show: its offset from any line of the road changes slowly at most.
+    """Return the path shifted so that it runs parallel to the lines and edges that its profiles show.
 
     Stretches of 20 m are sheared and shifted against the mean of those before them, beginning with the most usual one.
     Without lines and edges the path stays as it is.
@@ -220,12 +220,12 @@ def register_path(path: CloudPath, profiles: Profiles) -> CloudPath:
 
 
 def _self_fit(block: Float) -> _Fit:
-    """Return the fit of a stretch to itself: the shear under which its rows lie over each other best."""
+    """Return the fit of a stretch to itself: the shear under which its rows coincide best."""
     return _Fit(0.0, float(_SHEARS[int((block**2).sum(axis=1).argmax())]), 1.0)
 
 
 def _most_usual(blocks: list[Float]) -> int:
-    """Return the stretch that is most like its neighbours: no hatching, no arrows, no bridge above."""
+    """Return the index of the stretch that is most like its neighbours: no hatching, arrows or bridge."""
     alike = np.zeros(len(blocks) + 1)
     for number in range(len(blocks) - 1):
         fit = _best(blocks[number + 1], _shift_profile(blocks[number], _self_fit(blocks[number])), 0.0, 2.0 * _REACH)
@@ -234,7 +234,7 @@ def _most_usual(blocks: list[Float]) -> int:
 
 
 def evidence(profiles: Profiles) -> Grid:
-    """Return what profiles (S, U) are laid over each other by: paint and edges of the pavement; 0 without points."""
+    """Return the signal (S, U) by which profiles are registered: paint and the pavement's edges; 0 without points."""
     paint = np.clip(np.nan_to_num(profiles.paint), 0.0, 1.0)
     signal = ndimage.gaussian_filter1d(paint, 1.5, axis=1)
     if profiles.paved is not None:
@@ -244,7 +244,7 @@ def evidence(profiles: Profiles) -> Grid:
 
 
 def _shear_profiles(block: Grid) -> Float:
-    """Return the mean profile (shears, U) of a stretch (rows, U) under each shear."""
+    """Return the mean profile (shears, U) of a stretch (rows, U) under each shear of `_SHEARS`."""
     middle = 0.5 * (len(block) - 1)
     result = np.zeros((len(_SHEARS), block.shape[1]))
     for number, shear in enumerate(_SHEARS):
@@ -254,7 +254,7 @@ def _shear_profiles(block: Grid) -> Float:
 
 
 def _follow(blocks: list[Float], fits: list[_Fit], order: range, first: int) -> None:
-    """Fit stretch after stretch to the template of those before; write the fits in place."""
+    """Fit stretch after stretch to a template of those before, and write into ``fits``, in place."""
     if not len(order):
         return
     sign = order.step
@@ -279,7 +279,7 @@ def _shift_profile(block: Float, fit: _Fit) -> Float:
 
 
 def _best(block: Float, template: Float, expected: float, reach: float) -> _Fit | None:
-    """Return the shift and shear that lay a stretch over a template best; None where it shows nothing alike."""
+    """Return the shift (m) and shear that fit a stretch to a template best; None where nothing is alike."""
     bins = int(np.ceil(reach / ACROSS))
     middle = round(expected / ACROSS)
     shifts = np.arange(middle - bins, middle + bins + 1)

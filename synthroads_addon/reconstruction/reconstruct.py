@@ -54,7 +54,7 @@ class Options:
 
 @dataclass(frozen=True)
 class Reconstruction:
-    """A road, and everything that it was made from.
+    """A reconstructed road with all that it was made from.
 
     Attributes:
         parameters: the parameter set.
@@ -79,7 +79,7 @@ class Reconstruction:
 
 
 def reconstruct(cloud: RoadCloud, options: Options | None = None, progress: Progress = silent) -> Reconstruction:
-    """Return the road in a cloud.
+    """Return the reconstruction of the road that a cloud shows: parameter set, measurements and assessment.
 
     Raises:
         InputError: no road can be made out in it.
@@ -125,7 +125,7 @@ def reconstruct(cloud: RoadCloud, options: Options | None = None, progress: Prog
 
 
 def straighten_path(cloud: RoadCloud, options: Options) -> tuple[CloudPath, float]:
-    """Return a path parallel to the road, and how far to either side of it there is something to see (m)."""
+    """Return a path parallel to the road, and the half width (m) beside it within which there is something to see."""
     xy = cloud.xyz[cloud.of(PointKind.PAVEMENT, PointKind.MARKING) if cloud.labelled else cloud.surface, :2]
     path = path_through(options.path) if options.path is not None else first_path(xy)
     _, offset = path.project(xy[:: max(1, len(xy) // 200_000)])
@@ -139,14 +139,14 @@ def straighten_path(cloud: RoadCloud, options: Options) -> tuple[CloudPath, floa
 
 
 def _axis(cloud: RoadCloud, path: CloudPath, half: float, options: Options) -> tuple[Profiles, RoadLayout, FoundAxis]:
-    """Return profiles along a path, which lines they show, and where the axis lies."""
+    """Return exact profiles along a path, the layout of lines that they show, and the axis."""
     profiles = make_profiles(cloud, path, half, exact=True)
     layout = find_layout(profiles, find_lines(profiles), options.road)
     return profiles, layout, _centre(cloud, profiles, layout, options)
 
 
 def _centre(cloud: RoadCloud, profiles: Profiles, layout: RoadLayout, options: Options) -> FoundAxis:
-    """Return the axis along the path: from the lines, or from a learned predictor."""
+    """Return the axis along the path: from the lines, or from the learned predictor if one is given."""
     by_lines = axis_from_lines(layout)
     if options.predictor is None:
         return by_lines
@@ -167,7 +167,7 @@ def _centre(cloud: RoadCloud, profiles: Profiles, layout: RoadLayout, options: O
 def fit_axis_and_profile(
     profiles: Profiles, layout: RoadLayout, centre: FoundAxis, tolerance: float
 ) -> tuple[AxisFit, RotationAxis]:
-    """Return alignment and profile through the axis, and the line about which the crossfall turns.
+    """Return the fitted alignment and profile, and the line about which the crossfall turns.
 
     The profile is the height of that line, the same for both carriageways: of the two lines that a parameter set can
     name, the one at which the carriageways' heights differ less.
@@ -190,7 +190,7 @@ def fit_axis_and_profile(
 
 
 def _replace_faults(raw: Float, smoothed: Float) -> Float:
-    """Return measured values (K,), the smoothed ones in place of those that are missing or faults.
+    """Return measured values (K,) with missing and outlying ones replaced by the smoothed ones.
 
     The fit smooths by itself: values that are smooth already would pass for exact and get an element for every bend.
     """
@@ -200,7 +200,7 @@ def _replace_faults(raw: Float, smoothed: Float) -> Float:
 
 
 def _heights(profiles: Profiles, layout: RoadLayout, centre: FoundAxis, rotation: str) -> tuple[Float, Float]:
-    """Return the heights (K,) of the right and left carriageway at the line that the crossfall turns about."""
+    """Return the heights (K,), m, of right and left carriageway at the line that the crossfall turns about."""
     result = []
     axis = centre.offsets
     for name, sign in (("right", -1), ("left", 1)):
@@ -221,13 +221,13 @@ def _heights(profiles: Profiles, layout: RoadLayout, centre: FoundAxis, rotation
 
 
 def _height_difference(heights: tuple[Float, Float]) -> float:
-    """Return the median difference of the heights of both carriageways, m."""
+    """Return the median absolute difference of the two carriageways' heights, m; 0 if unknown."""
     difference = np.abs(heights[1] - heights[0])
     return float(np.nanmedian(difference)) if np.isfinite(difference).any() else 0.0
 
 
 def _surface(profiles: Profiles, section: MeasuredSection, side: Side, rotation: RotationAxis) -> Surface:
-    """Return one carriageway's surface along the alignment."""
+    """Return height and crossfall of one carriageway's surface in each stretch along the alignment."""
     measured_side = section.sides[side]
     count = len(measured_side.usual)
     inner = np.full(count, measured_side.inner_offset.value)
@@ -238,7 +238,7 @@ def _surface(profiles: Profiles, section: MeasuredSection, side: Side, rotation:
 
 
 def _smooth_fall(measured: Surface) -> Float:
-    """Return the crossfall (K,) without the noise of single stretches."""
+    """Return the crossfall (K,), m/m, smoothed along the road; as measured where too few are known."""
     known = np.isfinite(measured.fall)
     if known.sum() < 5:
         return measured.fall
@@ -246,7 +246,7 @@ def _smooth_fall(measured: Surface) -> Float:
 
 
 def _notes(cloud: RoadCloud, section: MeasuredSection, measured: RoadMeasurements) -> list[str]:
-    """Return what a reader of the parameter set must know."""
+    """Return remarks on assumptions and gaps that a reader of the parameter set must know."""
     single = "a single carriageway: written as two carriageways that meet in the middle line, one per direction"
     remarks = [
         (cloud.strays > 0, f"{cloud.strays:,} points lie far from all others and weren't used"),
@@ -261,7 +261,7 @@ def _notes(cloud: RoadCloud, section: MeasuredSection, measured: RoadMeasurement
 
 
 def _remarks_on(side: SideSection) -> Iterator[tuple[bool, str]]:
-    """Yield what may have to be said of one direction, and whether it has to."""
+    """Yield for one side (whether it applies, remark) of each possible remark."""
     hidden, name = any(line is None for line in side.lines[1:-1]), side.side
     yield not side.edge_seen, f"{name}: the pavement's outer edge isn't in the cloud: 0.5 m beyond the outermost line"
     yield not side.closed, f"{name}: the outermost line is dashed: there may be further lanes beyond the cloud"

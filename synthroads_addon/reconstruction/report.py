@@ -22,7 +22,7 @@ _LONG = 30.0  # m
 
 
 def report(found: Reconstruction, cloud: RoadCloud) -> dict[str, Any]:
-    """Return the report as JSON data; lengths in m, crossfall in percent."""
+    """Return the reconstruction's report as JSON data: residuals, deviations, widths; m, crossfall in percent."""
     geometry = RoadGeometry(found.parameters)
     section = found.measured.section
     violations = check(found.parameters)
@@ -54,7 +54,7 @@ def _cloud(cloud: RoadCloud) -> dict[str, Any]:
 
 
 def _centreline(found: Reconstruction) -> dict[str, Any]:
-    """Return how far the measured axis is from the alignment, and how sure it is."""
+    """Return as JSON data the residuals, m, of the measured axis from the alignment, and its deviations."""
     fit, std = found.measured.fit, found.centre.std[np.isfinite(found.centre.raw)]
     return {
         "elements": len(fit.alignment.elements),
@@ -66,7 +66,7 @@ def _centreline(found: Reconstruction) -> dict[str, Any]:
 
 
 def section_report(section: MeasuredSection) -> dict[str, Any]:
-    """Return the cross-section's widths with their standard deviations."""
+    """Return the cross-section's widths, m, with standard deviations, as JSON data."""
     median = section.median
     return {
         "standard": standard_section(section),
@@ -90,7 +90,7 @@ def _side(side: SideSection) -> dict[str, Any]:
 
 
 def _surface(found: Reconstruction, cloud: RoadCloud, geometry: RoadGeometry) -> dict[str, Any]:
-    """Return how far the pavement's points are above the reconstructed surface, by side."""
+    """Return by side, as JSON data, how far, m, the pavement's points lie above the reconstructed surface."""
     chosen = np.flatnonzero(cloud.of(PointKind.PAVEMENT, PointKind.MARKING)) if cloud.labelled else cloud.surface
     chosen = chosen[:: max(1, len(chosen) // _MOST_POINTS)]
     station, offset = geometry.alignment.project(cloud.xyz[chosen, :2])
@@ -106,7 +106,7 @@ def _surface(found: Reconstruction, cloud: RoadCloud, geometry: RoadGeometry) ->
 
 
 def _edges(side: SideSection, found: Reconstruction, geometry: RoadGeometry) -> dict[str, Any]:
-    """Return how far the edges seen in each stretch are outside of the reconstructed ones."""
+    """Return as JSON data how far, m, the edges seen in the stretches lie outside of the reconstructed ones."""
     stations = found.measured.stations
     section = geometry.sections[side.side]
     outer = np.where(side.usual, side.outer_edge.offsets - section.main_edge(stations), np.nan)
@@ -115,7 +115,7 @@ def _edges(side: SideSection, found: Reconstruction, geometry: RoadGeometry) -> 
 
 
 def _lines(found: Reconstruction, geometry: RoadGeometry) -> dict[str, Any]:
-    """Return how far each line's middle is to the left of the reconstructed one, and its own scatter."""
+    """Return by marking, as JSON data, how far, m, it lies to the left of the reconstructed one, and its deviations."""
     stations = found.measured.stations
     result: dict[str, Any] = {}
     section = found.measured.section
@@ -135,13 +135,13 @@ def _lines(found: Reconstruction, geometry: RoadGeometry) -> dict[str, Any]:
 
 
 def _excess_fall(found: Reconstruction, geometry: RoadGeometry, side: Side) -> Float:
-    """Return by how much the crossfall that was measured in each stretch is more than the reconstructed one, m/m."""
+    """Return the measured less the reconstructed crossfall (K,), m/m, in each stretch."""
     modelled = geometry.crossfall(geometry.sections[side].carriageway, found.measured.stations)
     return found.surfaces[side].fall - modelled
 
 
 def _widenings(side: SideSection, stations: Float) -> list[dict[str, float]]:
-    """Return stretches where the pavement is wider than usual: exits, entries, bays, which aren't reconstructed."""
+    """Return as JSON data the stretches with wider pavement (exits, entries, bays), which aren't reconstructed."""
     edge = side.outer_edge.offsets
     usual = float(np.nanmedian(np.where(side.usual, edge, np.nan))) if side.usual.any() else np.nan
     wide = np.isfinite(edge) & (edge > usual + _WIDER)

@@ -36,24 +36,24 @@ STANDARD_TOLERANCE = 0.15
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number that was measured: its value and standard deviation, in the same unit."""
+    """A measured number with its standard deviation, in the same unit."""
 
     value: float
     std: float
 
     @classmethod
     def of(cls, values: Float, apart: Float | None = None) -> Self:
-        """Return the robust mean of values (K,) in order along the road, see `mean_with_std`."""
+        """Return the robust mean of values (K,), in order along the road, with its standard deviation."""
         return cls(*mean_with_std(values, apart))
 
     def to_dict(self, digits: int = 4) -> dict[str, float | None]:
-        """Return it as JSON data; what isn't finite is null."""
+        """Return value and standard deviation, rounded, as JSON data; null where not finite."""
         return {"value": _finite(self.value, digits), "std": _finite(self.std, digits)}
 
 
 @dataclass(frozen=True)
 class SideSection:
-    """One carriageway, measured outwards from the axis.
+    """Cross-section of one carriageway (or half of a single one), measured outwards from the axis.
 
     Attributes:
         side: of the axis.
@@ -88,12 +88,12 @@ class SideSection:
 
     @property
     def sign(self) -> int:
-        """Return the sign of the side's offsets."""
+        """Return the sign of the side's offsets: 1 to the left, -1 to the right."""
         return 1 if self.side == "left" else -1
 
     @property
     def paved_width(self) -> Estimate:
-        """Return the width of the pavement, edge to edge, m."""
+        """Return the width of the pavement from edge to edge, m; from its parts where an edge isn't seen."""
         ends = (self.inner_edge.apart, self.outer_edge.apart)
         width = np.where(self.usual, self.outer_edge.offsets - self.inner_edge.offsets, np.nan)
         if self.edge_seen and np.isfinite(width).any():
@@ -104,7 +104,7 @@ class SideSection:
 
 @dataclass(frozen=True)
 class MeasuredSection:
-    """The road's cross-section.
+    """Measured cross-section of the road, with the standard one that is nearest to it.
 
     Attributes:
         kind: dual or single carriageway.
@@ -122,7 +122,7 @@ class MeasuredSection:
 
     @property
     def standard(self) -> str | None:
-        """Return the name of the standard cross-section that it passes for, or None."""
+        """Return the name of the standard cross-section within `STANDARD_TOLERANCE` of it; None if there is none."""
         return self.nearest if self.distance <= STANDARD_TOLERANCE else None
 
     @property
@@ -135,7 +135,7 @@ class MeasuredSection:
 
 
 def measure_section(profiles: Profiles, layout: RoadLayout, marked: bool) -> MeasuredSection:
-    """Return the cross-section of profiles along the alignment.
+    """Return the cross-section, with standard deviations, that profiles along the alignment show.
 
     Args:
         profiles: along the alignment, so that offset 0 is the axis.
@@ -152,7 +152,7 @@ def measure_section(profiles: Profiles, layout: RoadLayout, marked: bool) -> Mea
 
 @dataclass(frozen=True)
 class _SidePart:
-    """One side of the road while it is measured.
+    """Inputs for measuring one side of the road.
 
     Attributes:
         profiles, layout, marked: as in `measure_section`.
@@ -168,22 +168,22 @@ class _SidePart:
 
     @property
     def sign(self) -> int:
-        """Return the sign of the side's offsets."""
+        """Return the sign of the side's offsets: 1 to the left, -1 to the right."""
         return 1 if self.side == "left" else -1
 
     def everywhere(self, value: float) -> Float:
-        """Return a value for each stretch (K,)."""
+        """Return an array (K,) with the same value for each stretch."""
         return np.full(self.profiles.stretches, value)
 
     def edge(self, begin: Float, outwards: bool = True, reach: float | Float = FARTHEST) -> Edge:
-        """Return the pavement's edge beyond distances (K,) from the axis, within a reach (m), as distances."""
+        """Return the pavement's edge beyond distances (K,), m, from the axis, as distances from the axis."""
         sign = self.sign if outwards else -self.sign
         edge = paved_edge(self.profiles, self.layout.paved, self.sign * begin, sign, reach)
         return Edge(self.sign * edge.offsets, edge.apart)
 
 
 def line_width(line: Line | None, kind: LineKind, road: RoadKind, marked: bool) -> float:
-    """Return the width (m) that a line is taken to have: measured, or the usual one if it is near to that."""
+    """Return the width, m, to write for a line: the usual one if the measured one is near it or unreliable."""
     edge, narrow = (_RURAL_EDGE_LINE, _RURAL_LINE) if road == "single" else (EDGE_LINE, NARROW_LINE)
     usual = edge if kind == "outer_edge" else narrow
     if line is None or not marked:
@@ -196,7 +196,7 @@ def line_width(line: Line | None, kind: LineKind, road: RoadKind, marked: bool) 
 
 
 def _carriageway(part: _SidePart) -> SideSection:
-    """Return one carriageway of a dual one."""
+    """Return the measured cross-section of one carriageway of a dual one."""
     lines, distances, apart = _order_lines(part.band, part.sign)
     distances[:, 0] += 0.5 * line_width(lines[0], "inner_edge", "dual", part.marked)
     outer = part.edge(_everywhere(distances[:, -1]))
@@ -207,7 +207,7 @@ def _carriageway(part: _SidePart) -> SideSection:
 
 
 def _half(part: _SidePart) -> SideSection:
-    """Return one direction of a single carriageway, from the axis outwards."""
+    """Return the measured cross-section of one direction of a single carriageway, from the axis outwards."""
     nowhere = part.everywhere(0.0)
     beside = {s: _beside(part.band, s, part.marked) for s in (1, -1)}
     lines: list[Line | None] = [part.band.middle, *beside[part.sign]]
@@ -232,7 +232,7 @@ def _half(part: _SidePart) -> SideSection:
 
 
 def _beside(band: Band, sign: int, marked: bool) -> list[Line]:
-    """Return the lines of one half of a single carriageway from inside to outside.
+    """Return the lines on one half of a single carriageway, outwards; if not ``marked`` just the most painted one.
 
     Where brightness tells paint, seams and verges pass for lines too: only the best in a lane's distance counts.
     """
@@ -246,7 +246,7 @@ def _beside(band: Band, sign: int, marked: bool) -> list[Line]:
 
 
 def _by_width(part: _SidePart) -> SideSection:
-    """Return a carriageway whose lines aren't seen: with the lanes of the standard cross-section of about its width."""
+    """Return a carriageway whose lines aren't seen, with the lanes of the standard section nearest in width."""
     middle = part.everywhere(part.sign * 0.5 * (part.band.low + part.band.high))
     outer = part.edge(middle, reach=0.5 * part.band.width + _WIDEST)
     inner = part.edge(middle, False, np.abs(middle))
@@ -264,7 +264,7 @@ def _by_width(part: _SidePart) -> SideSection:
 
 
 def _open(line: Line | None, outer: Edge) -> bool:
-    """Return whether the outermost line parts lanes, the outer one of which the cloud doesn't show."""
+    """Return whether the outermost line is dashed with no edge seen, so that the cloud lacks the outer lane."""
     return line is not None and not line.solid and not _is_visible(outer)
 
 
@@ -273,14 +273,14 @@ def _is_visible(edge: Edge) -> bool:
 
 
 def _everywhere(distance: Float) -> Float:
-    """Return distances (K,) with the median where they aren't known."""
+    """Return distances (K,) with unknown ones replaced by the median."""
     return np.where(np.isfinite(distance), distance, np.nanmedian(distance))
 
 
 def _summarise_side(
     name: Side, lines: list[Line | None], boundaries: tuple[Float, Float], inner: Edge, outer: Edge
 ) -> SideSection:
-    """Return a side's widths from what was measured stretch by stretch."""
+    """Return a side's widths, with standard deviations, from lines and edges measured in each stretch."""
     distance, apart = boundaries
     lanes = [
         Estimate.of(distance[:, i + 1] - distance[:, i], np.hypot(apart[:, i], apart[:, i + 1]))
@@ -313,7 +313,7 @@ def _summarise_side(
 
 
 def _inside(first: Float, apart: Float, inner: Edge) -> tuple[Estimate, Estimate]:
-    """Return the distance of the pavement's inner edge from the axis, and the width of the strip up to the lanes."""
+    """Return the distance of the pavement's inner edge from the axis, and the inner edge strip's width, m."""
     if _is_visible(inner):
         offset = Estimate.of(inner.offsets, inner.apart)
         strip = Estimate.of(first - inner.offsets, np.hypot(apart, inner.apart))
@@ -324,7 +324,7 @@ def _inside(first: Float, apart: Float, inner: Edge) -> tuple[Estimate, Estimate
 
 
 def _usual(outside: Float, line: Line | None) -> Bool:
-    """Return where (K,) the pavement outside of the lanes (K,), m, is that of the road itself.
+    """Return a mask (K,) of the stretches where the pavement outside of the lanes is the road's own, not a turnout's.
 
     Beside exits and entries the edge line is a dashed one; beside an emergency bay the pavement is wider.
     """
@@ -341,8 +341,7 @@ def _usual(outside: Float, line: Line | None) -> Bool:
 
 
 def _order_lines(band: Band, sign: int) -> tuple[list[Line | None], Float, Float]:
-    """Return the lines of one side from inside to outside, their distances (K, lines) from the axis, and how far apart
-    the points are that these lie between."""
+    """Return lines outwards (None: unseen), their distances from the axis (K, lines), m, and their points' gaps, m."""
     seen: list[tuple[float, Line | None]] = [(sign * line.offset, line) for line in band.lines]
     seen += [(sign * offset, None) for offset in band.missing]
     seen.sort(key=lambda item: item[0])
@@ -361,7 +360,7 @@ def _order_lines(band: Band, sign: int) -> tuple[list[Line | None], Float, Float
 
 
 def _share_pavement(outside: Estimate) -> tuple[Estimate, Estimate]:
-    """Return the edge strip and hard shoulder that share the pavement outside of the lanes.
+    """Return the widths, m, of edge strip and hard shoulder that share the pavement outside of the lanes.
 
     Nothing on the road parts them: the strip is as wide as that of the standard cross-section which fits best.
     """
@@ -374,7 +373,7 @@ def _share_pavement(outside: Estimate) -> tuple[Estimate, Estimate]:
 
 
 def nearest_standard(sides: dict[Side, SideSection]) -> tuple[str, float]:
-    """Return the standard cross-section that both carriageways are nearest to, and the largest difference (m)."""
+    """Return the name of the standard cross-section nearest to both carriageways, and the largest difference (m)."""
     distances = {
         name: max(_distance(side, row) for side in sides.values()) for name, row in STANDARD_CROSS_SECTIONS.items()
     }
@@ -383,7 +382,7 @@ def nearest_standard(sides: dict[Side, SideSection]) -> tuple[str, float]:
 
 
 def _distance(side: SideSection, row: StandardCrossSection) -> float:
-    """Return the largest difference of a width, m; infinite for another number of lanes. A lane's counts twice."""
+    """Return the largest difference of a width, m, a lane's counting twice; inf if the numbers of lanes differ."""
     if len(side.lanes) != len(row.lanes):
         return float("inf")
     apart = [2.0 * abs(lane.value - width) for lane, width in zip(side.lanes, reversed(row.lanes), strict=True)]
@@ -395,7 +394,7 @@ def _distance(side: SideSection, row: StandardCrossSection) -> float:
 
 
 def snap_to_standard(section: MeasuredSection) -> MeasuredSection:
-    """Return a cross-section with the widths of the standard one that it passes for, else as it is."""
+    """Return the cross-section with the widths of the standard one it passes for; unchanged if it passes for none."""
     if section.standard is None:
         return section
     row = STANDARD_CROSS_SECTIONS[section.standard]
@@ -415,7 +414,7 @@ def snap_to_standard(section: MeasuredSection) -> MeasuredSection:
 
 
 def standard_section(section: MeasuredSection) -> dict[str, Any] | None:
-    """Return what the report says of the nearest standard cross-section; None for a single carriageway."""
+    """Return name and distance (m) of the nearest standard cross-section as JSON; None for a single carriageway."""
     if section.kind == "single":
         return None
     distance = _finite(section.distance, 3)

@@ -32,7 +32,7 @@ class SmoothedValues:
 def smooth(
     values: Float, weights: Float, spacing: float, wavelength: float, order: int = ORDER, usual: float = 0.0
 ) -> SmoothedValues:
-    """Smooth values (N,) at equal spacing by Whittaker's method, robustly (bisquare weights).
+    """Smooth values (N,) at equal spacing by Whittaker's method with bisquare weights; return standard deviations too.
 
     Args:
         values: (N,); NaN where nothing was measured.
@@ -73,7 +73,7 @@ def smooth(
 
 
 def correlation_factor(residual: Float) -> float:
-    """Return how many values with the lag-1 correlation of residuals (N,) tell as much as one independent value."""
+    """Return how many values, correlated (lag 1) as residuals (N,) are, tell as much as one independent value."""
     if len(residual) < 8:
         return 1.0
     centred = residual - residual.mean()
@@ -84,7 +84,7 @@ def correlation_factor(residual: Float) -> float:
 
 
 def mean_with_std(values: Float, apart: Float | None = None) -> tuple[float, float]:
-    """Return a robust mean of values (N,) in order along the road and its standard deviation.
+    """Return the robust mean (bisquare) of values (N,) along the road, and its standard deviation.
 
     Bisquare about the median; the deviation counts as many values as are independent of their neighbours, and what
     `hidden_std` tells of the distances ``apart`` (N,) of the points they lie between. NaN and infinity for no values.
@@ -108,7 +108,7 @@ def mean_with_std(values: Float, apart: Float | None = None) -> tuple[float, flo
 
 
 def hidden_std(apart: Float, scatter: float) -> float:
-    """Return the standard deviation of an offset that no scatter shows, because the points lie in rows along the road.
+    """Return the standard deviation, m, of an offset's error that scatter hides, as points lie in rows along the road.
 
     What lies midway between two rows is off by up to half of their distance: evenly distributed, so by
     distance / sqrt(12). Where the rows wander beside the road, the offsets scatter by as much and their mean is better;
@@ -125,23 +125,23 @@ def hidden_std(apart: Float, scatter: float) -> float:
 
 
 def robust_scale(residual: Float) -> float:
-    """Return a standard deviation from the median of absolute residuals (N,); 0 without any."""
+    """Return a standard deviation estimated by the median absolute residual (N,) times 1.4826; 0 for none."""
     return float(1.4826 * np.median(np.abs(residual))) if len(residual) else 0.0
 
 
 def bisquare(residual: Float, scale: float) -> Float:
-    """Return Tukey's weights (N,) of residuals with a standard deviation: 1 at 0, and nothing from 4.685 of it on."""
+    """Return Tukey's bisquare weights (N,) of residuals: 1 at 0, falling to 0 at 4.685 times the scale."""
     return np.asarray(np.maximum(1.0 - (residual / (_BISQUARE * scale)) ** 2, 0.0) ** 2)
 
 
 def fill_gaps(values: Float) -> Float:
-    """Return values (N,) with those missing interpolated between their neighbours; at least one isn't NaN."""
+    """Return values (N,) with NaN interpolated linearly, held at the ends; at least one must not be NaN."""
     rows, known = np.arange(len(values)), np.isfinite(values)
     return np.interp(rows, rows[known], values[known])
 
 
 def _difference_bands(count: int, order: int) -> Float:
-    """Return D'D of the differences of an order in lower banded form (order + 1, N)."""
+    """Return D'D of the difference operator D of an order, in lower banded form (order + 1, N)."""
     stencil = np.array([1.0])
     for _ in range(order):
         stencil = np.convolve(stencil, [-1.0, 1.0])
@@ -154,7 +154,7 @@ def _difference_bands(count: int, order: int) -> Float:
 
 
 def _solve(penalty: Float, weights: Float, values: Float) -> tuple[Float, Float]:
-    """Return the banded Cholesky factor and the smoothed values."""
+    """Return the banded Cholesky factor of the smoothing equations, and the smoothed values (N,)."""
     bands = penalty.copy()
     bands[0] += weights + _FLOOR * max(float(weights.mean()), _FLOOR)
     factor = np.asarray(cholesky_banded(bands, lower=True))
@@ -162,7 +162,7 @@ def _solve(penalty: Float, weights: Float, values: Float) -> tuple[Float, Float]
 
 
 def _inverse_diagonal(factor: Float) -> Float:
-    """Return the diagonal of the inverse of a banded matrix from its lower Cholesky factor (Takahashi's recursion)."""
+    """Return the diagonal (N,) of a banded matrix's inverse from its lower Cholesky factor (Takahashi's recursion)."""
     width, count = factor.shape[0] - 1, factor.shape[1]
     inverse = np.zeros((width + 1, count + width))  # bands below the diagonal
     lower = factor / factor[0]
@@ -177,7 +177,7 @@ def _inverse_diagonal(factor: Float) -> Float:
 
 
 def _block(inverse: Float, start: int, width: int) -> Float:
-    """Return the symmetric (width, width) block of the inverse that begins at a row."""
+    """Return the symmetric (width, width) block on the inverse's diagonal that begins at a row."""
     block = np.empty((width, width))
     for a in range(width):
         for b in range(a + 1):
@@ -186,7 +186,7 @@ def _block(inverse: Float, start: int, width: int) -> Float:
 
 
 def difference_figures(difference: Float, *names: str) -> dict[str, float]:
-    """Return some of the usual figures of differences (N,), m, by name: mean, mae, rms, p95, largest; NaN are left out.
+    """Return the named figures (mean, mae, rms, p95, largest) of differences (N,), m; NaN are left out.
 
     Without any number there are no figures.
     """

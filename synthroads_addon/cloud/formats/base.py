@@ -24,7 +24,7 @@ from ..strays import FARTHEST
 
 
 class CloudWriter(ABC):
-    """Writes point blocks to one file; a context manager.
+    """Base of writers of point blocks to one cloud file; a context manager.
 
     The file appears under its name only when the context ends without an exception.
 
@@ -99,7 +99,7 @@ class CloudWriter(ABC):
 
     @contextmanager
     def _output_errors(self) -> Iterator[None]:
-        """Raise `OutputError` in place of what the library beneath raises where it can't write."""
+        """Return a context that turns the errors of the library beneath into `OutputError`."""
         try:
             yield
         except self.faults as problem:
@@ -107,7 +107,7 @@ class CloudWriter(ABC):
             raise OutputError(str(self.path), None, f"cannot be written ({reason})") from None
 
     def write(self, block: PointBlock) -> None:
-        """Append a block; raise `OutputError` if a value doesn't fit or the disk is full."""
+        """Append a block to the file; raise `OutputError` if a value doesn't fit or the disk is full."""
         if len(block) == 0:
             return
         for column in self.columns:
@@ -118,7 +118,7 @@ class CloudWriter(ABC):
         self.count += len(block)
 
     def notes(self) -> dict[str, Any]:
-        """Return what the file says of itself as JSON data."""
+        """Return the file's metadata (intensity scale, attributes, classes) as JSON data."""
         return {
             "intensity_scale": self.intensity_scale,
             "attributes": list(self.attributes),
@@ -126,11 +126,11 @@ class CloudWriter(ABC):
         }
 
     def placed_notes(self) -> dict[str, Any]:
-        """Return `notes` with offset and coordinate system, for formats that have no fields for these."""
+        """Return `notes` plus offset and coordinate system, for formats that have no fields for these."""
         return {**self.notes(), "offset": self.offset.tolist(), "crs": self.crs_text}
 
     def to_integers(self, values: AnyArray, kind: str, name: str, scale: float | None = None) -> AnyArray:
-        """Return values (N,) as whole steps, rounded, in the integer type ``kind``.
+        """Return values (N,), divided by the scale and rounded, in the integer type ``kind``.
 
         Raises:
             OutputError: a value is NaN or doesn't fit.
@@ -150,18 +150,18 @@ class CloudWriter(ABC):
         return steps.astype(kind)
 
     def check_finite(self, values: AnyArray, name: str) -> AnyArray:
-        """Return values as they are; raise `OutputError` if one is NaN or infinite."""
+        """Return the values unchanged; raise `OutputError` if one is NaN or infinite."""
         if not np.isfinite(values).all():
             worst = values[~np.isfinite(values).reshape(len(values), -1).all(axis=1)][0]
             raise OutputError(str(self.path), worst.tolist(), f"{name} must be finite")
         return values
 
     def fit_values(self, values: AnyArray, kind: str, name: str) -> AnyArray:
-        """Return values that fit into a type, see `to_integers` and `check_finite`."""
+        """Return values for a field of a type: floats unchanged, integers rounded; `OutputError` if they don't fit."""
         return self.check_finite(values, name) if np.dtype(kind).kind == "f" else self.to_integers(values, kind, name)
 
     def file_class_ids(self, block: PointBlock) -> UInt8:
-        """Return the block's classes (N,) in the file's scheme."""
+        """Return the ids (N,) of the block's classes in the file's class scheme."""
         return np.take(self.scheme.ids, self.to_integers(block.class_id, "uint8", "class_id"))
 
     def stored_integers(self, column: Column, block: PointBlock) -> AnyArray:
@@ -174,17 +174,17 @@ class CloudWriter(ABC):
         return self.to_integers(values, column.dtype, column.name, column.scale)
 
     def content_id(self, *more: object) -> str:
-        """Return 32 hexadecimal digits that depend on the file's description alone: no wall clock, no chance."""
+        """Return 32 hexadecimal digits, a hash of the file's notes and point count: the same on any day."""
         text = json.dumps([self.notes(), self.crs_text, self.offset.tolist(), self.count, *more], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:32]
 
     @abstractmethod
     def _open(self) -> None:
-        """Begin the temporary file."""
+        """Create the temporary file and write what precedes the points."""
 
     @abstractmethod
     def _append(self, block: PointBlock) -> None:
-        """Write a block that isn't empty."""
+        """Write the points of a block that isn't empty."""
 
     @abstractmethod
     def _finish(self) -> None:
@@ -208,7 +208,7 @@ _LARGEST_SCALE = 1e300
 
 @dataclass(frozen=True)
 class CloudHeader:
-    """Header of a cloud's file.
+    """Metadata of a cloud's file, from its header.
 
     Attributes:
         path: the file.
@@ -241,7 +241,7 @@ class CloudHeader:
 
 
 class CloudReader(ABC):
-    """An open cloud; a context manager.
+    """Base of readers of one cloud file, block by block; a context manager.
 
     Attributes:
         header: what the file says of itself.
@@ -258,7 +258,7 @@ class CloudReader(ABC):
         self.close()
 
     def blocks(self, size: int = BLOCK) -> Iterator[PointBlock]:
-        """Yield all points in the file's order, at most ``size`` at a time.
+        """Yield all points in the file's order, as blocks of at most ``size`` points, and check them.
 
         What the file doesn't hold is 0, or NaN for range and incidence.
 
@@ -273,15 +273,15 @@ class CloudReader(ABC):
 
     @abstractmethod
     def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
-        """Yield what the file holds; see `blocks`."""
+        """Yield the file's points as blocks of at most ``size`` points, unchecked."""
 
     def close(self) -> None:
-        """Close the file; it may be closed already."""
+        """Close the file; closing it twice does no harm."""
         self._file.close()
 
 
 def epsg_of(text: str | None) -> int | None:
-    """Return the EPSG code that WKT 1 or 2 ends with, or None."""
+    """Return the EPSG code at the end of a coordinate system's WKT 1 or 2; None if it has none."""
     match = re.search(r'(?:AUTHORITY|ID)\["EPSG",\s*"?(\d+)"?\](?:\]|\s)*$', text.rstrip("\0 \n")) if text else None
     return int(match[1]) if match else None
 
@@ -297,7 +297,7 @@ def header_from_notes(
     usual: set[str],
     has_color: bool,
 ) -> CloudHeader:
-    """Return the header of a file in PLY, E57 or NPZ.
+    """Return the header of a PLY, E57 or NPZ file from the names of its columns and its notes.
 
     Args:
         path: the file.
@@ -337,7 +337,7 @@ def header_from_notes(
 
 
 def intensity_scale(path: Path, notes: dict[str, Any]) -> float:
-    """Return the 16-bit steps per unit of intensity that a file's notes tell.
+    """Return the 16-bit steps per unit of intensity that a file's notes give.
 
     Raises:
         InputError: they tell none, or it is no finite number above 0.
@@ -349,7 +349,7 @@ def intensity_scale(path: Path, notes: dict[str, Any]) -> float:
 
 
 def check_coordinates(path: Path, done: int, xyz: Float) -> Float:
-    """Return the coordinates (N, 3) of a block as they are.
+    """Return a block's coordinates (N, 3) unchanged; raise `InputError` if one isn't finite.
 
     Args:
         path: the file.
@@ -366,7 +366,7 @@ def check_coordinates(path: Path, done: int, xyz: Float) -> Float:
 
 
 def _check_block(path: Path, done: int, block: PointBlock) -> PointBlock:
-    """Return a block as it is; raise `InputError` if a coordinate or intensity can't be one."""
+    """Return a block unchanged; raise `InputError` if a coordinate is too large or an intensity isn't finite."""
     if not len(block):
         return block
     xyz = check_coordinates(path, done, block.xyz)
@@ -381,5 +381,5 @@ def _check_block(path: Path, done: int, block: PointBlock) -> PointBlock:
 
 
 def damage_error(path: Path, at: int, count: int) -> InputError:
-    """Return the error of a file whose points can be read up to the one numbered ``at`` only."""
+    """Return, without raising, the `InputError` for a file that is damaged from its point number ``at`` on."""
     return InputError(str(path), None, f"is truncated or damaged after {at:,} of {count:,} points")

@@ -46,7 +46,7 @@ _FIXED = {
 
 
 def library() -> Any:
-    """Return `pye57.libe57`; raise `InputError` if the package isn't installed."""
+    """Return the module `pye57.libe57`; raise `InputError` if the package isn't installed."""
     try:
         from pye57 import libe57
     except ModuleNotFoundError:
@@ -55,17 +55,17 @@ def library() -> Any:
 
 
 def e57_name(column: Column) -> str:
-    """Return what a column is called in E57."""
+    """Return the name of a column in E57: that of the normals' extension, else with the project's prefix."""
     return NORMALS.get(column.name, f"{EXTENSION}:{column.name}")
 
 
 def _buffer_type(kind: str) -> Any:
-    """Return the type that pye57 takes for values of a type: of integers of 32 bits and more it knows ``q`` alone."""
+    """Return the NumPy type in which pye57 takes values of a type: 64-bit for integers of 32 bits and more."""
     return np.longlong if np.dtype(kind).kind in "iu" and np.dtype(kind).itemsize >= 4 else np.dtype(kind)
 
 
 class E57Writer(CloudWriter):
-    """Writes point blocks to an E57 file; see `CloudWriter`. Colours have 8 bits; intensity isn't clipped."""
+    """Writer of point blocks to an E57 file, with 8-bit colours and unclipped intensities; see `CloudWriter`."""
 
     def _open(self) -> None:
         self._e57 = e57 = library()
@@ -102,7 +102,7 @@ class E57Writer(CloudWriter):
                 self._flush()
 
     def _flush(self) -> None:
-        """Hand the held points on: always as many at a time, so that the file doesn't depend on how they came."""
+        """Write the points held, always as many at a time, so that the file doesn't depend on the blocks' sizes."""
         if self._held:
             self._points.write(self._held)
             self._held = 0
@@ -132,7 +132,7 @@ class E57Writer(CloudWriter):
         self._file.close()
 
     def _pack_columns(self, part: PointBlock) -> dict[str, AnyArray]:
-        """Return what is stored of at most `_CAPACITY` points, by name."""
+        """Return the stored values (n,) of at most `_CAPACITY` points, by the columns' names in E57."""
         local = part.xyz - self.offset
         packed = {f"cartesian{'XYZ'[i]}": self.to_integers(local[:, i], "int32", "xyz", SCALE) for i in range(3)}
         rgb = self.to_integers(part.rgb, "uint16", "rgb") >> 8
@@ -151,7 +151,7 @@ class E57Writer(CloudWriter):
         return packed | {e57_name(column): self.stored_integers(column, part) for column in self.columns}
 
     def _begin_root(self) -> None:
-        """Write what a file and its one scan are described by."""
+        """Write the file's metadata and those of its one scan, the offset as its pose."""
         e57, image = self._e57, self._file
         image.extensionsAdd("", e57.E57_V1_0_URI)
         image.extensionsAdd(EXTENSION, _EXTENSION_URI)
@@ -177,14 +177,14 @@ class E57Writer(CloudWriter):
         self._scan.set("pose", pose)
 
     def _structure(self, kind: Any, values: Mapping[str, float]) -> Any:
-        """Return a structure of numbers, each a node of a kind."""
+        """Return an E57 structure of named numbers, each a node of a kind."""
         structure = self._e57.StructureNode(self._file)
         for name, value in values.items():
             structure.set(name, kind(self._file, value))
         return structure
 
     def _prototype(self) -> Any:
-        """Return the description of one point."""
+        """Return the E57 prototype of a point: type, limits and scale of each of its fields."""
         e57, image = self._e57, self._file
         prototype = e57.StructureNode(image)
         scales = {e57_name(column): (column.scale, self._shift(column)) for column in self.columns}
@@ -223,7 +223,7 @@ _FIELDS = {
 
 
 class E57Reader(CloudReader):
-    """Reads E57 files with Cartesian coordinates; each scan's pose is applied.
+    """Reader of E57 files with Cartesian coordinates; each scan's pose is applied.
 
     Args:
         path: an existing file.
@@ -258,7 +258,7 @@ class E57Reader(CloudReader):
         )
 
     def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
-        """See `CloudReader._stored_blocks`."""
+        """Yield the points of one scan after the other, in map coordinates, without invalid ones."""
         done = 0
         for scan, fields, count in zip(self._scans, self._fields, self._counts, strict=True):
             names = [name for name in sorted(_FIXED.keys() | self._layer_names()) if name in fields]
@@ -307,7 +307,7 @@ def _field_names(prototype: Any) -> set[str]:
 
 
 def _pose(scan: Any) -> tuple[AnyArray, AnyArray]:
-    """Return rotation matrix (3, 3) and translation (3,) of a scan."""
+    """Return the rotation matrix (3, 3) and translation (3,), m, of a scan's pose; identity and 0 without one."""
     if not scan.isDefined("pose"):
         return np.eye(3), np.zeros(3)
     pose = scan["pose"]

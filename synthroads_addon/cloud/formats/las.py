@@ -38,7 +38,7 @@ _SLICE = 16_384
 
 
 class LasWriter(CloudWriter):
-    """Writes point blocks to a LAZ (or, by its ending, LAS) file; see `CloudWriter`."""
+    """Writer of point blocks to a LAZ (or, by its ending, LAS) file; see `CloudWriter`."""
 
     faults = (OSError, lazrs.LazrsError)
 
@@ -80,14 +80,14 @@ class LasWriter(CloudWriter):
         self._file.close()
 
     def _flush(self) -> None:
-        """Hand the packed points on. laspy's own bookkeeping sorts and searches them: ours is kept while packing."""
+        """Write the packed points without laspy's bookkeeping, which sorts them: ours is kept while packing."""
         if self._held:
             record = laspy.PackedPointRecord(self._buffer[: self._held], self._header.point_format)
             self._writer.point_writer.write_points(record)
             self._held = 0
 
     def _pack(self, block: PointBlock, record: AnyArray) -> None:
-        """Turn points into LAS records, in place."""
+        """Fill in LAS records, in place, with the points of a block."""
         self._pack_coordinates(block.xyz, record)
         brightness = block.intensity * self.intensity_scale
         np.rint(brightness, out=brightness)
@@ -120,7 +120,7 @@ class LasWriter(CloudWriter):
         self._high = np.maximum(self._high, high.astype(np.int64))
 
     def _pack_returns(self, block: PointBlock, record: AnyArray) -> None:
-        """Pack return number and number of returns, four bits each."""
+        """Fill in, in place, return number and number of returns, four bits each, and count points by return."""
         number = self.to_integers(block.return_number, "uint8", "return_number")
         of = self.to_integers(block.number_of_returns, "uint8", "number_of_returns")
         most = max(number.max(), of.max())
@@ -186,7 +186,7 @@ _BYTES = 14
 
 
 class LasReader(CloudReader):
-    """Reads LAS and LAZ.
+    """Reader of LAS and LAZ files of any version and point format.
 
     Args:
         path: an existing file.
@@ -212,7 +212,7 @@ class LasReader(CloudReader):
             raise InputError(str(path), None, f"is not a LAS file that can be read ({problem})") from None
 
     def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
-        """See `CloudReader._stored_blocks`."""
+        """Yield the points as blocks of at most ``size``, from the file's first point on."""
         done, path = 0, self.header.path
         if self._reader.points_read:
             self._reader.seek(0)
@@ -232,7 +232,7 @@ class LasReader(CloudReader):
             yield self._block(record)
 
     def _check_size(self, path: Path) -> None:
-        """Refuse a file that ends before its points do (LAS), or whose chunks don't fill it (LAZ), before any work."""
+        """Raise `InputError` if a LAS file ends before its points do or a LAZ file's chunks don't fill it."""
         header, size = self._reader.header, path.stat().st_size
         start = header.offset_to_point_data
         if not header.are_points_compressed:
@@ -260,7 +260,7 @@ class LasReader(CloudReader):
 
 
 def open_to_copy(path: Path) -> laspy.LasReader:
-    """Open a LAS or LAZ file with laspy, with the extended records behind its points, to copy it.
+    """Open a LAS or LAZ file with laspy, including its extended records (EVLRs), to be copied.
 
     Raises:
         InputError: these records are damaged, or a header can't be written again as it is.
@@ -280,14 +280,14 @@ def open_to_copy(path: Path) -> laspy.LasReader:
 
 
 def _check_attributes(path: Path, header: laspy.LasHeader) -> None:
-    """Refuse attributes of no bytes: laspy has no type for them where it writes a header."""
+    """Raise `InputError` if an extra attribute has no bytes: laspy has no type for it when it writes."""
     for dimension in header.point_format.extra_dimensions:
         if dimension.num_bits == 0:
             raise InputError(str(path), None, f"can't be copied: its attribute {dimension.name!r} has no bytes")
 
 
 def _check_records_behind(path: Path, header: laspy.LasHeader) -> None:
-    """Refuse extended records that reach beyond the file: laspy would make as many, and as much room, as they claim."""
+    """Raise `InputError` if extended records (EVLRs) reach beyond the file's end, as laspy trusts their sizes."""
     at, size = header.start_of_first_evlr or 0, path.stat().st_size
     with path.open("rb") as file:
         for _ in range(header.number_of_evlrs or 0):
@@ -298,7 +298,7 @@ def _check_records_behind(path: Path, header: laspy.LasHeader) -> None:
 
 
 def _check_start(path: Path, file: BinaryIO) -> None:
-    """Refuse a header whose records can't all lie before the points: laspy would look for them one by one."""
+    """Raise `InputError` if a header's records can't all lie before the points: laspy would seek them one by one."""
     start = file.read(104)
     file.seek(0)
     if start[:4] != b"LASF" or len(start) < 104:
@@ -309,7 +309,7 @@ def _check_start(path: Path, file: BinaryIO) -> None:
 
 
 def _scan_angle(record: Any, names: set[str]) -> AnyArray:
-    """Return scan angles (N,) in degrees."""
+    """Return the scan angles (N,), deg, from whichever field the point format has."""
     if "scan_angle" in names:
         return np.asarray(record["scan_angle"]).astype(np.float64) * SCAN_ANGLE_STEP
     return np.asarray(record["scan_angle_rank"])
@@ -356,7 +356,7 @@ def _crs_text(las: laspy.LasHeader) -> str | None:
 
 
 def _geotiff_epsg(las: laspy.LasHeader) -> int | None:
-    """Return the projected system's code (key 3072) of files before LAS 1.4."""
+    """Return the EPSG code of the projected system in GeoTIFF keys (3072), as before LAS 1.4; None without."""
     for record in las.vlrs.get("GeoKeyDirectoryVlr"):
         for key in record.geo_keys:
             if key.id == 3072 and key.tiff_tag_location == 0 and key.value_offset != 32767:
@@ -365,7 +365,7 @@ def _geotiff_epsg(las: laspy.LasHeader) -> int | None:
 
 
 def _check_chunks(path: Path, start: int, record: bytes) -> None:
-    """Refuse a LAZ file whose chunks don't fill it: sizes that it claims, before its decompressor believes them.
+    """Raise `InputError` if a LAZ file's chunks don't fill it, before the decompressor believes their sizes.
 
     The decompressor makes room for as many chunks, and for layers as long, as the bytes say: one flipped bit costs
     4 GB, or the process where there is no room. The layout is that of LASzip (Isenburg 2013, "LASzip: lossless
@@ -409,7 +409,7 @@ def _damage_error(path: Path) -> InputError:
 
 
 def _chunk_sizes(path: Path, file: BinaryIO, start: int, record: bytes) -> list[int]:
-    """Return the bytes of each chunk, as the table says."""
+    """Return the size of each chunk, bytes, from the LAZ file's chunk table."""
     file.seek(start)
     try:
         table: list[tuple[int, int]] = lazrs.read_chunk_table(file, lazrs.LazVlr(record))
@@ -423,7 +423,7 @@ def _chunk_sizes(path: Path, file: BinaryIO, start: int, record: bytes) -> list[
 
 
 def _layers_of(record: bytes) -> tuple[int, int] | None:
-    """Return size of a point, bytes, and number of layers of a chunk; None if its chunks have no layers."""
+    """Return a point's size, bytes, and the number of layers in a chunk; None if its chunks have no layers."""
     compressor, items = struct.unpack_from("<H", record)[0], struct.unpack_from("<H", record, 32)[0]
     if compressor != _LAYERED:
         return None
@@ -433,7 +433,7 @@ def _layers_of(record: bytes) -> tuple[int, int] | None:
 
 
 def _layers_add_up(file: BinaryIO, at: int, length: int, point: int, layers: int) -> bool:
-    """Return whether a chunk's length is that of its first point, its number of points, and its layers together."""
+    """Return whether a LAZ chunk's length is the sum of its first point, its point count and its layers."""
     head = point + 4
     file.seek(at + head)
     lengths = file.read(4 * layers)

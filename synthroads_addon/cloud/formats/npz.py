@@ -37,7 +37,7 @@ _TIME = (1980, 1, 1, 0, 0, 0)
 
 
 class NpzWriter(CloudWriter):
-    """Writes point blocks to an NPZ file; see `CloudWriter`. Nothing is rounded or clipped."""
+    """Writer of point blocks to an NPZ file, neither rounded nor clipped; see `CloudWriter`."""
 
     def _open(self) -> None:
         names = {column.array for column in self.columns}
@@ -74,7 +74,7 @@ class NpzWriter(CloudWriter):
 
 
 class NpzReader(CloudReader):
-    """Reads NPZ files with arrays named as those of `PointBlock`; ``xyz`` is needed.
+    """Reader of NPZ files with arrays named as those of `PointBlock`; ``xyz`` is needed.
 
     Args:
         path: an existing file.
@@ -111,7 +111,7 @@ class NpzReader(CloudReader):
         )
 
     def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
-        """See `CloudReader._stored_blocks`."""
+        """Yield the points as blocks of at most ``size``, read in step from all arrays."""
         members = {name: self._file.open(f"{name}.npy") for name in self._kinds}
         try:
             for member in members.values():
@@ -143,7 +143,7 @@ class NpzReader(CloudReader):
         return make_points(arrays | stored, self.header.attributes, count)
 
     def _read_kinds(self, path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
-        """Return shape and type of each array that is known here."""
+        """Return shape and type of each array of the file that `PointBlock` knows, by name."""
         kinds = {}
         for name in POINT_TYPES | _ON_REQUEST:
             if f"{name}.npy" in self._file.namelist():
@@ -172,7 +172,7 @@ class NpzReader(CloudReader):
 
 
 def _npy_header(member: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Read the header of an array; return its shape and type."""
+    """Read an NPY header from an open member and return the array's shape and type."""
     version = npy.read_magic(member)
     read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
     shape, fortran_order, kind = read(member)

@@ -51,7 +51,7 @@ _MOST_DIGITS = 18
 
 
 def ply_name(column: Column) -> str:
-    """Return what a column is called in PLY."""
+    """Return the name of a column in PLY."""
     return _NAMES.get(column.name, column.name)
 
 
@@ -62,7 +62,7 @@ def _ply_type(column: Column) -> str:
 
 
 class PlyWriter(CloudWriter):
-    """Writes point blocks to a PLY file; see `CloudWriter`. Colours have 8 bits; intensity isn't clipped."""
+    """Writer of point blocks to a binary PLY file, with 8-bit colours and unclipped intensities."""
 
     def _open(self) -> None:
         self._fields = [*_FIXED, *((ply_name(column), _ply_type(column)) for column in self.columns)]
@@ -93,7 +93,7 @@ class PlyWriter(CloudWriter):
         self._file.close()
 
     def _header(self, count: int) -> bytes:
-        """Return the header, which has the same length for any number of points."""
+        """Return the PLY header for a number of points; it is equally long for any number."""
         notes = json.dumps(self.placed_notes(), separators=(",", ":"))
         lines = [
             "ply",
@@ -108,7 +108,7 @@ class PlyWriter(CloudWriter):
 
 
 class PlyReader(CloudReader):
-    """Reads binary little-endian PLY files whose points are scalars, the project's own and others'.
+    """Reader of binary little-endian PLY files whose points are scalars, the project's own and others'.
 
     Args:
         path: an existing file.
@@ -138,7 +138,7 @@ class PlyReader(CloudReader):
         )
 
     def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
-        """See `CloudReader._stored_blocks`."""
+        """Yield the points as blocks of at most ``size``, from the file's first point on."""
         self._file.seek(self._start)
         for done in range(0, self.header.count, size):
             rows = min(size, self.header.count - done)
@@ -162,14 +162,14 @@ class PlyReader(CloudReader):
 
 
 def _sixteen_bits(channel: AnyArray) -> UInt16:
-    """Return a colour channel of 8 bits, 16 bits, or 0 to 1, in 16 bits."""
+    """Return a colour channel as 16 bits, from 8 bits, 16 bits or floats of 0 to 1."""
     if channel.dtype.kind == "f":
         return np.rint(np.clip(channel, 0, 1) * 65535).astype(np.uint16)
     return channel.astype(np.uint16) * np.uint16(257 if channel.dtype.itemsize == 1 else 1)
 
 
 def _read_header(path: Path, file: BinaryIO) -> tuple[int, np.dtype[Any], Any]:
-    """Return number and type of the points and the project's notes (None if there are none)."""
+    """Return the number and the record type of a PLY's points, and the project's notes (None without)."""
     if file.readline(8).strip() != b"ply":
         raise InputError(str(path), None, "is not a PLY file")
     fields: list[tuple[str, str]] = []
@@ -194,7 +194,7 @@ def _read_header(path: Path, file: BinaryIO) -> tuple[int, np.dtype[Any], Any]:
 
 
 def _header_lines(path: Path, file: BinaryIO) -> Iterator[str]:
-    """Yield the lines before ``end_header``."""
+    """Yield the lines of a PLY header up to ``end_header``; raise `InputError` if the file ends first."""
     while raw := file.readline(_LONGEST_LINE):
         line = raw.decode("ascii", errors="replace").rstrip("\r\n")
         if line.strip() == "end_header":

@@ -20,7 +20,7 @@ _PACKAGES = {".e57": "pye57"}
 
 
 def missing_package(ending: str) -> str | None:
-    """Return the package that files of this ending need and that isn't installed; None if there is none."""
+    """Return the package that files of this ending need and that isn't installed; None if nothing is missing."""
     package = _PACKAGES.get(ending)
     return package if package and importlib.util.find_spec(package) is None else None
 
@@ -42,19 +42,19 @@ def open_writer(
     scheme: ClassScheme | None = None,
     crs_text: str | None = None,
 ) -> CloudWriter:
-    """Return the writer for a file's ending, yet to be entered; see `CloudWriter` for the arguments."""
+    """Return the writer that suits a file's ending, not yet entered as a context; arguments as `CloudWriter`."""
     make: type[CloudWriter] = _format_class(check_ending(path), "Writer")
     return make(path, epsg, offset, intensity_scale, attributes, scheme, crs_text)
 
 
 def _format_class(ending: str, role: Literal["Reader", "Writer"]) -> Any:
-    """Return the class that reads or writes a kind of file; only its own library is loaded."""
+    """Return the reader or writer class of an ending, importing only that format's library."""
     name = _FORMATS[ending]
     return getattr(import_module(f".{name.lower()}", __package__), f"{name}{role}")
 
 
 def open_cloud(path: Path) -> CloudReader:
-    """Open a cloud of any format.
+    """Open a LAS, LAZ, PLY, E57 or NPZ file, by its ending, and return its reader.
 
     Raises:
         MissingFileError: there is no such file, or it can't be read.

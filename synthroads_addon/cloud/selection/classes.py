@@ -18,7 +18,7 @@ FEWEST = 200
 
 @dataclass(frozen=True)
 class RealCloud:
-    """Points of a cloud as the calibration needs them; (N,) arrays.
+    """N points of a measured cloud with what the calibration needs; (N,) arrays.
 
     Attributes:
         xyz: (N, 3) map coordinates, m.
@@ -40,7 +40,7 @@ class RealCloud:
 
 @dataclass(frozen=True)
 class RealClass:
-    """The points of a class that have an intensity.
+    """N points of one class of a measured cloud, all with an intensity above 0.
 
     Attributes:
         selection: how they are told from the others, in words.
@@ -61,7 +61,7 @@ class RealClass:
 
 
 def read_real(path: Path, attribute: str | None = None) -> RealCloud:
-    """Read a cloud.
+    """Read all points of a measured cloud, with class labels from ``class_id`` or another attribute.
 
     Args:
         path: of any format that is read here.
@@ -89,7 +89,7 @@ def read_real(path: Path, attribute: str | None = None) -> RealCloud:
 
 
 def _attribute(path: Path, name: str) -> Int:
-    """Return an extra attribute (N,) of a LAS file."""
+    """Return a named attribute (N,) of a LAS or LAZ file as integers."""
     if path.suffix.lower() not in (".las", ".laz"):
         raise InputError("--class-field", name, f"needs a LAS or LAZ file, not {path.name}")
     with laspy.open(path, read_evlrs=False) as file:
@@ -100,7 +100,7 @@ def _attribute(path: Path, name: str) -> Int:
 
 
 def class_by_label(cloud: RealCloud, code: str) -> RealClass:
-    """Return the points of a class by its number or name.
+    """Return the points of a measured cloud's class, given by its number or its name.
 
     Raises:
         InputError: there is no such class, or fewer than `FEWEST` of its points have an intensity.
@@ -126,7 +126,7 @@ def _number(cloud: RealCloud, code: str) -> tuple[int, str]:
 
 
 def select_class(cloud: RealCloud, chosen: Index, selection: str) -> RealClass:
-    """Return chosen points of a cloud as a class; zeros are counted and left out."""
+    """Return the points at these indices as a class; those of intensity 0 are only counted."""
     bright = chosen[cloud.intensity[chosen] > 0.0]
     if len(bright) < FEWEST:
         raise InputError("--real", selection, f"{len(bright)} points have an intensity, at least {FEWEST} are needed")
@@ -142,7 +142,7 @@ def select_class(cloud: RealCloud, chosen: Index, selection: str) -> RealClass:
 
 
 def ranges_and_incidences(real: RealClass, scanner: Float) -> tuple[Float, Float]:
-    """Return ranges (N,), m, and incidence angles (N,), rad, of points that a scanner at one place saw.
+    """Return ranges (N,), m, and incidence angles (N,), rad, of a class's points to a scanner at one place.
 
     The surface's normal is that of the plane through the points of each square of `_CELL`; where those are few or in
     line, it is upright.
@@ -162,7 +162,7 @@ _CELL = 3.0
 
 
 def _normals(place: Float) -> Float:
-    """Return unit normals (N, 3) of a ground-like surface through points (N, 3)."""
+    """Return unit normals (N, 3) of points on ground-like surfaces: of a plane fitted in each square cell."""
     cell = np.floor(place[:, :2] / _CELL).astype(np.int64)
     _, owner, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
     owner = owner.ravel()

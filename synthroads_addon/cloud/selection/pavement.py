@@ -37,7 +37,7 @@ _FEWEST_OF_LINE = 30
 
 @dataclass(frozen=True)
 class RoadClasses:
-    """Where pavement and markings lie.
+    """Road axis, and the offsets from it at which pavement and markings lie.
 
     Attributes:
         axis: CSV or GeoJSON, in the cloud's coordinates.
@@ -53,7 +53,7 @@ class RoadClasses:
 
 
 def road_classes(cloud: RealCloud, road: RoadClasses) -> dict[str, RealClass]:
-    """Return the points of ``paved`` and of ``line``.
+    """Return the points of pavement (``paved``) and markings (``line``) of a cloud, told by offset from the axis.
 
     Raises:
         InputError: the axis can't be read, or too few points lie where pavement or markings should be.
@@ -82,7 +82,7 @@ def road_classes(cloud: RealCloud, road: RoadClasses) -> dict[str, RealClass]:
 
 
 def _on_lines(intensity: Float, station: Float, offset: Float, road: RoadClasses) -> tuple[Index, float]:
-    """Return the points on the dashes of lines, and the intensity above which a stretch of line is a dash."""
+    """Return the indices of points on dashes, and Otsu's threshold of median intensities that told them apart."""
     half = road.line_width / 2.0
     points, medians = [], []
     for line in road.lines:
@@ -104,7 +104,7 @@ def _on_lines(intensity: Float, station: Float, offset: Float, road: RoadClasses
 
 
 def _brightest(aside: Float, intensity: Float, half: float) -> float:
-    """Return the shift of a line of half a width at which its points' mean intensity is largest."""
+    """Return the lateral shift, m, that maximises the mean intensity within half a line's width of it."""
     shifts = np.arange(-REACH, REACH + 1e-9, 0.02)
     inside = np.abs(aside[:, None] - shifts) <= half
     count = inside.sum(axis=0)
@@ -113,7 +113,7 @@ def _brightest(aside: Float, intensity: Float, half: float) -> float:
 
 
 def _median_along(station: Float, intensity: Float) -> Float:
-    """Return for each point (N,) the smaller of the medians of the points within `ALONG` before and behind it."""
+    """Return for each point (N,) the smaller of the median intensities within `ALONG` before and behind it."""
     order = np.argsort(station, kind="stable")
     place, value = station[order], intensity[order]
     begin, end = np.searchsorted(place, place - ALONG), np.searchsorted(place, place + ALONG, side="right")
@@ -124,7 +124,7 @@ def _median_along(station: Float, intensity: Float) -> Float:
 
 
 def axis_coordinates(points: Float, axis: Float) -> tuple[Float, Float]:
-    """Return stations and offsets (N,) of points (N, 2) beside a chain of axis points (M, 2), m; NaN beside none.
+    """Return stations and offsets (N,), m, of points (N, 2) beside an axis polyline (M, 2); NaN where beside none.
 
     Each point belongs to the nearest of the segments whose ends it lies between, or to the corner of two.
     """
@@ -148,7 +148,7 @@ def axis_coordinates(points: Float, axis: Float) -> tuple[Float, Float]:
 
 
 def _nearest(points: Float, begin: Float, step: Float, length: Float) -> tuple[Index, Float, Float]:
-    """Return of each point (P,) the nearest segment, how far along it (m), and the offset; NaN beyond all ends."""
+    """Return for each point (P,) its nearest segment, the distance along it and the offset, m; NaN beyond all ends."""
     direction = step / length[:, None]
     offset = points[:, None, :] - begin
     along = np.einsum("psi,si->ps", offset, direction)

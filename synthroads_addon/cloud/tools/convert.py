@@ -61,7 +61,7 @@ def subsample(
     progress: Progress = silent,
     block: int = BLOCK,
 ) -> dict[str, Any]:
-    """Write one point per occupied cell of a cubic grid; see `GridSubsampler` and `convert`."""
+    """Write one point per occupied cell (edge in m) of a cubic grid; return what was done as JSON data."""
     _check_output(source, output, overwrite)
     with open_cloud(source) as cloud, GridSubsampler(cell, output.parent) as grid:
         scheme = _scheme_of(cloud, classes)
@@ -81,7 +81,7 @@ def map_intensity(
     overwrite: bool = False,
     progress: Progress = silent,
 ) -> dict[str, Any]:
-    """Write a cloud with its intensities mapped on another's; see `IntensityMapping` and `convert`."""
+    """Write a cloud with its intensities mapped onto another's distribution; return what was done as JSON data."""
     _check_output(source, output, overwrite)
     _check_output(target, output, overwrite)
     with open_cloud(source) as cloud, open_cloud(target) as other:
@@ -110,7 +110,7 @@ def draw_previews(
     depth: float = 1.0,
     overwrite: bool = False,
 ) -> dict[str, Any]:
-    """Draw a cloud from above and a cross-section of it.
+    """Draw a cloud from above and in cross-section into PNG files; return what was drawn as JSON data.
 
     Args:
         folder: for the pictures (`PREVIEWS`; the coloured one only if the cloud has colours).
@@ -154,7 +154,7 @@ def draw_previews(
 
 
 def _strays_of(cloud: CloudReader) -> Strays | None:
-    """Return the stray points of a cloud, which would make pictures far too wide; None if there are none."""
+    """Return the detector of a cloud's stray points, which would make pictures too wide; None if there are none."""
     strays = Strays()
     for block in cloud.blocks():
         strays.add(block.xyz)
@@ -162,13 +162,13 @@ def _strays_of(cloud: CloudReader) -> Strays | None:
 
 
 def _staying_blocks(cloud: CloudReader, strays: Strays | None) -> Iterator[PointBlock]:
-    """Yield a cloud's blocks without strays."""
+    """Yield a cloud's blocks without their stray points."""
     for block in cloud.blocks():
         yield block if strays is None else block.select(np.flatnonzero(strays.stay(block.xyz)))
 
 
 def read_centerline(path: Path) -> Float:
-    """Return the points (N, 2) of the first line of a GeoJSON file, as `synthroads generate` writes one."""
+    """Read the first LineString of a GeoJSON file and return its points (N, 2) in the file's coordinates."""
     data = read_json(path)
     try:
         shapes = [feature["geometry"] for feature in data["features"]] if "features" in data else [data]
@@ -182,7 +182,7 @@ def read_centerline(path: Path) -> Float:
 
 
 class _Extent:
-    """Where a cloud lies: its middle, its long axis in the plane, and its reach in any direction.
+    """A cloud's extent in plan: its middle, its long axis, and its reach in any direction, from one pass.
 
     One look at the points is enough: of each block the outermost points in 48 directions are kept, between which
     nothing reaches out by more than 0.3 % of the cloud's radius.
@@ -217,7 +217,7 @@ class _Extent:
         self.start, self.end = self.middle + low * self.along, self.middle + high * self.along
 
     def across(self, start: Float, end: Float) -> tuple[float, float]:
-        """Return the reach to the right (negative) and to the left of a line."""
+        """Return the cloud's extent across a line, m: to the right (negative) and to the left, 1 m added to each."""
         along = np.asarray(end) - np.asarray(start)
         length = float(np.hypot(*along))
         along = along / length if length else np.array([1.0, 0.0])
@@ -225,7 +225,7 @@ class _Extent:
         return low - 1.0, high + 1.0
 
     def axis(self) -> Float:
-        """Return the long axis as a line (2, 2)."""
+        """Return both ends (2, 2) of the cloud's long axis, map coordinates, m."""
         return np.stack([self.start, self.end])
 
     def _reach(self, origin: Float, direction: Float) -> tuple[float, float]:
@@ -237,7 +237,7 @@ class _Extent:
 def _cross_cut(
     line: tuple[float, float, float, float] | None, station: float | None, path: Float, reach: float, extent: _Extent
 ) -> tuple[Float, Float, float]:
-    """Return middle, direction (to the right) and reach to either side of a cut."""
+    """Return a cross-section's middle (2,), direction (2,) to the right, and reach (m) to either side."""
     if line is not None:
         left, right = np.array(line[:2]), np.array(line[2:])
         length = float(np.hypot(*(right - left)))
@@ -260,7 +260,7 @@ def _cross_cut(
 
 
 def _scheme_of(cloud: CloudReader, classes: str | None) -> ClassScheme:
-    """Return the scheme to write a cloud's points with."""
+    """Return the class scheme to write a cloud with; raise `InputError` if the cloud's classes don't suit it."""
     header = cloud.header
     if classes is None or (header.labelled and classes == header.scheme.name):
         return header.scheme.as_stored()
@@ -298,7 +298,7 @@ def _summary(cloud: CloudReader, writer: CloudWriter) -> dict[str, Any]:
 
 
 def _check_output(source: Path, output: Path, overwrite: bool) -> None:
-    """Refuse an output file that can't be written, before any work."""
+    """Raise an error if the output file's ending, place or rights won't do, before any work."""
     check_ending(output, "--output")
     check_ending(source)
     if output.exists() and source.exists() and source.samefile(output):

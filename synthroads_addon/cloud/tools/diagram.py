@@ -22,7 +22,7 @@ SCALE = 2
 
 @dataclass(frozen=True)
 class PlotFrame:
-    """A diagram's box in the picture and the values at its edges."""
+    """A diagram's box in an enlarged picture, and the values at its edges."""
 
     draw: ImageDraw.ImageDraw
     box: Box
@@ -30,7 +30,7 @@ class PlotFrame:
     high: tuple[float, float]
 
     def at(self, x: Float, y: Float) -> list[tuple[float, float]]:
-        """Return pixels of values."""
+        """Return the pixels of values, as (x, y) pairs in the enlarged picture; what lies above is cut at the top."""
         left, top, right, bottom = self.box
         across = left + (np.asarray(x) - self.low[0]) / (self.high[0] - self.low[0]) * (right - left)
         up = bottom - (np.asarray(y) - self.low[1]) / (self.high[1] - self.low[1]) * (bottom - top)
@@ -38,14 +38,14 @@ class PlotFrame:
 
 
 def draw_picture(size: tuple[int, int], paint: Callable[[ImageDraw.ImageDraw], None]) -> Image.Image:
-    """Return a picture of a size (pixels) that a function has painted on paper `SCALE` times as large."""
+    """Return a picture of a size (pixels), painted by a function at `SCALE` times that size and reduced."""
     picture = Image.new("RGB", (size[0] * SCALE, size[1] * SCALE), PAPER)
     paint(ImageDraw.Draw(picture))
     return picture.resize(size, Image.Resampling.LANCZOS)
 
 
 def draw_grid(frame: PlotFrame, text: str) -> None:
-    """Draw a frame, its vertical lines with their values, and below it what they are."""
+    """Draw a frame with vertical grid lines, their values, and the axis label below."""
     left, top, right, bottom = frame.box
     step = nice_step((frame.high[0] - frame.low[0]) / 6.0)
     for value in _multiples(np.ceil(frame.low[0] / step), frame.high[0], step):
@@ -58,7 +58,7 @@ def draw_grid(frame: PlotFrame, text: str) -> None:
 
 
 def draw_levels(frame: PlotFrame, step: float) -> None:
-    """Draw the horizontal lines of a frame within its edges, one every ``step``, with their values."""
+    """Draw a frame's horizontal grid lines at multiples of ``step`` above its low edge, with their values."""
     for value in _multiples(np.floor(frame.low[1] / step) + 1.0, frame.high[1], step):
         (left, y), (right, _) = frame.at(np.array([frame.low[0], frame.high[0]]), np.array([value, value]))
         frame.draw.line([(left, y), (right, y)], fill=GRID, width=SCALE)
@@ -66,7 +66,7 @@ def draw_levels(frame: PlotFrame, step: float) -> None:
 
 
 def _multiples(first: float, end: float, step: float) -> list[float]:
-    """Return the multiples of a step from the `first` one (a whole number) up to an end; 0 is 0 among them.
+    """Return the multiples of a step from ``first`` times it up to an end, with an exact 0.
 
     Sums of steps would miss it by some 1e-17, which would be written beside its line.
     """
@@ -76,6 +76,6 @@ def _multiples(first: float, end: float, step: float) -> list[float]:
 def draw_text(
     draw: ImageDraw.ImageDraw, place: tuple[float, float], text: str, size: int, color: Color = INK, anchor: str = "la"
 ) -> None:
-    """Write a text of a size (pixels) at a place of the picture as it is saved."""
+    """Draw text of a size (pixels) at a place, both counted in the picture as saved."""
     font = ImageFont.load_default(size=size * SCALE)
     draw.text((place[0] * SCALE, place[1] * SCALE), text, fill=color, font=font, anchor=anchor)

@@ -33,7 +33,7 @@ _HEIGHT_STOPS = ("#440154", "#472d7b", "#3b528b", "#2c728e", "#21918c", "#28ae80
 
 @dataclass
 class DisplayCloud:
-    """N points of a cloud, to be drawn, in random order.
+    """A random subset of N points of a cloud's file, in random order, to be drawn in a viewport.
 
     Attributes:
         header: what the file says of itself.
@@ -62,15 +62,15 @@ class DisplayCloud:
 
     @property
     def total(self) -> int:
-        """Return how many points the file has."""
+        """Return the number of points of the whole file."""
         return int(self.counts.sum())
 
     def colorings(self) -> tuple[ColourBy, ...]:
-        """Return what the points can be coloured by: a file without colours has no ``rgb``."""
+        """Return the quantities that the points can be coloured by; ``rgb`` only if the file has colours."""
         return tuple(name for name in COLOURINGS if name != "rgb" or self.header.has_color)
 
     def classes(self) -> list[tuple[PointClass, int]]:
-        """Return the classes that the file has points of, with their number, in the order of their ids."""
+        """Return the classes that occur in the file, with their numbers of points, by increasing id."""
         scheme: ClassScheme = self.header.scheme
         rows = {row.id: row for row in scheme.rows}
         return [
@@ -80,7 +80,7 @@ class DisplayCloud:
         ]
 
     def limits(self, by: ColourBy) -> tuple[float, float]:
-        """Return the values of the first and last colour of ``intensity`` or ``height`` (map m)."""
+        """Return the 0.5 and 99.5 % quantiles that the first and last colour stand for; heights in map m; cached."""
         if by not in self._limits:
             values, shift = (self.brightness, 0.0) if by == "intensity" else (self.xyz[:, 2], self.origin[2])
             low, high = np.quantile(values, [0.005, 0.995])
@@ -88,7 +88,7 @@ class DisplayCloud:
         return self._limits[by]
 
     def colors(self, by: ColourBy) -> UInt8:
-        """Return the points' colours (N, 4), sRGB and opaque; worked out once for each ``by``."""
+        """Return the points' colours (N, 4), opaque 8-bit sRGB; computed once for each ``by``."""
         if by not in self._colors:
             self._colors[by] = np.column_stack([self._rgb_by(by), np.full(len(self), 255, np.uint8)])
         return self._colors[by]
@@ -107,14 +107,14 @@ class DisplayCloud:
 
 
 def height_colors() -> UInt8:
-    """Return a (256, 3) table of sRGB colours from low to high."""
+    """Return a colour table (256, 3), 8-bit sRGB, from low to high: Viridis."""
     stops = np.array([[int(stop[i : i + 2], 16) for i in (1, 3, 5)] for stop in _HEIGHT_STOPS], dtype=np.float64)
     at = np.linspace(0.0, len(stops) - 1.0, 256)
     return np.column_stack([np.interp(at, np.arange(len(stops)), stops[:, i]) for i in range(3)]).astype(np.uint8)
 
 
 def chosen_points(count: int, budget: int) -> Int:
-    """Return the increasing indices (min(count, budget),) of the points that stay of ``count``."""
+    """Return the increasing indices (min(count, budget),) of a stratified random choice of ``count`` points."""
     if count <= budget:
         return np.arange(count, dtype=np.int64)
     edges = np.arange(budget + 1, dtype=np.int64) * count // budget
@@ -123,7 +123,7 @@ def chosen_points(count: int, budget: int) -> Int:
 
 
 def drawing_places(count: int) -> Int:
-    """Return for each of the chosen points (count,), in the file's order, where it stands in the drawing's."""
+    """Return a random permutation (count,): where each chosen point, in the file's order, is drawn."""
     return stream(0, "drawing order", count).permutation(count)
 
 
@@ -134,7 +134,7 @@ def read_display(
     progress: Callable[[float], None] = lambda share: None,
     block: int = BLOCK,
 ) -> DisplayCloud:
-    """Return a cloud to be drawn.
+    """Read a cloud block by block and return a random choice of at most ``budget`` points, to be drawn.
 
     Memory is that of ``budget`` points (20 bytes each and 4 for each colouring; 22 more while the file is read) and
     one block.

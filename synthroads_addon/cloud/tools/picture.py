@@ -13,7 +13,7 @@ from ..points import PointBlock
 
 @dataclass(frozen=True)
 class Axes:
-    """Coordinates along the picture's edges.
+    """Coordinates along a picture's edges: those of its lower left corner, and a pixel's size.
 
     Attributes:
         left, low: of the lower left corner, m.
@@ -27,7 +27,7 @@ class Axes:
 
 
 class Brightness:
-    """Values drawn as intensity: times the squared range where the points have one, so that nearness doesn't show.
+    """Intensities as they are drawn: times the squared range where points have one, so that nearness doesn't show.
 
     Attributes:
         text: what it is.
@@ -36,7 +36,7 @@ class Brightness:
     text = "intensity as stored"
 
     def values(self, block: PointBlock) -> Float:
-        """Return the intensities (N,) of a block as they are drawn."""
+        """Return a block's intensities (N,), times the squared range if it is known; sets `text` to match."""
         if not len(block) or np.isnan(block.range[0]):
             return block.intensity
         self.text = "intensity x squared range (white target = 1)"
@@ -67,7 +67,7 @@ class Raster:
         self._front = np.full(cells, -np.inf)
 
     def add(self, block: PointBlock, place: tuple[Float, Float], depth: Float) -> None:
-        """Add a block's points.
+        """Add a block's points to the cells that they lie in; what lies outside is left out.
 
         Args:
             block: N points.
@@ -90,15 +90,15 @@ class Raster:
         self._keep_foremost(cell, depth[inside], block.class_id[inside])
 
     def intensity(self) -> Float:
-        """Return the mean intensity (cells,); 0 where there are no points."""
+        """Return the mean intensity of each cell (cells,); 0 where there are no points."""
         return self._intensity / np.maximum(self.count, 1)
 
     def rgb(self) -> Float:
-        """Return the mean colour (cells, 3), 0 to 255."""
+        """Return the mean colour of each cell (cells, 3), 0 to 255; black where there are no points."""
         return (self._rgb / np.maximum(self.count, 1) / 257.0).T
 
     def picture(self, colors: AnyArray, paper: tuple[int, int, int]) -> UInt8:
-        """Return colours (cells, 3) as a picture (height, width, 3), with larger dots the fewer cells are filled."""
+        """Return cell colours as an image (height, width, 3), with dots enlarged the fewer cells are filled."""
         shape = (self.height, self.width)
         filled = (self.count > 0).reshape(shape)
         result = np.where(self.count[:, None] > 0, colors, paper).astype(np.uint8).reshape(*shape, 3)
@@ -107,7 +107,7 @@ class Raster:
         return result
 
     def _dot_growth(self, filled: Bool) -> int:
-        """Return by how many cells to enlarge the points' dots; 0 where most cells between points are filled."""
+        """Return by how many cells, 0 to 2, the points' dots are enlarged; 0 where most cells are filled."""
         rows, columns = filled.any(axis=1), filled.any(axis=0)
         used = filled[rows][:, columns]
         share = float(used.mean()) if used.size else 1.0
@@ -121,7 +121,7 @@ class Raster:
 
 
 def _grow_cells(picture: UInt8, filled: Bool) -> tuple[UInt8, Bool]:
-    """Fill empty cells beside filled ones with their colours."""
+    """Return copies of a picture and its mask in which empty cells beside filled ones take their colours."""
     result, done = picture.copy(), filled.copy()
     for axis, step in ((1, 1), (1, -1), (0, 1), (0, -1)):
         near, color = np.roll(filled, step, axis), np.roll(picture, step, axis)
@@ -143,7 +143,7 @@ Color = tuple[int, int, int]
 
 @dataclass(frozen=True)
 class GrayBar:
-    """Legend of a grey picture: the values that black and white stand for.
+    """Legend of a grey picture: the values that black and white stand for, and their quantity.
 
     Attributes:
         low, high: values of black and white.
@@ -160,13 +160,13 @@ Legend = Sequence[tuple[str, Color]] | GrayBar | None
 
 
 def class_legend(rows: Sequence[PointClass], labels: UInt8) -> list[tuple[str, Color]]:
-    """Return names and colours of the classes that occur among labels, unlabelled points included."""
+    """Return (name, colour) of the classes that occur among labels, in the scheme's order."""
     seen = set(np.unique(labels).tolist())
     return [(row.name.replace("_", " "), row.color) for row in rows if row.id in seen]
 
 
 def gray(values: Float, filled: Bool, text: str) -> tuple[Float, GrayBar]:
-    """Return values (N,) as grays (N, 3), the darkest and brightest half percent cut, with their legend."""
+    """Return values (N,) as grays (N, 3), 0 to 255, stretched between their 0.5 and 99.5 % quantiles, with a legend."""
     low, high = np.quantile(values[filled], [0.005, 0.995]) if filled.any() else (0.0, 1.0)
     shade = np.clip((values - low) / max(high - low, 1e-300), 0, 1) * 255
     return np.repeat(shade[:, None], 3, axis=1), GrayBar(float(low), float(high), text)
@@ -175,7 +175,7 @@ def gray(values: Float, filled: Bool, text: str) -> tuple[Float, GrayBar]:
 def add_frame(
     pixels: UInt8, title: str, legend: Legend, axes: Axes, north: tuple[float, float] | None = None, ticks: bool = False
 ) -> Image.Image:
-    """Return a picture (height, width, 3) with its frame.
+    """Return an image (height, width, 3) framed with title, legend, and scale bar or ticks.
 
     Args:
         axes: the picture's coordinates; of its scale, and of its ticks if there are to be any.
@@ -208,7 +208,7 @@ def add_frame(
 
 
 def nice_step(reach: float) -> float:
-    """Return the largest of 1, 2, 5 times a power of ten that isn't above ``reach``."""
+    """Return the largest of 1, 2, 5 times a power of ten that is at most ``reach``."""
     power = 10.0 ** np.floor(np.log10(reach))
     return float(max(factor * power for factor in (1, 2, 5) if factor * power <= reach * (1 + 1e-9)))
 
@@ -218,7 +218,7 @@ def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
 
 
 def _wrap_entries(legend: Sequence[tuple[str, Color]], width: float) -> list[list[tuple[str, Color]]]:
-    """Return the legend's entries in lines that fit."""
+    """Return the legend's entries, broken into lines no wider than ``width`` (pixels)."""
     lines: list[list[tuple[str, Color]]] = []
     used = np.inf
     for entry in legend:
@@ -252,7 +252,7 @@ def _draw_bar(draw: ImageDraw.ImageDraw, bar: GrayBar, corner: tuple[float, floa
 
 
 def _draw_scale(draw: ImageDraw.ImageDraw, pixel: float, width: int, corner: tuple[float, float]) -> float:
-    """Draw a scale bar; return where it ends."""
+    """Draw a scale bar with its length; return the x, pixels, at which it ends."""
     x, y = corner
     step = nice_step(pixel * min(max(width, 40), 160))
     draw.rectangle([x, y + 8, x + step / pixel, y + 13], fill=INK)
@@ -263,7 +263,7 @@ def _draw_scale(draw: ImageDraw.ImageDraw, pixel: float, width: int, corner: tup
 
 
 def _draw_north(draw: ImageDraw.ImageDraw, north: tuple[float, float], centre: tuple[float, float]) -> None:
-    """Draw an arrow to the north: the picture is turned by the road's direction."""
+    """Draw a north arrow in a picture that is rotated by the road's direction."""
     right, up = north
     x, y = centre
     tip = (x + 13 * right, y - 13 * up)
@@ -274,7 +274,7 @@ def _draw_north(draw: ImageDraw.ImageDraw, north: tuple[float, float], centre: t
 
 
 def _draw_ticks(draw: ImageDraw.ImageDraw, axes: Axes, box: tuple[int, int, int, int]) -> None:
-    """Mark distances below and heights to the left of the picture, which lies in ``box`` (x, y, width, height)."""
+    """Draw ticks with distances below and heights to the left of the picture in ``box`` (x, y, width, height)."""
     x0, y0, width, height = box
     draw.rectangle([x0 - 1, y0 - 1, x0 + width, y0 + height], outline=_GRID)
     step = nice_step(width * axes.across / 6)

@@ -23,7 +23,7 @@ _SECTION_PAPER = (172, 187, 204)
 
 
 class TopView:
-    """A raster over the cloud, turned so that the road runs from left to right.
+    """Top view of a cloud, rasterised block by block and rotated so that the road runs from left to right.
 
     Args:
         start, end: (2,) map coordinates of the road's ends.
@@ -47,7 +47,7 @@ class TopView:
 
     @classmethod
     def over_road(cls, geometry: RoadGeometry, scheme: ClassScheme | None = None) -> Self:
-        """Return a raster that holds the whole swath of a road; see the class."""
+        """Return an empty view that holds the whole swath of a road."""
         origin = np.array(geometry.parameters.transform.translate)[:2]
         stations = np.linspace(0.0, geometry.length, 50)
         terrain = geometry.parameters.terrain
@@ -63,7 +63,7 @@ class TopView:
 
     @classmethod
     def over_box(cls, low: Float, high: Float, scheme: ClassScheme | None = None) -> Self:
-        """Return a raster that holds a box, given by its corners in map coordinates, its longer side left to right."""
+        """Return an empty view that holds a box (corners in map coordinates), its longer side from left to right."""
         start, end = low[:2].copy(), high[:2].copy()
         axis = int(np.argmax(end - start))
         reach = float((end - start)[1 - axis]) / 2.0 + _BORDER
@@ -71,14 +71,14 @@ class TopView:
         return cls(start, end, -reach, reach, scheme)
 
     def add(self, block: PointBlock) -> None:
-        """Add a block's points."""
+        """Add a block's points to the view; higher points hide lower ones."""
         relative = block.xyz[:, :2] - self.start
         across = relative @ np.array([-self.along[1], self.along[0]])
         height = block.xyz[:, 2] + self._lift[block.class_id]
         self.raster.add(block, (relative @ self.along, across), height)
 
     def save(self, folder: Path, epsg: int | None, has_color: bool = True) -> list[Path]:
-        """Write ``preview_class.png``, ``preview_intensity.png`` and ``preview_rgb.png``; return their paths."""
+        """Write the pictures ``preview_class``, ``_intensity`` and (with colours) ``_rgb``, PNG; return their paths."""
         raster = self.raster
         pictures: dict[str, tuple[AnyArray, Legend]] = {
             "class": _class_colors(raster, self.scheme),
@@ -97,7 +97,7 @@ class TopView:
 
 
 class CrossSection:
-    """A cut through the cloud, seen along the road: distances from the cut's middle, to the left negative.
+    """Cross-section of a cloud, seen along the road: distances from the cut's middle, to the left negative.
 
     Args:
         middle: (2,) map coordinates of the cut's middle.
@@ -134,7 +134,7 @@ class CrossSection:
         self.scheme = scheme or class_scheme("17")
 
     def add(self, block: PointBlock) -> None:
-        """Add a block's points; those outside the slab are left out."""
+        """Add a block's points to the section; those outside the slab are left out."""
         relative = block.xyz[:, :2] - self.middle
         away = np.abs(relative @ np.array([-self.right[1], self.right[0]]))
         inside = np.flatnonzero(away <= self.depth / 2)
@@ -144,7 +144,7 @@ class CrossSection:
             self.raster.add(part, place, -away[inside])
 
     def save(self, path: Path) -> Path:
-        """Write the picture."""
+        """Write the section as a picture to a path and return the path."""
         raster = self.raster
         colors, legend = _class_colors(raster, self.scheme) if self.by_class else _grays(raster)
         scale = "" if abs(self.exaggeration - 1) < 0.01 else f"   heights x {self.exaggeration:.3g}"
@@ -154,11 +154,11 @@ class CrossSection:
 
 
 def _class_colors(raster: Raster, scheme: ClassScheme) -> tuple[AnyArray, Legend]:
-    """Return the colours (cells, 3) of the classes, and their legend."""
+    """Return the class colours (cells, 3) of a raster's foremost points, with their legend."""
     shown = raster.label[raster.count > 0]
     return scheme.colors()[raster.label], class_legend(scheme.rows, shown)
 
 
 def _grays(raster: Raster) -> tuple[AnyArray, Legend]:
-    """Return the grays (cells, 3) of the intensities, and their legend."""
+    """Return a raster's mean intensities as grays (cells, 3), with their legend."""
     return gray(raster.intensity(), raster.count > 0, raster.brightness.text)

@@ -19,7 +19,7 @@ _GOLDEN = 0.6180339887498949
 
 
 def steps_per_unit(cloud: CloudReader) -> float:
-    """Return the 16-bit steps per unit of a cloud's intensity; where it says none, those of the brightest point."""
+    """Return the 16-bit steps per unit of a cloud's intensity; if unknown, so that the brightest point has all."""
     header = cloud.header
     if header.intensity_scale is not None:
         return header.intensity_scale
@@ -30,12 +30,12 @@ def steps_per_unit(cloud: CloudReader) -> float:
 
 
 def levels(intensity: Float, scale: float) -> Index:
-    """Return intensities (N,) as 16-bit steps; what is brighter is the brightest."""
+    """Return intensities (N,) as 16-bit levels, rounded and clipped to 0 to 65535."""
     return np.clip(np.rint(intensity * scale), 0, LEVELS - 1).astype(np.intp)
 
 
 def histograms(cloud: CloudReader, scale: float) -> dict[int, Int]:
-    """Return the number of points on each level (65536,) by class."""
+    """Return the number of points on each intensity level (65536,) by class id; reads the whole cloud."""
     result: dict[int, Int] = {}
     for block in cloud.blocks():
         level = levels(block.intensity, scale)
@@ -46,12 +46,12 @@ def histograms(cloud: CloudReader, scale: float) -> dict[int, Int]:
 
 
 def largest_gap(a: Int, b: Int) -> float:
-    """Return the Kolmogorov-Smirnov distance of two histograms: the largest gap between their distributions."""
+    """Return the Kolmogorov-Smirnov distance of two histograms, 0 to 1; of an empty one as if it were all 0."""
     return float(np.abs(np.cumsum(a) / max(a.sum(), 1) - np.cumsum(b) / max(b.sum(), 1)).max())
 
 
 class QuantileMap:
-    """Maps levels onto a target's distribution, monotonically.
+    """Monotonic map of intensity levels onto a target's distribution, quantile on quantile; keeps count.
 
     Points of one level are spread over the target's levels of their share: the k-th of them in the cloud's order takes
     the fraction k x golden section (mod 1) of that share, which fills it evenly, without chance and however the points
@@ -76,7 +76,7 @@ class QuantileMap:
         self.mapped = np.zeros(LEVELS, dtype=np.int64)
 
     def map(self, level: Index) -> Index:
-        """Return the levels (N,) that points of given levels, in the cloud's order, are mapped to."""
+        """Return the target levels (N,) of points with given levels, in the cloud's order, and count them as mapped."""
         turn = self._seen[level] + _occurrence(level)
         self._seen += np.bincount(level, minlength=LEVELS)
         quantile = self._begin[level] + self._share[level] * ((turn + 0.5) * _GOLDEN % 1.0)
@@ -86,7 +86,7 @@ class QuantileMap:
 
 
 class IntensityMapping:
-    """The mapping of a whole cloud, of all its points at once or class by class.
+    """Mapping of a cloud's intensities onto another's distribution, of all points at once or class by class.
 
     Args:
         source, target: the clouds.
@@ -117,7 +117,7 @@ class IntensityMapping:
             self._maps = dict.fromkeys(have, whole)
 
     def blocks(self, source: CloudReader) -> Iterator[PointBlock]:
-        """Yield the source's points with mapped intensities."""
+        """Yield the source's points with mapped intensities; the distances afterwards count these."""
         for block in source.blocks():
             level = levels(block.intensity, self._steps)
             mapped = np.zeros(len(level), dtype=np.intp)
@@ -128,16 +128,16 @@ class IntensityMapping:
             yield replace(block, intensity=mapped / self.scale)
 
     def distance_before(self) -> float:
-        """Return the Kolmogorov-Smirnov distance of the clouds' levels as they were."""
+        """Return the Kolmogorov-Smirnov distance of the two clouds' intensities before mapping."""
         return largest_gap(self._have, self._want)
 
     def distance_after(self) -> float:
-        """Return the same of what has been mapped."""
+        """Return the Kolmogorov-Smirnov distance of the intensities mapped so far to the target's."""
         tables = {id(table): table for table in self._maps.values()}.values()
         return largest_gap(_total({i: table.mapped for i, table in enumerate(tables)}), self._want)
 
     def class_distances(self) -> dict[int, float]:
-        """Return the distances after mapping of the classes that have a map of their own, by the source's ids."""
+        """Return the Kolmogorov-Smirnov distances after mapping of classes with maps of their own, by source id."""
         return {label: largest_gap(self._maps[label].mapped, want) for label, want in self._class_targets.items()}
 
     def _class_maps(
@@ -161,7 +161,7 @@ def _total(parts: dict[int, Int]) -> Int:
 
 
 def _occurrence(values: Index) -> Index:
-    """Return for each value (N,) how many equal ones stand before it."""
+    """Return for each value (N,) the number of equal values before it."""
     order = np.argsort(values, kind="stable")
     ordered = values[order]
     starts = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]]) if len(values) else np.zeros(0, dtype=np.intp)

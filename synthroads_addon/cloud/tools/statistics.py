@@ -23,12 +23,12 @@ _PAIRS_AT_ONCE = 4_000_000
 
 
 def luminance(rgb: UInt16) -> Float:
-    """Return 0.3 r + 0.59 g + 0.11 b (N,), 0 to 1, of colours (N, 3) as they are stored."""
+    """Return the luma 0.3 r + 0.59 g + 0.11 b (N,), 0 to 1, of 16-bit sRGB colours (N, 3)."""
     return rgb @ LUMINANCE / 65535.0
 
 
 def cloud_statistics(cloud: CloudReader, radius: float = RADIUS, samples: int = SAMPLES) -> dict[str, Any]:
-    """Return a cloud's figures as JSON data, of all points and of each class; the cloud is read twice.
+    """Return a cloud's statistics, of all points and of each class, as JSON data; the cloud is read twice.
 
     ``density`` is points per m2 of the 1 m cells that hold any; ``roughness`` the mean surface variation
     l0 / (l0 + l1 + l2), l0 the smallest eigenvalue of the covariance of the points within ``radius`` (Pauly et al.
@@ -64,7 +64,7 @@ def cloud_statistics(cloud: CloudReader, radius: float = RADIUS, samples: int = 
 
 
 class Moments:
-    """Number, mean and sum of squared deviations of several quantities by class, without loss in large numbers.
+    """Running count, mean and sum of squared deviations of several quantities, for each class label.
 
     Args:
         width: number of quantities.
@@ -76,7 +76,7 @@ class Moments:
         self.squares = np.zeros((width, 256))
 
     def add(self, label: UInt8, values: Iterable[Float]) -> None:
-        """Add points by label (N,) and their quantities, each (N,) (Chan, Golub and LeVeque 1979)."""
+        """Add points, by labels (N,) and quantities, each (N,), to the moments (Chan, Golub and LeVeque 1979)."""
         count = np.bincount(label, minlength=256)
         some = np.maximum(count, 1)
         together = np.maximum(self.count + count, 1)
@@ -89,7 +89,7 @@ class Moments:
         self.count += count
 
     def mean_and_deviation(self, row: int, labels: list[int]) -> tuple[float, float]:
-        """Return mean and standard deviation of a quantity over the points of some labels."""
+        """Return mean and standard deviation of one quantity over all points of some labels."""
         count = self.count[labels]
         mean = float(np.average(self.mean[row, labels], weights=count))
         squares = float((self.squares[row, labels] + count * (self.mean[row, labels] - mean) ** 2).sum())
@@ -122,7 +122,7 @@ class _FirstPass:
             self._samples[int(label)].add(block.xyz[chosen], ranks[chosen])
 
     def samples(self, radius: float) -> dict[int, Float]:
-        """Return the places (S, 3) to measure roughness at, by class: so few that it takes bounded time."""
+        """Return the places (S, 3) to measure roughness at, by class; fewer in dense clouds to bound the time."""
         places = {label: sample.xyz for label, sample in self._samples.items() if len(sample.xyz)}
         density = self.moments.count.sum() / max(1.0, self._cells.area(None))
         pairs = sum(map(len, places.values())) * density * 9 * radius**2
@@ -130,7 +130,7 @@ class _FirstPass:
         return {label: xyz[: max(1, int(len(xyz) * share))] for label, xyz in places.items()}
 
     def figures(self, labels: list[int], rough: dict[int, tuple[float, int]]) -> dict[str, Any]:
-        """Return the figures of the points of some classes together."""
+        """Return the statistics of some classes' points together, as JSON data."""
         count = int(self.moments.count[labels].sum())
         area = self._cells.area(labels)
         height, intensity, light = (self.moments.mean_and_deviation(row, labels) for row in range(3))
@@ -153,7 +153,7 @@ class _FirstPass:
 
 
 class _Cells:
-    """The occupied cells of the ground, by class."""
+    """Set of the occupied 1 m cells of the ground, by class."""
 
     def __init__(self) -> None:
         self._keys = np.zeros(0, dtype=np.int64)
@@ -168,7 +168,7 @@ class _Cells:
             self._settle()
 
     def area(self, labels: list[int] | None) -> float:
-        """Return the area (m2) that points of some classes (None: all) occupy."""
+        """Return the area, m2, of the cells that points of some classes (None: all) occupy."""
         self._settle()
         keys = self._keys if labels is None else self._keys[np.isin(self._keys & 255, labels)]
         return float(len(np.unique(keys >> 8))) * AREA_CELL**2
@@ -179,7 +179,7 @@ class _Cells:
 
 
 class _Sample:
-    """The points of lowest rank: a sample that doesn't depend on the points' order."""
+    """A sample of the points of lowest hash rank, which doesn't depend on the points' order."""
 
     def __init__(self, size: int) -> None:
         self._size = size
@@ -196,7 +196,7 @@ class _Sample:
 
 
 def hash_positions(xyz: Float) -> NDArray[np.uint64]:
-    """Return a well-mixed number (N,) of each position (N, 3), rounded to 0.1 mm (SplitMix64, Steele et al. 2014)."""
+    """Return a 64-bit hash (N,) of each position (N, 3), rounded to 0.1 mm (SplitMix64, Steele et al. 2014)."""
     mixed = np.zeros(len(xyz), dtype=np.uint64)
     for axis in range(3):
         mixed += np.rint(xyz[:, axis] * 1e4).astype(np.int64).view(np.uint64) + np.uint64(0x9E3779B97F4A7C15)
@@ -230,7 +230,7 @@ class _Roughness:
         self._counts = np.diff(np.r_[self._starts, len(order)])
 
     def add(self, xyz: Float) -> None:
-        """Add a block's points (N, 3)."""
+        """Add a block's points (N, 3) to the covariances of the places that they are near."""
         if not len(self._keys):
             return
         column = self._column(xyz)
@@ -247,7 +247,7 @@ class _Roughness:
             self._gather(xyz[point] - self._places[place], place)
 
     def by_class(self) -> dict[int, tuple[float, int]]:
-        """Return mean surface variation and the number of places that it is of, by class."""
+        """Return the mean surface variation, and the number of places it was measured at, by class."""
         count = self._sums[0]
         enough = count >= _FEWEST_NEIGHBOURS
         number = np.maximum(count, 1)
@@ -283,7 +283,7 @@ _PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
 def _parts(counts: Index) -> Iterator[slice]:
-    """Yield slices over points of which each stands for so many pairs that they fit into memory."""
+    """Yield slices over points such that each slice's pairs (``counts`` per point) fit into memory."""
     ends = np.cumsum(counts)
     first = 0
     while first < len(counts):

@@ -24,7 +24,7 @@ _TIE_ORDER = ("gps_time", "return_number", "intensity", "range", "instance_id", 
 
 
 class TileFiles:
-    """A file of points for each tile, so that a cloud of any size can be worked on tile by tile; a context manager.
+    """Scratch files of points, one for each tile, to work on a cloud of any size; a context manager.
 
     Args:
         folder: where the files are kept meanwhile, as large as the cloud; a folder in it is made and removed.
@@ -43,7 +43,7 @@ class TileFiles:
         self._scratch.close()
 
     def append(self, block: PointBlock, tile: Int) -> None:
-        """Append a block's points to their tiles (N, 2); all blocks must have the same attributes."""
+        """Append a block's points to the files of their tiles (N, 2); all blocks must have the same attributes."""
         if len(block) == 0:
             return
         arrays = block.attributes()
@@ -61,7 +61,7 @@ class TileFiles:
                 file.write(record[first:last].tobytes())
 
     def by_tile(self) -> Iterator[tuple[tuple[int, int], PointBlock]]:
-        """Yield each tile's numbers and its points in the order handed in; its file is removed."""
+        """Yield each tile's (column, row) and its points, in the order added, and remove its file."""
         for key, path in sorted(self._paths.items()):
             record = np.fromfile(path, dtype=self._type)
             path.unlink()
@@ -69,7 +69,7 @@ class TileFiles:
 
 
 class GridSubsampler(TileFiles):
-    """Takes a cloud's blocks and gives back one point per occupied cell; a context manager.
+    """Subsampler that keeps one point per occupied cell of a cubic grid; a context manager.
 
     Args:
         cell: edge of the grid's cells, m; a cell's corners are whole multiples of it in map coordinates.
@@ -88,7 +88,7 @@ class GridSubsampler(TileFiles):
         self._tile = max(_CELLS_ACROSS_TILE, int(np.ceil(_SMALLEST_TILE / self.cell)))  # cells: none is cut in two
 
     def add(self, block: PointBlock) -> None:
-        """Take a block; all blocks must have the same attributes. Thinning it at once saves room on the disk."""
+        """Add a block, thinned at once to save room on the disk; all blocks must have the same attributes."""
         if len(block) == 0:
             return
         self.points_read += len(block)
@@ -96,14 +96,14 @@ class GridSubsampler(TileFiles):
         self.append(block, np.floor(block.xyz[:, :2] / self.cell).astype(np.int64) // self._tile)
 
     def blocks(self) -> Iterator[PointBlock]:
-        """Yield the points that stay, tile by tile and by time within a tile, which LAZ packs best."""
+        """Yield the points that stay, tile by tile, ordered by time within a tile, which LAZ packs best."""
         for _, tile in self.by_tile():
             points = tile.select(keep_one_per_cell(tile, self.cell))
             yield points.select(np.lexsort((points.return_number, points.gps_time)))
 
 
 def keep_one_per_cell(block: PointBlock, cell: float) -> Index:
-    """Return the indices of the points that stay of a block, ordered by their cells (z, then y, then x)."""
+    """Return the indices of the points nearest to their cells' centres, one per cell, ordered by z, y, x."""
     cells = np.floor(block.xyz / cell)
     away = ((block.xyz - (cells + 0.5) * cell) ** 2).sum(axis=1)
     # A step of a billionth of the cell's square: roundings of equal distances must not decide.
@@ -115,7 +115,7 @@ def keep_one_per_cell(block: PointBlock, cell: float) -> Index:
 
 
 def _order(block: PointBlock, cells: Float, nearness: Float) -> Index:
-    """Return the order by cell, then nearness; where points tie, by position and attributes."""
+    """Return the indices that sort points by cell, then nearness, then position and attributes where they tie."""
     low = cells.min(axis=0) if len(cells) else np.zeros(3)
     spans = (cells.max(axis=0) - low + 1 if len(cells) else np.ones(3)).astype(np.int64)
     if float(np.prod(spans.astype(np.float64))) < 2**62:
