@@ -23,9 +23,9 @@ from synthroads_addon.calibration.job import (
     Calibration,
     CalibrationJob,
     MaterialTarget,
-    check,
+    calibration_steps,
+    check_job,
     save_fitted,
-    steps,
 )
 from synthroads_addon.cloud.selection.pavement import RoadClasses
 
@@ -91,13 +91,13 @@ def _fit_arguments(group: argparse._ArgumentGroup) -> None:
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads calibrate`."""
     job = job_of(arguments)
-    check(job)
+    check_job(job)
     for field, path, ending in (("--save", arguments.save, ".json"), ("--plot", arguments.plot, ".png")):
         check_target(field, path, ending, arguments.overwrite)
     if arguments.save and (job.real is None or not job.fit):
         raise InputError("--save", str(arguments.save), "needs a cloud that materials are fitted to")
     progress = progress_bar(arguments)
-    result = exhaust(steps(job), lambda share: progress("calibrate", share))
+    result = exhaust(calibration_steps(job), lambda share: progress("calibrate", share))
     if arguments.save:
         save_fitted(result, arguments.save, arguments.overwrite)
     if arguments.plot:

@@ -169,8 +169,8 @@ class Expectation:
         self._receiver, self._reflection = receiver, reflection
         self._place = np.column_stack([rng.random((SAMPLES, 2)), np.zeros(SAMPLES)]) * _FIELDS
         self._across = rng.random(SAMPLES) - 0.5
-        self._share = None if strip is None else self._share_on(strip)
-        self._texture = None if texture is None else self._of_texture(texture, rng)
+        self._share = None if strip is None else self._share_on_strip(strip)
+        self._texture = None if texture is None else self._texture_factors(texture, rng)
 
     def linear_intensities(self, material: Material, beside: Material | None = None) -> Float:
         """Return the linear intensities (`SAMPLES`,) that a material gives at the sampled places.
@@ -202,13 +202,13 @@ class Expectation:
         along = pattern.across[:, 0] * radius[0] / np.maximum(self._cosine, 0.05)[:, None]
         return along, pattern.across[:, 1] * radius[1], pattern.weights
 
-    def _share_on(self, width: float) -> Float:
+    def _share_on_strip(self, width: float) -> Float:
         """Return the share (`SAMPLES`,) of each pulse's energy on a strip, pulses being spread over its width (m)."""
         along, _, weight = self._rays()
         inside = np.abs(along + width * self._across[:, None]) <= width / 2.0
         return np.asarray((inside * weight).sum(axis=1))
 
-    def _of_texture(self, texture: Texture, rng: np.random.Generator) -> Float:
+    def _texture_factors(self, texture: Texture, rng: np.random.Generator) -> Float:
         """Return the texture's mean factor (`SAMPLES`,) over each footprint, at random places of the picture."""
         along, across, weight = self._rays()
         middle = rng.random((2, SAMPLES, 1)) * np.array(texture.size)[:, None, None]

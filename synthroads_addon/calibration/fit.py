@@ -207,11 +207,11 @@ def fitted_wavelength(place: Float, intensity: Float) -> float:
         intensity: (N,) in any unit.
     """
     squares = [_members(place, size) for size in _CELLS]
-    real = _within(_scores(intensity), squares)
+    real = _variance_within(_normal_scores(intensity), squares)
     misfits = []
     for wavelength in WAVELENGTHS:
         values = noise_field(place - place.min(axis=0), wavelength, 1, OCTAVES)
-        misfits.append(float(np.nansum((_within(_scores(values), squares) - real) ** 2)))
+        misfits.append(float(np.nansum((_variance_within(_normal_scores(values), squares) - real) ** 2)))
     return WAVELENGTHS[int(np.argmin(misfits))]
 
 
@@ -221,7 +221,7 @@ def _members(place: Float, size: float) -> Index:
     return np.asarray(owner.ravel(), dtype=np.intp)
 
 
-def _within(values: Float, squares: list[Index]) -> Float:
+def _variance_within(values: Float, squares: list[Index]) -> Float:
     """Return the variance within squares of each size as a share of the total; NaN where too few pairs are in one."""
     result = []
     for owner in squares:
@@ -233,7 +233,7 @@ def _within(values: Float, squares: list[Index]) -> Float:
     return np.array(result)
 
 
-def _scores(values: Float) -> Float:
+def _normal_scores(values: Float) -> Float:
     """Return normal scores (N,) of values by rank, by a rational approximation (Abramowitz & Stegun 26.2.23)."""
     rank = np.empty(len(values))
     rank[np.argsort(values, kind="stable")] = (np.arange(len(values)) + 0.5) / len(values)

@@ -1,6 +1,6 @@
 """A calibration from its inputs to its result: expected intensities beside a real cloud's, and a fit if asked for.
 
-`steps` yields the share that is done, so that the panel can show progress and stop it; `calibrate` runs it through.
+`calibration_steps` yields the share that is done, so that the panel can show progress and stop it.
 """
 
 from collections.abc import Generator, Mapping
@@ -13,7 +13,7 @@ import numpy as np
 from ..base.arrays import Float
 from ..base.errors import InputError, nearest_name
 from ..base.progress import exhaust
-from ..cloud.selection.classes import RealClass, RealCloud, class_by_label, ranges_and_incidences, read_real
+from ..cloud.selection.classes import RealClass, RealCloud, class_by_label, ranges_and_incidences, read_real_cloud
 from ..cloud.selection.pavement import RoadClasses, road_classes
 from ..materials.surfaces import Reflection
 from ..materials.table import Material, materials, read_material_table, write_material_table
@@ -103,7 +103,7 @@ class CalibrationJob:
         mrad = load_device(self.device).divergence_mrad if self.device else (0.0, 0.0)
         return Receiver((mrad[0] * 1e-3, mrad[1] * 1e-3), self.attenuation, self.range_corrected, self.decibels)
 
-    def start(self) -> dict[str, Material]:
+    def initial_materials(self) -> dict[str, Material]:
         """Return the materials, by name, that the calibration starts from: shipped, the scene's, the user's table's."""
         return {**materials(), **self.scene, **(read_material_table(self.table) if self.table else {})}
 
@@ -206,11 +206,11 @@ class Calibration:
 
 
 def calibrate(job: CalibrationJob) -> Calibration:
-    """Run a calibration to its end, without progress, and return its result; see `steps`."""
-    return exhaust(steps(job), lambda share: None)
+    """Run a calibration to its end, without progress, and return its result; see `calibration_steps`."""
+    return exhaust(calibration_steps(job), lambda share: None)
 
 
-def steps(job: CalibrationJob) -> Generator[float, None, Calibration]:
+def calibration_steps(job: CalibrationJob) -> Generator[float, None, Calibration]:
     """Run a calibration step by step: yield the share done, 0 to 1, and return the result.
 
     The classes share one gain. With a fit each takes the level that its quantiles need, and the gain is what they have
@@ -219,8 +219,8 @@ def steps(job: CalibrationJob) -> Generator[float, None, Calibration]:
     Raises:
         InputError: an input is wrong, or the classes can't be explained by materials.
     """
-    check(job)
-    table = job.start()
+    check_job(job)
+    table = job.initial_materials()
     yield 0.02
     real = _real_classes(job)
     yield 0.4
@@ -248,9 +248,9 @@ def save_fitted(result: Calibration, path: Path, overwrite: bool = False) -> Non
     write_material_table(path, rows, overwrite)
 
 
-def check(job: CalibrationJob) -> None:
+def check_job(job: CalibrationJob) -> None:
     """Raise `InputError` if a job can't be done or contradicts itself, before any work."""
-    table = job.start()
+    table = job.initial_materials()
     if not job.targets:
         raise InputError("--material", None, "at least one is needed")
     for target in job.targets:
@@ -315,7 +315,7 @@ class _FitInput:
 def _real_classes(job: CalibrationJob) -> list[RealClass | None]:
     if job.real is None:
         return [None] * len(job.targets)
-    cloud: RealCloud = read_real(job.real, job.class_field)
+    cloud: RealCloud = read_real_cloud(job.real, job.class_field)
     if job.road is not None:
         classes = road_classes(cloud, job.road)
         return [classes[str(target.real_class)] for target in job.targets]

@@ -46,11 +46,11 @@ class Strays:
 
     def count(self) -> int:
         """Return the number of places added that stray from the rest."""
-        return int(self._counts.sum() - self._counts[np.isin(self._keys, self._of_body())].sum())
+        return int(self._counts.sum() - self._counts[np.isin(self._keys, self._body_cubes())].sum())
 
     def stay(self, xyz: NDArray[np.floating]) -> Bool:
         """Return a mask (N,) of the places (N, 3), all of them added before, that don't stray."""
-        return np.isin(self._keys_of(xyz), self._of_body())
+        return np.isin(self._keys_of(xyz), self._body_cubes())
 
     def _keys_of(self, xyz: NDArray[np.floating]) -> Keys:
         return _cube_keys(np.floor(np.asarray(xyz, dtype=np.float64) / self._edge).astype(np.int64))
@@ -59,16 +59,16 @@ class Strays:
         self._keys, owner = np.unique(keys, return_inverse=True)
         self._counts = np.bincount(owner.ravel(), counts, len(self._keys)).astype(np.int64)
 
-    def _of_body(self) -> Keys:
+    def _body_cubes(self) -> Keys:
         """Return the keys of the cubes that don't stray; cached until places are added."""
         if self._body is None:
-            parts = self._parts()
+            parts = self._connected_parts()
             sizes = np.bincount(parts, self._counts, parts.max(initial=-1) + 1)
             kept = sizes > max(_FEW, _SHARE * self._counts.sum())
             self._body = self._keys[kept[parts]] if kept.any() else self._keys
         return self._body
 
-    def _parts(self) -> Index:
+    def _connected_parts(self) -> Index:
         """Return the number of the connected part (touching cubes) that each cube belongs to."""
         place = {int(key): number for number, key in enumerate(self._keys)}
         steps = _cube_keys(np.array(_STEPS)) - _cube_keys(np.zeros((1, 3), dtype=np.int64))

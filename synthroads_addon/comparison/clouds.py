@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 from ..base.errors import InputError
 from ..base.schema import ClosedModel, Finite, quantity, read_yaml
 from ..cloud.formats.registry import ENDINGS
-from ..cloud.selection.classes import RealClass, RealCloud, class_by_label, read_real
+from ..cloud.selection.classes import RealClass, RealCloud, class_by_label, read_real_cloud
 from ..cloud.selection.pavement import RoadClasses, road_classes
 
 LISTS = (".yaml", ".yml", ".json")
@@ -85,7 +85,7 @@ def read_compared(path: Path, row: ListedCloud) -> ComparedCloud:
     Raises:
         InputError: the file can't be read, or has too few points of the road.
     """
-    cloud = read_real(path, row.class_field)
+    cloud = read_real_cloud(path, row.class_field)
     if row.axis is not None:
         beside = road_classes(cloud, RoadClasses(path.parent / row.axis, row.paved, row.lines, row.line_width))
         found = {ROAD: beside["paved"]} | ({"marking": beside["line"]} if "line" in beside else {})

@@ -36,14 +36,14 @@ class DescribedCloud:
     def to_dict(self) -> dict[str, Any]:
         """Return the cloud's medians and the figures of its classes and ranges as JSON data."""
         middle = np.median(self.patches.values, axis=0)
-        road = float(np.median(_level(self.cloud.classes[ROAD])))
+        road = float(np.median(_decibels(self.cloud.classes[ROAD])))
         return {
             "cloud": self.cloud.name,
             "patches": len(self.patches),
             "density": round(float(np.median(self.patches.density)), 2),
             "medians": {name: _short(value) for name, value in zip(FEATURES, middle, strict=True)},
             "classes": {name: class_figures(points, road) for name, points in self.cloud.classes.items()},
-            "by_range": by_range(self.cloud.classes[ROAD], road),
+            "by_range": range_figures(self.cloud.classes[ROAD], road),
         }
 
 
@@ -142,14 +142,14 @@ def _against_others(one: DescribedCloud, others: list[DescribedCloud], seed: int
     return distinguish(halves[0], halves[1], seed, one.cloud.name)
 
 
-def _level(points: RealClass) -> Float:
+def _decibels(points: RealClass) -> Float:
     """Return a class's intensities (N,) in dB."""
     return np.asarray(10.0 * np.log10(points.intensity))
 
 
 def class_figures(points: RealClass, road: float) -> dict[str, float]:
     """Return counts, dB median over the pavement's (``road``, dB) and dB spread of a class as JSON data."""
-    level = _level(points)
+    level = _decibels(points)
     low, middle, high = np.quantile(level, (0.25, 0.5, 0.75))
     total = len(level) + points.zeros
     return {
@@ -162,13 +162,13 @@ def class_figures(points: RealClass, road: float) -> dict[str, float]:
     }
 
 
-def by_range(points: RealClass, road: float) -> list[dict[str, float]]:
+def range_figures(points: RealClass, road: float) -> list[dict[str, float]]:
     """Return points and dB median over the pavement's in each ring of range as JSON data; empty without ranges."""
     rows = []
     for low, high in pairwise(RINGS):
         inside = (points.distance >= low) & (points.distance < high)
         if inside.sum() >= _FEWEST_OF_RING:
-            middle = float(np.median(_level(points)[inside])) - road
+            middle = float(np.median(_decibels(points)[inside])) - road
             rows.append({"from": low, "to": high, "points": int(inside.sum()), "median_over_road_db": round(middle, 3)})
     return rows
 

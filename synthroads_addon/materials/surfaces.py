@@ -125,7 +125,7 @@ def brightness_of(surfaces: Surfaces, material: NDArray[np.integer], cosine: Flo
 def mean_over_median(below: Float | float, above: Float | float) -> Float:
     """Return exp(b^2 / 2) P(-b) + exp(a^2 / 2) P(a), mean over median of a two-piece lognormal distribution."""
     low, high = np.asarray(below, dtype=np.float64), np.asarray(above, dtype=np.float64)
-    return np.exp(0.5 * low * low) * _normal(-low) + np.exp(0.5 * high * high) * _normal(high)
+    return np.exp(0.5 * low * low) * _normal_cdf(-low) + np.exp(0.5 * high * high) * _normal_cdf(high)
 
 
 def spread_factors(surfaces: Surfaces, material: NDArray[np.integer], position: Float, seed: int) -> Float:
@@ -143,5 +143,5 @@ def spread_factors(surfaces: Surfaces, material: NDArray[np.integer], position: 
     return np.asarray(np.exp(normal * sigma) * scale)
 
 
-def _normal(value: Float) -> Float:
+def _normal_cdf(value: Float) -> Float:
     return np.array([0.5 * math.erfc(-x / math.sqrt(2.0)) for x in np.ravel(value)]).reshape(np.shape(value))

@@ -123,11 +123,11 @@ def write_material_table(path: Path, rows: Mapping[str, Material], overwrite: bo
     """
     if path.suffix != ".json":
         raise InputError("--save", str(path), "must end in .json")
-    lines = ",\n".join(f"  {json.dumps(name)}: {_line(row)}" for name, row in rows.items())
+    lines = ",\n".join(f"  {json.dumps(name)}: {_json_line(row)}" for name, row in rows.items())
     write_file(path, f'{{\n "materials": {{\n{lines}\n }}\n}}\n'.encode(), "--save", overwrite)
 
 
-def _line(row: Material) -> str:
+def _json_line(row: Material) -> str:
     """Return a material as a line of JSON: its required fields and those that differ from the defaults."""
     given = {
         name: value

@@ -38,11 +38,11 @@ def vary_material(
     """
     result = _age_material(name, {**materials(), **(own or {})}, variation)
     if environment.wetness > 0.0 and name in _POROUS:
-        result = _wet(result, environment.wetness)
+        result = _wet_material(result, environment.wetness)
     return result
 
 
-def _wet(dry: Material, wet: float) -> Material:
+def _wet_material(dry: Material, wet: float) -> Material:
     """Return a porous material under a film of water, ``wet`` 0 to 1: darker, smoother, less retro-reflective."""
     smoother = 1.0 - WET_ROUGHNESS * wet
     result = _scale_color(dry, 1.0 - WET_BASE * wet, 1.0 - WET_SPECULAR * wet)

@@ -55,7 +55,7 @@ def paved_edge(profiles: Profiles, paved: Grid, begin: Float, sign: int, farthes
         column = profiles.column(place)
         end = profiles.column(place + sign * reach[number])
         share = _mean(paved[rows, column : end + sign if end + sign >= 0 else None : sign])
-        edges[number] = _edge(share, float(profiles.offsets[column]), sign)
+        edges[number] = _find_edge(share, float(profiles.offsets[column]), sign)
         if profiles.points is not None and np.isfinite(edges[number]):
             edges[number], apart[number] = _between_points(profiles.points, number, edges[number], sign)
     return Edge(edges, apart)
@@ -73,7 +73,7 @@ def _between_points(points: SurfacePoints, stretch: int, edge: float, sign: int)
     return 0.5 * float(offset[at - 1] + offset[at]), abs(float(offset[at] - offset[at - 1]))
 
 
-def _edge(share: Float, begin: float, sign: int) -> float:
+def _find_edge(share: Float, begin: float, sign: int) -> float:
     """Return the offset, m, of the edge in a profile (C,) of paved shares that starts at ``begin``; NaN if unseen."""
     known = np.isfinite(share)
     if known.sum() < 4:
@@ -111,7 +111,7 @@ class Surface:
     fall: Float
 
 
-def surface(profiles: Profiles, low: Float, high: Float, pivot: Float) -> Surface:
+def fit_surface(profiles: Profiles, low: Float, high: Float, pivot: Float) -> Surface:
     """Return height and crossfall between two edges (K,), by a robust line (bisquare) across each stretch.
 
     Args:

@@ -84,9 +84,9 @@ def judge(profiles: Profiles, layout: RoadLayout, section: MeasuredSection) -> J
     if section.kind == "dual":
         what, edges = "the median's middle", "neither the median's edges nor lines on both sides of it are seen"
         painted = np.all([np.isfinite(guide.measured) & (guide.width > 0.0) for guide in guides], axis=0)
-        unseen &= ~_is_near(painted)
+        unseen &= ~_is_seen_nearby(painted)
     reasons = {
-        "neither lines nor edges are seen": ~_is_near(np.isfinite(lines)),
+        "neither lines nor edges are seen": ~_is_seen_nearby(np.isfinite(lines)),
         f"the lines lie more than {FARTHEST_LINES:g} m beside it": np.abs(lines) > FARTHEST_LINES,
         edges: unseen,
         f"{what} lies more than {FARTHEST_MIDDLE:g} m beside it": np.abs(middles) > FARTHEST_MIDDLE,
@@ -102,15 +102,15 @@ def pavement_edges(profiles: Profiles, section: MeasuredSection) -> Float:
 
     They are found by brightness and height alone; NaN where an edge isn't seen.
     """
-    stretches, height = range(profiles.stretches), _level(profiles.height)
+    stretches, height = range(profiles.stretches), _remove_grade(profiles.height)
     brightness = np.array([_median_profile(profiles.brightness, number) for number in stretches])
     steps = np.array([_is_kerb(_median_profile(height, number)) for number in stretches])
-    known, core = np.isfinite(brightness), _core(profiles, section)
+    known, core = np.isfinite(brightness), _core_bins(profiles, section)
     filled = np.array([fill_gaps(row) if np.isfinite(row).any() else row for row in brightness])
     smooth = ndimage.median_filter(filled, (1, _PAINT))
     levels = np.array([np.percentile(row[core], 30) if np.isfinite(row).all() else np.nan for row in smooth])
     apart = np.abs(smooth - levels[:, None])
-    alike = known & ~(apart > _contrast(apart[known], apart[:, core]))
+    alike = known & ~(apart > _brightness_threshold(apart[known], apart[:, core]))
     inside = _close_cracks(alike) & ~steps
     if section.kind == "dual":
         inside = _close_cracks(known & ~inside)
@@ -127,7 +127,7 @@ def _median_profile(values: Grid | Float, stretch: int) -> Float:
     return np.where(np.isfinite(rows).sum(axis=0) >= _FEWEST_ROWS, median, np.nan)
 
 
-def _level(height: Grid) -> Float:
+def _remove_grade(height: Grid) -> Float:
     """Return heights (S, U) less their row's median, which removes the road's grade."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # rows without points
@@ -144,7 +144,7 @@ def _is_kerb(height: Float) -> Bool:
     return np.asarray(np.abs(rise) > _KERB)
 
 
-def _core(profiles: Profiles, section: MeasuredSection) -> Bool:
+def _core_bins(profiles: Profiles, section: MeasuredSection) -> Bool:
     """Return a mask (U,) of the bins about the carriageways' middles, which are paved for sure."""
     middles = [0.0]
     if section.kind == "dual":
@@ -153,7 +153,7 @@ def _core(profiles: Profiles, section: MeasuredSection) -> Bool:
     return np.any([np.abs(profiles.offsets - middle) < _CORE for middle in middles], axis=0)
 
 
-def _contrast(apart: Float, core: Float) -> float:
+def _brightness_threshold(apart: Float, core: Float) -> float:
     """Return the threshold of brightness differences beyond which ground is unpaved; inf if brightness can't tell."""
     apart, core = apart[np.isfinite(apart)], core[np.isfinite(core)]
     if not len(apart) or not len(core):
@@ -184,7 +184,7 @@ def _run_at_axis(profiles: Profiles, inside: Bool, known: Bool) -> tuple[float, 
     return float(right) if right_seen else np.nan, float(left) if left_seen else np.nan
 
 
-def _is_near(seen: Bool) -> Bool:
+def _is_seen_nearby(seen: Bool) -> Bool:
     """Return a mask (K,) of the stretches that have something seen within `_NEAR` stretches."""
     return ndimage.binary_dilation(seen, iterations=_NEAR)
 

@@ -110,7 +110,7 @@ def find_layout(profiles: Profiles, lines: list[Line], wanted: RoadKind | None =
     bands = [_band(profiles, paved, span, main) for span in spans]
     if not bands:
         raise InputError("road", None, "no carriageway can be made out in the cloud")
-    pair = None if wanted == "single" else _pair(bands)
+    pair = None if wanted == "single" else _carriageway_pair(bands)
     if pair is None and wanted == "dual":
         raise InputError("--road", "dual", "only one carriageway can be made out in the cloud")
     chosen = pair or (max(bands, key=lambda band: (len(band.lines), band.width)),)
@@ -224,17 +224,17 @@ def _edge_line(profiles: Profiles, paved: Grid, span: tuple[float, float], sign:
     )
 
 
-def _pair(bands: list[Band]) -> tuple[Band, Band] | None:
+def _carriageway_pair(bands: list[Band]) -> tuple[Band, Band] | None:
     """Return the neighbouring bands with the most lines that a median may lie between; None if there are none."""
     pairs = [
         (right, left)
         for right, left in pairwise(bands)
-        if _NARROWEST_MEDIAN <= left.low - right.high <= _WIDEST_MEDIAN and _whole(right) and _whole(left)
+        if _NARROWEST_MEDIAN <= left.low - right.high <= _WIDEST_MEDIAN and _is_whole(right) and _is_whole(left)
     ]
     return max(pairs, key=lambda pair: len(pair[0].lines) + len(pair[1].lines)) if pairs else None
 
 
-def _whole(band: Band) -> bool:
+def _is_whole(band: Band) -> bool:
     """Return whether a band may be one direction's carriageway, by its lines or its width."""
     return len(band.lines) >= 2 or band.width >= _UNMARKED_CARRIAGEWAY
 

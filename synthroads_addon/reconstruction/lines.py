@@ -153,14 +153,14 @@ def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line |
     half = _WINDOW / 2.0
     start = max(profiles.stations[0], stations[0] - half)
     end = min(profiles.stations[-1], stations[-1] + half)
-    middle, cover = _rows(profiles, stations, offsets)
+    middle, cover = _paint_by_row(profiles, stations, offsets)
     inside = (profiles.stations >= start) & (profiles.stations <= end)
     usual = float(np.nanpercentile(cover[inside], 90)) if np.isfinite(cover[inside]).any() else 0.0
     if usual < 0.03:
         return None
     share = _painted_share(cover, usual)
     grid = profiles.middles
-    measured, weights = _stretches(profiles, middle, np.where(inside, share, 0.0))
+    measured, weights = _offsets_by_stretch(profiles, middle, np.where(inside, share, 0.0))
     if (weights > 0.0).sum() < 4:
         return None
     width, width_std = mean_with_std(cover[inside][np.nan_to_num(share[inside]) > 0.5])
@@ -183,7 +183,7 @@ def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line |
         offsets=np.where(within, smoothed.values, np.nan),
         std=np.where(within, np.hypot(smoothed.std, hidden_std(apart, smoothed.scatter)), np.nan),
         apart=apart,
-        cover=_cover(share),
+        cover=_cover_by_stretch(share),
         start=start,
         end=end,
         width=width,
@@ -195,7 +195,7 @@ def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line |
     )
 
 
-def _rows(profiles: Profiles, stations: Float, offsets: Float) -> tuple[Float, Float]:
+def _paint_by_row(profiles: Profiles, stations: Float, offsets: Float) -> tuple[Float, Float]:
     """Return, per row of the profiles (S,), the paint's mean offset near a track and its width (m); NaN without points.
 
     The mean is found twice, the second time around the smoothed first one, so that a track's own error doesn't pull.
@@ -237,7 +237,7 @@ def _painted_share(cover: Float, usual: float) -> Float:
     return np.where(known, np.clip(np.nan_to_num(cover) / full, 0.0, 1.0), np.nan)
 
 
-def _stretches(profiles: Profiles, middle: Float, share: Float) -> tuple[Float, Float]:
+def _offsets_by_stretch(profiles: Profiles, middle: Float, share: Float) -> tuple[Float, Float]:
     """Return the paint's weighted mean offset (K,), m, in each stretch, NaN without paint, and its weight."""
     count = profiles.stretches
     index = np.arange(len(middle)) // STRETCH
@@ -290,7 +290,7 @@ def _best_span(marked: Bool) -> tuple[int, int]:
     return int(total[: high + 1].argmin()), high
 
 
-def _cover(share: Float) -> Float:
+def _cover_by_stretch(share: Float) -> Float:
     """Return the share (K,) of the rows of each stretch that are painted; NaN for stretches without points."""
     count = -(-len(share) // STRETCH)
     index = np.arange(len(share)) // STRETCH

@@ -115,9 +115,9 @@ def find_barriers(standing: StandingPoints) -> tuple[list[FoundBarrier], Bool]:
     used = np.zeros(len(standing.station), dtype=bool)
     for kind in (PointKind.GUARDRAIL, PointKind.BARRIER, PointKind.NOISE_BARRIER, PointKind.FURNITURE):
         of_kind = np.flatnonzero(standing.kind == kind)
-        for members in _linear(standing.station[of_kind], standing.offset[of_kind]):
+        for members in _linear_clusters(standing.station[of_kind], standing.offset[of_kind]):
             part = standing.select(of_kind[members])
-            for piece in _pieces(part):
+            for piece in _split_at_jumps(part):
                 barrier = _barrier(part.select(piece), kind)
                 if barrier is not None:
                     barriers.append(barrier)
@@ -125,7 +125,7 @@ def find_barriers(standing: StandingPoints) -> tuple[list[FoundBarrier], Bool]:
     return sorted(barriers, key=lambda item: (item.start, item.offset)), used
 
 
-def _linear(station: Float, offset: Float) -> list[Index]:
+def _linear_clusters(station: Float, offset: Float) -> list[Index]:
     """Return the point indices of each long cluster of connected cells; small holes along the road are bridged."""
     if len(station) < _FEWEST_OF_BARRIER:
         return []
@@ -142,7 +142,7 @@ def _linear(station: Float, offset: Float) -> list[Index]:
     return [g for g in groups if len(g) >= _FEWEST_OF_BARRIER and np.ptp(station[g]) >= SHORTEST_BARRIER]
 
 
-def _pieces(part: StandingPoints) -> list[Bool]:
+def _split_at_jumps(part: StandingPoints) -> list[Bool]:
     """Return masks (N,) of the pieces of a linear cluster, split where its offset jumps."""
     index = np.floor((part.station - part.station.min()) / _STRETCH).astype(np.int64)
     order = np.argsort(index, kind="stable")
@@ -296,7 +296,7 @@ def measure_ground(cloud: RoadCloud, path: CloudPath, section: MeasuredSection, 
     inside = (station > 0.0) & (station < path.length)
     chosen, station, offset = chosen[inside], station[inside], offset[inside]
     beyond = np.where(offset > 0.0, offset - _outer(section, 1), -offset - _outer(section, -1))
-    beside = _usual(section, station, offset)
+    beside = _is_beside_usual_edge(section, station, offset)
     verge = beyond[(cloud.kind[chosen] == PointKind.VERGE) & (beyond > 0.1) & beside]
     seen = len(verge) > 200
     width = float(np.clip(np.percentile(verge, 97), 0.5, 5.0)) if seen else USUAL_VERGE
@@ -310,7 +310,7 @@ def measure_ground(cloud: RoadCloud, path: CloudPath, section: MeasuredSection, 
     return GroundShape(max(reach, outermost + 5.0), float(np.median(below)), spread, width, seen)
 
 
-def _usual(section: MeasuredSection, station: Float, offset: Float) -> Bool:
+def _is_beside_usual_edge(section: MeasuredSection, station: Float, offset: Float) -> Bool:
     """Return a mask (N,) of places where the pavement's edge on their side is the road's own, not a turnout's."""
     result = np.zeros(len(station), dtype=bool)
     for side in section.sides.values():

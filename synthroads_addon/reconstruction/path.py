@@ -163,7 +163,7 @@ def first_path(xy: Float) -> CloudPath:
     """
     cells = np.unique(np.floor(xy).astype(np.int64), axis=0) + 0.5
     tree = cKDTree(cells)
-    start, direction, half = _begin(cells, tree)
+    start, direction, half = _march_start(cells, tree)
     ahead = _march(cells, tree, start, direction, half)
     back = _march(cells, tree, start, direction + np.pi, half)
     line = np.array([*back[::-1], *ahead[1:]])
@@ -180,7 +180,7 @@ def smooth_path(path: CloudPath, wavelength: float) -> CloudPath:
     return path_through(np.column_stack(smoothed))
 
 
-def _begin(cells: Float, tree: cKDTree) -> tuple[Float, float, float]:
+def _march_start(cells: Float, tree: cKDTree) -> tuple[Float, float, float]:
     """Return the point (2,) at which the march begins, its direction (rad), and the surface's half width there (m)."""
     _, middle = tree.query(np.median(cells, axis=0))
     for radius in _START_RADII:
@@ -211,11 +211,11 @@ def _march(cells: Float, tree: cKDTree, start: Float, direction: float, half: fl
         at = ahead + 0.5 * (low + high) * np.array([-forward[1], forward[0]])
         half = min(0.5 * (high - low) + _MARGIN, _REACH)
         line.append(at)
-        direction = _direction(line, direction)
+        direction = _march_direction(line, direction)
     return line
 
 
-def _direction(line: list[Float], before: float) -> float:
+def _march_direction(line: list[Float], before: float) -> float:
     """Return the direction (rad) after a march's latest points, turned from the one before by 0.12 rad at most."""
     last = np.array(line[-6:])
     chord = last[-1] - last[max(0, len(last) - 4)] if len(last) > 2 else last[-1] - last[0]

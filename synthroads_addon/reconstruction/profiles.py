@@ -194,17 +194,17 @@ def register_path(path: CloudPath, profiles: Profiles) -> CloudPath:
     Stretches of 20 m are sheared and shifted against the mean of those before them, beginning with the most usual one.
     Without lines and edges the path stays as it is.
     """
-    signal = evidence(profiles)
+    signal = registration_signal(profiles)
     starts = np.arange(0, max(1, len(signal) - WINDOW + 1), STEP)
     blocks = [_shear_profiles(signal[row : row + WINDOW]) for row in starts]
     energy = np.array([float((block**2).sum(axis=1).max()) for block in blocks])
     if energy.max() <= 0.0:
         return path
-    first = _most_usual(blocks)
+    first = _reference_stretch(blocks)
     fits = [_Fit(0.0, 0.0, 0.0)] * len(blocks)
     fits[first] = _self_fit(blocks[first])
-    _follow(blocks, fits, range(first + 1, len(blocks)), first)
-    _follow(blocks, fits, range(first - 1, -1, -1), first)
+    _fit_in_order(blocks, fits, range(first + 1, len(blocks)), first)
+    _fit_in_order(blocks, fits, range(first - 1, -1, -1), first)
     middles = SPACING * (starts + 0.5 * min(WINDOW, len(signal)))
     weights = np.array([fit.score for fit in fits])
     if len(fits) < 5 or (weights > 0).sum() < 5:
@@ -224,16 +224,16 @@ def _self_fit(block: Float) -> _Fit:
     return _Fit(0.0, float(_SHEARS[int((block**2).sum(axis=1).argmax())]), 1.0)
 
 
-def _most_usual(blocks: list[Float]) -> int:
+def _reference_stretch(blocks: list[Float]) -> int:
     """Return the index of the stretch that is most like its neighbours: no hatching, arrows or bridge."""
     alike = np.zeros(len(blocks) + 1)
     for number in range(len(blocks) - 1):
-        fit = _best(blocks[number + 1], _shift_profile(blocks[number], _self_fit(blocks[number])), 0.0, 2.0 * _REACH)
+        fit = _fit_to(blocks[number + 1], _shift_profile(blocks[number], _self_fit(blocks[number])), 0.0, 2.0 * _REACH)
         alike[number + 1] = fit.score if fit is not None else 0.0
     return int(np.minimum(alike[:-1], alike[1:]).argmax())
 
 
-def evidence(profiles: Profiles) -> Grid:
+def registration_signal(profiles: Profiles) -> Grid:
     """Return the signal (S, U) by which profiles are registered: paint and the pavement's edges; 0 without points."""
     paint = np.clip(np.nan_to_num(profiles.paint), 0.0, 1.0)
     signal = ndimage.gaussian_filter1d(paint, 1.5, axis=1)
@@ -253,7 +253,7 @@ def _shear_profiles(block: Grid) -> Float:
     return result / len(block)
 
 
-def _follow(blocks: list[Float], fits: list[_Fit], order: range, first: int) -> None:
+def _fit_in_order(blocks: list[Float], fits: list[_Fit], order: range, first: int) -> None:
     """Fit stretch after stretch to a template of those before, and write into ``fits``, in place."""
     if not len(order):
         return
@@ -264,7 +264,7 @@ def _follow(blocks: list[Float], fits: list[_Fit], order: range, first: int) -> 
     for index in order:
         distance += 1
         expected = last.shift + sign * distance * STEP * SPACING * last.shear
-        fit = _best(blocks[index], template, expected, loose)
+        fit = _fit_to(blocks[index], template, expected, loose)
         if fit is None:
             loose = min(loose + _LOOSE, 3.0 * _REACH)
             continue
@@ -278,7 +278,7 @@ def _shift_profile(block: Float, fit: _Fit) -> Float:
     return np.roll(block[number], -round(fit.shift / ACROSS))
 
 
-def _best(block: Float, template: Float, expected: float, reach: float) -> _Fit | None:
+def _fit_to(block: Float, template: Float, expected: float, reach: float) -> _Fit | None:
     """Return the shift (m) and shear that fit a stretch to a template best; None where nothing is alike."""
     bins = int(np.ceil(reach / ACROSS))
     middle = round(expected / ACROSS)

@@ -12,7 +12,7 @@ from ..fitting.fit import AxisFit, fit_axis
 from ..road.parameters import RoadParameters
 from .assemble import RoadMeasurements, RotationAxis, assemble_parameters
 from .cloud import PointKind, RoadCloud
-from .edges import Surface, paved_edge, surface
+from .edges import Surface, fit_surface, paved_edge
 from .judgement import Judgement, judge
 from .layout import FoundAxis, RoadKind, RoadLayout, axis_from_lines, find_layout
 from .lines import find_lines
@@ -142,10 +142,10 @@ def _axis(cloud: RoadCloud, path: CloudPath, half: float, options: Options) -> t
     """Return exact profiles along a path, the layout of lines that they show, and the axis."""
     profiles = make_profiles(cloud, path, half, exact=True)
     layout = find_layout(profiles, find_lines(profiles), options.road)
-    return profiles, layout, _centre(cloud, profiles, layout, options)
+    return profiles, layout, _find_axis(cloud, profiles, layout, options)
 
 
-def _centre(cloud: RoadCloud, profiles: Profiles, layout: RoadLayout, options: Options) -> FoundAxis:
+def _find_axis(cloud: RoadCloud, profiles: Profiles, layout: RoadLayout, options: Options) -> FoundAxis:
     """Return the axis along the path: from the lines, or from the learned predictor if one is given."""
     by_lines = axis_from_lines(layout)
     if options.predictor is None:
@@ -172,7 +172,7 @@ def fit_axis_and_profile(
     The profile is the height of that line, the same for both carriageways: of the two lines that a parameter set can
     name, the one at which the carriageways' heights differ less.
     """
-    heights = {name: _heights(profiles, layout, centre, name) for name in ("carriageway_axis", "inner_edge")}
+    heights = {name: _pivot_heights(profiles, layout, centre, name) for name in ("carriageway_axis", "inner_edge")}
     rotation: RotationAxis = "carriageway_axis"
     if _height_difference(heights["inner_edge"]) < 0.5 * _height_difference(heights["carriageway_axis"]) - 0.002:
         rotation = "inner_edge"
@@ -199,7 +199,7 @@ def _replace_faults(raw: Float, smoothed: Float) -> Float:
     return np.where(np.isfinite(raw) & (apart <= 4.0 * max(usual, 1e-3)), raw, smoothed)
 
 
-def _heights(profiles: Profiles, layout: RoadLayout, centre: FoundAxis, rotation: str) -> tuple[Float, Float]:
+def _pivot_heights(profiles: Profiles, layout: RoadLayout, centre: FoundAxis, rotation: str) -> tuple[Float, Float]:
     """Return the heights (K,), m, of right and left carriageway at the line that the crossfall turns about."""
     result = []
     axis = centre.offsets
@@ -216,7 +216,7 @@ def _heights(profiles: Profiles, layout: RoadLayout, centre: FoundAxis, rotation
             inner = axis + (float(np.nanmedian(edge - axis)) if np.isfinite(edge).any() else sign * innermost)
         low, high = (inner, outer) if sign > 0 else (outer, inner)
         pivot = inner if rotation == "inner_edge" else 0.5 * (inner + outer)
-        result.append(surface(profiles, low, high, pivot).height)
+        result.append(fit_surface(profiles, low, high, pivot).height)
     return result[0], result[1]
 
 
@@ -234,7 +234,7 @@ def _surface(profiles: Profiles, section: MeasuredSection, side: Side, rotation:
     outer = inner + measured_side.paved_width.value
     pivot = inner if rotation == "inner_edge" else 0.5 * (inner + outer)
     low, high = (inner, outer) if measured_side.sign > 0 else (-outer, -inner)
-    return surface(profiles, low, high, float(measured_side.sign) * pivot)
+    return fit_surface(profiles, low, high, float(measured_side.sign) * pivot)
 
 
 def _smooth_fall(measured: Surface) -> Float:

@@ -145,8 +145,8 @@ def measure_section(profiles: Profiles, layout: RoadLayout, marked: bool) -> Mea
     bands = zip(SIDES, layout.bands * (2 if layout.kind == "single" else 1), strict=True)
     parts = [_SidePart(profiles, layout, band, side, marked) for side, band in bands]
     if layout.kind == "single":
-        return MeasuredSection("single", {part.side: _half(part) for part in parts}, layout.bands[0].middle)
-    sides = {part.side: _carriageway(part) if len(part.band.lines) > 1 else _by_width(part) for part in parts}
+        return MeasuredSection("single", {part.side: _half_section(part) for part in parts}, layout.bands[0].middle)
+    sides = {part.side: _carriageway(part) if len(part.band.lines) > 1 else _assumed_section(part) for part in parts}
     return MeasuredSection("dual", sides, None, *nearest_standard(sides))
 
 
@@ -199,17 +199,17 @@ def _carriageway(part: _SidePart) -> SideSection:
     """Return the measured cross-section of one carriageway of a dual one."""
     lines, distances, apart = _order_lines(part.band, part.sign)
     distances[:, 0] += 0.5 * line_width(lines[0], "inner_edge", "dual", part.marked)
-    outer = part.edge(_everywhere(distances[:, -1]))
-    if not _open(lines[-1], outer):
+    outer = part.edge(_fill_with_median(distances[:, -1]))
+    if not _lacks_outer_lane(lines[-1], outer):
         distances[:, -1] -= 0.5 * line_width(lines[-1], "outer_edge", "dual", part.marked)
-    first = _everywhere(distances[:, 0])
+    first = _fill_with_median(distances[:, 0])
     return _summarise_side(part.side, lines, (distances, apart), part.edge(first, False, first), outer)
 
 
-def _half(part: _SidePart) -> SideSection:
+def _half_section(part: _SidePart) -> SideSection:
     """Return the measured cross-section of one direction of a single carriageway, from the axis outwards."""
     nowhere = part.everywhere(0.0)
-    beside = {s: _beside(part.band, s, part.marked) for s in (1, -1)}
+    beside = {s: _half_lines(part.band, s, part.marked) for s in (1, -1)}
     lines: list[Line | None] = [part.band.middle, *beside[part.sign]]
     columns = [nowhere, *(part.sign * line.offsets for line in beside[part.sign])]
     apart = [nowhere, *(line.apart for line in beside[part.sign])]
@@ -231,7 +231,7 @@ def _half(part: _SidePart) -> SideSection:
     return replace(half, inner_offset=nothing, inner_strip=nothing, mirrored=mirrored)
 
 
-def _beside(band: Band, sign: int, marked: bool) -> list[Line]:
+def _half_lines(band: Band, sign: int, marked: bool) -> list[Line]:
     """Return the lines on one half of a single carriageway, outwards; if not ``marked`` just the most painted one.
 
     Where brightness tells paint, seams and verges pass for lines too: only the best in a lane's distance counts.
@@ -245,7 +245,7 @@ def _beside(band: Band, sign: int, marked: bool) -> list[Line]:
     return [max(near, key=lambda line: line.length * line.width)] if near else []
 
 
-def _by_width(part: _SidePart) -> SideSection:
+def _assumed_section(part: _SidePart) -> SideSection:
     """Return a carriageway whose lines aren't seen, with the lanes of the standard section nearest in width."""
     middle = part.everywhere(part.sign * 0.5 * (part.band.low + part.band.high))
     outer = part.edge(middle, reach=0.5 * part.band.width + _WIDEST)
@@ -263,7 +263,7 @@ def _by_width(part: _SidePart) -> SideSection:
     return replace(measured_side, lanes=lanes, inner_strip=Estimate(row.inner_edge_strip, np.inf), assumed=name)
 
 
-def _open(line: Line | None, outer: Edge) -> bool:
+def _lacks_outer_lane(line: Line | None, outer: Edge) -> bool:
     """Return whether the outermost line is dashed with no edge seen, so that the cloud lacks the outer lane."""
     return line is not None and not line.solid and not _is_visible(outer)
 
@@ -272,7 +272,7 @@ def _is_visible(edge: Edge) -> bool:
     return bool(np.isfinite(edge.offsets).mean() > _FEWEST_EDGES)
 
 
-def _everywhere(distance: Float) -> Float:
+def _fill_with_median(distance: Float) -> Float:
     """Return distances (K,) with unknown ones replaced by the median."""
     return np.where(np.isfinite(distance), distance, np.nanmedian(distance))
 
@@ -287,14 +287,14 @@ def _summarise_side(
         for i in range(distance.shape[1] - 1)
     ]
     edge_seen = _is_visible(outer)
-    usual = _usual(outer.offsets - distance[:, -1], lines[-1])
+    usual = _usual_stretches(outer.offsets - distance[:, -1], lines[-1])
     outside = Estimate(_USUAL_STRIP, np.inf)
     if edge_seen:
         width = np.where(usual, outer.offsets - distance[:, -1], np.nan)
         outside = Estimate.of(width, np.hypot(outer.apart, apart[:, -1]))
     outside = Estimate(float(np.clip(outside.value, 0.0, 2.0 + _WIDEST)), outside.std)
     strip, shoulder = _share_pavement(outside)
-    inner_offset, inner_strip = _inside(distance[:, 0], apart[:, 0], inner)
+    inner_offset, inner_strip = _inner_widths(distance[:, 0], apart[:, 0], inner)
     return SideSection(
         side=name,
         lines=lines,
@@ -308,11 +308,11 @@ def _summarise_side(
         strip=strip,
         shoulder=shoulder,
         edge_seen=edge_seen,
-        closed=not _open(lines[-1], outer),
+        closed=not _lacks_outer_lane(lines[-1], outer),
     )
 
 
-def _inside(first: Float, apart: Float, inner: Edge) -> tuple[Estimate, Estimate]:
+def _inner_widths(first: Float, apart: Float, inner: Edge) -> tuple[Estimate, Estimate]:
     """Return the distance of the pavement's inner edge from the axis, and the inner edge strip's width, m."""
     if _is_visible(inner):
         offset = Estimate.of(inner.offsets, inner.apart)
@@ -323,7 +323,7 @@ def _inside(first: Float, apart: Float, inner: Edge) -> tuple[Estimate, Estimate
     return (Estimate(max(0.0, offset.value), offset.std), Estimate(float(np.clip(strip.value, 0.0, 2.0)), strip.std))
 
 
-def _usual(outside: Float, line: Line | None) -> Bool:
+def _usual_stretches(outside: Float, line: Line | None) -> Bool:
     """Return a mask (K,) of the stretches where the pavement outside of the lanes is the road's own, not a turnout's.
 
     Beside exits and entries the edge line is a dashed one; beside an emergency bay the pavement is wider.
@@ -375,13 +375,13 @@ def _share_pavement(outside: Estimate) -> tuple[Estimate, Estimate]:
 def nearest_standard(sides: dict[Side, SideSection]) -> tuple[str, float]:
     """Return the name of the standard cross-section nearest to both carriageways, and the largest difference (m)."""
     distances = {
-        name: max(_distance(side, row) for side in sides.values()) for name, row in STANDARD_CROSS_SECTIONS.items()
+        name: max(_misfit(side, row) for side in sides.values()) for name, row in STANDARD_CROSS_SECTIONS.items()
     }
     best = min(distances, key=lambda name: distances[name])
     return best, distances[best]
 
 
-def _distance(side: SideSection, row: StandardCrossSection) -> float:
+def _misfit(side: SideSection, row: StandardCrossSection) -> float:
     """Return the largest difference of a width, m, a lane's counting twice; inf if the numbers of lanes differ."""
     if len(side.lanes) != len(row.lanes):
         return float("inf")

@@ -21,9 +21,16 @@ from synthroads_addon.calibration.fit import (
     fitted_slope,
     fitted_wavelength,
 )
-from synthroads_addon.calibration.job import Calibration, CalibrationJob, MaterialTarget, calibrate, save_fitted, steps
+from synthroads_addon.calibration.job import (
+    Calibration,
+    CalibrationJob,
+    MaterialTarget,
+    calibrate,
+    calibration_steps,
+    save_fitted,
+)
 from synthroads_addon.calibration.plot import save_plot
-from synthroads_addon.cloud.selection.classes import RealClass, class_by_label, ranges_and_incidences, read_real
+from synthroads_addon.cloud.selection.classes import RealClass, class_by_label, ranges_and_incidences, read_real_cloud
 from synthroads_addon.cloud.selection.pavement import RoadClasses, axis_coordinates, road_classes
 from synthroads_addon.materials.reflectance import facet_terms
 from synthroads_addon.materials.table import Material, materials, read_material_table, write_material_table
@@ -200,7 +207,7 @@ def test_the_wavelength_is_found(wavelength: float) -> None:
 def test_lines_are_found_where_they_are_and_not_by_each_points_own_brightness(tmp_path: Path) -> None:
     cloud, paint = striped(tmp_path / "road.laz", tmp_path / "axis.csv", 40.0)
     road = RoadClasses(tmp_path / "axis.csv", ((-6.0, 6.0),), (3.0,), 0.2)
-    real = read_real(cloud)
+    real = read_real_cloud(cloud)
     found = road_classes(real, road)
     on_paint = {tuple(row) for row in np.round(real.xyz[paint], 3).tolist()}
     right = [tuple(row) in on_paint for row in np.round(found["line"].place, 3).tolist()]
@@ -270,17 +277,17 @@ def run_job(**changes) -> Calibration:
 )
 def test_bad_jobs_are_refused_before_any_work(changes, field: str) -> None:
     with pytest.raises(InputError, match=field):
-        next(steps(CalibrationJob(**({"targets": (MaterialTarget("asphalt"),)} | changes))))
+        next(calibration_steps(CalibrationJob(**({"targets": (MaterialTarget("asphalt"),)} | changes))))
 
 
 def test_classes_that_are_not_there_are_refused(tmp_path: Path) -> None:
     cloud = labelled(tmp_path / "real.laz", None, 60_000.0)
-    real = read_real(cloud, "label")
+    real = read_real_cloud(cloud, "label")
     for code, message in (("41", "40, 60"), ("road", "a number")):
         with pytest.raises(InputError, match=message):
             class_by_label(real, code)
     with pytest.raises(InputError, match="did you mean 'label'"):
-        read_real(cloud, "labels")
+        read_real_cloud(cloud, "labels")
     striped(tmp_path / "s.laz", tmp_path / "a.csv", 40.0)
     with pytest.raises(InputError, match="at least 200"):
         road_classes(real, RoadClasses(tmp_path / "a.csv", ((-39.0, -38.0),), ()))

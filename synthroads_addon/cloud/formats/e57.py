@@ -45,7 +45,7 @@ _FIXED = {
 }
 
 
-def library() -> Any:
+def load_libe57() -> Any:
     """Return the module `pye57.libe57`; raise `InputError` if the package isn't installed."""
     try:
         from pye57 import libe57
@@ -68,7 +68,7 @@ class E57Writer(CloudWriter):
     """Writer of point blocks to an E57 file, with 8-bit colours and unclipped intensities; see `CloudWriter`."""
 
     def _open(self) -> None:
-        self._e57 = e57 = library()
+        self._e57 = e57 = load_libe57()
         self.faults = (OSError, e57.E57Exception)
         with self._temporary.open("wb"):
             pass  # the library's own complaint about a folder that can't be written says nothing
@@ -233,7 +233,7 @@ class E57Reader(CloudReader):
     """
 
     def __init__(self, path: Path) -> None:
-        self._e57 = e57 = library()
+        self._e57 = e57 = load_libe57()
         try:
             self._file = e57.ImageFile(str(path), "r")
         except Exception as problem:

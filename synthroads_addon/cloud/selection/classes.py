@@ -60,7 +60,7 @@ class RealClass:
     returns: UInt8
 
 
-def read_real(path: Path, attribute: str | None = None) -> RealCloud:
+def read_real_cloud(path: Path, attribute: str | None = None) -> RealCloud:
     """Read all points of a measured cloud, with class labels from ``class_id`` or another attribute.
 
     Args:

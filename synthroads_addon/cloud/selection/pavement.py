@@ -71,7 +71,7 @@ def road_classes(cloud: RealCloud, road: RoadClasses) -> dict[str, RealClass]:
         selection = f"{spans} m beside the axis, more than {CLEAR:g} m from the lines" if road.lines else f"{spans} m"
         result["paved"] = select_class(cloud, np.flatnonzero(on & free), selection)
     if road.lines:
-        chosen, threshold = _on_lines(cloud.intensity, station, offset, road)
+        chosen, threshold = _points_on_dashes(cloud.intensity, station, offset, road)
         selection = (
             f"within {road.line_width / 2:g} m of the lines at {', '.join(f'{line:g}' for line in road.lines)} m, "
             f"each {STRETCH:g} m of them moved by up to {REACH:g} m to where it is brightest, where the "
@@ -81,7 +81,7 @@ def road_classes(cloud: RealCloud, road: RoadClasses) -> dict[str, RealClass]:
     return result
 
 
-def _on_lines(intensity: Float, station: Float, offset: Float, road: RoadClasses) -> tuple[Index, float]:
+def _points_on_dashes(intensity: Float, station: Float, offset: Float, road: RoadClasses) -> tuple[Index, float]:
     """Return the indices of points on dashes, and Otsu's threshold of median intensities that told them apart."""
     half = road.line_width / 2.0
     points, medians = [], []
@@ -91,7 +91,7 @@ def _on_lines(intensity: Float, station: Float, offset: Float, road: RoadClasses
         for number in np.unique(stretch):
             rows = near[stretch == number]
             aside = offset[rows] - line
-            shift = _brightest(aside, intensity[rows], half)
+            shift = _brightest_shift(aside, intensity[rows], half)
             rows = rows[np.abs(aside - shift) <= half]
             if len(rows) >= _FEWEST_OF_LINE // 2:
                 points.append(rows)
@@ -103,7 +103,7 @@ def _on_lines(intensity: Float, station: Float, offset: Float, road: RoadClasses
     return chosen[level > threshold], threshold
 
 
-def _brightest(aside: Float, intensity: Float, half: float) -> float:
+def _brightest_shift(aside: Float, intensity: Float, half: float) -> float:
     """Return the lateral shift, m, that maximises the mean intensity within half a line's width of it."""
     shifts = np.arange(-REACH, REACH + 1e-9, 0.02)
     inside = np.abs(aside[:, None] - shifts) <= half
@@ -142,12 +142,12 @@ def axis_coordinates(points: Float, axis: Float) -> tuple[Float, Float]:
         middle = (corner + 0.5) * _CELL
         near = np.flatnonzero(np.abs(begin - middle).max(axis=1) < _CELL / 2.0 + _FARTHEST)
         if len(near):
-            nearest = _nearest(points[rows], begin[near], step[near], length[near])
+            nearest = _nearest_segments(points[rows], begin[near], step[near], length[near])
             station[rows], offset[rows] = start[near][nearest[0]] + nearest[1], nearest[2]
     return station, offset
 
 
-def _nearest(points: Float, begin: Float, step: Float, length: Float) -> tuple[Index, Float, Float]:
+def _nearest_segments(points: Float, begin: Float, step: Float, length: Float) -> tuple[Index, Float, Float]:
     """Return for each point (P,) its nearest segment, the distance along it and the offset, m; NaN beyond all ends."""
     direction = step / length[:, None]
     offset = points[:, None, :] - begin

@@ -19,7 +19,7 @@ from ...base.errors import InputError
 from ...base.random_streams import stream
 from ..formats.base import CloudHeader
 from ..formats.registry import open_cloud
-from .picture import Brightness, gray
+from .picture import Brightness, grays
 
 ColourBy = Literal["class", "intensity", "rgb", "height"]
 COLOURINGS: tuple[ColourBy, ...] = get_args(ColourBy)
@@ -99,7 +99,7 @@ class DisplayCloud:
         if by == "rgb":
             return self.rgb
         if by == "intensity":
-            shades, _ = gray(self.brightness.astype(np.float64), np.ones(len(self), dtype=bool), self.brightness_text)
+            shades, _ = grays(self.brightness.astype(np.float64), np.ones(len(self), dtype=bool), self.brightness_text)
             return shades.astype(np.uint8)
         low, high = (value - self.origin[2] for value in self.limits("height"))
         share = np.clip((self.xyz[:, 2] - low) / max(high - low, 1e-9), 0.0, 1.0)
@@ -122,7 +122,7 @@ def chosen_points(count: int, budget: int) -> Int:
     return edges[:-1] + (picks * np.diff(edges)).astype(np.int64)
 
 
-def drawing_places(count: int) -> Int:
+def drawing_order(count: int) -> Int:
     """Return a random permutation (count,): where each chosen point, in the file's order, is drawn."""
     return stream(0, "drawing order", count).permutation(count)
 
@@ -156,7 +156,7 @@ def read_display(
         chosen = chosen_points(cloud.header.count, budget)
         if len(chosen) == 0:
             raise InputError(str(path), None, "has no points")
-        size, places = len(chosen), drawing_places(len(chosen))
+        size, places = len(chosen), drawing_order(len(chosen))
         xyz, class_id = np.empty((size, 3), np.float32), np.empty(size, np.uint8)
         rgb, brightness, counts = np.empty((size, 3), np.uint16), np.empty(size, np.float32), np.zeros(256, np.int64)
         measure, done, kept = Brightness(), 0, 0

@@ -165,7 +165,7 @@ def class_legend(rows: Sequence[PointClass], labels: UInt8) -> list[tuple[str, C
     return [(row.name.replace("_", " "), row.color) for row in rows if row.id in seen]
 
 
-def gray(values: Float, filled: Bool, text: str) -> tuple[Float, GrayBar]:
+def grays(values: Float, filled: Bool, text: str) -> tuple[Float, GrayBar]:
     """Return values (N,) as grays (N, 3), 0 to 255, stretched between their 0.5 and 99.5 % quantiles, with a legend."""
     low, high = np.quantile(values[filled], [0.005, 0.995]) if filled.any() else (0.0, 1.0)
     shade = np.clip((values - low) / max(high - low, 1e-300), 0, 1) * 255

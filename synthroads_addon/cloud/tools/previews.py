@@ -9,7 +9,7 @@ from ...base.arrays import AnyArray, Float
 from ...base.classes import ClassScheme, class_scheme
 from ...road.geometry import RoadGeometry
 from ..points import PointBlock
-from .picture import PAPER, Axes, Legend, Raster, add_frame, class_legend, gray, nice_step
+from .picture import PAPER, Axes, Legend, Raster, add_frame, class_legend, grays, nice_step
 
 WIDTH = 1800
 """Width of the pictures, pixels."""
@@ -161,4 +161,4 @@ def _class_colors(raster: Raster, scheme: ClassScheme) -> tuple[AnyArray, Legend
 
 def _grays(raster: Raster) -> tuple[AnyArray, Legend]:
     """Return a raster's mean intensities as grays (cells, 3), with their legend."""
-    return gray(raster.intensity(), raster.count > 0, raster.brightness.text)
+    return grays(raster.intensity(), raster.count > 0, raster.brightness.text)

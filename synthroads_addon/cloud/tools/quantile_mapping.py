@@ -45,7 +45,7 @@ def histograms(cloud: CloudReader, scale: float) -> dict[int, Int]:
     return result
 
 
-def largest_gap(a: Int, b: Int) -> float:
+def ks_distance(a: Int, b: Int) -> float:
     """Return the Kolmogorov-Smirnov distance of two histograms, 0 to 1; of an empty one as if it were all 0."""
     return float(np.abs(np.cumsum(a) / max(a.sum(), 1) - np.cumsum(b) / max(b.sum(), 1)).max())
 
@@ -129,16 +129,16 @@ class IntensityMapping:
 
     def distance_before(self) -> float:
         """Return the Kolmogorov-Smirnov distance of the two clouds' intensities before mapping."""
-        return largest_gap(self._have, self._want)
+        return ks_distance(self._have, self._want)
 
     def distance_after(self) -> float:
         """Return the Kolmogorov-Smirnov distance of the intensities mapped so far to the target's."""
         tables = {id(table): table for table in self._maps.values()}.values()
-        return largest_gap(_total({i: table.mapped for i, table in enumerate(tables)}), self._want)
+        return ks_distance(_total({i: table.mapped for i, table in enumerate(tables)}), self._want)
 
     def class_distances(self) -> dict[int, float]:
         """Return the Kolmogorov-Smirnov distances after mapping of classes with maps of their own, by source id."""
-        return {label: largest_gap(self._maps[label].mapped, want) for label, want in self._class_targets.items()}
+        return {label: ks_distance(self._maps[label].mapped, want) for label, want in self._class_targets.items()}
 
     def _class_maps(
         self, source: CloudReader, target: CloudReader, have: dict[int, Int], want: dict[int, Int]

@@ -239,7 +239,7 @@ class _Roughness:
         slot = np.minimum(np.searchsorted(self._keys, key), len(self._keys) - 1)
         known = self._keys[slot] == key
         inside, slot = inside[known], slot[known]
-        for part in _parts(self._counts[slot]):
+        for part in _bounded_slices(self._counts[slot]):
             counts = self._counts[slot[part]]
             point = np.repeat(inside[part], counts)
             within = np.arange(len(point)) - np.repeat(np.cumsum(counts) - counts, counts)
@@ -282,7 +282,7 @@ class _Roughness:
 _PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
-def _parts(counts: Index) -> Iterator[slice]:
+def _bounded_slices(counts: Index) -> Iterator[slice]:
     """Yield slices over points such that each slice's pairs (``counts`` per point) fit into memory."""
     ends = np.cumsum(counts)
     first = 0

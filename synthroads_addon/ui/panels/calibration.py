@@ -12,7 +12,7 @@ import bpy
 from ...base.errors import InputError
 from ...base.progress import exhaust
 from ...calibration.fit import FITTED
-from ...calibration.job import Calibration, CalibrationJob, ClassComparison, save_fitted, steps
+from ...calibration.job import Calibration, CalibrationJob, ClassComparison, calibration_steps, save_fitted
 from ...calibration.plot import calibration_picture
 from ..fields.room import buttons_row, draw_text
 from ..work.common import Sidebar, column, large_button, refusing
@@ -27,7 +27,7 @@ PICTURE = "SynthRoads Calibration"
 
 def panel_job(job: CalibrationJob) -> PanelJob[Calibration]:
     """Return a calibration as a job in a thread: it touches none of Blender's data."""
-    return PanelJob.aside("Calibration", lambda report: exhaust(steps(job), report), "Calibrating")
+    return PanelJob.aside("Calibration", lambda report: exhaust(calibration_steps(job), report), "Calibrating")
 
 
 latest: Calibration | None = None

@@ -15,7 +15,7 @@ from ...base.errors import InputError
 from ...blender.materials import constants, table_name
 from ...blender.materials.image import base_color_image, color_image_node
 from ...calibration.expected import texture_of
-from ...calibration.job import CalibrationJob, MaterialTarget, Part, check
+from ...calibration.job import CalibrationJob, MaterialTarget, Part, check_job
 from ...cloud.selection.pavement import RoadClasses
 from ...materials.surfaces import Reflection
 from ...materials.table import Material, materials
@@ -140,7 +140,7 @@ class SYNTHROADS_PG_calibration(bpy.types.PropertyGroup):
             gain=self.gain or None,
             scene=scene,
         )
-        check(job)
+        check_job(job)
         return job
 
 

@@ -15,7 +15,7 @@ from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import Cancelled, InputError, MissingFileError
 from synthroads_addon.cloud.formats.registry import ENDINGS, open_cloud, open_writer
 from synthroads_addon.cloud.points import PointBlock, concatenate
-from synthroads_addon.cloud.tools.display import chosen_points, drawing_places, height_colors, read_display
+from synthroads_addon.cloud.tools.display import chosen_points, drawing_order, height_colors, read_display
 from tests.helpers.clouds.random_points import make_points
 
 ORIGIN = np.array([294_000.0, 5_628_000.0, 180.0])
@@ -31,7 +31,7 @@ def stored(path: Path, shown: int) -> PointBlock:
     """Return the points of a file that are to be shown, in the drawing's order."""
     with open_cloud(path) as cloud:
         every = concatenate(list(cloud.blocks()))
-    return every.select(chosen_points(len(every), shown)[np.argsort(drawing_places(min(shown, len(every))))])
+    return every.select(chosen_points(len(every), shown)[np.argsort(drawing_order(min(shown, len(every))))])
 
 
 @given(count=st.integers(0, 3000), budget=st.integers(1, 3000))
@@ -123,7 +123,7 @@ def test_intensity_is_stretched_between_its_outer_half_percents(tmp_path: Path) 
     cloud = read_display(write(tmp_path / "a.npz", block), 1_001, ORIGIN)
     low, high = cloud.limits("intensity")
     assert (low, high) == (pytest.approx(0.005e-2, rel=0.01), pytest.approx(0.995e-2, rel=0.01))
-    shades = cloud.colors("intensity")[drawing_places(1_001)]
+    shades = cloud.colors("intensity")[drawing_order(1_001)]
     assert (shades[:, 0] == shades[:, 2]).all()
     assert (shades[0, 0], shades[-1, 0]) == (0, 255)
     assert (np.diff(shades[:, 0].astype(int)) >= 0).all()
@@ -133,7 +133,7 @@ def test_height_runs_from_dark_to_light(tmp_path: Path) -> None:
     xyz = ORIGIN + np.stack([np.zeros(101), np.zeros(101), np.arange(101.0)], axis=1)
     cloud = read_display(write(tmp_path / "a.npz", replace(make_points(101), xyz=xyz)), 101, ORIGIN)
     assert cloud.limits("height") == (pytest.approx(180.5), pytest.approx(279.5))
-    colors = cloud.colors("height")[drawing_places(101), :3].astype(float)
+    colors = cloud.colors("height")[drawing_order(101), :3].astype(float)
     assert (np.diff(colors @ [0.2126, 0.7152, 0.0722]) >= -1e-9).all()
     assert colors[0].tolist() == height_colors()[0].tolist()
     assert colors[-1].tolist() == height_colors()[255].tolist()

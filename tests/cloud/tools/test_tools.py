@@ -19,7 +19,7 @@ from synthroads_addon.cloud.points import PointBlock, concatenate
 from synthroads_addon.cloud.tools.convert import draw_previews, map_intensity, subsample
 from synthroads_addon.cloud.tools.picture import nice_step
 from synthroads_addon.cloud.tools.previews import CrossSection, TopView
-from synthroads_addon.cloud.tools.quantile_mapping import LEVELS, IntensityMapping, QuantileMap, largest_gap
+from synthroads_addon.cloud.tools.quantile_mapping import LEVELS, IntensityMapping, QuantileMap, ks_distance
 from synthroads_addon.cloud.tools.statistics import Moments, cloud_statistics, luminance
 from synthroads_addon.cloud.tools.subsample import GridSubsampler, keep_one_per_cell
 from tests.helpers.clouds.random_points import make_points
@@ -190,7 +190,7 @@ def test_mapping_meets_the_target_and_keeps_the_order(source, target, ties, cuts
     assert np.isin(mapped, target).all()
     # Discrepancy of the golden section's multiples is below 2 ln(n) / n; an even tie adds to it no more than once.
     count = len(source)
-    assert largest_gap(table.mapped, wanted) <= (2 * np.log(count + 1) + 2) / count
+    assert ks_distance(table.mapped, wanted) <= (2 * np.log(count + 1) + 2) / count
     order = np.lexsort((mapped, source))
     assert (np.diff(mapped[order])[np.diff(source[order]) > 0] >= 0).all()
 

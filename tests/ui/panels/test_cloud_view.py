@@ -18,7 +18,7 @@ from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.blender.views.cloud import Pace
 from synthroads_addon.cloud.formats.registry import ENDINGS, open_writer
 from synthroads_addon.cloud.points import PointBlock
-from synthroads_addon.cloud.tools.display import COLOURINGS, drawing_places, read_display
+from synthroads_addon.cloud.tools.display import COLOURINGS, drawing_order, read_display
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.ui.panels import cloud_view
 from synthroads_addon.ui.panels.cloud_view import view
@@ -81,7 +81,7 @@ def test_it_lies_on_the_model(shown: Any, tmp_path: Path) -> None:
     path, local = surface_cloud(tmp_path / "a.npz", geometry)
     bpy.ops.synthroads.show_cloud(filepath=str(path))
     assert view.cloud
-    drawn = (view.cloud.xyz + view.offset(bpy.context.scene))[drawing_places(400)]
+    drawn = (view.cloud.xyz + view.offset(bpy.context.scene))[drawing_order(400)]
     assert np.abs(drawn - local).max() < 0.001
     road = bpy.data.objects["Road"].evaluated_get(bpy.context.evaluated_depsgraph_get())
     gaps = [road.closest_point_on_mesh(point)[1] for point in drawn.tolist()]
