@@ -35,7 +35,7 @@ _TILE, _MARGIN = 1024, 128
 
 
 class PointKind(IntEnum):
-    """What a point lies on, as far as the reconstruction tells it apart."""
+    """Kind of surface or object that a point lies on, as far as the reconstruction tells them apart."""
 
     OTHER = 0
     UNSORTED = 1

@@ -14,13 +14,7 @@ from synthroads_addon.base.arrays import otsu_threshold
 from synthroads_addon.base.errors import InputError, OutputError
 from synthroads_addon.base.noise import noise_field
 from synthroads_addon.calibration.expected import Expectation, Receiver, Views, chosen_views, read_texture, texture_of
-from synthroads_addon.calibration.fit import (
-    BRIGHTEST,
-    brighten_material,
-    common_gain,
-    fitted_slope,
-    fitted_wavelength,
-)
+from synthroads_addon.calibration.fit import BRIGHTEST, brighten_material, common_gain, fitted_slope, fitted_wavelength
 from synthroads_addon.calibration.job import (
     Calibration,
     CalibrationJob,
