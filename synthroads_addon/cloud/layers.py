@@ -41,7 +41,7 @@ class Column:
 
     @property
     def whole(self) -> bool:
-        """Return whether the values are whole numbers."""
+        """Return whether the column holds whole numbers, which are stored without a scale."""
         return self.scale is None
 
     def values(self, block: PointBlock) -> AnyArray:

@@ -72,7 +72,7 @@ class Band:
 
 @dataclass(frozen=True)
 class RoadLayout:
-    """Layout of a road: kind and number of its carriageways and lanes.
+    """Layout of a road: its carriageways, with their lines, and the pavement in the profiles.
 
     Attributes:
         kind: dual carriageway, or a single one.

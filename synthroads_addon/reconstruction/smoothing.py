@@ -16,7 +16,7 @@ _FLOOR = 1e-9  # of the mean weight: what holds the solution where nothing was m
 
 @dataclass(frozen=True)
 class SmoothedValues:
-    """A smoothed sequence.
+    """A smoothed sequence of N values with their standard deviations.
 
     Attributes:
         values: (N,).

@@ -48,7 +48,7 @@ class PulseHits:
 
 @dataclass(frozen=True)
 class EchoChanges:
-    """Changes that an effect makes to the pulses of a block.
+    """Echoes that an effect adds to a block's pulses, and factors on the brightness of what their rays meet.
 
     Attributes:
         pulse, ray: (N,) pulse and ray of each echo that is added, as indices into `PulseHits.distance`.
@@ -66,14 +66,14 @@ class EchoChanges:
 
 
 class EchoEffect(Protocol):
-    """Something that adds echoes to pulses, or weakens what they meet.
+    """Interface of effects that add echoes to pulses or weaken what they meet.
 
     It is called from several threads, for blocks in any order, so it must keep nothing from one call to the next.
     """
 
     @property
     def name(self) -> str:
-        """Return the name by which its random numbers are keyed: another name gives others."""
+        """Return the effect's name, which keys its random numbers: another name gives others."""
         ...
 
     def change_echoes(self, hits: PulseHits, random: np.random.Generator) -> EchoChanges:

@@ -95,7 +95,7 @@ def _open_layers(plan: ScanPlan, stack: ExitStack, timer: StageTimer) -> LayerSo
 
 
 def scan_blocks(plan: ScanPlan, source: LayerSource | None = None) -> Iterator[BlockResult]:
-    """Yield the blocks of a scan in their order, computed side by side; only a few are held at a time.
+    """Scan a plan's blocks in parallel and yield their results in order; only a few are held at a time.
 
     Where materials are worked out or rendered return by return, several blocks come as one.
 
@@ -135,7 +135,7 @@ def _nothing() -> None:
 def _computed(
     work: Callable[[Block], BlockResult], plan: ScanPlan, workers: int, ahead: int, wait: Wait
 ) -> Iterator[BlockResult]:
-    """Yield the results of a plan's blocks in their order, see `_map_side_by_side`."""
+    """Return an iterator over a plan's blocks' results, in their order, computed by threads if the caster allows."""
     blocks = plan.blocks()
     if plan.target.caster.main_thread_only:
         return map(work, blocks)
@@ -143,7 +143,7 @@ def _computed(
 
 
 def _join_into_batches(results: Iterator[BlockResult]) -> Iterator[BlockResult]:
-    """Yield blocks joined until they have `RETURNS_AT_ONCE`."""
+    """Yield the results joined, in order, into batches of at least `RETURNS_AT_ONCE` points."""
     batch: list[BlockResult] = []
     for result in results:
         batch.append(result)
@@ -162,7 +162,7 @@ def _map_side_by_side(
     wait: Wait,
     stop: Callable[[], None] = _nothing,
 ) -> Iterator[BlockResult]:
-    """Yield the results of items in their order, of which as many as there are workers are computed at once.
+    """Yield the results of ``work`` on items, in their order, from a pool of threads, a few items ahead.
 
     Args:
         work: computes an item.

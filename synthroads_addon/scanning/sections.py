@@ -45,7 +45,7 @@ _AROUND = 60.0
 
 @dataclass(frozen=True)
 class RoadSection:
-    """A part of a road that is built and scanned at once.
+    """A part of a road that is built and scanned at once, with the blocks of pulses that belong to it.
 
     Attributes:
         start, end: stations that it is of, m.
@@ -95,7 +95,7 @@ def reached_stations(cut: Blocks, geometry: RoadGeometry, blocks: list[Block]) -
 
 
 def strip_parts(cut: Blocks, blocks: Sequence[Block]) -> tuple[Strip, ...]:
-    """Return the parts of strips that blocks cover, each with its strip's index."""
+    """Return the parts of strips, as shorter strips of the same index, that runs of blocks cover."""
     parts = []
     for strip, numbers in _by_strip(blocks):
         for run in np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1):
@@ -189,7 +189,7 @@ def _stations_of_rays(cut: Blocks, geometry: RoadGeometry, origin: Float, direct
 
 
 def _overpass_reach(geometry: RoadGeometry) -> float:
-    """Return how far along the road an overpass reaches at most from where it crosses, m."""
+    """Return how far, m, along the road an overpass reaches at most from where it crosses."""
     bridges = geometry.parameters.of_type(Overpass).values()
     lengths = [abs(np.sin(np.deg2rad(item.rotation_deg))) * _BRIDGE_SIDE + item.width for item in bridges]
     return float(max(lengths, default=0.0))
@@ -204,7 +204,7 @@ def _corridor(geometry: RoadGeometry) -> float:
 
 
 def _elevation_range(geometry: RoadGeometry, start: float, end: float) -> tuple[float, float]:
-    """Return the lowest and the highest local elevation of what there is between two stations, m."""
+    """Return the lowest and highest local elevation, m, of anything between two stations."""
     station = np.linspace(max(start, 0.0), min(end, geometry.length), 60)
     wide = _corridor(geometry)
     offset = np.linspace(-wide, wide, 9)

@@ -19,7 +19,7 @@ _BEYOND = 1e-3
 
 @dataclass(frozen=True)
 class Rays:
-    """K rays of each of P pulses.
+    """K rays of each of P pulses: origins, directions, shares of energy, times.
 
     The pulses stand side by side, so that sums over a pulse's rays are sums of long rows.
 

@@ -27,7 +27,7 @@ _PENUMBRA = 0.04
 
 
 def sun_direction(environment: Environment) -> Float:
-    """Return the unit vector (3,) towards the sun; x east, y north, z up."""
+    """Return the unit vector (3,) towards an environment's sun; x east, y north, z up."""
     azimuth, elevation = np.deg2rad([environment.sun_azimuth_deg, environment.sun_elevation_deg])
     return np.array([np.cos(elevation) * np.sin(azimuth), np.cos(elevation) * np.cos(azimuth), np.sin(elevation)])
 
@@ -77,7 +77,7 @@ def expose_light(direction: Float, sun: Float, sky: Float) -> tuple[SunAndSky, f
 
 
 class CloudShadows:
-    """Shadows of clouds on the ground: a periodic field that drifts with the wind.
+    """Shadows of clouds: a periodic field of the direct sun's transmission that drifts with the wind.
 
     A cloud's shadow is soft-edged and leaves `SHADE` of the direct sun; its share of the ground is the
     environment's cloud cover.
@@ -115,7 +115,7 @@ def _cloud_field(cover: float, seed: int) -> Float32:
     total = np.zeros((_CELLS, _CELLS))
     for cells, weight in _OCTAVES:
         coarse = random.normal(size=(_CELLS // cells,) * 2)
-        total += weight * _smooth(_smooth(coarse, cells).T, cells).T
+        total += weight * _upsample(_upsample(coarse, cells).T, cells).T
     rank = np.argsort(np.argsort(total, axis=None)).reshape(total.shape) / total.size
     # The densest share of the field is cloud: ranks are even, so the cover is met exactly.
     edge = np.clip((rank - (1.0 - cover)) / (2.0 * _PENUMBRA) + 0.5, 0.0, 1.0)
@@ -124,8 +124,8 @@ def _cloud_field(cover: float, seed: int) -> Float32:
     return np.asarray(1.0 - (1.0 - SHADE) * edge, np.float32)
 
 
-def _smooth(values: Float, cells: int) -> Float:
-    """Return a periodic field's rows (n, m), each interpolated at `cells` places by a cubic step: (n * cells, m)."""
+def _upsample(values: Float, cells: int) -> Float:
+    """Return a periodic field's rows (n, m) upsampled to (n * cells, m), with cubic steps between them."""
     t = (np.arange(cells) / cells)[:, None]
     step = t * t * (3.0 - 2.0 * t)
     following = np.roll(values, -1, axis=0)

@@ -42,7 +42,7 @@ class LayerRequest:
 
     @property
     def lit(self) -> bool:
-        """Return whether colours under sun and sky are wanted."""
+        """Return whether RGB colours lit by sun and sky are wanted."""
         return "rgb" in self.wanted and self.settings.mode == "lit"
 
 

@@ -217,7 +217,7 @@ def device_names() -> list[str]:
 
 
 def load_device(name_or_file: str) -> Device:
-    """Load a preset or a file; raise `InputError` if there is no such device or it is inconsistent."""
+    """Return the device of a preset's name or of a file; raise `InputError` if there is none or it is inconsistent."""
     path = preset_path(DEVICES, name_or_file, "scan.device")
     return Device.from_dict(read_json(path), source=str(name_or_file))
 

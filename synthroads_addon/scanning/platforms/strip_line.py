@@ -39,11 +39,11 @@ class Sway:
 
     @property
     def slope(self) -> float:
-        """Return the legs' slope, m/m."""
+        """Return the slope of the zigzag's straight legs, offset over station, m/m."""
         return self.amplitude / self.wavelength / (0.25 - self.ROUNDED * (0.5 - 1.0 / np.pi))
 
     def at(self, station: Float) -> tuple[Float, Float]:
-        """Return offset (K,), m, and slope (K,) at stations (K,)."""
+        """Return the zigzag's offset (K,), m, and slope (K,), m/m, at stations (K,), m."""
         phase = station / self.wavelength
         nearest = np.round(2.0 * phase - 0.5)  # turning point: even ones to the left, odd ones to the right
         side = np.where(np.mod(nearest, 2.0) == 0.0, 1.0, -1.0)

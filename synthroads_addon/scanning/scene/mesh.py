@@ -117,7 +117,7 @@ class SceneMesh:
 
 
 def empty_scene_mesh(origin: Float, materials: tuple[str, ...] = ()) -> SceneMesh:
-    """Return a mesh without triangles."""
+    """Return a mesh without vertices and triangles that keeps an origin and materials."""
     return SceneMesh(
         vertices=np.empty((0, 3), np.float32),
         triangles=np.empty((0, 3), np.int32),

@@ -245,7 +245,7 @@ def _passes_in_lane(vehicles: list[Vehicle], line: LaneLine) -> list[VehiclePass
 
 @dataclass(frozen=True)
 class VehiclePasses:
-    """The way of one vehicle: once from where it is at the time 0, then from the lane's beginning again and again.
+    """Passes of one vehicle along its lane: from where it is at time 0, then again and again from the beginning.
 
     Attributes:
         start: distance of its middle from the lane's beginning, in the direction of traffic, at the time 0, m.
@@ -269,7 +269,7 @@ class VehiclePasses:
         return max(0.0, (self.whole - self.start) / self.speed)
 
     def at(self, time: Float) -> tuple[Float, Bool]:
-        """Return the distances (K,) of its middle, m, and whether (K,) it is there, at times (K,).
+        """Return the vehicle's distances (K,) along the lane, m, and whether (K,) it is there, at times (K,), s.
 
         Where it waits to come in again it is at the lane's end.
         """
@@ -293,7 +293,7 @@ class VehiclePasses:
 def lane_passes(
     start: Sequence[float], speed: Sequence[float], length: Sequence[float], whole: float
 ) -> list[VehiclePasses]:
-    """Return the passes of all vehicles of one lane, in their order.
+    """Return the passes of all vehicles of one lane, in their order, timed so that none overtakes another.
 
     They come in again in the order in which they leave, each as soon as it may: not before it has left, and so far
     behind the one before it that it keeps `VEHICLE_GAP` up to the lane's end, as nobody overtakes in a lane. The fast

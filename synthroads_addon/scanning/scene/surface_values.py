@@ -170,7 +170,7 @@ def corner_shares(corners: Float, place: Float) -> Float:
 
 @dataclass
 class ValuesBuilder:
-    """Gathers the values of parts while a scene's mesh is put together."""
+    """Collector of the surface values of parts while a scene's mesh is put together."""
 
     parts: list[PartValues] = field(default_factory=list)
 
