@@ -143,7 +143,7 @@ def _computed(
 
 
 def _join_into_batches(results: Iterator[BlockResult]) -> Iterator[BlockResult]:
-    """Yield the results joined, in order, into batches of at least `RETURNS_AT_ONCE` points."""
+    """Yield the results joined, in order, into batches of `RETURNS_AT_ONCE` points or more; the last may have less."""
     batch: list[BlockResult] = []
     for result in results:
         batch.append(result)
