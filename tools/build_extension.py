@@ -194,7 +194,7 @@ def check_complete(extension: Extension, wheels: list[Path]) -> None:
                 raise BuildError(f"{fields['Name']} needs {requirement}: add it to {extension.wheel_list.name}")
 
 
-def licence(fields: Message) -> str:
+def licence_name(fields: Message) -> str:
     """Return the name of a package's licence from its metadata: an expression, a classifier or a line of text."""
     if fields["Name"] in LICENCES:
         return LICENCES[fields["Name"]]
@@ -205,7 +205,7 @@ def licence(fields: Message) -> str:
 
 def third_party_notice(wheels: list[Path]) -> str:
     """Return the text that lists the bundled packages with their licences."""
-    rows = {f"{fields['Name']} {fields['Version']}": licence(fields) for fields in map(wheel_metadata, wheels)}
+    rows = {f"{fields['Name']} {fields['Version']}": licence_name(fields) for fields in map(wheel_metadata, wheels)}
     lines = [f"{name}: {rows[name]}" for name in sorted(rows, key=str.lower)]
     head = (
         "SynthRoads is licensed under the GPL, version 3 or later (LICENSE). It brings these packages as wheels,\n"
@@ -227,11 +227,11 @@ def bill_of_materials(extension: Extension, wheels: list[Path]) -> dict[str, obj
                 "name": fields["Name"],
                 "version": fields["Version"],
                 "purl": f"{address}?file_name={wheel.name}",
-                "licenses": [{"license": {"name": licence(fields)}}],
+                "licenses": [{"license": {"name": licence_name(fields)}}],
                 "hashes": [{"alg": "SHA-256", "content": hashlib.sha256(wheel.read_bytes()).hexdigest()}],
             }
         )
-    root = {"type": "application", "bom-ref": extension.name, "name": extension.name, "version": version()}
+    root = {"type": "application", "bom-ref": extension.name, "name": extension.name, "version": project_version()}
     return {
         "$schema": "http://cyclonedx.org/schema/bom-1.6.schema.json",
         "bomFormat": "CycloneDX",
@@ -287,7 +287,7 @@ def write_asset_library(path: Path) -> None:
         raise BuildError(f"the library of node groups was not written:\n{answer.stdout}{answer.stderr}")
 
 
-def version() -> str:
+def project_version() -> str:
     """Return the project's version, as the extension's manifest has it."""
     return str(tomllib.loads(MANIFEST.read_text(encoding="utf-8"))["version"])
 
@@ -297,7 +297,7 @@ def complete_manifest(extension: Extension, target: str, wheels: list[str]) -> s
     committed = extension.manifest.read_text(encoding="utf-8")
     tables = re.search(r"^\[", committed, flags=re.MULTILINE)
     split = tables.start() if tables else len(committed)
-    own = "" if extension.manifest == MANIFEST else f"version = {json.dumps(version())}\n"
+    own = "" if extension.manifest == MANIFEST else f"version = {json.dumps(project_version())}\n"
     added = f"{own}platforms = {toml_list([target])}\nwheels = {toml_list(wheels)}\n\n"
     return committed[:split] + added + committed[split:]
 
@@ -315,7 +315,7 @@ def build(extension: Extension, target: str, output_dir: Path, cache: Path) -> P
     wheels = fetch_wheels(extension, target, cache)
     check_complete(extension, wheels)
     output_dir.mkdir(parents=True, exist_ok=True)
-    archive = output_dir / f"{extension.name}-{version()}-{target.replace('-', '_')}.zip"
+    archive = output_dir / f"{extension.name}-{project_version()}-{target.replace('-', '_')}.zip"
     with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
         stage(extension, target, wheels, Path(folder))
         run_tool("build", "--source-dir", folder, "--output-filepath", str(archive))

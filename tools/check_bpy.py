@@ -37,7 +37,7 @@ def missing_libraries(ldd_output: str) -> list[str]:
     return list(dict.fromkeys(line.split(" =>")[0] for line in lines if line.endswith("=> not found")))
 
 
-def advice(libraries: list[str]) -> str:
+def install_advice(libraries: list[str]) -> str:
     """Return a text that says which Debian packages to install for missing libraries."""
     packages = sorted({DEBIAN_PACKAGES[name] for name in libraries if name in DEBIAN_PACKAGES})
     others = [name for name in libraries if name not in DEBIAN_PACKAGES]
@@ -74,7 +74,7 @@ def main() -> int:
     if binary and binary.exists() and sys.platform.startswith("linux"):
         found = subprocess.run(["ldd", str(binary)], capture_output=True, text=True, check=False)
         if libraries := missing_libraries(found.stdout):
-            print(advice(libraries))
+            print(install_advice(libraries))
             return 1
     print(f"bpy does not load: {error}")
     return 1

@@ -100,7 +100,7 @@ def compare(table: Path, output: Path, cloud: Path) -> Calibration:
     )
 
 
-def checked(table: Path, output: Path, rays: int = 19, height: float = 700.0) -> Calibration:
+def check_table(table: Path, output: Path, rays: int = 19, height: float = 700.0) -> Calibration:
     """Build the plane, scan it and compare the cloud with the table; return the calibration."""
     output.mkdir(parents=True, exist_ok=True)
     build()
@@ -115,7 +115,7 @@ def main() -> None:
     parser.add_argument("--rays", type=int, default=19)
     parser.add_argument("--height", type=float, default=700.0, metavar="M")
     arguments = parser.parse_args()
-    result = checked(arguments.table, arguments.output, arguments.rays, arguments.height)
+    result = check_table(arguments.table, arguments.output, arguments.rays, arguments.height)
     save_plot(result, arguments.output / "check.png", overwrite=True)
     rows: list[dict[str, Any]] = result.to_dict()["classes"]
     for row in rows:

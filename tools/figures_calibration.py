@@ -49,7 +49,7 @@ def command(folder: Path, name: str, gain: float | None, tables: Path, pictures:
     return words
 
 
-def calibrated(words: list[str]) -> dict[str, Any]:
+def run_command(words: list[str]) -> dict[str, Any]:
     """Run a `synthroads` command; return its JSON report, or exit with its code if it fails."""
     said = io.StringIO()
     with contextlib.redirect_stdout(said):
@@ -91,7 +91,7 @@ def main() -> None:
     gain, gains = None, []
     for name in CLOUDS:
         words = command(arguments.real, name, gain, arguments.tables, arguments.output)
-        report = calibrated(words)
+        report = run_command(words)
         gain = report["gain"] if name == GIVES_GAIN else gain
         gains.append(f"{name}: gain {report['gain']:g}")
         print("\n".join(rows(name, report)))

@@ -194,7 +194,7 @@ def remembering(plain: CenterlinePredictor) -> RememberingPredictor:
     return other
 
 
-def models(runs: Sequence[str]) -> dict[str, list[Model]]:
+def load_models(runs: Sequence[str]) -> dict[str, list[Model]]:
     """Load trained runs given as NAME=FOLDER; return models by name, merging those of one truth and real roads."""
     found: dict[str, dict[tuple[TruthKind, frozenset[str], float], list[Predictor]]] = {}
     for text in runs:
@@ -272,7 +272,7 @@ def synthetic_roads(texts: Sequence[str], kind: TruthKind) -> list[LearningRoad]
     return [road for scene in scenes for road in read_scene(scene, kind)]
 
 
-def searched(shown: Sequence[Case], masks: Sequence[str], file: Path) -> GridSearch:
+def search_settings(shown: Sequence[Case], masks: Sequence[str], file: Path) -> GridSearch:
     """Run the skeleton baseline's grid search and write its settings and figures to a JSON file; return it."""
     search = grid_search(shown, masks)
     rows = [{"raster": s.raster, "branch": s.branch, "mask": s.mask, "bin": s.bin, **row} for s, row in search.rows]
@@ -286,7 +286,7 @@ def shown_by(roads: Sequence[LearningRoad], cropping: Cropping | None, estimated
     return lambda seed: [make_case(road, seed, cropping=cropping, estimated=estimated) for road in roads]
 
 
-def synthetic(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Model]]) -> dict[str, str]:
+def synthetic_tables(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Model]]) -> dict[str, str]:
     """Measure on the synthetic data sets; return the document's Markdown tables by name."""
     result: dict[str, str] = {}
     for kind in arguments.truths:
@@ -301,7 +301,7 @@ def in_domain(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Mode
     """Measure on roads of the training's scanner, write tables and pictures; return Markdown tables by name."""
     name, roads = f"in-domain-{kind}", synthetic_roads(arguments.in_domain, kind)
     cases = shown_by(roads, None, estimated=False)
-    search = searched(cases(arguments.seeds[0])[:1], ["classes"], arguments.output / f"skeleton-{name}.json")
+    search = search_settings(cases(arguments.seeds[0])[:1], ["classes"], arguments.output / f"skeleton-{name}.json")
     learned = of_kind(trained, kind, len(arguments.seeds))
     measured = measure(learned | baselines(search, seen_by(trained, kind)), cases, arguments.seeds)
     tables.write_tables(arguments.output, name, measured)
@@ -318,7 +318,7 @@ def other_scanners(
     again, sets = by_title(arguments.recalibrate), by_title(arguments.other)
     roads = {title: synthetic_roads(texts, kind) for title, texts in sets.items()}
     every = shown_by([road for some in roads.values() for road in some], None, estimated=False)
-    search = searched(every(arguments.seeds[0])[:1], ["classes"], arguments.output / f"skeleton-{name}.json")
+    search = search_settings(every(arguments.seeds[0])[:1], ["classes"], arguments.output / f"skeleton-{name}.json")
     plain = learned | baselines(search, seen_by(trained, kind))
     merged: Measured = {}
     for title, some in roads.items():
@@ -390,7 +390,7 @@ def measure_corridor(
     return {name: {"all": over_seeds(values)} for name, values in rows.items()}
 
 
-def real(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Model]]) -> dict[str, str]:
+def real_tables(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Model]]) -> dict[str, str]:
     """Measure on the real roads, cropped in several ways, write tables; return Markdown tables by name."""
     if arguments.real is None:
         return {}
@@ -402,7 +402,7 @@ def real(arguments: argparse.Namespace, trained: Mapping[str, Sequence[Model]]) 
     result = {}
     for table, cropping in CROPPINGS.items():
         shown = make_case(roads[TUNED_ON], arguments.seeds[0], cropping=cropping, estimated=True)
-        search = searched([shown], ["ground", "dark"], arguments.output / f"skeleton-{table}.json")
+        search = search_settings([shown], ["ground", "dark"], arguments.output / f"skeleton-{table}.json")
         measured = measure_real(arguments.seeds, roads, cropping, trained, search)
         tables.write_tables(arguments.output, table, measured)
         result[table] = road_table(measured, titles)
@@ -464,7 +464,7 @@ def draw_synthetic(
     """Write pictures of centrelines and of one corridor over a synthetic road."""
     shown = make_case(road, arguments.seeds[0], cropping=None, estimated=False)
     learned = {name: several[0] for name, several in versions.items()}
-    view = middle(road, 160.0)
+    view = middle_view(road, 160.0)
     draw_lines(arguments.pictures / "centerline-lines.png", shown, learned, search, view, f"synthetic road {road.name}")
     if learned:
         name = arguments.corridor or list(learned)[-1]
@@ -483,7 +483,7 @@ def draw_real(
     learned = {name: several[0] for name, several in fit.items()}
     title = f"real road, {REAL_ROADS[road.name][0]}, both sides of every slice cropped"
     path = arguments.pictures / "centerline-real.png"
-    draw_lines(path, shown, learned, search, middle(road, 160.0), title)
+    draw_lines(path, shown, learned, search, middle_view(road, 160.0), title)
 
 
 def draw_lines(
@@ -504,7 +504,7 @@ def draw_lines(
     write_file(path, pictures.lines_picture(shown, lines, view, title, height), overwrite=True)
 
 
-def middle(road: LearningRoad, length: float) -> pictures.PictureView:
+def middle_view(road: LearningRoad, length: float) -> pictures.PictureView:
     """Return the view of `length` (m) in the middle of a road."""
     whole = road.reference.length
     return pictures.PictureView(max(0.0, (whole - length) / 2.0), min(whole, (whole + length) / 2.0))
@@ -540,7 +540,7 @@ def arguments_of(words: Sequence[str] | None) -> argparse.Namespace:
     return arguments
 
 
-def expected(arguments: argparse.Namespace) -> list[str]:
+def expected_tables(arguments: argparse.Namespace) -> list[str]:
     """Return the names of the tables that the arguments ask for."""
     names = [f"in-domain-{kind}" for kind in arguments.truths if arguments.in_domain]
     others = [f"{OTHER}-{kind}" for kind in arguments.truths if arguments.other]
@@ -552,15 +552,15 @@ def expected(arguments: argparse.Namespace) -> list[str]:
 
 def measured_tables(arguments: argparse.Namespace) -> dict[str, str]:
     """Measure on all data that are given; return the document's Markdown tables by name."""
-    trained = models(arguments.run)
-    return synthetic(arguments, trained) | real(arguments, trained)
+    trained = load_models(arguments.run)
+    return synthetic_tables(arguments, trained) | real_tables(arguments, trained)
 
 
 def main(words: Sequence[str] | None = None) -> None:
     """Measure as the command line says, fill the document's tables and print them."""
     arguments = arguments_of(words)
     try:
-        found = fill(arguments.document, expected(arguments), lambda: measured_tables(arguments))
+        found = fill(arguments.document, expected_tables(arguments), lambda: measured_tables(arguments))
     except SynthRoadsError as error:
         raise SystemExit(str(error)) from None
     for name, text in found.items():

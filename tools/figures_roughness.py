@@ -214,7 +214,7 @@ def section(axes: Any, cloud: Cloud, station: float, depth: float) -> None:
     axes.scatter(cloud.xyz[near, 1], 1e3 * cloud.xyz[near, 2], s=5, c=colors, linewidths=0)
 
 
-def statistics(real: Cloud | None) -> Rows:
+def print_statistics(real: Cloud | None) -> Rows:
     """Print the roughness by relief strength and of the real asphalt; return it without and with range noise."""
     plain = strip_points((0.0, -1.6), (400.0, 4.0), 18.0)
     plain = Cloud(plain.xyz, np.full(len(plain.xyz), 2))
@@ -243,7 +243,7 @@ def statistics(real: Cloud | None) -> Rows:
     return rows
 
 
-def footprints() -> None:
+def print_footprints() -> None:
     """Print the share of the relief's deviation that is left of its means over Gaussian footprints, by diameters."""
     random = stream(SEED, "footprint")
     centres = np.column_stack([random.uniform(-300, 300, (1500, 2)), np.zeros(1500)])
@@ -258,7 +258,7 @@ def footprints() -> None:
         print(f"  of the relief of {name}, a footprint sees: " + ", ".join(text))
 
 
-def timing(count: int = 1_000_000) -> None:
+def print_timing(count: int = 1_000_000) -> None:
     """Print the micro-relief's processor seconds per million points, by fidelity."""
     size = 2**15  # points that a scan works on at once
     blocks = [
@@ -316,7 +316,7 @@ def draw(output: Path, real: Cloud | None, station: float | None, rows: Rows) ->
             label = "paint" if name == "paint_white" else name.split("_")[0]
             where = 0.5 * (max(start, low[1]) + min(end, high[1]))
             panel.text(1.97, where, label, color=color, va="center", ha="right", fontsize=8, backgroundcolor="w")
-    curves(axes[0, 3], rows, None if real is None else measure(real.asphalt)["residual"])
+    draw_residuals(axes[0, 3], rows, None if real is None else measure(real.asphalt)["residual"])
     columns = sparse_columns(real, noise, station)
     for column in range(4):
         if column >= len(columns):
@@ -359,7 +359,7 @@ def window(real: Cloud, station: float | None) -> Cloud:
     return Cloud(local, np.where(known, [row[0] for row in STRIP].index("asphalt"), -1))
 
 
-def curves(axes: Any, rows: Rows, real: float | None) -> None:
+def draw_residuals(axes: Any, rows: Rows, real: float | None) -> None:
     """Draw the residual in patches against the relief's strength into the axes."""
     labels = ("relief alone", f"relief and range noise, {1e3 * DEVICE_NOISE:.0f} mm")
     for row, label, style in zip(rows, labels, ("o-", "s--"), strict=True):
@@ -387,11 +387,11 @@ def main() -> None:
     parser.add_argument("--footprints", action="store_true", help="what of the relief a laser's footprint sees")
     arguments = parser.parse_args()
     real = read_real(arguments) if arguments.real else None
-    rows = statistics(real)
+    rows = print_statistics(real)
     if arguments.timing:
-        timing()
+        print_timing()
     if arguments.footprints:
-        footprints()
+        print_footprints()
     if arguments.output:
         draw(arguments.output, real, arguments.at, rows)
 

@@ -60,7 +60,7 @@ def scan(scenario: str, changes: list[str], folder: Path) -> laspy.LasData:
     return laspy.read(folder / "cloud.laz")
 
 
-def platforms(output: Path) -> None:
+def draw_platforms(output: Path) -> None:
     """Write a picture of each platform's cloud from above, coloured by class."""
     figure, axes = pyplot.subplots(len(PLATFORMS), 1, figsize=(9, 3.9 * len(PLATFORMS)), layout="constrained")
     with tempfile.TemporaryDirectory() as folder:
@@ -121,7 +121,7 @@ def _draw_colors(
     axis.set(ylabel="across (m)")
 
 
-def clouds(output: Path) -> None:
+def draw_cloud_shadows(output: Path) -> None:
     """Write a picture of two strips of one scan, between which the clouds' shadows have drifted."""
     changes = ["road.length=200", "road.half_width=40", "scan.lines_per_second=50"]
     changes += ['road.environment.cloud_cover={"minimum":0.45,"maximum":0.45}']
@@ -167,7 +167,7 @@ def cloud_scale(cloud: laspy.LasData) -> float:
     return float(json.loads(note.record_data)["intensity_scale"])
 
 
-def convergence(output: Path) -> None:
+def print_convergence(output: Path) -> None:
     """Print a Markdown table: errors of mean range and spread on a slanted plane (mm) by rays per pulse."""
     print("| rays per pulse | error of the mean range (mm) | of the spread within the pulse (mm) |\n|---|---|---|")
     distance, tilt, sigma = 300.0, np.deg2rad(75.0), np.tan(1e-3) / 2.0
@@ -189,10 +189,10 @@ def _moments(distance: float, tilt: float, x: Any, y: Any, weights: Any) -> tupl
 
 
 FIGURES: dict[str, Callable[[Path], None]] = {
-    "platforms": platforms,
+    "platforms": draw_platforms,
     "intensity_histograms": intensity_histograms,
-    "convergence": convergence,
-    "clouds": clouds,
+    "convergence": print_convergence,
+    "clouds": draw_cloud_shadows,
 }
 
 if __name__ == "__main__":

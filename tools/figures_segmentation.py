@@ -41,7 +41,7 @@ _WHOLE = 1000.0
 """Edge of the tiles that real clouds are cut into, m: the largest, so that each is one."""
 
 
-def small(folder: Path) -> str:
+def run_table(folder: Path) -> str:
     """Return a Markdown table of a trained run's first test, with weights and training time below."""
     metrics = read_json(folder / METRICS)
     if not metrics["tests"]:
@@ -52,7 +52,7 @@ def small(folder: Path) -> str:
     return f"{table_by_class([scores])}\n\n{told}"
 
 
-def experiment(folder: Path) -> str:
+def experiment_tables(folder: Path) -> str:
     """Return Markdown tables of an experiment, one per test, with the trainings' seconds in the first."""
     results: dict[str, dict[str, Any]] = read_json(folder / RESULTS)
     seconds = {
@@ -70,7 +70,7 @@ def training_seconds(run: Path) -> float:
     return sum(epoch["seconds"] for path in parts for epoch in read_json(path))
 
 
-def real(runs: Sequence[Path], folder: Path, pictures: Path) -> dict[str, str]:
+def real_tables(runs: Sequence[Path], folder: Path, pictures: Path) -> dict[str, str]:
     """Score runs on the labelled real clouds, write pictures of the first run's classes; return Markdown tables."""
     found: dict[str, list[dict[str, Any]]] = {name: [] for name in REAL_CLOUDS}
     for place, path in enumerate(runs):
@@ -89,7 +89,7 @@ def real(runs: Sequence[Path], folder: Path, pictures: Path) -> dict[str, str]:
     return {f"real-{name}": f"{table_by_class(scores)}\n\n{note[name]}" for name, scores in found.items()}
 
 
-def prediction(file: Path) -> str:
+def prediction_table(file: Path) -> str:
     """Return a Markdown table of the result file of `tools/measure_prediction.py`."""
     told = read_json(file)
     changed = ", ".join(told["changed"]) or "none"
@@ -98,7 +98,7 @@ def prediction(file: Path) -> str:
     return _table(head, [*(f"{value:,.0f}" for value in row), str(told["attributes"]), changed])
 
 
-def packed(file: Path) -> str:
+def packed_table(file: Path) -> str:
     """Return a Markdown table of a packed file's size, roads, tiles and points."""
     told = pack_summary(PackReader(file).notes, file.stat().st_size)
     head = ("file (MB)", "roads", "tiles", "points", "bytes per point", f"crops of {CROP:,} points")
@@ -106,7 +106,7 @@ def packed(file: Path) -> str:
     return _table(head, [*cells, f"{told['bytes_per_point']:.2f}", f"{told['crops']:,}"])
 
 
-def forecast(file: Path) -> str:
+def forecast_table(file: Path) -> str:
     """Return a Markdown table of the result file of `synthroads forecast`."""
     told = read_json(file)
     head = ("tiles", "points of a batch", "s per step", "threads", "steps", "hours in all", "peak memory (MB)")
@@ -120,17 +120,17 @@ def _table(head: Sequence[str], row: Sequence[str]) -> str:
 
 
 READERS = {
-    "small": small,
-    "mixing": experiment,
-    "gantries": experiment,
-    "prediction": prediction,
-    "packed": packed,
-    "forecast": forecast,
+    "small": run_table,
+    "mixing": experiment_tables,
+    "gantries": experiment_tables,
+    "prediction": prediction_table,
+    "packed": packed_table,
+    "forecast": forecast_table,
 }
 """Functions that make a table out of a folder or file; the names are those of the options and of the tables."""
 
 
-def expected(arguments: argparse.Namespace) -> list[str]:
+def expected_tables(arguments: argparse.Namespace) -> list[str]:
     """Return the names of the tables that the arguments ask for."""
     names = [name for name in READERS if getattr(arguments, name)]
     return names + ([f"real-{name}" for name in REAL_CLOUDS] if arguments.real else [])
@@ -139,7 +139,7 @@ def expected(arguments: argparse.Namespace) -> list[str]:
 def tables(arguments: argparse.Namespace) -> Mapping[str, str]:
     """Make the document's Markdown tables that the arguments ask for, by name."""
     found = {name: read(getattr(arguments, name)) for name, read in READERS.items() if getattr(arguments, name)}
-    return found | (real(arguments.run, arguments.real, arguments.pictures) if arguments.real else {})
+    return found | (real_tables(arguments.run, arguments.real, arguments.pictures) if arguments.real else {})
 
 
 def arguments_of(words: Sequence[str] | None) -> argparse.Namespace:
@@ -165,7 +165,7 @@ def main(words: Sequence[str] | None = None) -> None:
     """Make the tables that the command line asks for, fill the document's and print them."""
     arguments = arguments_of(words)
     try:
-        found = fill(arguments.document, expected(arguments), lambda: tables(arguments))
+        found = fill(arguments.document, expected_tables(arguments), lambda: tables(arguments))
     except SynthRoadsError as error:
         raise SystemExit(str(error)) from None
     for name, text in found.items():

@@ -65,7 +65,7 @@ def _expected(errors: Mapping[str, tuple[float, float]]) -> dict[str, float]:
     return {name: _short(pair[0]) for name, pair in errors.items()}
 
 
-def measured(platform: str) -> dict[str, Any]:
+def measure_platform(platform: str) -> dict[str, Any]:
     """Measure a platform's scene; return the table's row of costs (microseconds) and errors as JSON data."""
     name, changes = SCENES[platform]
     scenario = load_scenario(name, [*changes, "cloud.point_spacing=null"])
@@ -99,7 +99,7 @@ def measured(platform: str) -> dict[str, Any]:
         "octave": {str(octaves): _short(octave_seconds(trial, octaves)) for octaves in OCTAVES},
         "image": [_short(first), _short(each / CORES), _short(pixel / CORES)],
         "sample": SAMPLE,
-        "scene_file": _short(_saving(shown.area)),
+        "scene_file": _short(_saving_time(shown.area)),
         "previews": PREVIEWS,
     }
 
@@ -133,7 +133,7 @@ def image_seconds(trial: Trial, changes: Mapping[str, Any]) -> tuple[float, floa
     return max(float(times[0]) - each - pixel * sizes[0], 0.0), each, pixel
 
 
-def _saving(area: float) -> float:
+def _saving_time(area: float) -> float:
     """Return the processor microseconds per square metre of `area` that saving the open file takes."""
     with tempfile.TemporaryDirectory() as folder:
         begin = time.process_time()
@@ -152,7 +152,7 @@ def main() -> None:
         raise SystemExit("needs Blender 5.0 or newer: true colours are those of a pixel per return")
     found = read_json(FILE)["platforms"] if FILE.exists() else {}
     for platform in platforms:
-        found[platform] = measured(platform)
+        found[platform] = measure_platform(platform)
         data = {"command": "python tools/make_tradeoff_prior.py", "cores": CORES, "platforms": found}
         FILE.write_text(canonical_json(data), encoding="utf-8")
         print(platform, round(time.process_time(), 1), "s")

@@ -32,10 +32,10 @@ def save_scene(path: Path, compress: bool = True) -> None:
     try:
         bpy.ops.wm.save_as_mainfile(filepath=str(path.absolute()), copy=True, compress=compress, check_existing=False)
     except RuntimeError as error:
-        raise OutputError(str(path), None, f"cannot be written ({complaint(error)})") from None
+        raise OutputError(str(path), None, f"cannot be written ({error_line(error)})") from None
 
 
-def complaint(error: Exception) -> str:
+def error_line(error: Exception) -> str:
     """Return a Blender error's message as one line, without "Error:"; of a traceback only its last line."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     if any("Traceback" in line for line in lines):

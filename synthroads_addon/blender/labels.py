@@ -58,7 +58,7 @@ class Labels:
         self._ids = dict(full if ids is None else ids)
         self.reserved = frozenset(self._ids.values()) - frozenset(full.values())
         self.by_name = NameClasses(mapping, self._ids)
-        self._by_collection = self._collections(scene)
+        self._by_collection = self._collection_classes(scene)
 
     def label_of(self, item: bpy.types.Object, owner: bpy.types.Object) -> Label:
         """Return the label of an original object that `owner` shows as an instance (itself if it is none)."""
@@ -89,7 +89,7 @@ class Labels:
             return number % 2**32  # Blender's whole numbers have a sign
         return -1
 
-    def _collections(self, scene: bpy.types.Scene) -> dict[bpy.types.Object, int]:
+    def _collection_classes(self, scene: bpy.types.Scene) -> dict[bpy.types.Object, int]:
         """Return the class id of each object by its collections' names; the innermost collection counts."""
         mapped: dict[bpy.types.Object, int] = {}
         named: dict[bpy.types.Object, int] = {}

@@ -14,7 +14,7 @@ from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
 from synthroads_addon.materials.table import materials, write_material_table
 from synthroads_addon.road.surroundings import Environment, MaterialVariation
 from synthroads_addon.scenario.scenario import Scenario
-from tools.check_calibration import checked
+from tools.check_calibration import check_table
 
 OWN = {
     "asphalt": {"specular": 0.21, "spread_below": 0.29, "spread_above": 0.2, "spread_wavelength": 0.25},
@@ -33,7 +33,7 @@ def table(tmp_path: Path) -> Path:
 @pytest.mark.slow
 def test_a_scan_gives_the_expected_percentiles(table: Path, tmp_path: Path) -> None:
     """Mixed footprints, ranges, angles and spread together; the markings' few points leave them a little uncertain."""
-    asphalt, paint = checked(table, tmp_path / "check", rays=19).compared
+    asphalt, paint = check_table(table, tmp_path / "check", rays=19).compared
     for entry, allowed in ((asphalt, 0.02), (paint, 0.06)):
         errors = entry.errors()
         assert errors is not None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tools.check_bpy import advice, missing_libraries
+from tools.check_bpy import install_advice, missing_libraries
 
 
 def test_missing_system_libraries_are_named_with_their_packages() -> None:
@@ -11,6 +11,6 @@ def test_missing_system_libraries_are_named_with_their_packages() -> None:
         "\tlibSM.so.6 => not found\n\tlibodd.so.1 => not found\n\tlibXi.so.6 => not found\n"
     )
     assert libraries == ["libXi.so.6", "libSM.so.6", "libodd.so.1"]
-    text = advice(libraries)
+    text = install_advice(libraries)
     assert "sudo apt install libsm6 libxi6\n" in text
     assert text.endswith("libodd.so.1")

@@ -32,7 +32,7 @@ def seconds_of(work: Callable[[], object]) -> float:
     return time.perf_counter() - begin
 
 
-def rendering(request: LayerRequest, count: int) -> dict[str, Any]:
+def measure_rendering(request: LayerRequest, count: int) -> dict[str, Any]:
     """Render some images with all layers and with the picture alone; return both rates, million samples per second.
 
     Both are without what the first image costs, which brings the scene into the renderer.

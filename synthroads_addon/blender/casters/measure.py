@@ -98,14 +98,14 @@ def _edge_distances(mesh: SceneMesh, origins: Float, directions: Float, faces: F
     distance = np.full(len(faces), np.inf)
     for i in range(3):
         # Seen along the ray, the line is a point and the edge a segment in the plane across it.
-        begin = _across(corners[:, i] - origins, directions)
-        edge = _across(corners[:, (i + 1) % 3] - corners[:, i], directions)
+        begin = _perpendicular(corners[:, i] - origins, directions)
+        edge = _perpendicular(corners[:, (i + 1) % 3] - corners[:, i], directions)
         length = np.einsum("ij,ij->i", edge, edge)
         share = np.clip(-np.einsum("ij,ij->i", begin, edge) / np.where(length > 0.0, length, 1.0), 0.0, 1.0)
         distance = np.minimum(distance, np.linalg.norm(begin + share[:, None] * edge, axis=1))
     return np.where(faces >= 0, distance, np.inf)
 
 
-def _across(vectors: Float, directions: Float) -> Float:
+def _perpendicular(vectors: Float, directions: Float) -> Float:
     """Return the components (N, 3) of vectors that are perpendicular to unit directions (N, 3)."""
     return vectors - np.einsum("ij,ij->i", vectors, directions)[:, None] * directions

@@ -70,8 +70,8 @@ def edited_axis(geometry: RoadGeometry, backbone: bpy.types.Object, place: Float
         kept = {name: getattr(before, name) for name in ("start_x", "start_y", "start_heading_deg", "horizontal")}
         alignment = alignment.model_copy(update=kept)
         return EditedAxis(alignment, lambda at: at, fit)
-    now = _stations(alignment_of(alignment), points, station)
-    return EditedAxis(alignment, lambda at: _carried(at, station, now), fit)
+    now = _project_stations(alignment_of(alignment), points, station)
+    return EditedAxis(alignment, lambda at: _map_station(at, station, now), fit)
 
 
 def moved_alignment(axis: AlignmentObject, place: Float) -> AlignmentObject:
@@ -85,13 +85,13 @@ def moved_alignment(axis: AlignmentObject, place: Float) -> AlignmentObject:
     return axis.model_copy(update=update)
 
 
-def _stations(alignment: Alignment, points: Float, before: Float) -> Float:
+def _project_stations(alignment: Alignment, points: Float, before: Float) -> Float:
     """Return non-decreasing stations (N,), m, of points projected onto an axis near those before."""
     near, _ = alignment.project_near(points[:, :2], before, 0.25 * alignment.length + 100.0)
     return np.maximum.accumulate(near)
 
 
-def _carried(station: float, before: Float, now: Float) -> float:
+def _map_station(station: float, before: Float, now: Float) -> float:
     """Return a station mapped from the axis before to the one now, m; beyond the ends it keeps its distance."""
     if station <= before[0]:
         return float(now[0] + station - before[0])

@@ -247,7 +247,7 @@ class _Build:
             old = _parts_of(root, self._place)
             _repoint(old, builder.objects)
             remove_with_meshes(list(old))
-            collection = _home(root, scene)
+            collection = _road_collection(root, scene)
         else:
             collection = bpy.data.collections.new(COLLECTION)
             collection[MADE_COLLECTION] = True
@@ -290,7 +290,7 @@ def _describe(item: bpy.types.Object, role: str, parameters: RoadParameters) -> 
     item.lock_location = item.lock_rotation = item.lock_scale = (True, True, True)
 
 
-def _home(root: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Collection:
+def _road_collection(root: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Collection:
     """Return the scene's collection that holds a road's root object."""
     inside = {scene.collection, *scene.collection.children_recursive}
     return next(collection for collection in root.users_collection if collection in inside)

@@ -72,7 +72,7 @@ def rename_inputs(parameters: RoadParameters, objects: Mapping[str, bpy.types.Ob
     group = item.modifiers[0].node_group if item and item.modifiers else None
     if group is None:
         return
-    interface, words = group.interface, dict(_words(parameters))
+    interface, words = group.interface, dict(_worded_ids(parameters))
     older = [(entry, name) for entry in interface.items_tree if (name := _name_in_words(entry.name, words))]
     if not older:
         return
@@ -89,7 +89,7 @@ def _name_in_words(name: str, words: Mapping[str, str]) -> str:
     return f"{words[key]} {_RENAMED.get(rest, rest)}".strip() if key in words else ""
 
 
-def _words(parameters: RoadParameters) -> Iterator[tuple[str, str]]:
+def _worded_ids(parameters: RoadParameters) -> Iterator[tuple[str, str]]:
     """Yield (id, name in words with side) of the road's lines and turnouts."""
     words = names_in_words(parameters)
     for key, item in parameters.objects.items():

@@ -50,7 +50,7 @@ def settle_steps(road: str, edited: EditedRoad) -> Generator[float | None, None,
     place = BuildTarget(road, keep_moves=False, keeps=frozenset(kept), drops=copied)
     model = yield from build_steps(parameters, settings.tolerance, settings.vegetation_detail, place=place)
     for name, edit in kept.items():
-        _release(bpy.data.objects[name], edit.part, edit.reason)
+        _hand_over(bpy.data.objects[name], edit.part, edit.reason)
     remember(model.root, parameters, scenario, built_from)
     return model
 
@@ -67,7 +67,7 @@ def settle(road: str, edited: EditedRoad) -> RoadModel:
             return model
 
 
-def _release(item: bpy.types.Object, part: str, reason: str) -> None:
+def _hand_over(item: bpy.types.Object, part: str, reason: str) -> None:
     """Turn a part that was edited by hand into a user's object, in place: no role, instance 0, class kept."""
     modifier = own_modifier(item)
     if modifier is not None and modifier.node_group.interface.items_tree.get("Instance") is not None:
@@ -87,7 +87,7 @@ def move_line(item: bpy.types.Object, scene: bpy.types.Scene) -> bool:
     root, modifier = root_of(item, scene), own_modifier(item)
     if ROLE not in item or root is None or modifier is None or item.library is not None or PARAMETERS not in root:
         return False
-    axes = _axes(str(root[PARAMETERS]))
+    axes = _stored_axes(str(root[PARAMETERS]))
     thing = axes.before.parameters.objects.get(str(item[ROLE])) if axes else None
     place = np.linalg.inv(world_matrix(root)) @ world_matrix(item)
     if axes is None or not isinstance(thing, LineObject) or place_reason(place):
@@ -104,7 +104,7 @@ def move_line(item: bpy.types.Object, scene: bpy.types.Scene) -> bool:
 
 
 @lru_cache(maxsize=4)
-def _axes(text: str) -> RoadAxes | None:
+def _stored_axes(text: str) -> RoadAxes | None:
     """Return a road's geometry from its stored parameter set (JSON text), cached; None if that is damaged."""
     try:
         geometry = RoadGeometry(recall_parameters({PARAMETERS: text}))  # it reads this key only

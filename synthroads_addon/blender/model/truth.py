@@ -151,7 +151,7 @@ class _Reading:
     def result(self) -> EditedRoad:
         """Return the road with all edits read back."""
         self.by_hand += _released(self.root, self.scene)
-        if lost := self._lost():
+        if lost := self._lost_reason():
             self.by_hand.append(HandEdit("Road", self.root.name, lost))
             return EditedRoad(self._base, tuple(self.by_hand), lost)
         shown = {role: item for role, item in self._parts.items() if role not in (*_SURFACE, "Ground")}
@@ -167,7 +167,7 @@ class _Reading:
         axes = RoadAxes(before, RoadGeometry(parameters) if axis is not None else before)
         moved = dict(self._moved(parameters, axes, fine))
         objects = {name: moved[name] for name in parameters.objects if name in moved}
-        objects |= self._copied(parameters, objects, axes)
+        objects |= self._read_copies(parameters, objects, axes)
         data = parameters.to_dict() | {"objects": {name: item.to_dict() for name, item in objects.items()}}
         whole = self._placed(RoadParameters.from_dict(data))
         if not self.stale and InstanceNumbers(whole).parts != _kept_numbers(self._base, whole):
@@ -179,7 +179,7 @@ class _Reading:
         place = self._into @ world_matrix(item)
         return np.eye(4) if np.allclose(place, np.eye(4), rtol=0.0, atol=1e-9) else place
 
-    def _lost(self) -> str:
+    def _lost_reason(self) -> str:
         """Return the reason, in words, why the road as a whole can't be read back; empty if it can."""
         if reason := place_reason(displacement(self.root)):
             return reason
@@ -187,9 +187,9 @@ class _Reading:
             if role in self._parts:
                 if reason := self._reason(role, self._parts[role]):
                     return f"{role}: {reason}"
-            elif role in self._built():
+            elif role in self._built_roles():
                 return f"{role} was deleted"
-        details = (role for role in self._built() if role.endswith(" Detail"))
+        details = (role for role in self._built_roles() if role.endswith(" Detail"))
         for role in details:
             if role not in self._parts:
                 return f"{role} was deleted"
@@ -197,7 +197,7 @@ class _Reading:
                 return f"{role}: {reason}"
         return ""
 
-    def _built(self) -> list[str]:
+    def _built_roles(self) -> list[str]:
         """Return the roles of all parts as built, as kept by the root; empty if that is damaged."""
         try:
             return [str(role) for role in json.loads(self.root.get(BUILT_PARTS, "[]"))]
@@ -207,7 +207,7 @@ class _Reading:
     def _is_fine(self, role: str, item: bpy.types.Object) -> bool:
         """Return whether parameters still describe a part; else add it to `by_hand`."""
         reason = self._reason(role, item)
-        if not reason and role == "Terrain" and "Ground" in self._built():
+        if not reason and role == "Terrain" and "Ground" in self._built_roles():
             ground = self._parts.get("Ground")
             reason = "its ground was deleted" if ground is None else self._reason("Ground", ground)
         if reason:
@@ -232,7 +232,7 @@ class _Reading:
         self, parameters: RoadParameters, axes: RoadAxes, fine: dict[str, bpy.types.Object]
     ) -> Iterator[tuple[str, RoadObject]]:
         """Yield (id, object) of the parameter set's objects that are still there, with their present places."""
-        gone = self._gone(fine)
+        gone = self._gone_ids(fine)
         for name, item in parameters.objects.items():
             if name in gone:
                 continue
@@ -246,11 +246,11 @@ class _Reading:
                 yield name, item
         for role, kind in POSTS.items():
             if role in fine:
-                yield from self._posts(parameters, axes, fine[role], kind)
+                yield from self._vertex_things(parameters, axes, fine[role], kind)
 
-    def _gone(self, fine: dict[str, bpy.types.Object]) -> set[str]:
+    def _gone_ids(self, fine: dict[str, bpy.types.Object]) -> set[str]:
         """Return the ids of objects deleted or edited by hand, and of those that depend on them."""
-        roles = {role for role in (*self._built(), *self._parts) if role not in fine}
+        roles = {role for role in (*self._built_roles(), *self._parts) if role not in fine}
         gone = {self._ids.get(role, role) for role in roles} & set(self._base.objects)
         if self._ids["Terrain"] in gone:
             gone |= set(self._base.of_type(Vegetation))
@@ -258,14 +258,14 @@ class _Reading:
         if _PAINT in roles:
             gone |= set(self._base.of_type(Hatching)) | set(self._base.of_type(Arrow))
         for role, kind in POSTS.items():
-            if role in self._built() or role in self._parts:
+            if role in self._built_roles() or role in self._parts:
                 gone |= set(self._base.of_type(kind))  # those that are there come back with their vertices
         return gone | self._without_face(fine, gone)
 
     def _without_face(self, fine: dict[str, bpy.types.Object], gone: set[str]) -> set[str]:
         """Return the ids of gantries with a deleted or edited sign face, adding each to `by_hand`."""
         found: set[str] = set()
-        for role in [*self._built(), *self._parts]:
+        for role in [*self._built_roles(), *self._parts]:
             owner = role.partition("/")[0]
             if "/" in role and role not in fine and owner in fine and owner not in gone | found:
                 found.add(owner)
@@ -287,7 +287,7 @@ class _Reading:
             self.stale.append(f"{part.name} was moved")
         return item.model_copy(update=update) if update else item
 
-    def _posts(
+    def _vertex_things(
         self, parameters: RoadParameters, axes: RoadAxes, part: bpy.types.Object, kind: type[PointObject]
     ) -> Iterator[tuple[str, RoadObject]]:
         """Yield (id, thing) of each vertex of one object that holds many things, with their present places."""
@@ -308,7 +308,7 @@ class _Reading:
             except Lost as lost:
                 self.by_hand.append(HandEdit(name, part.name, str(lost)))
 
-    def _copied(
+    def _read_copies(
         self, parameters: RoadParameters, objects: dict[str, RoadObject], axes: RoadAxes
     ) -> dict[str, RoadObject]:
         """Return the user's copies of parts as new road objects by new ids, with new instance numbers."""

@@ -40,7 +40,7 @@ _TAGS = {"GEOMETRY": "GEOMETRY", "VECTOR": "VECTOR"}
 """Colours of groups by the kind of their first output, as Blender gives them to its own nodes; else ``CONVERTER``."""
 
 
-def _calculation(operation: str, turned: bool = False) -> Callable[[Value, Operand], Value]:
+def _operator_method(operation: str, turned: bool = False) -> Callable[[Value, Operand], Value]:
     """Return the method of an arithmetic operator of `Value`, of its reflected form (``__radd__`` ...) if `turned`."""
 
     def calculate(value: Value, other: Operand) -> Value:
@@ -83,14 +83,14 @@ class Value:
         kind = "INT" if {_kind(self), _kind(other)} == {"INT"} else "FLOAT"
         return self.tree.node("FunctionNodeCompare", self, other, operation=operation, data_type=kind).value
 
-    __add__ = _calculation("ADD")
-    __radd__ = _calculation("ADD", turned=True)
-    __sub__ = _calculation("SUBTRACT")
-    __rsub__ = _calculation("SUBTRACT", turned=True)
-    __truediv__ = _calculation("DIVIDE")
-    __rtruediv__ = _calculation("DIVIDE", turned=True)
-    __floordiv__ = _calculation("DIVIDE_FLOOR")
-    __mod__ = _calculation("FLOORED_MODULO")
+    __add__ = _operator_method("ADD")
+    __radd__ = _operator_method("ADD", turned=True)
+    __sub__ = _operator_method("SUBTRACT")
+    __rsub__ = _operator_method("SUBTRACT", turned=True)
+    __truediv__ = _operator_method("DIVIDE")
+    __rtruediv__ = _operator_method("DIVIDE", turned=True)
+    __floordiv__ = _operator_method("DIVIDE_FLOOR")
+    __mod__ = _operator_method("FLOORED_MODULO")
     __lt__ = _comparison("LESS_THAN")
     __le__ = _comparison("LESS_EQUAL")
     __gt__ = _comparison("GREATER_THAN")
@@ -314,7 +314,7 @@ def _kind(operand: Operand) -> str:
 
 
 @cache
-def _sources() -> bytes:
+def _sources_digest() -> bytes:
     """Return a SHA-256 digest of the source files of all node groups: a change to any makes new groups; cached."""
     digest, blender = hashlib.sha256(), Path(__file__).parents[1]
     # Of the materials one has the colour's attribute, one groups of its own, which are written in the road's field.
@@ -347,7 +347,7 @@ def node_group(
         description: shown as a tooltip.
         kind: Blender's name of the tree's class.
     """
-    key = hashlib.sha256(_sources() + repr((name, arguments)).encode()).hexdigest()[:16]
+    key = hashlib.sha256(_sources_digest() + repr((name, arguments)).encode()).hexdigest()[:16]
     for group in bpy.data.node_groups:
         if group.get(KEY) == key:
             return group

@@ -336,7 +336,7 @@ class _SceneWalk:
             # A million uses may share one mesh: what they have in common is found once.
             key = (item.data.as_pointer(), item.original.as_pointer(), owner.as_pointer())
             if key not in known:
-                known[key] = self._look(item, owner)
+                known[key] = self._use_mesh(item, owner)
             about = known[key]
             if about is None:
                 continue
@@ -348,7 +348,7 @@ class _SceneWalk:
             if about.values is not None:
                 places.objects.append(about.values.rows(random_number(use), (matrix[3], matrix[7], matrix[11])))
 
-    def _look(self, item: bpy.types.Object, owner: bpy.types.Object) -> _MeshUse | None:
+    def _use_mesh(self, item: bpy.types.Object, owner: bpy.types.Object) -> _MeshUse | None:
         """Queue or copy an evaluated object's mesh; return its part, label and motion, None if it isn't scanned."""
         original, shown_by = item.original, owner.original
         if not len(item.data.polygons) or SUPPORT in shown_by:

@@ -11,7 +11,7 @@ import bpy
 
 from ...base.errors import InputError, MissingFileError
 from ...scanning.scene.mesh_files import check_mesh_file
-from ..files import complaint, empty_file, stderr_if_it_succeeds
+from ..files import empty_file, error_line, stderr_if_it_succeeds
 
 UpAxis = Literal["y", "z"]
 
@@ -83,7 +83,7 @@ def open_scene(path: Path, up: UpAxis | None = None) -> None:
         with stderr_if_it_succeeds():
             getattr(getattr(bpy.ops, module), name)(filepath=place, **options)
     except (AttributeError, RuntimeError) as error:
-        raise InputError("SCENE", str(path), f"can't be read by Blender: {complaint(error)}") from None
+        raise InputError("SCENE", str(path), f"can't be read by Blender: {error_line(error)}") from None
 
 
 def _try_in_a_process(path: Path, importer: str) -> None:

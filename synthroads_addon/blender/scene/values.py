@@ -75,13 +75,13 @@ def _mesh_value(mesh: bpy.types.Mesh, what: SurfaceInput, undeformed: bool) -> M
     if what.kind in ("normal", "object_normal"):
         normals = np.empty((len(mesh.loops), 3), np.float32)
         mesh.corner_normals.foreach_get("vector", normals.ravel())
-        return MeshValues(_four(normals), "corner")
+        return MeshValues(_to_rgba(normals), "corner")
     if what.kind == "generated" and undeformed:
         places = np.empty((len(mesh.vertices), 3), np.float32)
         mesh.attributes["position"].data.foreach_get("vector", places.ravel())
         size = np.array(mesh.texspace_size)
         scale = np.where(size != 0.0, 0.5 / np.where(size != 0.0, size, 1.0), 0.0)
-        return MeshValues(_four((places - np.array(mesh.texspace_location)) * scale + 0.5), "point")
+        return MeshValues(_to_rgba((places - np.array(mesh.texspace_location)) * scale + 0.5), "point")
     return None
 
 
@@ -107,10 +107,10 @@ def _attribute(mesh: bpy.types.Mesh, name: str, mean: bool = False) -> MeshValue
     values = flat.reshape(-1, parts)
     if mean and parts > 1:
         values = values[:, :1] if parts == 2 else values[:, :3].mean(axis=1, keepdims=True)
-    return MeshValues(_four(values), _DOMAINS[attribute.domain])
+    return MeshValues(_to_rgba(values), _DOMAINS[attribute.domain])
 
 
-def _four(values: np.ndarray) -> Float32:
+def _to_rgba(values: np.ndarray) -> Float32:
     """Return values (n, c), c from 1 to 4, as RGBA (n, 4): one number is grey, missing ones are 0, alpha 1."""
     result = np.zeros((len(values), 4), np.float32)
     result[:, 3] = 1.0
@@ -175,10 +175,10 @@ def random_number(use: bpy.types.DepsgraphObjectInstance) -> int:
     number = 0
     for byte in use.object.name.encode():
         number = (number * 37 + byte) & _BITS
-    return _mixed(number)
+    return _hash_number(number)
 
 
-def _mixed(number: int) -> int:
+def _hash_number(number: int) -> int:
     """Return a number's hash with 0 by Bob Jenkins' lookup3, as Cycles has it."""
     c = b = (0xDEADBEEF + (2 << 2) + 13) & _BITS
     a = (b + number) & _BITS

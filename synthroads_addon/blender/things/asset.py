@@ -16,7 +16,7 @@ from ...road.terrain import surface_elevation
 from ...road.things.asset import Asset
 from ...scanning.scene.mesh_files import check_mesh_file
 from ...scenario.assets import LibraryAsset, library_file, read_asset_library
-from ..files import complaint, stderr_if_it_succeeds
+from ..files import error_line, stderr_if_it_succeeds
 from ..labels import CLASS_PROPERTY, INSTANCE_PROPERTY
 from .meshes import on_plan
 from .model_builder import ModelBuilder
@@ -66,7 +66,7 @@ def _collection(path: Path, asset: LibraryAsset) -> bpy.types.Collection:
         with stderr_if_it_succeeds():
             objects = run_in_caller(lambda: read(path, asset.object))  # importers need Blender's main thread
     except (OSError, RuntimeError) as error:
-        raise InputError(str(path), None, f"cannot be read as an asset ({complaint(error)})") from None
+        raise InputError(str(path), None, f"cannot be read as an asset ({error_line(error)})") from None
     if not objects:
         raise InputError(str(path), asset.object, "holds no such object" if asset.object else "holds no objects")
     collection = bpy.data.collections.new(f"SR Asset {path.stem}")

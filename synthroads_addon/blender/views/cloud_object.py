@@ -35,8 +35,8 @@ def add_cloud_object(cloud: DisplayCloud, by: ColourBy, radius: float, offset: N
     _fill(points, "class_id", "INT", "value", cloud.class_id.astype(np.int32))
     _fill(points, "intensity", "FLOAT", "value", cloud.brightness.astype(np.float32))
     if "rgb" in cloud.colorings():
-        _fill(points, "color", "BYTE_COLOR", "color", _linear(cloud.colors("rgb")))
-    _fill(points, SHOWN, "BYTE_COLOR", "color", _linear(cloud.colors(by)))
+        _fill(points, "color", "BYTE_COLOR", "color", _to_linear(cloud.colors("rgb")))
+    _fill(points, SHOWN, "BYTE_COLOR", "color", _to_linear(cloud.colors(by)))
     points.materials.clear()
     points.materials.append(_material())
     item.location = offset.tolist()
@@ -46,7 +46,7 @@ def add_cloud_object(cloud: DisplayCloud, by: ColourBy, radius: float, offset: N
 
 def color_cloud_object(item: bpy.types.Object, cloud: DisplayCloud, by: ColourBy) -> None:
     """Recolour the points of a cloud's object by another attribute, in place."""
-    _fill(item.data, SHOWN, "BYTE_COLOR", "color", _linear(cloud.colors(by)))
+    _fill(item.data, SHOWN, "BYTE_COLOR", "color", _to_linear(cloud.colors(by)))
     item.data.update_tag()
 
 
@@ -97,7 +97,7 @@ def _fill(points: Any, name: str, kind: str, field: str, values: NDArray[Any]) -
     attribute.data.foreach_set(field, np.ascontiguousarray(values).ravel())
 
 
-def _linear(colors: NDArray[np.uint8]) -> NDArray[np.float32]:
+def _to_linear(colors: NDArray[np.uint8]) -> NDArray[np.float32]:
     """Return sRGB colours (N, 4) uint8 as linear float32, 0 to 1, alpha unchanged."""
     share = colors.astype(np.float32) / 255.0
     low = share[:, :3] <= 0.04045

@@ -63,7 +63,7 @@ def make_gallery(folder: Path, quality: Quality, only: str, say: Callable[[str],
         if only in name:
             road = {"design_class": design_class, "cross_section": section, "length": 800.0}
             parameters = _build_scene({"road": road, "seed": 2})
-            _look(aerial_view(parameters))
+            _aim_camera(aerial_view(parameters))
             made.append(_render(folder / f"{name}.png", quality, say))
     made += _material_pictures(folder, quality, only, say)
     return made
@@ -85,10 +85,10 @@ def _scene_pictures(
     made = []
     for view, seen_from in views.items():
         if only in f"scene-{name}-{view}":
-            _look(seen_from(parameters))
+            _aim_camera(seen_from(parameters))
             made.append(_render(folder / f"scene-{name}-{view}.png", quality, say))
     mesh = scene_mesh()
-    for kind, item in _kinds(parameters):
+    for kind, item in _shown_objects(parameters):
         picture = f"object-{kind}"
         if kind not in closed_up and only in picture and _close_up(parameters, mesh, item):
             closed_up.add(kind)
@@ -112,11 +112,11 @@ def _far_ground() -> None:
     bpy.context.object.data.materials.append(material("grass_ground"))
 
 
-def _look(view: Viewpoint) -> None:
+def _aim_camera(view: Viewpoint) -> None:
     pictures.camera(view.place, view.target, view.lens)
 
 
-def _kinds(parameters: RoadParameters) -> Iterator[tuple[str, str]]:
+def _shown_objects(parameters: RoadParameters) -> Iterator[tuple[str, str]]:
     """Yield (kind, id) of the objects to show close up; a kind is the type and its species, model or variant."""
     for key, item in parameters.objects.items():
         name = type(item).__name__

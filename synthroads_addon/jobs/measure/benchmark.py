@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ...base.arrays import Float32
 from ...base.machine import available_cores
 from ...base.progress import StageTimer, peak_memory_mb
-from ...blender.cameras.benchmark import panel_edit, rendering, seconds_of
+from ...blender.cameras.benchmark import measure_rendering, panel_edit, seconds_of
 from ...blender.casters.measure import bare_rate
 from ...blender.files import empty_file
 from ...cloud.formats.registry import open_cloud
@@ -81,7 +81,7 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         floors = [*casting.values(), writing]
         assert plan.request is not None
         if scenario.colour.source != "material":
-            floors.append(rendering(plan.request, _VIEWS))
+            floors.append(measure_rendering(plan.request, _VIEWS))
     own = casting[plan.rays_per_pulse]
     lines = {
         "points": files.counts.points / 1e6,

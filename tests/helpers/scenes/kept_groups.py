@@ -38,7 +38,7 @@ class KeptGroups:
     def _node_group(
         self, name: str, build: Any, *arguments: object, description: str = "", kind: str = "GeometryNodeTree"
     ) -> bpy.types.NodeTree:
-        wanted = (builder._sources(), name, repr(arguments))
+        wanted = (builder._sources_digest(), name, repr(arguments))
         key = self._keys.get(wanted) if self.on else None
         if key is not None and all(group.get(builder.KEY) != key for group in bpy.data.node_groups):
             return self._take(key, name)
