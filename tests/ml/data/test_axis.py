@@ -216,7 +216,7 @@ def test_reading_a_trajectory(tmp_path: Path) -> None:
     path = read_path(tmp_path / "flight.csv", (294000.0, 5628000.0, 0.0))
     assert 99.0 < path.length < 100.0
     assert np.diff(path.station).min() >= 0.3 - 1e-9
-    (tmp_path / "still.csv").write_text("x,y\n1,1\n1.1,1\n")
+    (tmp_path / "still.csv").write_text("x,y\n294000,5628000\n294000.1,5628000\n")
     with pytest.raises(InputError, match=r"at least 0\.3 m"):
         read_path(tmp_path / "still.csv")
 
