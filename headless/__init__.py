@@ -28,7 +28,7 @@ ENDS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") i
 
 
 def was_stopped() -> bool:
-    """Return whether the command was told to end, whatever error came of it: libraries turn Ctrl-C into others."""
+    """Return whether a signal told the command to end, even if a library turned that into another exception."""
     return _stopped
 
 
@@ -46,15 +46,15 @@ def _stop(number: int, frame: FrameType | None) -> None:
     signal.default_int_handler(signal.SIGINT, frame)
 
 
-def finish_in_peace() -> None:
-    """Hear no more signals: the process has nothing left to do but to clean up and end."""
+def ignore_end_signals() -> None:
+    """Ignore all further end signals, as the process only has to clean up and end."""
     for number in ENDS:
         with suppress(ValueError):  # not in the main thread
             signal.signal(number, signal.SIG_IGN)
 
 
 def _in_callback(frame: FrameType | None) -> bool:
-    """Return whether one of Blender's operators has called Python: it would swallow what is raised there, and go on."""
+    """Return whether Python is being called by a Blender operator, which would swallow an exception raised there."""
     inner = frame
     while frame is not None:
         if frame.f_code.co_filename.endswith(_OPERATORS) and frame is not inner:
@@ -63,8 +63,8 @@ def _in_callback(frame: FrameType | None) -> bool:
     return False
 
 
-def _end_quietly(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-    """End as `headless.commands` does where a command that is still loading is stopped, or lacks the memory for it."""
+def _exit_with_one_line(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    """Exception hook: end the process with one line where it was stopped (130) or lacks memory (2) while loading."""
     if not _stopped and (isinstance(error, MemoryError) or MAPPING_FAILED in str(error)):
         with suppress(OSError):
             print(f"error: too little memory ({str(error)[-200:] or 'it is full'})", file=sys.stderr, flush=True)
@@ -79,7 +79,7 @@ def _end_quietly(kind: type[BaseException], error: BaseException, trace: Traceba
 
 _started = Path(sys.argv[0]) if sys.argv else Path()
 if _started.name in ("-m", "synthroads") or _started.parent.name == "headless":  # a command, not a library
-    sys.excepthook = _end_quietly
+    sys.excepthook = _exit_with_one_line
     for _number in ENDS:
         # One that is ignored stays so: `nohup` and a shell's background jobs ask for that.
         if signal.getsignal(_number) in (signal.default_int_handler, signal.SIG_DFL):

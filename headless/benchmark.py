@@ -16,7 +16,7 @@ if __name__ == "__main__":
 
 from headless.benchmark_table import DEMO, QUICK, TABLE, judge_lines, markdown
 from headless.commands import Outcome, add_changes_argument, entry
-from headless.marked_documents import fill
+from headless.marked_documents import put_tables
 from headless.messages import progress_bar
 from headless.waves import CELLS, write_waves
 from synthroads_addon.base.errors import InputError
@@ -35,7 +35,7 @@ _QUICK_CELLS = 60
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of `synthroads benchmark`."""
+    """Add the arguments of `synthroads benchmark` to its parser."""
     available = available_cores()
     cores = sorted({1, min(2, available)})
     parser.add_argument("--output", type=Path, metavar="DIR", help=f"folder for {' and '.join(_FILES)}")
@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
-    """Run `synthroads benchmark`; each part is measured in a process of its own, so that its memory is its own."""
+    """Run `synthroads benchmark`, each part in its own process; return exit code, result as JSON data, printed text."""
     if arguments.part:
         result = _measure_part(json.loads(arguments.part))
         return 0, result, canonical_json(result)
@@ -64,22 +64,22 @@ def run(arguments: argparse.Namespace) -> Outcome:
     found: dict[str, Any] = {}
 
     def measure() -> dict[str, str]:
-        found.update(_all(arguments))
+        found.update(_measure_all(arguments))
         return {TABLE: markdown(found)}
 
     with ExitStack() as opened:
         folder = None
         if arguments.output:
             folder = opened.enter_context(output_folder(arguments.output, _FILES, arguments.overwrite))
-        table = fill(arguments.document, [TABLE], measure)[TABLE]
+        table = put_tables(arguments.document, [TABLE], measure)[TABLE]
         if folder:
             (folder / _FILES[0]).write_text(canonical_json(found), encoding="utf-8")
             (folder / _FILES[1]).write_text(table, encoding="utf-8")
     return 0, found, table + _verdict(found)
 
 
-def _all(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Measure every number of cores; return what `headless.benchmark_table` makes tables of."""
+def _measure_all(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Measure the demo job and the waves scene on each requested number of cores; return the results for the tables."""
     with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
         scene = Path(folder) / "waves.obj"
         triangles = write_waves(scene, _QUICK_CELLS if arguments.quick else CELLS)
@@ -94,15 +94,15 @@ def _runs(arguments: argparse.Namespace, waves: dict[str, Any]) -> dict[str, Any
         measured: dict[str, Any] = {"lines": {}}
         for step, part in enumerate(parts):
             progress(f"{part}, {cores}", (number * len(parts) + step) / (len(parts) * len(arguments.cores)))
-            result_of_part = _in_own_process({**about, "part": part}, cores)
+            result_of_part = _measure_in_process({**about, "part": part}, cores)
             measured |= result_of_part | {"lines": measured["lines"] | result_of_part["lines"]}
         runs.append(measured | {"cores": cores})
     versions = {"Blender": runs[0]["blender"], "Python": platform.python_version()}
     return {"machine": machine(versions), "quick": arguments.quick, "runs": runs}
 
 
-def _in_own_process(part: dict[str, Any], cores: int) -> dict[str, Any]:
-    """Measure a part in a process that may use so many cores."""
+def _measure_in_process(part: dict[str, Any], cores: int) -> dict[str, Any]:
+    """Measure a part in a new process limited to so many cores, and return its result."""
     command = [sys.executable, str(Path(__file__).resolve()), _PART, json.dumps(part), "--json"]
     before = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else None
     if before is not None:
@@ -119,19 +119,19 @@ def _in_own_process(part: dict[str, Any], cores: int) -> dict[str, Any]:
 
 
 def _measure_part(part: dict[str, Any]) -> dict[str, Any]:
-    """Measure a part in this process."""
+    """Measure one part (`demo`, `waves_1` or `waves_19`) in this process, and return its figures."""
     if part["part"] == "demo":
         from synthroads_addon.jobs.measure.benchmark import measure_demo
 
         result = measure_demo(_scenario(part["scenario"], part["changes"], part["quick"]))
     else:
         rays = int(part["part"].removeprefix("waves_"))
-        result = {"lines": _waves(rays, Path(part["scene"]), part["triangles"])}
+        result = {"lines": _measure_waves(rays, Path(part["scene"]), part["triangles"])}
     return result | {"blender": sys.modules["bpy"].app.version_string}
 
 
-def _waves(rays: int, scene: Path, triangles: int) -> dict[str, float]:
-    """Return the lines of the scene that other simulators are compared on."""
+def _measure_waves(rays: int, scene: Path, triangles: int) -> dict[str, float]:
+    """Scan the waves scene; return pulses or rays per second (millions), bytes per triangle and seconds to open it."""
     from synthroads_addon.base.progress import peak_memory_mb
     from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
     from synthroads_addon.scenario.scenario import apply_change

@@ -23,7 +23,7 @@ QUICK = ("road.length=60", "fidelity=draft", "scan.platform.speed=8", "colour.gr
 
 @dataclass(frozen=True)
 class Limit:
-    """A line of what must be reached.
+    """A bound that a measured figure of the benchmark must keep.
 
     Attributes:
         title: what is measured.
@@ -40,7 +40,7 @@ class Limit:
     digits: int = 2
 
     def is_kept_by(self, value: float) -> bool:
-        """Return whether a value keeps the limit."""
+        """Return whether a value keeps the limit, which is an upper or a lower bound."""
         return value <= self.limit if self.most else value >= self.limit
 
 
@@ -62,7 +62,7 @@ LIMITS = {
 
 
 def markdown(result: dict[str, Any]) -> str:
-    """Return the tables of a result as `headless.benchmark` gathers it."""
+    """Return a benchmark's result as Markdown: tables of limits, stages, and rates beside bare libraries."""
     lines = [f"Machine: {result['machine']}", ""]
     if result["quick"]:
         lines += ["A quick run on a small scene: it shows that all works, and nothing of the speed.", ""]
@@ -70,7 +70,7 @@ def markdown(result: dict[str, Any]) -> str:
 
 
 def judge_lines(result: dict[str, Any]) -> Iterator[tuple[str, float, bool]]:
-    """Yield (name, value, kept) of every line that was measured on as many cores as the limits are for."""
+    """Yield (name, value, whether its limit is kept) for each line measured on as many cores as limits are for."""
     run = next((run for run in result["runs"] if run["cores"] == CORES), None)
     for name, limit in LIMITS.items():
         value = (run or {}).get("lines", {}).get(name)

@@ -37,7 +37,7 @@ _SAME = (
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of `synthroads calibrate`."""
+    """Add the arguments of `synthroads calibrate` to its parser."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     text = "material of the table, and the cloud's class by number or name, or paved or line (can be repeated)"
     parser.add_argument("--material", action="append", required=True, metavar="NAME[=CLASS]", help=text)
@@ -89,7 +89,7 @@ def _fit_arguments(group: argparse._ArgumentGroup) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
-    """Run `synthroads calibrate`."""
+    """Run `synthroads calibrate`; return exit code, result as JSON data and printed text."""
     job = job_of(arguments)
     check_job(job)
     for field, path, ending in (("--save", arguments.save, ".json"), ("--plot", arguments.plot, ".png")):
@@ -109,7 +109,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
 
 def check_target(field: str, path: Path | None, ending: str, overwrite: bool) -> None:
-    """Refuse a file that can't be written as it is asked for, before any work."""
+    """Raise an InputError if a file to write has the wrong ending, or exists and may not be overwritten."""
     if path is None:
         return
     if path.suffix.lower() != ending:
@@ -119,7 +119,7 @@ def check_target(field: str, path: Path | None, ending: str, overwrite: bool) ->
 
 
 def job_of(arguments: argparse.Namespace) -> CalibrationJob:
-    """Return the job that the arguments stand for."""
+    """Return the calibration job that the command line's arguments describe."""
     textures = dict(_texture(text) for text in arguments.texture)
     targets = [_parse_target(text, textures) for text in arguments.material]
     unknown = set(textures) - {one.material for one in targets}
@@ -137,7 +137,7 @@ def job_of(arguments: argparse.Namespace) -> CalibrationJob:
 
 
 def summary(result: Calibration) -> list[str]:
-    """Return the result for people."""
+    """Return a calibration's result as lines of text: gain, reflectivities, percentiles and fitted values."""
     data = result.to_dict()
     lines = [f"gain {data['gain']:g}, one for all classes"] if data["real"] else []
     for row in data["classes"]:

@@ -70,7 +70,7 @@ def _classes(name: str) -> Entry:
 
 
 def _member(member: Member) -> str | int:
-    """Return what a class stands for as text; a selector as its fields."""
+    """Return a member of a class as its name or number, and a selector as text `field=value ...`."""
     if not isinstance(member, ClassSelector):
         return member
     shown = {key: value for key, value in member.to_dict().items() if key != "where" and value} | member.where

@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of `synthroads check`."""
+    """Add the arguments of `synthroads check` to its parser."""
     parser.add_argument("file", type=Path, metavar="FILE", help="parameter set (parameters.json)")
 
 
 def run(arguments: argparse.Namespace) -> tuple[int, dict[str, Any], str]:
-    """Run `synthroads check`."""
+    """Run `synthroads check`; return exit code (3 if rules are broken), violations as JSON data, and a text table."""
     from synthroads_addon.checking.checker import check
     from synthroads_addon.road.parameters import read_parameters
 
@@ -33,7 +33,7 @@ def run(arguments: argparse.Namespace) -> tuple[int, dict[str, Any], str]:
 
 
 def table(violations: list[Violation]) -> str:
-    """Return the violations as a table for people, each with its sentence."""
+    """Return violations as a text table, one row with a sentence each, or a line that says there are none."""
     if not violations:
         return "no violations"
     head = ("rule", "object", "station", "value", "limit", "")

@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Sequence
 from typing import Any
 
-from headless.commands import Parser, complete_arguments, leave, module_of, run
+from headless.commands import Parser, add_shared_options, leave, module_of, run
 from synthroads_addon.base.version import generator
 
 COMMANDS = {
@@ -32,7 +32,7 @@ COMMANDS = {
 
 
 class _PrintCompletion(argparse.Action):
-    """Prints the script that completes the command line in a shell, and ends the process."""
+    """Command-line action that prints a shell's completion script and ends the process."""
 
     def __call__(
         self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, option: str | None = None
@@ -49,13 +49,13 @@ class _PrintCompletion(argparse.Action):
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one sub-command; return its exit code."""
+    """Run the sub-command named in `argv` (the process's own arguments if None); return its exit code."""
     arguments = build_parser().parse_args(argv)
     return run(module_of(arguments.command).run, arguments)
 
 
 def build_parser() -> argparse.ArgumentParser:
-    """Return the parser of `synthroads` with all of `COMMANDS`; the documentation's reference is made from it."""
+    """Return the argument parser of `synthroads` with all sub-commands in `COMMANDS`."""
     parser = Parser(prog="synthroads", description="Synthetic motorways, scanned and labelled.")
     parser.add_argument("--version", action="version", version=generator())
     text = "print what makes a shell complete commands, options, names and files"
@@ -64,10 +64,10 @@ def build_parser() -> argparse.ArgumentParser:
     for name, summary in COMMANDS.items():
         module = module_of(name)
         module.add_arguments(commands.add_parser(name, help=summary, description=module.__doc__))
-    complete_arguments(parser)
+    add_shared_options(parser)
     return parser
 
 
 def console() -> None:
-    """Run the console command `synthroads`; ends the process."""
+    """Entry point of the console command `synthroads`; ends the process with the exit code."""
     leave(main)

@@ -26,7 +26,7 @@ _COLUMNS = (
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of `synthroads cloud`."""
+    """Add the arguments of `synthroads cloud` and its tools to the parser."""
     tools = parser.add_subparsers(dest="tool", required=True, metavar="TOOL")
     _info_arguments(tools.add_parser("info", help="figures of all points and of each class"))
     thin = tools.add_parser("subsample", help="keep one point per cell of a grid")
@@ -46,13 +46,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
-    """Run `synthroads cloud`."""
+    """Run a tool of `synthroads cloud`; return exit code, result as JSON data and printed text."""
     actions = {"info": _info, "subsample": _subsample, "map-intensity": _map_intensity, "convert": _convert}
     return actions.get(arguments.tool, _preview)(arguments)
 
 
 def table(figures: dict[str, Any]) -> str:
-    """Return a cloud's figures for people."""
+    """Return a cloud's statistics as text: extent, attributes, and a table of figures by class."""
     lines = [f"{figures['file']}: {figures['kind']}, {figures['points']:,} points"]
     lines.append(f"coordinate system {'EPSG:' + str(figures['epsg']) if figures['epsg'] else 'not named'}")
     if figures["bounds"]:

@@ -16,7 +16,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from headless import INTERRUPTED, MAPPING_FAILED, finish_in_peace, was_stopped
+from headless import INTERRUPTED, MAPPING_FAILED, ignore_end_signals, was_stopped
 from headless.messages import messages
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.machine import prepare_memory
@@ -24,7 +24,7 @@ from synthroads_addon.base.scratch.folders import remove_scratch_folders, tempor
 
 
 def _missing_package(error: ModuleNotFoundError) -> str:
-    """Return what to say of a package that isn't there; a missing part of our own is a defect and raised again."""
+    """Return the error line for a package that isn't installed; re-raises the error of a module of our own."""
     name = (error.name or "").partition(".")[0]
     if name in ("", "headless", "ml", "synthroads_addon"):
         raise error
@@ -63,7 +63,7 @@ SHORT_OPTIONS = {
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose complaints are one line, like every other bad input.
+    """Argument parser that reports errors in one line, without usage.
 
     Attributes:
         words: argument that takes words on both sides of options; argparse by itself ends one with ``*`` at the first.
@@ -72,7 +72,7 @@ class Parser(argparse.ArgumentParser):
     words: str | None = None
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Parse what is known; return it and the rest."""
+        """Return the namespace and unknown arguments; words after options go to the argument named by `words`."""
         parsed, rest = super().parse_known_args(args, namespace)
         if self.words and not any(word.startswith("-") for word in rest):
             setattr(parsed, self.words, [*(getattr(parsed, self.words) or ()), *rest])
@@ -83,13 +83,13 @@ class Parser(argparse.ArgumentParser):
         self.exit(2, f"{self.prog}: {message}\n")
 
 
-def complete_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what every command understands to a parser or all of its sub-commands, and the letters of `SHORT_OPTIONS`."""
+def add_shared_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options that all commands share, and `SHORT_OPTIONS`, to a parser and its sub-parsers, in place."""
     inner = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
     if not inner:
         _add_common_arguments(parser)
     for its_parser in (its_parser for action in inner for its_parser in action.choices.values()):
-        complete_arguments(its_parser)
+        add_shared_options(its_parser)
     for action in parser._actions:
         letters = [SHORT_OPTIONS[name] for name in action.option_strings if name in SHORT_OPTIONS]
         action.option_strings = [*letters, *action.option_strings]
@@ -97,35 +97,35 @@ def complete_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def module_of(name: str) -> Any:
-    """Return the module of a sub-command."""
+    """Import and return the module `headless.NAME` of a sub-command."""
     return import_module(f"headless.{name}")
 
 
 def command(name: str, argv: Sequence[str] | None = None) -> int:
-    """Run the sub-command `name` by itself, as ``python -m headless.NAME`` does."""
+    """Run one sub-command with its own parser, as ``python -m headless.NAME`` does; return its exit code."""
     module = module_of(name)
     parser = Parser(prog=f"synthroads {name}", description=module.__doc__)
     module.add_arguments(parser)
-    complete_arguments(parser)
+    add_shared_options(parser)
     return run(module.run, parser.parse_args(argv))
 
 
 def add_changes_argument(
     parser: argparse.ArgumentParser, owner: str = "the scenario", example: str = "road.length=800"
 ) -> None:
-    """Add ``--set PATH=VALUE``, gathered in ``changes``, by which fields of an owner are changed."""
+    """Add the option ``--set PATH=VALUE``, which can be repeated; values are collected in ``changes``."""
     text = f"change one field of {owner}, e.g. {example} (can be repeated)"
     parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", dest="changes", help=text)
 
 
 def add_device_argument(parser: argparse.ArgumentParser) -> None:
-    """Add ``--device NAME``, short for the field ``scan.device``."""
+    """Add the option ``--device NAME``, a short form of the scenario's field ``scan.device``."""
     text = "scanner: a preset's name (`synthroads list devices`) or a .json file (the scenario's own)"
     parser.add_argument("--device", metavar="NAME", help=text)
 
 
 def all_changes(arguments: argparse.Namespace, short: Mapping[str, str]) -> list[str]:
-    """Return the changes of the scenario that ``--set`` and options which are short for fields ask for.
+    """Return the scenario changes (``path=value``) of ``--set`` and of options that are short for fields.
 
     Args:
         arguments: of the command.
@@ -153,13 +153,13 @@ def all_changes(arguments: argparse.Namespace, short: Mapping[str, str]) -> list
 
 
 def add_allow_large_argument(parser: argparse.ArgumentParser) -> None:
-    """Add ``--allow-large``, short for a value of the field ``scan.most_pulses``."""
+    """Add the flag ``--allow-large``, which lifts the scenario's limit ``scan.most_pulses``."""
     text = "do a scan of any size: without it one of more pulses than scan.most_pulses is refused"
     parser.add_argument("--allow-large", action="store_const", const=MOST_POSSIBLE, help=text)
 
 
 def add_choice_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add ``--tolerance`` and ``--time-budget``, by which settings are chosen."""
+    """Add ``--tolerance`` and ``--time-budget``, by which the job chooses its settings itself."""
     kinds = ", ".join(KINDS)
     parser.add_argument(
         "--tolerance",
@@ -175,7 +175,7 @@ def add_choice_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def choice_changes(arguments: argparse.Namespace) -> list[str]:
-    """Return the changes of the scenario that ``--tolerance`` and ``--time-budget`` stand for."""
+    """Return the scenario changes (``path=value``) that ``--tolerance`` and ``--time-budget`` stand for."""
     changes = []
     if arguments.tolerance is not None:
         changes.append(f"tolerance={json.dumps(parse_tolerance(arguments.tolerance))}")
@@ -187,7 +187,7 @@ def choice_changes(arguments: argparse.Namespace) -> list[str]:
 
 
 def choice_summary(report: dict[str, Any]) -> list[str]:
-    """Return what was chosen, and what is expected of it, for people; nothing where nothing was."""
+    """Return lines of text on settings chosen and errors expected; empty if the report has no choice."""
     if "choice" not in report:
         return []
     choice = report["choice"]
@@ -201,7 +201,7 @@ def choice_summary(report: dict[str, Any]) -> list[str]:
 
 
 def numbers(counts: Sequence[int], form: str) -> Callable[[str], tuple[float, ...]]:
-    """Return what reads so many numbers with commas from an argument, in metres; ``form`` says it in the message."""
+    """Return an argparse type that reads numbers (m) separated by commas, as many as one of ``counts`` allows."""
 
     def read(text: str) -> tuple[float, ...]:
         try:
@@ -216,7 +216,7 @@ def numbers(counts: Sequence[int], form: str) -> Callable[[str], tuple[float, ..
 
 
 def whole_number(most: int, shown: str) -> Callable[[str], int]:
-    """Return what reads a whole number from 0 to the largest from an argument."""
+    """Return an argparse type that reads a whole number from 0 to a maximum."""
 
     def read(text: str) -> int:
         if not text.isascii() or not text.isdigit() or int(text) > most:
@@ -227,7 +227,7 @@ def whole_number(most: int, shown: str) -> Callable[[str], int]:
 
 
 def add_renamed_argument(parser: argparse.ArgumentParser, former: str, name: str) -> None:
-    """Refuse an option's former name with a hint at its name; help doesn't show it."""
+    """Add an option's former name, hidden from help, which ends the command with a hint at the new name."""
 
     class Renamed(argparse.Action):
         def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
@@ -237,18 +237,18 @@ def add_renamed_argument(parser: argparse.ArgumentParser, former: str, name: str
 
 
 def add_twin_argument(parser: argparse.ArgumentParser, default: Sequence[str] = ()) -> None:
-    """Add ``--twin FORMATS``, a list of names of formats in ``twin``."""
+    """Add the option ``--twin FORMATS``: names of formats separated by commas, as a list in ``twin``."""
     text = f"geometric-semantic models, with commas: {', '.join(TWIN_FORMATS)} ({','.join(default) or 'none'})"
     parser.add_argument("--twin", type=_split_names, default=list(default), metavar="FORMATS", help=text)
 
 
 def _split_names(text: str) -> list[str]:
-    """Return the names in a list with commas, each once."""
+    """Return the names in a list separated by commas, without repetitions, in order."""
     return list(dict.fromkeys(text.split(",")))
 
 
 def _add_common_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the flags that every sub-command understands."""
+    """Add the flags that all sub-commands share: ``--quiet``, ``--verbose``, ``--json``."""
     amount = parser.add_mutually_exclusive_group()
     text = "no progress and no notes: print errors only, and the result where it is written to no file"
     amount.add_argument("--quiet", action="store_true", help=text)
@@ -257,15 +257,15 @@ def _add_common_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _writes_files(arguments: argparse.Namespace) -> bool:
-    """Return whether a command's result is in files, so that what it prints are notes on them."""
+    """Return whether a command's result goes to files, so that ``--quiet`` may drop what it prints."""
     named = ("output", "save", "plot", "document")
     return any(getattr(arguments, name, None) for name in named) and not getattr(arguments, "verify", False)
 
 
 def run(action: Callable[[argparse.Namespace], Outcome], arguments: argparse.Namespace) -> int:
-    """Run an action and print of its outcome what was asked for; turn errors into one line and an exit code."""
+    """Run a sub-command and print its result as text or JSON; return the exit code; bad input becomes one line."""
     try:
-        with _without_blenders_chatter(), messages(arguments):
+        with _silent_standard_output(), messages(arguments):
             prepare_memory()
             code, result, text = action(arguments)
         if arguments.json:
@@ -284,25 +284,25 @@ def run(action: Callable[[argparse.Namespace], Outcome], arguments: argparse.Nam
     except Exception as error:
         if was_stopped():  # which libraries turn into errors of their own, and workers into the loss of them
             return report_interrupt()
-        told = _line_of(error)
+        told = _error_line(error)
         if told is None:
             raise
         print(told, file=sys.stderr)
         return 2
 
 
-def _line_of(error: Exception) -> str | None:
-    """Return the line that an error is told in; None where it is a defect of ours."""
+def _error_line(error: Exception) -> str | None:
+    """Return the line printed for an error, or None if it is a defect of ours, which is raised."""
     if isinstance(error, InputError):
         return f"error: {error}"
     if isinstance(error, ModuleNotFoundError):
         return _missing_package(error)
-    reason = _shortage(error)
+    reason = _shortage_reason(error)
     return reason and f"error: {reason}"
 
 
-def _shortage(error: Exception) -> str | None:
-    """Return what to say of an error by which a machine tells that it is too small; None of any other."""
+def _shortage_reason(error: Exception) -> str | None:
+    """Return the reason if an error means that memory, disk space or file handles ran out, else None."""
     text = " ".join(str(error).split())
     full = isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM
     if full or any(sign in text for sign in _MEMORY_SIGNS):
@@ -324,14 +324,14 @@ _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 
 
 def report_interrupt() -> int:
-    """Say that the user stopped the work; return the exit code."""
+    """Print that the command was interrupted, and return exit code 130."""
     with suppress(OSError):  # the terminal is gone
         print(INTERRUPTED, file=sys.stderr, flush=True)
     return 130
 
 
 def entry(name: str) -> None:
-    """Run a sub-command as a script, under plain Python or ``blender -b -P``; ends the process.
+    """Run a sub-command as a script, under plain Python or ``blender -b -P``, and end the process with its exit code.
 
     In Blender the arguments follow ``--``. The process is left at once, since Blender's teardown can crash.
     """
@@ -342,7 +342,7 @@ def entry(name: str) -> None:
 
 
 def leave(action: Callable[[], int], supervised: bool = True) -> None:
-    """Run an action and end the process with its exit code, without Blender's teardown.
+    """Run an action and end the process at once with its exit code, without Blender's teardown.
 
     Args:
         action: returns the exit code.
@@ -371,7 +371,7 @@ def leave(action: Callable[[], int], supervised: bool = True) -> None:
 
             traceback.print_exc()
             code = 1
-    finish_in_peace()
+    ignore_end_signals()
     remove_scratch_folders()
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError):  # the terminal is gone
@@ -380,8 +380,8 @@ def leave(action: Callable[[], int], supervised: bool = True) -> None:
 
 
 @contextmanager
-def _without_blenders_chatter() -> Iterator[None]:
-    """Drop what Blender prints to standard output meanwhile (where it saved, say); its errors still show."""
+def _silent_standard_output() -> Iterator[None]:
+    """Context in which whatever Blender prints to standard output is dropped; standard error still shows."""
     sys.stdout.flush()
     try:
         saved = os.dup(1)

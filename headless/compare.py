@@ -24,7 +24,7 @@ _GIVEAWAYS = 5
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of `synthroads compare`."""
+    """Add the arguments of `synthroads compare` to its parser."""
     parser.add_argument(
         "synthetic", type=Path, metavar="SYNTHETIC", help="cloud, folder or list of clouds to be judged"
     )
@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
-    """Run `synthroads compare`."""
+    """Run `synthroads compare`; return exit code, result as JSON data and printed text."""
     from synthroads_addon.comparison.job import compare_steps
     from synthroads_addon.comparison.picture import save_picture
 
@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
 
 def summary(data: dict[str, Any], output: Path) -> str:
-    """Return the result for people."""
+    """Return a comparison's result as text: AUC of telling clouds apart, realism, and the most telling features."""
     lines = []
     for side in ("synthetic", "real"):
         for row in data[side]:

@@ -33,7 +33,7 @@ _NAMES: dict[str, Iterable[str]] = {
 
 
 def completion_script(parser: argparse.ArgumentParser, shell: str) -> str:
-    """Return the script that completes a parser's command line; the parser is of no other use afterwards.
+    """Return a shell's completion script for a parser, which is modified and can't be used afterwards.
 
     Args:
         parser: with all sub-commands.
@@ -44,16 +44,16 @@ def completion_script(parser: argparse.ArgumentParser, shell: str) -> str:
     """
     import shtab
 
-    _describe(parser, shtab.FILE, shtab.DIRECTORY)
+    _set_completions(parser, shtab.FILE, shtab.DIRECTORY)
     return str(shtab.complete(parser, shell))
 
 
-def _describe(parser: argparse.ArgumentParser, file: Any, directory: Any) -> None:
-    """Note at each argument what it takes, as `shtab` wants it."""
+def _set_completions(parser: argparse.ArgumentParser, file: Any, directory: Any) -> None:
+    """Set what each argument of a parser completes (files, folders or names) for `shtab`, in place."""
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             for its_parser in action.choices.values():
-                _describe(its_parser, file, directory)
+                _set_completions(its_parser, file, directory)
             continue
         called: Sequence[str] = action.option_strings or [action.dest]
         kind = next((name for name in called if name in _NAMES_OR_FILES), None)
@@ -69,7 +69,7 @@ def _describe(parser: argparse.ArgumentParser, file: Any, directory: Any) -> Non
 
 
 def _names_or_files(kind: str, names: Sequence[str]) -> dict[str, Any]:
-    """Return the function, for each shell, that completes names and files."""
+    """Return shell functions for `shtab`, by shell, that complete given names as well as files."""
     function = f"_synthroads_{kind.strip('-')}_or_files"
     words = shlex.join(names)
     bash = f'{function}() {{\n  compgen -W {shlex.quote(words)} -- "$1"\n  compgen -f -- "$1"\n}}'

@@ -16,7 +16,7 @@ from synthroads_addon.scenario.scenario import parse_change
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of `synthroads dataset`."""
+    """Add the arguments of `synthroads dataset` to its parser."""
     known = ", ".join(recipe_names())
     parser.add_argument("recipe", metavar="RECIPE", help=f"{known}, or a .yaml or .json file")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the data set")
@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
-    """Run `synthroads dataset`."""
+    """Run `synthroads dataset`; return exit code (3 if scenes failed), manifest as JSON data and printed text."""
     for name, keeps in (("--resume", arguments.resume), ("--verify", arguments.verify)):
         if keeps and arguments.overwrite:
             raise InputError("--overwrite", None, f"can't be given with {name}, which keeps what is there")
@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
 
 def _change_recipe(recipe: Recipe, changes: list[str]) -> Recipe:
-    """Return a recipe whose scenarios are changed as well; the changes become a part of it."""
+    """Return a copy of a recipe with further changes (``path=value``) to the scenarios of all its groups."""
     if not changes:
         return recipe
     values = dict(parse_change(change) for change in changes)
@@ -85,7 +85,7 @@ def _verify(folder: Path) -> Outcome:
 
 
 def summary(manifest: Manifest, folder: Path) -> str:
-    """Return what was made, for people."""
+    """Return a line on the scenes and points that were made, and where they are."""
     done = [scene for scene in manifest.scenes if scene.status == "done"]
     points = sum(scene.points or 0 for scene in done)
     return f"{len(done)} of {len(manifest.scenes)} scenes, {points:,} points\nwritten to {folder}"

@@ -74,7 +74,7 @@ _MODULE = Path(__file__).with_name("dataset_scene.py")
 
 @dataclass(frozen=True)
 class Outcome:
-    """How a scene's process ended.
+    """Result of one scene's process: the folder it worked in, and an error if it failed.
 
     Attributes:
         folder: where it worked.
@@ -86,19 +86,19 @@ class Outcome:
 
 
 class Stop(Protocol):
-    """Says whether all is to stop, as `threading.Event` does."""
+    """Protocol of a stop flag, as of `threading.Event`."""
 
     def is_set(self) -> bool:
-        """Return whether it is."""
+        """Return whether work has to stop."""
         ...
 
     def wait(self, timeout: float) -> bool:
-        """Wait for so many seconds, or until it is; return whether it is."""
+        """Wait for at most so many seconds until work has to stop; return whether it has to."""
         ...
 
 
 class WorkerClosing:
-    """Whether the Dask worker of this thread is about to close, as at the end of its wall time."""
+    """Stop flag that is set when this thread's Dask worker is about to close, as at the end of its wall time."""
 
     def __init__(self) -> None:
         from distributed import get_worker  # an optional package
@@ -106,17 +106,17 @@ class WorkerClosing:
         self.worker = get_worker()
 
     def is_set(self) -> bool:
-        """Return whether it is."""
+        """Return whether the worker is closing or closed."""
         return self.worker.status.name not in ("running", "paused")
 
     def wait(self, timeout: float) -> bool:
-        """Wait for so many seconds; return whether it is."""
+        """Sleep for so many seconds; return whether the worker is closing."""
         time.sleep(timeout)
         return self.is_set()
 
 
 def run_on_worker(folder: str) -> Outcome:
-    """Run a task on a Dask worker, with its share of the cores.
+    """Run the task in a folder on a Dask worker with its share of the cores; return how it ended.
 
     Raises:
         distributed.Reschedule: the worker closes; Dask has another one do it.
@@ -133,7 +133,7 @@ def run_on_worker(folder: str) -> Outcome:
 
 
 def run_task(folder: str, threads: int, stopping: Stop) -> Outcome:
-    """Run the process of a task that was written to a folder; it is ended when ``stopping`` is set.
+    """Run the process of a task in a folder, again if it is killed; return how it ended; stops if ``stopping`` is set.
 
     Each attempt has a folder of its own: one on a lost node may still be writing while the next is at work.
     """
@@ -155,7 +155,7 @@ def run_task(folder: str, threads: int, stopping: Stop) -> Outcome:
 
 
 def _run_process(path: Path, threads: int, stopping: Stop) -> int:
-    """Run the process of the task in a folder to its end, or not at all if all is stopping; return its exit code."""
+    """Run a scene's process in a folder until it ends or all is stopping; return its exit code, 0 if not begun."""
     if stopping.is_set():
         return 0
     command = [sys.executable, str(_MODULE), str(path / TASK), str(threads)]
@@ -179,7 +179,7 @@ def _reason(code: int, log: Path) -> str:
 
 @dataclass
 class DatasetRun:
-    """A data set at work.
+    """Production of a data set's scenes from a recipe in a folder, resumable after an interruption.
 
     Args:
         recipe: what is made.
@@ -214,7 +214,7 @@ class DatasetRun:
         self._generator = generator()
 
     def run(self, submit: Submit) -> Manifest:
-        """Make all scenes that aren't there yet; return the manifest.
+        """Make all scenes that are missing, write the data set's descriptions, and return the manifest.
 
         Args:
             submit: see `local_processes` and `dask_workers`.
@@ -225,11 +225,11 @@ class DatasetRun:
         """
         try:
             with self._lock_folder():
-                self._open()
+                self._open_folder()
                 try:
                     self._prepare()
                     self._make(submit)
-                    self._close()
+                    self._write_descriptions()
                 except BaseException:
                     self._abandon()
                     raise
@@ -239,51 +239,51 @@ class DatasetRun:
         return self._manifest()
 
     def _make(self, submit: Submit) -> None:
-        """Make the scenes that aren't there yet."""
+        """Make the missing scenes of the chosen splits, and publish each when it is complete."""
         chosen = [job for job in self.jobs if self.splits is None or job.split in self.splits]
         missing = [job for job in chosen if not self._is_done(job)]
         done = len(chosen) - len(missing)
         self.progress("scenes", done / len(chosen))
         for number, outcome in enumerate(submit([self._write_task(job) for job in missing]), start=1):
-            self._take(outcome)
+            self._publish(outcome)
             self.progress("scenes", (done + number) / len(chosen))
 
     @contextmanager
     def _lock_folder(self) -> Iterator[None]:
-        """Keep others out of the folder; the lock goes with the process however it ends."""
+        """Context that holds the folder's lock, and raises an OutputError if another run holds it."""
         with ExitStack() as stack:
             try:
                 self.folder.mkdir(parents=True, exist_ok=True)
                 stack.enter_context(exclusive(self.folder / LOCK))
             except LockHeldError as taken:
-                raise OutputError("--output", str(self.folder), _other_run(taken, self.folder / LOCK)) from None
+                raise OutputError("--output", str(self.folder), _lock_text(taken, self.folder / LOCK)) from None
             yield
 
-    def _open(self) -> None:
-        """Take over what is done or remove it, as is wanted."""
+    def _open_folder(self) -> None:
+        """Check that the folder is empty, or take over or remove the data set in it as requested."""
         if (self.folder / MANIFEST).exists():
-            self._open_again()
+            self._reopen()
         elif {path.name for path in self.folder.iterdir()} - {LOCK, f".{MANIFEST}.part"}:
             raise OutputError("--output", str(self.folder), "holds other files; choose an empty folder")
 
     def _prepare(self) -> None:
-        """Remove what a run before left unfinished, and make the folders of this one."""
+        """Remove unfinished remains of an earlier run, and create manifest, recipe and folders of this one."""
         write_manifest(self.folder, self._manifest())  # first: a folder without one could never be resumed
         shutil.rmtree(self.folder / WORK, ignore_errors=True)
-        for path in self._unknown():
+        for path in self._unrecorded_folders():
             remove(path)
         (self.folder / WORK).mkdir()
         (self.folder / "logs").mkdir(exist_ok=True)
         write_atomically(self.folder / "recipe.json", self._recipe_text)
 
-    def _open_again(self) -> None:
-        """Take over the scenes of the set that is there, or have a new one take its place."""
+    def _reopen(self) -> None:
+        """Take over the finished scenes of the data set in the folder, or remove it if it is to be overwritten."""
         if self.overwrite or self.resume:
             fold_records(self.folder)
         if self.overwrite:
             finish_removal(self.folder)
             paths = [*paths_of_set(self.folder, read_manifest(self.folder)), *self._published_folders()]
-            for path in self._unknown(set(paths)):
+            for path in self._unrecorded_folders(set(paths)):
                 name = path.relative_to(self.folder).as_posix()
                 raise OutputError("--output", str(self.folder), f"holds {name}, which is no scene's; move it away")
             begin_removal(self.folder, paths)
@@ -298,18 +298,18 @@ class DatasetRun:
         finish_removal(self.folder)
 
     def _published_folders(self) -> list[str]:
-        """Return the folders of scenes that a run before published, or was about to, when it was killed."""
+        """Return the folders of scenes that a killed run had published, or was about to, unrecorded."""
         tasks = [json.loads(path.read_text(encoding="utf-8")) for path in (self.folder / WORK).glob(f"*/*/{DONE}")]
         return [name for task in tasks for name in task["folders"]]
 
-    def _unknown(self, known: Set[str] = frozenset()) -> list[Path]:
-        """Return the folders where scenes of the recipe go that are neither in the manifest nor among the known."""
+    def _unrecorded_folders(self, known: Set[str] = frozenset()) -> list[Path]:
+        """Return existing folders named as scenes of the recipe that are neither recorded nor in ``known``."""
         there = {name for entry in self.entries.values() for name in entry.folders or ()} | known
         paths = [path for pattern in PUBLISHED for path in sorted(self.folder.glob(pattern)) if self._is_scenes(path)]
         return [path for path in paths if path.relative_to(self.folder).as_posix() not in there]
 
     def _is_scenes(self, path: Path) -> bool:
-        """Return whether a folder's name is one that a scene of the recipe has in its place."""
+        """Return whether a folder's name is that of a scene of the recipe."""
         top = path.relative_to(self.folder).parts[0]
         if top == "semantickitti":
             return path.name in self._sequences
@@ -319,7 +319,7 @@ class DatasetRun:
         return job.name in self.entries
 
     def _write_task(self, job: SceneJob) -> str:
-        """Write down what a process is to make; return its folder."""
+        """Write a scene's task file into a new work folder, and return that folder."""
         folder = Path(tempfile.mkdtemp(prefix=f"{job.name}-", dir=self.folder / WORK))
         task = {
             "name": job.name,
@@ -331,8 +331,8 @@ class DatasetRun:
         (folder / TASK).write_text(json.dumps(task), encoding="utf-8")
         return str(folder)
 
-    def _take(self, outcome: Outcome) -> None:
-        """Publish a scene that is complete, or note why there is none."""
+    def _publish(self, outcome: Outcome) -> None:
+        """Publish the files of a complete scene, or log its failure, and record it in the manifest."""
         task = json.loads((outcome.folder / TASK).read_text(encoding="utf-8"))
         job = self.jobs[task["number"]]
         about: dict[str, Any] = {"name": job.name, "split": job.split, "seed": job.scenario.seed}
@@ -363,20 +363,20 @@ class DatasetRun:
         shutil.rmtree(work / outcome.folder.relative_to(work).parts[0], ignore_errors=True)
 
     def _manifest(self) -> Manifest:
-        """Return the manifest of the scenes that are done or failed so far, in the recipe's order."""
+        """Return the manifest of the scenes done or failed so far, in the recipe's order."""
         entries = [self.entries[job.name] for job in self.jobs if job.name in self.entries]
         return make_manifest(self.recipe.title, self._generator, self._recipe_text, entries, len(self.jobs))
 
     def _abandon(self) -> None:
-        """Leave a folder with nothing half-done in it where the work ends early; doesn't raise for a full disk."""
+        """Remove everything unfinished and write the manifest, after a failure; ignores errors of the disk."""
         with suppress(OSError):
-            for path in self._unknown():
+            for path in self._unrecorded_folders():
                 remove(path)
             shutil.rmtree(self.folder / WORK, ignore_errors=True)
             write_manifest(self.folder, self._manifest())
 
-    def _close(self) -> None:
-        """Write what describes the whole."""
+    def _write_descriptions(self) -> None:
+        """Write the manifest, layout descriptions and data card of the data set, and remove the work folder."""
         manifest = self._manifest()
         write_manifest(self.folder, manifest)
         texts = layout_descriptions(self.recipe, self.jobs)
@@ -392,7 +392,7 @@ Submit = Callable[[list[str]], Iterator[Outcome]]
 
 
 def local_processes(jobs: int) -> Submit:
-    """Return what runs as many processes at once on this machine."""
+    """Return a function that runs tasks in so many processes at once on this machine."""
 
     threads = max(1, available_cores() // jobs)
 
@@ -423,7 +423,7 @@ def local_processes(jobs: int) -> Submit:
 
 
 def dask_workers(address: str, patience: float = 1800.0) -> Submit:
-    """Return what has the workers of a Dask cluster do it; they must see the same folder under the same name.
+    """Return a function that runs tasks on a Dask cluster, whose workers must see the folder under the same path.
 
     The scheduler is called at once, before anything in the folder is touched.
 
@@ -447,14 +447,14 @@ def dask_workers(address: str, patience: float = 1800.0) -> Submit:
     def submit(folders: list[str]) -> Iterator[Outcome]:
         with client:
             futures = client.map(run_on_worker, folders, key=folders, retries=ATTEMPTS, pure=False)
-            for future in _ended_futures(client, futures, Absence(address, patience)):
+            for future in _ended_futures(client, futures, WorkerAbsence(address, patience)):
                 yield _outcome(future, address)
 
     return submit
 
 
-def _ended_futures(client: Any, futures: list[Any], absence: Absence) -> Iterator[Any]:
-    """Yield the futures as they end, while somebody works on them."""
+def _ended_futures(client: Any, futures: list[Any], absence: WorkerAbsence) -> Iterator[Any]:
+    """Yield Dask futures as they end; raises an InputError if the cluster has no worker for too long."""
     from distributed import as_completed as completed  # an optional package
 
     ending, looked = completed(futures, loop=client.loop, raise_errors=False), 0.0
@@ -465,11 +465,11 @@ def _ended_futures(client: Any, futures: list[Any], absence: Absence) -> Iterato
         time.sleep(_TICK)
         if client.status == "running" and time.monotonic() - looked >= _LOOK:
             looked = time.monotonic()
-            absence.look(len(client.scheduler_info(n_workers=-1)["workers"]), looked)
+            absence.update(len(client.scheduler_info(n_workers=-1)["workers"]), looked)
 
 
 def _outcome(future: Any, address: str) -> Outcome:
-    """Return how the task of a future ended."""
+    """Return how the task of an ended Dask future ended; raises an InputError if the scheduler was lost."""
     if future.status == "finished":
         return cast(Outcome, future.result())
     if future.status == "error":
@@ -477,8 +477,8 @@ def _outcome(future: Any, address: str) -> Outcome:
     raise InputError("--scheduler", address, "was lost; --resume continues with what is done")
 
 
-class Absence:
-    """How long no worker has been there: said after a minute, and an error after too long.
+class WorkerAbsence:
+    """Timer of how long a cluster has had no worker: warns after a minute, raises after too long.
 
     Args:
         address: the scheduler's.
@@ -490,8 +490,8 @@ class Absence:
         self._since: float | None = None
         self._said = False
 
-    def look(self, workers: int, now: float) -> None:
-        """Take note of how many workers there are at a time (s).
+    def update(self, workers: int, now: float) -> None:
+        """Update the timer with the number of workers at a time, s.
 
         Raises:
             InputError: there has been none for too long.
@@ -512,8 +512,8 @@ class Absence:
             )
 
 
-def _other_run(taken: LockHeldError, lock: Path) -> str:
-    """Return what to say of a folder that another run holds, or may hold."""
+def _lock_text(taken: LockHeldError, lock: Path) -> str:
+    """Return the error text for a folder whose lock another run holds, or may hold."""
     owner = f": process {taken.owner.pid} of {taken.owner.host}" if taken.owner else ""
     if taken.certain:
         return f"another run is at work in it{owner}"

@@ -34,7 +34,7 @@ FAILED = "failed.json"
 
 
 def make_scene(task: dict[str, Any], folder: Path, threads: int) -> None:
-    """Make a scene's files below ``folder / FILES`` and describe them in ``folder / DONE``.
+    """Generate one scene below ``folder / FILES``, in all the recipe's layouts, and describe it in ``folder / DONE``.
 
     Raises:
         InputError: the scenario can't be met.
@@ -64,7 +64,7 @@ def make_scene(task: dict[str, Any], folder: Path, threads: int) -> None:
 
 
 def points_by_class(cloud: Path) -> dict[str, int]:
-    """Return how many points of a cloud each of its classes has, in the order of their ids."""
+    """Return the number of points of each class in a cloud file, by class name, ordered by id."""
     with open_cloud(cloud) as source:
         count = sum((np.bincount(block.class_id, minlength=256) for block in source.blocks()), np.zeros(256, np.int64))
         names = source.header.scheme.names()
@@ -72,12 +72,12 @@ def points_by_class(cloud: Path) -> dict[str, int]:
 
 
 def published_folders(files: Path) -> list[Path]:
-    """Return the folders of a scene that are published whole: its own, its tiles and its sequence."""
+    """Return the folders below ``files`` that are moved into the data set: scene, tiles and sequence."""
     return sorted(path for pattern in PUBLISHED for path in files.glob(pattern))
 
 
 def main() -> int:
-    """Make the scene of the task file; exit codes as those of `synthroads`."""
+    """Make the scene of the task file in ``sys.argv``; return the exit code, 2 if the scenario can't be met."""
     path = Path(sys.argv[1])
     threading.Thread(target=_end_with_parent, daemon=True).start()
     try:
@@ -90,7 +90,7 @@ def main() -> int:
 
 
 def _end_with_parent() -> None:
-    """Wait until standard input is closed, which happens when the parent ends however it ends; then end at once."""
+    """Block until standard input is closed, as when the parent ends; then end the process with code 130."""
     sys.stdin.buffer.read()
     remove_scratch_folders()
     os._exit(130)

@@ -12,7 +12,7 @@ from headless.messages import progress_bar
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of `synthroads evaluate`."""
+    """Add the arguments of `synthroads evaluate` to its parser."""
     parser.add_argument("run", type=Path, metavar="RUN", help="folder of a trained run")
     parser.add_argument("data", type=Path, nargs="+", metavar="DATA", help="data sets' folders or clouds")
     parser.add_argument("--split", default="test", metavar="NAME", help="split of the data sets (test)")
@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
-    """Run `synthroads evaluate`."""
+    """Run `synthroads evaluate`; return exit code, scores as JSON data and printed tables."""
     from ml.runs import Run
     from ml.tasks import Evaluation, task
 

@@ -17,7 +17,7 @@ from synthroads_addon.base.errors import InputError
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of `synthroads experiment`."""
+    """Add the arguments of `synthroads experiment` to its parser."""
     known = ", ".join(names_in(EXPERIMENTS))
     parser.add_argument("experiment", metavar="EXPERIMENT", help=f"YAML file, or one of {known}")
     text = "folder that {NAME} in the experiment's paths stands for (can be repeated)"
@@ -31,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
-    """Run `synthroads experiment`."""
+    """Run `synthroads experiment`; return exit code, scores as JSON data and a printed table."""
     from ml.segmentation.experiment import RESULTS, TABLE, configurations, load_experiment, run_experiment, table
 
     experiment = load_experiment(arguments.experiment)

@@ -19,7 +19,7 @@ from synthroads_addon.base.schema import canonical_json
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of `synthroads forecast`."""
+    """Add the arguments of `synthroads forecast` to its parser."""
     text = "shipped configuration of a segmentation, or a YAML file"
     parser.add_argument("configuration", metavar="CONFIGURATION", help=text)
     text = "steps that are measured (%(default)s)"
@@ -29,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
-    """Run `synthroads forecast`."""
+    """Run `synthroads forecast`; return exit code, figures as JSON data and printed text."""
     if arguments.steps < 1:
         raise InputError("--steps", arguments.steps, "must be 1 or more")
     from ml.segmentation.forecast import forecast
@@ -42,7 +42,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
 
 def summary(found: dict[str, Any]) -> str:
-    """Return how long a training takes, for people."""
+    """Return a forecast as a line of text: hours, steps, seconds per step, device, batch."""
     return (
         f"{found['hours']:,.1f} hours for {found['steps']:,} steps of {found['seconds_per_step']:.2f} s, on "
         f"{found['device']} with {found['threads']} threads ({found['tiles']:,} tiles, "

@@ -12,7 +12,7 @@ from headless.messages import logger
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of `synthroads gallery`."""
+    """Add the arguments of `synthroads gallery` to its parser."""
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the pictures")
     parser.add_argument("--only", default="", metavar="TEXT", help="only pictures whose name contains this (all)")
     parser.add_argument("--width", type=int, default=1280, metavar="N", help="width of a picture, pixels (1280)")
@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
-    """Run `synthroads gallery`."""
+    """Run `synthroads gallery`; return exit code, paths of the pictures as JSON data and printed text."""
     from synthroads_addon.blender.views.gallery import Quality, make_gallery
 
     quality = Quality((arguments.width, arguments.width * 9 // 16), arguments.samples)

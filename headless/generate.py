@@ -36,7 +36,7 @@ _FIELDS = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of `synthroads generate`."""
+    """Add the arguments of `synthroads generate` to its parser."""
     names = ", ".join(scenario_names())
     text = f"{names}, or a .json file (%(default)s)"
     parser.add_argument("--scenario", default="rq31-600m", metavar="NAME_OR_FILE", help=text)
@@ -56,7 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
-    """Run `synthroads generate`."""
+    """Run `synthroads generate`; return exit code, the job's report as JSON data and printed text."""
     begun = time.perf_counter()
     scenario = load_scenario(arguments.scenario, [*choice_changes(arguments), *all_changes(arguments, _FIELDS)])
     detail("scenario", scenario.to_dict())
@@ -69,7 +69,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
 
 def summary(report: dict[str, Any], output: Path) -> str:
-    """Return the report for people: what was made, how long each stage took, where it lies."""
+    """Return a job's report as text: warnings, choice, points, seconds and memory of each stage, output folder."""
     counts = report.get("counts", {})
     lines = [*(f"warning: {text}" for text in report.get("warnings", [])), *choice_summary(report)]
     if "axis" in report:

@@ -36,7 +36,7 @@ _OWNERS: dict[str, Callable[[], Any]] = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of `synthroads list`."""
+    """Add the arguments of `synthroads list` to its parser."""
     text = f"{', '.join(KINDS)}, or {_FIELDS}: what --set takes (the kinds themselves)"
     parser.add_argument("kind", nargs="?", metavar="KIND", help=text)
     text = "only names (of fields: paths) that begin so; or files of your own, or folders of them (all that is shipped)"
@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
-    """Run `synthroads list`."""
+    """Run `synthroads list`; return exit code, the listed entries as JSON data and a printed table."""
     words = [*filter(None, [arguments.kind]), *arguments.names]  # after an option all of them are names
     name, *names = words or [None]
     if name != _FIELDS and arguments.of != "scenario":
@@ -88,7 +88,7 @@ def _fields(owner: str, wanted: Sequence[str]) -> Outcome:
 
 
 def _row(one: FieldEntry) -> tuple[str, str, str]:
-    """Return the cells of a field; an interval's two fields stand in one line."""
+    """Return the table cells (path, default, meaning) of a field; an interval's two fields share one row."""
     if one.interval:
         given = f"{one.default['minimum']:g} to {one.default['maximum']:g} {one.unit}" if one.default else ""
         return f"{one.path}.{{minimum,maximum}}", given.strip(), f"{one.description} [two numbers{_in(one.unit)}]"

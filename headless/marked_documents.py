@@ -14,7 +14,7 @@ FIELD = "--document"
 
 
 def replace_tables(document: str, tables: Mapping[str, str]) -> str:
-    """Return a document with new text between the markers of the named tables; all else stays.
+    """Return a document's text with the text between the markers of the named tables replaced.
 
     Raises:
         InputError: a table has no markers in it, or more than one pair.
@@ -28,8 +28,8 @@ def replace_tables(document: str, tables: Mapping[str, str]) -> str:
     return document
 
 
-def fill(document: Path | None, names: Iterable[str], make: Callable[[], Mapping[str, str]]) -> Mapping[str, str]:
-    """Make tables and write them into a document, of which it is known before the work that it has room for them.
+def put_tables(document: Path | None, names: Iterable[str], make: Callable[[], Mapping[str, str]]) -> Mapping[str, str]:
+    """Make tables and write them between a document's markers, which are checked first; return the tables by name.
 
     Args:
         document: Markdown with markers; None: nothing is written.

@@ -33,7 +33,7 @@ _endings: list[Callable[[], None]] = []
 
 @contextmanager
 def messages(arguments: argparse.Namespace) -> Iterator[None]:
-    """Show the messages that the flags ask for while a command works; at the end its progress is gone."""
+    """Context that logs to standard error as a command's flags say, and removes its progress display at the end."""
     set_up(arguments)
     begun = time.perf_counter()
     if logger.isEnabledFor(logging.DEBUG):
@@ -49,7 +49,7 @@ def messages(arguments: argparse.Namespace) -> Iterator[None]:
 
 
 def set_up(arguments: argparse.Namespace) -> None:
-    """Let those messages through that the flags ask for."""
+    """Set the logger's output to standard error and its level to what ``--quiet`` and ``--verbose`` ask for."""
     logger.handlers[:] = [logging.StreamHandler(sys.stderr)]
     logger.propagate = False
     verbose = getattr(arguments, "verbose", False)
@@ -57,7 +57,7 @@ def set_up(arguments: argparse.Namespace) -> None:
 
 
 def detail(name: str, data: Mapping[str, Any]) -> None:
-    """Show settings, as one line of JSON, with ``--verbose``."""
+    """Log named settings as one line of JSON at debug level, shown with ``--verbose``."""
     if logger.isEnabledFor(logging.DEBUG):
         logger.debug("%s: %s", name, json.dumps(data, default=str))
 
@@ -71,17 +71,17 @@ def _versions() -> Iterator[str]:
 
 
 def progress_bar(arguments: argparse.Namespace) -> Progress:
-    """Return the progress that suits the flags: a bar in a terminal, lines elsewhere, nothing with ``--quiet``."""
+    """Return a progress callback: a bar in a terminal, log lines elsewhere, nothing with ``--quiet``."""
     if arguments.quiet:
         return silent
     set_up(arguments)  # for those that aren't run by `headless.commands.run`
     verbose = logger.isEnabledFor(logging.DEBUG)
-    shown = _bar() if sys.stderr is not None and sys.stderr.isatty() else _Lines(0.0 if verbose else PATIENCE)
-    return _StageTimes(shown) if verbose else shown
+    shown = _bar() if sys.stderr is not None and sys.stderr.isatty() else _LineProgress(0.0 if verbose else PATIENCE)
+    return _StageTimeProgress(shown) if verbose else shown
 
 
-class _Lines:
-    """Progress for a file: a line for each stage that is new, and one every `INTERVAL` seconds.
+class _LineProgress:
+    """Progress callback that logs a line for each new stage, and one every `INTERVAL` seconds.
 
     What is over within `PATIENCE` seconds shows none, so that wrong input stays a single line.
     """
@@ -116,8 +116,8 @@ class _Lines:
             self._held = None
 
 
-class _StageTimes:
-    """Passes progress on, and says when a stage begins and how long it took."""
+class _StageTimeProgress:
+    """Progress callback that logs each stage's beginning and duration, and calls another one."""
 
     def __init__(self, shown: Progress) -> None:
         self._shown = shown

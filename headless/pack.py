@@ -18,7 +18,7 @@ _LIMITS = {"voxel": (0.02, 10.0), "corridor": (5.0, 1000.0), "limit_mb": (0.5, 1
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of `synthroads pack`."""
+    """Add the arguments of `synthroads pack` to its parser."""
     parser.add_argument("source", type=Path, metavar="DATASET", help="data set, or another source of labelled points")
     parser.add_argument("--split", metavar="NAME", help="split to pack (all)")
     parser.add_argument("--output", required=True, type=Path, metavar="FILE", help="file to write, .npz")
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
-    """Run `synthroads pack`."""
+    """Run `synthroads pack`; return exit code, figures of the file as JSON data and printed text."""
     _check(arguments)
     from ml.data.pack import choose_tiles, pack_summary, packed_tiles
     from ml.data.packed import write_pack
@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
 
 def _check(arguments: argparse.Namespace) -> None:
-    """Raise `InputError` where an option can't be kept to, before hours of work."""
+    """Raise an InputError or OutputError if an option is out of range or the file exists, before hours of work."""
     if arguments.output.suffix != ".npz":
         raise InputError("--output", str(arguments.output), "must end in .npz")
     if arguments.output.exists() and not arguments.overwrite:
@@ -63,7 +63,7 @@ def _check(arguments: argparse.Namespace) -> None:
 
 
 def contents(packed: dict[str, Any]) -> str:
-    """Return what a packed file holds, for people."""
+    """Return a line of text on a packed file: size, tiles, scenes, points and crops."""
     return (
         f"{packed['bytes'] / 1e6:.1f} MB with {packed['tiles']:,} tiles of {packed['scenes']:,} scenes, "
         f"{packed['points']:,} points ({packed['bytes_per_point']:.2f} bytes each), which are {packed['crops']:,} crops"

@@ -25,7 +25,7 @@ _FIELDS = {
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of `synthroads parameters`."""
+    """Add the arguments of `synthroads parameters` to its parser."""
     parser.add_argument("--seed", type=int, metavar="N", help=f"seed of the first set ({Scenario().seed})")
     parser.add_argument("--count", type=int, metavar="K", help="write K sets of consecutive seeds, one per line")
     usual, sections = next(iter(USUAL_SECTION)), ", ".join(STANDARD_CROSS_SECTIONS)
@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
-    """Run `synthroads parameters`."""
+    """Run `synthroads parameters`; return exit code, parameters as JSON data, and text or an iterator of lines."""
     data: Any = {}
     for change in all_changes(arguments, _FIELDS):
         data = apply_change(data, change)

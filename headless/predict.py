@@ -13,7 +13,7 @@ from headless.train import summary
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of `synthroads predict`."""
+    """Add the arguments of `synthroads predict` to its parser."""
     parser.add_argument("run", type=Path, metavar="RUN", help="folder of a trained run")
     parser.add_argument("cloud", type=Path, metavar="CLOUD", help="cloud to read (.laz, .las, .ply, ...)")
     text = "labelled cloud (.laz, .las) for segmentation, centreline (.geojson) for a centreline model"
@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
-    """Run `synthroads predict`."""
+    """Run `synthroads predict`; return exit code, metrics as JSON data and printed text."""
     from ml.runs import Run
     from ml.tasks import Prediction, task
 

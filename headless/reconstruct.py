@@ -33,7 +33,7 @@ _TOLERANCES = (0.005, 1.0)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of `synthroads reconstruct`."""
+    """Add the arguments of `synthroads reconstruct` to its parser."""
     parser.add_argument("cloud", type=Path, metavar="CLOUD", help="cloud to read (.laz, .las, .ply, .e57, .npz)")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the files")
     text = "kind of road, where it is known (auto: found out)"
@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
-    """Run `synthroads reconstruct`."""
+    """Run `synthroads reconstruct`; return exit code (3 if doubtful), report as JSON data and printed text."""
     tolerance = arguments.fit_tolerance
     if not _TOLERANCES[0] <= tolerance <= _TOLERANCES[1]:
         raise InputError("--fit-tolerance", tolerance, f"must be from {_TOLERANCES[0]:g} to {_TOLERANCES[1]:g} m")
@@ -77,7 +77,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
 
 def _comparison(truth: Path | None) -> Callable[[RoadParameters], dict[str, Any]] | None:
-    """Return what compares a found road with the truth of a file, read now: before hours of work."""
+    """Read a file's true parameters or axis, and return a function that compares a road with it; None without one."""
     if truth is None:
         return None
     from synthroads_addon.reconstruction.comparison import compare, compare_axis
@@ -114,7 +114,7 @@ def _options(arguments: argparse.Namespace, cloud: RoadCloud, folder: Path) -> O
 
 
 def _write(found: Reconstruction, cloud: RoadCloud, folder: Path, no_picture: bool) -> dict[str, Any]:
-    """Write parameters, centreline and picture; return the report."""
+    """Write parameters, centreline and picture into a folder; return the report as JSON data."""
     from synthroads_addon.reconstruction.report import report
     from synthroads_addon.road.centerline import centerline_geojson
     from synthroads_addon.road.geometry import RoadGeometry
@@ -134,7 +134,7 @@ def _write(found: Reconstruction, cloud: RoadCloud, folder: Path, no_picture: bo
 
 
 def summary(result: dict[str, Any], output: Path) -> str:
-    """Return what was found, for people."""
+    """Return a reconstruction's report as text: alignment, widths, objects, doubts, comparison with the truth."""
     section, line = result["section"], result["centreline"]
     off, std = 100.0 * line["from_alignment"]["rms"], 100.0 * line["std"]["mean"]
     lines = [f"{result['road']} carriageway of {result['length']:.0f} m, alignment of {line['elements']} elements"]

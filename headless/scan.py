@@ -41,7 +41,7 @@ _SAME = ("output", "scene", "path", "classes", "road", "epsg", "origin", "up", "
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of `synthroads scan`."""
+    """Add the arguments of `synthroads scan` to its parser."""
     names = ", ".join(scenario_names())
     parser.add_argument("scene", type=Path, metavar="SCENE", help="file with the scene")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the files")
@@ -76,7 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
-    """Run `synthroads scan`."""
+    """Run `synthroads scan`; return exit code, the job's report as JSON data and printed text."""
     begun = time.perf_counter()
     scenario = scenario_of(arguments)
     detail("scenario", scenario.to_dict())
@@ -89,7 +89,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
 
 def scenario_of(arguments: argparse.Namespace) -> Scenario:
-    """Return the scenario that the arguments stand for."""
+    """Return the scenario that the command line's arguments describe."""
     changes = [*choice_changes(arguments), *all_changes(arguments, _FIELDS)]
     if arguments.trajectory:
         for name in ("height", "speed"):
@@ -106,7 +106,7 @@ def scenario_of(arguments: argparse.Namespace) -> Scenario:
 
 
 def summary(report: dict[str, Any], output: Path) -> str:
-    """Return the report for people: that of `synthroads generate`, with classes and warnings."""
+    """Return the report as text: number of points by class, then the summary of `synthroads generate`."""
     counts = report["counts"]
     rows = sorted(counts["points_by_class"].items(), key=lambda row: -row[1])
     lines = [f"  {name:<20} {number:>12,} points" for name, number in rows]

@@ -28,7 +28,7 @@ _DEATH_SIGNAL = 1
 
 
 def supervise() -> None:
-    """Go on in a copy of this process; this one waits for it, cleans up, and ends with its exit code.
+    """Fork: go on in the child; the parent waits, cleans up if the child is killed, and ends with its exit code.
 
     An end by the system is told in a line, as exit code 2 where memory is short and 1 where it isn't. Within Blender,
     and beside other threads, of which a copy would have none, nothing is done.
@@ -36,29 +36,29 @@ def supervise() -> None:
     if "bpy" in sys.modules or threading.active_count() > 1:
         return
     journal = os.memfd_create("synthroads")
-    spoken = _Spoken()
+    spoken = _ErrorPipe()
     handlers = {number: signal.getsignal(number) for number in ENDS}
     signal.pthread_sigmask(signal.SIG_BLOCK, ENDS)
     child = os.fork()
     if child:
-        _wait(child, spoken, journal)
-    _die_with(os.getppid())
-    spoken.speak()
+        _wait_and_exit(child, spoken, journal)
+    _die_with_parent(os.getppid())
+    spoken.redirect()
     record_folders_in(journal)
     for number, handler in handlers.items():
         signal.signal(number, handler)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDS)
 
 
-def _die_with(parent: int) -> None:
-    """Have the system kill this process when its parent ends, which may have happened already."""
+def _die_with_parent(parent: int) -> None:
+    """Have Linux kill this process when its parent ends; end at once if it has ended already."""
     ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
     if os.getppid() != parent:
         os._exit(130)
 
 
-def _wait(child: int, spoken: _Spoken, journal: int) -> NoReturn:
-    """Wait for the process that does the work, and end as it did."""
+def _wait_and_exit(child: int, spoken: _ErrorPipe, journal: int) -> NoReturn:
+    """Wait for the child, passing on signals and errors, and end this process with the child's exit code."""
 
     def hand_on(number: int, _: object) -> None:
         with suppress(ProcessLookupError):
@@ -68,7 +68,7 @@ def _wait(child: int, spoken: _Spoken, journal: int) -> NoReturn:
         if signal.getsignal(number) != signal.SIG_IGN:
             signal.signal(number, hand_on)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDS)
-    listening = threading.Thread(target=spoken.listen, daemon=True)
+    listening = threading.Thread(target=spoken.pass_on, daemon=True)
     listening.start()
     _, status = os.waitpid(child, 0)
     listening.join(1.0)  # a process that the work has begun may still hold the other end
@@ -84,7 +84,7 @@ def _wait(child: int, spoken: _Spoken, journal: int) -> NoReturn:
 
 
 def _memory_is_short(number: int, said: str) -> bool:
-    """Return whether a process that was ended by a signal probably had too little memory."""
+    """Return whether a process that a signal ended probably lacked memory, by signal, limits and output."""
     limits = [resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_DATA)]
     limited = any(limit != resource.RLIM_INFINITY for limit in limits)
     return number == signal.SIGKILL or limited or any(sign in said for sign in LOSSES)
@@ -102,8 +102,8 @@ def _say(text: str) -> None:
         os.write(2, text.encode(errors="backslashreplace"))
 
 
-class _Spoken:
-    """A pipe for what libraries write on standard error: handed on, but for what they say of the end that they make.
+class _ErrorPipe:
+    """Pipe for what native libraries write to standard error: passed on, except from their last message before a crash.
 
     Attributes:
         held: what wasn't handed on.
@@ -113,8 +113,8 @@ class _Spoken:
         self.held = ""
         self._hear, self._say = os.pipe()
 
-    def speak(self) -> None:
-        """Have libraries in this process write into the pipe, and Python to where standard error was."""
+    def redirect(self) -> None:
+        """In the child, redirect file descriptor 2 into the pipe; Python's ``sys.stderr`` keeps the terminal."""
         os.close(self._hear)
         with suppress(OSError):  # there is no standard error
             sys.stderr.flush()
@@ -123,8 +123,8 @@ class _Spoken:
             sys.stderr = os.fdopen(terminal, "w", buffering=1, encoding=sys.stderr.encoding, errors="backslashreplace")
         os.close(self._say)
 
-    def listen(self) -> None:
-        """Hand on line by line what the others write until all of them have ended."""
+    def pass_on(self) -> None:
+        """In the parent, pass on the child's lines until it ends; from a crash message on, keep them in `held`."""
         os.close(self._say)
         with os.fdopen(self._hear, encoding="utf-8", errors="backslashreplace") as lines:
             for line in lines:

@@ -13,7 +13,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.commands import Outcome, entry
-from headless.marked_documents import fill
+from headless.marked_documents import put_tables
 from headless.messages import progress_bar
 from headless.tradeoff_plot import plot
 from headless.tradeoff_table import markdown
@@ -22,7 +22,7 @@ from synthroads_addon.base.files import write_file
 from synthroads_addon.base.progress import Progress
 from synthroads_addon.base.schema import canonical_json, read_json
 from synthroads_addon.base.version import generator
-from synthroads_addon.jobs.measure.tradeoff import KNOBS, REPEATED, SCENES, row_scenario, rows
+from synthroads_addon.jobs.measure.tradeoff import KNOBS, REPEATED, SCENES, knob_rows, row_scenario
 from synthroads_addon.scenario.scenario import load_scenario
 
 _ROW = "--row"
@@ -33,7 +33,7 @@ _TABLE = "tradeoff {}"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of `synthroads tradeoff`."""
+    """Add the arguments of `synthroads tradeoff` to its parser."""
     scenes = ", ".join(SCENES)
     parser.add_argument(
         "--scenario", action="append", metavar="NAME_OR_FILE", help=f"scene to measure on; can be repeated ({scenes})"
@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
-    """Run `synthroads tradeoff`; each row is measured in a process of its own, so that its memory is its own."""
+    """Run `synthroads tradeoff`, each row in its own process; return exit code, rows as JSON data, printed tables."""
     if arguments.row:
         from synthroads_addon.jobs.measure.rows import measure_row
 
@@ -71,12 +71,12 @@ def run(arguments: argparse.Namespace) -> Outcome:
             _write(arguments, title, results_of_scene, tables[_TABLE.format(title)])
         return tables
 
-    tables = fill(arguments.document, map(_TABLE.format, titles.values()), measure)
+    tables = put_tables(arguments.document, map(_TABLE.format, titles.values()), measure)
     return 0, {"scenes": results}, "\n".join([*tables.values(), f"written to {arguments.output}"])
 
 
 def _check_request(arguments: argparse.Namespace, scenes: Sequence[str]) -> dict[str, str]:
-    """Refuse what can't be done before hours of work; return what the files of each scene are called."""
+    """Raise an error if the request can't be done, before hours of work; return the files' title by scene."""
     titles = {scene: Path(scene).stem for scene in scenes}
     for scene in scenes:
         load_scenario(scene)
@@ -103,11 +103,11 @@ def _part(progress: Progress, number: int, count: int) -> Progress:
 
 
 def _measure_all(arguments: argparse.Namespace, scene: str, title: str, progress: Progress) -> list[dict[str, Any]]:
-    """Return the rows of the wanted knobs and those that were measured before, in the order of `KNOBS`."""
-    chosen = set(rows(arguments.knobs))
+    """Measure the rows of the wanted knobs; return these and kept rows of others, in the order of `KNOBS`."""
+    chosen = set(knob_rows(arguments.knobs))
     results = []
-    for number, (knob, value) in enumerate(rows(KNOBS)):
-        progress(f"{title} {knob} {value}", number / len(list(rows(KNOBS))))
+    for number, (knob, value) in enumerate(knob_rows(KNOBS)):
+        progress(f"{title} {knob} {value}", number / len(list(knob_rows(KNOBS))))
         path = arguments.output / _ROWS / title / f"{knob}-{_file_name(value)}.json"
         job = _fingerprint(scene, knob, value)
         result = _read_kept_row(path, job) if arguments.resume else None
@@ -124,13 +124,13 @@ def _file_name(value: Any) -> str:
 
 
 def _fingerprint(scene: str, knob: str, value: Any) -> str:
-    """Return what a row was measured of and with: one of another job is not kept."""
+    """Return a hash of a row's scenario and the program's version, to recognise rows measured for the same job."""
     changed = row_scenario(scene, knob, value).to_json()
     return hashlib.sha256(f"{generator()} {changed}".encode()).hexdigest()
 
 
 def _read_kept_row(path: Path, job: str) -> dict[str, Any] | None:
-    """Return the row of this job that was measured before, if there is one; another Blender may have what it lacked."""
+    """Return a row measured earlier for the same job, or None if there is none or it couldn't be measured."""
     if not path.exists():
         return None
     data = read_json(path)
@@ -141,7 +141,7 @@ def _read_kept_row(path: Path, job: str) -> dict[str, Any] | None:
 
 
 def _measure_row(scene: str, knob: str, value: Any) -> dict[str, Any]:
-    """Measure a row, those of some knobs several times: the fastest is returned, with the times of all."""
+    """Measure a row, as often as `REPEATED` says; return the fastest, with the seconds of all in `all_seconds`."""
     several = [_measured_once(scene, knob, value) for _ in range(REPEATED.get(knob, 1))]
     if len(several) == 1 or "left_out" in several[0]:
         return several[0]

@@ -15,7 +15,7 @@ _DECADES = 30.0
 
 
 def plot(results: Sequence[Row], path: Path) -> None:
-    """Draw error against time; the rows of one knob are joined, the presets are stars.
+    """Draw rows as errors against seconds into an image file, one panel per kind of error; presets are stars.
 
     Raises:
         InputError: matplotlib is missing.
@@ -40,7 +40,7 @@ def plot(results: Sequence[Row], path: Path) -> None:
         for knob in sorted(_knobs(measured), key=_ORDER.index):
             if _varies(measured, knob, name):
                 shown[_label(knob)] = _draw_knob(axis, [row for row in measured if row["knob"] == knob], knob, name)
-        _scale(axis, [abs(row["errors"][name]) for row in measured if name in row["errors"]])
+        _set_scales(axis, [abs(row["errors"][name]) for row in measured if name in row["errors"]])
         axis.set(xlabel="processor time of the whole job (s)", ylabel=ROW_TITLES[name])
         axis.grid(alpha=0.3)
     if shown:
@@ -49,8 +49,8 @@ def plot(results: Sequence[Row], path: Path) -> None:
     pyplot.close(figure)
 
 
-def _scale(axis: Any, errors: Sequence[float]) -> None:
-    """Make time logarithmic, and the error where it spans decades: linear below the smallest, to show exact ones."""
+def _set_scales(axis: Any, errors: Sequence[float]) -> None:
+    """Set an axis to logarithmic time, and to a symmetric-log error scale where errors span decades."""
     from matplotlib.ticker import LogLocator, NullFormatter
 
     axis.set_xscale("log")
@@ -81,7 +81,7 @@ def _whole_job(knob: str) -> bool:
 
 
 def _varies(measured: Sequence[Row], knob: str, name: str) -> bool:
-    """Return whether a knob changes a kind of error, so that it can be seen: a flat line says nothing."""
+    """Return whether a knob changes a kind of error visibly; presets always count if they have the error."""
     errors = [abs(row["errors"][name]) for row in measured if row["knob"] == knob and name in row["errors"]]
     if _whole_job(knob):
         return bool(errors)
@@ -97,7 +97,7 @@ def _spans_decades(errors: Sequence[float]) -> bool:
 
 
 def _draw_knob(axis: Any, rows_of_knob: Sequence[Row], knob: str, name: str) -> Any:
-    """Draw the rows of a knob as points with their values beside them, most joined by a line; return its handle."""
+    """Draw a knob's rows as labelled points, joined by a line unless they are presets; return the plot handle."""
     preset = knob == "fidelity"
     style = "*" if preset else "x" if _whole_job(knob) else "o-"
     colour = "black" if preset else "0.55" if _whole_job(knob) else f"C{_ORDER.index(knob) % 10}"

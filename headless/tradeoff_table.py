@@ -44,12 +44,12 @@ TABLES: dict[str, tuple[str, ...]] = {
 
 
 def measured_rows(results: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Return the rows that this Blender could measure."""
+    """Return the rows without those that couldn't be measured in this Blender."""
     return [row for row in results if "left_out" not in row]
 
 
 def time_noise(results: Iterable[Mapping[str, Any]]) -> float | None:
-    """Return the measured noise of the times: how far those of one row are apart, as a share of their mean.
+    """Return the largest relative spread of the seconds of repeated rows, (max - min) / mean; None without any.
 
     The largest such spread of the rows that were measured `REPEATED` times; None if there is none.
     """
@@ -58,7 +58,7 @@ def time_noise(results: Iterable[Mapping[str, Any]]) -> float | None:
 
 
 def better_row(row: Mapping[str, Any], others: Iterable[Mapping[str, Any]], noise: float) -> Mapping[str, Any] | None:
-    """Return a row that is faster than `row`, beyond the noise of time, and as accurate in all errors.
+    """Return the fastest row that beats `row` in time beyond the noise and is as accurate in all errors, or None.
 
     Errors count as equal up to `ALIKE`. The fastest such row; None if there is none, so that `row` lies on the front.
     """
@@ -71,7 +71,7 @@ def better_row(row: Mapping[str, Any], others: Iterable[Mapping[str, Any]], nois
 
 
 def front_lines(results: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Return a table of the presets that says of each whether it lies on the front; nothing without presets."""
+    """Return a Markdown table of which presets lie on the Pareto front; empty without presets."""
     job = [row for row in measured_rows(results) if KNOBS[row["knob"]].table == "presets"]
     presets = [row for row in job if row["knob"] == "fidelity"]
     if not presets:
@@ -91,7 +91,7 @@ def front_lines(results: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def markdown(results: Sequence[Mapping[str, Any]], scenario: str) -> str:
-    """Return the tables of rows by `jobs.measure.rows.measure_row`, and what was left out of them and why."""
+    """Return rows of `jobs.measure.rows.measure_row` as Markdown tables, with the reasons for rows left out."""
     machines = dict.fromkeys(row["machine"] for row in results if "machine" in row)
     lines = [f"Scene `{scenario}`: `synthroads tradeoff --scenario {scenario} --output DIR`; {'; '.join(machines)}", ""]
     for table, costs in TABLES.items():
@@ -112,7 +112,7 @@ def markdown(results: Sequence[Mapping[str, Any]], scenario: str) -> str:
 
 
 def _table(measured: Sequence[Mapping[str, Any]], costs: tuple[str, ...]) -> list[str]:
-    """Return a table's lines; it has a column for each of its costs, and for each error that one of its rows has."""
+    """Return the lines of a Markdown table of rows, with columns for costs and for each error that a row has."""
     errors = [name for name in ROW_TITLES if any(name in row["errors"] for row in measured)]
     shares = [name for name in costs if name in _SHARES and any(name in row["shares"] for row in measured)]
     plain = [name for name in costs if name in _COSTS]

@@ -13,7 +13,7 @@ from ml.configuration import SHIPPED, load_configuration, names_in
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of `synthroads train`."""
+    """Add the arguments of `synthroads train` to its parser."""
     known = ", ".join(names_in(SHIPPED))
     parser.add_argument("configuration", metavar="CONFIGURATION", help=f"YAML file, or one of {known}")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the run")
@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
-    """Run `synthroads train`."""
+    """Run `synthroads train`; return exit code, metrics as JSON data and printed text."""
     from ml.runs import Run
     from ml.tasks import task
 
@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
 
 def summary(metrics: dict[str, object]) -> str:
-    """Return the plain numbers of some metrics as one line of text."""
+    """Return the scalar metrics as one line of text, `name value, ...`; other metrics are left out."""
     numbers = {name: value for name, value in metrics.items() if isinstance(value, (int, float))}
     return ", ".join(f"{name} {value:.4g}" for name, value in numbers.items())
 

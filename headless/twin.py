@@ -30,7 +30,7 @@ _LIMITS = (1e-4, 1.0)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of `synthroads twin`."""
+    """Add the arguments of `synthroads twin` to its parser."""
     parser.add_argument("parameters", type=Path, metavar="PARAMETERS", help="parameter set (parameters.json)")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the files")
     add_twin_argument(parser, TWIN_FORMATS)
@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
-    """Run `synthroads twin`."""
+    """Run `synthroads twin`; return exit code, files and losses as JSON data, and printed text."""
     deviation = arguments.max_deviation
     if not _LIMITS[0] <= deviation <= _LIMITS[1]:
         raise InputError("--max-deviation", deviation, f"must be from {_LIMITS[0]:g} to {_LIMITS[1]:g} m")
@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     reports = {name: arguments.output / report_file_name(name) for name in formats}
     lost = {name: _read_losses(path) for name, path in reports.items()}
     result = {"files": _texts(files), "reports": _texts(reports), "lost": lost}
-    return 0, result, "\n".join(f"{_written(path)}\n{_told(reports[name], lost[name])}" for name, path in files.items())
+    return 0, result, "\n".join(f"{_written(path)}\n{_line(reports[name], lost[name])}" for name, path in files.items())
 
 
 def _texts(paths: dict[str, Path]) -> dict[str, str]:
@@ -66,7 +66,7 @@ def _texts(paths: dict[str, Path]) -> dict[str, str]:
 
 
 def _read_losses(report: Path) -> dict[str, int]:
-    """Return for how many instance numbers a file has nothing, by the reasons."""
+    """Return the number of instance numbers without an entity in a file, by reason, from its report."""
     return Counter(row["reason"] for row in read_json(report)["lost"])
 
 
@@ -74,8 +74,8 @@ def _written(path: Path) -> str:
     return f"written {path} ({path.stat().st_size / 1e6:.2f} MB)"
 
 
-def _told(report: Path, lost: dict[str, int]) -> str:
-    """Return what a report says of a file, in short."""
+def _line(report: Path, lost: dict[str, int]) -> str:
+    """Return a line of text on a format's report: its file name, and how many instances are missing and why."""
     nothing = "; ".join(f"{count} not: {reason}" for reason, count in lost.items())
     return f"        {report.name}: what became of each instance number{f'; {nothing}' if nothing else ''}"
 

@@ -9,8 +9,8 @@ CELLS = 1000
 """Cells along either side: two million triangles."""
 
 
-def waves(cells: int = CELLS) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-    """Return vertices (V, 3) of z = 0.2 sin x cos y, and triangles (2 cells^2, 3)."""
+def wave_mesh(cells: int = CELLS) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """Return vertices (V, 3) of z = 0.2 sin x cos y over 100 m x 100 m, m, and triangles (2 cells^2, 3)."""
     x = np.linspace(-50.0, 50.0, cells + 1)
     grid = np.stack(np.meshgrid(x, x), axis=-1).reshape(-1, 2)
     vertices = np.column_stack([grid, 0.2 * np.sin(grid[:, 0]) * np.cos(grid[:, 1])]).astype(np.float32)
@@ -21,8 +21,8 @@ def waves(cells: int = CELLS) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
 
 
 def write_waves(path: Path, cells: int = CELLS) -> int:
-    """Write the waves as .obj with z up; return the number of triangles."""
-    vertices, triangles = waves(cells)
+    """Write the mesh of waves as an .obj file with z up; return the number of triangles."""
+    vertices, triangles = wave_mesh(cells)
     with path.open("w", encoding="ascii") as file:
         np.savetxt(file, vertices, fmt="v %.6f %.6f %.6f")
         np.savetxt(file, triangles + 1, fmt="f %d %d %d")

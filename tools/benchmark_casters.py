@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.waves import waves
+from headless.waves import wave_mesh
 from synthroads_addon.base.progress import peak_memory_mb
 from synthroads_addon.base.random_streams import stream
 from synthroads_addon.blender.casters.bvhtree import BVHTreeCaster
@@ -75,7 +75,7 @@ def demo_scene() -> tuple[SceneMesh, Flight]:
 
 def waves_scene() -> tuple[SceneMesh, Flight]:
     """Return a mesh of 2 million triangles over 100 m x 100 m, z = 0.2 sin x cos y, and the flight over it."""
-    vertices, triangles = waves()
+    vertices, triangles = wave_mesh()
     mesh = bare_mesh(vertices, triangles)
     station = np.arange(-40.0, 40.0, LINE_SPACING)
     # Askew to the grid: rays that run along its lines would tell nothing but which face owns an edge.

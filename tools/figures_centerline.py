@@ -29,7 +29,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from headless.marked_documents import fill  # noqa: E402
+from headless.marked_documents import put_tables  # noqa: E402
 from ml.centerline.predictor import CenterlinePredictor  # noqa: E402
 from ml.configuration import Part  # noqa: E402
 from ml.data.batches import DataOptions  # noqa: E402
@@ -560,7 +560,7 @@ def main(words: Sequence[str] | None = None) -> None:
     """Measure as the command line says, fill the document's tables and print them."""
     arguments = arguments_of(words)
     try:
-        found = fill(arguments.document, expected_tables(arguments), lambda: measured_tables(arguments))
+        found = put_tables(arguments.document, expected_tables(arguments), lambda: measured_tables(arguments))
     except SynthRoadsError as error:
         raise SystemExit(str(error)) from None
     for name, text in found.items():

@@ -21,7 +21,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from headless.marked_documents import fill  # noqa: E402
+from headless.marked_documents import put_tables  # noqa: E402
 from ml.data.pack import CROP, pack_summary  # noqa: E402
 from ml.data.packed import PackReader  # noqa: E402
 from ml.data.sources import Source  # noqa: E402
@@ -165,7 +165,7 @@ def main(words: Sequence[str] | None = None) -> None:
     """Make the tables that the command line asks for, fill the document's and print them."""
     arguments = arguments_of(words)
     try:
-        found = fill(arguments.document, expected_tables(arguments), lambda: tables(arguments))
+        found = put_tables(arguments.document, expected_tables(arguments), lambda: tables(arguments))
     except SynthRoadsError as error:
         raise SystemExit(str(error)) from None
     for name, text in found.items():

@@ -23,7 +23,7 @@ from .scan.plan import check_scan
 
 @dataclass
 class Job:
-    """Request to `generate`.
+    """Request to `generate`: scenario, output folder, and optionally a given road or axis.
 
     Attributes:
         scenario: limits, scan, fidelity and outputs.
@@ -46,7 +46,7 @@ class Job:
 
 @dataclass(frozen=True)
 class RoadSource:
-    """Where a job's road comes from: its limits alone, a parameter set, or a measured axis; see `Job`.
+    """Source of a job's road: random sampling within limits, a parameter set, or a measured axis; see `Job`.
 
     Attributes:
         pictures: folder for the picture of an axis that no road follows; none is drawn if None.
@@ -58,7 +58,7 @@ class RoadSource:
     pictures: Path | None = None
 
     def read(self) -> tuple[RoadParameters, dict[str, Any]]:
-        """Return the road, and what to report of the axis that it was fitted to."""
+        """Return the road's parameters, and a report of the fit to a measured axis (empty without an axis)."""
         scenario = self.scenario
         if self.parameters:
             return read_parameters(self.parameters), {}
@@ -70,7 +70,7 @@ class RoadSource:
 
 
 def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
-    """Run the main job; return the report that is also written to ``report.json``.
+    """Run the main job, from scenario to files; return the report, which is also written to ``report.json``.
 
     Raises:
         AxisRefusedError: no road follows the axis; a picture of the fit is in the output folder.
@@ -82,7 +82,7 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
     files, scene = JobFiles(job.scenario), None
     with output_folder(job.output, files.names, job.overwrite) as folder:
         road, report = make_road(source, timer)
-        refuse_sections(job.scenario, road.length)
+        check_sections(job.scenario, road.length)
         check_asset_classes(job.scenario.cloud.scheme(), road.parameters)
         if set(job.scenario.outputs) & {"scene", *OF_POINTS}:
             from ..blender.files import empty_file  # Blender takes a second to start: other outputs need none
@@ -106,7 +106,7 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
 
 
 def check(job: Job) -> None:
-    """Refuse a job that can't be done before any work starts."""
+    """Raise an InputError for a job that can't be done, before any work starts."""
     scenario = job.scenario
     check_scan(scenario)
     wkt(scenario.road.epsg)
@@ -118,14 +118,14 @@ def check(job: Job) -> None:
 
 
 def make_road(source: RoadSource, timer: StageTimer) -> tuple[RoadGeometry, dict[str, Any]]:
-    """Return the road that a job is about, and what to report of the axis that it was fitted to."""
+    """Return the road's geometry, and a report of the fit to a measured axis (empty without an axis)."""
     with timer.stage("parameters"):
         parameters, axis_report = source.read()
         return RoadGeometry(parameters), axis_report
 
 
-def refuse_sections(scenario: Scenario, length: float) -> None:
-    """Refuse what needs the whole model of a road of a length (m) if the road is built by sections."""
+def check_sections(scenario: Scenario, length: float) -> None:
+    """Raise an InputError if the road is built by sections and the job needs all of its model at once."""
     section = scenario.section_length(length)
     if section is None:
         return

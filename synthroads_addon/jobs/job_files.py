@@ -32,7 +32,7 @@ FILES = {
 
 @dataclass(frozen=True)
 class JobFiles:
-    """The files that a job writes.
+    """The output files of a job: their names, and writers of those that need no Blender scene.
 
     Attributes:
         scenario: the job.
@@ -44,18 +44,18 @@ class JobFiles:
 
     @property
     def outputs(self) -> tuple[Output, ...]:
-        """Return the outputs that are wanted and can be had."""
+        """Return the requested outputs; a job without a road has only those made from points."""
         return tuple(name for name in self.scenario.outputs if self.road or name in OF_POINTS)
 
     @property
     def names(self) -> list[str]:
-        """Return the names of all files, and of the report, which is always written."""
+        """Return the names of all files that the job writes, `report.json` included."""
         files = FILES | {"cloud": self.scenario.cloud.file_names()}
         twins = twin_file_names(self.scenario.twin) if self.road else []
         return [*(name for output in self.outputs for name in files[output]), "report.json", *twins]
 
     def write_road(self, folder: Path, road: RoadGeometry, timer: StageTimer) -> None:
-        """Write the files of a road that need no scene: parameters, centreline and geometric-semantic models."""
+        """Write the road's files that need no scene: parameters, centreline and geometric-semantic models."""
         if "parameters" in self.outputs:
             (folder / "parameters.json").write_text(road.parameters.to_json(), encoding="utf-8")
         tolerance = self.scenario.settings().tolerance
@@ -67,7 +67,7 @@ class JobFiles:
                 write_twin(road.parameters, folder, self.scenario.twin, tolerance, self.scenario.ifc)
 
     def write_report(self, folder: Path, told: dict[str, Any], timer: StageTimer) -> dict[str, Any]:
-        """Write ``report.json`` and return what it holds.
+        """Write ``report.json`` and return its content.
 
         Args:
             folder: for it.
@@ -98,7 +98,7 @@ class JobFiles:
 
 
 def empty_scan_warnings(counts: Mapping[str, Any]) -> list[str]:
-    """Return what to warn of where a scan has no point; nothing where nothing was scanned."""
+    """Return a list with a warning if a scan has no points; empty otherwise, also if nothing was scanned."""
     if counts.get("points", 1):
         return []
     return ["not one pulse came back: is the scene within the scanner's range and field of view?"]

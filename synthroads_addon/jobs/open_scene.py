@@ -25,7 +25,7 @@ from .scan.plan import Site
 
 @dataclass(frozen=True)
 class ForeignScene:
-    """A scene that is there and stays as it is: read, and scanned.
+    """An open scene made elsewhere, which is scanned as it is and never rebuilt.
 
     Attributes:
         site: of its scan.
@@ -38,21 +38,21 @@ class ForeignScene:
     area: ClassVar[float] = 0.0
 
     def rebuild(self, changes: Mapping[str, Any]) -> ScannedScene:
-        """Return the scene, which no change of the model's settings touches."""
+        """Return the scene unchanged: settings of the model don't apply to it."""
         return self.scene
 
-    def choose(self, scenario: Scenario, stands: bool) -> ForeignScene:
-        """Return the scene under a scenario with other settings; see `RoadScene.choose`."""
+    def with_settings(self, scenario: Scenario, stands: bool) -> ForeignScene:
+        """Return a copy with another scenario; `stands` has no effect, see `RoadScene.with_settings`."""
         return replace(self, site=replace(self.site, scenario=scenario))
 
     def scan(self, folder: Path, timer: StageTimer) -> dict[str, Any]:
-        """Scan it and write the cloud and the previews; return the counts as JSON data, see `Site.scan`."""
+        """Scan the scene and write cloud and previews; return the counts as JSON data."""
         return self.site.scan(self.scene, BlenderServices(), folder, timer)
 
 
 @dataclass
 class RoadScene:
-    """A road in the open file: built, read and scanned as a scenario asks for it.
+    """A road as a scene in the open Blender file, which is built, read and scanned by a scenario.
 
     Attributes:
         scenario: the job.
@@ -70,17 +70,17 @@ class RoadScene:
 
     @cached_property
     def site(self) -> Site:
-        """The site of the road's scan."""
+        """Return the site of the road's scan: path, conditions and preview raster; cached."""
         return Site.of_road(self.scenario, self.road)
 
     @property
     def area(self) -> float:
-        """Return the area of the model, m2."""
+        """Return the area of the model in plan, m2: the road's length times the full width of its terrain."""
         terrain = self.road.parameters.terrain
         return 2.0 * (terrain.half_width if terrain else self.scenario.road.half_width) * self.road.length
 
     def build(self) -> RoadModel:
-        """Build the road in place of that before, with the materials of the scenario's own table."""
+        """Build the road's model in the open file, in place of the one before, and return it."""
         settings, parameters = self.scenario.settings(), self.road.parameters
         self.model, self.scene = build_road(parameters, settings.tolerance, settings.vegetation_detail), None
         if self.scenario.materials_table:
@@ -93,7 +93,7 @@ class RoadScene:
         return self.model
 
     def read(self) -> ScannedScene:
-        """Return the open scene, which shows the road, as it is scanned."""
+        """Return the open file's evaluated scene for scanning, cached until the model is rebuilt."""
         if self.scene is None:
             factor, class_ids = self.scenario.scan.traffic_speed_factor, self.scenario.cloud.scheme().source_ids()
             road = self.model.road_id if self.model else self.road_id
@@ -101,27 +101,27 @@ class RoadScene:
         return self.scene
 
     def rebuild(self, changes: Mapping[str, Any]) -> ScannedScene:
-        """Build the model anew with fields of the scenario changed; return its scene."""
+        """Build the model with fields of the scenario changed, and return its scene; the scenario stays as it is."""
         changed = RoadScene(self.scenario.model_copy(update=changes), self.road)
         self.model, self.scene = changed.build(), changed.read()
         return self.scene
 
-    def choose(self, scenario: Scenario, stands: bool) -> RoadScene:
-        """Return the road under a scenario with other settings; ``stands``: the model is theirs already."""
+    def with_settings(self, scenario: Scenario, stands: bool) -> RoadScene:
+        """Return the road under another scenario; model and scene are kept only if ``stands`` says they fit it."""
         return RoadScene(scenario, self.road, *((self.model, self.scene) if stands else ()))
 
     def plan(self) -> ScanPlan:
-        """Return the scan of the scene, see `Site.plan`."""
+        """Return the plan of the scan with every default resolved; builds the ray casters."""
         return self.site.plan(self.read(), BlenderServices())
 
     def scan(self, folder: Path, timer: StageTimer) -> dict[str, Any]:
-        """Scan the scene and write the cloud and the previews; return the counts as JSON data, see `Site.scan`."""
+        """Scan the scene and write cloud and previews; return the counts as JSON data."""
         with timer.stage("scene mesh"):
             scene = self.read()
         return self.site.scan(scene, BlenderServices(), folder, timer)
 
     def write_files(self, folder: Path, timer: StageTimer) -> dict[str, Any]:
-        """Build the model, unless it stands, scan it, and write the files that need it; return the counts."""
+        """Build the model unless it is there, scan it and write the files made from it; return the counts."""
         scenario = self.scenario
         if scenario.section_length(self.road.length) is not None:
             return scan_by_section(self.site, self.road, folder, timer)

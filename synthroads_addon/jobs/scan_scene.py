@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SceneScan:
-    """Request to `scan_scene`.
+    """Request to `scan_scene`: scenario, output folder, scene, and the scanner's path.
 
     Attributes:
         scenario: scan, fidelity and seed; its road is not looked at.
@@ -69,7 +69,7 @@ class SceneScan:
 
 
 def scan_scene(job: SceneScan, progress: Progress = silent) -> dict[str, Any]:
-    """Scan a scene; return the report that is also written to ``report.json``.
+    """Scan a scene made elsewhere into files; return the report, which is also written to ``report.json``.
 
     Raises:
         InputError: an input is wrong or the output can't be written; nothing is left half-written.
@@ -91,7 +91,7 @@ def scan_scene(job: SceneScan, progress: Progress = silent) -> dict[str, Any]:
 
 
 def check_scene_scan(job: SceneScan) -> ClassMapping | None:
-    """Refuse a job that can't be done before any work starts; return the classes by name."""
+    """Raise an InputError for a job that can't be done; return its mapping of names to classes, or None."""
     from ..blender.scene.foreign import check_scene_file  # see `scan_scene`
 
     platform = job.scenario.scan.platform
@@ -123,7 +123,7 @@ def check_scene_scan(job: SceneScan) -> ClassMapping | None:
 def open_and_read(
     job: SceneScan, mapping: ClassMapping | None, timer: StageTimer, report: dict[str, Any]
 ) -> tuple[ScannedScene, RoadGeometry | None, list[str]]:
-    """Open a job's scene and return it as it is scanned, its road, and warnings; report which road that is.
+    """Open a job's scene; return its scanned form, its road (or None) and warnings; adds the road to `report`.
 
     Raises:
         InputError: the file can't be read, there is nothing to scan in it, or it has a road and an origin is given.
@@ -164,7 +164,7 @@ def open_and_read(
 
 
 def scene_site(job: SceneScan, mesh: SceneMesh, road: RoadGeometry | None) -> Site:
-    """Return the site of a scene's scan."""
+    """Return the site of a scene's scan: path, conditions, preview raster if wanted."""
     conditions = ScanConditions.of(road.parameters if road else None)
     if job.epsg is not None:
         conditions = replace(conditions, epsg=job.epsg)
@@ -178,7 +178,7 @@ def scene_site(job: SceneScan, mesh: SceneMesh, road: RoadGeometry | None) -> Si
 
 
 def route_site(scenario: Scenario, route: SceneRoute, mesh: SceneMesh) -> Site:
-    """Return the site of a scan along a way in a scene without a road."""
+    """Return the site of a scan along a route through a scene without a road."""
     view = None
     if "previews" in scenario.outputs:
         low, high = body_bounds(mesh) + mesh.origin
@@ -187,6 +187,6 @@ def route_site(scenario: Scenario, route: SceneRoute, mesh: SceneMesh) -> Site:
 
 
 def warnings_of_counts(counts: dict[str, Any]) -> list[str]:
-    """Return what a user should know of the counts of a scene's scan, in sentences."""
+    """Return warnings about a scene's scan, as sentences: no points, points without class."""
     unlabelled = int(counts["points_by_class"].get("unlabelled", 0))
     return [*empty_scan_warnings(counts), *([f"{unlabelled:,} points have no class"] if unlabelled else [])]

@@ -7,7 +7,7 @@ from ..road.things.thing import Thing
 
 
 def attributes_of(item: RoadObject) -> dict[str, Any]:
-    """Return an object's parameters as JSON data, ``instance`` first; its type is ``object_type``.
+    """Return an object's parameters as JSON data: its `instance` number first, its type as `object_type`.
 
     Furniture and structures have the ``class`` of their points beside it.
     """

@@ -19,7 +19,7 @@ _NO_AREA = 1e-6  # twice the area in plan that a triangle of the ground has at l
 
 @dataclass(frozen=True)
 class Faces:
-    """Polygons without holes, each anticlockwise as seen from its outer (upper) side.
+    """Planar polygons without holes as arrays, each anticlockwise as seen from its outer (upper) side.
 
     Attributes:
         points: (N, 3) local coordinates, m.
@@ -32,12 +32,12 @@ class Faces:
     sizes: Int
 
     def __len__(self) -> int:
-        """Return the number of polygons."""
+        """Return the number of polygons, F."""
         return len(self.sizes)
 
 
-def join_polygons(parts: Sequence[Faces]) -> Faces:
-    """Return all polygons of several parts as one; points stay apart."""
+def join_faces(parts: Sequence[Faces]) -> Faces:
+    """Return all polygons of several parts as one `Faces`, the points concatenated and not merged."""
     if not parts:
         return Faces(np.empty((0, 3)), np.empty(0, np.int64), np.empty(0, np.int64))
     starts = np.cumsum([0, *(len(part.points) for part in parts[:-1])])
@@ -48,22 +48,22 @@ def join_polygons(parts: Sequence[Faces]) -> Faces:
     )
 
 
-def polygons(points: Float, rings: Iterable[Sequence[int]]) -> Faces:
-    """Return polygons given by their corners' indices."""
+def ring_faces(points: Float, rings: Iterable[Sequence[int]]) -> Faces:
+    """Return the polygons whose corners are given as rings of indices into points (N, 3)."""
     listed = [np.asarray(ring, dtype=np.int64) for ring in rings]
     sizes = np.array([len(ring) for ring in listed], dtype=np.int64)
     return Faces(points, np.concatenate(listed), sizes)
 
 
-def compact(faces: Faces) -> Faces:
-    """Return polygons with only the points that they use."""
+def drop_unused_points(faces: Faces) -> Faces:
+    """Return the same polygons with points that no polygon uses removed and the corner indices renumbered."""
     used, corners = np.unique(faces.corners, return_inverse=True)
     return Faces(faces.points[used], corners, faces.sizes)
 
 
-def quads(points: Float, corners: Int) -> Faces:
-    """Return quadrilaterals (Q, 4) of points; those that aren't flat become two triangles each, in their place."""
-    flat = twist(points, corners) <= FLAT
+def quad_faces(points: Float, corners: Int) -> Faces:
+    """Return quadrilaterals (Q, 4 indices) as polygons, those that aren't flat split into two triangles each."""
+    flat = quad_twist(points, corners) <= FLAT
     # Six slots per quadrilateral: the ring of one and two slots left out, or two rings of three.
     slots = np.where(flat[:, None], corners[:, [0, 1, 2, 3, 0, 0]], corners[:, [0, 1, 2, 0, 2, 3]])
     keep = np.ones(slots.shape, dtype=bool)
@@ -72,8 +72,8 @@ def quads(points: Float, corners: Int) -> Faces:
     return Faces(points, slots[keep], np.repeat(np.where(flat, 4, 3), counts))
 
 
-def twist(points: Float, corners: Int) -> Float:
-    """Return how far (Q,) from a quadrilateral's first diagonal plane its last corner lies, m.
+def quad_twist(points: Float, corners: Int) -> Float:
+    """Return how far each quadrilateral is from planar: the distance (Q,) of its two diagonals, m.
 
     A quadrilateral without area (a strip that is nowhere wide there) has none.
     """
@@ -95,21 +95,21 @@ def grid_corners(rows: int, columns: int) -> Int:
     return np.stack([first + 1, first + columns + 1, first + columns, first], axis=1)
 
 
-def halves(corners: Int) -> Int:
-    """Return quadrilaterals (Q, 4) as triangles (2 Q, 3): the first halves, then the second."""
+def split_quads(corners: Int) -> Int:
+    """Return quadrilaterals (Q, 4 indices) split into triangles (2 Q, 3): all first halves, then all second ones."""
     return np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
 
 
 def upward_triangles(points: Float, corners: Int) -> Faces:
-    """Return those of the triangles (T, 3) that are seen from above against the clock and have an area in plan."""
+    """Return only those triangles (T, 3 indices) that are anticlockwise and not degenerate seen from above."""
     flat = points[corners][..., :2]
     one, two = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
     kept = corners[one[:, 0] * two[:, 1] - one[:, 1] * two[:, 0] > _NO_AREA]
-    return compact(Faces(points, kept.ravel(), np.full(len(kept), 3)))
+    return drop_unused_points(Faces(points, kept.ravel(), np.full(len(kept), 3)))
 
 
 def loft(sections: Float) -> Faces:
-    """Return the closed body through sections (R, K, 3), whose ends are caps; faces look outwards.
+    """Return the closed body through cross-sections (R, K, 3) with its end caps; faces look outwards.
 
     Args:
         sections: R >= 2 outlines of K corners each, in the same order round.
@@ -123,27 +123,27 @@ def loft(sections: Float) -> Faces:
     last = (rows - 1) * count
     caps = Faces(points, np.concatenate([here[::-1], last + here]), np.array([count, count]))
     if max(_off_plane(sections[0]), _off_plane(sections[-1])) > FLAT / 2.0:
-        triangles = strip_triangles(caps)
+        triangles = triangulate(caps)
         caps = Faces(points, triangles.ravel(), np.full(len(triangles), 3))
-    body = quads(points, sides.reshape(-1, 4))
+    body = quad_faces(points, sides.reshape(-1, 4))
     closed = Faces(points, np.concatenate([body.corners, caps.corners]), np.concatenate([body.sizes, caps.sizes]))
-    return closed if volume(closed) >= 0.0 else turn_polygons(closed)
+    return closed if enclosed_volume(closed) >= 0.0 else flip_faces(closed)
 
 
 def _off_plane(ring: Float) -> float:
-    """Return how far the corners (K, 3) of a polygon lie from its plane at most, m."""
+    """Return the largest distance of a polygon's corners (K, 3) from its mean plane, m."""
     arms = ring - ring.mean(axis=0)
     normal = np.cross(arms, np.roll(arms, -1, axis=0)).sum(axis=0)
     return float(np.abs(arms @ normal).max() / max(float(np.linalg.norm(normal)), 1e-12))
 
 
-def turn_polygons(faces: Faces) -> Faces:
-    """Return polygons with their other side outwards."""
+def flip_faces(faces: Faces) -> Faces:
+    """Return polygons with their orientation reversed, so that their normals point the other way."""
     return Faces(faces.points, faces.corners[::-1], faces.sizes[::-1])
 
 
-def strip_triangles(faces: Faces) -> Int:
-    """Return the corners (T, 3) of triangles that polygons are cut into: strips between their first and last corners.
+def triangulate(faces: Faces) -> Int:
+    """Triangulate polygons as strips between their first and last corners; return corner indices (T, 3).
 
     So a polygon needs not be convex if its corner i faces the last one but i.
     """
@@ -161,8 +161,8 @@ def strip_triangles(faces: Faces) -> Int:
     return np.concatenate(found) if found else np.empty((0, 3), np.int64)
 
 
-def volume(faces: Faces) -> float:
-    """Return the volume (m3) that closed polygons enclose; negative where they look inwards."""
+def enclosed_volume(faces: Faces) -> float:
+    """Return the signed volume that closed polygons enclose, m3; negative where they look inwards."""
     if not len(faces):
         return 0.0
     points = faces.points - faces.points[faces.corners[0]]
@@ -173,15 +173,15 @@ def volume(faces: Faces) -> float:
 
 
 def next_corner(sizes: Int) -> Int:
-    """Return the (C,) index of the corner that follows each corner round its polygon."""
+    """Return for each corner the index (C,) of the corner that follows it round its polygon."""
     following = np.arange(1, int(sizes.sum()) + 1)
     starts = np.cumsum(sizes) - sizes
     following[starts + sizes - 1] = starts
     return following
 
 
-def without_collapsed(corners: Int, sizes: Int) -> tuple[Int, Int, NDArray[np.bool_]]:
-    """Return corners, sizes and which (F,) polygons are left when neighbouring equal corners become one."""
+def drop_collapsed(corners: Int, sizes: Int) -> tuple[Int, Int, NDArray[np.bool_]]:
+    """Merge equal neighbouring corners and drop polygons left with fewer than 3; return corners, sizes, kept (F,)."""
     distinct = corners != corners[next_corner(sizes)]
     polygon = np.repeat(np.arange(len(sizes)), sizes)
     left = np.bincount(polygon[distinct], minlength=len(sizes))

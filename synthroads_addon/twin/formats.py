@@ -23,7 +23,7 @@ from .trace import Trace
 
 @dataclass(frozen=True)
 class FormatEntry:
-    """A format of the model.
+    """A file format of the geometric-semantic model (twin): its texts, file name, writer module and optional package.
 
     Attributes:
         label, description: for people.
@@ -78,7 +78,7 @@ IfcPlacement = Literal["linear", "local"]
 
 
 class IfcSettings(ClosedModel):
-    """How a road is written as IFC."""
+    """Settings of the IFC export: how objects are placed."""
 
     placement: IfcPlacement = Field(
         "linear",
@@ -88,7 +88,7 @@ class IfcSettings(ClosedModel):
 
 
 def twin_file_names(formats: Iterable[str]) -> tuple[str, ...]:
-    """Return the names of the files that formats are written to, each with its report behind it.
+    """Return the names of all files that formats are written to: for each the model, then its JSON report.
 
     Raises:
         InputError: a format is unknown.
@@ -97,12 +97,12 @@ def twin_file_names(formats: Iterable[str]) -> tuple[str, ...]:
 
 
 def report_file_name(name: str) -> str:
-    """Return the name of the file that says what a format's file lacks, and where in it each instance number is."""
+    """Return the file name of a format's JSON report: what the model lacks, and where each instance is in it."""
     return f"twin-{name}-report.json"
 
 
 def known_format(name: str) -> TwinFormat:
-    """Return a format's name if there is such a format.
+    """Return a format's name unchanged, or raise an InputError that suggests the nearest known name.
 
     Raises:
         InputError: there is none; the nearest name is suggested.
@@ -113,8 +113,8 @@ def known_format(name: str) -> TwinFormat:
     raise InputError("twin", name, f"must be one of {', '.join(TWIN_FORMATS)}{nearest_name(name, TWIN_FORMATS)}")
 
 
-def missing_packages(name: str) -> str | None:
-    """Return the package that a format needs and that isn't installed, or None if it can be written.
+def missing_package(name: str) -> str | None:
+    """Return the optional Python package that a format needs and that isn't installed, or None.
 
     Raises:
         InputError: the format is unknown.
@@ -124,13 +124,13 @@ def missing_packages(name: str) -> str | None:
 
 
 def check_formats(formats: Iterable[str]) -> None:
-    """Refuse formats that are unknown or can't be written here, before any work starts.
+    """Raise an InputError if one of the formats is unknown or the Python package that it needs isn't installed.
 
     Raises:
         InputError: a format is unknown, or its package isn't installed.
     """
     for name in formats:
-        if package := missing_packages(name):
+        if package := missing_package(name):
             raise InputError("twin", name, f"needs the package {package}: pip install 'synthroads[twin]'")
 
 
@@ -141,7 +141,7 @@ def write_twin(
     tolerance: float = TOLERANCE,
     ifc: IfcSettings | None = None,
 ) -> None:
-    """Write a road's geometric-semantic model into a folder, a file and its report per format (`twin_file_names`).
+    """Write a road's geometric-semantic model into a folder: for each format the model file and a JSON report.
 
     Args:
         parameters: the road.

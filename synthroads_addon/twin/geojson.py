@@ -18,7 +18,7 @@ from ..road.parameters import RoadParameters
 from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Median, Turnout
 from .attributes import attributes_of
 from .plants import placed_plants
-from .surfaces import dash_stations, line_points, on_ground, painted_surface, road_stations
+from .surfaces import dash_stations, line_points, painted_surface, road_stations, surface_points
 from .trace import Trace
 from .vehicles import placed_vehicles
 
@@ -42,7 +42,7 @@ _LOST = {
 
 
 def write_geojson(parameters: RoadParameters, path: Path, tolerance: float) -> Trace:
-    """Write a road's lines and places as GeoJSON, one feature per line; return what became of its objects.
+    """Write a road's lines and points as GeoJSON in map coordinates; return the trace of what became of each object.
 
     Coordinates are those of the parameter set's reference system, named by the member ``crs`` (GeoJSON 2008): degrees
     of WGS 84, which RFC 7946 wants, would cost millimetres.
@@ -63,7 +63,7 @@ def write_geojson(parameters: RoadParameters, path: Path, tolerance: float) -> T
         file.write(compact_json(collection)[:-1] + ',"features":[')
         before = "\n"
         for number, feature in enumerate((*features, *_Writer(geometry, stations, tolerance, trace).features())):
-            trace.found(feature["properties"]["instance"], feature=number)
+            trace.record_entity(feature["properties"]["instance"], feature=number)
             file.write(before + compact_json(feature))
             before = ",\n"
         file.write("\n]}\n")
@@ -71,7 +71,7 @@ def write_geojson(parameters: RoadParameters, path: Path, tolerance: float) -> T
 
 
 class _Writer:
-    """Writer of the features of one road."""
+    """Generator of the GeoJSON features of one road."""
 
     def __init__(self, geometry: RoadGeometry, stations: Float, tolerance: float, trace: Trace) -> None:
         self.geometry = geometry
@@ -81,7 +81,7 @@ class _Writer:
         self.origin = np.array(geometry.parameters.transform.translate)
 
     def features(self) -> Iterator[Feature]:
-        """Yield the features of every object, in the order of the parameter set."""
+        """Yield the GeoJSON features of all objects in the parameter set's order, then of plants and vehicles."""
         for name, item in self.geometry.parameters.objects.items():
             if isinstance(item, Carriageway):
                 yield from self._carriageway(name, item)
@@ -94,7 +94,7 @@ class _Writer:
             elif isinstance(item, Hatching | Arrow):
                 yield from self._painted(name, item)
             elif isinstance(item, PointObject):
-                place = on_ground(self.geometry, np.array([item.station]), np.array([item.offset]))
+                place = surface_points(self.geometry, np.array([item.station]), np.array([item.offset]))
                 place[:, 2] += item.elevation
                 yield _feature(self._furniture(name, item), "Point", self._map(place)[0])
             elif isinstance(item, LineObject):
@@ -105,7 +105,7 @@ class _Writer:
 
     def _plants(self) -> Iterator[Feature]:
         for plant in placed_plants(self.geometry):
-            self.trace.grow(plant)
+            self.trace.record_plant(plant)
             about = {"id": plant.name, "feature": "plant"} | plant.attributes()
             yield _feature(about, "Point", self._map(plant.foot[None])[0])
 
@@ -151,7 +151,7 @@ class _Writer:
         yield from self._lanes(about, carriageway, (np.where(here, inner, 0.0), np.where(here, outer, 0.0)))
 
     def _lanes(self, about: Feature, carriageway: Carriageway, distances: tuple[Float, Float]) -> Iterator[Feature]:
-        """Yield a lane's centreline with its widths wherever it is there."""
+        """Yield a LineString with widths along a lane's middle for each stretch on which the lane is wider than 0."""
         inner, outer = distances
         there = np.flatnonzero(outer - inner > _THERE)
         for run in np.split(there, np.flatnonzero(np.diff(there) > 1) + 1):
@@ -167,8 +167,8 @@ class _Writer:
         inner = {side: section.distances(self.stations)[:, 0] for side, section in self.geometry.sections.items()}
         if len(inner) < 2:
             return
-        left = on_ground(self.geometry, self.stations, inner["left"])
-        right = on_ground(self.geometry, self.stations, -inner["right"])
+        left = surface_points(self.geometry, self.stations, inner["left"])
+        right = surface_points(self.geometry, self.stations, -inner["right"])
         ring = self._map(np.concatenate([right, left[::-1], right[:1]]))
         about = {"id": name, "instance": item.instance, "object_type": "Median", "feature": "median"}
         yield _feature(about, "Polygon", [ring])
@@ -178,7 +178,7 @@ class _Writer:
         if not len(dashes):
             return
         left, right = self.geometry.marking_edges(item, station)
-        points = on_ground(self.geometry, station, (left + right) / 2.0)
+        points = surface_points(self.geometry, station, (left + right) / 2.0)
         points[:, 2] += item.film_thickness
         lines = np.split(points, np.flatnonzero(np.diff(owner)) + 1)
         about = attributes_of(item) | {"id": name, "feature": "marking", "dashes": np.round(dashes, DIGITS).tolist()}
@@ -196,7 +196,7 @@ class _Writer:
 
     def _along(self, about: Feature, offset: Float, rows: NDArray[np.intp] | None = None) -> Feature:
         station = self.stations if rows is None else self.stations[rows]
-        points = on_ground(self.geometry, station, offset)
+        points = surface_points(self.geometry, station, offset)
         about = about | {"stations": np.round(station, DIGITS).tolist(), "offsets": np.round(offset, DIGITS).tolist()}
         return _feature(about, "LineString", self._map(points))
 

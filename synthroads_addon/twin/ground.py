@@ -11,9 +11,9 @@ from ..road.alignment import clip_offset
 from ..road.geometry import RoadGeometry
 from ..road.surroundings import Terrain
 from ..road.terrain import ground_elevation
-from .faces import Faces, Float, grid_corners, halves, upward_triangles
-from .strips import zip_rows
-from .surfaces import on_ground
+from .faces import Faces, Float, grid_corners, split_quads, upward_triangles
+from .strips import triangulate_rows
+from .surfaces import surface_points
 
 GROUND_TOLERANCE = 0.03
 """Largest distance (m) of the ground from its surface, unless a larger one is asked for of everything."""
@@ -27,7 +27,7 @@ _HALVINGS = 30
 
 @dataclass(frozen=True)
 class GroundSide:
-    """The ground on one side of the road, in rows across the road and columns outwards.
+    """The ground on one side of the road, sampled in rows across the road and columns outwards.
 
     Attributes:
         geometry: the road.
@@ -44,13 +44,13 @@ class GroundSide:
     distance: Float
 
     def points(self, distance: Float) -> Float:
-        """Return the local points (R * K, 3) of the surface at distances (R, K) from the road's edge."""
+        """Return the ground's local points (R * K, 3) at distances (R, K) outwards from the road's edge, m."""
         bend = self.geometry.alignment.curvature(self.station)
         offset = clip_offset(self.edge[:, None] + self.sign * distance, bend[:, None])
-        return on_ground(self.geometry, np.repeat(self.station, distance.shape[1]), offset.ravel())
+        return surface_points(self.geometry, np.repeat(self.station, distance.shape[1]), offset.ravel())
 
     def triangles(self, road: Float) -> Faces:
-        """Return the ground's triangles, seen from above against the clock.
+        """Return the ground's triangles, anticlockwise from above, with the road's edge points as their seam.
 
         Args:
             road: (N,) stations at which the road's edge has points: the ground's are the same.
@@ -58,25 +58,25 @@ class GroundSide:
         rows, columns = self.distance.shape
         grid = self.points(self.distance)
         edge = self.geometry.offsets(road)[:, 0 if self.sign > 0.0 else -1]
-        seam = on_ground(self.geometry, road, edge)
+        seam = surface_points(self.geometry, road, edge)
         inner, toe = len(grid) + np.arange(len(road)), np.arange(rows) * columns + 1
-        first = np.append(inner, toe)[np.array(zip_rows(road, self.station))]
+        first = np.append(inner, toe)[np.array(triangulate_rows(road, self.station))]
         cells = grid_corners(rows, columns - 1)
-        beyond = halves(cells + cells // (columns - 1) + 1)
+        beyond = split_quads(cells + cells // (columns - 1) + 1)
         # Seen from above the first are against the clock on the left, the others on the right.
         corners = np.concatenate([first, beyond[:, ::-1]] if self.sign > 0.0 else [first[:, ::-1], beyond])
         points = np.concatenate([grid, seam])
         return upward_triangles(points, corners)
 
-    def band(self, start: float, end: float) -> Float:
-        """Return the distances (R, K) of those of the ground's columns that lie within a band, and of its limits, m."""
+    def clip_to_band(self, start: float, end: float) -> Float:
+        """Return the column distances (R, K) clipped to a band between two distances from the road's edge, m."""
         reach = self.distance[:, -1:]
         return np.clip(self.distance, min(max(start, 0.0), reach.min()), np.clip(end, 0.0, reach))
 
 
 @dataclass(frozen=True)
 class GroundMesh:
-    """The ground beside a road.
+    """The triangulated ground beside a road, left and right, with its measured deviation.
 
     Attributes:
         sides: left and right.
@@ -89,8 +89,8 @@ class GroundMesh:
     deviation: float
 
 
-def ground_beside(geometry: RoadGeometry, terrain: Terrain, road: Float, tolerance: float) -> GroundMesh:
-    """Return the ground beside a road, as coarse as keeps `GROUND_TOLERANCE`, or the tolerance if that is larger.
+def triangulate_ground(geometry: RoadGeometry, terrain: Terrain, road: Float, tolerance: float) -> GroundMesh:
+    """Triangulate the ground beside a road as coarsely as `GROUND_TOLERANCE`, or a larger tolerance, allows.
 
     Args:
         geometry: the road.
@@ -115,14 +115,14 @@ def _side(geometry: RoadGeometry, terrain: Terrain, sign: float, spacing: float)
     station = np.unique(np.concatenate([even, kinks]))
     edge = geometry.offsets(station)[:, 0 if sign > 0.0 else -1]
     reach = np.maximum(terrain.half_width - sign * edge, 0.0)
-    toe = _toe(geometry, terrain, station, edge, reach * sign)
+    toe = _toe_distance(geometry, terrain, station, edge, reach * sign)
     further = np.arange(1, int(np.ceil(reach.max() / spacing)) + 1) * spacing
     beyond = np.clip(further[None, :], toe[:, None], reach[:, None])
     return GroundSide(geometry, sign, station, edge, np.column_stack([np.zeros(len(station)), toe, beyond]))
 
 
-def _toe(geometry: RoadGeometry, terrain: Terrain, station: Float, edge: Float, reach: Float) -> Float:
-    """Return how far (R,) from the road's edge its batter meets the ground, m.
+def _toe_distance(geometry: RoadGeometry, terrain: Terrain, station: Float, edge: Float, reach: Float) -> Float:
+    """Return the distance (R,) from the road's edge at which its batter meets the ground, m; the reach if nowhere.
 
     Args:
         geometry, terrain: the road and its ground.
@@ -131,8 +131,8 @@ def _toe(geometry: RoadGeometry, terrain: Terrain, station: Float, edge: Float, 
     """
     level, far = geometry.elevation(station, edge), np.abs(reach)
 
-    def outside(distance: Float) -> Float:
-        """Return how far the ground lies beyond the batter's reach at distances (R, D)."""
+    def excess_height(distance: Float) -> Float:
+        """Return by how much the ground's height over the edge exceeds the batter's (R, D), m; -1 where unknown."""
         every = np.repeat(station, distance.shape[1])
         offset = (edge[:, None] + np.sign(reach)[:, None] * distance).ravel()
         ground = ground_elevation(geometry, terrain, every, offset).reshape(distance.shape)
@@ -140,19 +140,19 @@ def _toe(geometry: RoadGeometry, terrain: Terrain, station: Float, edge: Float, 
         return np.where(np.isnan(apart), -1.0, apart)
 
     steps = np.linspace(0.0, 1.0, max(2, int(np.ceil(far.max() / _FIRST_LOOK)) + 1))
-    met = outside(far[:, None] * steps) <= 0.0
+    met = excess_height(far[:, None] * steps) <= 0.0
     first = np.where(met.any(axis=1), met.argmax(axis=1), len(steps) - 1)
     high = far * steps[first]
     low = far * steps[np.maximum(first - 1, 0)]
     for _ in range(_HALVINGS):
         middle = (low + high) / 2.0
-        there = outside(middle[:, None])[:, 0] <= 0.0
+        there = excess_height(middle[:, None])[:, 0] <= 0.0
         low, high = np.where(there, low, middle), np.where(there, middle, high)
     return np.where(met.any(axis=1), high, far)
 
 
 def _deviation(geometry: RoadGeometry, faces: Faces) -> float:
-    """Return how far the surface lies above or below triangles, at their middles and those of their edges."""
+    """Return the largest vertical distance of sampled triangles from the ground, at centroids and edge middles, m."""
     return max((float(np.abs(away).max()) for away in _away(geometry, faces) if len(away)), default=0.0)
 
 
@@ -163,4 +163,4 @@ def _away(geometry: RoadGeometry, faces: Faces) -> Iterator[Float]:
     for place in ((a + b + c) / 3.0, (a + b) / 2.0, (b + c) / 2.0, (c + a) / 2.0):
         station, offset = geometry.alignment.project(place[:, :2])
         within = (station >= 0.0) & (station <= geometry.length)
-        yield (on_ground(geometry, station[within], offset[within]) - place[within])[:, 2]
+        yield (surface_points(geometry, station[within], offset[within]) - place[within])[:, 2]

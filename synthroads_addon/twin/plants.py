@@ -13,13 +13,13 @@ from ..road.instances import GRASS_STRIPS
 from ..road.surroundings import Vegetation
 from ..road.vegetation.plants import ROADSIDE_HEIGHT, WILD_GRASSES, grown_plants
 from ..road.vegetation.species import PlantShape, plant_shape
-from .faces import Faces, grid_corners, halves, join_polygons, upward_triangles
+from .faces import Faces, grid_corners, join_faces, split_quads, upward_triangles
 from .ground import GroundMesh
-from .surfaces import on_ground
+from .surfaces import surface_points
 
 
 class PlacedPlant(NamedTuple):
-    """A tree or shrub.
+    """One tree or shrub of a stand: its place, measures and shape.
 
     Attributes:
         name, instance: its id and its number in the cloud.
@@ -46,7 +46,7 @@ class PlacedPlant(NamedTuple):
     shape: PlantShape
 
     def attributes(self) -> dict[str, str | int | float]:
-        """Return what is said of it: number, class, species and measures (m)."""
+        """Return the plant's attributes for a file: instance number, class, species and measures (m)."""
         told: dict[str, str | int | float] = {"instance": self.instance, "class": self.about.points_class}
         told |= {"function": self.about.kind, "species": self.about.species, "stand": self.stand}
         told |= {
@@ -60,12 +60,12 @@ class PlacedPlant(NamedTuple):
 
     @property
     def scale(self) -> tuple[float, float, float]:
-        """Return the factors on the shape of a plant of height 1."""
+        """Return the scale factors (x, y, z) from its shape, a plant of height 1, to its size."""
         return self.breadth, self.breadth, self.height
 
 
 class GrassStrip(NamedTuple):
-    """A strip that grass of one species grows on.
+    """A strip of ground on which grass of one species grows, as a surface at the grass's mean height.
 
     Attributes:
         name, instance: its id and its number in the cloud.
@@ -83,14 +83,14 @@ class GrassStrip(NamedTuple):
     faces: Faces
 
     def attributes(self) -> dict[str, str | int | float]:
-        """Return what is said of it: number, class, species and mean height (m)."""
+        """Return the strip's attributes for a file: instance number, class, species and mean height (m)."""
         told: dict[str, str | int | float] = {"instance": self.instance, "class": self.about.points_class}
         told |= {"function": self.about.kind, "species": self.about.species, "stand": self.stand}
         return told | {"strip": self.name.rpartition("/")[2], "averageHeight": round(self.mean_height, 4)}
 
 
 def placed_plants(geometry: RoadGeometry) -> Iterator[PlacedPlant]:
-    """Yield all trees and shrubs of a road, stand by stand in the order of the parameter set."""
+    """Yield all trees and shrubs of a road, stand by stand in the parameter set's order; none without terrain."""
     terrain = geometry.parameters.terrain
     for stand, about in geometry.parameters.of_type(Vegetation).items():
         if about.kind == "grass" or terrain is None:
@@ -104,7 +104,7 @@ def placed_plants(geometry: RoadGeometry) -> Iterator[PlacedPlant]:
 
 
 def grass_strips(geometry: RoadGeometry, ground: GroundMesh) -> Iterator[GrassStrip]:
-    """Yield the strips of all stands of grass that have an area, stand by stand."""
+    """Yield the strips of all stands of grass that have an area, stand by stand in the parameter set's order."""
     for stand, about in geometry.parameters.of_type(Vegetation).items():
         if about.kind != "grass":
             continue
@@ -114,34 +114,34 @@ def grass_strips(geometry: RoadGeometry, ground: GroundMesh) -> Iterator[GrassSt
             if not band and about.species in WILD_GRASSES:
                 continue
             height = mean if band else mean * ROADSIDE_HEIGHT
-            faces = _band(ground, number, about, height) if band else _roadside(geometry, ground, strip, height)
+            faces = _band(ground, number, about, height) if band else _verges(geometry, ground, strip, height)
             if len(faces):
                 name, instance = geometry.numbers.part(stand, number)
                 yield GrassStrip(name, instance, stand, about, height, faces)
 
 
 def _band(ground: GroundMesh, number: int, about: Vegetation, height: float) -> Faces:
-    """Return the surface of a band on one side (0 left, 1 right)."""
+    """Return the triangles of a stand's band of grass on one side of the road (number 0 left, 1 right)."""
     side = ground.sides[number]
-    distance = side.band(about.band_start, about.band_end)
-    return _sheet(side.points(distance), (len(distance), distance.shape[1]), height, side.sign < 0.0)
+    distance = side.clip_to_band(about.band_start, about.band_end)
+    return _raised(side.points(distance), (len(distance), distance.shape[1]), height, side.sign < 0.0)
 
 
-def _roadside(geometry: RoadGeometry, ground: GroundMesh, strip: str, height: float) -> Faces:
-    """Return the surface of the strips beside the pavement on one side, or of the median."""
+def _verges(geometry: RoadGeometry, ground: GroundMesh, strip: str, height: float) -> Faces:
+    """Return the triangles of a grass strip beside the pavement (`left-verge`, `right-verge` or `median`)."""
     station = ground.sides[0].station
     offsets = geometry.offsets(station)
     parts = []
     for number, one in enumerate(geometry.strips):
         if one.class_name == "roadside" and strip == ("median" if one.side is None else f"{one.side}-verge"):
             # From left to right.
-            points = on_ground(geometry, np.repeat(station, 2), offsets[:, number : number + 2].ravel())
-            parts.append(_sheet(points, (len(station), 2), height, True))
-    return join_polygons(parts)
+            points = surface_points(geometry, np.repeat(station, 2), offsets[:, number : number + 2].ravel())
+            parts.append(_raised(points, (len(station), 2), height, True))
+    return join_faces(parts)
 
 
-def _sheet(points: Float, shape: tuple[int, int], height: float, rightwards: bool) -> Faces:
-    """Return the triangles between points row by row, raised by a height; those without area are left out."""
-    corners = halves(grid_corners(*shape))
+def _raised(points: Float, shape: tuple[int, int], height: float, rightwards: bool) -> Faces:
+    """Triangulate a grid of points (rows, columns), raised by a height (m); triangles without area are left out."""
+    corners = split_quads(grid_corners(*shape))
     raised = points + np.array([0.0, 0.0, height])
     return upward_triangles(raised, corners if rightwards else corners[:, ::-1])

@@ -14,14 +14,14 @@ from ..road.damage import damage_columns, damage_depth, damaged_strips, space_sh
 from ..road.geometry import RoadGeometry, SurfaceStrip
 from ..road.section import Pavement, Pothole, Rut
 from ..road.section_geometry import CarriagewaySection
-from .faces import Faces, Float, compact, grid_corners, join_polygons, polygons, quads
+from .faces import Faces, Float, drop_unused_points, grid_corners, join_faces, quad_faces, ring_faces
 
 Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
 class StripSurface:
-    """The surface of one strip, as far as it belongs to one object.
+    """The polygons of one strip of the road, as far as the strip belongs to one object.
 
     Attributes:
         strip: the strip.
@@ -38,7 +38,7 @@ class StripSurface:
 
 @dataclass(frozen=True)
 class _StripDamage:
-    """One rut or pothole on one strip: the stations between which it lies, and where across it needs points."""
+    """One rut or pothole on one strip: its stations (m), and the shares of the width at which it needs points."""
 
     start: float
     end: float
@@ -47,7 +47,7 @@ class _StripDamage:
 
 @dataclass(frozen=True)
 class _Edges:
-    """The two edges of a strip at N stations, and what its points are made from.
+    """The two edges of a strip at N stations, from which its surface points are interpolated.
 
     Attributes:
         geometry: the road.
@@ -64,7 +64,7 @@ class _Edges:
     heights: Float
 
     def points(self, first: int, last: int, shares: Float) -> Float:
-        """Return points (R, C, 3) of the rows from `first` to `last` at shares (C,) of the width, damage included."""
+        """Return surface points (R, C, 3) of rows `first` to `last` at shares (C,) of the width, lowered by damage."""
         rows = slice(first, last + 1)
         offset = self.offsets[rows, :1] * (1.0 - shares) + self.offsets[rows, 1:] * shares
         height = self.heights[rows, :1] * (1.0 - shares) + self.heights[rows, 1:] * shares
@@ -78,7 +78,7 @@ class _Edges:
 
 
 def strip_surfaces(geometry: RoadGeometry, stations: Float, tolerance: float) -> Iterator[StripSurface]:
-    """Yield the surface of every strip from left to right, those of turnouts one by one.
+    """Yield the polygons of every strip from left to right, split by the objects that they belong to.
 
     Neighbouring strips share their points. Where a strip is damaged it has as many points across as keep it within
     the tolerance.
@@ -91,20 +91,20 @@ def strip_surfaces(geometry: RoadGeometry, stations: Float, tolerance: float) ->
     offsets, heights = geometry.offsets(stations), geometry.boundary_elevations(stations)
     plan, heading, _ = geometry.alignment.frame(stations)
     middle = (stations[:-1] + stations[1:]) / 2.0
-    damages, lanes = _damages(geometry, tolerance), _lane_numbers(geometry)
+    damages, lanes = _damages_by_strip(geometry, tolerance), _lane_numbers(geometry)
     for number, strip in enumerate(geometry.strips):
         two = slice(number, number + 2)
         edges = _Edges(geometry, stations, plan, left_vectors(heading), offsets[:, two], heights[:, two])
         width = offsets[:, number] - offsets[:, number + 1]
         owners = geometry.instances(strip, middle)
         for owner in np.unique(owners).tolist():
-            faces = _faces(edges, damages.get(number, []), (width[:-1] + width[1:] > 1e-9) & (owners == owner))
+            faces = _strip_faces(edges, damages.get(number, []), (width[:-1] + width[1:] > 1e-9) & (owners == owner))
             if len(faces):
                 yield StripSurface(strip, lanes.get(number), owner, faces)
 
 
 def _lane_numbers(geometry: RoadGeometry) -> dict[int, int]:
-    """Return the lane of each strip that is one, counted from outside."""
+    """Return each lane's number, counted from outside in its carriageway, by the index of its strip."""
     numbers: dict[int, int] = {}
     for side in geometry.sections:
         lanes = [n for n, strip in enumerate(geometry.strips) if strip.side == side and strip.kind == "lane"]
@@ -115,8 +115,8 @@ def _lane_numbers(geometry: RoadGeometry) -> dict[int, int]:
 # --- damage -----------------------------------------------------------------------------------------------------
 
 
-def _damages(geometry: RoadGeometry, tolerance: float) -> dict[int, list[_StripDamage]]:
-    """Return what damages each strip, by the strip's number."""
+def _damages_by_strip(geometry: RoadGeometry, tolerance: float) -> dict[int, list[_StripDamage]]:
+    """Return the ruts and potholes on each strip, by the strip's index."""
     damages: dict[int, list[_StripDamage]] = {}
     for side, section in geometry.sections.items():
         strips = [number for number, strip in enumerate(geometry.strips) if strip.side == side]
@@ -124,7 +124,7 @@ def _damages(geometry: RoadGeometry, tolerance: float) -> dict[int, list[_StripD
         pavement = section.carriageway.pavement
         items: list[Rut | Pothole] = [*pavement.ruts, *pavement.potholes]
         for item in items:
-            alone = _only(section, item)
+            alone = _with_only(section, item)
             for index in damaged_strips(alone):
                 shares = damage_columns(alone, index, tolerance)
                 shares = 1.0 - shares[::-1] if side == "left" else shares
@@ -132,8 +132,8 @@ def _damages(geometry: RoadGeometry, tolerance: float) -> dict[int, list[_StripD
     return damages
 
 
-def _only(section: CarriagewaySection, item: Rut | Pothole) -> CarriagewaySection:
-    """Return a section with only one rut or pothole."""
+def _with_only(section: CarriagewaySection, item: Rut | Pothole) -> CarriagewaySection:
+    """Return a copy of a section with one rut or pothole as its only damage."""
     alone, carriageway = copy.copy(section), section.carriageway
     pavement = Pavement(ruts=(item,)) if isinstance(item, Rut) else Pavement(potholes=(item,))
     alone.carriageway = carriageway.model_copy(update={"pavement": pavement})
@@ -147,7 +147,7 @@ def _range(item: Rut | Pothole) -> tuple[float, float]:
 
 
 def _row_masks(stations: Float, damages: list[_StripDamage]) -> Mask:
-    """Return which damages (N, D) a row's points must follow: those before or behind it."""
+    """Return which damages (N, D) reach the interval before or behind each row, so that its points follow them."""
     starts, ends = np.array([d.start for d in damages]), np.array([d.end for d in damages])
     between = (starts < stations[1:, None] - 1e-6) & (ends > stations[:-1, None] + 1e-6)
     rows = np.zeros((len(stations), len(damages)), dtype=bool)
@@ -157,7 +157,7 @@ def _row_masks(stations: Float, damages: list[_StripDamage]) -> Mask:
 
 
 def _shares(damages: list[_StripDamage], mask: Mask) -> Float:
-    """Return where across (C,), from 0 at the left to 1 at the right edge, a row needs points."""
+    """Return the shares (C,) of the width at which a row needs points, from 0 (left edge) to 1 (right edge)."""
     inside = [damage.shares for damage, there in zip(damages, mask.tolist(), strict=True) if there]
     return space_shares(np.unique(np.concatenate([[0.0, 1.0], *inside])))
 
@@ -165,30 +165,30 @@ def _shares(damages: list[_StripDamage], mask: Mask) -> Float:
 # --- polygons ---------------------------------------------------------------------------------------------------
 
 
-def _faces(edges: _Edges, damages: list[_StripDamage], chosen: Mask) -> Faces:
-    """Return a strip's polygons between those rows that are chosen (N - 1,), row by row.
+def _strip_faces(edges: _Edges, damages: list[_StripDamage], chosen: Mask) -> Faces:
+    """Return a strip's polygons in the chosen intervals (N - 1,) between its rows, in the order of the rows.
 
     From edge to edge there is one polygon, but where the strip is damaged. Rows with different numbers of points are
     joined by triangles, so that all points are corners on both sides.
     """
     if not chosen.any():
-        return join_polygons([])
+        return join_faces([])
     masks = _row_masks(edges.stations, damages) if damages else np.zeros((len(edges.stations), 1), dtype=bool)
     even = np.all(masks[:-1] == masks[1:], axis=1)
     parts = []
-    for first, last in _runs(even & chosen, chosen):
+    for first, last in _row_runs(even & chosen, chosen):
         shares, others = (_shares(damages, masks[row]) if damages else np.array([0.0, 1.0]) for row in (first, last))
         if even[first]:
             points = edges.points(first, last, shares)
-            parts.append(quads(points.reshape(-1, 3), grid_corners(*points.shape[:2])))
+            parts.append(quad_faces(points.reshape(-1, 3), grid_corners(*points.shape[:2])))
         else:
             points = np.concatenate([edges.points(first, first, shares)[0], edges.points(last, last, others)[0]])
-            parts.append(polygons(points, zip_rows(shares, others)))
-    return compact(join_polygons(parts))
+            parts.append(ring_faces(points, triangulate_rows(shares, others)))
+    return drop_unused_points(join_faces(parts))
 
 
-def _runs(even: Mask, chosen: Mask) -> Iterator[tuple[int, int]]:
-    """Yield (first, last) rows: as many as have the same damages, or two that differ."""
+def _row_runs(even: Mask, chosen: Mask) -> Iterator[tuple[int, int]]:
+    """Yield (first, last) rows of chosen intervals: maximal runs with the same damages, or single intervals."""
     number = np.flatnonzero(chosen)
     breaks = np.ones(len(number), dtype=bool)
     breaks[1:] = (np.diff(number) > 1) | ~even[number[1:]] | ~even[number[:-1]]
@@ -197,8 +197,8 @@ def _runs(even: Mask, chosen: Mask) -> Iterator[tuple[int, int]]:
     yield from zip(starts.tolist(), ends.tolist(), strict=True)
 
 
-def zip_rows(here: Float, there: Float) -> list[list[int]]:
-    """Return triangles between a row of points at shares (C,) and the next one at shares (D,)."""
+def triangulate_rows(here: Float, there: Float) -> list[list[int]]:
+    """Triangulate between a row of points at shares (C,) and the next at shares (D,); return triples of indices."""
     rings, i, j, ahead = [], 0, 0, len(here)
     while i < len(here) - 1 or j < len(there) - 1:
         if j == len(there) - 1 or (i < len(here) - 1 and here[i + 1] <= there[j + 1]):

@@ -13,29 +13,29 @@ from ..road.pavement.outlines import CRACK_FILM, PATCH_FILM, crack_outlines, pat
 from ..road.section import Arrow, Crack, Hatching, LineMarking, Patch, Pothole
 from ..road.terrain import known_elevation
 from ..road.tessellation import sample_stations
-from .faces import FLAT, Faces, Int, compact, grid_corners, join_polygons, quads, twist
+from .faces import FLAT, Faces, Int, drop_unused_points, grid_corners, join_faces, quad_faces, quad_twist
 
 Float = NDArray[np.float64]
 
 
 def road_stations(geometry: RoadGeometry, tolerance: float) -> Float:
-    """Return the (N,) stations at which the road's surface is sampled; the ends of dashes don't matter to it."""
+    """Return the stations (N,) at which the road's surface is sampled to keep a chord error (m), without markings."""
     parameters = geometry.parameters
     objects = {name: item for name, item in parameters.objects.items() if not isinstance(item, LineMarking)}
     bare = RoadGeometry(parameters.model_copy(update={"objects": objects}))
     return sample_stations(bare, tolerance)
 
 
-def on_ground(geometry: RoadGeometry, station: Float, offset: Float) -> Float:
-    """Return local points (N, 3) of what lies open to the sky: the road, its batter, or the ground beside it.
+def surface_points(geometry: RoadGeometry, station: Float, offset: Float) -> Float:
+    """Return local surface points (N, 3) at stations and offsets: on the road, its batter or the ground beside it.
 
     Where an elevation model doesn't reach, the road's edge goes on level.
     """
     return np.column_stack([geometry.alignment.place(station, offset), known_elevation(geometry, station, offset)])
 
 
-def left_of(geometry: RoadGeometry, station: Float) -> Float:
-    """Return the level unit vectors (N, 3) to the left of the road at stations (N,)."""
+def level_left_vectors(geometry: RoadGeometry, station: Float) -> Float:
+    """Return horizontal unit vectors (N, 3) that point to the left of the road at stations (N,)."""
     return np.column_stack([left_vectors(geometry.alignment.heading(station)), np.zeros(len(station))])
 
 
@@ -43,15 +43,15 @@ def left_of(geometry: RoadGeometry, station: Float) -> Float:
 
 
 def dash_stations(geometry: RoadGeometry, line: LineMarking, stations: Float) -> tuple[Float, Float, Int]:
-    """Return a marking's dashes (D, 2: start and end station), their points' stations (N,) and dashes (N,)."""
+    """Return a line marking's dashes (D, 2: start and end), and the station and dash index (N,) of its points."""
     dashes = geometry.dashes(line)
-    rows = [_between(stations, start, end) for start, end in dashes.tolist()]
+    rows = [_stations_between(stations, start, end) for start, end in dashes.tolist()]
     owner = np.repeat(np.arange(len(rows)), [len(row) for row in rows])
     return dashes, np.concatenate([np.empty(0), *rows]), owner
 
 
 def dash_surfaces(geometry: RoadGeometry, line: LineMarking, stations: Float) -> tuple[Float, Faces, Int]:
-    """Return the dashes (D, 2: start and end station) of a line marking, its polygons, and the dash (F,) of each.
+    """Return a line marking's dashes (D, 2: start and end station), its polygons, and each polygon's dash (F,).
 
     Args:
         geometry: the road.
@@ -60,46 +60,46 @@ def dash_surfaces(geometry: RoadGeometry, line: LineMarking, stations: Float) ->
     """
     dashes, station, owner = dash_stations(geometry, line, stations)
     if not len(dashes):
-        return dashes, join_polygons([]), owner
+        return dashes, join_faces([]), owner
     left, right = geometry.marking_edges(line, station)
-    points = on_ground(geometry, np.repeat(station, 2), np.stack([left, right], axis=1).ravel())
+    points = surface_points(geometry, np.repeat(station, 2), np.stack([left, right], axis=1).ravel())
     points[:, 2] += line.film_thickness
     same = owner[:-1] == owner[1:]
     corners = grid_corners(len(station), 2)[same]
-    faces = quads(points, corners)
+    faces = quad_faces(points, corners)
     # A quadrilateral's polygons begin with its right rear corner, 2 * row + 1, or contain it.
     first = faces.corners[np.cumsum(faces.sizes) - faces.sizes]
     return dashes, faces, owner[first // 2]
 
 
 def painted_surface(geometry: RoadGeometry, item: Hatching | Arrow, stations: Float) -> Faces:
-    """Return the polygons of a hatched area or an arrow, cut at the stations at which the road is sampled."""
+    """Return the polygons of a hatching or an arrow on the road's surface, cut at the sampling stations."""
     outlines = hatching_outlines(geometry, item) if isinstance(item, Hatching) else arrow_outlines(item)
-    return _laid(geometry, outlines, stations, item.film_thickness)
+    return _drape_outlines(geometry, outlines, stations, item.film_thickness)
 
 
 def damaged_surface(geometry: RoadGeometry, item: Patch | Crack, stations: Float) -> Faces:
-    """Return the polygons of a patch or a crack, cut at the stations at which the road is sampled."""
+    """Return the polygons of a patch or crack on the road's surface, cut at the sampling stations."""
     if isinstance(item, Patch):
         outline = patch_outline(item)
-        return _laid(geometry, [outline] if len(outline) > 2 else [], stations, PATCH_FILM)
-    return _laid(geometry, crack_outlines(item), stations, CRACK_FILM)
+        return _drape_outlines(geometry, [outline] if len(outline) > 2 else [], stations, PATCH_FILM)
+    return _drape_outlines(geometry, crack_outlines(item), stations, CRACK_FILM)
 
 
-def _laid(geometry: RoadGeometry, outlines: Iterable[Float], stations: Float, film: float) -> Faces:
-    """Return convex outlines (K, 2) as polygons that lie a film (m) above the road."""
+def _drape_outlines(geometry: RoadGeometry, outlines: Iterable[Float], stations: Float, film: float) -> Faces:
+    """Return convex outlines (K, 2: station, offset) as flat polygons a film thickness (m) above the road's surface."""
     parts = [piece for outline in outlines for piece in cut_outline(outline, _inside(stations, outline))]
     if not parts:
-        return join_polygons([])
+        return join_faces([])
     places = np.concatenate(parts)
-    points = on_ground(geometry, places[:, 0], places[:, 1])
+    points = surface_points(geometry, places[:, 0], places[:, 1])
     points[:, 2] += film
     sizes = np.array([len(piece) for piece in parts], dtype=np.int64)
-    return cut_into_triangles(Faces(points, np.arange(len(points)), sizes))
+    return triangulate_twisted(Faces(points, np.arange(len(points)), sizes))
 
 
-def cut_into_triangles(faces: Faces) -> Faces:
-    """Return polygons of which those that could be twisted (more than three corners) are flat or cut into triangles."""
+def triangulate_twisted(faces: Faces) -> Faces:
+    """Return polygons with those of more than three corners that aren't planar cut into fans of triangles."""
     starts = np.cumsum(faces.sizes) - faces.sizes
     parts = []
     for start, size in zip(starts.tolist(), faces.sizes.tolist(), strict=True):
@@ -118,17 +118,17 @@ def cut_into_triangles(faces: Faces) -> Faces:
 
 
 def _flat_fans(points: Float, fans: Int) -> NDArray[np.bool_]:
-    return twist(points, fans) <= FLAT / 2.0
+    return quad_twist(points, fans) <= FLAT / 2.0
 
 
-def _between(stations: Float, start: float, end: float) -> Float:
-    """Return a range's ends and the stations between them, none closer than a millimetre to an end."""
+def _stations_between(stations: Float, start: float, end: float) -> Float:
+    """Return a range's ends and the stations between them, leaving out those within a millimetre of an end."""
     inside = stations[np.searchsorted(stations, start + 1e-3) : np.searchsorted(stations, end - 1e-3)]
     return np.concatenate([[start], inside, [end]])
 
 
 def _inside(stations: Float, outline: Float) -> Float:
-    return _between(stations, float(outline[:, 0].min()), float(outline[:, 0].max()))
+    return _stations_between(stations, float(outline[:, 0].min()), float(outline[:, 0].max()))
 
 
 # --- damage -----------------------------------------------------------------------------------------------------
@@ -137,7 +137,7 @@ _RIM = 24
 
 
 def pothole_surface(geometry: RoadGeometry, pothole: Pothole, tolerance: float) -> Faces:
-    """Return the bowl of a pothole as triangles whose corners lie on the damaged surface.
+    """Return a pothole's bowl as triangles whose corners lie on the damaged surface, within a tolerance (m).
 
     Rings of a paraboloid of the depth d, n of them, leave d / (4 n^2).
     """
@@ -154,26 +154,26 @@ def pothole_surface(geometry: RoadGeometry, pothole: Pothole, tolerance: float) 
         triangles += [np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)]
     corners = np.concatenate(triangles)
     inside = ~np.isnan(points[corners, 2]).any(axis=1)
-    return compact(Faces(points, corners[inside].ravel(), np.full(int(inside.sum()), 3)))
+    return drop_unused_points(Faces(points, corners[inside].ravel(), np.full(int(inside.sum()), 3)))
 
 
 # --- along the road ---------------------------------------------------------------------------------------------
 
 
-def close_stations(start: float, end: float, step: float = 1.0) -> Float:
-    """Return stations (N,), closely spaced (m), from a start to an end; at least two."""
+def even_stations(start: float, end: float, step: float = 1.0) -> Float:
+    """Return evenly spaced stations (N,) from a start to an end, both included, at most a step (m) apart."""
     return np.linspace(start, max(end, start + 1e-3), max(2, int(np.ceil((end - start) / step)) + 1))
 
 
 def line_points(geometry: RoadGeometry, item: LineObject, tolerance: float) -> Float:
-    """Return points (N, 3) of the surface below a line object's axis, so many that chords keep the tolerance (m)."""
-    station = close_stations(item.start_station, min(item.end_station, geometry.length))
-    points = on_ground(geometry, station, item.offset_at(station))
-    return points[needed_rows(points, tolerance)]
+    """Return surface points (N, 3) below a line object's axis, simplified within a chord tolerance (m)."""
+    station = even_stations(item.start_station, min(item.end_station, geometry.length))
+    points = surface_points(geometry, station, item.offset_at(station))
+    return points[simplify_polyline(points, tolerance)]
 
 
-def needed_rows(points: Float, tolerance: float, kept: NDArray[np.bool_] | None = None) -> NDArray[np.intp]:
-    """Return the rows that chords through a line's points (N, 3) need to stay within the tolerance (m) of all.
+def simplify_polyline(points: Float, tolerance: float, kept: NDArray[np.bool_] | None = None) -> NDArray[np.intp]:
+    """Return the indices of a polyline's points (N, 3) that Douglas-Peucker simplification keeps at a tolerance (m).
 
     Douglas and Peucker's way: the farthest point from a chord is kept until none is too far.
 

@@ -11,7 +11,7 @@ from ..road.geometry import RoadGeometry
 from ..road.terrain import highest_pavement
 from ..road.things.body import Body, Course, Place
 from ..road.things.thing import LengthwiseThing, StandingThing, Thing
-from .surfaces import Float, close_stations, left_of, needed_rows, on_ground
+from .surfaces import Float, even_stations, level_left_vectors, simplify_polyline, surface_points
 
 _ACROSS, _ROWS = 0.0125, 7
 """Distance (m) of the points across the road at which the pavement is looked at (0.9 mm at 7 % crossfall), and their
@@ -22,7 +22,7 @@ _SLOPE = 1.5
 
 @dataclass(frozen=True)
 class Frame:
-    """Frame of what stands at one place.
+    """Local frame of a thing that stands at one place: x to the right, y along the traffic that it faces, z up.
 
     Attributes:
         geometry: the road.
@@ -35,13 +35,13 @@ class Frame:
     right: Float
     along: Float
 
-    def local(self, points: Float) -> Float:
-        """Return local coordinates (..., 3) of points (..., 3) of the frame."""
+    def to_local(self, points: Float) -> Float:
+        """Transform points (..., 3) from this frame into the road's local coordinates."""
         plan = points[..., :1] * self.right + points[..., 1:2] * self.along
         return self.origin + np.concatenate([plan, points[..., 2:]], axis=-1)
 
     def place(self) -> Place:
-        """Return what lies below it."""
+        """Return the ground and pavement heights around this frame as functions of x and y, and the batters' slope."""
         terrain = self.geometry.parameters.terrain
         return Place(self._ground, self._pavement, terrain.batter_slope if terrain else _SLOPE)
 
@@ -50,7 +50,7 @@ class Frame:
 
     def _ground(self, x: ArrayLike, y: ArrayLike) -> Float:
         beside, ahead = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64))
-        return on_ground(self.geometry, *self._located(beside, ahead))[:, 2] - self.origin[2]
+        return surface_points(self.geometry, *self._located(beside, ahead))[:, 2] - self.origin[2]
 
     def _pavement(self, x: tuple[float, float], y: tuple[float, float], shear: float) -> float:
         across = np.linspace(*x, max(2, int(np.ceil((x[1] - x[0]) / _ACROSS)) + 1))
@@ -60,7 +60,7 @@ class Frame:
 
 
 class PlacedThing(NamedTuple):
-    """A thing of a road.
+    """A thing of a road with the bodies that it consists of and the frame in which they are given.
 
     Attributes:
         name: its id.
@@ -74,13 +74,13 @@ class PlacedThing(NamedTuple):
     frame: Frame | None
     bodies: list[Body]
 
-    def local(self, body: Body) -> Float:
-        """Return a body's sections (R, K, 3) in local coordinates."""
-        return self.frame.local(body.sections) if self.frame else body.sections
+    def local_sections(self, body: Body) -> Float:
+        """Transform a body's sections (R, K, 3) into the road's local coordinates."""
+        return self.frame.to_local(body.sections) if self.frame else body.sections
 
 
 def placed_things(geometry: RoadGeometry, tolerance: float) -> Iterator[PlacedThing]:
-    """Yield all things of a road in the order of the parameter set.
+    """Yield all standing and lengthwise things of a road with their bodies, in the parameter set's order.
 
     Args:
         geometry: the road.
@@ -96,18 +96,18 @@ def placed_things(geometry: RoadGeometry, tolerance: float) -> Iterator[PlacedTh
 
 
 def standing_things(geometry: RoadGeometry) -> Iterator[PlacedThing]:
-    """Yield all things of a road that stand at one place, in the order of the parameter set."""
+    """Yield only the things that stand at one place, with frames and bodies, in the parameter set's order."""
     standing = geometry.parameters.of_type(StandingThing)
-    frames = frames_of(geometry, list(standing.values()))
+    frames = standing_frames(geometry, list(standing.values()))
     for (name, item), frame in zip(standing.items(), frames, strict=True):
         yield PlacedThing(name, item, frame, item.bodies(frame.place()))
 
 
-def frames_of(geometry: RoadGeometry, items: Sequence[StandingThing]) -> list[Frame]:
-    """Return the frames of things on the surface below them, turned by their rotations."""
+def standing_frames(geometry: RoadGeometry, items: Sequence[StandingThing]) -> list[Frame]:
+    """Return the frames of standing things, placed on the surface below them and turned by their rotations."""
     places = [(item.station, item.offset, item.elevation, item.turn) for item in items]
     station, offset, above, turn = np.array(places, dtype=np.float64).reshape(-1, 4).T
-    origins = on_ground(geometry, station, offset)
+    origins = surface_points(geometry, station, offset)
     origins[:, 2] += above
     heading = geometry.alignment.heading(station) + turn
     along = np.stack([np.cos(heading), np.sin(heading)], axis=1)
@@ -116,16 +116,16 @@ def frames_of(geometry: RoadGeometry, items: Sequence[StandingThing]) -> list[Fr
 
 
 def _course(geometry: RoadGeometry, tolerance: float) -> Course:
-    """Return the road as what runs along it needs it."""
+    """Return the road as bodies along it are built from it: its length, surface points, left vectors and sampling."""
 
     def rows(offset: Callable[[Float], Float], start: float, end: float, kinks: Sequence[float]) -> Float:
-        station = np.unique(np.concatenate([close_stations(start, end), kinks]))
-        feet = on_ground(geometry, station, offset(station))
-        return station[needed_rows(feet, tolerance, np.isin(station, kinks))]
+        station = np.unique(np.concatenate([even_stations(start, end), kinks]))
+        feet = surface_points(geometry, station, offset(station))
+        return station[simplify_polyline(feet, tolerance, np.isin(station, kinks))]
 
     return Course(
         length=geometry.length,
-        feet=lambda station, offset: on_ground(geometry, station, offset),
-        left=lambda station: left_of(geometry, station),
+        feet=lambda station, offset: surface_points(geometry, station, offset),
+        left=lambda station: level_left_vectors(geometry, station),
         rows=rows,
     )

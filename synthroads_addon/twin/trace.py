@@ -33,7 +33,7 @@ _NOWHERE = dict.fromkeys(
 
 
 class Trace:
-    """Entities of one file by instance number, and what it lacks.
+    """Report on one twin file: the entities that each instance number became, and what the file lacks.
 
     Args:
         geometry: the road.
@@ -57,36 +57,36 @@ class Trace:
         self._entities: dict[int, list[Entity]] = {}
         self._reduced: list[tuple[str, str]] = []
 
-    def found(self, instance: int, **entity: str | int) -> None:
-        """Note an entity of an instance number, by what it is found with."""
+    def record_entity(self, instance: int, **entity: str | int) -> None:
+        """Record that an instance number became an entity of the file, given by keys to find it with."""
         self._entities.setdefault(instance, []).append(entity)
 
-    def grow(self, plant: PlacedPlant) -> None:
-        """Note that a plant grows."""
+    def record_plant(self, plant: PlacedPlant) -> None:
+        """Record that a plant exists, so that the report lists its instance number."""
         self._grown.setdefault(self._geometry.numbers.parts[plant.stand].first, []).append(plant.instance)
 
-    def reduce(self, name: str, reason: str) -> None:
-        """Note that the file has less of an object than the parameter set."""
+    def record_loss(self, name: str, reason: str) -> None:
+        """Record why the file shows an object in less detail than the parameter set has it."""
         self._reduced.append((name, reason))
 
-    def leave_out(self, placed: PlacedThing) -> None:
-        """Note what of a thing all formats leave out: its fittings, a shape that isn't known, what it says itself."""
+    def record_omissions(self, placed: PlacedThing) -> None:
+        """Record the details of a thing that every format omits: fittings, an unknown shape, what the thing names."""
         sizes = [body.detail for body in placed.bodies if body.detail]
         if sizes:
             few = "a fitting" if len(sizes) == 1 else f"{len(sizes)} fittings"
-            self.reduce(placed.name, f"without {few} of up to {max(sizes):.3g} m")
+            self.record_loss(placed.name, f"without {few} of up to {max(sizes):.3g} m")
         if not placed.bodies and isinstance(placed.thing, StandingThing):
-            self.reduce(placed.name, "its place alone: its shape isn't in the parameter set")
+            self.record_loss(placed.name, "its place alone: its shape isn't in the parameter set")
         if placed.thing.left_out:
-            self.reduce(placed.name, f"without {placed.thing.left_out}")
+            self.record_loss(placed.name, f"without {placed.thing.left_out}")
 
-    def simplify(self, placed: PlacedVehicle) -> None:
-        """Note that a vehicle is a box."""
+    def record_box(self, placed: PlacedVehicle) -> None:
+        """Record that a vehicle is written as its bounding box, at time 0 if it moves."""
         moves = ", where it is at the time 0" if placed.vehicle.speed else ""
-        self.reduce(placed.name, f"the box around it{moves}")
+        self.record_loss(placed.name, f"the box around it{moves}")
 
     def write(self, path: Path, name: str, file: str) -> None:
-        """Write what is traced and what is lacking; same road, same bytes.
+        """Write the report as JSON: entities by instance number, and what is missing and why; same road, same bytes.
 
         Args:
             path: the JSON file.
@@ -96,7 +96,7 @@ class Trace:
         parameters, numbers = self._geometry.parameters, self._geometry.numbers
         about = {"type": "TwinReport", "version": "1.0", "generator": generator(), "format": name, "file": file}
         about |= {"identifier": parameters.metadata.identifier, "level_of_detail": self.level}
-        traced, lost = self._sorted()
+        traced, lost = self._rows()
         own = {key: item.instance for key, item in parameters.objects.items()}
         reduced = [{"id": key, "instance": own[key], "reason": reason} for key, reason in self._reduced]
         passes = [
@@ -108,12 +108,12 @@ class Trace:
             text += f',\n"{key}":[' + ",".join("\n" + compact_json(row) for row in rows) + "]"
         path.write_text(text + "}\n", encoding="utf-8", newline="\n")
 
-    def _sorted(self) -> tuple[list[Entity], list[Entity]]:
-        """Return what each number became, and the numbers that became nothing with the reasons."""
+    def _rows(self) -> tuple[list[Entity], list[Entity]]:
+        """Return the report's rows for instance numbers with entities, and for those that are missing with reasons."""
         objects = self._geometry.parameters.objects
         if not self._grown:  # the format has no plants
             for plant in placed_plants(self._geometry):
-                self.grow(plant)
+                self.record_plant(plant)
         traced, lost = [], []
         for number, name, kinds in self._numbers():
             entities = self._entities.get(number)
@@ -127,11 +127,11 @@ class Trace:
         return traced, lost
 
     def _is_only_parts(self, item: RoadObject | None) -> bool:
-        """Return whether an object consists of parts alone: no point has its own number."""
+        """Return whether an object consists of numbered parts only, so that no point has its own number."""
         return isinstance(item, Vegetation) or (isinstance(item, LineMarking) and bool(item.dash_length))
 
     def _numbers(self) -> Iterator[tuple[int, str, tuple[str, ...]]]:
-        """Yield every number that points can have, but those of later passes, its id, and what may give the reason."""
+        """Yield the number, id and type names of every object and part that points can bear, later passes excluded."""
         numbers, objects = self._geometry.numbers, self._geometry.parameters.objects
         for name, item in objects.items():
             yield item.instance, name, tuple(kind.__name__ for kind in type(item).__mro__)
@@ -142,7 +142,7 @@ class Trace:
                 yield number, text, (text.partition("/")[2].partition("-")[0], parts.kind, *kinds)
 
     def _parts_of(self, item: RoadObject, parts: Parts) -> Iterable[int]:
-        """Return the parts of an object that are there."""
+        """Return the numbers of an object's parts that exist on the road, counted from 0."""
         if isinstance(item, LineMarking):
             return range(len(self._geometry.dashes(item)) if item.dash_length else 0)
         if isinstance(item, Vegetation) and item.kind != "grass":

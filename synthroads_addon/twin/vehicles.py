@@ -16,7 +16,7 @@ from ..road.things.vehicles import CHASSIS, VEHICLE_TYPES
 
 
 class PlacedVehicle(NamedTuple):
-    """A vehicle at the time 0.
+    """A vehicle at time 0: its place on the road and its rotation.
 
     Attributes:
         name: its id.
@@ -33,14 +33,14 @@ class PlacedVehicle(NamedTuple):
     rotation: Float
 
     def box(self) -> Float:
-        """Return the local sections (2, 4, 3) of the box around it."""
+        """Return the vehicle's bounding box as local sections (2, 4, 3), m."""
         kind = VEHICLE_TYPES[self.vehicle.model]
         around = box((kind.length, kind.width, kind.height), (0.0, 0.0, kind.height / 2.0))
         return around @ self.rotation.T + self.place
 
 
 def placed_vehicles(geometry: RoadGeometry) -> Iterator[PlacedVehicle]:
-    """Yield all vehicles of a road in the order of the parameter set."""
+    """Yield all vehicles of a road with their poses at time 0, in the parameter set's order."""
     for name, vehicle in geometry.parameters.of_type(Vehicle).items():
         line, station = lane_of(geometry, vehicle), np.array([vehicle.station])
         rotation, place = wheel_pose(line, CHASSIS[vehicle.model], station)

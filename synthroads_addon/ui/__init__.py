@@ -54,7 +54,7 @@ MODULES = (
 
 
 def register() -> None:
-    """Register every class, attach the settings, and listen to what happens in Blender."""
+    """Register all classes of the panel with Blender, attach the settings' property groups, and add event handlers."""
     for module in MODULES:
         for cls in _classes_of(module):
             bpy.utils.register_class(cls)
@@ -68,7 +68,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Undo `register`; what is at work is stopped."""
+    """Undo `register` in reverse order: remove handlers, property groups and classes; running work is stopped."""
     for module in reversed(MODULES):
         for event, function in getattr(module, "HANDLERS", {}).items():
             getattr(bpy.app.handlers, event).remove(function)
@@ -81,6 +81,6 @@ def unregister() -> None:
 
 
 def _classes_of(module: ModuleType) -> list[type]:
-    """Return the classes of a module that Blender is to know, in the order in which they are defined."""
+    """Return the classes of a module to be registered with Blender, in the order of their definition."""
     defined = [c for c in vars(module).values() if isinstance(c, type) and c.__module__ == module.__name__]
     return list(getattr(module, "CLASSES", ())) or [c for c in defined if issubclass(c, bpy.types.bpy_struct)]

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from headless import dataset_run
-from headless.dataset_run import TASK, Absence, Outcome, local_processes, run_task
+from headless.dataset_run import TASK, Outcome, WorkerAbsence, local_processes, run_task
 from synthroads_addon.base.errors import InputError
 
 
@@ -73,17 +73,17 @@ def test_each_attempt_has_a_folder_of_its_own(monkeypatch: pytest.MonkeyPatch, t
 
 
 def test_absence_of_workers_is_said_after_a_minute_and_ended_in_the_end(caplog: pytest.LogCaptureFixture) -> None:
-    absence = Absence("tcp://here:1", 600.0)
+    absence = WorkerAbsence("tcp://here:1", 600.0)
     for workers, now in ((1, 0.0), (0, 10.0), (0, 69.0)):
-        absence.look(workers, now)
+        absence.update(workers, now)
     assert not caplog.records
-    absence.look(0, 70.0)
-    absence.look(0, 300.0)
+    absence.update(0, 70.0)
+    absence.update(0, 300.0)
     assert [record.getMessage() for record in caplog.records] == [
         "warning: tcp://here:1 has no worker; waiting for one, up to 600 s in all"
     ]
-    absence.look(2, 400.0)
+    absence.update(2, 400.0)
     assert caplog.records[-1].getMessage() == "tcp://here:1 has workers again: 2"
-    absence.look(0, 500.0)
+    absence.update(0, 500.0)
     with pytest.raises(InputError, match=r"had no worker for 600 s \(--worker-timeout\); --resume continues"):
-        absence.look(0, 1100.0)
+        absence.update(0, 1100.0)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from headless.marked_documents import BEGIN, END, fill, replace_tables
+from headless.marked_documents import BEGIN, END, put_tables, replace_tables
 from synthroads_addon.base.errors import InputError
 
 
@@ -24,10 +24,10 @@ def test_only_what_stands_between_markers_is_replaced() -> None:
 def test_a_document_is_looked_at_before_the_work_and_filled_after_it(tmp_path: Path) -> None:
     document = tmp_path / "page.md"
     document.write_text(f"{BEGIN.format('one')}\n{END}\n", encoding="utf-8")
-    assert fill(document, ["one"], lambda: {"one": "made"}) == {"one": "made"}
+    assert put_tables(document, ["one"], lambda: {"one": "made"}) == {"one": "made"}
     assert "made" in document.read_text(encoding="utf-8")
-    assert fill(None, ["other"], lambda: {"other": "made"}) == {"other": "made"}
+    assert put_tables(None, ["other"], lambda: {"other": "made"}) == {"other": "made"}
     with pytest.raises(InputError):
-        fill(document, ["other"], lambda: pytest.fail("worked for nothing"))
+        put_tables(document, ["other"], lambda: pytest.fail("worked for nothing"))
     with pytest.raises(InputError, match=r"--document is .*nowhere.md': cannot be read \(No such file"):
-        fill(tmp_path / "nowhere.md", ["one"], lambda: pytest.fail("worked for nothing"))
+        put_tables(tmp_path / "nowhere.md", ["one"], lambda: pytest.fail("worked for nothing"))

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import pytest
 
 from headless.cli import COMMANDS, build_parser
-from headless.commands import SHORT_OPTIONS, command, complete_arguments, module_of
+from headless.commands import SHORT_OPTIONS, add_shared_options, command, module_of
 
 
 def parsers(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
@@ -62,7 +62,7 @@ def test_a_command_by_itself_understands_them(capsys: pytest.CaptureFixture[str]
 def test_every_command_can_be_quiet_and_verbose(name: str) -> None:
     parser = argparse.ArgumentParser()
     module_of(name).add_arguments(parser)
-    complete_arguments(parser)
+    add_shared_options(parser)
     for tool in list(parsers(parser))[1:] or [parser]:
         known = tool._option_string_actions
         assert {"--quiet", "--verbose", "--json"} <= set(known)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from headless.tradeoff_table import TABLES, better_row, markdown, time_noise
-from synthroads_addon.jobs.measure.tradeoff import KNOBS, row_scenario, rows
+from synthroads_addon.jobs.measure.tradeoff import KNOBS, knob_rows, row_scenario
 from synthroads_addon.scanning.platforms.path import Strip
 from synthroads_addon.scanning.platforms.stretches import spread_stretches
 from synthroads_addon.scenario.scenario import load_scenario
@@ -22,8 +22,8 @@ def _row(knob: str, value: Any, **more: Any) -> dict[str, Any]:
 
 
 def test_every_row_is_named_and_in_a_table() -> None:
-    assert len(list(rows(KNOBS))) == sum(len(knob.rows) for knob in KNOBS.values())
-    assert len(list(rows(KNOBS))) == 54
+    assert len(list(knob_rows(KNOBS))) == sum(len(knob.rows) for knob in KNOBS.values())
+    assert len(list(knob_rows(KNOBS))) == 54
     assert {knob.table for knob in KNOBS.values()} == TABLES.keys()
 
 

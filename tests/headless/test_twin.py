@@ -77,8 +77,8 @@ def test_a_missing_package_is_named_with_its_extra(
     parameters: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setitem(twin.FORMATS, "geojson", replace(twin.FORMATS["geojson"], package="no_such_package"))
-    assert twin.missing_packages("geojson") == "no_such_package"
-    assert twin.missing_packages("cityjson") is None
+    assert twin.missing_package("geojson") == "no_such_package"
+    assert twin.missing_package("cityjson") is None
     assert run(parameters, "--output", tmp_path / "out", "--twin", "cityjson,geojson") == 2
     assert "needs the package no_such_package: pip install 'synthroads[twin]'" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

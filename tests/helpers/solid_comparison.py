@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from synthroads_addon.road.things.body import Body
-from synthroads_addon.twin.faces import loft, strip_triangles
+from synthroads_addon.twin.faces import loft, triangulate
 
 Float = NDArray[np.float64]
 ALIKE = 1.02e-3
@@ -35,7 +35,7 @@ class Misfit(NamedTuple):
 def triangles_of(body: Body) -> Float:
     """Return the triangles (T, 3, 3) of a body."""
     faces = loft(body.sections)
-    return faces.points[strip_triangles(faces)]
+    return faces.points[triangulate(faces)]
 
 
 def compare(mesh: Float, bodies: Sequence[Float], fittings: Sequence[Float]) -> Misfit:

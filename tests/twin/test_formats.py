@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from synthroads_addon.road.objects import PointObject
-from synthroads_addon.twin.formats import FORMATS, TWIN_FORMATS, FormatEntry, missing_packages, write_twin
+from synthroads_addon.twin.formats import FORMATS, TWIN_FORMATS, FormatEntry, missing_package, write_twin
 from tests.helpers.page_modules import block_of_page, module_of_page
 from tests.helpers.roads.twin_roads import one_of_many
 from tests.twin.test_geojson import features_of
@@ -23,7 +23,7 @@ PAGE = "extend/twin-format.md"
 
 @pytest.mark.parametrize("name", TWIN_FORMATS)
 def test_a_format_is_written_to_its_file_with_the_same_bytes_each_time(name: str, tmp_path: Path) -> None:
-    if package := missing_packages(name):
+    if package := missing_package(name):
         pytest.skip(f"needs {package}")
     road, entry = one_of_many(3), FORMATS[name]
     for folder in ("one", "two"):

@@ -17,7 +17,7 @@ from synthroads_addon.road.things.vehicles import VEHICLE_TYPES
 from synthroads_addon.twin.formats import write_twin
 from synthroads_addon.twin.ground import GROUND_TOLERANCE
 from synthroads_addon.twin.plants import PlacedPlant, placed_plants
-from synthroads_addon.twin.surfaces import on_ground
+from synthroads_addon.twin.surfaces import surface_points
 from synthroads_addon.twin.vehicles import placed_vehicles
 from tests.helpers.files.cityjson_files import City, read_city, triangles_of_rings
 from tests.helpers.files.ifc_reading import body, named, parts, said
@@ -81,13 +81,13 @@ def test_the_ground_is_the_surface_beside_the_road(twins: Twins) -> None:
     beside = (offset > edges[:, 0] + 0.05) | (offset < edges[:, -1] - 0.05)
     beside &= clip_offset(offset, geometry.alignment.curvature(station)) == offset
     beside &= np.abs(offset) < half - 0.05
-    above, count = _heights(triangles, on_ground(geometry, station[beside], offset[beside]))
+    above, count = _heights(triangles, surface_points(geometry, station[beside], offset[beside]))
     assert beside.sum() > 100
     assert set(count.tolist()) == {1.0}
     assert np.abs(above).max() < item["attributes"]["deviation"] * 1.2 + TENTH < GROUND_TOLERANCE
     corners = triangles.reshape(-1, 3)
     station, offset = geometry.alignment.project(corners[:, :2])
-    known = on_ground(geometry, np.clip(station, 0.0, geometry.length), offset)
+    known = surface_points(geometry, np.clip(station, 0.0, geometry.length), offset)
     assert np.linalg.norm(corners - known, axis=1).max() < 1e-3
 
 
@@ -115,7 +115,7 @@ def test_ground_far_off_is_seen(twins: Twins) -> None:
     triangles = twins.triangles("terrain") + (0.0, 0.0, 0.05)
     geometry = twins.geometry
     station = np.linspace(5.0, geometry.length - 5.0, 20)
-    above, _ = _heights(triangles, on_ground(geometry, station, np.full(20, 50.0)))
+    above, _ = _heights(triangles, surface_points(geometry, station, np.full(20, 50.0)))
     assert np.nanmax(np.abs(above)) > GROUND_TOLERANCE
 
 
@@ -168,7 +168,7 @@ def test_plants_stand_on_the_ground_within_their_band(twins: Twins) -> None:
     geometry = twins.geometry
     for plant in twins.plants:
         station, offset = (float(value[0]) for value in geometry.alignment.project(plant.foot[None, :2]))
-        surface = on_ground(geometry, np.array([station]), np.array([offset]))
+        surface = surface_points(geometry, np.array([station]), np.array([offset]))
         np.testing.assert_allclose(plant.foot, surface[0], rtol=0, atol=1e-6)
         edges = geometry.offsets(np.array([station]))[0]
         distance = max(offset - edges[0], edges[-1] - offset)
@@ -200,7 +200,7 @@ def test_grass_is_an_area_above_the_ground_for_each_strip(twins: Twins) -> None:
         assert numbers.name_of(item["attributes"]["instance"]) == name
         corners = twins.corners(name)
         station, offset = twins.geometry.alignment.project(corners[:, :2])
-        level = on_ground(twins.geometry, np.clip(station, 0.0, twins.geometry.length), offset)[:, 2]
+        level = surface_points(twins.geometry, np.clip(station, 0.0, twins.geometry.length), offset)[:, 2]
         height = corners[:, 2] - level
         assert height == pytest.approx(np.full(len(height), item["attributes"]["averageHeight"]), abs=2e-3)
         edges = twins.geometry.offsets(np.clip(station, 0.0, twins.geometry.length))

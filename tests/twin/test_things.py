@@ -119,7 +119,7 @@ def differences(name: str, parameters: RoadParameters, folder: Path) -> dict[str
         if name == "opendrive" and isinstance(thing.thing, LengthwiseThing):
             continue
         if bodies:
-            corners = np.concatenate([thing.local(item).reshape(-1, 3) for item in bodies])
+            corners = np.concatenate([thing.local_sections(item).reshape(-1, 3) for item in bodies])
             off[thing.name] = float(np.abs(_extent(thing, corners) - _extent(thing, found[thing.name])).max())
     return off
 

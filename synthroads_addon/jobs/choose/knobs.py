@@ -27,19 +27,19 @@ _OF_POSITION = 0.2
 
 
 class ModelKnobs(NamedTuple):
-    """The model's knobs: see `scenario.Settings`."""
+    """The two settings of the road's model that are chosen: geometric tolerance (m) and vegetation detail (0 to 1)."""
 
     tolerance: float
     detail: float
 
     @property
     def changes(self) -> dict[str, Any]:
-        """Return the changes of the scenario."""
+        """Return these settings as changes of a scenario: field name -> value."""
         return {"geometric_tolerance": self.tolerance, "vegetation_detail": self.detail}
 
 
 def model_knobs(scenario: Scenario, limits: Mapping[str, float]) -> tuple[ModelKnobs, ...]:
-    """Return the models to choose from, the cheapest first: with few plants and with all.
+    """Return the model settings to choose from, the cheapest first: with few plants and with all.
 
     Their geometric tolerance is the coarsest that the limits allow; without limits, a coarse one and a fine one.
     """
@@ -57,7 +57,7 @@ def model_knobs(scenario: Scenario, limits: Mapping[str, float]) -> tuple[ModelK
 
 
 def rays_choices(scenario: Scenario) -> dict[int, tuple[int, ...]]:
-    """Return rays per pulse -> rays on each ring, to choose from; one if the scenario gives it."""
+    """Return the beams to choose from, rays per pulse -> rays on each ring; only one if the scenario gives it."""
     if scenario.scan.beam_rings is not None:
         return {1 + sum(scenario.scan.beam_rings): scenario.scan.beam_rings}
     if scenario.scan.rays_per_pulse is not None:
@@ -66,7 +66,7 @@ def rays_choices(scenario: Scenario) -> dict[int, tuple[int, ...]]:
 
 
 def octave_choices(scenario: Scenario) -> tuple[int, ...]:
-    """Return octaves of the micro-relief to choose from; none if there is no relief."""
+    """Return the numbers of octaves of the micro-relief to choose from; empty if the scan has no relief."""
     if scenario.scan.relief == 0.0:
         return ()
     if scenario.scan.relief_octaves is not None:
@@ -75,7 +75,7 @@ def octave_choices(scenario: Scenario) -> tuple[int, ...]:
 
 
 def colour_choices(scenario: Scenario, typical_range: float, returns: bool) -> dict[str, dict[str, Any]]:
-    """Return what colours and layers can come from: name -> changes, in the order of their accuracy.
+    """Return the colour sources to choose from, name -> changes of the scenario, from least to most accurate.
 
     Args:
         scenario: its colours' own fields stay as they are.
@@ -102,11 +102,11 @@ def colour_choices(scenario: Scenario, typical_range: float, returns: bool) -> d
 
 
 def with_changes(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
-    """Return the scenario with dotted fields changed, and without a choice still to be made."""
+    """Return the scenario with fields changed by dotted path, and without its tolerance and time budget."""
     return Scenario.from_dict(apply_values(scenario.to_dict(), {**changes, "tolerance": None, "time_budget": None}))
 
 
 def given_knobs(scenario: Scenario) -> dict[str, Any]:
-    """Return the knobs that a scenario gives itself, by their paths: a choice leaves these as they are."""
+    """Return the choosable fields that a scenario sets itself, dotted path -> value; a choice leaves these alone."""
     values = {path: attrgetter(path)(scenario) for path in KNOBS}
     return {path: value for path, value in values.items() if value not in (None, "auto")}

@@ -18,7 +18,7 @@ _LEAST = 1e-9
 
 @dataclass(frozen=True)
 class Option:
-    """One setting of a knob, or one of every knob, see `combine`.
+    """One setting of a knob (or, from `combine`, of all knobs) with its expected errors, cost and time.
 
     Attributes:
         changes: of the scenario: dotted path -> value.
@@ -33,11 +33,11 @@ class Option:
     seconds: float = 0.0
 
     def upper(self, kind: str) -> float:
-        """Return the upper bound of a kind of error."""
+        """Return the upper confidence bound of a kind of error; 0 for a kind that the option has no error of."""
         return self.found.get(kind, (0.0, 0.0))[1]
 
     def keeps(self, limits: Mapping[str, float]) -> bool:
-        """Return whether all errors are within their limits."""
+        """Return whether the upper bounds of all limited errors are within their limits."""
         return all(self.upper(kind) <= limit for kind, limit in limits.items())
 
 
@@ -46,7 +46,7 @@ Knobs = Sequence[Sequence[Option]]
 
 
 def combine(options: Iterable[Option]) -> Option:
-    """Return one option of every knob as a whole: their changes and errors together, costs and times added up."""
+    """Return one option for several knobs together: changes and errors merged, costs and seconds summed."""
     several = tuple(options)
     changes = {path: value for option in several for path, value in option.changes.items()}
     found = {kind: pair for option in several for kind, pair in option.found.items()}
@@ -54,19 +54,19 @@ def combine(options: Iterable[Option]) -> Option:
 
 
 def options_within(knobs: Knobs, limits: Mapping[str, float]) -> list[list[Option]]:
-    """Return the options that keep a tolerance.
+    """Return for each knob the options whose errors are within the limits.
 
     Raises:
         InputError: a knob has none; says what is the best to be had.
     """
     kept = [[option for option in options if option.keeps(limits)] for options in knobs]
     if [] in kept:
-        raise _impossible(knobs[kept.index([])], limits)
+        raise _tolerance_error(knobs[kept.index([])], limits)
     return kept
 
 
-def _impossible(options: Sequence[Option], limits: Mapping[str, float]) -> InputError:
-    """Return the error for a tolerance that no option keeps: the best of each kind, or of all together."""
+def _tolerance_error(options: Sequence[Option], limits: Mapping[str, float]) -> InputError:
+    """Return the InputError for limits that no option keeps, naming the best that can be had."""
     for kind, limit in limits.items():
         best = min(option.upper(kind) for option in options)
         if best > limit:
@@ -79,7 +79,7 @@ def _impossible(options: Sequence[Option], limits: Mapping[str, float]) -> Input
 
 
 def cheapest(knobs: Knobs, limits: Mapping[str, float]) -> Option:
-    """Return the cheapest settings that keep a tolerance.
+    """Return the settings of the lowest total cost whose errors are within the limits.
 
     Raises:
         InputError: there are none; says what is the best to be had.
@@ -90,7 +90,7 @@ def cheapest(knobs: Knobs, limits: Mapping[str, float]) -> Option:
 def best_in_time(
     knobs: Knobs, seconds: float, reference: Mapping[str, float], limits: Mapping[str, float] | None = None
 ) -> Option:
-    """Return the best settings that fit a time: their largest error, as a multiple of a reference, is the smallest.
+    """Return the settings with the smallest largest error, relative to a reference, that take at most a time (s).
 
     Of several as good in that, those whose errors' sum is the smallest, and of these the fastest.
 
@@ -106,12 +106,12 @@ def best_in_time(
     choices = list(map(combine, itertools.product(*options_within(knobs, limits or {}))))
     fitting = [choice for choice in choices if choice.seconds <= seconds]
     if not fitting:
-        raise too_short(seconds, min(choice.seconds for choice in choices), bool(limits))
+        raise too_short_error(seconds, min(choice.seconds for choice in choices), bool(limits))
     return min(fitting, key=lambda choice: _loss(choice, reference))
 
 
-def too_short(seconds: float, fastest: float, tolerance: bool = False) -> InputError:
-    """Return the error for a time that nothing fits."""
+def too_short_error(seconds: float, fastest: float, tolerance: bool = False) -> InputError:
+    """Return the InputError for a time budget that even the fastest settings exceed, in seconds."""
     which = "that keep the tolerance " if tolerance else ""
     left = f"{max(seconds, 0.0):.0f} s of it can still be used"
     text = f"too short: {left}, and the fastest settings {which}take about {fastest:.0f} s"

@@ -21,8 +21,8 @@ from ..measure.errors import CONVERGED, Errors, beam_errors
 from ..open_scene import ForeignScene, RoadScene
 from . import knobs as choices
 from .knobs import ModelKnobs
-from .options import Knobs, Option, best_in_time, cheapest, too_short
-from .table import JobTimes, nearest_row, table_of
+from .options import Knobs, Option, best_in_time, cheapest, too_short_error
+from .table import JobTimes, nearest_row, shipped_table
 from .trial import LINES, Trial
 
 _BEAM = frozenset({"position", "intensity", "labels", "density"})
@@ -38,9 +38,7 @@ S = TypeVar("S", ForeignScene, RoadScene)
 
 @dataclass(frozen=True)
 class _Findings:
-    """Errors of the options of every knob: of the beam by model and rays, of the relief by octaves, of the colours by
-    name; and where they are from.
-    """
+    """Expected errors of all options (beam by model and rays, relief by octaves, colour by name) and their source."""
 
     beam: Mapping[tuple[ModelKnobs | None, int], Errors]
     relief: Mapping[int, Errors]
@@ -49,7 +47,7 @@ class _Findings:
 
 
 def choose_settings(scene: S, begun: float, timer: StageTimer) -> tuple[S, dict[str, Any]]:
-    """Choose the settings that a scene's scenario leaves open.
+    """Choose the settings that a scenario leaves open, to keep its error tolerance or time budget.
 
     Args:
         scene: its scenario has a tolerance or a time budget, or both.
@@ -67,12 +65,12 @@ def choose_settings(scene: S, begun: float, timer: StageTimer) -> tuple[S, dict[
         search = _Search(scene, begun)
         scenario, report = search.decide()
     settings = scenario.settings()
-    built = None if search.trial is None else search.trial[0]
-    return scene.choose(scenario, built in (None, ModelKnobs(settings.tolerance, settings.vegetation_detail))), report
+    chosen = ModelKnobs(settings.tolerance, settings.vegetation_detail)
+    return scene.with_settings(scenario, search.trial is None or search.trial[0] in (None, chosen)), report
 
 
 class _Search:
-    """One choice: what there is to choose from, and what was measured of it.
+    """Search for a job's settings: the options, and the errors and times measured for them so far.
 
     Attributes:
         limits: the tolerance; empty without.
@@ -89,14 +87,14 @@ class _Search:
         colours = choices.colour_choices(self.scenario, self.site.path.typical_range, HAS_RETURN_CAMERA)
         self.colours = colours if _COLOURS & set(self.limits) or self.scenario.may_render else {}
         pulses = sum(map(self.site.cut.pulse_count, self.site.path.strips))
-        self.times = JobTimes(table_of(self.scenario.scan.platform.kind), scene.area, pulses)
+        self.times = JobTimes(shipped_table(self.scenario.scan.platform.kind), scene.area, pulses)
         models = choices.model_knobs(self.scenario, self.limits) if scene.area else (None,)
         self.models: list[ModelKnobs | None] = [*models]
         self.build_seconds: dict[ModelKnobs | None, float] = {}
         self.trial: tuple[ModelKnobs | None, Trial] | None = None
 
     def decide(self) -> tuple[Scenario, dict[str, Any]]:
-        """Return the job with the chosen settings, and the report."""
+        """Return the scenario with the chosen settings, and a report of the choice as JSON data."""
         budget = self.scenario.time_budget
         found, choice = self._choose_by_tolerance() if budget is None else self._choose_by_time(budget)
         here, kept = time.perf_counter(), choices.given_knobs(self.scenario)
@@ -125,39 +123,39 @@ class _Search:
             return budget - (time.perf_counter() - self.begun)
 
         fewest, times = min(self.rays), self.times
-        seconds = times.model(0) + times.scan(fewest) + times.other_outputs(self.scenario)
+        seconds = times.model_seconds(0) + times.scan_seconds(fewest) + times.other_seconds(self.scenario)
         if seconds > _HOPELESS * left():  # by the shipped table, before anything is built
-            raise too_short(left(), seconds)
-        times.calibrate(fewest, *self._try(self.models[0]).time_scan(self.rays[fewest]))
-        if (fastest := times.scan(fewest) + times.other_outputs(self.scenario)) > left():
-            raise too_short(left(), fastest)
+            raise too_short_error(left(), seconds)
+        times.calibrate(fewest, *self._try_model(self.models[0]).time_scan(self.rays[fewest]))
+        if (fastest := times.scan_seconds(fewest) + times.other_seconds(self.scenario)) > left():
+            raise too_short_error(left(), fastest)
         # The error of the height follows from the model, without a measurement.
-        found = self._measure() if set(self.limits) - {"height"} else self._look_up()
-        return found, best_in_time(self._options(found), _SURE * left(), self._reference(), self.limits)
+        found = self._measure() if set(self.limits) - {"height"} else self._table_errors()
+        return found, best_in_time(self._options(found), _SURE * left(), self._reference_errors(), self.limits)
 
     def _measure(self) -> _Findings:
-        """Return errors as trials show them: of the beam and of colours only if they are limited."""
+        """Return errors measured in trials; those of beam and colours only if the tolerance limits them."""
         limited = set(self.limits)
         beam = self._measure_beam() if _BEAM & limited else {(self.models[0], min(self.rays)): {}}
         if self.trial is None:
-            self._try(self.models[0])
+            self._try_model(self.models[0])
         colour: Mapping[str, Errors] = {name: {} for name in self.colours}
         if self.colours and _COLOURS & limited:
             colour = self._trial.colour_errors(self.colours, self.scenario.coloured_layers)
         return _Findings(beam, self._trial.relief_errors(self.octaves) if self.octaves else {}, colour)
 
     def _measure_beam(self) -> dict[tuple[ModelKnobs | None, int], Errors]:
-        """Try all models out, the one with all plants last; the truth is seen among these."""
+        """Return the beam's errors by model and rays per pulse, measured against 61 rays on the last model."""
         points: dict[tuple[ModelKnobs | None, int], list[PointBlock]] = {}
         for model in self.models:
-            trial = self._try(model)
+            trial = self._try_model(model)
             points |= {(model, rays): trial.points(rings) for rays, rings in self.rays.items()}
         exact = self.rays.get(CONVERGED) == RINGS[CONVERGED]
         truth = points[self.models[-1], CONVERGED] if exact else self._trial.points()
         return {knobs: beam_errors(mine, truth) for knobs, mine in points.items()}
 
-    def _look_up(self) -> _Findings:
-        """Return the shipped table's errors."""
+    def _table_errors(self) -> _Findings:
+        """Return the errors of all options from the shipped table instead of from measurements."""
         table, beam = self.times.table, {}
         for model in self.models:
             few = model is not None and model.detail < FIDELITIES["standard"].vegetation_detail
@@ -169,27 +167,27 @@ class _Search:
         colour = {name: _exact({kind: table.colour[name][kind] for kind in kinds}) for name in self.colours}
         return _Findings(beam, relief, colour, "shipped table, scaled by a short run")
 
-    def _reference(self) -> dict[str, float]:
-        """Return the errors of the standard fidelity, by which kinds of errors are weighed against each other."""
+    def _reference_errors(self) -> dict[str, float]:
+        """Return the standard fidelity's error of each kind, by which errors are weighed against each other."""
         table, standard = self.times.table, FIDELITIES["standard"]
         found = {"height": standard.tolerance, "relief": nearest_row(table.relief, standard.relief_octaves)}
         found |= {**nearest_row(table.beam, standard.rays_per_pulse), **table.colour["standard"]}
         return {kind: error for kind, error in found.items() if error > 0.0}
 
     def _options(self, found: _Findings) -> Knobs:
-        """Return the options of every knob, with the times that are expected by what is known of this machine."""
+        """Return the options of every knob with their errors, costs and seconds expected on this machine."""
         beam = [self._beam_option(*knobs, errors) for knobs, errors in found.beam.items()]
         relief = [
-            Option({"scan.relief_octaves": octaves}, errors, octaves, self.times.relief(octaves))
+            Option({"scan.relief_octaves": octaves}, errors, octaves, self.times.relief_seconds(octaves))
             for octaves, errors in found.relief.items()
         ]
         colour = [self._colour_option(name, errors) for name, errors in found.colour.items()]
-        rest = [Option({}, {}, 0.0, self.times.other_outputs(self.scenario))]
+        rest = [Option({}, {}, 0.0, self.times.other_seconds(self.scenario))]
         return [options for options in (beam, relief, colour, rest) if options]
 
     def _beam_option(self, model: ModelKnobs | None, rays: int, errors: Errors) -> Option:
-        """Return an option of rays and a model; its time is that of the scan, and of building if it doesn't stand."""
-        cost, seconds = 4.0 + rays, self.times.scan(rays)
+        """Return the option of a model and rays per pulse; its seconds include building a model that isn't open."""
+        cost, seconds = 4.0 + rays, self.times.scan_seconds(rays)
         changes: dict[str, Any] = {"scan.rays_per_pulse": rays} if self.scenario.scan.beam_rings is None else {}
         if model is None:
             return Option(changes, errors, cost, seconds)
@@ -197,21 +195,21 @@ class _Search:
         # The model's vertices lie on the surface: heights are off by its tolerance at most, positions by half of it.
         errors = {**errors, "height": (model.tolerance,) * 2, "position": (estimate, bound + model.tolerance / 2.0)}
         if self.trial is None or model != self.trial[0]:
-            seconds += self.build_seconds.get(model, self.times.model(self.models.index(model)))
+            seconds += self.build_seconds.get(model, self.times.model_seconds(self.models.index(model)))
         return Option({**model.changes, **changes}, errors, cost + 0.5 * model.detail, seconds)
 
     def _colour_option(self, name: str, errors: Errors) -> Option:
         changes = self.colours[name]
         work = changes["colour.source"], *self._trial.count_images(changes)
-        return Option(changes, errors, self.times.colour_cost(*work), self.times.colour(*work))
+        return Option(changes, errors, self.times.colour_cost(*work), self.times.colour_seconds(*work))
 
     @property
     def _trial(self) -> Trial:
         assert self.trial is not None
         return self.trial[1]
 
-    def _try(self, model: ModelKnobs | None) -> Trial:
-        """Return the trial of a model, which is built unless it stands."""
+    def _try_model(self, model: ModelKnobs | None) -> Trial:
+        """Return a trial of a model, which is built in the open file unless it is there already."""
         if self.trial is None or self.trial[0] != model:
             begin = time.perf_counter()
             self.trial = model, Trial.of(self.site, self.scene.rebuild(model.changes if model else {}))

@@ -22,7 +22,7 @@ _RETURN = 1.6
 
 @dataclass(frozen=True)
 class Table:
-    """Errors by `tolerance.KINDS`, and seconds on the machine that they were measured on.
+    """Shipped table of one platform: errors by `tolerance.KINDS`, and times on the machine that measured them.
 
     Attributes:
         beam: errors by rays per pulse, among all plants.
@@ -52,7 +52,7 @@ class Table:
     cores: int
 
     def pulse_seconds(self, rays: int) -> float:
-        """Return the seconds of a pulse of so many rays, linear between what was measured."""
+        """Return the seconds per pulse for a number of rays, interpolated linearly between measured numbers."""
         known = sorted((int(number), 1e-6 * value) for number, value in self.pulse.items())
         rays = max(rays, known[0][0])
         (a, low), (b, high) = next((pair for pair in pairwise(known) if rays <= pair[1][0]), (known[-2], known[-1]))
@@ -60,21 +60,21 @@ class Table:
 
 
 @cache
-def table_of(platform: str) -> Table:
-    """Return the table of a kind of platform; a trajectory has the UAV's."""
+def shipped_table(platform: str) -> Table:
+    """Return the shipped table of a kind of platform, cached; of the UAV for a kind that has none, as a trajectory."""
     data: dict[str, Any] = read_json(FILE)
     platforms = data["platforms"]
     return Table(**platforms.get(platform, platforms["uav"]), cores=data["cores"])
 
 
 def nearest_row(rows: Mapping[str, Any], number: int) -> Any:
-    """Return the row of the number nearest to one."""
+    """Return the value whose key, a number as text, is nearest to a number."""
     return rows[min(rows, key=lambda key: abs(int(key) - number))]
 
 
 @dataclass
 class JobTimes:
-    """Expected times of a job's parts on this machine, s: those of the table, scaled by one short run.
+    """Expected seconds of a job's parts on this machine: the table's times scaled by one short run.
 
     Attributes:
         table: the platform's.
@@ -91,28 +91,28 @@ class JobTimes:
     speed: float = 1.0
 
     def calibrate(self, rays: int, seconds: float, points: int) -> None:
-        """Take over what the scan takes at so many rays per pulse, and how many points it has."""
+        """Set the machine's speed and the number of points from a timed scan with a number of rays per pulse."""
         self.speed = seconds / max(self.pulses * self.table.pulse_seconds(rays), 1e-9)
         self.points = points
 
-    def scan(self, rays: int) -> float:
-        """Return the time of the scan into files, with the coarsest relief and the materials' colours."""
+    def scan_seconds(self, rays: int) -> float:
+        """Return the seconds of the scan into files, with the coarsest relief and the materials' mean colours."""
         return self.pulses * self.table.pulse_seconds(rays) * self.speed
 
-    def model(self, number: int) -> float:
-        """Return the time of building a model: 0 is that with few plants, 1 that with all."""
+    def model_seconds(self, number: int) -> float:
+        """Return the seconds to build a model: number 0 is the one with few plants, 1 the one with all."""
         return 1e-6 * self.table.model[number] * self.area * self.speed
 
-    def relief(self, octaves: int) -> float:
-        """Return what octaves take beyond the two that are part of `scan`.
+    def relief_seconds(self, octaves: int) -> float:
+        """Return the additional seconds of a micro-relief with so many octaves, beyond the two included in the scan.
 
         The table has processor seconds, and `speed` is a second here for one of the table's cores together.
         """
         extra = nearest_row(self.table.octave, octaves) - nearest_row(self.table.octave, 2)
         return max(0.0, extra) * 1e-6 * self.points * self.speed / self.table.cores
 
-    def colour(self, source: str, images: int, megapixels: float) -> float:
-        """Return the time of a source of colours beyond the materials' means."""
+    def colour_seconds(self, source: str, images: int, megapixels: float) -> float:
+        """Return the additional seconds of a colour source beyond the materials' mean colours."""
         if source == "material":
             return 0.0
         first, each, pixel = self.table.image if source == "images" else (0.0, 0.0, 0.0)
@@ -120,13 +120,13 @@ class JobTimes:
         return (rendered + 1e-6 * self.table.sample[source] * self.points) * self.speed
 
     def colour_cost(self, source: str, images: int, megapixels: float) -> float:
-        """Return the cost of a source of colours in megapixels, which is the same on every machine."""
+        """Return a colour source's cost in megapixels rendered, independent of the machine."""
         if source == "images":
             return 1.0 + _IMAGE * images + megapixels
         return 0.0 if source == "material" else _RETURN * 1e-6 * self.pulses
 
-    def other_outputs(self, scenario: Scenario) -> float:
-        """Return the time of what no knob changes, beyond the scan."""
+    def other_seconds(self, scenario: Scenario) -> float:
+        """Return the seconds of outputs that no choice affects: scene file and previews."""
         seconds = 1e-6 * self.table.scene_file * self.area if "scene" in scenario.outputs else 0.0
         seconds += 1e-6 * self.table.previews * self.points if "previews" in scenario.outputs else 0.0
         return seconds * self.speed

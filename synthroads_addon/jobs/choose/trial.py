@@ -51,7 +51,7 @@ _COLOURED = 8
 
 @dataclass
 class Trial:
-    """A scene that is tried out.
+    """Scans of short stretches of a path, by which errors and the machine's speed are measured on a scene.
 
     Attributes:
         site: of the scan; its scenario is without noise.
@@ -69,7 +69,7 @@ class Trial:
 
     @classmethod
     def of(cls, site: Site, scene: ScannedScene) -> Self:
-        """Prepare to scan a scene; builds the casters."""
+        """Return a trial of a scene, without range noise; plans the scan and builds its ray casters."""
         quiet = site.scenario.scan.model_copy(update={"noise": Noise(range_sigma=0.0)})
         colour = site.scenario.colour.model_copy(update={"intensity_from_layers": "never"})
         scenario = site.scenario.model_copy(update={"scan": quiet, "colour": colour})
@@ -78,28 +78,28 @@ class Trial:
 
     @property
     def pulses(self) -> int:
-        """Return how many pulses the whole path has."""
+        """Return the number of pulses of the whole path."""
         return sum(map(self.plan.pulse_count, self.plan.path.strips))
 
     def scan_lines(self, rings: tuple[int, ...], lines: int = 0) -> list[BlockResult]:
-        """Scan the stretches that errors are taken of with a beam; return the points of each, and where they are."""
+        """Scan short stretches with a beam of so many rays per ring; return the result of each stretch."""
         path = scatter_stretches(self.plan.path, lines or self.lines, PULSES / self.plan.setting.shot_rate, self.phase)
         plan = replace(self.plan, path=path, rings=rings)
         results = iter(record_as_measured(plan))
         return [join_results([next(results) for _ in plan.cut.block_numbers(strip)]) for strip in path.strips]
 
     def points(self, rings: tuple[int, ...] = RINGS[CONVERGED]) -> list[PointBlock]:
-        """Return the points of the stretches with a beam: the converged one, which is the truth, if none is given."""
+        """Scan the stretches and return the points of each, by default with the 61 rays per pulse of the truth."""
         return [result.points for result in self.scan_lines(rings)]
 
     def relief_errors(self, octaves: Iterable[int]) -> dict[int, Errors]:
-        """Return the error of the micro-relief by octaves."""
+        """Return the micro-relief's position error (m, 95th percentile, with bound) by number of octaves."""
         results = [one for one in self.scan_lines(RINGS[1]) if len(one.points)]
         truth = shift_points(results, self.plan, FINEST)
         return {number: relief_errors(shift_points(results, self.plan, number), truth) for number in octaves}
 
     def colour_errors(self, choices: Mapping[str, Mapping[str, Any]], wanted: frozenset[str]) -> dict[str, Errors]:
-        """Return the errors of colours and layers by where they come from, see `knobs.colour_choices`.
+        """Return the errors of colours and material layers against the truest rendering, by colour source name.
 
         Of each image only what shows a scan line is rendered.
 
@@ -119,7 +119,7 @@ class Trial:
         return errors
 
     def layer_request(self, changes: Mapping[str, Any]) -> LayerRequest:
-        """Return the request for colours with changes of the scenario."""
+        """Return the plan's request for colours and layers with the scenario's `colour` fields changed."""
         given = {path.removeprefix("colour."): value for path, value in changes.items()}
         scenario = self.site.scenario
         colour = type(scenario.colour).from_dict(scenario.colour.to_dict() | given)
@@ -128,14 +128,14 @@ class Trial:
         return replace(self.plan.request, settings=settings)
 
     def count_images(self, changes: Mapping[str, Any]) -> tuple[int, float]:
-        """Return how many images the whole path would have, and their megapixels; 0 where none are rendered."""
+        """Return the number of images that the whole path needs and their total megapixels; 0 without images."""
         if changes["colour.source"] != "images":
             return 0, 0.0
         views = image_views(self.layer_request(changes))
         return len(views), sum(view.pixels for view in views) / 1e6
 
     def time_scan(self, rings: tuple[int, ...]) -> tuple[float, int]:
-        """Return the seconds of the whole scan into files with a beam, projected from stretches, and its points.
+        """Measure stretches and return the projected seconds and number of points of the whole scan into files.
 
         Few stretches and twice as many tell what every scan takes from what each pulse takes; before these, the few
         are scanned once, as the first scan waits for much that later ones find done. Colours are the materials' means
@@ -151,7 +151,7 @@ class Trial:
         return late + rate * (self.pulses - more), round(points * self.pulses / more)
 
     def _time_stretches(self, rings: tuple[int, ...], count: int, share: float) -> tuple[int, float, int]:
-        """Scan so many stretches, at most a share of the path, into files; return pulses, seconds and points."""
+        """Scan so many stretches, at most a share of the path, into files; return pulses, seconds, points."""
         path = scatter_stretches(self.plan.path, count, _TIMED_PULSES / self.plan.setting.shot_rate, 0.5, share)
         request = self.layer_request({"colour.source": "material"})
         plan = replace(self.plan, path=path, rings=rings, relief_octaves=2, request=request)

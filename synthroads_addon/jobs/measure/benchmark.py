@@ -50,7 +50,7 @@ Rate = dict[str, Any]
 
 
 def measure_demo(scenario: Scenario) -> dict[str, Any]:
-    """Do the demo job and measure its stages and their floors; the open file is lost.
+    """Run the demo job and measure its stages, memory and rates beside bare libraries; the open file is lost.
 
     Returns:
         ``cores``; ``stages`` with seconds and peak memory; ``lines`` by the names of
@@ -76,8 +76,8 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         seconds, memory = timer.seconds, peak_memory_mb()
         # The scene, its caster and the materials are the same for every number of rays.
         bare = replace(plan, records_seen_points=False, measured_layers=frozenset())
-        casting = {rays: _cast_beside(replace(bare, rings=RINGS[rays])) for rays in _RAYS}
-        writing = _write_beside(files)
+        casting = {rays: _measure_casting(replace(bare, rings=RINGS[rays])) for rays in _RAYS}
+        writing = _measure_writing(files)
         floors = [*casting.values(), writing]
         assert plan.request is not None
         if scenario.colour.source != "material":
@@ -96,8 +96,8 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
     return {"cores": available_cores(), "stages": timer.stages, "lines": lines, "floors": floors}
 
 
-def _cast_beside(plan: ScanPlan) -> Rate:
-    """Return casting and radiometry beside the bare caster on the same rays."""
+def _measure_casting(plan: ScanPlan) -> Rate:
+    """Measure casting with radiometry beside the bare caster on the same rays, in million rays per second."""
     threads, every = available_cores(), list(plan.blocks())
     blocks = [every[i] for i in np.unique(np.linspace(0, len(every) - 1, _CAST_BLOCKS + 2).astype(int)[1:-1])]
     part, target, kept = plan.target._parts[0], copy(plan.target), list[tuple[Float32, Float32]]()
@@ -122,17 +122,17 @@ def _cast_beside(plan: ScanPlan) -> Rate:
         return bare_rate(caster, origins, directions, limit, threads, repeats=1).rays_per_second
 
     name = f"casting and radiometry, {plan.rays_per_pulse} rays per pulse; Embree"
-    return {"name": name, "unit": "million rays/s", **_best_of_both(ours, floor)}
+    return {"name": name, "unit": "million rays/s", **_best_rates(ours, floor)}
 
 
-def _best_of_both(ours: Callable[[], float], floor: Callable[[], float]) -> dict[str, float]:
-    """Return the best rates, in millions, of two works that take turns: what disturbs one disturbs the other."""
+def _best_rates(ours: Callable[[], float], floor: Callable[[], float]) -> dict[str, float]:
+    """Return the best rates, in millions per second, of two functions called in turn; disturbances hit both."""
     rates = [(ours(), floor()) for _ in range(_TURNS)]
     return {"ours": max(own for own, _ in rates) / 1e6, "floor": max(bare for _, bare in rates) / 1e6}
 
 
-def _write_beside(files: CloudFiles) -> Rate:
-    """Return the writing of LAZ beside the mere compression of the same records by lazrs through laspy.
+def _measure_writing(files: CloudFiles) -> Rate:
+    """Measure writing LAZ beside bare lazrs compression of the same points, in million points per second.
 
     The points are the first of the cloud that the job has written.
     """
@@ -154,5 +154,5 @@ def _write_beside(files: CloudFiles) -> Rate:
         with laspy.open(folder / "bare.laz", "w", header=written.header, laz_backend=backend) as writer:
             writer.point_writer.write_points(written.points)  # without laspy's bookkeeping
 
-    rates = _best_of_both(lambda: count / seconds_of(ours), lambda: count / seconds_of(floor))
+    rates = _best_rates(lambda: count / seconds_of(ours), lambda: count / seconds_of(floor))
     return {"name": "writing LAZ; lazrs alone", "unit": "million points/s", **rates}

@@ -48,14 +48,14 @@ FINEST = 8
 
 
 def match_pulses(mine: PointBlock, truth: PointBlock) -> tuple[PointBlock, PointBlock]:
-    """Return the first returns of the pulses that both have, in one order; pulses are known by their time."""
+    """Return the first returns of pulses in both clouds, in the same order, matched by GPS time."""
     a, b = (points.select(points.return_number == 1) for points in (mine, truth))
     _times, first, second = np.intersect1d(a.gps_time, b.gps_time, return_indices=True)
     return a.select(first), b.select(second)
 
 
 def beam_errors(mine: Sequence[PointBlock], truth: Sequence[PointBlock]) -> Errors:
-    """Return position (m), intensity, labels and density (shares) of parts of a cloud against the truth."""
+    """Return a cloud's errors against the truth: position (m), intensity, labels, density (shares), with bounds."""
     pairs = [match_pulses(a, b) for a, b in zip(mine, truth, strict=True)]
     position = [np.linalg.norm(a.xyz - b.xyz, axis=1) for a, b in pairs]
     intensity = [np.abs(a.intensity / b.intensity - 1.0) for a, b in pairs]
@@ -72,20 +72,20 @@ def beam_errors(mine: Sequence[PointBlock], truth: Sequence[PointBlock]) -> Erro
 
 
 def shift_points(results: Sequence[BlockResult], plan: ScanPlan, octaves: int) -> list[Float]:
-    """Return the places (N, 3) of the points of each part as a plan's micro-relief shifts them, m."""
+    """Return the points (N, 3) of each part, moved along their normals by a plan's micro-relief, m."""
     assert plan.relief is not None
     shift = partial(shift_along_normals, relief=plan.relief, strength=plan.relief_strength, seed=plan.seed)
     return [shift(one.points, one.seen.position, octaves=octaves).xyz for one in results if one.seen is not None]
 
 
 def relief_errors(mine: Sequence[Float], truth: Sequence[Float]) -> Errors:
-    """Return the error of parts of shifted points (N, 3) against others, m."""
+    """Return the 95th percentile of distances between two sets of shifted points (N, 3), m, with its upper bound."""
     parts = [np.linalg.norm(a - b, axis=1) for a, b in zip(mine, truth, strict=True)]
     return {"relief": quantile_bound(parts, QUANTILE, "relief")}
 
 
 def truest_settings(request: LayerRequest) -> ColourSettings:
-    """Return the settings of a request whose colours count as true, under direct light.
+    """Return a request's colour settings with the most accurate source, under direct light and one sample.
 
     That is a pixel per return where Blender has it, else the materials' nodes at the returns.
     """
@@ -94,13 +94,13 @@ def truest_settings(request: LayerRequest) -> ColourSettings:
 
 
 def render_layers(request: LayerRequest, parts: Sequence[SeenPoints]) -> list[LayerValues]:
-    """Return the colours and layers of parts of a cloud as a request wants them."""
+    """Render and return the requested colours and layers at the seen points of each part."""
     with layer_source(request) as source:
         return [sample_points(source, seen, request.wanted) for seen in parts]
 
 
 def colour_errors(mine: Sequence[LayerValues], truth: Sequence[LayerValues], wanted: frozenset[str]) -> Errors:
-    """Return the errors of the wanted colours and layers of parts of a cloud, of the points whose truth is known."""
+    """Return the 95th percentile of CIEDE2000 and the largest RMSE of a layer, with bounds, where truth is known."""
     parts = [(a, b, known_rows(b)) for a, b in zip(mine, truth, strict=True)]
     result: Errors = {}
     if "rgb" in wanted:
@@ -117,7 +117,7 @@ def colour_errors(mine: Sequence[LayerValues], truth: Sequence[LayerValues], wan
 
 
 def errors_by_source(mine: LayerValues, truth: LayerValues) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
-    """Return the errors of colours and layers, of all points and by what gave them to these."""
+    """Return colour and layer errors of all points, and the same by the source of each point's colour."""
     known = known_rows(truth)
     difference = colour_difference(mine, truth, known)
     squares = [squared_error(name, mine, truth, known) for name in MATERIAL_LAYERS]

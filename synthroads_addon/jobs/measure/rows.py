@@ -52,7 +52,7 @@ _FEW = 64
 
 
 def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
-    """Measure one row of the trade-off; it says why if this Blender can't do it.
+    """Measure time, memory and errors of one knob value of the trade-off; return them, or why it can't be done here.
 
     Times are processor seconds, which other work on the machine hardly touches: building the model, building the
     caster's tree, rendering the images, and the rest of the job - scan, colours, relief, thinning out and the file -
@@ -100,7 +100,7 @@ def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class StretchPoints:
-    """Points of stretches of a path, of which a row's errors are taken.
+    """Points of short stretches of a path, from which a row's errors are taken.
 
     Attributes:
         plan: of the stretches.
@@ -118,7 +118,7 @@ class StretchPoints:
 
 
 def _measure_stretches(site: Site, knob: Knob, plan: ScanPlan) -> tuple[dict[str, Any], StretchPoints]:
-    """Do the job on stretches of the path; return what it costs after the caster is built, and the points.
+    """Run the job on stretches of the path; return projected costs after the caster is built, and the points.
 
     Returns:
         ``image_seconds`` before the first point, and ``images`` and ``megapixels`` that are rendered then;
@@ -159,7 +159,7 @@ def _measure_stretches(site: Site, knob: Knob, plan: ScanPlan) -> tuple[dict[str
 
 
 def _true_plan(shown: RoadScene, part: ScanPlan, plants: float) -> ScanPlan | None:
-    """Return the plan of a plan's stretches with the converged footprint among all plants; None if it is that itself.
+    """Return the plan of the same stretches with 61 rays per pulse among all plants; None if it is that already.
 
     The road is built anew, in place of the one scanned, if it lacks plants.
 
@@ -181,7 +181,7 @@ def _true_plan(shown: RoadScene, part: ScanPlan, plants: float) -> ScanPlan | No
 
 
 def _beam_errors(sample: StretchPoints, plan: ScanPlan | None) -> dict[str, float]:
-    """Compare first returns with those of the converged footprint's plan; points with those in the file."""
+    """Return errors of first returns against a plan of the truth: position (mm), intensity, labels, density (%)."""
     mine = sample.result.points
     truth = mine if plan is None else join_results(record_as_measured(plan)).points
     found = beam_errors([mine], [truth])
@@ -194,7 +194,7 @@ def _beam_errors(sample: StretchPoints, plan: ScanPlan | None) -> dict[str, floa
 
 
 def _relief_error(sample: StretchPoints) -> float:
-    """Return how far the points' micro-relief is from the finest with full strength, m, 95th percentile."""
+    """Return the points' 95th percentile distance from the finest micro-relief at full strength, m."""
     plan, materials = sample.plan, sample.plan.target.materials
     relief = plan.relief or micro_relief(materials, BlenderServices().materials(materials))
     mine = shift_points([sample.result], replace(plan, relief=relief), plan.relief_octaves)
@@ -203,7 +203,7 @@ def _relief_error(sample: StretchPoints) -> float:
 
 
 def _colour_errors(knob: Knob, sample: StretchPoints) -> tuple[dict[str, float], dict[str, Any]]:
-    """Return the errors of colours and layers against those rendered as well as can be, and what to say of them.
+    """Return colour and layer errors against the truest rendering, and details of the comparison.
 
     That is ``colour_truth``, what they were compared with, and ``errors_by_source``, their errors by what gave them to
     the points.

@@ -22,7 +22,7 @@ _LENGTHS_OF_IMAGES = ("colour.image_spacing", "colour.ground_sampling_distance")
 
 @dataclass(frozen=True)
 class Knob:
-    """A knob and the rows that are measured of it.
+    """A setting that trades speed for accuracy, the values it is measured at, and the errors measured.
 
     Attributes:
         table: of `TABLES`, that the rows are in.
@@ -38,7 +38,7 @@ class Knob:
 
 
 def _read_knob(table: str, errors: list[str], always: list[str], rows: list[Any], whole_paths: bool = False) -> Knob:
-    """Return a knob of the shipped file: ``always`` are changes of every row, and ``rows`` values with their own."""
+    """Return a `Knob` from its entry in the shipped file; ``always`` are changes that apply to every row."""
     return Knob(table, {value: (*always, *changes) for value, changes in rows}, tuple(errors), whole_paths)
 
 
@@ -48,15 +48,15 @@ knob of another, which a preset must not be worse than. What is usual in them: n
 the beam are measured, which don't touch these."""
 
 
-def rows(knobs: Iterable[str]) -> Iterator[tuple[str, Any]]:
-    """Yield (knob, value) of every row."""
+def knob_rows(knobs: Iterable[str]) -> Iterator[tuple[str, Any]]:
+    """Yield (knob, value) for every row of the trade-off's knobs."""
     for knob in knobs:
         for value in KNOBS[knob].rows:
             yield knob, value
 
 
 def row_scenario(scenario: str, knob: str, value: Any, changes: Iterable[str] = ()) -> Scenario:
-    """Return the job that a row is about: the scenario with the knob's changes, and others before them.
+    """Return the scenario of one row: a built-in one with further changes, then those of the knob's value.
 
     What a knob doesn't change is as in the standard fidelity, so that its errors aren't drowned by those of a coarser
     one. Spacings and pixels of images are those for a range of 60 m, and farther apart and coarser from farther away.

@@ -29,7 +29,7 @@ from .plan import Site
 
 
 def scan_by_section(site: Site, road: RoadGeometry, folder: Path, timer: StageTimer) -> dict[str, Any]:
-    """Build and scan a road section by section; write the cloud and the previews; must run in the main thread.
+    """Build and scan a road section by section, and write cloud and previews; only in the main thread.
 
     A road in the open scene is replaced; afterwards there is none.
 
@@ -47,7 +47,7 @@ def scan_by_section(site: Site, road: RoadGeometry, folder: Path, timer: StageTi
 
 
 class SectionScan:
-    """The plans of a road's sections, which are built one after the other.
+    """Plans of the scan of a road by sections, each of which is built, scanned and removed in turn.
 
     Args:
         site: of the whole road's scan.
@@ -68,13 +68,13 @@ class SectionScan:
         self._standing = road.parameters.model_copy(update={"objects": standing})
 
     def sections(self) -> Iterator[RoadSection]:
-        """Yield the sections from the road's start to its end."""
+        """Yield the road's sections from its start to its end."""
         shadows = shadow_length(self._road) if self._scenario.may_render else 0.0
         length = self._road.length
         return sections(self.cut, self._road, self._scenario.section_length(length) or length, shadows)
 
     def plans(self, timer: StageTimer) -> Generator[ScanPlan, None, None]:
-        """Build one section after the other and yield its plan; afterwards the section is dropped."""
+        """Build each section in turn and yield its plan; the section is removed when the next one is asked for."""
         done, total = 0, self.cut.count()
         for section in self.sections():
             shares = done / total, (done + len(section.blocks)) / total
@@ -87,7 +87,7 @@ class SectionScan:
             self.scanned += 1
 
     def plan(self, section: RoadSection, timer: StageTimer) -> ScanPlan:
-        """Build a section and return the plan of its blocks."""
+        """Build a section in the open file and return the plan of its blocks of pulses."""
         with timer.stage("model"):
             scene, frame = self._build(section)
         path = PathStretches(self.cut.path, self.cut.path.strips, frame)
@@ -99,7 +99,7 @@ class SectionScan:
         return replace(plan, frame_origin=frame, chosen_blocks=section.blocks, request=request)
 
     def _build(self, section: RoadSection) -> tuple[ScannedScene, Float]:
-        """Return what is scanned of a section, and where its frame begins in the road's."""
+        """Build a section; return its scene with passing vehicles, and its frame's origin (3,) in the road's, m."""
         settings, whole, stretch = self._scenario.settings(), self._road.parameters, (section.low, section.high)
         tolerance, detail = settings.tolerance, settings.vegetation_detail
         model = build_road(self._standing, tolerance, detail, stretch=stretch, geometry=self._road)

@@ -32,7 +32,7 @@ _LONG = 300.0
 
 @dataclass
 class ScanCounts:
-    """Counts of a scan."""
+    """Counts of pulses, rays and points of a scan, also by class and by colour source."""
 
     pulses: int = 0
     rays: int = 0
@@ -44,7 +44,7 @@ class ScanCounts:
     by_source: np.ndarray = field(default_factory=lambda: np.zeros(256, dtype=np.int64))
 
     def add(self, result: BlockResult) -> None:
-        """Add one block."""
+        """Add the counts of one block of a scan, in place."""
         for name in ("pulses", "rays", "below_threshold", "saturated"):
             setattr(self, name, getattr(self, name) + getattr(result, name))
         self.points += len(result.points)
@@ -55,7 +55,7 @@ class ScanCounts:
 
 @dataclass
 class CloudFiles:
-    """Sink that writes the cloud and the previews, of one scan or of one section after the other.
+    """Sink for blocks of scanned points that writes the cloud's files and the previews.
 
     Attributes:
         scenario: says which files are wanted.
@@ -81,7 +81,7 @@ class CloudFiles:
 
     @property
     def intensity_scale(self) -> float:
-        """Return the 16-bit steps per unit of intensity, unless the scenario gives them.
+        """Return the 16-bit steps per unit of intensity: the scenario's, or one from the usual range.
 
         16 bits are full for a white target at a right angle at half the usual range: only what is nearer or a
         retro-reflector is brighter, and the weakest echoes still have hundreds of steps.
@@ -92,7 +92,7 @@ class CloudFiles:
 
     @contextmanager
     def open(self) -> Iterator[None]:
-        """Open the files; they are complete, and under their names, when the context ends without an exception."""
+        """Context that opens the files; they are complete and get their names if it ends without an exception."""
         cloud = self.scenario.cloud
         with ExitStack() as stack:
             if "cloud" in self.scenario.outputs:
@@ -112,7 +112,7 @@ class CloudFiles:
             self.view.save(self.folder, self.epsg)
 
     def write(self, result: BlockResult) -> None:
-        """Write a block of a scan."""
+        """Write a block of scanned points, after thinning if the scenario asks for it, and count it."""
         self.counts.add(result)
         if self._grid:
             self._grid.add(result.points)
@@ -120,7 +120,7 @@ class CloudFiles:
             self._keep(result.points)
 
     def open_writer(self, name: str) -> CloudWriter:
-        """Open a file of the cloud as the scenario asks for it."""
+        """Return a writer for a cloud file in the folder, with the scenario's attributes and classes."""
         cloud, path = self.scenario.cloud, self.folder / name
         return open_writer(path, self.epsg, self.origin, self.intensity_scale, cloud.attributes, cloud.scheme())
 
@@ -132,12 +132,12 @@ class CloudFiles:
             self._painting.append(self._painter.submit(self.view.add, points))
 
     def _wait_for_painter(self, most: int) -> None:
-        """Wait until so many blocks at most are still to be painted; raise what went wrong with the others."""
+        """Wait until at most so many blocks wait for the previews; raises what failed in the others."""
         while len(self._painting) > most:
             self._painting.pop(0).result()
 
     def summary(self) -> dict[str, Any]:
-        """Return the counts as JSON data."""
+        """Return the counts so far as JSON data, by class name and colour source."""
         names = self.scenario.cloud.scheme().sources().names()
         by_class = {names.get(i, str(i)): int(n) for i, n in enumerate(self.counts.by_class) if n}
         return {
@@ -151,7 +151,7 @@ class CloudFiles:
 def record_to_files(
     plans: Iterable[ScanPlan], files: CloudFiles, timer: StageTimer, announce: bool = True
 ) -> dict[str, Any]:
-    """Scan one plan after the other into the cloud and the previews.
+    """Scan plans one after the other into the cloud and the previews.
 
     The stage ``files`` is what is left to be written at the end. Where something is rendered, it must run in the main
     thread.
@@ -185,6 +185,6 @@ def record_to_files(
 
 
 def _add_up(sums: dict[str, Any], figures: Mapping[str, Any]) -> None:
-    """Add figures to sums of the same names; what is no number takes the place of what was there."""
+    """Add numbers to the sums of the same names, in place; other values replace those before."""
     for name, value in figures.items():
         sums[name] = sums[name] + value if isinstance(value, int | float) and name in sums else value

@@ -39,7 +39,7 @@ from .files import CloudFiles, record_to_files
 
 
 def check_scan(scenario: Scenario, foreign: bool = False) -> None:
-    """Refuse a scan that can't be done, before any work starts.
+    """Raise an InputError for a scan that can't be done, before any work starts.
 
     Args:
         scenario: the job.
@@ -66,7 +66,7 @@ def plan_scan(
     services: SceneServices,
     conditions: ScanConditions | None = None,
 ) -> ScanPlan:
-    """Return the scan that a scenario asks for, with nothing left open; builds the casters.
+    """Return the complete plan of a scenario's scan, every default resolved; builds the ray casters.
 
     Args:
         scenario: the job.
@@ -140,7 +140,7 @@ def plan_scan(
 def _intensity_from_layers(
     scenario: Scenario, scanned: Sequence[Material], services: SceneServices, materials: tuple[str, ...]
 ) -> bool:
-    """Return whether intensities come from the points' own layers.
+    """Return whether intensities are computed from each point's own material layers.
 
     Where nothing is said they do if nodes give these layers, and no table says how the brightness varies: who fitted
     such a table to a real cloud wants that.
@@ -154,7 +154,7 @@ def _intensity_from_layers(
 
 @dataclass(frozen=True)
 class Site:
-    """Where a scenario's scan takes place.
+    """Place and conditions of a scenario's scan, independent of who made the scene.
 
     Attributes:
         scenario: the job.
@@ -170,18 +170,18 @@ class Site:
 
     @classmethod
     def of_road(cls, scenario: Scenario, road: RoadGeometry) -> Self:
-        """Return the site of a road's scan."""
+        """Return the site of a road's scan: the platform's path over it, its conditions, a preview raster if wanted."""
         view = TopView.over_road(road, scenario.cloud.scheme().sources()) if "previews" in scenario.outputs else None
         path = scenario.scan.platform.make_path(RoadGuide(road))
         return cls(scenario, path, ScanConditions.of(road.parameters), view)
 
     @property
     def cut(self) -> Blocks:
-        """Return the blocks of pulses that the scan is cut into."""
+        """Return the division of the scan's pulses into blocks."""
         return Blocks(scanner_setting(self.scenario.scan), self.path, 1 + sum(self.scenario.beam_rings))
 
     def plan(self, scene: ScannedScene, services: SceneServices) -> ScanPlan:
-        """Return the scan of a scene, see `plan_scan`.
+        """Return the plan of the scan of a scene with every default resolved; builds the ray casters.
 
         Raises:
             InputError: there is nothing that could be scanned, or see `plan_scan`.
@@ -191,11 +191,11 @@ class Site:
         return plan_scan(self.scenario, scene, self.path, services, self.conditions)
 
     def files(self, folder: Path, origin: Float) -> CloudFiles:
-        """Return the sink that writes the cloud and the previews; the origin (3,) is near the points, map, m."""
+        """Return a sink that writes cloud and previews to a folder; the origin (3,) is near the points, map, m."""
         return CloudFiles(self.scenario, folder, origin, self.path.typical_range, self.conditions.epsg, self.view)
 
     def scan(self, scene: ScannedScene, services: SceneServices, folder: Path, timer: StageTimer) -> dict[str, Any]:
-        """Scan a scene and write the cloud and the previews; return the counts as JSON data.
+        """Scan a scene and write the cloud and the previews to a folder; return the counts as JSON data.
 
         Raises:
             InputError: see `plan` and `check_colour`.

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.schema import compact_json
-from ..faces import Faces, Float, Int, without_collapsed
+from ..faces import Faces, Float, Int, drop_collapsed
 from ..trace import Trace
 
 SCALE = 1e-4
@@ -27,7 +27,7 @@ GeometryType = Literal[
 
 @dataclass(frozen=True)
 class CityGeometry:
-    """A geometry of a city object.
+    """One geometry of a city object, in local float64 coordinates.
 
     Attributes:
         type: CityJSON's name.
@@ -51,7 +51,7 @@ class CityGeometry:
 
 @dataclass(frozen=True)
 class CityObject:
-    """A city object.
+    """A city object of CityJSON 2.0 with its attributes, geometries and relatives.
 
     Attributes:
         id: as in the parameter set; parts of a bridge have the bridge's, a slash and a name.
@@ -78,7 +78,7 @@ class _Shell:
 
 @dataclass
 class CityModel:
-    """City objects whose vertices are collected, made whole numbers and shared.
+    """A CityJSON file in the making: city objects whose vertices are quantized to `SCALE` and shared.
 
     Attributes:
         translate: map coordinates of the local origin, m: what is added to a vertex times `SCALE`.
@@ -95,13 +95,13 @@ class CityModel:
         self._count = 0
 
     def add(self, item: CityObject) -> None:
-        """Take an object over; of its points only the whole numbers are kept."""
+        """Add a city object; its points are quantized to multiples of `SCALE` and not kept otherwise."""
         shells = [[self._shell(part) for part in shape.parts] for shape in item.geometry]
         bare = tuple(replace(shape, parts=()) for shape in item.geometry)
         self._objects.append((replace(item, geometry=bare), shells))
 
-    def template(self, key: Hashable, make: Callable[[], CityGeometry]) -> int:
-        """Return the number of a template by a key of one's own; it is made if it isn't there yet."""
+    def template_index(self, key: Hashable, make: Callable[[], CityGeometry]) -> int:
+        """Return the index of the geometry template for a key; `make` is called once per key to create it."""
         if key not in self._templates:
             self._templates[key] = (len(self._templates), make())
         return self._templates[key][0]
@@ -113,13 +113,13 @@ class CityModel:
         return shell
 
     def write(self, path: Path, metadata: dict[str, Any]) -> None:
-        """Write the file; same objects, same bytes.
+        """Write the CityJSON file and record its entities in the trace; same objects, same bytes.
 
         Args:
             path: its name.
             metadata: CityJSON's, without the extent.
         """
-        vertices = self._share()
+        vertices = self._merge_vertices()
         extent = self._extent(vertices)
         head = {
             "type": "CityJSON",
@@ -143,8 +143,8 @@ class CityModel:
                 _write_templates(file, [shape for _, shape in self._templates.values()])
             file.write("}\n")
 
-    def _share(self) -> Int:
-        """Let equal vertices be one, drop polygons that vanish and vertices that nothing uses; return (V, 3)."""
+    def _merge_vertices(self) -> Int:
+        """Merge equal vertices in place, drop collapsed polygons and unused vertices; return the vertices (V, 3)."""
         raw = np.concatenate(self._vertices) if self._vertices else np.empty((0, 3), np.int64)
         self._vertices = []
         same = _first_equal(raw)
@@ -152,7 +152,7 @@ class CityModel:
         for shell, closed in self._shells():
             corners = same[shell.corners]
             if closed:
-                shell.corners, shell.sizes, shell.kept = without_collapsed(corners, shell.sizes)
+                shell.corners, shell.sizes, shell.kept = drop_collapsed(corners, shell.sizes)
             else:
                 shell.corners, shell.kept = corners, np.ones(len(shell.sizes), dtype=bool)
             used[shell.corners] = True
@@ -162,7 +162,7 @@ class CityModel:
         return raw[used]
 
     def _shells(self) -> Iterator[tuple[_Shell, bool]]:
-        """Yield every shell, and whether its corners run round polygons."""
+        """Yield every shell with whether its corners are closed rings of polygons, not points or lines."""
         for item, shapes in self._objects:
             for shape, shells in zip(item.geometry, shapes, strict=True):
                 yield from ((shell, "Surface" in shape.type or "Solid" in shape.type) for shell in shells)
@@ -173,7 +173,7 @@ class CityModel:
 
 
 def _first_equal(vertices: Int) -> Int:
-    """Return for each vertex (V, 3) the index of the first one that is equal."""
+    """Return for each vertex (V, 3) the index (V,) of the first vertex equal to it."""
     order = np.lexsort((np.arange(len(vertices)), vertices[:, 2], vertices[:, 1], vertices[:, 0]))
     ordered = vertices[order]
     new = np.ones(len(vertices), dtype=bool)
@@ -197,7 +197,7 @@ def _write_object(file: TextIO, item: CityObject, shapes: list[list[_Shell]], tr
         for shape, shells in zip(item.geometry, shapes, strict=True)
         if any(len(shell.sizes) for shell in shells)
     ]
-    trace.found(item.attributes["instance"], object=item.id)
+    trace.record_entity(item.attributes["instance"], object=item.id)
     if not there:
         file.write(compact_json(head))
         return
@@ -206,12 +206,12 @@ def _write_object(file: TextIO, item: CityObject, shapes: list[list[_Shell]], tr
         file.write("," * bool(number))
         surfaces = _write_geometry(file, shape, [shell for shell in shells if len(shell.sizes)])
         for index, about in enumerate(surfaces):
-            trace.found(about["instance"], object=item.id, surface=index)
+            trace.record_entity(about["instance"], object=item.id, surface=index)
     file.write("]}")
 
 
 def _write_geometry(file: TextIO, shape: CityGeometry, shells: list[_Shell]) -> list[dict[str, Any]]:
-    """Write a geometry; return its semantic surfaces."""
+    """Write a geometry as JSON; return its semantic surfaces, empty if it has none."""
     if shape.type == "GeometryInstance":
         _write_instance(file, shape, shells[0])
         return []
@@ -245,7 +245,7 @@ def _write_instance(file: TextIO, shape: CityGeometry, shell: _Shell) -> None:
 
 
 def _write_templates(file: TextIO, shapes: Sequence[CityGeometry]) -> None:
-    """Write templates with the vertices that they share."""
+    """Write the `geometry-templates` member: templates and the vertices they share."""
     vertices: list[list[float]] = []
     file.write('{"templates":[')
     for number, shape in enumerate(shapes):
@@ -259,7 +259,7 @@ def _write_templates(file: TextIO, shapes: Sequence[CityGeometry]) -> None:
 
 
 def _write_many(file: TextIO, shell: _Shell, surfaces: bool) -> None:
-    """Write many polygons (or lines) a few thousand at a time: as lists of Python's they take much memory."""
+    """Write the rings of polygons, or lines, as JSON in blocks of `_LINE`, to save memory."""
     file.write("[")
     for first in range(0, len(shell.sizes), _LINE):
         text = compact_json(_rings(shell, first, first + _LINE, surfaces))[1:-1]
@@ -276,15 +276,15 @@ def _rings(shell: _Shell, first: int, last: int, surfaces: bool) -> list[Any]:
     return [[ring] for ring in rings] if surfaces else rings
 
 
-def lines(points: Iterable[Float]) -> Faces:
-    """Return lines (K, 3) as the one part of a MultiLineString."""
+def line_faces(points: Iterable[Float]) -> Faces:
+    """Return polylines, (K, 3) points each, as the single part of a MultiLineString."""
     listed = list(points)
     sizes = np.array([len(line) for line in listed], dtype=np.int64)
     return Faces(np.concatenate(listed), np.arange(int(sizes.sum())), sizes)
 
 
-def solids(bodies: Iterable[Faces], lod: str) -> tuple[CityGeometry, ...]:
-    """Return the geometry of closed bodies: a Solid if it is one, else a MultiSolid; none if there are none."""
+def solid_geometry(bodies: Iterable[Faces], lod: str) -> tuple[CityGeometry, ...]:
+    """Return closed bodies as one Solid or MultiSolid geometry in a tuple, empty if there are no bodies."""
     parts = tuple(chain(bodies))
     if not parts:
         return ()

@@ -10,10 +10,10 @@ from ...road.geometry import RoadGeometry
 from ...road.objects import RoadObject
 from ...road.section import Arrow, Carriageway, Crack, Hatching, LineMarking, Median, Patch, Turnout
 from ..attributes import attributes_of
-from ..faces import Faces, Int, join_polygons
+from ..faces import Faces, Int, join_faces
 from ..strips import StripSurface, strip_surfaces
 from ..surfaces import damaged_surface, dash_surfaces, painted_surface, pothole_surface
-from .model import CityGeometry, CityObject, lines
+from .model import CityGeometry, CityObject, line_faces
 
 Float = NDArray[np.float64]
 Surface = tuple[dict[str, Any], Faces]
@@ -41,7 +41,7 @@ _DRIVEN = ("lane", "turnout_lane")
 
 
 def road_objects(geometry: RoadGeometry, stations: Float, tolerance: float) -> Iterator[CityObject]:
-    """Yield the Roads: the centreline's, and one for every carriageway, median and turnout.
+    """Yield the CityJSON Road objects: the centreline's, then one per carriageway, median and turnout.
 
     Args:
         geometry: the road.
@@ -50,7 +50,7 @@ def road_objects(geometry: RoadGeometry, stations: Float, tolerance: float) -> I
     """
     parameters = geometry.parameters
     plan = geometry.alignment.position(stations)
-    axis = lines([np.column_stack([plan, geometry.profile.elevation(stations)])])
+    axis = line_faces([np.column_stack([plan, geometry.profile.elevation(stations)])])
     name = next(name for name, item in parameters.objects.items() if item is parameters.alignment)
     attributes = attributes_of(parameters.alignment) | {
         "class": "motorway",
@@ -79,15 +79,15 @@ def _road(geometry: RoadGeometry, name: str, item: RoadObject, surfaces: list[Su
     faces = [part for _, part in surfaces]
     values = np.repeat(np.arange(len(surfaces)), [len(part) for part in faces])
     semantics = tuple(about for about, _ in surfaces)
-    shape = CityGeometry("MultiSurface", LOD, (join_polygons(faces),), semantics, values)
+    shape = CityGeometry("MultiSurface", LOD, (join_faces(faces),), semantics, values)
     return CityObject(name, "Road", attributes, (shape,))
 
 
 def _surfaces(geometry: RoadGeometry, stations: Float, tolerance: float) -> dict[int, list[Surface]]:
-    """Return the surfaces of every Road by its instance number: strips, then markings, then damage."""
+    """Return the semantic surfaces of each Road by its instance number: strips, markings and damage with an area."""
     by_road: dict[int, list[Surface]] = {}
     for surface in strip_surfaces(geometry, stations, tolerance):
-        by_road.setdefault(surface.instance, []).append((_area(geometry, surface), surface.faces))
+        by_road.setdefault(surface.instance, []).append((_strip_semantics(geometry, surface), surface.faces))
     for name, item in geometry.parameters.objects.items():
         if isinstance(item, LineMarking | Hatching | Arrow):
             owner = geometry.parameters.objects[item.turnout if isinstance(item, Hatching) else item.carriageway]
@@ -110,8 +110,8 @@ def _surfaces(geometry: RoadGeometry, stations: Float, tolerance: float) -> dict
     return {instance: [pair for pair in pairs if len(pair[1])] for instance, pairs in by_road.items()}
 
 
-def _area(geometry: RoadGeometry, surface: StripSurface) -> dict[str, Any]:
-    """Return what a strip's surface is."""
+def _strip_semantics(geometry: RoadGeometry, surface: StripSurface) -> dict[str, Any]:
+    """Return the CityJSON semantics of a strip's surface: type, function, material, lane, instance number."""
     strip = surface.strip
     about: dict[str, Any] = {
         "type": "TrafficArea" if strip.kind in _DRIVEN else "AuxiliaryTrafficArea",
@@ -134,7 +134,7 @@ def _area(geometry: RoadGeometry, surface: StripSurface) -> dict[str, Any]:
 def _marking(
     geometry: RoadGeometry, name: str, item: LineMarking | Hatching | Arrow, stations: Float
 ) -> Iterator[Surface]:
-    """Yield the surfaces of a marking: one for each dash of a line."""
+    """Yield the semantic surfaces of a marking: one for each dash of a line, one for a hatching or an arrow."""
     function = "line" if isinstance(item, LineMarking) else item.type.lower()
     about = {"type": "TransportationMarking", "function": function, "id": name, "instance": item.instance}
     about |= {"color": item.color, "film_thickness": item.film_thickness}
@@ -150,11 +150,11 @@ def _marking(
         dash: dict[str, Any] = {"start_station": round(start, 6), "end_station": round(end, 6)}
         if item.dash_length:
             dash["id"], dash["instance"] = geometry.numbers.part(name, number)
-        yield about | dash, _part(faces, starts, polygons)
+        yield about | dash, _polygon_range(faces, starts, polygons)
 
 
-def _part(faces: Faces, starts: Int, chosen: Int) -> Faces:
-    """Return neighbouring polygons of many, with their own points."""
+def _polygon_range(faces: Faces, starts: Int, chosen: Int) -> Faces:
+    """Return a contiguous range of polygons with only the points in the range of their indices."""
     begin, end = int(starts[chosen[0]]), int(starts[chosen[-1]] + faces.sizes[chosen[-1]])
     corners = faces.corners[begin:end]
     low, high = int(corners.min()), int(corners.max()) + 1

@@ -13,17 +13,17 @@ from ...road.surroundings import Terrain, Vegetation
 from ...road.vegetation.species import PlantShape
 from ..attributes import attributes_of
 from ..faces import Faces, Float, loft
-from ..ground import GroundMesh, ground_beside
+from ..ground import GroundMesh, triangulate_ground
 from ..plants import PlacedPlant, grass_strips, placed_plants
 from ..vehicles import placed_vehicles
-from .model import CityGeometry, CityModel, CityObject, solids
+from .model import CityGeometry, CityModel, CityObject, solid_geometry
 
 _GROUND, _PLANTS, _BOXES = "2", "2", "1"
 """Levels of detail: surfaces, plants as trunk and crown, boxes around vehicles."""
 
 
 def add_surroundings(model: CityModel, geometry: RoadGeometry, stations: Float, tolerance: float) -> None:
-    """Add ground, plants and vehicles.
+    """Add terrain, plants and vehicles to the city model; plants need a terrain.
 
     Args:
         model: the objects of the file.
@@ -32,7 +32,7 @@ def add_surroundings(model: CityModel, geometry: RoadGeometry, stations: Float, 
         tolerance: chord error of its surface, m.
     """
     for name, terrain in geometry.parameters.of_type(Terrain).items():
-        ground = ground_beside(geometry, terrain, stations, tolerance)
+        ground = triangulate_ground(geometry, terrain, stations, tolerance)
         model.add(_terrain(name, terrain, ground))
         _add_plants(model, geometry, ground)
     for item in _vehicles(geometry, model):
@@ -46,10 +46,10 @@ def _terrain(name: str, terrain: Terrain, ground: GroundMesh) -> CityObject:
 
 
 def _add_plants(model: CityModel, geometry: RoadGeometry, ground: GroundMesh) -> None:
-    """Add every plant, every strip of grass, and a group for each stand."""
+    """Add every plant and every strip of grass, and for each stand a CityObjectGroup of them."""
     members: dict[str, list[str]] = {name: [] for name in geometry.parameters.of_type(Vegetation)}
     for plant in placed_plants(geometry):
-        model.trace.grow(plant)
+        model.trace.record_plant(plant)
         members[plant.stand].append(plant.name)
         model.add(_plant(model, plant))
     for strip in grass_strips(geometry, ground):
@@ -57,7 +57,7 @@ def _add_plants(model: CityModel, geometry: RoadGeometry, ground: GroundMesh) ->
         shape = CityGeometry("MultiSurface", _GROUND, (strip.faces,))
         model.add(CityObject(strip.name, "PlantCover", strip.attributes(), (shape,), parent=strip.stand))
     for name, stand in geometry.parameters.of_type(Vegetation).items():
-        model.trace.reduce(name, "grass is its strips, without its tufts" if stand.kind == "grass" else _SHAPE)
+        model.trace.record_loss(name, "grass is its strips, without its tufts" if stand.kind == "grass" else _SHAPE)
         attributes = attributes_of(stand) | {"class": stand.points_class}
         model.add(CityObject(name, "CityObjectGroup", attributes, children=tuple(members[name])))
 
@@ -67,7 +67,7 @@ _SHAPE = "a plant is its trunk and its crown's outline, upright, without branche
 
 def _plant(model: CityModel, plant: PlacedPlant) -> CityObject:
     key = plant.about.kind, plant.about.species, plant.variant
-    template = model.template(key, partial(_plant_template, plant.shape))
+    template = model.template_index(key, partial(_plant_template, plant.shape))
     foot = Faces(plant.foot[None], np.zeros(1, np.int64), np.ones(1, np.int64))
     shape = CityGeometry("GeometryInstance", _PLANTS, (foot,), template=template, scale=plant.scale)
     return CityObject(plant.name, "SolitaryVegetationObject", plant.attributes(), (shape,), parent=plant.stand)
@@ -75,12 +75,12 @@ def _plant(model: CityModel, plant: PlacedPlant) -> CityObject:
 
 def _plant_template(shape: PlantShape) -> CityGeometry:
     bodies = [loft(sections) for sections in (shape.trunk(), shape.crown()) if sections is not None]
-    return solids(bodies, _PLANTS)[0]
+    return solid_geometry(bodies, _PLANTS)[0]
 
 
 def _vehicles(geometry: RoadGeometry, model: CityModel) -> Iterator[CityObject]:
     for placed in placed_vehicles(geometry):
-        model.trace.simplify(placed)
+        model.trace.record_box(placed)
         attributes: dict[str, Any] = attributes_of(placed.vehicle) | {"class": placed.vehicle.points_class}
         attributes |= geometry.numbers.part_attributes(placed.vehicle.instance)
-        yield CityObject(placed.name, "GenericCityObject", attributes, solids([loft(placed.box())], _BOXES))
+        yield CityObject(placed.name, "GenericCityObject", attributes, solid_geometry([loft(placed.box())], _BOXES))

@@ -17,13 +17,13 @@ from ..faces import Faces, loft
 from ..surfaces import road_stations
 from ..things import Frame, PlacedThing, placed_things
 from ..trace import Trace
-from .model import CityGeometry, CityModel, CityObject, solids
+from .model import CityGeometry, CityModel, CityObject, solid_geometry
 from .road import road_objects
 from .surroundings import add_surroundings
 
 
 def write_cityjson(parameters: RoadParameters, path: Path, tolerance: float) -> Trace:
-    """Write a road as CityJSON 2.0; return what became of its objects.
+    """Write a road and its surroundings as CityJSON 2.0; return the trace of what became of each object.
 
     Vertices are whole tenths of millimetres from the parameter set's origin, which is the file's ``transform``.
 
@@ -53,7 +53,7 @@ _LOD = "3"
 
 
 def furniture_objects(geometry: RoadGeometry, tolerance: float, trace: Trace) -> Iterator[CityObject]:
-    """Yield everything that stands on and beside the road, in the order of the parameter set.
+    """Yield the city objects of everything on and beside the road, a bridge's parts after the bridge.
 
     Args:
         geometry: the road.
@@ -61,11 +61,11 @@ def furniture_objects(geometry: RoadGeometry, tolerance: float, trace: Trace) ->
         trace: it is told what is left out.
     """
     for placed in placed_things(geometry, tolerance):
-        trace.leave_out(placed)
+        trace.record_omissions(placed)
         types, parts = placed.thing.twin(), _faces_of_parts(placed)
         attributes = attributes_of(placed.thing)
         if not types.cityjson_part:
-            shapes = solids((face for faces in parts.values() for face in faces), _LOD) or _point(placed.frame)
+            shapes = solid_geometry((face for faces in parts.values() for face in faces), _LOD) or _point(placed.frame)
             yield CityObject(placed.name, types.cityjson, attributes, shapes)
             continue
         names = {part: f"{placed.name}/{part}" for part in parts}
@@ -73,20 +73,20 @@ def furniture_objects(geometry: RoadGeometry, tolerance: float, trace: Trace) ->
         for part, faces in parts.items():
             about = {"instance": placed.thing.instance, "class": placed.thing.semantic_class}
             about |= {"function": part.rstrip("-0123456789")}
-            yield CityObject(names[part], types.cityjson_part, about, solids(faces, _LOD), parent=placed.name)
+            yield CityObject(names[part], types.cityjson_part, about, solid_geometry(faces, _LOD), parent=placed.name)
 
 
 def _faces_of_parts(placed: PlacedThing) -> dict[str, list[Faces]]:
-    """Return the bodies of a thing by its parts, fittings left out."""
+    """Return the closed bodies of a thing in local coordinates, by part name, without fittings."""
     parts: dict[str, list[Faces]] = {}
     for body in placed.bodies:
         if not body.detail:
-            parts.setdefault(body.part, []).append(loft(placed.local(body)))
+            parts.setdefault(body.part, []).append(loft(placed.local_sections(body)))
     return parts
 
 
 def _point(frame: Frame | None) -> tuple[CityGeometry, ...]:
-    """Return the place of something whose shape isn't known here."""
+    """Return a MultiPoint at a frame's origin for a thing whose shape isn't known; empty if the frame is None."""
     if frame is None:
         return ()
     point = Faces(frame.origin[None], np.zeros(1, np.int64), np.ones(1, np.int64))

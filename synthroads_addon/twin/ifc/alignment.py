@@ -15,7 +15,7 @@ from ...road.alignment import Alignment
 from ...road.geometry import RoadGeometry
 from ...road.profile import Profile
 from ...road.section import Carriageway
-from .entities import Entity, Float, IfcFile, short
+from .entities import Entity, Float, IfcFile, rounded
 
 _HORIZONTAL = {"line": "LINE", "arc": "CIRCULARARC", "clothoid": "CLOTHOID"}
 _SHORTEST = 1e-6
@@ -34,7 +34,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 
 @dataclass(frozen=True)
 class PlanSegment:
-    """One element of the plan.
+    """One segment of the horizontal alignment: line, circular arc or clothoid.
 
     Attributes:
         kind: ``LINE``, ``CIRCULARARC``, ``CLOTHOID``.
@@ -55,7 +55,7 @@ class PlanSegment:
 
 @dataclass(frozen=True)
 class ProfileSegment:
-    """One piece of the profile: ``height`` + u (``grade`` + u ``curvature`` / 2), u from 0 to ``length`` (m)."""
+    """One segment of the profile: ``height`` + u (``grade`` + u ``curvature`` / 2), u from 0 to ``length`` (m)."""
 
     station: float
     length: float
@@ -66,7 +66,7 @@ class ProfileSegment:
 
 @dataclass(frozen=True)
 class Axis:
-    """The centreline in the file.
+    """The centreline in the IFC file: the IfcAlignment and its plan curve.
 
     Attributes:
         alignment: the IfcAlignment.
@@ -78,7 +78,7 @@ class Axis:
 
 
 def plan_segments(alignment: Alignment) -> list[PlanSegment]:
-    """Return the plan's elements; a clothoid so flat that readers of IFC fail on it is an arc or a line."""
+    """Return the horizontal alignment's segments; a clothoid too flat for readers of IFC is an arc or a line."""
     starts = alignment.element_starts[:-1]
     position, heading, _ = alignment.frame(starts)
     segments = []
@@ -92,7 +92,7 @@ def plan_segments(alignment: Alignment) -> list[PlanSegment]:
 
 
 def profile_segments(profile: Profile, length: float) -> list[ProfileSegment]:
-    """Return the profile's pieces from station 0 to the road's length."""
+    """Return the profile's segments of constant curvature from station 0 to the road's length."""
     inside = profile.breakpoints[(profile.breakpoints > _SHORTEST) & (profile.breakpoints < length - _SHORTEST)]
     borders = np.concatenate([[0.0], inside, [length]])
     keep = np.append(np.diff(borders) > _SHORTEST, True)
@@ -106,7 +106,7 @@ def profile_segments(profile: Profile, length: float) -> list[ProfileSegment]:
 
 
 def write_alignment(ifc: IfcFile, geometry: RoadGeometry) -> Axis:
-    """Add the alignment: its layouts, curves and referents; return what other things are placed along."""
+    """Add the IfcAlignment with its layouts, curves and referents to the file; return it with its plan curve."""
     name, item = next((n, o) for n, o in geometry.parameters.objects.items() if o is geometry.parameters.alignment)
     plan, gradient = _Plan(ifc, name), _Profile(ifc, name)
     plan_curve = plan.write(geometry.alignment)
@@ -115,30 +115,30 @@ def write_alignment(ifc: IfcFile, geometry: RoadGeometry) -> Axis:
         ifc.add("IfcShapeRepresentation", ifc.contexts["Axis"], "FootPrint", "Curve2D", [plan_curve]),
         ifc.add("IfcShapeRepresentation", ifc.contexts["Axis"], "Axis", "Curve3D", [gradient_curve]),
     ]
-    alignment = ifc.rooted(
+    alignment = ifc.add_root(
         "IfcAlignment",
         name,
         Name=name,
         ObjectPlacement=ifc.local_frame,
         Representation=ifc.add("IfcProductDefinitionShape", None, None, shapes),
     )
-    ifc.gather("IfcRelAggregates", ifc.project, [alignment])
-    ifc.gather("IfcRelNests", alignment, [plan.layout, gradient.layout])
+    ifc.note_relation("IfcRelAggregates", ifc.project, [alignment])
+    ifc.note_relation("IfcRelNests", alignment, [plan.layout, gradient.layout])
     values = {key: value for key, value in ifc.parameters_of(item).items() if key not in ("horizontal", "vertical")}
-    ifc.properties(alignment, "SynthRoads", values | {"length": ifc.value(geometry.length, "m")})
+    ifc.add_properties(alignment, "SynthRoads", values | {"length": ifc.value(geometry.length, "m")})
     axis = Axis(alignment, plan_curve)
     _write_referents(ifc, geometry, axis)
     return axis
 
 
 class _Layout:
-    """Base of plan and profile: segments, and an end of length 0 as IFC wants it."""
+    """Base of horizontal and vertical layout: segments with their curves, the last of length 0 as IFC demands."""
 
     entity: str
 
     def __init__(self, ifc: IfcFile, name: str) -> None:
         self.ifc, self.name = ifc, name
-        self.layout = ifc.rooted(self.entity, name)
+        self.layout = ifc.add_root(self.entity, name)
         self.line = ifc.add(
             "IfcLine",
             ifc.point(0.0, 0.0),
@@ -147,21 +147,21 @@ class _Layout:
         self.curves: list[Entity] = []
 
     def segment(self, number: int, design: Entity, curve: Entity) -> None:
-        """Add a semantic segment and its curve."""
+        """Add an IfcAlignmentSegment with its design parameters and keep its curve for the composite curve."""
         key = f"{self.name}/{number}"
-        made = self.ifc.rooted("IfcAlignmentSegment", f"{self.entity}/{key}", Name=key, DesignParameters=design)
-        self.ifc.gather("IfcRelNests", self.layout, [made])
+        made = self.ifc.add_root("IfcAlignmentSegment", f"{self.entity}/{key}", Name=key, DesignParameters=design)
+        self.ifc.note_relation("IfcRelNests", self.layout, [made])
         self.curves.append(curve)
 
     def curve(self, placement: Entity, parent: tuple[Entity, float, float], transition: str) -> Entity:
-        """Add the piece of a parent curve from a start on with a length (both along it), moved to a placement."""
+        """Add an IfcCurveSegment: a piece (curve, start, length) of a parent curve, moved to a placement."""
         curve, start, length = parent
         return self.ifc.add(
             "IfcCurveSegment",
             Transition=transition,
             Placement=placement,
-            SegmentStart=self.ifc.length(start),
-            SegmentLength=self.ifc.length(length),
+            SegmentStart=self.ifc.length_measure(start),
+            SegmentLength=self.ifc.length_measure(length),
             ParentCurve=curve,
         )
 
@@ -170,7 +170,7 @@ class _Plan(_Layout):
     entity = "IfcAlignmentHorizontal"
 
     def write(self, alignment: Alignment) -> Entity:
-        """Add all segments; return the composite curve."""
+        """Add all horizontal segments; return the IfcCompositeCurve."""
         segments = plan_segments(alignment)
         end, heading, _ = alignment.frame(np.array([alignment.length]))
         x, y = end[0].tolist()
@@ -181,9 +181,9 @@ class _Plan(_Layout):
 
     def _write(self, number: int, segment: PlanSegment, transition: str) -> None:
         ifc = self.ifc
-        angle = short(math.remainder(segment.heading, 2.0 * math.pi), 12)
+        angle = rounded(math.remainder(segment.heading, 2.0 * math.pi), 12)
         radii = [1.0 / k if k else 0.0 for k in (segment.start_curvature, segment.end_curvature)]
-        start = ifc.add("IfcCartesianPoint", short([segment.x, segment.y], 9))
+        start = ifc.add("IfcCartesianPoint", rounded([segment.x, segment.y], 9))
         design = ifc.add(
             "IfcAlignmentHorizontalSegment",
             StartPoint=start,
@@ -197,7 +197,7 @@ class _Plan(_Layout):
         self.segment(number, design, self.curve(placement, self._parent(segment), transition))
 
     def _parent(self, segment: PlanSegment) -> tuple[Entity, float, float]:
-        """Return the curve that a segment is a piece of, and where along it the piece begins and how long it is."""
+        """Return a segment's parent curve, and the start and length of the piece along it, m."""
         ifc, first, length = self.ifc, segment.start_curvature, segment.length
         if segment.kind == "LINE":
             return self.line, 0.0, length
@@ -217,7 +217,7 @@ class _Profile(_Layout):
     entity = "IfcAlignmentVertical"
 
     def write(self, profile: Profile, length: float, plan: Entity) -> Entity:
-        """Add all segments; return the gradient curve over the plan."""
+        """Add all vertical segments; return the IfcGradientCurve over the plan curve."""
         segments = profile_segments(profile, length)
         last = segments[-1]
         grade = last.grade + last.curvature * last.length
@@ -233,13 +233,13 @@ class _Profile(_Layout):
             "IfcAlignmentVerticalSegment",
             StartDistAlong=segment.station,
             HorizontalLength=length,
-            StartHeight=short(segment.height, 9),
+            StartHeight=rounded(segment.height, 9),
             StartGradient=grade,
             EndGradient=grade + curvature * length,
             RadiusOfCurvature=1.0 / curvature if curvature else None,
             PredefinedType="PARABOLICARC" if curvature else "CONSTANTGRADIENT",
         )
-        place = ifc.add("IfcCartesianPoint", short([segment.station, segment.height], 9))
+        place = ifc.add("IfcCartesianPoint", rounded([segment.station, segment.height], 9))
         slope = ifc.direction(1.0 / math.hypot(1.0, grade), grade / math.hypot(1.0, grade))
         placement = ifc.add("IfcAxis2Placement2D", place, slope)
         along = _slope_length(grade, curvature, length)
@@ -249,13 +249,13 @@ class _Profile(_Layout):
                 "IfcPolynomialCurve",
                 Position=ifc.axes_2d(0.0, 0.0, 0.0),
                 CoefficientsX=[0.0, 1.0],
-                CoefficientsY=[short(segment.height, 9), grade, curvature / 2.0],
+                CoefficientsY=[rounded(segment.height, 9), grade, curvature / 2.0],
             )
         self.segment(number, design, self.curve(placement, (parent, 0.0, along), transition))
 
 
 def _plan_transition(segment: PlanSegment, after: PlanSegment | None = None) -> str:
-    """Return how a segment goes over into the next one."""
+    """Return the IfcTransitionCode from a plan segment to the next; DISCONTINUOUS if there is none."""
     if after is None:
         return "DISCONTINUOUS"
     same = segment.end_curvature == after.start_curvature
@@ -263,7 +263,7 @@ def _plan_transition(segment: PlanSegment, after: PlanSegment | None = None) -> 
 
 
 def _profile_transition(segment: ProfileSegment, after: ProfileSegment | None = None) -> str:
-    """Return how a segment goes over into the next one; at an intersection without rounding the grade jumps."""
+    """Return the IfcTransitionCode from a profile segment to the next; CONTINUOUS where the grade jumps."""
     if after is None:
         return "DISCONTINUOUS"
     grade = segment.grade + segment.curvature * segment.length
@@ -273,7 +273,7 @@ def _profile_transition(segment: ProfileSegment, after: ProfileSegment | None = 
 
 
 def _slope_length(grade: float, curvature: float, length: float) -> float:
-    """Return the length (m) of a piece of profile along its slope."""
+    """Return the arc length of a parabola or grade over a horizontal length, m, by Gauss-Legendre quadrature."""
     at = (_NODES + 1.0) / 2.0 * length
     return float(np.sqrt(1.0 + (grade + curvature * at) ** 2) @ _WEIGHTS * length / 2.0)
 
@@ -283,7 +283,7 @@ def _slope_length(grade: float, curvature: float, length: float) -> float:
 
 @dataclass(frozen=True)
 class _Referent:
-    """A point of the alignment of which something is known: its station (m), name, kind, and one property set."""
+    """A point of the alignment with properties: its station (m), name, predefined type, and one property set."""
 
     station: float
     name: str
@@ -293,7 +293,7 @@ class _Referent:
 
 
 def _write_referents(ifc: IfcFile, geometry: RoadGeometry, axis: Axis) -> None:
-    """Nest the beginning of the stationing, and the points of crossfall and of changing widths, by station."""
+    """Nest IfcReferents in the alignment by station: its start, crossfall points and width changes."""
     zero = {"Station": ifc.add("IfcLengthMeasure", 0.0)}
     referents = [_Referent(0.0, "station-0", "STATION", "Pset_Stationing", zero)]
     for name, carriageway in geometry.parameters.of_type(Carriageway).items():
@@ -302,20 +302,20 @@ def _write_referents(ifc: IfcFile, geometry: RoadGeometry, axis: Axis) -> None:
     # What lies before or behind the road isn't on the curve.
     inside = [item for item in referents if 0.0 <= item.station <= geometry.length]
     for item in sorted(inside, key=lambda item: item.station):
-        place = linear_placement(ifc, geometry, axis, item.station)
-        referent = ifc.rooted("IfcReferent", item.name, Name=item.name, ObjectPlacement=place, PredefinedType=item.kind)
-        ifc.properties(referent, item.properties, item.values)
+        named = {"Name": item.name, "ObjectPlacement": linear_placement(ifc, geometry, axis, item.station)}
+        referent = ifc.add_root("IfcReferent", item.name, **named, PredefinedType=item.kind)
+        ifc.add_properties(referent, item.properties, item.values)
         if item.kind != "STATION":
-            ifc.properties(referent, "Pset_Stationing", {"Station": ifc.value(item.station, "m")})
-        ifc.gather("IfcRelNests", axis.alignment, [referent], "referents")
+            ifc.add_properties(referent, "Pset_Stationing", {"Station": ifc.value(item.station, "m")})
+        ifc.note_relation("IfcRelNests", axis.alignment, [referent], "referents")
 
 
 def _superelevation(ifc: IfcFile, name: str, carriageway: Carriageway) -> Iterator[_Referent]:
-    """Yield a referent per point of crossfall, a ratio that is positive where the surface falls to the right."""
+    """Yield a referent per crossfall point of a carriageway, as a ratio, positive where it falls to the right."""
     for number, point in enumerate(carriageway.crossfall):
         values = {
             "Side": [carriageway.side.upper()],
-            "Superelevation": ifc.add("IfcRatioMeasure", short(point.crossfall_percent / 100.0, 9)),
+            "Superelevation": ifc.add("IfcRatioMeasure", rounded(point.crossfall_percent / 100.0, 9)),
             "TransitionSuperelevation": ["LINEAR"],
         }
         key = f"{name}/crossfall-{number}"
@@ -323,14 +323,14 @@ def _superelevation(ifc: IfcFile, name: str, carriageway: Carriageway) -> Iterat
 
 
 def _widths(ifc: IfcFile, geometry: RoadGeometry, name: str, carriageway: Carriageway) -> Iterator[_Referent]:
-    """Yield a referent at the beginning and wherever the width of a carriageway's pavement bends."""
+    """Yield a referent with the paved width at station 0 and wherever the width of a carriageway's strips bends."""
     section = geometry.sections[carriageway.side]
     for number, station in enumerate(sorted({0.0, *section.kinks()})):
         distances = section.distances(station)[0]
         values = {
             "Side": [carriageway.side.upper()],
             "TransitionWidth": ["LINEAR"],
-            "NominalWidth": ifc.add("IfcNonNegativeLengthMeasure", short(distances[-2] - distances[0])),
+            "NominalWidth": ifc.add("IfcNonNegativeLengthMeasure", rounded(distances[-2] - distances[0])),
         }
         yield _Referent(station, f"{name}/width-{number}", "WIDTHEVENT", "Pset_Width", values)
 
@@ -341,7 +341,7 @@ def _widths(ifc: IfcFile, geometry: RoadGeometry, name: str, carriageway: Carria
 def linear_placement(
     ifc: IfcFile, geometry: RoadGeometry, axis: Axis, station: float, offset: float = 0.0, height: float | None = None
 ) -> Entity:
-    """Place something along the alignment: x along it, y to the left, z up.
+    """Add and return an IfcLinearPlacement along the alignment, upright: x along it, y to the left, z up.
 
     Distances are along the plan, which is flat: so heights are elevations, and nothing leans with the grade. The
     directions are those of the curve, which all readers take alike. The same as Cartesian coordinates stands beside it
@@ -357,9 +357,9 @@ def linear_placement(
     x, y = (position[0] + offset * np.array([-math.sin(angle), math.cos(angle)])).tolist()
     place = ifc.add(
         "IfcPointByDistanceExpression",
-        DistanceAlong=ifc.length(station),
-        OffsetLateral=short(offset, 9),
-        OffsetVertical=short(z),
+        DistanceAlong=ifc.length_measure(station),
+        OffsetLateral=rounded(offset, 9),
+        OffsetVertical=rounded(z),
         BasisCurve=axis.plan,
     )
     relative = ifc.add("IfcAxis2PlacementLinear", place, ifc.direction(0.0, 0.0, 1.0), None)
@@ -367,5 +367,5 @@ def linear_placement(
 
 
 def local_placement(ifc: IfcFile, origin: Float, angle: float) -> Entity:
-    """Place something at local coordinates (3,), its x axis at an angle (rad) from the local frame's, z up."""
+    """Add and return an IfcLocalPlacement at a local point (3,), turned about z by an angle (rad)."""
     return ifc.add("IfcLocalPlacement", None, ifc.axes_3d(origin.tolist(), angle))

@@ -34,8 +34,8 @@ _HEADER_TIME = "1970-01-01T00:00:00"
 _MEASURES = {"m": "IfcLengthMeasure", "m/s": "IfcLinearVelocityMeasure"}
 
 
-def library() -> Any:
-    """Return the package `ifcopenshell`; InputError saying how to install it where it is missing."""
+def import_ifcopenshell() -> Any:
+    """Import and return `ifcopenshell`, or raise an InputError that says how to install it."""
     try:
         import ifcopenshell
         import ifcopenshell.guid
@@ -44,13 +44,13 @@ def library() -> Any:
     return ifcopenshell
 
 
-def short(values: Any, digits: int = LENGTH_DIGITS) -> Any:
-    """Return numbers rounded for the file, as (nested) lists of floats; no negative zeros."""
+def rounded(values: Any, digits: int = LENGTH_DIGITS) -> Any:
+    """Return numbers rounded to decimals as (nested) lists of floats, without negative zeros."""
     return (np.round(np.asarray(values, dtype=np.float64), digits) + 0.0).tolist()
 
 
 class IfcFile:
-    """A file in the making.
+    """An IFC file in the making, with reproducible identifiers and relations gathered until the end.
 
     Attributes:
         file: ifcopenshell's file.
@@ -61,7 +61,7 @@ class IfcFile:
     def __init__(self, namespace: str, trace: Trace) -> None:
         """Make an empty file; ``namespace`` (the road's identifier) keeps apart the identifiers of different roads."""
         self.trace = trace
-        ifcopenshell = library()
+        ifcopenshell = import_ifcopenshell()
         self.file = ifcopenshell.file(schema=SCHEMA)
         self._schema = ifcopenshell.schema_by_name(SCHEMA)
         self._compress = ifcopenshell.guid.compress
@@ -82,11 +82,11 @@ class IfcFile:
     # --- entities -------------------------------------------------------------------------------------------------
 
     def add(self, entity: str, *values: Any, **named: Any) -> Entity:
-        """Add an entity with its attributes."""
+        """Add an entity of an IFC class with attributes by position or name, and return it."""
         return self.file.create_entity(entity, *values, **named)
 
-    def knows(self, entity: str, kind: str) -> bool:
-        """Return whether the schema has an element, or a bridge, of a class with a predefined type."""
+    def has_type(self, entity: str, kind: str) -> bool:
+        """Return whether the schema has a concrete element or bridge class with this predefined type."""
         try:
             declaration = self._schema.declaration_by_name(entity)
         except RuntimeError:
@@ -103,7 +103,7 @@ class IfcFile:
         return False
 
     def guid(self, key: str) -> str:
-        """Return the identifier of a key, which must be new: a hash of the road's identifier and the key."""
+        """Return the compressed GlobalId hashed from the road's identifier and a key; ValueError if it was used."""
         if key in self._keys:
             raise ValueError(f"two objects have the key {key!r}")
         self._keys.add(key)
@@ -114,54 +114,54 @@ class IfcFile:
         marked[8] = marked[8] & 0x3F | 0x80
         return str(self._compress(bytes(marked).hex()))
 
-    def rooted(self, entity: str, key: str, **named: Any) -> Entity:
-        """Add an entity that has a GlobalId, which follows from its class and key."""
+    def add_root(self, entity: str, key: str, **named: Any) -> Entity:
+        """Add and return an entity with a GlobalId, which is hashed from its class and key."""
         return self.add(entity, GlobalId=self.guid(f"{entity}/{key}"), **named)
 
-    def product(
+    def add_product(
         self, entity: str, name: str, kind: str, about: str | None = None, placement: Entity = None, **named: Any
     ) -> Entity:
-        """Add what has a place: `kind` is its predefined type, `about` its object type.
+        """Add and return an IfcProduct: `kind` is its predefined type, `about` its object type.
 
         Without a placement its coordinates are local. Its key is its name.
         """
         placement = self.local_frame if placement is None else placement
         named = {"Name": name, "ObjectType": about, "ObjectPlacement": placement, "PredefinedType": kind} | named
-        return self.rooted(entity, name, **named)
+        return self.add_root(entity, name, **named)
 
     # --- geometry -------------------------------------------------------------------------------------------------
 
     def point(self, *coordinates: float) -> Entity:
-        """Add a point."""
-        return self.add("IfcCartesianPoint", short(coordinates))
+        """Add and return an IfcCartesianPoint, rounded to micrometres."""
+        return self.add("IfcCartesianPoint", rounded(coordinates))
 
     def direction(self, *ratios: float) -> Entity:
-        """Return a direction; equal ones are one entity."""
-        key = tuple(short(ratios, _DIRECTION_DIGITS))
+        """Return an IfcDirection; equal ones are one entity."""
+        key = tuple(rounded(ratios, _DIRECTION_DIGITS))
         if key not in self._directions:
             self._directions[key] = self.add("IfcDirection", list(key))
         return self._directions[key]
 
     def heading(self, angle: float, dimension: int = 2) -> Entity:
-        """Return the horizontal direction of an angle from the x axis (rad)."""
+        """Return the IfcDirection (2D or 3D) of a horizontal angle from the x axis, rad."""
         return self.direction(*(math.cos(angle), math.sin(angle), 0.0)[:dimension])
 
     def axes_2d(self, x: float, y: float, angle: float) -> Entity:
-        """Add a 2D placement whose x axis has an angle (rad)."""
+        """Add and return an IfcAxis2Placement2D at a point, its x axis at an angle (rad)."""
         return self.add("IfcAxis2Placement2D", self.point(x, y), self.heading(angle))
 
     def axes_3d(self, place: Sequence[float], angle: float = 0.0) -> Entity:
-        """Add an upright 3D placement, turned about the vertical by an angle (rad)."""
+        """Add and return an upright IfcAxis2Placement3D, turned about the vertical by an angle (rad)."""
         return self.add(
             "IfcAxis2Placement3D", self.point(*place), self.direction(0.0, 0.0, 1.0), self.heading(angle, 3)
         )
 
-    def length(self, value: float) -> Entity:
-        """Add a length with its type, where IFC lets a choice of types."""
-        return self.add("IfcLengthMeasure", short(value, 9))
+    def length_measure(self, value: float) -> Entity:
+        """Return an IfcLengthMeasure (m) for attributes whose type is a choice."""
+        return self.add("IfcLengthMeasure", rounded(value, 9))
 
     def mesh(self, vertices: Float, triangles: NDArray[np.intp], closed: bool) -> Entity | None:
-        """Add a triangulated face set; None if no triangle has an area.
+        """Add and return an IfcTriangulatedFaceSet; None if all triangles are degenerate.
 
         Args:
             vertices: (N, 3) m, in the frame of the product's placement.
@@ -181,7 +181,7 @@ class IfcFile:
         return self.add("IfcTriangulatedFaceSet", Coordinates=points, Closed=closed, CoordIndex=numbered)
 
     def shape(self, items: Iterable[Entity | None], kind: str, key: object = None) -> Entity | None:
-        """Add the body of a product from items of one kind (``Tessellation``, ``SweptSolid``); None without items.
+        """Add and return a product's body from items of one representation type; None if there are no items.
 
         Bodies of the same ``key`` are one: the second product shares the first one's.
         """
@@ -197,15 +197,15 @@ class IfcFile:
         return made
 
     def has_shape(self, key: object) -> bool:
-        """Return whether a body of this key is there."""
+        """Return whether a body with this key has been added."""
         return key in self._shapes
 
     def scaled_shape(self, key: object, make: Callable[[], list[Entity]], scale: tuple[float, float, float]) -> Entity:
-        """Add a body that is another one scaled along the axes; the other is made once for its key, from items."""
+        """Add and return a scaled copy of a mapped shape, which `make` creates once per key."""
         if key not in self._maps:
             shared = self.add("IfcShapeRepresentation", self.contexts["Body"], "Body", "Tessellation", make())
             self._maps[key] = self.add("IfcRepresentationMap", self.flat_axes, shared)
-        x, y, z = short(scale)
+        x, y, z = rounded(scale)
         target = self.add(
             "IfcCartesianTransformationOperator3DnonUniform",
             LocalOrigin=self.origin,
@@ -219,28 +219,28 @@ class IfcFile:
 
     # --- what is said of objects ----------------------------------------------------------------------------------
 
-    def gather(self, relation: str, of: Entity, members: Iterable[Entity], group: str = "") -> None:
-        """Note that objects stand in a relation (``IfcRelAggregates``, ...) to another, to be written at the end.
+    def note_relation(self, relation: str, of: Entity, members: Iterable[Entity], group: str = "") -> None:
+        """Note members of a relation (``IfcRelAggregates``, ...) to an object; `relate` writes it at the end.
 
         Those of different groups become relations of their own.
         """
         self._gathered.setdefault((relation, of.id(), group), (of, []))[1].extend(members)
 
-    def label(self, item: Entity, instance: int, class_name: str, model: Model | None = None) -> None:
-        """Give an object its instance number and the class of its points, and all that a model says, as properties."""
+    def add_labels(self, item: Entity, instance: int, class_name: str, model: Model | None = None) -> None:
+        """Give an entity the property set `SynthRoads`: instance number, class of its points, and a model's fields."""
         values = {"instance": self.value(instance), "class": self.value(class_name)}
-        self.properties(item, "SynthRoads", values | (self.parameters_of(model) if model else {}))
+        self.add_properties(item, "SynthRoads", values | (self.parameters_of(model) if model else {}))
 
-    def properties(self, item: Entity, name: str, values: Values) -> None:
-        """Give an object a property set: of values of IFC's simple types, and of lists of labels that are chosen."""
+    def add_properties(self, item: Entity, name: str, values: Values) -> None:
+        """Add a property set to an entity, none if it is empty; lists of strings become enumerated values."""
         made = [self._property(key, value) for key, value in values.items()]
         if not made:
             return
         if name == "SynthRoads" and "instance" in values:
-            self.trace.found(values["instance"].wrappedValue, entity=item.is_a(), GlobalId=item.GlobalId)
+            self.trace.record_entity(values["instance"].wrappedValue, entity=item.is_a(), GlobalId=item.GlobalId)
         key = f"{item.GlobalId}/{name}"
-        definition = self.rooted("IfcPropertySet", key, Name=name, HasProperties=made)
-        self.rooted("IfcRelDefinesByProperties", key, RelatedObjects=[item], RelatingPropertyDefinition=definition)
+        definition = self.add_root("IfcPropertySet", key, Name=name, HasProperties=made)
+        self.add_root("IfcRelDefinesByProperties", key, RelatedObjects=[item], RelatingPropertyDefinition=definition)
 
     def _property(self, name: str, value: Entity | list[str]) -> Entity:
         if isinstance(value, list):
@@ -249,7 +249,7 @@ class IfcFile:
         return self.add("IfcPropertySingleValue", name, None, value, None)
 
     def value(self, value: object, unit: str = "") -> Entity:
-        """Return a value of a parameter set as one of IFC's simple types; what has parts becomes JSON text."""
+        """Return a Python value as an IFC simple type by its type and unit; structured values become JSON text."""
         if isinstance(value, bool):
             return self.add("IfcBoolean", value)
         if isinstance(value, int):
@@ -260,28 +260,28 @@ class IfcFile:
         return self.add("IfcLabel" if isinstance(value, str) and len(text) <= _LONGEST_LABEL else "IfcText", text)
 
     def parameters_of(self, model: Model) -> dict[str, Entity]:
-        """Return all that a parameter set says of an object, under the same names, as IFC values."""
+        """Return a model's fields that aren't None as IFC values, by field name."""
         fields = type(model).model_fields
         values = {name: (getattr(model, name), unit_of(field)) for name, field in fields.items()}
         return {name: self.value(value, unit) for name, (value, unit) in values.items() if value is not None}
 
-    def made_of(self, item: Entity, name: str) -> None:
-        """Give an object its material, by its name in the material table."""
+    def assign_material(self, item: Entity, name: str) -> None:
+        """Assign an object a material of the material table by name; the material is added once."""
         if name not in self._materials:
             self._materials[name] = self._material(name)
-        self.gather("IfcRelAssociatesMaterial", self._materials[name], [item])
+        self.note_relation("IfcRelAssociatesMaterial", self._materials[name], [item])
 
-    def paint(self, item: Entity, name: str) -> None:
-        """Give one body of an object the colour of a material that isn't the object's."""
+    def assign_style(self, item: Entity, name: str) -> None:
+        """Give one body of an object the surface style of a material other than the object's."""
         if name not in self._materials:
             self._materials[name] = self._material(name)
         self.add("IfcStyledItem", item, [self._styles[name]], None)
 
     def _material(self, name: str) -> Entity:
-        """Add a material and its colour."""
+        """Add and return an IfcMaterial, its surface style in the table's base colour (or the unknown material's)."""
         entry = materials().get(name, materials()[UNKNOWN])
         # Viewers take the colour as it is; linear base colours would look too dark.
-        red, green, blue = short([channel ** (1.0 / 2.2) for channel in entry.base_color], 4)
+        red, green, blue = rounded([channel ** (1.0 / 2.2) for channel in entry.base_color], 4)
         material = self.add("IfcMaterial", Name=name)
         colour = self.add("IfcColourRgb", None, red, green, blue)
         shading = self.add("IfcSurfaceStyleShading", colour, None)
@@ -293,16 +293,16 @@ class IfcFile:
 
     # --- the end --------------------------------------------------------------------------------------------------
 
-    def relate(self) -> None:
-        """Write the gathered relations."""
+    def write_relations(self) -> None:
+        """Write the gathered relations to the file, one entity each, and clear them."""
         for (relation, _, group), (of, members) in self._gathered.items():
             relating, related = _RELATIONS[relation]
             key = f"{of.GlobalId if hasattr(of, 'GlobalId') else of.Name}/{group}"
-            self.rooted(relation, key, **{relating: of, related: members})
+            self.add_root(relation, key, **{relating: of, related: members})
         self._gathered.clear()
 
     def write(self, path: Path, title: str, program: str) -> None:
-        """Write the file; its header names no time, so that the same road gives the same bytes."""
+        """Write the IFC file to a path; its header has a fixed time, so that the same road gives the same bytes."""
         header = self.file.header
         header.file_description.description = ("ViewDefinition [NotAssigned]",)
         name = header.file_name
@@ -328,7 +328,7 @@ _RELATIONS = {
 
 
 def _plain(value: object) -> object:
-    """Return models in a value as plain JSON data."""
+    """Return a value with the models in it, also in tuples and lists, turned into JSON data."""
     if isinstance(value, Model):
         return value.to_dict()
     if isinstance(value, tuple | list):

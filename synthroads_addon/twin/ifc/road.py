@@ -23,7 +23,7 @@ from ...road.section_geometry import CarriagewaySection
 from ...road.turnout_geometry import TURNOUT_STRIPS, TurnoutShape
 from ..faces import Faces
 from ..surfaces import damaged_surface, dash_surfaces, painted_surface
-from .entities import Entity, Float, IfcFile, short
+from .entities import Entity, Float, IfcFile, rounded
 from .scene import Scene, grid_triangles
 
 _NARROWEST = 1e-4
@@ -47,45 +47,45 @@ _PAVEMENTS = {"asphalt": "FLEXIBLE", "concrete": "RIGID"}
 
 
 def write_road(ifc: IfcFile, parameters: RoadParameters, site: Entity) -> Entity:
-    """Add the IfcRoad with what is designed for all of it."""
+    """Add and return the IfcRoad with the design criteria that hold for all of it."""
     name = parameters.metadata.identifier
-    road = ifc.rooted(
+    road = ifc.add_root(
         "IfcRoad", "road", Name=name, LongName=parameters.metadata.title or None, ObjectPlacement=ifc.local_frame,
         CompositionType="ELEMENT",
     )  # fmt: skip
-    ifc.gather("IfcRelAggregates", site, [road])
+    ifc.note_relation("IfcRelAggregates", site, [road])
     lanes = [len(carriageway.lanes) for carriageway in parameters.of_type(Carriageway).values()]
     design = {
-        "DesignSpeed": ifc.add("IfcLinearVelocityMeasure", short(LIMITS[parameters.design_class].speed / 3.6)),
+        "DesignSpeed": ifc.add("IfcLinearVelocityMeasure", rounded(LIMITS[parameters.design_class].speed / 3.6)),
         "NumberOfThroughLanes": ifc.add("IfcCountMeasure", sum(lanes)),
         "RoadDesignClass": ifc.add("IfcLabel", parameters.design_class),
     }
-    ifc.properties(road, "Pset_RoadDesignCriteriaCommon", design)
+    ifc.add_properties(road, "Pset_RoadDesignCriteriaCommon", design)
     return road
 
 
 def write_carriageways(scene: Scene) -> None:
-    """Add all parts of the road and their surfaces."""
+    """Add roadsides, carriageways with pavement and damage, and the median; fill in `scene.parts`."""
     for side in _SIDES:
         # With a slash, as no object's id has one.
         scene.parts[f"roadside-{side}"] = _part(scene, scene.road, f"road/roadside-{side}", "ROADSIDE")
     for name, carriageway in scene.geometry.parameters.of_type(Carriageway).items():
-        _Direction(scene, name, carriageway).write()
+        _CarriagewayWriter(scene, name, carriageway).write()
     _write_median(scene)
 
 
 def _part(
     scene: Scene, whole: Entity, name: str, kind: str, usage: str = "LATERAL", about: str | None = None
 ) -> Entity:
-    """Add a part of the road, or of one of its parts."""
-    part = scene.ifc.product("IfcRoadPart", name, kind, about, CompositionType="PARTIAL", UsageType=usage)
-    scene.ifc.gather("IfcRelAggregates", whole, [part])
+    """Add and return an IfcRoadPart of the road or of one of its parts."""
+    part = scene.ifc.add_product("IfcRoadPart", name, kind, about, CompositionType="PARTIAL", UsageType=usage)
+    scene.ifc.note_relation("IfcRelAggregates", whole, [part])
     return part
 
 
 @dataclass(frozen=True)
 class _Piece:
-    """A strip, or a turnout's piece of one.
+    """A strip of a carriageway, or the piece of one that belongs to a turnout, that becomes a road part.
 
     Attributes:
         name: of its part and its course.
@@ -108,8 +108,8 @@ class _Piece:
     width: AnyWidth | None
 
 
-class _Direction:
-    """Writes one carriageway."""
+class _CarriagewayWriter:
+    """Writer of one carriageway's road parts, pavement and damage."""
 
     def __init__(self, scene: Scene, name: str, carriageway: Carriageway) -> None:
         self.scene, self.ifc, self.name, self.carriageway = scene, scene.ifc, name, carriageway
@@ -123,17 +123,17 @@ class _Direction:
         }
 
     def write(self) -> None:
-        """Add parts, pavement and courses."""
+        """Add the carriageway's road parts, its pavement, a course for each strip, and the damage."""
         scene, carriageway = self.scene, self.carriageway
         self.plateau = _part(scene, scene.road, f"{self.name}/plateau", "ROADWAYPLATEAU")
         self.part = _part(scene, self.plateau, self.name, "CARRIAGEWAY")
         scene.parts[f"carriageway-{carriageway.side}"] = self.part
-        scene.describe(self.part, carriageway)
+        scene.add_parameters(self.part, carriageway)
         pieces = list(self._pieces())
         kind = _PAVEMENTS[carriageway.pavement.kind]
-        self.pavement = self.ifc.product("IfcPavement", self.name, kind, Name=f"{self.name}/pavement")
-        self.ifc.gather("IfcRelContainedInSpatialStructure", self.part, [self.pavement])
-        self.ifc.label(self.pavement, carriageway.instance, carriageway.points_class, carriageway.pavement)
+        self.pavement = self.ifc.add_product("IfcPavement", self.name, kind, Name=f"{self.name}/pavement")
+        self.ifc.note_relation("IfcRelContainedInSpatialStructure", self.part, [self.pavement])
+        self.ifc.add_labels(self.pavement, carriageway.instance, carriageway.points_class, carriageway.pavement)
         scene.parts[f"pavement-{carriageway.side}"] = self.pavement
         for piece in pieces:
             self._write_piece(piece)
@@ -159,11 +159,11 @@ class _Direction:
             yield _Piece(name, index, kind, strip, whole, strip.instance, 0.0, length, width)
 
     def _turnout(self, name: str) -> Entity:
-        """Add the part of a turnout."""
+        """Add and return the IfcRoadPart of a turnout."""
         turnout = self.scene.geometry.parameters.objects[name]
         assert isinstance(turnout, Turnout)
         part = _part(self.scene, self.plateau, name, _TURNOUT_TYPES[turnout.kind], "REGION", turnout.kind)
-        self.scene.describe(part, turnout)
+        self.scene.add_parameters(part, turnout)
         return part
 
     def _turnout_pieces(self, index: int, strip: SurfaceStrip, wholes: dict[int, Entity]) -> Iterator[_Piece]:
@@ -179,7 +179,7 @@ class _Direction:
         return bool((distances[:, index + 1] - distances[:, index] > _NARROWEST).any())
 
     def _write_piece(self, piece: _Piece) -> None:
-        """Add the part of a strip and its surface, if it is anywhere on the road."""
+        """Add the road part and the surface of a strip, unless it has no width anywhere."""
         station = self.scene.rows(piece.start, piece.end)
         if not self._wide(piece.index, station):
             return
@@ -189,17 +189,17 @@ class _Direction:
         items = [ifc.mesh(*mesh, False) for mesh in self._meshes(piece, station)]
         entity, kind = ("IfcCourse", "PAVEMENT") if paved else ("IfcEarthworksFill", "USERDEFINED")
         shape = ifc.shape(items, "Tessellation")
-        surface = ifc.product(entity, piece.name, kind, piece.kind, Representation=shape)
+        surface = ifc.add_product(entity, piece.name, kind, piece.kind, Representation=shape)
         if paved:
-            ifc.gather("IfcRelAggregates", self.pavement, [surface])
-            ifc.gather("IfcRelReferencedInSpatialStructure", part, [surface])
+            ifc.note_relation("IfcRelAggregates", self.pavement, [surface])
+            ifc.note_relation("IfcRelReferencedInSpatialStructure", part, [surface])
         else:
-            ifc.gather("IfcRelContainedInSpatialStructure", part, [surface])
-        ifc.made_of(surface, piece.strip.material)
+            ifc.note_relation("IfcRelContainedInSpatialStructure", part, [surface])
+        ifc.assign_material(surface, piece.strip.material)
         self._describe(part, surface, piece, station)
 
     def _describe(self, part: Entity, surface: Entity, piece: _Piece, station: Float) -> None:
-        """Say how wide and long a strip is."""
+        """Add property sets to a strip's part and surface: class, stations, width, nominal measures."""
         ifc = self.ifc
         distances = self.section.distances(station)
         widths = distances[:, piece.index + 1] - distances[:, piece.index]
@@ -213,16 +213,16 @@ class _Direction:
         if piece.width is not None:
             values["width"] = ifc.value(piece.width, "m")
         for entity in (part, surface):
-            ifc.properties(entity, "SynthRoads", values)
+            ifc.add_properties(entity, "SynthRoads", values)
         if piece.strip.class_name == "road":
             nominal = {
-                "NominalLength": ifc.add("IfcNonNegativeLengthMeasure", short(piece.end - piece.start)),
-                "NominalWidth": ifc.add("IfcNonNegativeLengthMeasure", short(widths.max())),
+                "NominalLength": ifc.add("IfcNonNegativeLengthMeasure", rounded(piece.end - piece.start)),
+                "NominalWidth": ifc.add("IfcNonNegativeLengthMeasure", rounded(widths.max())),
             }
-            ifc.properties(surface, "Pset_CourseCommon", nominal)
+            ifc.add_properties(surface, "Pset_CourseCommon", nominal)
 
     def _meshes(self, piece: _Piece, station: Float) -> Iterator[tuple[Float, NDArray[np.intp]]]:
-        """Yield vertices and triangles of a strip, finer across where it is damaged."""
+        """Yield vertices (N, 3) and triangles (M, 3) of a strip's blocks, finer across where it is damaged."""
         for first, last, damaged in self._blocks(piece, station):
             section, rows = self.section, station[first : last + 1]
             shares = np.array([0.0, 1.0])
@@ -232,7 +232,7 @@ class _Direction:
             yield self._mesh(piece.index, rows, shares)
 
     def _mesh(self, index: int, station: Float, shares: Float) -> tuple[Float, NDArray[np.intp]]:
-        """Return the points and triangles of a strip between its boundaries, at shares (K,) of its width."""
+        """Return points (N, 3) and triangles (M, 3) of a strip at shares (K,) of its width, lowered by damage."""
         geometry, section = self.scene.geometry, self.section
         inner, outer = section.distances(station)[:, index : index + 2].T
         crossfall = geometry.crossfall(self.carriageway, station)
@@ -248,7 +248,7 @@ class _Direction:
         return points, grid_triangles(len(station), len(shares), flip=self.carriageway.sign < 0)
 
     def _blocks(self, piece: _Piece, station: Float) -> Iterator[tuple[int, int, bool]]:
-        """Yield the first and last row of every stretch along which the same damage lies, and whether there is any."""
+        """Yield (first row, last row, whether damaged) of each stretch along which the same damage lies."""
         ranges = _damage_ranges(self.section) if piece.index in self._damaged_strips else []
         masks = [(station[1:] > low) & (station[:-1] < high) for low, high in ranges]
         damage = np.array([np.zeros(len(station) - 1, dtype=bool), *masks])
@@ -257,7 +257,7 @@ class _Direction:
             yield first, last, bool(damage[:, first].any())
 
     def _write_damage(self) -> None:
-        """Add a DEFECT for all damage; the shapes of ruts and potholes are in the courses' surfaces."""
+        """Add a DEFECT for each damage; only patches and cracks get shapes: ruts and potholes are in the courses."""
         ifc, pavement = self.ifc, self.carriageway.pavement
         damages: list[tuple[str, Rut | Pothole, float, float]] = [
             ("rut", rut, rut.start_station, self._rut_offset(rut)) for rut in pavement.ruts
@@ -266,41 +266,41 @@ class _Direction:
         for number, (kind, damage, station, offset) in enumerate(damages):
             name, instance = self.scene.geometry.numbers.part(self.name, number)
             placement = self.scene.place(station, offset).placement
-            defect = ifc.product("IfcSurfaceFeature", name, "DEFECT", kind, placement)
-            ifc.label(defect, instance, self.carriageway.points_class, damage)
-            ifc.gather("IfcRelAdheresToElement", self.pavement, [defect])
+            defect = ifc.add_product("IfcSurfaceFeature", name, "DEFECT", kind, placement)
+            ifc.add_labels(defect, instance, self.carriageway.points_class, damage)
+            ifc.note_relation("IfcRelAdheresToElement", self.pavement, [defect])
         laid: list[Patch | Crack] = [*pavement.patches, *pavement.cracks]
         for number, item in enumerate(laid, len(damages)):
             name, instance = self.scene.geometry.numbers.part(self.name, number)
             mesh = _triangles(damaged_surface(self.scene.geometry, item, self.scene.stations))
             shape = ifc.shape([ifc.mesh(*mesh, False)], "Tessellation") if mesh else None
             kind = "patch" if isinstance(item, Patch) else f"{item.kind} crack"
-            defect = ifc.product("IfcSurfaceFeature", name, "DEFECT", kind, Representation=shape)
-            ifc.label(defect, instance, self.carriageway.points_class)
-            ifc.gather("IfcRelAdheresToElement", self.pavement, [defect])
+            defect = ifc.add_product("IfcSurfaceFeature", name, "DEFECT", kind, Representation=shape)
+            ifc.add_labels(defect, instance, self.carriageway.points_class)
+            ifc.note_relation("IfcRelAdheresToElement", self.pavement, [defect])
 
     def _rut_offset(self, rut: Rut) -> float:
-        """Return the offset of the middle of a rut's lane at its beginning."""
+        """Return the offset of the middle of a rut's lane at the rut's start, m."""
         lane = min(rut.lane, len(self.carriageway.lanes) - 1)
         boundaries = self.section.lane_boundaries(rut.start_station)[0]
         return self.carriageway.sign * float(boundaries[lane] + boundaries[lane + 1]) / 2.0
 
 
 def _range(shape: TurnoutShape, length: float) -> tuple[float, float]:
-    """Return the stations (m) between which a turnout changes anything, within the road."""
+    """Return the stations (m) between which a turnout changes the cross-section, clipped to the road."""
     low, high = shape.range()
     return max(low, 0.0), min(high, length)
 
 
 def _damage_ranges(section: CarriagewaySection) -> list[tuple[float, float]]:
-    """Return the stations (m) of every rut and pothole."""
+    """Return (start, end) stations (m) of every pothole and rut of a carriageway."""
     pavement = section.carriageway.pavement
     holes = [(hole.station - hole.length / 2.0, hole.station + hole.length / 2.0) for hole in pavement.potholes]
     return holes + [(rut.start_station, rut.end_station) for rut in pavement.ruts]
 
 
 def _local_damage(section: CarriagewaySection, low: float, high: float) -> CarriagewaySection:
-    """Return a section with no damage but that between two stations (m)."""
+    """Return a copy of a section with only the ruts and potholes between two stations (m)."""
     carriageway, pavement = section.carriageway, section.carriageway.pavement
     ruts = tuple(rut for rut in pavement.ruts if rut.start_station < high and rut.end_station > low)
     middle, half = (low + high) / 2.0, (high - low) / 2.0
@@ -311,7 +311,7 @@ def _local_damage(section: CarriagewaySection, low: float, high: float) -> Carri
 
 
 def _write_median(scene: Scene) -> None:
-    """Add the strip between the carriageways; beside a single one a median is named, and has no surface."""
+    """Add the median's road part, and its surface if the road has two carriageways."""
     geometry = scene.geometry
     index = next((i for i, strip in enumerate(geometry.strips) if strip.kind == "median"), None)
     median = next(iter(geometry.parameters.of_type(Median).items()), None)
@@ -323,11 +323,11 @@ def _write_median(scene: Scene) -> None:
     if index is not None:
         _write_median_surface(scene, index, name, part)
     if median:
-        scene.describe(part, median[1])
+        scene.add_parameters(part, median[1])
 
 
 def _write_median_surface(scene: Scene, index: int, name: str, part: Entity) -> None:
-    """Add the surface of a strip to the part of the road that it is."""
+    """Add the median strip's surface as an IfcEarthworksFill contained in its road part."""
     ifc, geometry = scene.ifc, scene.geometry
     strip = geometry.strips[index]
     station = scene.stations
@@ -337,10 +337,10 @@ def _write_median_surface(scene: Scene, index: int, name: str, part: Entity) -> 
     points = np.column_stack([plan, heights.ravel()])
     shape = ifc.shape([ifc.mesh(points, grid_triangles(len(station), 2), False)], "Tessellation")
     surface = {"Name": f"{name}/surface", "Representation": shape}
-    fill = ifc.product("IfcEarthworksFill", name, "USERDEFINED", "median", **surface)
-    ifc.gather("IfcRelContainedInSpatialStructure", part, [fill])
-    ifc.made_of(fill, strip.material)
-    ifc.label(fill, strip.instance, strip.class_name)
+    fill = ifc.add_product("IfcEarthworksFill", name, "USERDEFINED", "median", **surface)
+    ifc.note_relation("IfcRelContainedInSpatialStructure", part, [fill])
+    ifc.assign_material(fill, strip.material)
+    ifc.add_labels(fill, strip.instance, strip.class_name)
 
 
 # --- markings -------------------------------------------------------------------------------------------------------
@@ -350,7 +350,7 @@ _MARKINGS: dict[type, str] = {LineMarking: "LINEMARKING", Hatching: "HATCHMARKIN
 
 
 def write_markings(scene: Scene) -> None:
-    """Add every line, hatching and arrow with the surface of its film."""
+    """Add every line, hatching and arrow as an IfcSurfaceFeature that adheres to its carriageway's pavement."""
     for name, item in scene.geometry.parameters.objects.items():
         if isinstance(item, LineMarking | Hatching | Arrow):
             if isinstance(item, LineMarking):
@@ -366,19 +366,19 @@ def _write_marking(scene: Scene, name: str, item: LineMarking | Hatching | Arrow
     mesh = _triangles(faces)
     shape = ifc.shape([ifc.mesh(*mesh, False)], "Tessellation") if mesh else None
     about = "hatching" if isinstance(item, Hatching) else item.kind
-    feature = ifc.product("IfcSurfaceFeature", name, _MARKINGS[type(item)], about, Representation=shape)
-    ifc.gather("IfcRelAdheresToElement", bearer, [feature])
-    ifc.made_of(feature, f"paint_{item.color}")
-    scene.describe(feature, item)
+    feature = ifc.add_product("IfcSurfaceFeature", name, _MARKINGS[type(item)], about, Representation=shape)
+    ifc.note_relation("IfcRelAdheresToElement", bearer, [feature])
+    ifc.assign_material(feature, f"paint_{item.color}")
+    scene.add_parameters(feature, item)
     common = {
         "MaterialColour": ifc.add("IfcLabel", item.color),
         "MaterialThickness": ifc.add("IfcPositiveLengthMeasure", item.film_thickness),
     }
-    ifc.properties(feature, "Pset_RoadMarkingCommon", common)
+    ifc.add_properties(feature, "Pset_RoadMarkingCommon", common)
 
 
 def _triangles(faces: Faces) -> tuple[Float, NDArray[np.intp]] | None:
-    """Return convex polygons as points and triangles."""
+    """Return convex polygons as points and fans of triangles (M, 3); None if there are no polygons."""
     if not len(faces):
         return None
     starts = np.cumsum(faces.sizes) - faces.sizes

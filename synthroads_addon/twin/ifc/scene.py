@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from ...road.geometry import RoadGeometry
 from ...road.objects import RoadObject
-from ..surfaces import on_ground
+from ..surfaces import surface_points
 from .alignment import Axis, linear_placement, local_placement
 from .entities import Entity, Float, IfcFile
 
 
 @dataclass(frozen=True)
 class IfcPlace:
-    """An upright frame on the road: x along it, y to the left, z up.
+    """An upright placement on the road: x along it, y to the left, z up.
 
     Attributes:
         placement: the IfcLinearPlacement or IfcLocalPlacement.
@@ -29,11 +29,11 @@ class IfcPlace:
     heading: float
 
     def frame(self, ifc: IfcFile) -> Entity:
-        """Add a placement in this frame, at its origin."""
+        """Add and return an IfcLocalPlacement relative to this placement, at its origin."""
         return ifc.add("IfcLocalPlacement", self.placement, ifc.flat_axes)
 
-    def inside(self, points: Float) -> Float:
-        """Return local points (..., 3) in this frame."""
+    def to_frame(self, points: Float) -> Float:
+        """Transform local points (..., 3) into this frame."""
         cosine, sine = math.cos(self.heading), math.sin(self.heading)
         rotation = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
         return (points - self.origin) @ rotation
@@ -41,7 +41,7 @@ class IfcPlace:
 
 @dataclass(frozen=True)
 class Scene:
-    """A road that is being written.
+    """Context of an IFC export: the file, the road's geometry, its alignment and its spatial parts.
 
     Attributes:
         geometry: the analytic road.
@@ -64,8 +64,8 @@ class Scene:
     parts: dict[str, Entity] = field(default_factory=dict)
     _known: dict[tuple[float, float], tuple[float, int]] = field(default_factory=dict)
 
-    def look_up(self, places: Iterable[tuple[float, float]]) -> None:
-        """Find surface and strip at stations and offsets (m) at once: one by one it takes a hundred times longer."""
+    def cache_surface(self, places: Iterable[tuple[float, float]]) -> None:
+        """Compute and cache surface elevation and strip index at stations and offsets (m), all at once for speed."""
         unknown = [place for place in dict.fromkeys(places) if place not in self._known]
         if not unknown:
             return
@@ -74,29 +74,29 @@ class Scene:
         heights, strips = self.surface(station, offset), self.geometry.strip_index(station, offset)
         self._known.update(zip(unknown, zip(heights.tolist(), strips.tolist(), strict=True), strict=True))
 
-    def at(self, station: float, offset: float) -> tuple[float, int]:
-        """Return the surface's local elevation (m) and the strip's index, -1 beside the road."""
-        self.look_up([(station, offset)])
+    def surface_and_strip(self, station: float, offset: float) -> tuple[float, int]:
+        """Return the surface's local elevation (m) and the strip's index, -1 beside the road; cached."""
+        self.cache_surface([(station, offset)])
         return self._known[station, offset]
 
     def surface(self, station: Float, offset: Float) -> Float:
-        """Return the local elevations (N,) of the road or the ground."""
-        return on_ground(self.geometry, station, offset)[:, 2]
+        """Return the local elevations (N,) of road or ground at stations and offsets (N,), m."""
+        return surface_points(self.geometry, station, offset)[:, 2]
 
     def points(self, station: Float, offset: Float, above: float | Float = 0.0) -> Float:
-        """Return local points (N, 3) on the surface, or above it."""
-        points = on_ground(self.geometry, station, offset)
+        """Return local points (N, 3) at stations and offsets, `above` (m) the surface of road or ground."""
+        points = surface_points(self.geometry, station, offset)
         points[:, 2] += above
         return points
 
     def rows(self, start: float, end: float) -> Float:
-        """Return the stations (N,) of rows from a start to an end (m), both included."""
+        """Return a range's ends (m) and the scene's sampling stations between them, sorted (N,)."""
         inside = self.stations[(self.stations > start) & (self.stations < end)]
         return np.unique(np.concatenate([[start], inside, [end]]))
 
     def place(self, station: float, offset: float, above: float = 0.0) -> IfcPlace:
-        """Return a frame on the surface, or above it; beyond the road's ends it lies on its end."""
-        height = self.at(station, offset)[0] + above
+        """Return an upright placement `above` (m) the surface; stations beyond the road are clipped to its ends."""
+        height = self.surface_and_strip(station, offset)[0] + above
         station = min(max(station, 0.0), self.geometry.length)
         at = np.array([station])
         position, heading, _ = self.geometry.alignment.frame(at)
@@ -109,8 +109,8 @@ class Scene:
         return IfcPlace(placement, origin, float(heading[0]))
 
     def container(self, station: float, offset: float) -> Entity:
-        """Return the part of the road that something stands in: a carriageway, the median, or beside the road."""
-        _, index = self.at(station, offset)
+        """Return the IfcRoadPart at a station and offset (m): a carriageway, the median or a roadside."""
+        _, index = self.surface_and_strip(station, offset)
         strip = self.geometry.strips[index] if index >= 0 else None
         if strip is not None and strip.kind == "median":
             return self.parts["median"]
@@ -118,22 +118,22 @@ class Scene:
             return self.parts[f"carriageway-{strip.side}"]
         return self.parts["roadside-left" if offset > 0.0 else "roadside-right"]
 
-    def describe(self, entity: Entity, item: RoadObject) -> None:
-        """Give an entity what the parameter set says of its object, under the same names, and its class."""
+    def add_parameters(self, entity: Entity, item: RoadObject) -> None:
+        """Give an entity the property set `SynthRoads` with all parameters of its object and its semantic class."""
         label = item.semantic_class
         values = self.ifc.parameters_of(item) | ({"class": self.ifc.value(label)} if label else {})
         numbers = self.geometry.numbers.part_attributes(item.instance)
         values |= {key: self.ifc.value(number) for key, number in numbers.items()}
-        self.ifc.properties(entity, "SynthRoads", values)
+        self.ifc.add_properties(entity, "SynthRoads", values)
 
-    def stand(self, entity: Entity, container: Entity) -> None:
-        """Put an element that is placed along the alignment into its container."""
-        self.ifc.gather("IfcRelContainedInSpatialStructure", container, [entity])
-        self.ifc.gather("IfcRelPositions", self.axis.alignment, [entity])
+    def contain(self, entity: Entity, container: Entity) -> None:
+        """Note that an element is contained in a spatial part and positioned by the alignment."""
+        self.ifc.note_relation("IfcRelContainedInSpatialStructure", container, [entity])
+        self.ifc.note_relation("IfcRelPositions", self.axis.alignment, [entity])
 
 
 def grid_triangles(rows: int, columns: int, closed: bool = False, flip: bool = False) -> NDArray[np.intp]:
-    """Return the triangles (T, 3) of a grid of points, row by row along the road, each row from right to left.
+    """Return triangles (T, 3), anticlockwise from above, of a grid of points whose rows run from right to left.
 
     Seen from above they run counter-clockwise. ``closed`` joins the last column to the first; ``flip`` turns them over.
     """

@@ -5,14 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...base.arrays import Float
-from ..faces import loft, strip_triangles
-from .entities import Entity, IfcFile, short
+from ..faces import loft, triangulate
+from .entities import Entity, IfcFile, rounded
 
 _FLAT = 1e-9  # m
 
 
-def give_bodies(ifc: IfcFile, product: Entity, bodies: Sequence[tuple[Float, str]]) -> None:
-    """Give a product its bodies, and the material of the first of them; the others have their materials' colours.
+def assign_bodies(ifc: IfcFile, product: Entity, bodies: Sequence[tuple[Float, str]]) -> None:
+    """Set a product's representation and material from bodies, as extrusions if all are prisms, else as meshes.
 
     Products of the same bodies share them.
 
@@ -22,43 +22,43 @@ def give_bodies(ifc: IfcFile, product: Entity, bodies: Sequence[tuple[Float, str
         bodies: sections (R, K, 3) as in `road.things.body`, and names of materials.
     """
     key = tuple((sections.round(9).tobytes(), sections.shape, material) for sections, material in bodies)
-    ifc.made_of(product, bodies[0][1])
+    ifc.assign_material(product, bodies[0][1])
     if ifc.has_shape(key):
         product.Representation = ifc.shape((), "", key)
         return
-    swept = [_extrusion(sections) for sections, _ in bodies]
+    swept = [_as_extrusion(sections) for sections, _ in bodies]
     if all(extrusion is not None for extrusion in swept):
-        kind, items = "SweptSolid", [_extrude(ifc, *extrusion) for extrusion in swept if extrusion]
+        kind, items = "SweptSolid", [_add_extrusion(ifc, *extrusion) for extrusion in swept if extrusion]
     else:
         kind, items = "Tessellation", [_mesh(ifc, sections) for sections, _ in bodies]
     for item, (_, material) in zip(items, bodies, strict=True):
         if item is not None and material != bodies[0][1]:
-            ifc.paint(item, material)
+            ifc.assign_style(item, material)
     product.Representation = ifc.shape(items, kind, key)
 
 
 def _mesh(ifc: IfcFile, sections: Float) -> Entity | None:
     faces = loft(sections)
-    return ifc.mesh(faces.points, strip_triangles(faces), True)
+    return ifc.mesh(faces.points, triangulate(faces), True)
 
 
-def _extrude(ifc: IfcFile, outline: Float, way: Float) -> Entity | None:
-    """Add an outline (K, 3), pushed along a vector at right angles to it; None if it has no extent."""
+def _add_extrusion(ifc: IfcFile, outline: Float, way: Float) -> Entity | None:
+    """Add and return an outline (K, 3) extruded by a vector normal to it; None if it has no extent."""
     depth, side = float(np.linalg.norm(way)), outline[1] - outline[0]
     axis, u = way / depth, side / max(float(np.linalg.norm(side)), _FLAT)
     middle = outline.mean(axis=0)
     flat = (outline - middle) @ np.stack([u, np.cross(axis, u)], axis=1)
-    if min(short([depth, *np.ptp(flat, axis=0)])) <= 0.0:
+    if min(rounded([depth, *np.ptp(flat, axis=0)])) <= 0.0:
         return None
-    corners = ifc.add("IfcCartesianPointList2D", short([*flat, flat[0]]))
+    corners = ifc.add("IfcCartesianPointList2D", rounded([*flat, flat[0]]))
     curve = ifc.add("IfcIndexedPolyCurve", corners, None, False)
     profile = ifc.add("IfcArbitraryClosedProfileDef", "AREA", None, curve)
     position = ifc.add("IfcAxis2Placement3D", ifc.point(*middle), ifc.direction(*axis), ifc.direction(*u))
-    return ifc.add("IfcExtrudedAreaSolid", profile, position, ifc.direction(0.0, 0.0, 1.0), short(depth))
+    return ifc.add("IfcExtrudedAreaSolid", profile, position, ifc.direction(0.0, 0.0, 1.0), rounded(depth))
 
 
-def _extrusion(sections: Float) -> tuple[Float, Float] | None:
-    """Return the outline and the way of sections that are one flat outline pushed at right angles; else None."""
+def _as_extrusion(sections: Float) -> tuple[Float, Float] | None:
+    """Return outline (K, 3) and extrusion vector (3,) of two sections that form a right prism; else None."""
     if len(sections) > 2:
         return None
     ways = sections[1] - sections[0]

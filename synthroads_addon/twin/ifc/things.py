@@ -17,46 +17,46 @@ from ...road.things.thing import LengthwiseThing, StandingThing, Thing, TwinType
 from ..things import PlacedThing, placed_things
 from .entities import Entity, Values
 from .scene import IfcPlace, Scene
-from .solids import give_bodies
+from .solids import assign_bodies
 
 _SUBSTRUCTURE = ("IfcColumn", "IfcWall")
 """Elements that carry a bridge."""
 
 
 def write_things(scene: Scene) -> None:
-    """Add everything that stands on and beside the road."""
+    """Add every thing on and beside the road to the IFC file, and record what is left out."""
     for placed in placed_things(scene.geometry, scene.tolerance):
         _Writer(scene, placed).write()
-        scene.ifc.trace.leave_out(placed)
+        scene.ifc.trace.record_omissions(placed)
 
 
 class _Writer:
-    """Writes one thing."""
+    """Writer of one thing as an element, an assembly or a bridge."""
 
     def __init__(self, scene: Scene, placed: PlacedThing) -> None:
         self.scene, self.ifc = scene, scene.ifc
         self.name, self.thing = placed.name, placed.thing
         self.bodies = [body for body in placed.bodies if not body.detail]
         self.types = self.thing.twin()
-        self.station, self.offset, above = _foot(scene, self.thing)
+        self.station, self.offset, above = _foot_place(scene, self.thing)
         self.place: IfcPlace = scene.place(self.station, self.offset, above)
 
     def write(self) -> None:
-        """Add the thing and its parts."""
+        """Add the thing with its properties, bodies and parts, and put it into its spatial container."""
         entity, kind, *site = self.types.ifc.split(".")
         self._check(entity, kind)
         bridge = entity == "IfcBridge"
         named = {"AssemblyPlace": site[0]} if site else {"CompositionType": "ELEMENT"} if bridge else {}
         about = self.types.kind or type(self.thing).__name__
-        made = self.ifc.product(entity, self.name, kind, about, self.place.placement, **named)
-        self.scene.describe(made, self.thing)
+        made = self.ifc.add_product(entity, self.name, kind, about, self.place.placement, **named)
+        self.scene.add_parameters(made, self.thing)
         if bridge:
-            self.ifc.gather("IfcRelAggregates", self.scene.site, [made])
-            self.ifc.gather("IfcRelPositions", self.scene.axis.alignment, [made])
+            self.ifc.note_relation("IfcRelAggregates", self.scene.site, [made])
+            self.ifc.note_relation("IfcRelPositions", self.scene.axis.alignment, [made])
         else:
             offset = self.thing.foot_offset if isinstance(self.thing, StandingThing) else self.offset
-            self.scene.stand(made, self.scene.container(self.station, offset))
-        self.ifc.properties(made, *self._common(entity))
+            self.scene.contain(made, self.scene.container(self.station, offset))
+        self.ifc.add_properties(made, *self._common(entity))
         self._give_bodies(made, [body for body in self.bodies if not body.ifc])
         parts: dict[str, list[Body]] = {}
         for body in self.bodies:
@@ -65,15 +65,15 @@ class _Writer:
         self._parts(made, parts, bridge)
 
     def _check(self, entity: str, kind: str) -> None:
-        """Refuse types of an asset that IFC doesn't have, and note those that say nothing."""
+        """Raise an InputError if IFC 4.3 has no such type; record in the trace if it is only a proxy."""
         if entity == TwinTypes().ifc.partition(".")[0]:
-            self.ifc.trace.reduce(self.name, "a proxy: neither its library nor its class says what it is")
-        if not self.ifc.knows(entity, kind):
+            self.ifc.trace.record_loss(self.name, "a proxy: neither its library nor its class says what it is")
+        if not self.ifc.has_type(entity, kind):
             allowed = "must be an element of IFC 4.3 and one of its predefined types, with a dot between them"
             raise InputError(f"objects.{self.name}.twin_types.ifc", self.types.ifc, allowed)
 
     def _parts(self, whole: Entity, parts: dict[str, list[Body]], bridge: bool) -> None:
-        """Add the elements that a thing is made of; a bridge's belong to its superstructure or its substructure."""
+        """Add a thing's part elements; a bridge's go into its superstructure or substructure."""
         spatial: dict[str, Entity] = {}
         models = self.thing.part_models()
         for name, bodies in parts.items():
@@ -83,26 +83,26 @@ class _Writer:
                 if half not in spatial:
                     usage = {"CompositionType": "PARTIAL", "UsageType": "VERTICAL"}
                     spatial[half] = self._add_part(whole, "IfcBridgePart", half, half.upper(), **usage)
-                made = self.ifc.product(entity, f"{self.name}/{name}", kind, placement=self.place.frame(self.ifc))
-                self.ifc.gather("IfcRelContainedInSpatialStructure", spatial[half], [made])
+                made = self.ifc.add_product(entity, f"{self.name}/{name}", kind, placement=self.place.frame(self.ifc))
+                self.ifc.note_relation("IfcRelContainedInSpatialStructure", spatial[half], [made])
             else:
                 made = self._add_part(whole, entity, name, kind)
             if kind == "USERDEFINED":
                 made.ObjectType = name.rstrip("-0123456789").upper()
             self._give_bodies(made, bodies)
-            self.ifc.label(made, self.thing.instance, self.thing.semantic_class)
+            self.ifc.add_labels(made, self.thing.instance, self.thing.semantic_class)
             if name in models:
-                self.ifc.properties(made, "SynthRoads sign", self.ifc.parameters_of(models[name]))
+                self.ifc.add_properties(made, "SynthRoads sign", self.ifc.parameters_of(models[name]))
 
     def _add_part(self, whole: Entity, entity: str, name: str, kind: str, **named: Any) -> Entity:
-        """Add an element that is part of another one, in its frame."""
+        """Add and return an element that the whole aggregates, placed at the thing's frame."""
         frame = self.place.frame(self.ifc)
-        part = self.ifc.product(entity, f"{self.name}/{name}", kind, placement=frame, **named)
-        self.ifc.gather("IfcRelAggregates", whole, [part])
+        part = self.ifc.add_product(entity, f"{self.name}/{name}", kind, placement=frame, **named)
+        self.ifc.note_relation("IfcRelAggregates", whole, [part])
         return part
 
     def _common(self, entity: str) -> tuple[str, Values]:
-        """Return the standard's property set for an entity, and what it says of the thing."""
+        """Return the name and values of the standard property set for an entity class; empty if it has none."""
         ifc, external = self.ifc, self.ifc.value(True)
         status = ["TEMPORARY" if self.types.temporary else "EXISTING"]
         if entity == "IfcRailing":
@@ -119,17 +119,17 @@ class _Writer:
 
     def _give_bodies(self, product: Entity, bodies: list[Body]) -> None:
         if bodies:
-            give_bodies(self.ifc, product, [(self._inside(body.sections), body.material) for body in bodies])
+            assign_bodies(self.ifc, product, [(self._to_placement(body.sections), body.material) for body in bodies])
 
-    def _inside(self, sections: Float) -> Float:
-        """Return sections in the frame of the thing's placement: x along the road, y to the left."""
+    def _to_placement(self, sections: Float) -> Float:
+        """Transform sections into the thing's placement: x along the road, y to the left."""
         if isinstance(self.thing, StandingThing):
             return rotate_z(sections, self.thing.turn - math.pi / 2.0)
-        return self.place.inside(sections)
+        return self.place.to_frame(sections)
 
 
-def _foot(scene: Scene, thing: Thing) -> tuple[float, float, float]:
-    """Return station, offset and height above the surface (m) of the place that a thing is put to."""
+def _foot_place(scene: Scene, thing: Thing) -> tuple[float, float, float]:
+    """Return station, offset and height above the surface (m) of the point at which a thing is placed."""
     if isinstance(thing, StandingThing):
         return thing.station, thing.offset, thing.elevation
     assert isinstance(thing, LengthwiseThing)

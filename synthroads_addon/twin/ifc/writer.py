@@ -35,7 +35,7 @@ _SHORTEST_ELEMENT = 1e-6
 def write_ifc(
     parameters: RoadParameters, path: Path, tolerance: float = 0.005, placement: Literal["linear", "local"] = "linear"
 ) -> Trace:
-    """Write a road as IFC 4.3; return what became of its objects. The same road gives the same bytes.
+    """Write a road as IFC 4.3, the same bytes for the same road; return the trace of what became of each object.
 
     Args:
         parameters: the road.
@@ -69,12 +69,12 @@ def write_ifc(
         road=write_road(ifc, parameters, site),
         along_axis=placement == "linear",
     )
-    scene.look_up((item.station, item.offset) for item in parameters.of_type(PointObject).values())
+    scene.cache_surface((item.station, item.offset) for item in parameters.of_type(PointObject).values())
     write_carriageways(scene)
     write_markings(scene)
     write_things(scene)
     write_surroundings(scene)
-    ifc.relate()
+    ifc.write_relations()
     ifc.write(path, parameters.metadata.identifier, parameters.metadata.generator)
     return ifc.trace
 
@@ -83,7 +83,7 @@ _PRECISION = 1e-6  # m, within which viewers take points as one
 
 
 def write_project(ifc: IfcFile, parameters: RoadParameters) -> Entity:
-    """Add project, units, contexts and georeferencing; return the IfcSite."""
+    """Add IfcProject, units, contexts and georeferencing to the file; return the IfcSite."""
     model = _contexts(ifc)
     units = [
         ifc.add("IfcSIUnit", None, kind, None, name)
@@ -95,7 +95,7 @@ def write_project(ifc: IfcFile, parameters: RoadParameters) -> Entity:
         )
     ]
     metadata = parameters.metadata
-    ifc.project = ifc.rooted(
+    ifc.project = ifc.add_root(
         "IfcProject",
         "project",
         Name=metadata.identifier,
@@ -104,8 +104,8 @@ def write_project(ifc: IfcFile, parameters: RoadParameters) -> Entity:
         UnitsInContext=ifc.add("IfcUnitAssignment", units),
     )
     _georeference(ifc, parameters, model, units[0])
-    site = ifc.rooted("IfcSite", "site", Name="site", ObjectPlacement=ifc.local_frame, CompositionType="ELEMENT")
-    ifc.gather("IfcRelAggregates", ifc.project, [site])
+    site = ifc.add_root("IfcSite", "site", Name="site", ObjectPlacement=ifc.local_frame, CompositionType="ELEMENT")
+    ifc.note_relation("IfcRelAggregates", ifc.project, [site])
     about = {
         "identifier": ifc.value(metadata.identifier),
         "seed": ifc.value(metadata.seed),
@@ -115,12 +115,12 @@ def write_project(ifc: IfcFile, parameters: RoadParameters) -> Entity:
         "referenceSystem": ifc.value(metadata.referenceSystem),
         "translate": ifc.value(parameters.transform.translate),
     }
-    ifc.properties(ifc.project, "SynthRoads", about)
+    ifc.add_properties(ifc.project, "SynthRoads", about)
     return site
 
 
 def _contexts(ifc: IfcFile) -> Entity:
-    """Add the contexts that shapes belong to; north is +y."""
+    """Add the geometric representation contexts (true north +y); return the model context."""
     model = ifc.add(
         "IfcGeometricRepresentationContext", None, "Model", 3, _PRECISION, ifc.flat_axes, ifc.direction(0.0, 1.0)
     )
@@ -136,7 +136,7 @@ def _contexts(ifc: IfcFile) -> Entity:
 
 
 def _georeference(ifc: IfcFile, parameters: RoadParameters, model: Entity, metre: Entity) -> None:
-    """Say where on the map the local frame lies: x east, y north, z up, not turned and not scaled.
+    """Add the projected coordinate system and the IfcMapConversion from local to map coordinates.
 
     So the file's coordinates stay small, and the map's origin is kept in float64.
     """
@@ -157,6 +157,6 @@ def _georeference(ifc: IfcFile, parameters: RoadParameters, model: Entity, metre
 
 
 def _quoted_name(text: str, key: str) -> str | None:
-    """Return the name that stands behind a keyword of well-known text."""
+    """Return the quoted name after a keyword in WKT, or None if the keyword is missing."""
     match = re.search(rf'\b{key}\["([^"]*)"', text)
     return match[1] if match else None

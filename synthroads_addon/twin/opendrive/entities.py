@@ -18,31 +18,31 @@ LOST = {
 
 
 def trace_elements(root: Element, trace: Trace) -> None:
-    """Tell a trace of all elements that bear an instance number.
+    """Record in the trace every element below a `road` that has an instance number as user data.
 
-    An element is told by its tag and its id; lanes and road marks by road, start of the section (m), lane, and number
+    An element is identified by tag and id; lanes and road marks by road, start of the section (m), lane, and number
     of the mark among the lane's. What is only named at the file's end is no element.
     """
     for road in root.findall("road"):
-        _look(road, {}, trace)
+        _trace_element(road, {}, trace)
 
 
-def _look(element: Element, above: Entity, trace: Trace) -> None:
-    here = _found_with(element, above)
+def _trace_element(element: Element, above: Entity, trace: Trace) -> None:
+    here = _entity_keys(element, above)
     for data in element.findall("userData"):
         if data.get("code") == "instance":
-            trace.found(int(data.get("value", "0")), **here)
+            trace.record_entity(int(data.get("value", "0")), **here)
     marks = 0
     for child in element:
         if child.tag == "roadMark":
-            _look(child, {**here, "mark": marks}, trace)
+            _trace_element(child, {**here, "mark": marks}, trace)
             marks += 1
         elif child.tag != "userData":
-            _look(child, here, trace)
+            _trace_element(child, here, trace)
 
 
-def _found_with(element: Element, above: Entity) -> Entity:
-    """Return what an element is found with, from what that above it is found with."""
+def _entity_keys(element: Element, above: Entity) -> Entity:
+    """Return the keys that identify an element in the report: its ancestors', its tag, and its id or section."""
     entity = {**above, "element": element.tag}
     if element.tag == "laneSection":
         entity["section"] = float(element.get("s", "0"))

@@ -5,10 +5,10 @@ import numpy as np
 from ...road.objects import Side
 from ...road.section import Lane
 from .marks import RoadMarks
-from .pieces import Float, chords, cubics, distinct, runs
+from .pieces import Float, chord_stations, fit_cubics, join_cubics, merge_similar
 from .sections import LanePlan, LaneSection, LaneStrip
 from .speeds import SpeedLimits
-from .xml import Element, cubic, element, note
+from .xml import Element, add_cubic, add_user_data, element
 
 HEIGHT_TOLERANCE = 1e-4
 """Largest distance (m) of a verge's edge from what is interpolated between two lane heights."""
@@ -20,28 +20,28 @@ _CLOSED = "stop"
 """Type of the lanes that only emergency vehicles may drive on."""
 
 
-def lanes(road: Element, plan: LanePlan, limits: SpeedLimits, marks: RoadMarks) -> None:
-    """Add the lanes of a road, section by section."""
+def write_lanes(road: Element, plan: LanePlan, limits: SpeedLimits, marks: RoadMarks) -> None:
+    """Add the `lanes` element to a road: the lane offset, then every lane section with its lanes and road marks."""
     parent = element(road, "lanes")
-    _lane_offset(parent, plan)
+    _add_lane_offset(parent, plan)
     for number, section in enumerate(plan.sections):
         item = element(parent, "laneSection", {"s": section.start})
-        _side(item, plan, limits, marks, (number, "left"))
+        _add_side(item, plan, limits, marks, (number, "left"))
         centre = element(element(item, "center"), "lane", {"id": 0, "type": "none", "level": False})
         marks.write(centre, number, 0)
-        _side(item, plan, limits, marks, (number, "right"))
+        _add_side(item, plan, limits, marks, (number, "right"))
 
 
-def _lane_offset(parent: Element, plan: LanePlan) -> None:
-    """Shift the centre lane to the carriageway's inner edge."""
-    offsets = cubics(lambda station: plan.offsets(station)[:, :1], plan.frame.borders)
-    rows = runs(offsets.borders, offsets.coefficients[:, 0])
-    for start, coefficients in distinct(rows, float(offsets.borders[-1])):
-        cubic(parent, "laneOffset", {"s": start}, coefficients)
+def _add_lane_offset(parent: Element, plan: LanePlan) -> None:
+    """Add `laneOffset` elements that shift the centre lane to the carriageway's inner edge."""
+    offsets = fit_cubics(lambda station: plan.offsets(station)[:, :1], plan.frame.borders)
+    rows = join_cubics(offsets.borders, offsets.coefficients[:, 0])
+    for start, coefficients in merge_similar(rows, float(offsets.borders[-1])):
+        add_cubic(parent, "laneOffset", {"s": start}, coefficients)
 
 
-def _side(parent: Element, plan: LanePlan, limits: SpeedLimits, marks: RoadMarks, where: tuple[int, Side]) -> None:
-    """Add one side's lanes, from left to right."""
+def _add_side(parent: Element, plan: LanePlan, limits: SpeedLimits, marks: RoadMarks, where: tuple[int, Side]) -> None:
+    """Add the lanes of one side of a lane section, ordered from left to right."""
     number, side = where
     section = plan.sections[number]
     if not section.lanes[side]:
@@ -63,7 +63,7 @@ def _side(parent: Element, plan: LanePlan, limits: SpeedLimits, marks: RoadMarks
 def _links(lane: Element, plan: LanePlan, number: int, side: Side, strip: LaneStrip) -> None:
     sign = 1 if side == "left" else -1
     links = {
-        tag: plan.linked(number, other, side, strip.column)
+        tag: plan.continuing_lane(number, other, side, strip.column)
         for tag, other in (("predecessor", number - 1), ("successor", number + 1))
     }
     if any(links.values()):
@@ -77,29 +77,29 @@ def _widths(lane: Element, plan: LanePlan, section: LaneSection, strip: LaneStri
     first, last = section.pieces
     borders = plan.widths.borders[first : last + 1]
     pieces = plan.widths.coefficients[first:last, strip.column]
-    rows = [(start - section.start, coefficients) for start, coefficients in runs(borders, pieces)]
-    for start, coefficients in distinct(rows, section.end - section.start):
-        cubic(lane, "width", {"sOffset": start}, coefficients)
+    rows = [(start - section.start, coefficients) for start, coefficients in join_cubics(borders, pieces)]
+    for start, coefficients in merge_similar(rows, section.end - section.start):
+        add_cubic(lane, "width", {"sOffset": start}, coefficients)
 
 
 def _traffic(lane: Element, limits: SpeedLimits, section: LaneSection, strip: LaneStrip) -> None:
-    """Say how fast a lane may be driven on, and who may: a hard shoulder is no lane to drive on."""
+    """Add speed limits to a lane that is driven on, and access for emergency vehicles only to a hard shoulder."""
     if strip.type in _WITH_LIMIT:
-        for start, speed in limits.between(section.start, section.end):
+        for start, speed in limits.limits_between(section.start, section.end):
             element(lane, "speed", {"sOffset": start - section.start, "max": speed, "unit": "km/h"})
     elif strip.type == _CLOSED:
         element(lane, "access", {"sOffset": 0.0, "rule": "allow", "restriction": "emergency"})
 
 
 def _heights(lane: Element, plan: LanePlan, section: LaneSection, strip: LaneStrip) -> None:
-    """Add the heights of a verge or the median: it leaves the pavement's plane, from its inner edge on."""
+    """Add the `height` elements of a verge's or the median's lane, whose outer edge leaves the carriageway's plane."""
     fall = plan.verge_fall if strip.kind == "verge" else plan.median_fall
 
     def drop(station: Float) -> Float:
-        return plan.frame.above(station, fall(station))[:, None]
+        return plan.frame.h_coordinate(station, fall(station))[:, None]
 
     first, last = section.pieces
-    stations = chords(drop, plan.widths.borders[first : last + 1], HEIGHT_TOLERANCE)
+    stations = chord_stations(drop, plan.widths.borders[first : last + 1], HEIGHT_TOLERANCE)
     values = drop(stations)[:, 0]
     if np.ptp(values) <= HEIGHT_TOLERANCE / 10.0:
         stations, values = stations[:1], values[:1]
@@ -109,11 +109,11 @@ def _heights(lane: Element, plan: LanePlan, section: LaneSection, strip: LaneStr
 
 
 def _notes(lane: Element, plan: LanePlan, side: Side, strip: LaneStrip) -> None:
-    note(lane, "instance", strip.instance)
-    note(lane, "strip", strip.kind)
+    add_user_data(lane, "instance", strip.instance)
+    add_user_data(lane, "strip", strip.kind)
     if strip.kind == "lane":
         section = plan.frame.section
         index = len(section.carriageway.lanes) - 1 - (strip.index - section.kinds.index("lane"))
         carriageway_lane: Lane = section.carriageway.lanes[index]
-        note(lane, "lane", index)
-        note(lane, "kind", carriageway_lane.kind)
+        add_user_data(lane, "lane", index)
+        add_user_data(lane, "kind", carriageway_lane.kind)

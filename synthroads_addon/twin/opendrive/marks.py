@@ -7,7 +7,7 @@ from ...road.objects import Side
 from ...road.section import LineMarking
 from .pieces import CLOSE
 from .sections import LanePlan, LaneSection
-from .xml import Element, element, notes
+from .xml import Element, add_object_data, element
 
 _OUTWARDS = {"outer_edge": 0.5, "block": 0.5, "turnout_edge": 0.5, "inner_edge": -0.5, "gore_edge": -0.5}
 """Kind of a line -> where its axis lies from its border, outwards, in widths."""
@@ -15,7 +15,7 @@ _OUTWARDS = {"outer_edge": 0.5, "block": 0.5, "turnout_edge": 0.5, "inner_edge":
 
 @dataclass(frozen=True)
 class _Stretch:
-    """A line along one lane's border in one section.
+    """The stretch of a line marking along one lane's outer border within one lane section.
 
     Attributes:
         name, line: its id and itself.
@@ -30,8 +30,8 @@ class _Stretch:
     side: Side
 
     @property
-    def rest(self) -> tuple[float, float]:
-        """Return the length of the dash that the start lies in (0: none), and the distance of the next dash, m."""
+    def cut_dash(self) -> tuple[float, float]:
+        """Return the length of the dash that is cut at the start (0: none) and the distance to the next dash, m."""
         line = self.line
         period = line.dash_length + line.gap_length
         if period == 0.0:
@@ -43,7 +43,7 @@ class _Stretch:
 
 
 class RoadMarks:
-    """The road marks of a road.
+    """Line markings of one carriageway, assigned to the lanes whose outer borders they follow.
 
     Attributes:
         loose: (id, line, start, end) of lines, or parts of them, that follow no lane's border or one that has a line.
@@ -64,19 +64,19 @@ class RoadMarks:
         if end - start <= CLOSE:
             return
         side = self._plan.side
-        index = _border(self._plan.geometry, side, line)
+        index = _border_strip(self._plan.geometry, side, line)
         for number, section in enumerate(self._plan.sections):
             low, high = max(start, section.start), min(end, section.end)
             if high - low <= CLOSE:
                 continue
-            if index is None or not self._on_border(_Stretch(name, line, low, high, side), number, index):
+            if index is None or not self._assign(_Stretch(name, line, low, high, side), number, index):
                 self._let_loose(name, line, low, high)
 
-    def _on_border(self, stretch: _Stretch, number: int, index: int) -> bool:
-        """Put a stretch on the border outside of a strip; return whether it is free."""
+    def _assign(self, stretch: _Stretch, number: int, index: int) -> bool:
+        """Assign a stretch to the outer border of a strip; return False if another line is there already."""
         section: LaneSection = self._plan.sections[number]
         sign = 1 if stretch.side == "left" else -1
-        stretches = self._of.setdefault((number, sign * section.number(stretch.side, index)), [])
+        stretches = self._of.setdefault((number, sign * section.lane_number(stretch.side, index)), [])
         if any(stretch.start < other.end - CLOSE and other.start < stretch.end - CLOSE for other in stretches):
             return False
         stretches.append(stretch)
@@ -88,7 +88,7 @@ class RoadMarks:
         self.loose.append((name, line, start, end))
 
     def write(self, lane: Element, number: int, lane_id: int) -> None:
-        """Add the road marks of a lane of a section."""
+        """Add the `roadMark` elements of one lane in a lane section, with type `none` in gaps between lines."""
         section = self._plan.sections[number]
         reached = section.start
         for stretch in self._of.get((number, lane_id), []):
@@ -100,8 +100,8 @@ class RoadMarks:
             _nothing(lane, reached - section.start)
 
 
-def _border(geometry: RoadGeometry, side: Side, line: LineMarking) -> int | None:
-    """Return the strip of a side whose outer border a line lies beside; -1 is its inner edge, None no border."""
+def _border_strip(geometry: RoadGeometry, side: Side, line: LineMarking) -> int | None:
+    """Return the index of the strip whose outer border a line follows: -1 for the inner edge, None for no border."""
     section = geometry.sections[side]
     if line.kind == "free":
         return None
@@ -117,12 +117,12 @@ def _nothing(lane: Element, offset: float) -> None:
 
 
 def _write_stretch(lane: Element, stretch: _Stretch, section_start: float) -> None:
-    """Add a stretch: a dash that the border of two sections cuts is a solid line, what follows it is broken again."""
+    """Add a stretch's road marks; a dash that the section's start cuts is solid, the rest is broken."""
     line, start = stretch.line, stretch.start - section_start
     if line.dash_length == 0.0:
         _mark(lane, stretch, start, (stretch.end - stretch.start, 0.0, 0.0))
         return
-    rest, following = stretch.rest
+    rest, following = stretch.cut_dash
     if rest > CLOSE:
         _mark(lane, stretch, start, (min(rest, stretch.end - stretch.start), 0.0, 0.0))
     if stretch.start + rest < stretch.end - CLOSE:
@@ -131,7 +131,7 @@ def _write_stretch(lane: Element, stretch: _Stretch, section_start: float) -> No
 
 
 def _mark(lane: Element, stretch: _Stretch, offset: float, pattern: tuple[float, float, float]) -> None:
-    """Add a road mark that begins at an offset (m) in its section, of dashes, gaps and a first gap (m)."""
+    """Add one `roadMark` at an offset (m) in its lane section; the pattern is dash, gap and first gap (m)."""
     line = stretch.line
     dash, gap, first = pattern
     broken = line.dash_length > 0.0
@@ -144,4 +144,4 @@ def _mark(lane: Element, stretch: _Stretch, offset: float, pattern: tuple[float,
     rule = "none" if broken else "no passing"
     shape = {"length": dash, "space": gap, "tOffset": sign * _OUTWARDS.get(line.kind, 0.0) * line.width}
     element(kind, "line", {**shape, "sOffset": first, "rule": rule, "width": line.width, "color": line.color})
-    notes(mark, stretch.name, line.instance)
+    add_object_data(mark, stretch.name, line.instance)

@@ -8,8 +8,8 @@ HIGHEST = 2**31 - 1
 """Largest id that readers with whole numbers of 32 bits can hold."""
 
 
-class Numbers:
-    """Numbers that nothing of the road has, from the highest downwards: those of passes follow all others.
+class FreeIds:
+    """Issuer of element ids that no object of the road has as instance number, from 2^31 - 1 downwards.
 
     Args:
         parameters: the road.
@@ -19,8 +19,8 @@ class Numbers:
         self._taken = {item.instance for item in parameters.objects.values()}
         self._next = HIGHEST
 
-    def next(self) -> int:
-        """Return the next number."""
+    def take(self) -> int:
+        """Return an unused id, each time a lower one."""
         while self._next in self._taken:
             self._next -= 1
         self._next -= 1

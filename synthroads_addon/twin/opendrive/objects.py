@@ -17,15 +17,15 @@ from ...road.things.thing import LengthwiseThing, StandingThing, Thing
 from ...road.vegetation.species import NEEDLES
 from ..plants import PlacedPlant
 from ..things import PlacedThing
-from .numbers import Numbers
+from .numbers import FreeIds
 from .pieces import CLOSE
 from .places import Ground, side_at, side_of
 from .surface import RoadFrame
-from .xml import Element, Value, element, notes
+from .xml import Element, Value, add_object_data, element
 
 
 class Objects:
-    """Writes the objects of a road.
+    """Writer of the OpenDRIVE `object` and `tunnel` elements of one carriageway.
 
     Attributes:
         parent: the element that they are added to.
@@ -40,7 +40,7 @@ class Objects:
         parent: Element,
         ground: Ground,
         frame: RoadFrame,
-        numbers: Numbers,
+        numbers: FreeIds,
         standing: Mapping[str, PlacedThing],
     ) -> None:
         self.parent = parent
@@ -50,7 +50,7 @@ class Objects:
         self.standing = standing
 
     def write(self, loose: Iterable[tuple[str, LineMarking, float, float]]) -> None:
-        """Add its objects in the order of the parameter set, then the lines that follow no lane."""
+        """Add all things and painted areas of this carriageway, then the line markings that follow no lane."""
         for name, item in self.ground.geometry.parameters.objects.items():
             written = isinstance(item, LengthwiseThing | StandingThing | Hatching | Arrow)
             if not written or side_of(self.ground.geometry, item) != self.frame.side:
@@ -69,10 +69,10 @@ class Objects:
     # --- things -----------------------------------------------------------------------------------------------------
 
     def barrier(self, name: str, item: LengthwiseThing) -> None:
-        """Add what runs along the road: repeats with distance 0, linear from one to the next."""
+        """Add a thing that runs along the road as one object with continuous `repeat` elements, linear in between."""
         right, left = item.reach()
         width, (kind, subtype) = right + left, _types(item)
-        rows = self.ground.along(item, self.frame, (left - right) / 2.0)
+        rows = self.ground.sample_along(item, self.frame, (left - right) / 2.0)
         if not len(rows):
             return
         attributes: dict[str, Value] = {"type": kind, "subtype": subtype, "hdg": 0.0}
@@ -86,7 +86,7 @@ class Objects:
         _describe(made, name, item)
 
     def upright(self, name: str, item: StandingThing) -> None:
-        """Add what stands at one place: each of its bodies but signs' faces is an outline around its place."""
+        """Add a standing thing as an object whose bodies are outlines; sign faces, which are signals, are left out."""
         kind, subtype = _types(item)
         signals = item.signals()
         bodies = [b for b in self.standing[name].bodies if not b.detail and b.part not in signals]
@@ -105,29 +105,29 @@ class Objects:
         _describe(made, name, item)
 
     def underpasses(self) -> None:
-        """Add the stretches below bridges as tunnels open to the sides, of each road; they follow all objects."""
+        """Add a `tunnel` of type underpass, open to the sides, for every stretch of the road below a bridge."""
         first = self.frame.side == next(iter(self.ground.geometry.sections))
         for name, item in self.ground.geometry.parameters.of_type(Thing).items():
             for block in item.footprint() if item.twin().cityjson == "Bridge" else ():
                 if block.part != "beam":
                     continue
                 start, end = max(block.start, 0.0), min(block.end, self.ground.geometry.length)
-                number = item.instance if first else self.numbers.next()
+                number = item.instance if first else self.numbers.take()
                 about: dict[str, Value] = {"id": number, "name": name, "s": start, "length": end - start}
                 made = element(self.parent, "tunnel", {**about, "type": "underpass", "daylight": 1.0, "lighting": 0.0})
-                notes(made, name, item.instance)
+                add_object_data(made, name, item.instance)
 
     # --- plants -----------------------------------------------------------------------------------------------------
 
     def plants(self, plants: Sequence[PlacedPlant]) -> None:
-        """Add the trees and shrubs on its side of the centreline: upright, as wide as their crowns."""
+        """Add the trees and shrubs on this carriageway's side as upright cylinders with the crown's radius."""
         geometry = self.ground.geometry
         mine = [plant for plant in plants if side_at(geometry, plant.offset) == self.frame.side]
         if not mine:
             return
         station, offset = np.array([(plant.station, plant.offset) for plant in mine]).T
         heights = np.array([plant.foot[2] for plant in mine]) - geometry.profile.elevation(station)
-        place = self.frame.place(station, offset, heights)
+        place = self.frame.road_coordinates(station, offset, heights)
         for plant, row in zip(mine, np.column_stack([place.s, place.t, place.h]), strict=True):
             kind: tuple[str, str] = ("vegetation", "bush")
             if plant.about.kind == "tree":
@@ -136,12 +136,12 @@ class Objects:
             attributes |= {"radius": round(plant.breadth * plant.shape.crown_radius, 6)}
             attributes["height"] = round(plant.height, 6)
             made = self._placed(plant.name, plant.about, attributes, row, plant.instance)
-            notes(made, plant.name, plant.instance, species=plant.about.species)
+            add_object_data(made, plant.name, plant.instance, species=plant.about.species)
 
     # --- painted ----------------------------------------------------------------------------------------------------
 
     def painted(self, name: str, item: Hatching | Arrow) -> None:
-        """Add a hatched area or an arrow: its parts as outlines in road coordinates."""
+        """Add a hatched area or an arrow as a `roadMark` object, its parts as outlines in road coordinates."""
         geometry = self.ground.geometry
         parts = hatching_outlines(geometry, item) if isinstance(item, Hatching) else arrow_outlines(item)
         if not parts:
@@ -156,21 +156,21 @@ class Objects:
         heading = math.radians((turn + 180.0) % 360.0 - 180.0)
         attributes: dict[str, Value] = {"type": "roadMark", "subtype": subtype, "hdg": heading}
         made = self._object(name, item, {**attributes, "height": item.film_thickness}, (*at, z))
-        place = self.frame.place(corners[:, 0], corners[:, 1], heights)
+        place = self.frame.road_coordinates(corners[:, 0], corners[:, 1], heights)
         rows = np.column_stack([place.s, place.t, place.h])
         outlines = element(made, "outlines")
         for number, part in enumerate(np.split(rows, np.cumsum([len(part) for part in parts])[:-1])):
             _road_outline(outlines, number, part, item.film_thickness)
         element(made, "material", {"surface": "paint", "roadMarkColor": item.color})
-        notes(made, name, item.instance, object_type=type(item).__name__)
+        add_object_data(made, name, item.instance, object_type=type(item).__name__)
 
     def loose_line(self, name: str, line: LineMarking, span: tuple[float, float], part: int) -> None:
-        """Add a line that follows no lane as a marking along corners in road coordinates."""
+        """Add part of a line marking that follows no lane as a `roadMark` object along corners."""
         geometry = self.ground.geometry
         corners = self._axis(line, *span)
         attributes: dict[str, Value] = {"type": "roadMark", "subtype": f"line_{line.kind}", "hdg": 0.0}
         attributes |= {"length": span[1] - span[0], "width": line.width, "height": line.film_thickness}
-        made = self._placed(name, line, attributes, corners[0], None if part == 1 else self.numbers.next())
+        made = self._placed(name, line, attributes, corners[0], None if part == 1 else self.numbers.take())
         _road_outline(element(made, "outlines"), 0, corners, 0.0, closed=False)
         marking: dict[str, Value] = {"color": line.color, "width": line.width, "zOffset": line.film_thickness}
         dash = line.dash_length or geometry.length
@@ -181,10 +181,10 @@ class Objects:
         item = element(element(made, "markings"), "marking", marking)
         for number in range(len(corners)):
             element(item, "cornerReference", {"id": number})
-        notes(made, name, line.instance, object_type="LineMarking", kind=line.kind)
+        add_object_data(made, name, line.instance, object_type="LineMarking", kind=line.kind)
 
     def _axis(self, line: LineMarking, start: float, end: float) -> Float:
-        """Return (N, 3) s, t and h of points along a line's axis, as close as the tolerance asks."""
+        """Return (N, 3) s, t and h of points along a line marking's axis, m, sampled within the chord tolerance."""
         geometry = self.ground.geometry
         bend = np.abs(geometry.alignment.curvature(np.linspace(start, end, 50))).max()
         step = min(math.sqrt(8.0 * self.ground.tolerance / max(float(bend), 1e-9)), 50.0)
@@ -194,18 +194,18 @@ class Objects:
         stations = np.unique(np.concatenate([np.linspace(start, end, count), inside]))
         left, right = geometry.marking_edges(line, stations)
         middle = (left + right) / 2.0
-        place = self.frame.place(stations, middle, self.ground.height(stations, middle))
+        place = self.frame.road_coordinates(stations, middle, self.ground.height(stations, middle))
         return np.column_stack([place.s, place.t, place.h])
 
     def _object(self, name: str, item: RoadObject, attributes: dict[str, Value], place: tuple[float, ...]) -> Element:
-        """Add an object at a station, offset and height."""
-        found = self.frame.place(*(np.array([value]) for value in place))
+        """Add and return an `object` element at a place given as station, offset and height, m."""
+        found = self.frame.road_coordinates(*(np.array([value]) for value in place))
         return self._placed(name, item, attributes, np.array([found.s[0], found.t[0], found.h[0]]))
 
     def _placed(
         self, name: str, item: RoadObject, attributes: dict[str, Value], place: Float, number: int | None = None
     ) -> Element:
-        """Add an object at s, t and h, with a number of its own or its instance number."""
+        """Add and return an `object` element at s, t and h; its id is `number`, or the instance number if None."""
         s, t, h = place.tolist()
         ids: dict[str, Value] = {"id": item.instance if number is None else number, "name": name}
         about = {**ids, "s": s, "t": t, "zOffset": _fine(h)}
@@ -213,7 +213,7 @@ class Objects:
 
 
 def _types(item: Thing) -> tuple[str, str]:
-    """Return the type and the subtype of a thing."""
+    """Return a thing's OpenDRIVE object type and subtype."""
     kind, _, subtype = item.twin().opendrive.partition(".")
     return kind, subtype
 
@@ -223,14 +223,14 @@ _SAID = ("instance", "type", "name", "station", "elevation", "rotation_deg", "st
 
 
 def _describe(made: Element, name: str, item: Thing) -> None:
-    """Add what the parameter set says of a thing, but where it stands and what has parts."""
+    """Add a thing's scalar parameters as user data, without those that its element's attributes already say."""
     values = {key: value for key, value in item.to_dict().items() if key not in _SAID}
     simple: dict[str, Any] = {key: value for key, value in values.items() if isinstance(value, str | int | float)}
-    notes(made, name, item.instance, object_type=type(item).__name__, **simple)
+    add_object_data(made, name, item.instance, object_type=type(item).__name__, **simple)
 
 
 def _upright_outline(body: Body) -> Float:
-    """Return an outline around a body (K, 4): u ahead, v to the left, its lowest and its highest z there."""
+    """Return a body's outline in plan (K, 4): u ahead, v to the left, lowest and highest z at each corner, m."""
     first, last = body.sections[0], body.sections[-1]
     if len(body.sections) > 2 or np.abs(first[:, :2] - last[:, :2]).max() > CLOSE:
         (x0, y0, z0), (x1, y1, z1) = body.sections.min(axis=(0, 1)), body.sections.max(axis=(0, 1))
@@ -241,12 +241,12 @@ def _upright_outline(body: Body) -> Float:
 
 
 def _fine(value: float) -> float:
-    """Return a height rounded so that the last bits of the terrain's sines don't show."""
+    """Return a height (m) rounded to 6 decimals, so that bits that differ between machines don't show."""
     return round(value, 6)
 
 
 def _road_outline(parent: Element, number: int, corners: Float, height: float, closed: bool = True) -> None:
-    """Add an outline of corners (N, 3: station, offset, height above the reference line)."""
+    """Add an outline with corners (N, 3: s, t, height above the reference line) in road coordinates."""
     attributes: dict[str, Value] = {"id": number, "outer": True, "closed": closed}
     outline = element(parent, "outline", {**attributes, "fillType": "paint" if closed else None})
     for corner, (s, t, z) in enumerate(corners.tolist()):

@@ -23,7 +23,7 @@ _SHARES = np.array([0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0, 0.08, 0.5, 0.92])
 
 @dataclass(frozen=True)
 class Cubics:
-    """Functions of the station in pieces.
+    """Piecewise cubic polynomials of the station, F functions on common pieces.
 
     Attributes:
         borders: (P + 1,) stations at which pieces begin, and the end of the last.
@@ -34,12 +34,12 @@ class Cubics:
     coefficients: Float
 
     def at(self, station: Float) -> Float:
-        """Return the values (N,) of a single function at stations (N,)."""
+        """Return the values (N,) of the first function at stations (N,)."""
         piece = self._piece(station)
         return _value(self.coefficients[piece, 0], station - self.borders[piece])
 
     def slope(self, station: Float) -> Float:
-        """Return the slopes (N,) of a single function at stations (N,); at a border that of the piece behind it."""
+        """Return the derivatives (N,) of the first function at stations (N,), at a border the next piece's."""
         piece = self._piece(station)
         _, b, c, d = self.coefficients[piece, 0].T
         u = station - self.borders[piece]
@@ -49,12 +49,12 @@ class Cubics:
         return np.clip(np.searchsorted(self.borders, station, side="right") - 1, 0, len(self.borders) - 2)
 
     def at_end(self, piece: int) -> Float:
-        """Return the values (F,) at the end of a piece."""
+        """Return the values (F,) of all functions at the end of a piece."""
         return _value(self.coefficients[piece], self.borders[piece + 1] - self.borders[piece])
 
 
 def merged_stations(stations: Iterable[float], start: float, end: float) -> Float:
-    """Return both ends and the stations between them, sorted, none closer than `CLOSE` to another."""
+    """Return `start`, `end` and the stations between, sorted, without those closer than `CLOSE` to another."""
     inside = sorted(s for s in stations if start + CLOSE < s < end - CLOSE)
     merged = [start]
     for station in inside:
@@ -63,8 +63,8 @@ def merged_stations(stations: Iterable[float], start: float, end: float) -> Floa
     return np.array([*merged, end])
 
 
-def cubics(function: Function, borders: Float) -> Cubics:
-    """Return the cubics that a continuous function consists of; pieces are halved until they are exact.
+def fit_cubics(function: Function, borders: Float) -> Cubics:
+    """Fit piecewise cubics to continuous functions, halving pieces until they agree within 1e-8.
 
     Args:
         function: the function.
@@ -74,7 +74,7 @@ def cubics(function: Function, borders: Float) -> Cubics:
         length = np.diff(borders)
         values = function((borders[:-1, None] + length[:, None] * _SHARES).ravel())
         values = values.reshape(len(length), len(_SHARES), -1)
-        coefficients = _through(values, length)
+        coefficients = _fit_lowest_degree(values, length)
         wrong = np.abs(_sample_cubics(coefficients, length) - values).max(axis=(1, 2)) > _EXACT
         wrong &= length > _SHORTEST
         if not wrong.any():
@@ -82,17 +82,17 @@ def cubics(function: Function, borders: Float) -> Cubics:
         borders = np.sort(np.append(borders, (borders[:-1] + length / 2.0)[wrong]))
 
 
-def piecewise(function: Callable[[Float, NDArray[np.intp]], Float], borders: Float) -> Cubics:
-    """Return the cubics through a function that may jump at borders (P + 1,): it is asked with the piece's number."""
+def fit_pieces(function: Callable[[Float, NDArray[np.intp]], Float], borders: Float) -> Cubics:
+    """Fit one cubic per piece to a function that may jump at borders (P + 1,) and is told the piece's number."""
     length = np.diff(borders)
     stations = borders[:-1, None] + length[:, None] * _SHARES
     piece = np.repeat(np.arange(len(length)), len(_SHARES))
     values = function(stations.ravel(), piece).reshape(len(length), len(_SHARES), 1)
-    return Cubics(borders, _through(values, length))
+    return Cubics(borders, _fit_lowest_degree(values, length))
 
 
-def _through(values: Float, length: Float) -> Float:
-    """Return the coefficients (P, F, 4) through the values at the first four shares, of as low a degree as will do."""
+def _fit_lowest_degree(values: Float, length: Float) -> Float:
+    """Fit polynomials (P, F, 4 coefficients) of the lowest degree that matches the values, cubic at most."""
     f = values[:, :4].transpose(0, 2, 1)
     f0, f1, f2, f3 = (f[..., i] for i in range(4))
     h = length[:, None]
@@ -109,7 +109,7 @@ def _through(values: Float, length: Float) -> Float:
 
 
 def _cubic_through(values: Float, length: Float) -> Float:
-    """Return the coefficients (P, F, 4) of the cubics through the values (P, S, F) at the first four shares."""
+    """Return the coefficients (P, F, 4) of the cubics through the values (P, S, F) at each piece's first 4 shares."""
     f = values[:, :4].transpose(0, 2, 1)
     f0, f1, f2, f3 = (f[..., i] for i in range(4))
     h = length[:, None]
@@ -123,7 +123,7 @@ def _cubic_through(values: Float, length: Float) -> Float:
 
 
 def _round_coefficients(coefficients: Float, length: Float) -> Float:
-    """Return coefficients without the bits that differ between machines: what each adds is exact to a fine step."""
+    """Round cubic coefficients (P, F, 4) so that each changes the value by 1e-10 at most at a piece's end."""
     result = coefficients.copy()
     for power in (1, 2, 3):
         decimals = np.ceil(_STEP_DIGITS + power * np.log10(length)).astype(np.int64)
@@ -133,7 +133,7 @@ def _round_coefficients(coefficients: Float, length: Float) -> Float:
 
 
 def _sample_cubics(coefficients: Float, length: Float) -> Float:
-    """Return the cubics' values (P, S, F) at all shares of their pieces."""
+    """Return the cubics' values (P, S, F) at the shares `_SHARES` of their pieces."""
     return _value(coefficients[:, None], (length[:, None] * _SHARES)[..., None])
 
 
@@ -142,8 +142,8 @@ def _value(coefficients: Float, u: Float | float) -> Float:
     return np.asarray(a + u * (b + u * (c + u * d)))
 
 
-def runs(borders: Float, coefficients: Float) -> list[tuple[float, list[float]]]:
-    """Return where the cubics of one function, (P, 4), begin and what they are; pieces that go on are one.
+def join_cubics(borders: Float, coefficients: Float) -> list[tuple[float, list[float]]]:
+    """Merge cubics (P, 4) of one function that continue each other; return (start, coefficients) of each run.
 
     A run has the coefficients of its longest piece: those of a short one are known to few digits.
     """
@@ -156,7 +156,7 @@ def runs(borders: Float, coefficients: Float) -> list[tuple[float, list[float]]]
         while last < len(length):
             longest = first + int(np.argmax(length[first : last + 1]))
             trial = _shift_cubic(coefficients[longest], borders[first] - borders[longest])
-            if not _goes_on(trial, borders, coefficients, (first, last + 1)):
+            if not _continues(trial, borders, coefficients, (first, last + 1)):
                 break
             run, last = trial, last + 1
         whole = np.array([borders[last] - borders[first]])
@@ -165,8 +165,8 @@ def runs(borders: Float, coefficients: Float) -> list[tuple[float, list[float]]]
     return joined
 
 
-def distinct(rows: list[tuple[float, list[float]]], end: float) -> list[tuple[float, list[float]]]:
-    """Return cubics, each with the place that it begins at, of which no two neighbours are as good as one.
+def merge_similar(rows: list[tuple[float, list[float]]], end: float) -> list[tuple[float, list[float]]]:
+    """Merge neighbouring cubics that the standard's checker takes for one; return (start, coefficients) of each.
 
     The standard's checker takes two for one if, counted from place 0, their coefficients differ by less than a
     millionth. Such are replaced by one through both.
@@ -190,8 +190,8 @@ def distinct(rows: list[tuple[float, list[float]]], end: float) -> list[tuple[fl
     return kept
 
 
-def _goes_on(cubic: Float, borders: Float, coefficients: Float, pieces: tuple[int, int]) -> bool:
-    """Return whether a cubic from the first of some pieces on is what they all are."""
+def _continues(cubic: Float, borders: Float, coefficients: Float, pieces: tuple[int, int]) -> bool:
+    """Return whether one cubic, counted from the first piece's start, reproduces a range of pieces within 5e-7."""
     first, end = pieces
     within = np.diff(borders[first : end + 1])[:, None] * np.array([0.0, 0.3, 0.7, 1.0])
     values = _value(coefficients[first:end, None], within)
@@ -200,13 +200,13 @@ def _goes_on(cubic: Float, borders: Float, coefficients: Float, pieces: tuple[in
 
 
 def _shift_cubic(cubic: Float, by: float) -> Float:
-    """Return a cubic (4,) whose distances are counted from a place that lies `by` (m) ahead."""
+    """Return the coefficients (4,) of a cubic whose origin is moved ahead by a distance (m)."""
     a, b, c, d = cubic.tolist()
     return np.array([a + by * (b + by * (c + by * d)), b + by * (2.0 * c + 3.0 * by * d), c + 3.0 * by * d, d])
 
 
-def chords(function: Function, borders: Float, tolerance: float, shortest: float = 1e-3) -> Float:
-    """Return stations (N,), borders included where needed, between which a function is linear within a tolerance.
+def chord_stations(function: Function, borders: Float, tolerance: float, shortest: float = 1e-3) -> Float:
+    """Return stations (N,) between which a function is linear within a tolerance, borders only where needed.
 
     Args:
         function: the function.
@@ -215,7 +215,7 @@ def chords(function: Function, borders: Float, tolerance: float, shortest: float
         shortest: no chord that isn't between two borders is made shorter than this, m.
     """
     shares = np.array([0.0, 0.23, 0.5, 0.71, 1.0])
-    borders = _no_longer(borders, _LONGEST)
+    borders = _divide_long(borders, _LONGEST)
     stations_so_far, begin, length = [borders], borders[:-1], np.diff(borders)
     while len(begin):
         values = function((begin[:, None] + length[:, None] * shares).ravel()).reshape(len(begin), 5, -1)
@@ -229,15 +229,15 @@ def chords(function: Function, borders: Float, tolerance: float, shortest: float
     return _drop_straight_stations(stations, function(stations))
 
 
-def _no_longer(borders: Float, longest: float) -> Float:
-    """Return the borders and, between those farther apart than `longest` (m), others at even distances."""
+def _divide_long(borders: Float, longest: float) -> Float:
+    """Return the borders with intervals longer than `longest` (m) divided evenly."""
     count = np.maximum(1, np.ceil(np.diff(borders) / longest)).astype(np.int64)
     nth = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
     return np.append(np.repeat(borders[:-1], count) + nth * np.repeat(np.diff(borders) / count, count), borders[-1])
 
 
 def _drop_straight_stations(stations: Float, values: Float) -> Float:
-    """Return the stations without those at which nothing bends."""
+    """Return the stations without those at which the values are linear between their neighbours."""
     kept = [0]
     for i in range(1, len(stations) - 1):
         before, after = kept[-1], i + 1

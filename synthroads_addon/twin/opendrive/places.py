@@ -10,12 +10,12 @@ from ...road.objects import PointObject, RoadObject, Side
 from ...road.section import Carriageway, Hatching, Turnout
 from ...road.terrain import known_elevation
 from ...road.things.thing import LengthwiseThing
-from .pieces import CLOSE, Float, chords, merged_stations
+from .pieces import CLOSE, Float, chord_stations, merged_stations
 from .surface import RoadFrame
 
 
 def side_of(geometry: RoadGeometry, item: RoadObject) -> Side:
-    """Return the carriageway that something is written with: the one on its side of the centreline, or the only one.
+    """Return the side of the carriageway that an object is written with: by its offset, a hatching's by its turnout.
 
     What is painted belongs to the carriageway whose pavement it is on.
     """
@@ -29,14 +29,14 @@ def side_of(geometry: RoadGeometry, item: RoadObject) -> Side:
 
 
 def side_at(geometry: RoadGeometry, offset: float) -> Side:
-    """Return the carriageway on the side of an offset, or the only one."""
+    """Return `left` or `right` by the sign of an offset, or the side of the road's only carriageway."""
     if len(geometry.sections) == 1:
         return next(iter(geometry.sections))
     return "left" if offset > 0.0 else "right"
 
 
 class Ground:
-    """The surface that objects stand on, relative to the reference line's elevation.
+    """Heights of road and ground, on which objects stand, above the profile's elevation at the same station.
 
     Attributes:
         geometry: the road.
@@ -57,16 +57,16 @@ class Ground:
         self._feet = dict(zip(points, raised.tolist(), strict=True))
 
     def foot(self, name: str) -> float:
-        """Return the height of a point object's foot above the reference line, m."""
+        """Return the height of a point object's foot above the profile, m, by the object's id."""
         return self._feet[name]
 
     def height(self, station: Float, offset: Float) -> Float:
-        """Return the height (N,) of road or ground above the reference line; the road's edge where there is no data."""
+        """Return the heights (N,) of road or ground above the profile, m; the road edge's without terrain data."""
         along = np.clip(station, 0.0, self.geometry.length)
         return known_elevation(self.geometry, along, offset) - self.geometry.profile.elevation(along)
 
-    def along(self, item: LengthwiseThing, frame: RoadFrame, beside: float) -> Float:
-        """Return rows (N, 4) of s, t, h and height of an object along the road, m.
+    def sample_along(self, item: LengthwiseThing, frame: RoadFrame, beside: float) -> Float:
+        """Return rows (N, 4) of s, t, h and object height (m) along a lengthwise thing, linear in between.
 
         Between two of them all is linear within the tolerance.
 
@@ -86,11 +86,11 @@ class Ground:
 
         def rows(station: Float) -> Float:
             offset = item.offset_at(station)
-            place = frame.place(station, offset + beside, self.height(station, offset))
+            place = frame.road_coordinates(station, offset + beside, self.height(station, offset))
             share = item.height_share(end, station)
             return np.column_stack([place.s - station, place.t, place.h, tall * share])
 
-        stations = chords(rows, merged_stations(bends, start, end), self.tolerance, shortest=0.05)
+        stations = chord_stations(rows, merged_stations(bends, start, end), self.tolerance, shortest=0.05)
         found = rows(stations)
         found[:, 0] += stations
         return found

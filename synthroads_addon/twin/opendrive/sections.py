@@ -8,7 +8,7 @@ import numpy as np
 from ...road.objects import Side
 from ...road.section import Median
 from ...road.turnout_geometry import TURNOUT_STRIPS, TurnoutShape
-from .pieces import CLOSE, Cubics, Float, cubics
+from .pieces import CLOSE, Cubics, Float, fit_cubics
 from .surface import RoadFrame
 
 SIDES: tuple[Side, ...] = ("left", "right")
@@ -35,8 +35,8 @@ _BESIDE = {"exit": "exit", "entry": "entry"}
 _RAMP = {"exit": "offRamp", "entry": "onRamp"}
 
 
-def _changing(before: set[int], after: set[int], count: int) -> list[list[int]]:
-    """Return the columns that are there before or after a border and not both, those beside each other together."""
+def _changing_columns(before: set[int], after: set[int], count: int) -> list[list[int]]:
+    """Return runs of adjacent columns that exist on one side of a border only, before or after it."""
     runs: list[list[int]] = [[]]
     for column in range(count):
         if column in before and column in after:
@@ -48,7 +48,7 @@ def _changing(before: set[int], after: set[int], count: int) -> list[list[int]]:
 
 @dataclass(frozen=True)
 class LaneStrip:
-    """A strip as a lane of one section.
+    """A strip of the road as a lane of one lane section.
 
     Attributes:
         column: its column in the widths of the plan.
@@ -67,7 +67,7 @@ class LaneStrip:
 
 @dataclass(frozen=True)
 class LaneSection:
-    """A lane section.
+    """A lane section: a range of stations in which no lane begins or ends.
 
     Attributes:
         start, end: stations, m.
@@ -80,18 +80,18 @@ class LaneSection:
     pieces: tuple[int, int]
     lanes: dict[Side, tuple[LaneStrip, ...]]
 
-    def number(self, side: Side, index: int) -> int:
-        """Return the number (without sign) of the lane whose outer border lies outside of a strip; 0 is the centre."""
+    def lane_number(self, side: Side, index: int) -> int:
+        """Return the unsigned lane number whose outer border is that of a strip's index; 0 is the centre lane."""
         return sum(lane.index <= index for lane in self.lanes[side])
 
     def find(self, side: Side, column: int) -> int | None:
-        """Return the number (without sign) of the lane that a column of widths is here, or None."""
+        """Return the unsigned lane number of a width column in this section, or None if it has no lane here."""
         numbers = [n for n, lane in enumerate(self.lanes[side], 1) if lane.column == column]
         return numbers[0] if numbers else None
 
 
 class LanePlan:
-    """A road's strips as lanes.
+    """Lanes and lane sections of one carriageway as an OpenDRIVE road, with their widths as cubics.
 
     The centre lane lies at the carriageway's inner edge, all its strips to one side; the median, if it belongs to the
     road, is the one lane to the other.
@@ -110,31 +110,31 @@ class LanePlan:
         self._columns += [(self.side, i, kind) for i, kind in enumerate(frame.section.kinds)]
         if frame.has_median:
             self._columns.append((_OTHER[self.side], -1, "median"))
-        self.widths: Cubics = cubics(self._widths, frame.borders)
-        self.sections = tuple(self._long_enough(self._sections()))
+        self.widths: Cubics = fit_cubics(self._widths, frame.borders)
+        self.sections = tuple(self._merge_short(self._sections()))
 
     def offsets(self, station: Float) -> Float:
-        """Return t (N, M) of the borders of the carriageway's strips, from the inside out, at stations (N,), m."""
+        """Return t (N, M) of the carriageway's strip borders, from the inside out, at stations (N,), m."""
         sign = self.frame.section.carriageway.sign
         distances = sign * self.frame.section.distances(station)
         below = np.zeros(distances.shape)
         below[:, -1] = self.verge_fall(station)
         columns = range(distances.shape[1])
-        return np.stack([self.frame.across(station, distances[:, i], below[:, i]) for i in columns], axis=1)
+        return np.stack([self.frame.t_coordinate(station, distances[:, i], below[:, i]) for i in columns], axis=1)
 
     def verge_fall(self, station: Float) -> Float:
-        """Return how far (N,) the verge's outer edge lies below the carriageway's plane, m."""
+        """Return how far (N,) the verge's outer edge lies below the carriageway's plane at stations (N,), m."""
         edge = 0 if self.side == "left" else -1
         offset, level = self.geometry.offsets(station)[:, edge], self.geometry.boundary_elevations(station)[:, edge]
-        return np.asarray(self.frame.plane(station, offset) - level)
+        return np.asarray(self.frame.plane_elevation(station, offset) - level)
 
     def median_fall(self, station: Float) -> Float:
         """Return how far (N,) the other carriageway's inner edge lies below this one's plane, m."""
-        other = RoadFrame.plane_of(self.geometry, _OTHER[self.side], station, self._far_edge(station))
-        return np.asarray(self.frame.plane(station, self._far_edge(station)) - other)
+        other = RoadFrame.elevation_of_plane(self.geometry, _OTHER[self.side], station, self._far_edge(station))
+        return np.asarray(self.frame.plane_elevation(station, self._far_edge(station)) - other)
 
     def _far_edge(self, station: Float) -> Float:
-        """Return the offset (N,) of the other carriageway's inner edge, m."""
+        """Return the offsets (N,) of the other carriageway's inner edge, m."""
         other = self.geometry.sections[_OTHER[self.side]]
         return np.asarray(other.carriageway.sign * other.distances(station)[:, 0])
 
@@ -143,16 +143,16 @@ class LanePlan:
         sign = self.frame.section.carriageway.sign
         widths = sign * (own[:, 1:] - own[:, :-1])
         if self.frame.has_median:
-            far = self.frame.across(station, self._far_edge(station), self.median_fall(station))
+            far = self.frame.t_coordinate(station, self._far_edge(station), self.median_fall(station))
             widths = np.column_stack([widths, sign * (own[:, 0] - far)])
         return np.asarray(widths, dtype=np.float64)
 
     def width_at_start(self, piece: int) -> Float:
-        """Return all widths (F,) at the beginning of a piece."""
+        """Return the widths (F,) of all columns at the beginning of a piece, m."""
         return np.asarray(self.widths.coefficients[piece, :, 0])
 
     def _sections(self) -> list[LaneSection]:
-        """Return the sections: a new one where a strip begins, ends, becomes something else or has no width."""
+        """Return the lane sections, divided where a strip begins, ends, changes its type or has no width."""
         borders = self.widths.borders
         rows = [self._lanes(piece) for piece in range(len(borders) - 1)]
         sections: list[LaneSection] = []
@@ -164,8 +164,8 @@ class LanePlan:
             first = piece
         return sections
 
-    def _long_enough(self, sections: list[LaneSection]) -> list[LaneSection]:
-        """Return the sections without those that are too short for readers.
+    def _merge_short(self, sections: list[LaneSection]) -> list[LaneSection]:
+        """Return the lane sections with those shorter than `SHORTEST_SECTION` merged into the next one.
 
         A short one is part of the next (or the last), in which what it has begins at once, with its width there.
         """
@@ -180,20 +180,20 @@ class LanePlan:
         return kept
 
     def _begin_earlier(self, section: LaneSection, short: LaneSection) -> LaneSection:
-        """Return a section that begins where a short one before it did."""
+        """Return a section extended back over a short one before it; adjusts the plan's widths there, in place."""
         first, last = short.pieces[0], section.pieces[0]
         before = self._columns_of(self._lanes(first - 1) if first > 0 else section.lanes)
         after = self._columns_of(section.lanes)
-        for run in _changing(before, after, len(self._columns)):
-            self._take_over(run, [column for column in run if column in after], (first, last))
+        for run in _changing_columns(before, after, len(self._columns)):
+            self._hand_over_width(run, [column for column in run if column in after], (first, last))
         return replace(section, start=short.start, pieces=(first, section.pieces[1]))
 
     @staticmethod
     def _columns_of(lanes: Mapping[Side, Iterable[LaneStrip]]) -> set[int]:
         return {lane.column for strips in lanes.values() for lane in strips}
 
-    def _take_over(self, columns: list[int], new: list[int], pieces: tuple[int, int]) -> None:
-        """Give the space of neighbouring columns, on some pieces, to those of them that are new behind these."""
+    def _hand_over_width(self, columns: list[int], new: list[int], pieces: tuple[int, int]) -> None:
+        """Give the width of adjacent columns, on a range of pieces, to the new ones among them, in place."""
         if not new:
             return
         first, last = pieces
@@ -239,7 +239,7 @@ class LanePlan:
         return self.geometry.sections["left"].carriageway.instance
 
     def _turnout(self, side: Side, station: float) -> TurnoutShape | None:
-        """Return the turnout that makes a side's strips at a station; the last, as `RoadGeometry.instances` has it."""
+        """Return the turnout at a station on a side, or None; of several the last, as in `RoadGeometry.instances`."""
         last = None
         for shape in self.geometry.sections[side].turnouts:
             low, high = shape.range()
@@ -247,8 +247,8 @@ class LanePlan:
                 last = shape
         return last
 
-    def linked(self, section: int, other: int, side: Side, column: int) -> int | None:
-        """Return the number (without sign) of the lane that one of a section goes on as in its neighbour, or None.
+    def continuing_lane(self, section: int, other: int, side: Side, column: int) -> int | None:
+        """Return the unsigned number of the lane that continues a column in a neighbouring section, or None.
 
         A lane without width at the border begins or ends there.
         """

@@ -9,15 +9,15 @@ import numpy as np
 from ...base.arrays import Float
 from ...road.things.thing import Signal, StandingThing
 from ..things import PlacedThing
-from .numbers import Numbers
+from .numbers import FreeIds
 from .places import Ground, side_at
 from .surface import RoadFrame
-from .xml import Element, Value, element, notes
+from .xml import Element, Value, add_object_data, element
 
 
 @dataclass(frozen=True)
 class Face:
-    """A face that is a signal.
+    """A face of a thing that is written as a signal, such as a sign's plate.
 
     Attributes:
         placed: the thing that shows it.
@@ -36,8 +36,8 @@ class Face:
     height: float
 
 
-def faces_of(standing: Iterable[PlacedThing], numbers: Numbers) -> list[Face]:
-    """Return the faces of things; those that are parts of their own have numbers of their own."""
+def signal_faces(standing: Iterable[PlacedThing], numbers: FreeIds) -> list[Face]:
+    """Return the signal faces of standing things; a face that is a separate part gets an id of its own."""
     found = []
     for placed in standing:
         assert isinstance(placed.thing, StandingThing)
@@ -47,14 +47,14 @@ def faces_of(standing: Iterable[PlacedThing], numbers: Numbers) -> list[Face]:
             corners = np.concatenate([body.sections.reshape(-1, 3) for body in bodies])
             low, size = corners.min(axis=0), np.ptp(corners, axis=0)
             own = bool(bodies[0].ifc)
-            number, name = (numbers.next(), f"{placed.name}-{place}") if own else (placed.thing.instance, placed.name)
-            middle = placed.frame.local(np.array([low[0] + size[0] / 2.0, 0.0, low[2]]))
+            number, name = (numbers.take(), f"{placed.name}-{place}") if own else (placed.thing.instance, placed.name)
+            middle = placed.frame.to_local(np.array([low[0] + size[0] / 2.0, 0.0, low[2]]))
             found.append(Face(placed, number, name, signal, middle, float(size[0]), float(size[2])))
     return found
 
 
 def write_signals(parent: Element, ground: Ground, frame: RoadFrame, faces: Iterable[Face]) -> None:
-    """Add the signals of one road: those on its side of the centreline.
+    """Add a `signal` element for each face on this carriageway's side of the centreline.
 
     Args:
         parent: the element that they are added to.
@@ -69,14 +69,14 @@ def write_signals(parent: Element, ground: Ground, frame: RoadFrame, faces: Iter
 
 
 def _signal(parent: Element, ground: Ground, frame: RoadFrame, located: tuple[Face, float, float]) -> None:
-    """Add a signal, which stands at the lower edge of its face."""
+    """Add one `signal` element with a reference to its thing, placed at the lower edge of its face."""
     face, station, offset = located
     signal, thing = face.signal, face.placed.thing
     assert isinstance(thing, StandingThing)
     turn = math.remainder(thing.turn + (0.0 if signal.facing > 0.0 else math.pi), math.tau)
     with_stations = abs(turn) <= math.pi / 2.0 + 1e-12
     height = float(face.middle[2]) - float(ground.geometry.profile.elevation(np.array([station]))[0])
-    place = frame.place(np.array([station]), np.array([offset]), np.array([height]))
+    place = frame.road_coordinates(np.array([station]), np.array([offset]), np.array([height]))
     about: dict[str, Value] = {
         "id": face.number,
         "name": face.name,
@@ -97,4 +97,4 @@ def _signal(parent: Element, ground: Ground, frame: RoadFrame, located: tuple[Fa
     made = element(parent, "signal", about | ({"text": signal.text} if signal.text else {}))
     kind = thing.twin().opendrive.partition(".")[0]
     element(made, "reference", {"elementType": "object", "elementId": thing.instance, "type": kind})
-    notes(made, face.placed.name, thing.instance, object_type=type(thing).__name__)
+    add_object_data(made, face.placed.name, thing.instance, object_type=type(thing).__name__)

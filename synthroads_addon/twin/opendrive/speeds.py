@@ -17,7 +17,7 @@ _ENDS = re.compile(r"278|282")
 
 
 class SpeedLimits:
-    """Speed limits along one carriageway.
+    """Speed limits along one carriageway, km/h, as its traffic signs set them in the direction of traffic.
 
     Attributes:
         without: km/h where no sign says another.
@@ -37,8 +37,8 @@ class SpeedLimits:
         rows = zip(borders[:-1], borders[1:], speeds, strict=True)
         self.stretches = [(start, end, speed) for start, end, speed in rows if end - start > CLOSE]
 
-    def between(self, start: float, end: float) -> list[tuple[float, float]]:
-        """Return where limits begin between two stations (m), the first at the start, and the limits, km/h."""
+    def limits_between(self, start: float, end: float) -> list[tuple[float, float]]:
+        """Return (station in m, limit in km/h) where each limit begins between two stations, the first at the start."""
         found: list[tuple[float, float]] = []
         for first, last, speed in self.stretches:
             low, high = max(first, start), min(last, end)
@@ -48,7 +48,7 @@ class SpeedLimits:
 
 
 def _changes(geometry: RoadGeometry, ahead: bool, without: float) -> list[tuple[float, float]]:
-    """Return the stations (m) at which signs change the limit, and to what (km/h), in the order of the traffic."""
+    """Return (station in m, limit in km/h) of the signs that change the limit, in driving order."""
     found: dict[float, float] = {}
     for item in geometry.parameters.of_type(TrafficSign).values():
         with_stations = abs((item.rotation_deg + 180.0) % 360.0 - 180.0) <= 90.0

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from ...road.alignment import left_vectors
 from ...road.geometry import RoadGeometry
 from ...road.objects import Side
-from .pieces import Cubics, Float, cubics, distinct, merged_stations, piecewise, runs
-from .xml import PLAN_DIGITS, Element, Value, cubic, element
+from .pieces import Cubics, Float, fit_cubics, fit_pieces, join_cubics, merge_similar, merged_stations
+from .xml import PLAN_DIGITS, Element, Value, add_cubic, element
 
 _APPROXIMATIONS = 2
 SIDES: tuple[Side, ...] = ("right", "left")
@@ -19,7 +19,7 @@ _LINE_TURN = 1e-6  # rad, up to which the standard's checker takes two lines for
 
 
 def plan_view(road: Element, geometry: RoadGeometry) -> None:
-    """Add the plan view: a line, arc or spiral per element; clothoids too flat to be one are arcs or lines.
+    """Add the `planView` element: a line, arc or spiral per element of the alignment, straight lines joined.
 
     Each begins where the alignment, evaluated in float64, has its border, so that nothing adds up along the road.
     """
@@ -55,7 +55,7 @@ def _curvature(value: float) -> str:
 
 
 def _joined_lines(geometry: RoadGeometry, position: Float, heading: Float) -> list[tuple[int, int]]:
-    """Return the first and last element of each geometry: lines that go on straight are one."""
+    """Return (first, last) alignment elements of each plan geometry, consecutive collinear lines joined."""
     joined: list[tuple[int, int]] = []
     for number, item in enumerate(geometry.alignment.elements):
         if joined and item.kind == "line" and geometry.alignment.elements[joined[-1][0]].kind == "line":
@@ -71,7 +71,7 @@ def _joined_lines(geometry: RoadGeometry, position: Float, heading: Float) -> li
 
 @dataclass(frozen=True)
 class RoadCoordinates:
-    """Places in a road's own coordinates: s and t, and h at right angles to its tilted surface, (N,) each, m."""
+    """Points in an OpenDRIVE road's coordinates: s, t and h normal to its superelevated surface, (N,) each, m."""
 
     s: Float
     t: Float
@@ -79,7 +79,7 @@ class RoadCoordinates:
 
 
 class RoadFrame:
-    """One carriageway as a road: its surface is a plane across, through a line above or below the centreline.
+    """One carriageway as an OpenDRIVE road: its elevation profile and superelevation describe its plane.
 
     That line is the road's elevation profile, the plane's tilt its superelevation: what readers of OpenDRIVE know.
     By the standard t lies in the tilted plane and h at right angles to it, both turned with the grade as well.
@@ -101,36 +101,36 @@ class RoadFrame:
         self.borders = merged_stations(stations, 0.0, geometry.length)
         stations += geometry.profile.breakpoints.tolist()
         levels = merged_stations(stations, 0.0, geometry.length)
-        self.elevation: Cubics = cubics(lambda s: self.plane(s, np.zeros(len(s)))[:, None], levels)
-        self.superelevation: Cubics = self._tilt()
+        self.elevation: Cubics = fit_cubics(lambda s: self.plane_elevation(s, np.zeros(len(s)))[:, None], levels)
+        self.superelevation: Cubics = self._fit_superelevation()
 
     def crossfall(self, station: Float) -> Float:
-        """Return the plane's rise to the left (N,) at stations (N,)."""
+        """Return the crossfall (N,) of the carriageway's plane at stations (N,), as a ratio, rising to the left."""
         return np.asarray(self.geometry.crossfall(self.section.carriageway, station))
 
-    def plane(self, station: Float, offset: Float) -> Float:
-        """Return the elevation (N,) of the carriageway's plane at stations and offsets (N,), m."""
-        return self.plane_of(self.geometry, self.side, station, offset)
+    def plane_elevation(self, station: Float, offset: Float) -> Float:
+        """Return the elevations (N,) of this carriageway's plane at stations and offsets (N,), m."""
+        return self.elevation_of_plane(self.geometry, self.side, station, offset)
 
     @staticmethod
-    def plane_of(geometry: RoadGeometry, side: Side, station: Float, offset: Float) -> Float:
-        """Return the elevation (N,) of one of a road's carriageways' planes at stations and offsets (N,), m."""
+    def elevation_of_plane(geometry: RoadGeometry, side: Side, station: Float, offset: Float) -> Float:
+        """Return the elevations (N,) of the plane of the carriageway on a side at stations and offsets (N,), m."""
         section = geometry.sections[side]
         rise = geometry.crossfall(section.carriageway, station)
         pivot = section.carriageway.sign * section.pivot(station)
         return np.asarray(geometry.profile.elevation(station) + rise * (offset - pivot))
 
-    def across(self, station: Float, offset: Float, below: Float | float = 0.0) -> Float:
-        """Return t (N,) of points at offsets (N,) that lie ``below`` the plane, m."""
+    def t_coordinate(self, station: Float, offset: Float, below: Float | float = 0.0) -> Float:
+        """Return the coordinate t (N,) of points at offsets (N,) that lie ``below`` the plane vertically, m."""
         rise = self.crossfall(station)
         return np.asarray(offset * np.sqrt(1.0 + rise**2) - below * rise / np.sqrt(1.0 + rise**2))
 
-    def above(self, station: Float, below: Float) -> Float:
-        """Return h (N,) of points that lie ``below`` the plane, m: at right angles to it."""
+    def h_coordinate(self, station: Float, below: Float) -> Float:
+        """Return the coordinate h (N,), normal to the plane, of points that lie ``below`` it vertically, m."""
         return np.asarray(-below * np.cos(np.arctan(self.crossfall(station))) * self._cosine(station))
 
-    def place(self, station: Float, offset: Float, height: Float) -> RoadCoordinates:
-        """Return the road's coordinates of points (N,) at stations, offsets and heights above the profile, m."""
+    def road_coordinates(self, station: Float, offset: Float, height: Float) -> RoadCoordinates:
+        """Convert stations, offsets and heights above the profile (N,) to OpenDRIVE road coordinates s, t, h, m."""
         geometry = self.geometry
         station, offset, height = (np.asarray(values, dtype=np.float64) for values in (station, offset, height))
         station = np.clip(station, 0.0, geometry.length)
@@ -140,16 +140,16 @@ class RoadFrame:
         s = station
         # A point above the line lies at right angles to a place of it farther on, where it climbs.
         for _ in range(_APPROXIMATIONS):
-            ahead, _, above = self._beside(s, plan, level)
+            ahead, _, above = self._line_coordinates(s, plan, level)
             bend = 1.0 - geometry.alignment.curvature(s) * offset
             s = np.clip(s + ahead * self._cosine(s) / bend, 0.0, geometry.length)
-        _, left, above = self._beside(s, plan, level)
+        _, left, above = self._line_coordinates(s, plan, level)
         tilt = self.superelevation.at(s)
         cos, sin = np.cos(tilt), np.sin(tilt)
         return RoadCoordinates(s, left * cos + above * sin, above * cos - left * sin)
 
-    def _beside(self, s: Float, plan: Float, level: Float) -> tuple[Float, Float, Float]:
-        """Return how far (N,) points lie ahead of a place of the line along it, to its left, and above it, m."""
+    def _line_coordinates(self, s: Float, plan: Float, level: Float) -> tuple[Float, Float, Float]:
+        """Return distances (N,) of points from the line at s: ahead along it, to its left, and normal above it, m."""
         origin, heading, _ = self.geometry.alignment.frame(s)
         away, left = plan - origin, left_vectors(heading)
         forwards = away[:, 0] * left[:, 1] - away[:, 1] * left[:, 0]
@@ -159,8 +159,8 @@ class RoadFrame:
     def _cosine(self, station: Float) -> Float:
         return np.asarray(1.0 / np.sqrt(1.0 + self.elevation.slope(station) ** 2))
 
-    def _tilt(self) -> Cubics:
-        """Return the superelevation, rad: the angle in a section at right angles to the line, not an upright one."""
+    def _fit_superelevation(self) -> Cubics:
+        """Return the superelevation as cubics, rad: measured in the section normal to the line, not vertical."""
         levels = self.elevation
 
         def tilt(station: Float, piece: NDArray[np.intp]) -> Float:
@@ -169,27 +169,27 @@ class RoadFrame:
             grade = b + u * (2.0 * c + 3.0 * d * u)
             return np.asarray(np.arctan(self.crossfall(station) / np.sqrt(1.0 + grade**2)))
 
-        return piecewise(tilt, levels.borders)
+        return fit_pieces(tilt, levels.borders)
 
 
 def elevation_profile(road: Element, frame: RoadFrame) -> None:
-    """Add the elevation profile: the line in which the carriageway's plane meets the upright one of the centreline."""
+    """Add the `elevationProfile` element: elevations of the carriageway's plane along the centreline."""
     _cubics(element(road, "elevationProfile"), "elevation", frame.elevation)
 
 
 def lateral_profile(road: Element, frame: RoadFrame) -> None:
-    """Add the superelevation."""
+    """Add the `lateralProfile` element with the carriageway's superelevation."""
     _cubics(element(road, "lateralProfile"), "superelevation", frame.superelevation)
 
 
 def _cubics(parent: Element, tag: str, function: Cubics) -> None:
-    rows = runs(function.borders, function.coefficients[:, 0])
-    for start, coefficients in distinct(rows, float(function.borders[-1])):
-        cubic(parent, tag, {"s": start}, coefficients)
+    rows = join_cubics(function.borders, function.coefficients[:, 0])
+    for start, coefficients in merge_similar(rows, float(function.borders[-1])):
+        add_cubic(parent, tag, {"s": start}, coefficients)
 
 
-def bounds(geometry: RoadGeometry) -> dict[str, float]:
-    """Return the largest and smallest x and y of the road, to the metre, as the header has them."""
+def header_bounds(geometry: RoadGeometry) -> dict[str, float]:
+    """Return the header's bounding box of the road: north, south, east, west in local coordinates, whole metres."""
     stations = np.linspace(0.0, geometry.length, max(2, int(geometry.length / 10.0) + 2))
     edges = geometry.offsets(stations)
     points = np.concatenate([geometry.alignment.place(stations, edges[:, i]) for i in (0, -1)])

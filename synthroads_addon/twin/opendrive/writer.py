@@ -19,16 +19,16 @@ from ..plants import PlacedPlant, placed_plants
 from ..things import placed_things, standing_things
 from ..trace import LEVEL, Trace
 from .entities import LOST, trace_elements
-from .lanes import lanes
+from .lanes import write_lanes
 from .marks import RoadMarks
-from .numbers import Numbers
+from .numbers import FreeIds
 from .objects import Objects
 from .places import Ground
 from .sections import LanePlan
-from .signals import Face, faces_of, write_signals
+from .signals import Face, signal_faces, write_signals
 from .speeds import ADVISORY, SpeedLimits
-from .surface import RoadFrame, bounds, elevation_profile, lateral_profile, plan_view
-from .xml import Element, Value, element, note, verbatim, write
+from .surface import RoadFrame, elevation_profile, header_bounds, lateral_profile, plan_view
+from .xml import Element, Value, add_cdata, add_user_data, element, write_xml
 
 REVISION = (1, 8)
 _GROUND = 0.001
@@ -36,7 +36,7 @@ _GROUND = 0.001
 
 
 def write_opendrive(parameters: RoadParameters, path: Path, tolerance: float) -> Trace:
-    """Write a road's geometric-semantic model as an OpenDRIVE file; return what became of its objects.
+    """Write a road as an OpenDRIVE 1.8 file; return the trace of what became of each object.
 
     Coordinates in it are local; the header's offset adds the map origin, and its ``geoReference`` names the map's
     coordinate system. Each carriageway is a road of its own along the same line, with its own superelevation. Lanes,
@@ -54,26 +54,26 @@ def write_opendrive(parameters: RoadParameters, path: Path, tolerance: float) ->
     root = element(None, "OpenDRIVE")
     _header(root, geometry)
     ground = Ground(geometry, min(tolerance, _GROUND))
-    numbers = Numbers(parameters)
+    numbers = FreeIds(parameters)
     trace = Trace(geometry, within=("dash",), reasons=LOST)
     plants = list(placed_plants(geometry))
     standing = {placed.name: placed for placed in standing_things(geometry)}
-    faces = faces_of(standing.values(), numbers)
+    faces = signal_faces(standing.values(), numbers)
     for name, item in parameters.of_type(Carriageway).items():
         road = element(root, "road", {"name": name, "id": item.instance, **_attributes(geometry)})
         frame = RoadFrame(geometry, item.side)
         objects = Objects(element(None, "objects"), ground, frame, numbers, standing)
         _road(road, objects, faces, plants)
-        trace.found(parameters.alignment.instance, element="planView", road=item.instance)
+        trace.record_entity(parameters.alignment.instance, element="planView", road=item.instance)
     trace_elements(root, trace)
-    _list_rest(root, parameters)
-    write(root, path)
+    _list_unwritten(root, parameters)
+    write_xml(root, path)
     for plant in plants:
-        trace.grow(plant)
+        trace.record_plant(plant)
     for name in dict.fromkeys(plant.stand for plant in plants):
-        trace.reduce(name, "a plant is the upright cylinder around it")
+        trace.record_loss(name, "a plant is the upright cylinder around it")
     for placed in placed_things(geometry, tolerance):
-        trace.leave_out(placed)
+        trace.record_omissions(placed)
     return trace
 
 
@@ -82,7 +82,7 @@ def _attributes(geometry: RoadGeometry) -> dict[str, Value]:
 
 
 def _road(road: Element, objects: Objects, faces: list[Face], plants: list[PlacedPlant]) -> None:
-    """Fill in the road of one carriageway."""
+    """Fill in the `road` element of one carriageway: type, plan, profiles, lanes, objects, signals."""
     frame = objects.frame
     geometry, limits = frame.geometry, SpeedLimits(frame.geometry, frame.side)
     kind = element(road, "type", {"s": 0.0, "type": "motorway", "country": "DE"})
@@ -95,18 +95,18 @@ def _road(road: Element, objects: Objects, faces: list[Face], plants: list[Place
     lateral_profile(road, frame)
     plan = LanePlan(frame)
     marks = RoadMarks(plan)
-    lanes(road, plan, limits, marks)
+    write_lanes(road, plan, limits, marks)
     road.append(objects.parent)
     objects.write(marks.loose)
     objects.plants(plants)
     objects.underpasses()
     write_signals(element(road, "signals"), objects.ground, frame, faces)
-    note(road, "instance", frame.section.carriageway.instance)
-    note(road, "side", frame.side)
+    add_user_data(road, "instance", frame.section.carriageway.instance)
+    add_user_data(road, "side", frame.side)
 
 
 def _header(root: Element, geometry: RoadGeometry) -> None:
-    """Add the header, without a date: the same road has the same bytes."""
+    """Add the `header` element, without a date so that the same road gives the same bytes."""
     parameters = geometry.parameters
     metadata = parameters.metadata
     attributes: dict[str, Value] = {
@@ -115,13 +115,13 @@ def _header(root: Element, geometry: RoadGeometry) -> None:
         "name": metadata.identifier,
         "version": "1",
     }
-    header = element(root, "header", {**attributes, **bounds(geometry), "vendor": metadata.generator})
-    verbatim(header, "geoReference", geo_reference(metadata.epsg))
+    header = element(root, "header", {**attributes, **header_bounds(geometry), "vendor": metadata.generator})
+    add_cdata(header, "geoReference", geo_reference(metadata.epsg))
     x, y, z = parameters.transform.translate
     element(header, "offset", {"x": float(x), "y": float(y), "z": float(z), "hdg": 0.0})
-    note(header, "epsg", metadata.epsg)
-    note(header, "title", metadata.title)
-    note(header, "level_of_detail", LEVEL)
+    add_user_data(header, "epsg", metadata.epsg)
+    add_user_data(header, "title", metadata.title)
+    add_user_data(header, "level_of_detail", LEVEL)
 
 
 _PROJ = {
@@ -136,7 +136,7 @@ _PLAIN_DATUMS = ("European_Terrestrial_Reference_System_1989", "WGS_1984")
 
 
 def geo_reference(epsg: int) -> str:
-    """Return a coordinate system as a PROJ string if it is a plain Transverse Mercator one, else as WKT.
+    """Return a PROJ string for a plain Transverse Mercator coordinate system, else its WKT.
 
     A datum other than WGS 84's or ETRS89's has no PROJ string that would say it exactly: WKT names it.
 
@@ -154,8 +154,8 @@ def geo_reference(epsg: int) -> str:
     return f"+proj=tmerc {values} +ellps={_ELLIPSOIDS[spheroid[1]]} +units=m +vunits=m +no_defs"
 
 
-def _list_rest(root: Element, parameters: RoadParameters) -> None:
-    """Name what has no element of its own: centreline, parts whose lanes bear their number, ground, plants, traffic."""
+def _list_unwritten(root: Element, parameters: RoadParameters) -> None:
+    """Add user data to the root for objects without an element: centreline, owners of lanes, ground, traffic."""
     numbers = InstanceNumbers(parameters)
     kinds = (AlignmentObject, Carriageway, Median, Turnout, LineMarking, Terrain, Vegetation, Vehicle)
     for name, item in parameters.objects.items():

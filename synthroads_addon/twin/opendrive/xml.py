@@ -19,13 +19,13 @@ _VERBATIM = "verbatim:"
 
 
 def element(parent: Element | None, tag: str, attributes: Mapping[str, Value] | None = None) -> Element:
-    """Return a new element with attributes; those that are None are left out. Floats keep `DIGITS` decimals."""
-    texts = {name: text(value) for name, value in (attributes or {}).items() if value is not None}
+    """Return a new XML element, added to its parent if given; attributes that are None are left out."""
+    texts = {name: attribute_text(value) for name, value in (attributes or {}).items() if value is not None}
     return ElementTree.Element(tag, texts) if parent is None else ElementTree.SubElement(parent, tag, texts)
 
 
-def text(value: str | int | float | bool) -> str:
-    """Return a value as OpenDRIVE writes it; characters that XML can't hold are left out."""
+def attribute_text(value: str | int | float | bool) -> str:
+    """Return a value as the text of an OpenDRIVE attribute; floats are rounded, characters XML forbids are removed."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):
@@ -33,8 +33,8 @@ def text(value: str | int | float | bool) -> str:
     return _FORBIDDEN.sub("", str(value))
 
 
-def cubic(parent: Element, tag: str, where: Mapping[str, Value], coefficients: Sequence[float]) -> Element:
-    """Return a new element of a cubic a + b u + c u^2 + d u^3, which begins at `where`.
+def add_cubic(parent: Element, tag: str, where: Mapping[str, Value], coefficients: Sequence[float]) -> Element:
+    """Add and return an element with the coefficients of a cubic a + b u + c u^2 + d u^3, which begins at `where`.
 
     Coefficients have 12 significant digits: at 100 m a d of 12 digits is exact to less than a nanometre.
     """
@@ -43,25 +43,25 @@ def cubic(parent: Element, tag: str, where: Mapping[str, Value], coefficients: S
     return element(parent, tag, {**where, "a": float(a), **texts})
 
 
-def note(parent: Element, code: str, value: Value) -> None:
-    """Add user data to an element: what OpenDRIVE has no attribute for."""
+def add_user_data(parent: Element, code: str, value: Value) -> None:
+    """Add a `userData` element with a code and a value, for what OpenDRIVE has no attribute for."""
     element(parent, "userData", {"code": code, "value": value})
 
 
-def notes(parent: Element, name: str, instance: int, **more: Value) -> None:
-    """Add an object's id and instance number, and more, as user data."""
+def add_object_data(parent: Element, name: str, instance: int, **more: Value) -> None:
+    """Add `userData` elements with an object's instance number, id and further values; None is left out."""
     for code, value in {"instance": instance, "id": name, **more}.items():
         if value is not None:
-            note(parent, code, value)
+            add_user_data(parent, code, value)
 
 
-def verbatim(parent: Element, tag: str, content: str) -> None:
-    """Add an element whose text is marked as CDATA, as the standard asks for."""
+def add_cdata(parent: Element, tag: str, content: str) -> None:
+    """Add an element whose text is to be written as CDATA, as the standard asks for."""
     element(parent, tag).text = _VERBATIM + content
 
 
-def write(root: Element, path: Path) -> None:
-    """Write a tree, indented, with Unix line ends."""
+def write_xml(root: Element, path: Path) -> None:
+    """Write an element tree to an XML file, indented, in UTF-8 with Unix line ends."""
     ElementTree.indent(root, " ")
     content = ElementTree.tostring(root, encoding="unicode")
     content = re.sub(f">{_VERBATIM}([^<]*)<", _as_cdata, content)

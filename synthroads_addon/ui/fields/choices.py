@@ -46,7 +46,7 @@ STANDARD_PARTS: dict[str, Items] = {"road.cross_section": tuple(_cross_sections(
 
 
 def device_of(name_or_file: str) -> Device | None:
-    """Return a device, or None if it can't be read; quick enough to be asked whenever the panel is drawn."""
+    """Return the device of a name or JSON file, None if it can't be read; cached until the file changes."""
     path = Path(name_or_file)
     try:
         changed = path.stat().st_mtime_ns if path.suffix == ".json" else 0

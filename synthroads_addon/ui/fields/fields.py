@@ -25,7 +25,7 @@ from ...road.things.limits import Interval
 from ...scenario.scenario import Scenario
 from .choices import ITEMS
 from .inherited import SOURCES, Value
-from .numbers import exact, fitting, is_share, list_as_text, number_property, numbers_in, push_along
+from .numbers import clamp_32_bit, exact, is_share, list_as_text, number_property, numbers_in, push_along
 from .room import draw_flag, draw_text, fits, value_row, value_share
 from .wording import label, value_name, written_unit
 
@@ -38,7 +38,7 @@ ADD_FILE, REMOVE_FILE = "synthroads.add_file", "synthroads.remove_file"
 
 
 class Field:
-    """One field of the schema. Values are JSON data, as in a scenario's file; None is a field that isn't given.
+    """One field of the scenario's schema as Blender properties, converted from and to JSON data (None: not given).
 
     Attributes:
         path: where it stands in the scenario, e.g. ``road.turnouts.exits``; its last part is the property's name.
@@ -61,47 +61,47 @@ class Field:
 
     @property
     def tooltip(self) -> str:
-        """Return the description without its final stop: Blender adds one."""
+        """Return the schema's description without its final full stop, as Blender adds one."""
         return (self.info.description or "").removesuffix(".")
 
     @property
     def checkbox_name(self) -> str:
-        """Return the name of the checkbox of a field that may be left out, where its kind has one."""
+        """Return the name of the checkbox property that says whether an optional field is given."""
         return f"own_{self.name}"
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Return the names of its properties."""
+        """Return the names of the Blender properties that hold the field's value."""
         return (self.name,)
 
     def properties(self, hooks: Hooks) -> dict[str, Any]:
-        """Return its properties by name, for the annotations of a property group."""
+        """Return the field's Blender properties by name, for a property group's annotations."""
         raise NotImplementedError
 
     def read(self, owner: Any, base: Any) -> Any:
-        """Return the value that a property group shows; `base` is what was loaded last. `InputError` if it is none."""
+        """Return the value in a property group as JSON data; `base` gives digits that Blender lost; or InputError."""
         raise NotImplementedError
 
     def write(self, owner: Any, value: Any) -> None:
-        """Have a property group show a value."""
+        """Set the properties of a property group to a value given as JSON data."""
         setattr(owner, self.name, value)
 
     def classes(self) -> Iterator[type]:
-        """Yield the property groups that must be registered before the one that it stands in."""
+        """Yield the property group classes to register before the group that holds this field."""
         return iter(())
 
     def owner(self, settings: Any) -> Any:
-        """Return the property group that has its property."""
+        """Return the property group in the panel's settings that holds this field."""
         head, _, _ = self.path.rpartition(".")
         return attrgetter(head)(settings) if head else settings
 
     def declared(self, settings: Any) -> tuple[FieldInfo | None, type[BaseModel]]:
-        """Return its declaration as the panel is set, and the model; None if the chosen kind of its part lacks it."""
+        """Return the field's declaration in its part's chosen model (None if that lacks it), and the model."""
         model = self.part.model_of(settings) if self.part else Scenario
         return model.model_fields.get(self.name), model
 
     def has_effect(self, settings: Any) -> bool:
-        """Return whether it means something as the panel is set; the schema says it with ``only_with``."""
+        """Return whether the field matters with the panel's settings, by the schema's note ``only_with``."""
         info, _ = self.declared(settings)
         if info is None:
             return False
@@ -109,7 +109,7 @@ class Field:
         return all(getattr(owner, name) in values for name, values in needed)
 
     def inherited(self, settings: Any) -> Value:
-        """Return the number, the numbers or the interval that it has while it isn't given; None if there is none.
+        """Return the number, numbers or interval used while the field isn't given; None if there is none.
 
         The schema says where it comes from: the chosen kind of its part has ``usual`` values, others are named in the
         note ``inherits``, a source out of `SOURCES` and what is taken of it.
@@ -122,7 +122,7 @@ class Field:
         return SOURCES[source](settings, taken) if source else None
 
     def inherited_text(self, settings: Any) -> str:
-        """Return in words what it has while it isn't given."""
+        """Return the text for the value used while the field isn't given, with its unit, or Automatic."""
         info, value = self.declared(settings)[0], self.inherited(settings)
         if info is None or value is None:
             return str((info and note_of(info, "unset")) or "Automatic")
@@ -132,12 +132,12 @@ class Field:
         return list_as_text(value) if isinstance(value, tuple) else f"{value:.4g}"
 
     def draw(self, layout: bpy.types.UILayout, settings: Any) -> None:
-        """Draw it, unless the other settings leave it without meaning."""
+        """Draw the field in a row, unless other settings make it meaningless."""
         if self.has_effect(settings):
             self.draw_row(layout, settings, self.owner(settings))
 
     def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
-        """Draw its name and its value, a property of the owner."""
+        """Draw the row of the field: its label and its property of `owner`."""
         value_row(layout, self.label).prop(owner, self.name, text="")
 
     def _draw_inherited(self, row: bpy.types.UILayout, settings: Any, share: float = 1.0, beside: int = 0) -> None:
@@ -151,39 +151,39 @@ class Field:
 
 
 class OptionalField(Field):
-    """A field of which a checkbox, `checkbox_name`, says whether it is given, where it may be left out."""
+    """A field whose checkbox, `checkbox_name`, says whether its value is given, if it may be left out."""
 
     @property
     def values(self) -> tuple[str, ...]:
-        """Return the names of the properties beside the checkbox."""
+        """Return the names of the value's properties, without the checkbox."""
         return (self.name,)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Return the names of its properties."""
+        """Return the names of all its properties, with the checkbox if it is optional."""
         return (self.checkbox_name, *self.values) if self.optional else self.values
 
     def read(self, owner: Any, base: Any) -> Any:
-        """Return the value, or None where the checkbox isn't ticked."""
+        """Return the value as JSON data, or None if the checkbox isn't ticked."""
         return None if self.optional and not getattr(owner, self.checkbox_name) else self.read_given(owner, base)
 
     def read_given(self, owner: Any, base: Any) -> Any:
-        """Return the value that is given; see `read`."""
+        """Return the value as JSON data without regard to the checkbox; see `Field.read`."""
         raise NotImplementedError
 
     def write(self, owner: Any, value: Any) -> None:
-        """Have a property group show a value, or that none is given."""
+        """Set the properties of a property group to a value; None unticks the checkbox."""
         if self.optional:
             setattr(owner, self.checkbox_name, value is not None)
         if value is not None:
             self.write_given(owner, value)
 
     def write_given(self, owner: Any, value: Any) -> None:
-        """Show a value that is given."""
+        """Set the value's properties to a value that isn't None."""
         raise NotImplementedError
 
     def checkbox(self, hooks: Hooks) -> dict[str, Any]:
-        """Return the checkbox of a field that may be left out; none for others."""
+        """Return the checkbox property by name; empty for a field that can't be left out."""
         if not self.optional:
             return {}
         hook = hooks.get(checkbox_path(self.path))
@@ -198,14 +198,14 @@ class OptionalField(Field):
         return {self.checkbox_name: bpy.props.BoolProperty(**about, update=begin)}
 
     def begin_with_inherited(self, owner: Any) -> None:
-        """Have a field that was just ticked begin with what it had before."""
+        """Set a field that was just ticked to its inherited value, in place."""
         value = self.inherited(owner.id_data.synthroads)
         if value is not None and getattr(owner, self.checkbox_name):
             for name, number in zip(self.values, value if isinstance(value, tuple) else (value,), strict=True):
                 setattr(owner, name, type(getattr(owner, name))(number))
 
     def draw_checkbox(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> bpy.types.UILayout | None:
-        """Draw the checkbox, if there is one; return the place for the value if that is given."""
+        """Draw label and checkbox; return the layout for the value, or None if the value isn't given."""
         row = value_row(layout, self.label)
         if not self.optional:
             return row
@@ -216,7 +216,7 @@ class OptionalField(Field):
         return None
 
     def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
-        """Draw its name and its values, or what it has while none is given."""
+        """Draw label, checkbox and values, or the greyed inherited value if none is given."""
         row = self.draw_checkbox(layout, settings, owner)
         if row:
             for name in self.values:
@@ -224,45 +224,45 @@ class OptionalField(Field):
 
 
 class FlagField(Field):
-    """Yes or no."""
+    """A boolean field, shown as a checkbox."""
 
     def properties(self, hooks: Hooks) -> dict[str, Any]:
-        """Return a checkbox."""
+        """Return the boolean property by name."""
         return {self.name: bpy.props.BoolProperty(**self._common(hooks), default=bool(self.default))}
 
     def read(self, owner: Any, base: Any) -> bool:
-        """Return whether it is ticked."""
+        """Return whether the flag is set."""
         return bool(getattr(owner, self.name))
 
     def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
-        """Draw the checkbox with its name."""
+        """Draw the checkbox with its label."""
         draw_flag(layout, owner, self.name, self.label)
 
 
 class NumberField(OptionalField):
-    """A number with its limits."""
+    """A number field within the limits of the schema."""
 
     @property
     def is_share(self) -> bool:
-        """Return whether it is a share or a probability, which a slider shows."""
+        """Return whether the number is a share or probability from 0 to 1, shown as a slider."""
         return is_share(self.info)
 
     def properties(self, hooks: Hooks) -> dict[str, Any]:
-        """Return the number, and its checkbox."""
+        """Return the number property and, if it is optional, its checkbox, by name."""
         number = number_property(self.info, self.kind is int, self.default, **self._common(hooks))
         return self.checkbox(hooks) | {self.name: number}
 
     def read_given(self, owner: Any, base: Any) -> float:
-        """Return the number."""
+        """Return the number, with the digits of the loaded value if it is still that one."""
         value = exact(getattr(owner, self.name), base)
         return round(value) if self.kind is int else value
 
     def write_given(self, owner: Any, value: Any) -> None:
-        """Show a number, as far as Blender's numbers reach."""
-        setattr(owner, self.name, fitting(value) if isinstance(getattr(owner, self.name), int) else value)
+        """Set the number, clamped to Blender's 32-bit range if it is an integer."""
+        setattr(owner, self.name, clamp_32_bit(value) if isinstance(getattr(owner, self.name), int) else value)
 
     def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
-        """Draw the number; a slider has its name inside."""
+        """Draw the number in a row, or a share as a slider with the label inside if that fits."""
         if not self.is_share or self.optional or not fits(f"{self.label} 0.000"):
             super().draw_row(layout, settings, owner)
             return
@@ -272,17 +272,17 @@ class NumberField(OptionalField):
 
 
 class IntervalField(OptionalField):
-    """Two numbers, smallest and largest."""
+    """An interval as two number properties, minimum and maximum."""
 
     @property
     def ends(self) -> tuple[str, str]:
-        """Return the names of the two numbers."""
+        """Return the names of the properties for minimum and maximum."""
         return f"{self.name}_minimum", f"{self.name}_maximum"
 
     values = ends
 
     def properties(self, hooks: Hooks) -> dict[str, Any]:
-        """Return the two numbers, of which the one pushes the other along."""
+        """Return both number properties and the checkbox; changing one end pushes the other along."""
         low, high = self.ends
         default = self.default or {"minimum": 0.0, "maximum": 0.0}
         result = self.checkbox(hooks)
@@ -296,13 +296,13 @@ class IntervalField(OptionalField):
         return result
 
     def read_given(self, owner: Any, base: Any) -> dict[str, float]:
-        """Return the interval."""
+        """Return the interval as ``minimum`` and ``maximum``."""
         loaded = base if isinstance(base, dict) else {}
         ends = zip(("minimum", "maximum"), self.ends, strict=True)
         return {end: exact(getattr(owner, name), loaded.get(end)) for end, name in ends}
 
     def write_given(self, owner: Any, value: Any) -> None:
-        """Show an interval: its minimum first, which may push the maximum that is written next."""
+        """Set the interval: the minimum first, which may push the maximum that is set next."""
         for name, end in zip(self.ends, ("minimum", "maximum"), strict=True):
             setattr(owner, name, value[end])
 
@@ -311,7 +311,7 @@ class IntervalField(OptionalField):
 
 
 class ChoiceField(Field):
-    """One of several values; one more item stands for "not given"."""
+    """One of several values, as a menu; an optional field has one more item, Automatic."""
 
     choice = True
 
@@ -320,7 +320,7 @@ class ChoiceField(Field):
         self.values = {str(value): value for value in get_args(self.kind)}
 
     def properties(self, hooks: Hooks) -> dict[str, Any]:
-        """Return a menu."""
+        """Return the enum property by name."""
         tips = note_of(self.info, "tooltips") or {}
         plain = [(name, value_name(name, self.info), tips.get(name, "")) for name in self.values]
         items = list(ITEMS.get(self.path, plain))
@@ -330,15 +330,15 @@ class ChoiceField(Field):
         return {self.name: bpy.props.EnumProperty(**self._common(hooks), items=items, default=default)}
 
     def read(self, owner: Any, base: Any) -> Any:
-        """Return the chosen value."""
+        """Return the chosen value; None for Automatic."""
         return self.values.get(getattr(owner, self.name))
 
     def write(self, owner: Any, value: Any) -> None:
-        """Choose a value."""
+        """Select the menu item of a value; None selects Automatic."""
         setattr(owner, self.name, AUTOMATIC if value is None else str(value))
 
     def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
-        """Draw the menu, and beside "Automatic" what that is."""
+        """Draw the menu, and beside Automatic the greyed value that it stands for."""
         row = value_row(layout, self.label)
         row.prop(owner, self.name, text="")
         if self.optional and getattr(owner, self.name) == AUTOMATIC:
@@ -346,84 +346,84 @@ class ChoiceField(Field):
 
 
 class ChoicesField(Field):
-    """Any of several values; their order is the schema's, unless they were loaded in another."""
+    """Any number of several values, in the schema's order, unless they were loaded in another."""
 
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
         self.values = tuple(str(value) for value in get_args(get_args(self.kind)[0]))
 
     def properties(self, hooks: Hooks) -> dict[str, Any]:
-        """Return buttons of which several can be pressed."""
+        """Return the enum property with flags, of which several can be set, by name."""
         items = [(name, value_name(name, self.info), "") for name in self.values]
         flags = {"items": items, "default": set(self.default or ()), "options": {"ENUM_FLAG", "ANIMATABLE"}}
         return {self.name: bpy.props.EnumProperty(**self._common(hooks), **flags)}
 
     def read(self, owner: Any, base: Any) -> list[str]:
-        """Return the chosen values."""
+        """Return the names of the chosen values, in the loaded order if they are the same set."""
         chosen = getattr(owner, self.name)
         if isinstance(base, list) and set(base) == chosen:
             return base
         return [name for name in self.values if name in chosen]
 
     def write(self, owner: Any, value: Any) -> None:
-        """Choose values."""
+        """Select exactly the given values."""
         setattr(owner, self.name, set(value or ()))
 
     def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
-        """Draw the buttons, one below the other."""
+        """Draw a button for each value, below each other."""
         column = value_row(layout, self.label).column(align=True)
         for name in self.values:
             column.prop_enum(owner, self.name, name)
 
 
 class TextField(Field):
-    """A text; nothing at all is "not given" where that is allowed."""
+    """A text; an empty one means that an optional field isn't given."""
 
     choice = True
 
     def properties(self, hooks: Hooks) -> dict[str, Any]:
-        """Return a line of text, with a button to choose a file where it names one."""
+        """Return the string property by name; as a file path if the field names a file."""
         file = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}} if self.names_file else {}
         return {self.name: bpy.props.StringProperty(**self._common(hooks), **file, default=self.text(self.default))}
 
     def text(self, value: Any) -> str:
-        """Return a value as text; nothing at all for None."""
+        """Return a value as the property's text; empty for None."""
         return value or ""
 
     @property
     def names_file(self) -> bool:
-        """Return whether it can be nothing but a file."""
+        """Return whether the field is optional and its name or tooltip mentions a file."""
         return self.optional and "file" in f"{self.name} {self.tooltip}".lower()
 
     def read(self, owner: Any, base: Any) -> Any:
-        """Return the text; a file beside the .blend file by its whole name."""
+        """Return the text, None if it is empty and optional; Blender's ``//`` in file paths is resolved."""
         text = str(getattr(owner, self.name))
         if self.optional and not text:
             return None
         return bpy.path.abspath(text) if text.startswith("//") and self.names_file else text
 
     def write(self, owner: Any, value: Any) -> None:
-        """Show a value as text."""
+        """Set the property to a value's text."""
         setattr(owner, self.name, self.text(value))
 
     def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
-        """Draw the text; greyed in it what it has while nothing is given."""
+        """Draw the text field, with the inherited value as placeholder if it is optional."""
         greyed = self.inherited_text(settings) if self.optional else ""
         value_row(layout, self.label).prop(owner, self.name, text="", placeholder=greyed)
 
 
 class NumbersField(TextField):
-    """Several numbers as text, separated by commas: exact, and as many as are wanted."""
+    """Several numbers as comma-separated text, without loss of digits."""
 
     choice = False
     names_file = False
 
     def text(self, value: Any) -> str:
-        """Return numbers as text."""
+        """Return numbers as comma-separated text; empty for None."""
         return list_as_text(value or ())
 
     def read(self, owner: Any, base: Any) -> list[float] | None:
-        """Return the numbers; raise `InputError` if there is something else among them."""
+        """Return the numbers in the text, None if it is empty and optional; InputError if they aren't numbers."""
         text = getattr(owner, self.name)
         if self.optional and not text.strip():
             return None
@@ -434,17 +434,17 @@ class NumbersField(TextField):
 
 
 class JsonField(TextField):
-    """Whatever else the schema may hold: its JSON text."""
+    """A field of any other type, edited as JSON text."""
 
     choice = False
     names_file = False
 
     def text(self, value: Any) -> str:
-        """Return data as JSON."""
+        """Return data as JSON text; empty for None."""
         return "" if value is None else json.dumps(value)
 
     def read(self, owner: Any, base: Any) -> Any:
-        """Return the data; raise `InputError` if it isn't JSON."""
+        """Return the data of the JSON text, None if it is empty; InputError if it isn't JSON."""
         text = getattr(owner, self.name).strip()
         try:
             return json.loads(text) if text else None
@@ -453,7 +453,7 @@ class JsonField(TextField):
 
 
 class SYNTHROADS_PG_file(bpy.types.PropertyGroup):
-    """One file of a list."""
+    """One entry in a list of files."""
 
     __annotations__ = {
         "file": bpy.props.StringProperty(
@@ -463,26 +463,26 @@ class SYNTHROADS_PG_file(bpy.types.PropertyGroup):
 
 
 class FilesField(Field):
-    """Files, one below the other."""
+    """A list of file paths, a row each."""
 
     def properties(self, hooks: Hooks) -> dict[str, Any]:
-        """Return a list; it is empty at first."""
+        """Return the collection property by name; it starts empty."""
         return {self.name: bpy.props.CollectionProperty(type=SYNTHROADS_PG_file, **self._common({}))}
 
     def read(self, owner: Any, base: Any) -> list[str]:
-        """Return the files that are named, those beside the .blend file by their whole names."""
+        """Return the paths that aren't empty, with Blender's ``//`` resolved."""
         texts = [item.file for item in getattr(owner, self.name) if item.file]
         return [bpy.path.abspath(text) if text.startswith("//") else text for text in texts]
 
     def write(self, owner: Any, value: Any) -> None:
-        """Show files."""
+        """Replace the list of files with the given paths."""
         items = getattr(owner, self.name)
         items.clear()
         for text in value or ():
             items.add().file = text
 
     def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
-        """Draw a row for each file, with buttons that add one and take it off."""
+        """Draw a row with a remove button for each file, and a button to add one."""
         for number, item in enumerate(getattr(owner, self.name)):
             row = layout.row(align=True)
             row.use_property_split = False
@@ -493,6 +493,6 @@ class FilesField(Field):
 
 
 def checkbox_path(path: str) -> str:
-    """Return the path of a field's checkbox."""
+    """Return the path of a field's checkbox property: ``own_`` before the last part of the field's path."""
     head, dot, name = path.rpartition(".")
     return f"{head}{dot}own_{name}"

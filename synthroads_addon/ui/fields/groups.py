@@ -17,7 +17,7 @@ from .fields import Field, FilesField, Hooks, OptionalField
 
 
 class GroupField(OptionalField):
-    """A part of the scenario: a property group of its own.
+    """A nested model of the scenario as a property group of its own.
 
     Attributes:
         fields: what it holds, by name.
@@ -36,50 +36,50 @@ class GroupField(OptionalField):
         self.group = type(name, (bpy.types.PropertyGroup,), {"__annotations__": annotations})
 
     def properties(self, hooks: Hooks) -> dict[str, Any]:
-        """Return a pointer to its group, and its checkbox."""
+        """Return the pointer property to the nested group and, if it is optional, its checkbox, by name."""
         pointer = bpy.props.PointerProperty(type=self.group, name=self.label, description=self.tooltip)
         return self.checkbox(hooks) | {self.name: pointer}
 
     def read_given(self, owner: Any, base: Any) -> dict[str, Any]:
-        """Return the part's data without fields that aren't given."""
+        """Return the nested group's values as JSON data, without fields that aren't given."""
         return read_fields(self.fields_of(self.model_in(owner)), getattr(owner, self.name), base)
 
     def model_of(self, settings: Any) -> type[BaseModel]:
-        """Return the model that declares its fields, as the panel is set."""
+        """Return the pydantic model that declares the nested fields, with the panel's settings."""
         return self.model_in(self.owner(settings))
 
     def model_in(self, owner: Any) -> type[BaseModel]:
-        """Return the same of its owner."""
+        """Return the pydantic model that declares the nested fields, from the property group that holds it."""
         model: type[BaseModel] = self.kind
         return model
 
     def fields_of(self, model: type[BaseModel]) -> dict[str, Field]:
-        """Return the fields that a model of it declares."""
+        """Return those of the nested fields, by name, that a model declares."""
         return {name: field for name, field in self.fields.items() if name in model.model_fields}
 
     def write_given(self, owner: Any, value: Any) -> None:
-        """Show the part's data."""
+        """Set the nested group's properties to JSON data."""
         write_fields(self.fields, getattr(owner, self.name), value)
 
     def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
-        """Draw its checkbox, and its fields if it is given."""
+        """Draw the checkbox, if it is optional, and the nested fields if they are given."""
         if not self.optional or self.draw_checkbox(layout, settings, owner):
             self.draw_fields(layout, settings)
 
     def draw_fields(self, layout: bpy.types.UILayout, settings: Any) -> None:
-        """Draw those of its fields that have an effect."""
+        """Draw those of the nested fields that have an effect."""
         for field in self.fields.values():
             field.draw(layout, settings)
 
     def classes(self) -> Iterator[type]:
-        """Yield the group's class after those in it."""
+        """Yield the property group classes of nested groups, then its own."""
         for field in self.fields.values():
             yield from field.classes()
         yield self.group
 
 
 class KindField(GroupField):
-    """A part of one of several kinds: the fields of all kinds in one group, of which those of the chosen one count.
+    """A union of models as one property group with the fields of all kinds; only those of the chosen kind count.
 
     A kind may have a ``label`` for people, and `usual` values of fields that aren't given.
 
@@ -104,16 +104,16 @@ class KindField(GroupField):
         super().__init__(path, info, create_model(models[0].__name__, **fields), optional, default, hooks)
 
     def write_given(self, owner: Any, value: Any) -> None:
-        """Show the part's data; the fields of other kinds are as at first."""
+        """Set the group's properties to JSON data, and those of other kinds to their defaults."""
         super().write_given(owner, _defaults(self.kind) | value)
 
     def model_in(self, owner: Any) -> type[BaseModel]:
-        """Return the model of the kind that is chosen."""
+        """Return the pydantic model of the chosen kind."""
         return self.kinds[getattr(getattr(owner, self.name), self.tag)]
 
 
 class NamedOrByHandField(Field):
-    """One of the standard parts by its name, or a part by hand, which is a group of its own: ``NAME_by_hand``.
+    """A standard part chosen by name in a menu, or a part by hand in a nested group, ``NAME_by_hand``.
 
     Attributes:
         by_hand: the part by hand.
@@ -130,35 +130,35 @@ class NamedOrByHandField(Field):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Return the names of its properties."""
+        """Return the names of the menu's and the group's properties."""
         return (self.name, self.by_hand.name)
 
     def properties(self, hooks: Hooks) -> dict[str, Any]:
-        """Return a menu, and the group."""
+        """Return the menu property and the pointer to the nested group, by name."""
         items = [*self.items, (BY_HAND, "By Hand", "Widths of your own")]
         default = self.default if isinstance(self.default, str) else BY_HAND
         menu = bpy.props.EnumProperty(**self._common(hooks), items=items, default=default)
         return {self.name: menu} | self.by_hand.properties({})
 
     def read(self, owner: Any, base: Any) -> Any:
-        """Return the name, or the data of the part by hand."""
+        """Return the standard part's name, or the JSON data of the part by hand."""
         chosen = getattr(owner, self.name)
         return self.by_hand.read(owner, base if isinstance(base, dict) else {}) if chosen == BY_HAND else chosen
 
     def write(self, owner: Any, value: Any) -> None:
-        """Show a name, or the data of a part by hand."""
+        """Select a standard part by its name, or By Hand with the part's JSON data."""
         setattr(owner, self.name, BY_HAND if isinstance(value, dict) else value)
         if isinstance(value, dict):
             self.by_hand.write(owner, value)
 
     def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
-        """Draw the menu, and the fields of a part by hand."""
+        """Draw the menu and, if By Hand is chosen, the nested fields."""
         super().draw_row(layout, settings, owner)
         if getattr(owner, self.name) == BY_HAND:
             self.by_hand.draw_fields(layout, settings)
 
     def classes(self) -> Iterator[type]:
-        """Yield the group's class."""
+        """Yield the property group classes of the part by hand."""
         return self.by_hand.classes()
 
 
@@ -167,18 +167,18 @@ NOT_HERE = ("tolerance", "time_budget")
 
 
 def make_fields(model: type[BaseModel], default: dict[str, Any], path: str, hooks: Hooks) -> dict[str, Field]:
-    """Return the fields of a model by name, except those that can have one value only."""
+    """Return the fields of a pydantic model by name, without constants and those that the panel lacks."""
     infos, before = model.model_fields.items(), f"{path}." if path else ""
     made = (make_field(f"{before}{name}", info, default.get(name), hooks) for name, info in infos)
     return {field.name: field for field in made if field}
 
 
 def make_field(path: str, info: FieldInfo, default: Any, hooks: Hooks) -> Field | None:
-    """Return a field as the panel keeps it, chosen by its type; None for a constant, or if the panel lacks it."""
+    """Return the `Field` for a schema field by its type; None for a constant, or if the panel lacks it."""
     if path in NOT_HERE:
         return None
     kind, optional = _without_none(info.annotation)
-    tag = _tag(info)
+    tag = _discriminator(info)
     if tag:
         return KindField(path, info, kind, tag, optional, default, hooks)
     if get_origin(kind) is Union or isinstance(kind, types.UnionType):
@@ -212,20 +212,20 @@ def _simple(kind: Any) -> type[Field]:
 
 
 def read_fields(fields: Mapping[str, Field], owner: Any, base: Any) -> dict[str, Any]:
-    """Return what a property group shows as JSON data, without fields that aren't given."""
+    """Return a property group's values as JSON data by field name, without fields that aren't given."""
     loaded = base if isinstance(base, dict) else {}
     values = {name: field.read(owner, loaded.get(name)) for name, field in fields.items()}
     return {name: value for name, value in values.items() if value is not None}
 
 
 def write_fields(fields: Mapping[str, Field], owner: Any, data: Mapping[str, Any]) -> None:
-    """Have a property group show JSON data. Choices come first: choosing resets what depends on it."""
+    """Set a property group to JSON data, choices first, as choosing resets fields that depend on it."""
     for field in sorted(fields.values(), key=lambda field: not field.choice):
         field.write(owner, data.get(field.name))
 
 
 def shown_state(fields: Mapping[str, Field], owner: Any) -> list[Any]:
-    """Return all that a property group shows, right or wrong, to tell whether it has changed; quick."""
+    """Return the raw values of all properties in a group, valid or not, for fast comparison."""
     result: list[Any] = []
     for field in fields.values():
         for name in field.names:
@@ -241,7 +241,7 @@ def shown_state(fields: Mapping[str, Field], owner: Any) -> list[Any]:
 
 
 def leaves(fields: Mapping[str, Field]) -> Iterator[Field]:
-    """Yield the fields that are drawn by themselves: all but parts, unless a part may be left out as a whole."""
+    """Yield the fields that are drawn by themselves: fields of nested groups, and optional groups as a whole."""
     for field in fields.values():
         if isinstance(field, GroupField) and not field.optional:
             yield from leaves(field.fields)
@@ -250,7 +250,7 @@ def leaves(fields: Mapping[str, Field]) -> Iterator[Field]:
 
 
 def _without_none(kind: Any) -> tuple[Any, bool]:
-    """Return a type without None and the limits that are annotated, and whether None was allowed."""
+    """Return a type without None and annotations, and whether None was allowed."""
     kind = _bare(kind)
     if get_origin(kind) is Union or isinstance(kind, types.UnionType):
         parts = [part for part in get_args(kind) if part is not type(None)]
@@ -259,8 +259,8 @@ def _without_none(kind: Any) -> tuple[Any, bool]:
     return kind, False
 
 
-def _tag(info: FieldInfo) -> str:
-    """Return the field by which the models of a union differ, e.g. ``condition``; empty if it is no such union."""
+def _discriminator(info: FieldInfo) -> str:
+    """Return the name of the discriminator field of a union of models, e.g. ``condition``; empty if there is none."""
     if isinstance(info.discriminator, str):
         return info.discriminator
     for part in [info.annotation, *get_args(info.annotation)]:
@@ -281,7 +281,7 @@ def _is_model(kind: Any) -> bool:
 
 
 def _defaults(model: type[BaseModel]) -> dict[str, Any]:
-    """Return the defaults of a model that has one for each field, or else of those that have."""
+    """Return the JSON defaults of a model's fields, without required fields."""
     data: dict[str, Any] = {}
     for name, info in model.model_fields.items():
         value = info.get_default(call_default_factory=True)
@@ -293,5 +293,5 @@ def _defaults(model: type[BaseModel]) -> dict[str, Any]:
 
 
 def _first_values(model: type[BaseModel]) -> dict[str, Any]:
-    """Return what a part by hand shows at first: an example where there is no default."""
+    """Return the initial JSON values of a part by hand: its defaults, and two lanes of 3.75 m."""
     return {"lanes": [3.75, 3.75]} | _defaults(model)

@@ -14,7 +14,7 @@ Hook = Callable[[Any, Any], None]
 
 
 def _clear(*names: str) -> Hook:
-    """Return a hook that takes back values of one's own."""
+    """Return an update hook that resets the named properties to their type's empty value."""
 
     def clear(group: Any, context: Any) -> None:
         for name in names:
@@ -23,8 +23,8 @@ def _clear(*names: str) -> Hook:
     return clear
 
 
-def _instead(name: str, *others: str) -> Hook:
-    """Return a hook that takes back other values once this one is given."""
+def _clear_others(name: str, *others: str) -> Hook:
+    """Return an update hook that resets other properties when the property `name` is set."""
 
     def instead(group: Any, context: Any) -> None:
         if getattr(group, name):
@@ -67,10 +67,10 @@ HOOKS: dict[str, Hook] = {
     # A pulse rate and angles are those of one device, strips and heights those of one platform.
     "scan.device": _clear(*map(checkbox_path, DEVICE_SETTINGS)),
     "scan.platform.kind": _clear("own_height", "own_speed", "lateral_offsets", "stations", "file"),
-    "scan.own_weather": _instead("own_weather", "own_attenuation"),
-    "scan.own_attenuation": _instead("own_attenuation", "own_weather"),
-    "scan.weather.own_rate_mm_h": _instead("own_rate_mm_h", "own_visibility"),
-    "scan.weather.own_visibility": _instead("own_visibility", "own_rate_mm_h"),
+    "scan.own_weather": _clear_others("own_weather", "own_attenuation"),
+    "scan.own_attenuation": _clear_others("own_attenuation", "own_weather"),
+    "scan.weather.own_rate_mm_h": _clear_others("own_rate_mm_h", "own_visibility"),
+    "scan.weather.own_visibility": _clear_others("own_visibility", "own_rate_mm_h"),
     "scan.beam_rings": _no_rays,
     "scan.rays_per_pulse": _no_rings,
     "colour.lighting": _no_samples,

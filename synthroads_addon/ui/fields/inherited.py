@@ -27,7 +27,7 @@ DEVICE_SETTINGS = tuple(
 
 
 def section_of(settings: Any) -> StandardCrossSection | None:
-    """Return the chosen cross-section before lanes and median are changed; None if it is none."""
+    """Return the panel's cross-section, without changes of lanes and median; None if its lanes aren't numbers."""
     road = settings.road
     if road.cross_section != BY_HAND:
         return STANDARD_CROSS_SECTIONS[road.cross_section]
@@ -40,7 +40,7 @@ def section_of(settings: Any) -> StandardCrossSection | None:
 
 
 def scanner_setting(settings: Any, without: str = "") -> ScannerSetting | None:
-    """Return how the device is set, `without` one of its numbers; None if it can't be read or set so."""
+    """Return the panel's scanner setting, one number optionally left at its default; None if it is invalid."""
     device = device_of(settings.scan.device)
     if device is None:
         return None

@@ -21,14 +21,14 @@ _SMALL = 20.0
 
 
 def is_share(info: FieldInfo) -> bool:
-    """Return whether a number of the schema is a share or a probability, 0 to 1."""
+    """Return whether a schema field is a dimensionless number limited to 0 to 1."""
     return (*_limits(info), unit_of(info)) == (0, 1, "1")
 
 
 def number_property(
     info: FieldInfo, whole: bool, default: Any, unit: str | None = None, beside: float = 0.0, **arguments: Any
 ) -> Any:
-    """Return a float or int property with the limits, default and unit of a field of the schema.
+    """Return a Blender float or int property with the limits, default and unit of a schema field.
 
     `beside` is the other end of an interval: both show as many digits as the larger one needs.
     Blender's limits are inclusive: a limit that the schema excludes is refused when the scenario is made.
@@ -43,7 +43,7 @@ def number_property(
     if whole and not large:
         pixels = {"subtype": "PIXEL"} if unit == "px" else {}
         limits = {"min": int(max(low, -LARGEST_INTEGER)), "max": int(min(high, LARGEST_INTEGER))}
-        return bpy.props.IntProperty(default=fitting(int(first)), **limits, **pixels, **arguments)
+        return bpy.props.IntProperty(default=clamp_32_bit(int(first)), **limits, **pixels, **arguments)
     largest = abs(first) or (1.0 if high > _SMALL else 0.0)
     fine = max(largest, abs(beside)) < 0.1 and not share
     return bpy.props.FloatProperty(
@@ -59,9 +59,9 @@ def number_property(
 
 
 def exact(value: float, loaded: Any) -> float:
-    """Return a property's number: the one that was loaded where it is still that one, else the shortest decimal."""
+    """Return a 32-bit property's value as the loaded number if it still equals that, else as the shortest decimal."""
     if isinstance(loaded, int | float) and not isinstance(loaded, bool):
-        if isinstance(value, int) and fitting(int(loaded)) == value:
+        if isinstance(value, int) and clamp_32_bit(int(loaded)) == value:
             return loaded
         if isinstance(value, float) and float(np.float32(loaded)) == value:
             return loaded
@@ -69,7 +69,7 @@ def exact(value: float, loaded: Any) -> float:
 
 
 def push_along(name: str, other: str, limit: Callable[[float, float], float]) -> Callable[[Any, Any], None]:
-    """Return what keeps the other end of an interval on its side."""
+    """Return an update hook that moves an interval's other end so that minimum <= maximum."""
 
     def push(group: Any, context: Any) -> None:
         pushed = limit(getattr(group, name), getattr(group, other))
@@ -79,13 +79,13 @@ def push_along(name: str, other: str, limit: Callable[[float, float], float]) ->
     return push
 
 
-def fitting(value: int) -> int:
-    """Return the nearest whole number of 32 bits."""
+def clamp_32_bit(value: int) -> int:
+    """Return an integer clamped to 32 bits."""
     return max(-LARGEST_INTEGER, min(value, LARGEST_INTEGER))
 
 
 def list_as_text(values: Sequence[float]) -> str:
-    """Return numbers as a text that `numbers_in` reads, exactly."""
+    """Return numbers as comma-separated text that `numbers_in` reads back exactly."""
     return ", ".join(json.dumps(value).removesuffix(".0") for value in values)
 
 
@@ -97,7 +97,7 @@ def _number(text: str) -> float:
 
 
 def numbers_in(text: str) -> list[float]:
-    """Return the numbers of a text, separated by commas or blanks; raise ValueError if there is something else."""
+    """Return the numbers in a text, separated by commas, semicolons or blanks; ValueError if there is anything else."""
     return [_number(part) for part in re.split(r"[\s,;]+", text) if part]
 
 

@@ -21,7 +21,7 @@ _CASTER = ScanScenario.model_fields["caster"]
 
 @dataclass(frozen=True)
 class Preferences:
-    """Preferences of the extension.
+    """The extension's preferences as plain values.
 
     Attributes:
         cores: threads that a scan uses where its scenario doesn't say; 0 for every core.
@@ -36,12 +36,12 @@ class Preferences:
     library_folder: str = ""
 
     def library(self, kind: str) -> Path:
-        """Return the folder of the user's ``scenarios`` or ``devices``; it need not be there."""
+        """Return the user's library folder for ``scenarios`` or ``devices``, which need not exist."""
         return Path(bpy.path.abspath(self.library_folder)).expanduser() / kind
 
 
 def preferences() -> Preferences:
-    """Return the preferences, or what they are at first where the add-on isn't among those enabled."""
+    """Return the add-on's current preferences, or the defaults if the add-on isn't enabled."""
     entry = bpy.context.preferences.addons.get(PACKAGE)
     chosen = entry.preferences if entry else None
     if chosen is None:
@@ -55,7 +55,7 @@ def preferences() -> Preferences:
 
 
 def with_preferences(scenario: Scenario) -> Scenario:
-    """Return a scenario that casts as the preferences say where it leaves that open itself."""
+    """Return a copy of a scenario with threads and ray caster from the preferences where it leaves them open."""
     chosen, scan = preferences(), scenario.scan
     caster = chosen.caster if scan.caster == "auto" else scan.caster
     update = {"threads": scan.threads or chosen.cores, "caster": caster}
@@ -70,7 +70,7 @@ class SYNTHROADS_OT_add_asset_library(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """The library must be there, and not be known yet."""
+        """Return whether the library file exists and Blender doesn't have it yet."""
         if not (LIBRARY_FOLDER / LIBRARY_FILE).exists():
             cls.poll_message_set("Only an installed extension has the library")
             return False
@@ -80,7 +80,7 @@ class SYNTHROADS_OT_add_asset_library(bpy.types.Operator):
         return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Add it to the asset libraries in Blender's preferences."""
+        """Add the folder to the asset libraries in Blender's preferences."""
         context.preferences.filepaths.asset_libraries.new(name=LIBRARY_NAME, directory=str(LIBRARY_FOLDER))
         self.report({"INFO"}, f"The asset browser has the library {LIBRARY_NAME} now")
         return {"FINISHED"}
@@ -92,7 +92,7 @@ def _has_asset_library(context: bpy.types.Context) -> bool:
 
 
 class SYNTHROADS_AP_preferences(bpy.types.AddonPreferences):
-    """The add-on's entry in Blender's preferences."""
+    """The add-on's preferences in Blender."""
 
     bl_idname = PACKAGE
 
@@ -120,7 +120,7 @@ class SYNTHROADS_AP_preferences(bpy.types.AddonPreferences):
     )
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Show them all."""
+        """Draw all preferences and the button for the asset library."""
         layout = self.layout
         layout.use_property_split = True
         for name in ("cores", "caster", "output_folder"):

@@ -38,7 +38,7 @@ _Generated: Any = type(
 
 
 class SYNTHROADS_PG_settings(_Generated, bpy.types.PropertyGroup):
-    """State of the panel; `scenario` turns it into the same description of a job that the command line takes."""
+    """The panel's settings, convertible to and from a `Scenario`."""
 
     preset: bpy.props.StringProperty(
         name="Scenario", default=FIRST, description="Scenario that these settings were taken from, built-in or a file"
@@ -58,15 +58,15 @@ class SYNTHROADS_PG_settings(_Generated, bpy.types.PropertyGroup):
     )
 
     def scenario(self) -> Scenario:
-        """Return the job that the panel describes; raise `InputError` where a value is refused."""
+        """Return the scenario that the settings describe; InputError if a value is invalid."""
         return Scenario.from_dict(read_fields(FIELDS, self, self._base()))
 
     def exact_seed(self) -> int:
-        """Return the seed, which Blender's whole numbers may be too short to show."""
+        """Return the scenario's seed, which may exceed the 32 bits that Blender shows."""
         return int(FIELDS["seed"].read(self, self._base()["seed"]))
 
-    def take(self, scenario: Scenario) -> None:
-        """Show a scenario, to the last digit; raise `InputError` if it has what the panel lacks."""
+    def show_scenario(self, scenario: Scenario) -> None:
+        """Set all settings to a scenario, without losing digits; InputError if it uses fields the panel lacks."""
         data = scenario.to_dict()
         for name in NOT_HERE:
             if name in data:
@@ -75,8 +75,8 @@ class SYNTHROADS_PG_settings(_Generated, bpy.types.PropertyGroup):
         write_fields(FIELDS, self, data)
         self.loaded = json.dumps(data)
 
-    def take_preset(self, name: str) -> None:
-        """Show a built-in scenario with this seed and fidelity, or a file's with its own.
+    def show_preset(self, name: str) -> None:
+        """Set all settings to a built-in scenario, keeping seed, fidelity and outputs, or to a file.
 
         Raises:
             InputError: there is no such scenario, or it is wrong.
@@ -85,34 +85,34 @@ class SYNTHROADS_PG_settings(_Generated, bpy.types.PropertyGroup):
         if Path(name).suffix != ".json":
             kept = read_fields({key: FIELDS[key] for key in _KEPT}, self, None)
             scenario = Scenario.from_dict(scenario.to_dict() | kept)
-        self.take(scenario)
+        self.show_scenario(scenario)
         self.preset = name
 
     def _base(self) -> dict[str, Any]:
-        """Return the scenario that was loaded last: where a property still shows its value, that is meant."""
+        """Return the JSON data of the scenario loaded last, whose exact numbers replace unchanged ones."""
         return _data(self.loaded) if self.loaded else FIRST_DATA
 
     def road_values(self) -> str:
-        """Return what a road is built from, to tell whether it has changed."""
+        """Return a text of all settings that a road is built from, to detect changes."""
         return json.dumps(shown_state({name: FIELDS[name] for name in _OF_ROAD}, self))
 
     def chosen_folder(self) -> str:
-        """Return the folder as it is written here or else in the preferences."""
+        """Return the output folder as written in the panel, or the preferences' if it is empty."""
         return str(self.output) or preferences().output_folder
 
     def needs_saved_file(self) -> bool:
-        """Return whether the output folder is given relative to a file that has no place yet."""
+        """Return whether the output folder is relative to a .blend file not saved yet."""
         return self.chosen_folder().startswith("//") and not bpy.data.filepath
 
     def folder_to_open(self) -> Path | None:
-        """Return where a file browser is best opened: the output folder, or the nearest above it that is there."""
+        """Return the output folder or its nearest existing parent; None without a usable folder."""
         if not self.chosen_folder().strip() or self.needs_saved_file():
             return None
         folder = self.folder()
         return next((place for place in (folder, *folder.parents) if place.is_dir()), None)
 
     def folder(self) -> Path:
-        """Return the output folder; raise `InputError` if there is none."""
+        """Return the absolute output folder; InputError if it is empty or relative to an unsaved file."""
         chosen = self.chosen_folder()
         if not chosen.strip():
             raise InputError("Output", None, "choose a folder for the files")

@@ -26,34 +26,34 @@ _NARROW = 260.0
 
 
 def sidebar_width() -> float:
-    """Return the width of the region that is drawn, in pixels at a resolution scale of 1."""
+    """Return the width of the region being drawn, in pixels at a resolution scale of 1; 300 if there is none."""
     region, scale = bpy.context.region, bpy.context.preferences.system.ui_scale or 1.0  # 0 without a window
     return region.width / scale if region and region.width > 1 else _USUAL
 
 
 def row_width() -> float:
-    """Return the width of a row in a panel of the sidebar, in pixels at a resolution scale of 1."""
+    """Return the usable width of a row in a sidebar panel, in pixels at a resolution scale of 1."""
     return max(sidebar_width() - _EDGES, 60.0)
 
 
 def is_narrow() -> bool:
-    """Return whether there is too little room for names beside values."""
+    """Return whether the sidebar is too narrow for labels beside values."""
     return sidebar_width() < _NARROW
 
 
 def text_width(text: str) -> float:
-    """Return the width of a text in a panel, in pixels at a resolution scale of 1."""
+    """Return the width of a text in Blender's panel font, in pixels at a resolution scale of 1."""
     blf.size(0, 11.0)
     return float(blf.dimensions(0, text)[0])
 
 
 def fits(text: str, share: float = 1.0, icons: int = 0) -> bool:
-    """Return whether a text fits into a share of a row, beside icons."""
+    """Return whether a text and a number of icons fit into a share of a row's width."""
     return text_width(text) + _PADDING + icons * _ICON <= share * row_width()
 
 
 def text_lines(text: str, share: float = 1.0, icons: int = 0) -> list[str]:
-    """Return a text in lines that fit into a share of a row, beside icons; a word is broken only if it is too long."""
+    """Wrap a text into lines that fit into a share of a row beside icons; only words that are too long are broken."""
     lines: list[str] = []
     for word in text.split():
         if lines and fits(f"{lines[-1]} {word}", share, icons):
@@ -64,7 +64,7 @@ def text_lines(text: str, share: float = 1.0, icons: int = 0) -> list[str]:
 
 
 def _pieces(word: str, share: float, icons: int) -> list[str]:
-    """Return a word, in pieces if it doesn't fit."""
+    """Return a word broken into pieces that fit into a share of a row beside icons."""
     pieces = []
     while not fits(word, share, icons) and len(word) > _SHORTEST:
         count = next(n for n in range(len(word) - 1, 0, -1) if n <= _SHORTEST or fits(word[:n], share, icons))
@@ -74,7 +74,7 @@ def _pieces(word: str, share: float, icons: int) -> list[str]:
 
 
 def draw_text(layout: bpy.types.UILayout, text: str, icon: str = "NONE", share: float = 1.0, beside: int = 0) -> None:
-    """Draw a text in as many lines as it takes; the icon stands before the first.
+    """Draw a text as labels, wrapped to the available width, with an icon before the first line.
 
     Args:
         layout: a column.
@@ -91,13 +91,13 @@ def draw_text(layout: bpy.types.UILayout, text: str, icon: str = "NONE", share: 
 
 
 def buttons_row(layout: bpy.types.UILayout, texts: Sequence[str], align: bool = False) -> bpy.types.UILayout:
-    """Return a row for buttons with icons, or a column where their texts don't fit side by side."""
+    """Return a row layout for buttons, or a column if their texts don't fit side by side."""
     side_by_side = all(fits(text, 1.0 / len(texts), 1) for text in texts)
     return layout.row(align=align) if side_by_side else layout.column(align=align)
 
 
 def value_row(layout: bpy.types.UILayout, label: str) -> bpy.types.UILayout:
-    """Draw a name, and return the place for its value: beside it where there is room for both, else below."""
+    """Draw a label and return the layout for its value: beside it if both fit, else below."""
     if not is_narrow() and fits(label, NAMES_SHARE):
         split = layout.split(factor=NAMES_SHARE)
         name = split.row()
@@ -114,12 +114,12 @@ def value_row(layout: bpy.types.UILayout, label: str) -> bpy.types.UILayout:
 
 
 def value_share(label: str) -> float:
-    """Return the share of a row that `value_row` leaves for the value."""
+    """Return the share of a row's width that `value_row` leaves for the value of a label."""
     return 1.0 - NAMES_SHARE if not is_narrow() and fits(label, NAMES_SHARE) else 1.0
 
 
 def draw_flag(layout: bpy.types.UILayout, owner: object, name: str, label: str) -> None:
-    """Draw a checkbox with its text: in line with the values where it fits there, else over the whole row.
+    """Draw a checkbox with its label, in the column of values if it fits there, else over the whole row.
 
     Args:
         layout: a column.

@@ -15,8 +15,8 @@ from .properties import PATHS
 
 
 @dataclass(frozen=True)
-class Sheet:
-    """A panel's title, its place among the others, and what it shows.
+class PanelFields:
+    """Description of a panel: its title, its place among the others, and the scenario fields it shows.
 
     Attributes:
         name: the panel's class is SYNTHROADS_PT_name.
@@ -36,14 +36,14 @@ class Sheet:
 
     @property
     def panel(self) -> str:
-        """Return the name of the panel's class."""
+        """Return the name of the panel's Blender class."""
         return f"SYNTHROADS_PT_{self.name}"
 
 
 SHEETS = (
-    Sheet("main", "SynthRoads", "", 0, "fidelity", closed=False),
-    Sheet("road", "Road", "main", 10, "road.cross_section road.length seed", closed=False),
-    Sheet(
+    PanelFields("main", "SynthRoads", "", 0, "fidelity", closed=False),
+    PanelFields("road", "Road", "main", 10, "road.cross_section road.length seed", closed=False),
+    PanelFields(
         "section",
         "Alignment and Section",
         "road",
@@ -51,33 +51,33 @@ SHEETS = (
         "road.design_class road.lanes road.lane_width road.median_width road.radius road.grade_percent "
         "road.lane_changes.* geometric_tolerance road.*",
     ),
-    Sheet("turnouts", "Turnouts", "road", 2, "road.turnouts.*"),
-    Sheet("pavement", "Pavement", "road", 3, "road.pavement.*"),
-    Sheet("markings", "Markings", "road", 4, "road.markings.*"),
-    Sheet("materials", "Materials", "road", 5, "road.materials.* materials_table"),
-    Sheet("map", "Map", "road", 6, "title road.epsg road.map_origin"),
-    Sheet(
+    PanelFields("turnouts", "Turnouts", "road", 2, "road.turnouts.*"),
+    PanelFields("pavement", "Pavement", "road", 3, "road.pavement.*"),
+    PanelFields("markings", "Markings", "road", 4, "road.markings.*"),
+    PanelFields("materials", "Materials", "road", 5, "road.materials.* materials_table"),
+    PanelFields("map", "Map", "road", 6, "title road.epsg road.map_origin"),
+    PanelFields(
         "objects",
         "Objects",
         "main",
         20,
         "road.placement road.vehicles.per_km road.trees_per_hectare road.shrubs_per_hectare road.grass_density",
     ),
-    Sheet("barriers", "Barriers", "objects", 1, "road.barriers.*"),
-    Sheet("furniture", "Furniture", "objects", 2, "road.furniture.*"),
-    Sheet("vehicles", "Vehicles", "objects", 3, "road.vehicles.* scan.traffic_speed_factor"),
-    Sheet("vegetation", "Vegetation", "objects", 4, "vegetation_detail road.vegetation.*"),
-    Sheet("assets", "Assets of Your Own", "objects", 5, "road.assets"),
-    Sheet("environment", "Environment", "main", 30),
-    Sheet("weather", "Sun and Weather", "environment", 1, "road.environment.*", closed=False),
-    Sheet(
+    PanelFields("barriers", "Barriers", "objects", 1, "road.barriers.*"),
+    PanelFields("furniture", "Furniture", "objects", 2, "road.furniture.*"),
+    PanelFields("vehicles", "Vehicles", "objects", 3, "road.vehicles.* scan.traffic_speed_factor"),
+    PanelFields("vegetation", "Vegetation", "objects", 4, "vegetation_detail road.vegetation.*"),
+    PanelFields("assets", "Assets of Your Own", "objects", 5, "road.assets"),
+    PanelFields("environment", "Environment", "main", 30),
+    PanelFields("weather", "Sun and Weather", "environment", 1, "road.environment.*", closed=False),
+    PanelFields(
         "terrain",
         "Terrain",
         "environment",
         2,
         "road.embankment_height road.batter_slope road.undulation road.wavelength road.half_width road.elevation_model",
     ),
-    Sheet(
+    PanelFields(
         "scanner",
         "Scanner",
         "main",
@@ -85,36 +85,36 @@ SHEETS = (
         "scan.device scan.platform.kind scan.platform.file scan.platform.height scan.platform.speed",
         closed=False,
     ),
-    Sheet(
+    PanelFields(
         "device",
         "Pulses and Lines",
         "scanner",
         1,
         "scan.pulse_rate_khz scan.field_of_view_deg scan.lines_per_second scan.angle_step_deg",
     ),
-    Sheet(
+    PanelFields(
         "platform",
         "Platform and Path",
         "scanner",
         2,
         "scan.platform.* scan.platform.roll_deg scan.platform.pitch_deg scan.platform.yaw_deg",
     ),
-    Sheet("beam", "Beam", "scanner", 3, "scan.rays_per_pulse scan.beam_rings scan.beam scan.*"),
-    Sheet("air", "Air", "scanner", 4, "scan.weather scan.attenuation"),
-    Sheet("noise", "Noise", "scanner", 5, "scan.noise.*"),
-    Sheet("motion", "Motion", "scanner", 5, "scan.motion.*"),
-    Sheet("performance", "Performance", "scanner", 6, "scan.caster scan.threads"),
-    Sheet("colour", "Colour", "main", 50, "colour.source colour.rgb colour.mode"),
-    Sheet("images", "Rendering", "colour", 1, "colour.*"),
-    Sheet("output", "Output", "main", 60, "outputs cloud.formats twin ifc"),
-    Sheet("attributes", "Point Attributes", "output", 1, "cloud.*"),
+    PanelFields("beam", "Beam", "scanner", 3, "scan.rays_per_pulse scan.beam_rings scan.beam scan.*"),
+    PanelFields("air", "Air", "scanner", 4, "scan.weather scan.attenuation"),
+    PanelFields("noise", "Noise", "scanner", 5, "scan.noise.*"),
+    PanelFields("motion", "Motion", "scanner", 5, "scan.motion.*"),
+    PanelFields("performance", "Performance", "scanner", 6, "scan.caster scan.threads"),
+    PanelFields("colour", "Colour", "main", 50, "colour.source colour.rgb colour.mode"),
+    PanelFields("images", "Rendering", "colour", 1, "colour.*"),
+    PanelFields("output", "Output", "main", 60, "outputs cloud.formats twin ifc"),
+    PanelFields("attributes", "Point Attributes", "output", 1, "cloud.*"),
 )
 """All panels made of the scenario's fields."""
 
 
 @cache
-def fields_of(sheet: Sheet) -> tuple[Field, ...]:
-    """Return the fields that a panel shows, in their order."""
+def fields_of(sheet: PanelFields) -> tuple[Field, ...]:
+    """Return the fields that a sheet's panel shows, in order; cached."""
     return tuple(field for row in sheet.rows.split() for field in _fields(row))
 
 
@@ -131,7 +131,7 @@ def _fields(row: str) -> Iterator[Field]:
 
 @cache
 def _place_of(path: str) -> str:
-    """Return the row that a field has its place in: its own, or that of the innermost part."""
+    """Return the sheet row that shows a field: its own path, or the innermost part with ``.*``; empty if none."""
     rows = {row for sheet in SHEETS for row in sheet.rows.split()}
     if path in rows:
         return path

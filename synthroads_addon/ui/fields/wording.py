@@ -25,12 +25,12 @@ _SMALL_WORDS = {"and", "at", "by", "from", "in", "of", "per", "the", "to"}
 
 
 def written_unit(unit: str) -> str:
-    """Return a unit as people write it."""
+    """Return a schema unit as it is written in the panel."""
     return UNITS.get(unit, unit)
 
 
 def label(path: str, info: FieldInfo) -> str:
-    """Return a field's name in the panel: its title in the schema, or its name there and the unit."""
+    """Return a field's label in the panel: its title in the schema, else its name in title case with the unit."""
     if info.title:
         return info.title
     unit = unit_of(info)
@@ -40,11 +40,11 @@ def label(path: str, info: FieldInfo) -> str:
 
 
 def value_name(value: str, info: FieldInfo) -> str:
-    """Return what the panel calls a value of a choice: its label in the schema, or its name with capitals."""
+    """Return the panel's text for a value of a choice: its label in the schema, else its name in title case."""
     return str((note_of(info, "labels") or {}).get(value) or title_case(value))
 
 
 def title_case(name: str) -> str:
-    """Return a name of the schema with capitals, as Blender writes its labels."""
+    """Return a schema name in title case, as Blender writes labels: underscores become blanks."""
     words = name.replace("_", " ").split()
     return " ".join(w if i and w in _SMALL_WORDS else w[:1].upper() + w[1:] for i, w in enumerate(words))

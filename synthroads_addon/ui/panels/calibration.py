@@ -19,14 +19,14 @@ from ..work.common import Sidebar, column, large_button, refusing
 from ..work.job import PanelJob
 from ..work.long_operator import LongOperator
 from ..work.pictures import ShowPicture, keep_picture
-from .calibration_settings import file_of, textured_materials
+from .calibration_settings import path_of, textured_materials
 
 PICTURE = "SynthRoads Calibration"
 """Name of the image that shows the result."""
 
 
 def panel_job(job: CalibrationJob) -> PanelJob[Calibration]:
-    """Return a calibration as a job in a thread: it touches none of Blender's data."""
+    """Return a `PanelJob` that runs a calibration in a thread, as it touches none of Blender's data."""
     return PanelJob.aside("Calibration", lambda report: exhaust(calibration_steps(job), report), "Calibrating")
 
 
@@ -35,18 +35,18 @@ latest: Calibration | None = None
 
 
 def fitted_result() -> Calibration | None:
-    """Return the last result if it is a fit."""
+    """Return the latest calibration if it fitted materials to a real cloud, else None."""
     return latest if latest is not None and latest.job.fit and latest.job.real is not None else None
 
 
-class _Calibrates(LongOperator):
-    """Base of the two buttons that calibrate."""
+class _CalibrationOperator(LongOperator):
+    """Base of the two operators that calibrate: compare, and fit."""
 
     fit = False
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Object mode, nothing else at work, and something to compare."""
+        """Return whether nothing else is at work and the panel has a material, and a cloud if it fits."""
         if not super().poll(context):
             return False
         settings = context.scene.synthroads_calibration
@@ -57,11 +57,11 @@ class _Calibrates(LongOperator):
         return True
 
     def job(self, context: bpy.types.Context) -> PanelJob[Calibration]:
-        """Return the calibration that the panel asks for."""
+        """Return the calibration that the panel's settings describe, to be run in a thread."""
         return panel_job(context.scene.synthroads_calibration.job(self.fit))
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[Calibration]) -> str:
-        """Draw the diagrams; return the largest errors."""
+        """Keep the result as the latest and draw its diagrams; return a sentence with the largest errors."""
         global latest
         assert job.result is not None
         latest = job.result
@@ -69,14 +69,14 @@ class _Calibrates(LongOperator):
         return _sentence(job.result)
 
 
-class SYNTHROADS_OT_compare_intensities(_Calibrates, bpy.types.Operator):
+class SYNTHROADS_OT_compare_intensities(_CalibrationOperator, bpy.types.Operator):
     """Show what intensities the materials are expected to give, beside those of the real cloud"""
 
     bl_idname = "synthroads.compare_intensities"
     bl_label = "Compare"
 
 
-class SYNTHROADS_OT_fit_materials(_Calibrates, bpy.types.Operator):
+class SYNTHROADS_OT_fit_materials(_CalibrationOperator, bpy.types.Operator):
     """Fit the materials to the real cloud, with one gain of the device for all of them"""
 
     bl_idname = "synthroads.fit_materials"
@@ -92,7 +92,7 @@ class SYNTHROADS_OT_save_materials(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Something was fitted."""
+        """Return whether materials have been fitted."""
         if fitted_result() is None:
             cls.poll_message_set("Fit materials first")
             return False
@@ -100,8 +100,8 @@ class SYNTHROADS_OT_save_materials(bpy.types.Operator):
 
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
-        """Write the table; other materials that it holds stay."""
-        result, path = fitted_result(), file_of(context.scene.synthroads_calibration.table)
+        """Write the fitted materials to the table's file; other materials in it stay."""
+        result, path = fitted_result(), path_of(context.scene.synthroads_calibration.table)
         if path is None:
             raise InputError("Table", None, "choose the table's file")
         save_fitted(cast(Calibration, result), path, overwrite=True)
@@ -115,7 +115,7 @@ class SYNTHROADS_OT_add_calibration_class(bpy.types.Operator):
     bl_label = "Add Material"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Add a row: the first two are asphalt and white paint."""
+        """Add a row to the list of materials: asphalt as the first, white paint after it."""
         settings = context.scene.synthroads_calibration
         usual = (("asphalt", "road"), ("paint_white", "road_marking"))
         row = settings.classes.add()
@@ -133,7 +133,7 @@ class SYNTHROADS_OT_remove_calibration_class(bpy.types.Operator):
     index: bpy.props.IntProperty()
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Remove the row."""
+        """Remove the row `index` from the list of materials."""
         context.scene.synthroads_calibration.classes.remove(self.index)
         return {"FINISHED"}
 
@@ -147,7 +147,7 @@ class SYNTHROADS_OT_show_calibration(ShowPicture, bpy.types.Operator):
 
 
 class SYNTHROADS_PT_calibration(Sidebar, bpy.types.Panel):
-    """Intensities of materials and of real clouds."""
+    """Panel of the calibration: materials' intensities against those of a real cloud."""
 
     bl_label = "Calibration"
     bl_parent_id = "SYNTHROADS_PT_main"
@@ -155,7 +155,7 @@ class SYNTHROADS_PT_calibration(Sidebar, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Show materials, cloud, view, buttons and the result."""
+        """Draw the materials, cloud and view settings, the buttons, and the latest result."""
         layout, settings = column(self), context.scene.synthroads_calibration
         _draw_classes(layout, settings)
         _draw_cloud(layout.column(), settings)
@@ -206,12 +206,12 @@ def _draw_view(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) ->
 
 
 def _draw_result(layout: bpy.types.UILayout, result: Calibration) -> None:
-    """Show the figures, and what can be done with them."""
+    """Draw a calibration's gain and figures by material, and the buttons to show diagrams and save the table."""
     if result.job.real is not None:
         draw_text(layout, f"Gain {result.gain:.5g}, one for all")
     for entry in result.compared:
         box = layout.box()
-        for number, line in enumerate(lines_of(entry)):
+        for number, line in enumerate(result_lines(entry)):
             draw_text(box, line, "MATERIAL" if number == 0 else "NONE", share=0.9)
     row = buttons_row(layout, ("Show Diagrams", "Save to Table"), align=True)
     row.operator(SYNTHROADS_OT_show_calibration.bl_idname, icon="IMAGE_DATA")
@@ -219,8 +219,8 @@ def _draw_result(layout: bpy.types.UILayout, result: Calibration) -> None:
         row.operator(SYNTHROADS_OT_save_materials.bl_idname, icon="FILE_TICK")
 
 
-def lines_of(entry: ClassComparison) -> list[str]:
-    """Return the figures of a material as the panel shows them."""
+def result_lines(entry: ClassComparison) -> list[str]:
+    """Return a material's reflectivity, percentiles and errors as the panel's lines of text."""
     before, after = entry.before.reflectivity, entry.after.reflectivity
     changed = f"{before:.3f} → {after:.3f}" if before != after else f"{after:.3f}"
     data = entry.to_dict()
@@ -244,6 +244,6 @@ def _sentence(result: Calibration) -> str:
 
 
 def unregister() -> None:
-    """Forget the last result."""
+    """Drop the latest calibration."""
     global latest
     latest = None

@@ -25,7 +25,7 @@ _RAY = "RAY"
 
 
 def _materials(self: Any, context: bpy.types.Context, typed: str) -> Iterator[str]:
-    """Yield the materials of table and scene that hold what is typed."""
+    """Yield the names of materials in table and scene that contain the typed text, for a search field."""
     names = {*materials(), *(table_name(item) for item in bpy.data.materials)}
     yield from sorted(name for name in names if typed.lower() in name.lower())
 
@@ -38,7 +38,7 @@ def _devices() -> Iterator[tuple[str, str, str]]:
 
 
 class SYNTHROADS_PG_calibration_class(bpy.types.PropertyGroup):
-    """A material and the class of the cloud that it is compared with."""
+    """A material to be calibrated and the class of the cloud that it is compared with."""
 
     material: bpy.props.StringProperty(name="Material", default="asphalt", search=_materials)
     told: bpy.props.StringProperty(
@@ -57,7 +57,7 @@ class SYNTHROADS_PG_calibration_class(bpy.types.PropertyGroup):
 
 
 class SYNTHROADS_PG_calibration(bpy.types.PropertyGroup):
-    """Settings of a calibration; `job` turns them into what the command line takes."""
+    """Settings of the calibration panel."""
 
     classes: bpy.props.CollectionProperty(type=SYNTHROADS_PG_calibration_class)
     active: bpy.props.IntProperty()
@@ -110,22 +110,22 @@ class SYNTHROADS_PG_calibration(bpy.types.PropertyGroup):
     )
 
     def job(self, fit: bool) -> CalibrationJob:
-        """Return what the panel asks for.
+        """Return the settings as a checked `CalibrationJob`, as the command line makes it.
 
         Raises:
             InputError: a field isn't what it should be, in the words of the command line's options.
         """
-        table = file_of(self.table)
+        table = path_of(self.table)
         road = None
         if self.axis and self.real:
             spans = tuple(_pair(text) for text in self.paved.split(";") if text.strip())
-            road = RoadClasses(Path(file_of(self.axis) or ""), spans, _numbers("Lines", self.lines), self.line_width)
+            road = RoadClasses(Path(path_of(self.axis) or ""), spans, _numbers("Lines", self.lines), self.line_width)
         names = [row.material for row in self.classes]
         scene = _scene_materials(names)
         job = CalibrationJob(
             targets=tuple(_material_target(row, scene, bool(self.real)) for row in self.classes),
             table=table if table is not None and table.exists() else None,
-            real=file_of(self.real),
+            real=path_of(self.real),
             class_field=self.class_field or None,
             road=road,
             device=None if self.device == _RAY else self.device,
@@ -145,12 +145,12 @@ class SYNTHROADS_PG_calibration(bpy.types.PropertyGroup):
 
 
 def textured_materials() -> set[str]:
-    """Return the names of the scene's materials that have an image as their base colour."""
+    """Return the names of the scene's materials whose base colour is an image."""
     return {table_name(item) for item in bpy.data.materials if color_image_node(item) is not None}
 
 
 def _scene_materials(names: list[str]) -> dict[str, Material]:
-    """Return the properties of the scene's materials of these names."""
+    """Return the constant properties of those scene materials whose names are given, by name."""
     there = {table_name(item) for item in bpy.data.materials}
     return dict(constants(name for name in names if name in there))
 
@@ -167,8 +167,8 @@ def _material_target(row: Any, scene: dict[str, Material], compared: bool) -> Ma
     return MaterialTarget(row.material, real_class, texture, row.texture_width)
 
 
-def file_of(text: str) -> Path | None:
-    """Return the file that a property names; None if it is empty."""
+def path_of(text: str) -> Path | None:
+    """Return a property's path with Blender's ``//`` resolved; None if the property is empty."""
     return Path(bpy.path.abspath(text)) if text else None
 
 

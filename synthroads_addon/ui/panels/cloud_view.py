@@ -43,7 +43,7 @@ view = CloudView()
 
 
 def last_cloud(context: bpy.types.Context) -> Path | None:
-    """Return the cloud that lies in the panel's folder, where a scan writes it; None if there is none."""
+    """Return the path of the cloud in the panel's output folder, where a scan writes it; None if there is none."""
     settings = context.scene.synthroads
     if not settings.chosen_folder().strip() or settings.needs_saved_file():
         return None
@@ -52,7 +52,7 @@ def last_cloud(context: bpy.types.Context) -> Path | None:
 
 
 def cloud_path(context: bpy.types.Context, given: str) -> Path:
-    """Return the file that is given, or the last scan's cloud; raise `InputError` if there is neither."""
+    """Return the given path, or the last scan's cloud if it is empty; InputError if there is neither."""
     if given.strip():
         return Path(bpy.path.abspath(given)).expanduser()
     path = last_cloud(context)
@@ -62,7 +62,7 @@ def cloud_path(context: bpy.types.Context, given: str) -> Path:
 
 
 def read_cloud_to_show(path: Path, points: int, origin: Any, report: Report) -> DisplayCloud:
-    """Read a cloud with all its colourings, so that changing them is quick; see `read_display`."""
+    """Read at most `points` points of a cloud for display, and precompute all of their colourings."""
     cloud = read_display(path, points, origin, lambda share: report(0.9 * share))
     for number, by in enumerate(cloud.colorings(), 1):
         cloud.colors(by)
@@ -71,7 +71,7 @@ def read_cloud_to_show(path: Path, points: int, origin: Any, report: Report) -> 
 
 
 def _redraw(settings: "SYNTHROADS_PG_cloud_view", context: bpy.types.Context) -> None:
-    """Draw as it is set now."""
+    """Apply the panel's colouring, size and visibility to the shown cloud, and redraw the 3D views."""
     view.by, view.size, view.visible = settings.by, settings.size, settings.visible
     if view.cloud is not None and view.by in view.cloud.colorings():
         for item in cloud_objects(context.scene, view.cloud):
@@ -80,7 +80,7 @@ def _redraw(settings: "SYNTHROADS_PG_cloud_view", context: bpy.types.Context) ->
 
 
 class SYNTHROADS_PG_cloud_view(bpy.types.PropertyGroup):
-    """How clouds are shown."""
+    """Settings of the display of clouds in the 3D view."""
 
     file: bpy.props.StringProperty(
         name="File",
@@ -126,7 +126,7 @@ class SYNTHROADS_OT_show_cloud(LongOperator, bpy.types.Operator):
     nothing_done = "the view is as before"
 
     def job(self, context: bpy.types.Context) -> PanelJob[DisplayCloud]:
-        """Return the reading of the cloud in the scene's frame."""
+        """Return the reading of the cloud for display, relative to the scene's origin, as a job in a thread."""
         path, points = cloud_path(context, self.filepath), context.scene.synthroads_cloud_view.points
         origin = scene_origin(context.scene)
         return PanelJob.aside(
@@ -134,7 +134,7 @@ class SYNTHROADS_OT_show_cloud(LongOperator, bpy.types.Operator):
         )
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[DisplayCloud]) -> str:
-        """Draw it; where there is no road to look at, look at it."""
+        """Show the cloud that was read, framed if it is the first and there is no road; return the message."""
         cloud, settings = job.result, context.scene.synthroads_cloud_view
         assert cloud
         first = view.cloud is None and find_road(context.scene) is None
@@ -157,11 +157,11 @@ class SYNTHROADS_OT_hide_cloud(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """A cloud must be shown."""
+        """Return whether a cloud is shown."""
         return view.cloud is not None
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Remove it."""
+        """Remove the shown cloud and redraw the views."""
         view.remove()
         redraw_views(context)
         return {"FINISHED"}
@@ -180,11 +180,11 @@ class SYNTHROADS_OT_add_cloud(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """A cloud must be shown, in object mode."""
+        """Return whether a cloud is shown and Blender is in object mode."""
         return view.cloud is not None and context.mode == "OBJECT"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Add it; what is drawn over the view is hidden, so that each point is seen once."""
+        """Add the cloud as an object, and hide the overlay, so that each point is seen once."""
         settings = context.scene.synthroads_cloud_view
         assert view.cloud
         add_cloud_object(view.cloud, settings.by, self.radius, view.offset(context.scene))
@@ -200,11 +200,11 @@ class SYNTHROADS_OT_frame_cloud(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """A cloud must be shown, and a view be there."""
+        """Return whether a cloud is shown and there is a 3D view."""
         return view.cloud is not None and view_of(context) is not None
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Frame it."""
+        """Frame the cloud's points in the 3D view."""
         assert view.cloud
         frame_points(view_of(context), view.cloud.xyz, Vector(view.offset(context.scene)))
         redraw_views(context)
@@ -212,7 +212,7 @@ class SYNTHROADS_OT_frame_cloud(bpy.types.Operator):
 
 
 class SYNTHROADS_PT_cloud_view(Sidebar, bpy.types.Panel):
-    """A cloud over the 3D view."""
+    """Panel of the cloud shown over the 3D view."""
 
     bl_label = "Cloud in Viewport"
     bl_parent_id = "SYNTHROADS_PT_output"
@@ -220,7 +220,7 @@ class SYNTHROADS_PT_cloud_view(Sidebar, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Show what is shown, how, and what its colours mean."""
+        """Draw the cloud's file, the display settings and the legend of its colours."""
         layout, settings = column(self), context.scene.synthroads_cloud_view
         layout.prop(settings, "file", placeholder="Last scan's cloud")
         layout.prop(settings, "points")
@@ -235,7 +235,7 @@ class SYNTHROADS_PT_cloud_view(Sidebar, bpy.types.Panel):
         draw_text(row, cloud.header.path.name, beside=3)
         row.operator(SYNTHROADS_OT_frame_cloud.bl_idname, text="", icon="VIEWZOOM", emboss=False)
         row.operator(SYNTHROADS_OT_hide_cloud.bl_idname, text="", icon="X", emboss=False)
-        for text, icon in notes(cloud, context.scene):
+        for text, icon in cloud_notes(cloud, context.scene):
             draw_text(layout, text, icon)
         row = layout.column(align=True) if is_narrow() else layout.row(align=True)
         row.use_property_split = False
@@ -245,11 +245,11 @@ class SYNTHROADS_PT_cloud_view(Sidebar, bpy.types.Panel):
             choice.prop_enum(settings, "by", by)
         layout.prop(settings, "size")
         layout.operator(SYNTHROADS_OT_add_cloud.bl_idname, icon="OUTLINER_OB_POINTCLOUD")
-        _legend(layout, cloud, settings.by)
+        _draw_legend(layout, cloud, settings.by)
 
 
-def notes(cloud: DisplayCloud, scene: bpy.types.Scene) -> Iterator[tuple[str, str]]:
-    """Yield what a user should know of the cloud that is shown, each with its icon."""
+def cloud_notes(cloud: DisplayCloud, scene: bpy.types.Scene) -> Iterator[tuple[str, str]]:
+    """Yield (text, icon) of notes on the shown cloud: number of points, no road, or far from the road."""
     yield f"{len(cloud):,} of {cloud.total:,} points", "NONE"
     if scene_origin(scene) is None:
         x, y, z = (f"{value:,.0f}" for value in cloud.origin)
@@ -263,7 +263,7 @@ def _distance(cloud: DisplayCloud, scene: bpy.types.Scene) -> float:
     return float(np.hypot(*(cloud.xyz[0, :2] + view.offset(scene)[:2])))
 
 
-def _legend(layout: bpy.types.UILayout, cloud: DisplayCloud, by: ColourBy) -> None:
+def _draw_legend(layout: bpy.types.UILayout, cloud: DisplayCloud, by: ColourBy) -> None:
     if by == "class":
         _class_legend(layout, cloud)
     elif by in ("intensity", "height"):
@@ -289,7 +289,7 @@ def _class_legend(layout: bpy.types.UILayout, cloud: DisplayCloud) -> None:
 
 
 def swatch(color: Sequence[int]) -> int:
-    """Return the icon of a colour (red, green, blue; sRGB, 0 to 255); made when it is asked for first."""
+    """Return the icon id of a colour (red, green, blue; sRGB, 0 to 255); cached."""
     name = "#" + bytes(int(value) for value in color).hex()
     if name not in _icons:
         icon = _icons.new(name)
@@ -300,7 +300,7 @@ def swatch(color: Sequence[int]) -> int:
 
 @persistent
 def _forget(path: str) -> None:
-    """Remove the cloud: another file is opened."""
+    """Handler: remove the shown cloud before another file is opened."""
     view.remove()
 
 
@@ -309,12 +309,12 @@ HANDLERS = {"load_pre": _forget}
 
 
 def register() -> None:
-    """Make room for the icons of colours."""
+    """Create Blender's collection of preview icons for colours."""
     global _icons
     _icons = bpy.utils.previews.new()
 
 
 def unregister() -> None:
-    """Take the cloud and the icons away."""
+    """Remove the shown cloud and the collection of icons."""
     view.remove()
     bpy.utils.previews.remove(_icons)

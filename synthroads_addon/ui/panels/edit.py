@@ -30,8 +30,8 @@ Section = tuple[str, list[tuple[str, str]]]
 """A part's inputs under one heading: their names as shown, and identifiers."""
 
 
-def parts(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
-    """Return the objects of the scene's road that have something to edit, by role."""
+def editable_parts(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
+    """Return the objects of the scene's road that have editable inputs, by role; empty without a road."""
     road, parameters = find_road(scene), open_parameters(scene)
     if road is None or parameters is None:
         return {}
@@ -44,7 +44,7 @@ def _editable(parameters: RoadParameters, item: bpy.types.Object) -> bool:
 
 
 def open_parameters(scene: bpy.types.Scene) -> RoadParameters | None:
-    """Return what the scene's road was built from; None if there is no road, or its set is damaged."""
+    """Return the parameters that the scene's road was built from; None without a road or if they are damaged."""
     road = find_road(scene)
     return _parameters(str(road[PARAMETERS])) if road else None
 
@@ -57,8 +57,8 @@ def _parameters(text: str) -> RoadParameters | None:
         return None
 
 
-def sections(parameters: RoadParameters, item: bpy.types.Object, within: str = "") -> Iterator[Section]:
-    """Yield what can be edited of a part, by the headings that its node group has: all, or those `within` another."""
+def input_sections(parameters: RoadParameters, item: bpy.types.Object, within: str = "") -> Iterator[Section]:
+    """Yield (heading, inputs) of a part's editable inputs, of all headings or of those below the heading `within`."""
     modifier = _modifier(item)
     if modifier is None:
         return
@@ -73,7 +73,7 @@ def sections(parameters: RoadParameters, item: bpy.types.Object, within: str = "
 
 
 def _without_heading(name: str, heading: str) -> str:
-    """Return an input's name without what its heading says already: all of it, or the side."""
+    """Return an input's name without a prefix that repeats its heading, or the heading's first word."""
     for known in (heading, heading.partition(" ")[0]):
         if known and name.startswith(f"{known} "):
             return name.removeprefix(f"{known} ")
@@ -85,7 +85,7 @@ def _modifier(item: bpy.types.Object) -> bpy.types.NodesModifier | None:
 
 
 def part_name(role: str) -> str:
-    """Return what a part is called: the id ``guardrail-left-1`` becomes Guardrail Left 1."""
+    """Return a part's role as a title: ``guardrail-left-1`` becomes Guardrail Left 1."""
     return title_case(role.replace("/", " / ").replace("-", " "))
 
 
@@ -94,7 +94,7 @@ _items: list[tuple[str, str, str, str, int]] = []
 
 
 def _part_items(state: Any, context: Any) -> list[tuple[str, str, str, str, int]]:
-    by_role = parts(context.scene)
+    by_role = editable_parts(context.scene)
     _items[:] = [_NOTHING, *((role, part_name(role), "", "NONE", i) for i, role in enumerate(by_role, 1))]
     return _items
 
@@ -102,14 +102,14 @@ def _part_items(state: Any, context: Any) -> list[tuple[str, str, str, str, int]
 def _shown_part(state: Any) -> int:
     context = bpy.context
     active = context.view_layer.objects.active
-    roles = list(parts(context.scene))
+    roles = list(editable_parts(context.scene))
     role = active.get(ROLE) if active else None
     return roles.index(role) + 1 if role in roles else 0
 
 
 def _choose_part(state: Any, number: int) -> None:
     context = bpy.context
-    items = list(parts(context.scene).values())
+    items = list(editable_parts(context.scene).values())
     for other in context.view_layer.objects.selected:
         other.select_set(False)
     chosen = items[number - 1] if number else None
@@ -119,7 +119,7 @@ def _choose_part(state: Any, number: int) -> None:
 
 
 class SYNTHROADS_PG_edit(bpy.types.PropertyGroup):
-    """Which part is shown: the active object."""
+    """Choice of the part to edit, kept as Blender's active object."""
 
     part: bpy.props.EnumProperty(
         name="Part",
@@ -138,7 +138,7 @@ class SYNTHROADS_OT_show_plants(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads a plain set)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Turn all plants' visibility round."""
+        """Hide all plants of the road, in view and evaluation, or show them if all are hidden."""
         plants = plants_of(context.scene)
         hide = any(not item.hide_viewport for item in plants)
         for item in plants:
@@ -147,7 +147,7 @@ class SYNTHROADS_OT_show_plants(bpy.types.Operator):
 
 
 def plants_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """Return the objects of the scene's road that are vegetation."""
+    """Return the vegetation objects of the scene's road; empty without a road."""
     road, parameters = find_road(scene), open_parameters(scene)
     if road is None or parameters is None:
         return []
@@ -156,7 +156,7 @@ def plants_of(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 
 class SYNTHROADS_PT_edit(Sidebar, bpy.types.Panel):
-    """Inputs of the built model."""
+    """Panel to edit inputs of the built model's modifiers."""
 
     bl_label = "Edit"
     bl_parent_id = "SYNTHROADS_PT_road"
@@ -165,11 +165,11 @@ class SYNTHROADS_PT_edit(Sidebar, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """There must be a road."""
+        """Return whether the scene has a road."""
         return find_road(context.scene) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Show the choice of a part, and the chosen one's inputs."""
+        """Draw the choice of a part, the plants' button, and the inputs of the active part."""
         layout = column(self)
         row = layout.row(align=True)
         row.use_property_split = False
@@ -186,9 +186,9 @@ class SYNTHROADS_PT_edit(Sidebar, bpy.types.Panel):
 
 
 def _draw_part(layout: bpy.types.UILayout, parameters: RoadParameters, item: bpy.types.Object) -> None:
-    """Draw a part's inputs, each heading to be opened; the many of lines within one more."""
-    lines = list(sections(parameters, item, MARKINGS))
-    for heading, inputs in sections(parameters, item):
+    """Draw a part's inputs in a collapsible section per heading, those of markings in a common one."""
+    lines = list(input_sections(parameters, item, MARKINGS))
+    for heading, inputs in input_sections(parameters, item):
         if not heading:
             _draw_inputs(layout, item, inputs)
         elif (heading, inputs) not in lines:
@@ -218,8 +218,8 @@ def _draw_inputs(layout: bpy.types.UILayout, item: bpy.types.Object, inputs: lis
 
 
 @persistent
-def _name_in_words(*_: Any) -> None:
-    """Have roads of a file that was opened or appended have a root, their own id, and inputs named as they are now."""
+def _update_older_roads(*_: Any) -> None:
+    """Handler: update roads of an opened or appended file to today's roots, ids and input names."""
     adopt_older_roads()
     renew_ids()
     for scene in bpy.data.scenes:
@@ -228,5 +228,5 @@ def _name_in_words(*_: Any) -> None:
                 rename_inputs(parameters, objects_of(road, scene))
 
 
-HANDLERS = dict.fromkeys(("load_post", "blend_import_post"), _name_in_words)
+HANDLERS = dict.fromkeys(("load_post", "blend_import_post"), _update_older_roads)
 ATTACHED = (bpy.types.Scene, "synthroads_edit", SYNTHROADS_PG_edit)

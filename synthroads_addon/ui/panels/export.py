@@ -26,7 +26,7 @@ from ...twin.formats import (
     TWIN_FORMATS,
     IfcSettings,
     check_formats,
-    missing_packages,
+    missing_package,
     twin_file_names,
     write_twin,
 )
@@ -36,8 +36,8 @@ from ..work.common import Sidebar, column, has_road, is_free, refusing
 from ..work.job import PanelJob, Report
 from ..work.long_operator import FileChooser, FileOperator, draw_job
 from .cloud_view import ENDINGS_GLOB, cloud_path, last_cloud
-from .road_choice import draw_shown
-from .rules import road_now
+from .road_choice import draw_road_name
+from .rules import edited_parameters
 
 IFC_PACKAGE = "ifcopenshell"
 RUNS_AS_EXTENSION = str(__package__).startswith("bl_ext.")
@@ -54,7 +54,7 @@ _FORMATS = {
 
 
 def export_cloud(source: Path, output: Path, classes: str | None, spacing: float, report: Report) -> dict[str, Any]:
-    """Write a cloud in the format of another ending; see `convert` and `subsample`, which one it is by the spacing."""
+    """Write a cloud in the format of `output`'s ending, thinned if `spacing` (m) is above 0; return counts."""
 
     def progress(stage: str, share: float) -> None:
         report(share)
@@ -73,7 +73,7 @@ def export_twin(
     overwrite: bool,
     report: Report,
 ) -> tuple[str, ...]:
-    """Write a road's model in some formats, all or none; return the files' names; see `write_twin`."""
+    """Write a road's geometric-semantic model into a folder, all formats or none; return the names of the files."""
     names = twin_file_names(formats)
     with output_folder(folder, names, overwrite) as temporary:
         for number, name in enumerate(formats, 1):
@@ -115,13 +115,13 @@ class SYNTHROADS_OT_export_cloud(FileOperator, bpy.types.Operator):
     )
 
     def suggest(self, context: bpy.types.Context) -> None:
-        """Suggest a file beside the cloud that is read."""
+        """Set the file browser's path to a file beside the source cloud, if none is set."""
         source = Path(bpy.path.abspath(self.source)) if self.source else last_cloud(context)
         if source is not None and not self.filepath:
             self.filepath = str(source.with_name(f"{source.stem}-export{self.format}"))
 
     def check(self, context: bpy.types.Context) -> bool:
-        """Give the file the ending of its format; return whether that changed it. Called by the file browser."""
+        """Give `filepath` the ending of the chosen format; return whether that changed it."""
         path = Path(self.filepath)
         if not path.name or path.suffix.lower() == self.format:
             return False
@@ -129,7 +129,7 @@ class SYNTHROADS_OT_export_cloud(FileOperator, bpy.types.Operator):
         return True
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw the settings beside the file browser."""
+        """Draw the export's settings beside the file browser."""
         layout = column(self)
         source = self.source or last_cloud(context)
         layout.label(text=Path(source).name if source else "Scan first, or choose a cloud", icon="POINTCLOUD_DATA")
@@ -137,14 +137,14 @@ class SYNTHROADS_OT_export_cloud(FileOperator, bpy.types.Operator):
             layout.prop(self, name)
 
     def job(self, context: bpy.types.Context) -> PanelJob[dict[str, Any]]:
-        """Return the writing; the file browser has asked whether a file that is there may be replaced."""
+        """Return the export as a job in a thread; an existing file is replaced."""
         source, output = cloud_path(context, self.source), Path(bpy.path.abspath(self.filepath))
         classes = None if self.classes == "own" else self.classes
         work = partial(export_cloud, source, output, classes, exact(self.spacing, None))
         return PanelJob.aside("Export", work, "Exporting")
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[dict[str, Any]]) -> str:
-        """Return the number of points and the file."""
+        """Return the message with the number of points and the file."""
         assert job.result
         return f"{job.result['points']:,} points written to {job.result['output']}"
 
@@ -189,11 +189,11 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """There must be a road, and nothing else at work."""
+        """Return whether the scene has a road and nothing else is at work."""
         return has_road(cls, context) and is_free(cls, context)
 
     def suggest(self, context: bpy.types.Context) -> None:
-        """Suggest the output folder, where the cloud is, and the formats that scans write."""
+        """Set an empty folder to the panel's output folder, and formats and IFC placement to the scenario's."""
         folder = context.scene.synthroads.folder_to_open()
         if folder is not None and not self.directory:
             self.directory = f"{folder}{os.sep}"
@@ -204,7 +204,7 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
                 self.ifc_placement = chosen.placement
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Draw the settings beside the file browser; formats whose package is missing can't be chosen."""
+        """Draw the settings beside the file browser; formats whose package is missing are disabled."""
         layout = column(self)
         _draw_formats(layout, self)
         layout.prop(self, "tolerance")
@@ -214,8 +214,8 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
         layout.prop(self, "overwrite")
 
     def job(self, context: bpy.types.Context) -> PanelJob[tuple[str, ...]]:
-        """Return the writing of the road as it is edited now."""
-        parameters = road_now(context.scene)
+        """Return the export of the road, with edits read back, as a job in a thread."""
+        parameters = edited_parameters(context.scene)
         assert parameters  # poll() has seen the road
         formats = [name for name in TWIN_FORMATS if name in self.formats]
         if not formats:
@@ -229,7 +229,7 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
         return PanelJob.aside("Export", work, "Exporting")
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[tuple[str, ...]]) -> str:
-        """Return the names of the files and their folder."""
+        """Return the message with the files' names and their folder."""
         assert job.result
         return f"{', '.join(job.result)} written to {bpy.path.abspath(self.directory)}"
 
@@ -245,20 +245,20 @@ class SYNTHROADS_OT_install_ifc(FileChooser, bpy.types.Operator):
 
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
-        """Have Blender install and enable it; IFC can be written at once."""
+        """Install and enable the chosen extension zip, and check that IFC can then be written."""
         path = Path(bpy.path.abspath(self.filepath))
         if not path.name.startswith("synthroads_ifc") or not path.is_file():
             raise InputError("File", str(path), "choose the zip of SynthRoads IFC: synthroads_ifc-….zip")
         install = bpy.ops.extensions.package_install_files
         install(filepath=str(path), repo=_REPOSITORY, enable_on_install=True)
         importlib.invalidate_caches()
-        if missing_packages("ifc"):
+        if missing_package("ifc"):
             raise InputError("File", path.name, "was installed, but Blender can't load it: is it for this platform?")
         self.report({"INFO"}, "IFC can be written")
 
 
 class SYNTHROADS_PT_export(Sidebar, bpy.types.Panel):
-    """Files of other formats."""
+    """Panel to export clouds and the road's geometric-semantic model."""
 
     bl_label = "Export"
     bl_parent_id = "SYNTHROADS_PT_output"
@@ -266,7 +266,7 @@ class SYNTHROADS_PT_export(Sidebar, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Show the buttons, and how far a file is."""
+        """Draw the export buttons, or the progress of a running export."""
         layout = column(self)
         if draw_job(layout):
             return
@@ -274,14 +274,14 @@ class SYNTHROADS_PT_export(Sidebar, bpy.types.Panel):
         shown = context.scene.synthroads_cloud_view.file
         row.enabled = bool(shown) or last_cloud(context) is not None
         row.operator(SYNTHROADS_OT_export_cloud.bl_idname, icon="EXPORT").source = shown
-        draw_shown(layout, context)
+        draw_road_name(layout, context)
         layout.operator(SYNTHROADS_OT_export_twin.bl_idname, icon="EXPORT")
 
 
 def _draw_formats(layout: bpy.types.UILayout, operator: SYNTHROADS_OT_export_twin) -> None:
     rows = layout.column(align=True)
     rows.use_property_split = False
-    missing = {name: package for name in TWIN_FORMATS if (package := missing_packages(name))}
+    missing = {name: package for name in TWIN_FORMATS if (package := missing_package(name))}
     for name in TWIN_FORMATS:
         row = rows.row()
         row.enabled = name not in missing
@@ -289,11 +289,11 @@ def _draw_formats(layout: bpy.types.UILayout, operator: SYNTHROADS_OT_export_twi
     _draw_missing_packages(rows, {FORMATS[name].label: package for name, package in missing.items()})
 
 
-def draw_missing(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Say which packages the chosen formats of scans need and don't find."""
+def draw_missing_packages(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw which packages the chosen cloud and twin formats need that aren't installed."""
     settings = context.scene.synthroads
     clouds = {_FORMATS[f".{name}"][0]: cloud_package(f".{name}") for name in sorted(settings.cloud.formats)}
-    twins = {FORMATS[name].label: missing_packages(name) for name in TWIN_FORMATS if name in settings.twin}
+    twins = {FORMATS[name].label: missing_package(name) for name in TWIN_FORMATS if name in settings.twin}
     missing = {name: package for name, package in (clouds | twins).items() if package}
     _draw_missing_packages(layout, missing)
 

@@ -13,17 +13,17 @@ from .road_files import SYNTHROADS_OT_load_axis, SYNTHROADS_OT_load_road, SYNTHR
 _AXES = (".csv", ".txt", ".geojson")
 
 
-class _Dropped:
-    """Base of what Blender does with files that are dropped onto a 3D view."""
+class _DropHandler:
+    """Base of handlers for files that are dropped onto a 3D view."""
 
     @classmethod
     def poll_drop(cls, context: bpy.types.Context) -> bool:
-        """Only 3D views take them."""
+        """Return whether the file is dropped onto a 3D view."""
         return bool(context.area) and context.area.type == "VIEW_3D"
 
 
-class SYNTHROADS_FH_parameters(_Dropped, bpy.types.FileHandler):
-    """Parameter sets."""
+class SYNTHROADS_FH_parameters(_DropHandler, bpy.types.FileHandler):
+    """Handler of dropped parameter sets (.json)."""
 
     bl_idname = "SYNTHROADS_FH_parameters"
     bl_label = "SynthRoads Parameter Set"
@@ -32,8 +32,8 @@ class SYNTHROADS_FH_parameters(_Dropped, bpy.types.FileHandler):
     bl_file_extensions = ".json"
 
 
-class SYNTHROADS_FH_axis(_Dropped, bpy.types.FileHandler):
-    """Measured axes."""
+class SYNTHROADS_FH_axis(_DropHandler, bpy.types.FileHandler):
+    """Handler of dropped measured axes (.csv, .txt, .geojson)."""
 
     bl_idname = "SYNTHROADS_FH_axis"
     bl_label = "SynthRoads Centreline"
@@ -41,8 +41,8 @@ class SYNTHROADS_FH_axis(_Dropped, bpy.types.FileHandler):
     bl_file_extensions = ";".join(_AXES)
 
 
-class SYNTHROADS_FH_cloud(_Dropped, bpy.types.FileHandler):
-    """Point clouds; PLY is left to Blender's own importer, which may be meant as well."""
+class SYNTHROADS_FH_cloud(_DropHandler, bpy.types.FileHandler):
+    """Handler of dropped point clouds, without .ply, which Blender's own importer handles as well."""
 
     bl_idname = "SYNTHROADS_FH_cloud"
     bl_label = "SynthRoads Point Cloud"
@@ -64,12 +64,12 @@ def _draw_export(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
 
 
 def register() -> None:
-    """Add the entries to Blender's menus."""
+    """Add SynthRoads' entries to Blender's menus File > Import and File > Export."""
     bpy.types.TOPBAR_MT_file_import.append(_draw_import)
     bpy.types.TOPBAR_MT_file_export.append(_draw_export)
 
 
 def unregister() -> None:
-    """Take the entries out of Blender's menus."""
+    """Remove SynthRoads' entries from Blender's menus File > Import and File > Export."""
     bpy.types.TOPBAR_MT_file_import.remove(_draw_import)
     bpy.types.TOPBAR_MT_file_export.remove(_draw_export)

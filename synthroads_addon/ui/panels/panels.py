@@ -10,14 +10,14 @@ from ...blender.model.store import BUILT_FROM, find_road
 from ...blender.things.model_builder import ROLE
 from ..fields.preferences import preferences
 from ..fields.room import buttons_row, draw_flag, draw_text, value_row
-from ..fields.sheets import SHEETS, Sheet, fields_of
+from ..fields.sheets import SHEETS, PanelFields, fields_of
 from ..work.build import SYNTHROADS_OT_build
 from ..work.common import Sidebar, column, large_button
 from ..work.edited import draw_edits
 from ..work.long_operator import draw_job
 from ..work.scan import SYNTHROADS_OT_scan, last_written
 from ..work.scan_steps import Written
-from .export import draw_missing
+from .export import draw_missing_packages
 from .presets import (
     SYNTHROADS_MT_devices,
     SYNTHROADS_MT_scenarios,
@@ -25,52 +25,52 @@ from .presets import (
     device_title,
     scenario_title,
 )
-from .road_choice import draw_choice, draw_shown
-from .road_files import draw_road_files, source_of
+from .road_choice import draw_road_choice, draw_road_name
+from .road_files import draw_road_files, source_file_name
 from .scene_scan import draw_scene_scan
 
 _SOLID = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
 
 
 class SheetPanel(Sidebar):
-    """A panel that shows the fields of its sheet."""
+    """Base of panels that draw the scenario fields listed in their `Sheet`."""
 
-    sheet: ClassVar[Sheet]
+    sheet: ClassVar[PanelFields]
     layout: bpy.types.UILayout
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Show the fields."""
+        """Draw the panel: the fields of its sheet."""
         self.draw_fields(column(self), context.scene.synthroads)
 
     def draw_fields(self, layout: bpy.types.UILayout, settings: Any) -> None:
-        """Show the fields, each by what belongs to its kind."""
+        """Draw every field of the sheet into a layout, each as its kind is drawn."""
         for field in fields_of(self.sheet):
             field.draw(layout, settings)
 
 
 class MainPanel(SheetPanel):
-    """Panel of the scenario that everything starts from."""
+    """Panel with the scenario's menu and its fidelity."""
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Show which scenario the settings were taken from, and how fine all is."""
+        """Draw the menu of scenarios and the sheet's fields."""
         layout, settings = column(self), context.scene.synthroads
         layout.menu(SYNTHROADS_MT_scenarios.bl_idname, text=scenario_title(settings.preset), icon="PRESET")
         self.draw_fields(layout, settings)
 
 
 class RoadPanel(SheetPanel):
-    """Panel of the road, with the buttons that build it."""
+    """Panel of the road with the buttons to build, load and save it."""
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Show the fields, whether the road is older than they are, and the buttons."""
+        """Draw the choice of road, the fields, notes on the road's source and edits, and the buttons."""
         layout, settings = column(self), context.scene.synthroads
-        draw_choice(layout, context)
+        draw_road_choice(layout, context)
         self.draw_fields(layout, settings)
         if (seed := settings.exact_seed()) != settings.seed:
             draw_text(layout, f"Seed of the file: {seed}", "INFO")
         road = find_road(context.scene)
-        if road and source_of(road):
-            draw_text(layout, f"Built from {source_of(road)}", "FILE")
+        if road and source_file_name(road):
+            draw_text(layout, f"Built from {source_file_name(road)}", "FILE")
         elif road and not road.get(BUILT_FROM):
             draw_text(layout, "Built by a command, not from these settings", "FILE")
         elif road and road.get(BUILT_FROM) != settings.road_values():
@@ -86,10 +86,10 @@ class RoadPanel(SheetPanel):
 
 
 class ScannerPanel(SheetPanel):
-    """Panel of the scanner, with the button that scans."""
+    """Panel of the scanner with the scan button."""
 
     def draw_fields(self, layout: bpy.types.UILayout, settings: Any) -> None:
-        """Show the fields; devices have a menu."""
+        """Draw the sheet's fields; the device is a menu."""
         for field in fields_of(self.sheet):
             if field.path == "scan.device":
                 layout.menu(SYNTHROADS_MT_devices.bl_idname, text=device_title(settings.scan.device), icon="PRESET")
@@ -97,38 +97,38 @@ class ScannerPanel(SheetPanel):
                 field.draw(layout, settings)
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Show the fields, the folder and the button."""
+        """Draw the fields, then the scan button, progress or last result."""
         layout = column(self)
         self.draw_fields(layout, context.scene.synthroads)
         draw_scan(layout, context)
 
 
 class OutputPanel(SheetPanel):
-    """Which files are written, and where."""
+    """Panel of the output folder and the files to write."""
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Show the folder and the fields."""
+        """Draw folder, overwrite flag and fields, and which packages are missing."""
         layout, settings = column(self), context.scene.synthroads
         draw_folder(layout, settings)
         draw_flag(layout, settings, "overwrite", "Replace Files")
         self.draw_fields(layout, settings)
-        draw_missing(layout, context)
+        draw_missing_packages(layout, context)
 
 
 def draw_folder(layout: bpy.types.UILayout, settings: Any) -> None:
-    """Draw where the files go; greyed where the preferences say it."""
+    """Draw the output folder's text field, with the preferences' folder as placeholder."""
     value_row(layout, "Folder").prop(settings, "output", text="", placeholder=preferences().output_folder)
 
 
 def draw_scan(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw the folder and the button; while something is at work, how far it is."""
+    """Draw the scan button with notes and the last result, or the progress of running work."""
     settings = context.scene.synthroads
     if draw_job(layout):
         return
     if find_road(context.scene) is None:
         draw_scene_scan(layout, context)
     else:
-        draw_shown(layout, context)
+        draw_road_name(layout, context)
         _draw_other_objects(layout, context)
     if settings.needs_saved_file():
         _ask_to_save(layout, settings)
@@ -146,7 +146,7 @@ def _ask_to_save(layout: bpy.types.UILayout, settings: Any) -> None:
 
 
 def _draw_other_objects(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Say that objects of the user's own are scanned as well."""
+    """Draw a note on the number of visible objects that aren't the road's but are scanned too."""
     count = sum(item.type in _SOLID and ROLE not in item for item in context.visible_objects)
     if count:
         text = "1 other object is scanned too" if count == 1 else f"{count} other objects are scanned too"
@@ -154,7 +154,7 @@ def _draw_other_objects(layout: bpy.types.UILayout, context: bpy.types.Context) 
 
 
 def _draw_result(layout: bpy.types.UILayout, settings: Any, written: Written) -> None:
-    """Show what the last scan wrote, as long as the panel names its folder."""
+    """Draw the number of points of the last scan and a button for its folder, if that is the panel's folder."""
     if settings.needs_saved_file() or not settings.chosen_folder().strip() or settings.folder() != written.target:
         return
     row = layout.row(align=True)
@@ -165,8 +165,8 @@ def _draw_result(layout: bpy.types.UILayout, settings: Any, written: Written) ->
 _OWN_PANELS = {"main": MainPanel, "road": RoadPanel, "scanner": ScannerPanel, "output": OutputPanel}
 
 
-def _panel(sheet: Sheet) -> type:
-    """Return the class of a panel."""
+def _panel(sheet: PanelFields) -> type:
+    """Create and return the Blender panel class of a sheet."""
     base = _OWN_PANELS.get(sheet.name, SheetPanel)
     parent = {"bl_parent_id": f"SYNTHROADS_PT_{sheet.parent}"} if sheet.parent else {}
     members = {

@@ -23,14 +23,14 @@ from ..work.long_operator import FileChooser
 
 
 class _Undoable:
-    """Base of operators that change settings."""
+    """Base of operators that change settings and can be undone."""
 
     bl_options = {"REGISTER", "UNDO"}  # noqa: RUF012 (Blender reads a plain set)
     report: Any
 
 
-def _take_device(context: bpy.types.Context, name_or_file: str) -> None:
-    """Scan with a device; raise `InputError` if it is wrong."""
+def _set_device(context: bpy.types.Context, name_or_file: str) -> None:
+    """Set the scenario's device by name or file; raises an InputError if it can't be read."""
     load_device(name_or_file)
     context.scene.synthroads.scan.device = name_or_file
 
@@ -45,13 +45,13 @@ class SYNTHROADS_OT_choose_scenario(_Undoable, bpy.types.Operator):
 
     @classmethod
     def description(cls, context: bpy.types.Context, properties: Any) -> str:
-        """Say what is behind the menu's item."""
+        """Return the tooltip of a menu item: the scenario's title."""
         return scenario_title(properties.name)
 
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
-        """Show its values."""
-        context.scene.synthroads.take_preset(self.name)
+        """Set the panel to the scenario `name`."""
+        context.scene.synthroads.show_preset(self.name)
 
 
 class SYNTHROADS_OT_choose_device(_Undoable, bpy.types.Operator):
@@ -64,7 +64,7 @@ class SYNTHROADS_OT_choose_device(_Undoable, bpy.types.Operator):
 
     @classmethod
     def description(cls, context: bpy.types.Context, properties: Any) -> str:
-        """Say what the device can do."""
+        """Return the tooltip of a menu item: title, wavelength, pulse rates, number of returns."""
         device = device_of(properties.name)
         if device is None:
             return "This file can't be read"
@@ -73,24 +73,24 @@ class SYNTHROADS_OT_choose_device(_Undoable, bpy.types.Operator):
 
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
-        """Choose it; one that is wrong is refused."""
-        _take_device(context, self.name)
+        """Set the panel's device to `name`; one that can't be read is refused."""
+        _set_device(context, self.name)
 
 
 class JsonFileChooser(FileChooser):
-    """Base of operators that ask for a JSON file."""
+    """Base of operators that ask for a JSON file in a file browser."""
 
     filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     filter_glob: bpy.props.StringProperty(default="*.json", options={"HIDDEN"})
 
 
 class _LibraryFile(JsonFileChooser):
-    """Base of operators that ask for a scenario or a device, at first in the library's folder."""
+    """Base of operators that ask for a scenario or device file, starting in the user's library folder."""
 
     kind = ""
 
     def suggest(self, context: bpy.types.Context) -> None:
-        """Suggest the library's folder."""
+        """Set the file browser's path, if empty, to the library folder, or home if there is none."""
         if not self.filepath:
             folder = preferences().library(self.kind)
             self.filepath = str(folder if folder.is_dir() else folder.home()) + "/"
@@ -105,8 +105,8 @@ class SYNTHROADS_OT_load_scenario(_LibraryFile, _Undoable, bpy.types.Operator):
 
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
-        """Show the file's values."""
-        context.scene.synthroads.take_preset(self.filepath)
+        """Set the panel to the scenario in the chosen file."""
+        context.scene.synthroads.show_preset(self.filepath)
 
 
 class SYNTHROADS_OT_load_device(_LibraryFile, _Undoable, bpy.types.Operator):
@@ -118,8 +118,8 @@ class SYNTHROADS_OT_load_device(_LibraryFile, _Undoable, bpy.types.Operator):
 
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
-        """Choose the file's device; one that is wrong is refused."""
-        _take_device(context, self.filepath)
+        """Set the panel's device to the chosen file; one that can't be read is refused."""
+        _set_device(context, self.filepath)
 
 
 class SYNTHROADS_OT_save_scenario(_LibraryFile, bpy.types.Operator):
@@ -132,7 +132,7 @@ class SYNTHROADS_OT_save_scenario(_LibraryFile, bpy.types.Operator):
     check_existing: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
 
     def suggest(self, context: bpy.types.Context) -> None:
-        """Suggest a file in the library's folder, which is made if need be."""
+        """Set the path to `scenario.json` in the library folder, which is created if missing."""
         folder = preferences().library(self.kind)
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -142,7 +142,7 @@ class SYNTHROADS_OT_save_scenario(_LibraryFile, bpy.types.Operator):
 
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
-        """Write the file; the browser has asked whether to replace one that is there."""
+        """Write the panel's scenario as JSON; an existing file is replaced."""
         target = Path(self.filepath).with_suffix(".json").absolute()
         scenario = context.scene.synthroads.scenario()
         with output_folder(target.parent, [target.name], overwrite=True) as folder:
@@ -150,8 +150,8 @@ class SYNTHROADS_OT_save_scenario(_LibraryFile, bpy.types.Operator):
         self.report({"INFO"}, f"Saved {target}")
 
 
-def _files_of(context: bpy.types.Context, path: str) -> Any:
-    """Return the list of files that a field at a path of the scenario holds."""
+def _file_list(context: bpy.types.Context, path: str) -> Any:
+    """Return the Blender collection of files that belongs to the scenario field at a path."""
     field = PATHS[path]
     return getattr(field.owner(context.scene.synthroads), field.name)
 
@@ -165,8 +165,8 @@ class SYNTHROADS_OT_add_file(JsonFileChooser, _Undoable, bpy.types.Operator):
     path: bpy.props.StringProperty(options={"HIDDEN"})
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Add the file."""
-        _files_of(context, self.path).add().file = self.filepath
+        """Append the chosen file to the list of the field `path`."""
+        _file_list(context, self.path).add().file = self.filepath
         return {"FINISHED"}
 
 
@@ -180,8 +180,8 @@ class SYNTHROADS_OT_remove_file(_Undoable, bpy.types.Operator):
     number: bpy.props.IntProperty(options={"HIDDEN"})
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Remove it."""
-        _files_of(context, self.path).remove(self.number)
+        """Remove entry `number` from the list of the field `path`."""
+        _file_list(context, self.path).remove(self.number)
         return {"FINISHED"}
 
 
@@ -194,15 +194,15 @@ class SYNTHROADS_OT_random_road(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """As building."""
+        """Return whether nothing else is at work."""
         return is_free(cls, context)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Build as the button does."""
+        """Set the next seed and build the road in the background, as the build button does."""
         return self._build(context, "INVOKE_DEFAULT")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Build to the end."""
+        """Set the next seed and build the road, blocking until it is built."""
         return self._build(context, "EXEC_DEFAULT")
 
     def _build(self, context: bpy.types.Context, how: str) -> set[str]:
@@ -225,7 +225,7 @@ class SYNTHROADS_MT_scenarios(bpy.types.Menu):
     bl_label = "Scenarios"
 
     def draw(self, context: bpy.types.Context) -> None:
-        """List them, then loading and saving."""
+        """Draw menu items for built-in scenarios, the library's, and loading and saving."""
         layout = self.layout
         _list(layout, SYNTHROADS_OT_choose_scenario.bl_idname, scenario_names(), scenario_title)
         _list(layout, SYNTHROADS_OT_choose_scenario.bl_idname, library_files("scenarios"), scenario_title)
@@ -240,7 +240,7 @@ class SYNTHROADS_MT_devices(bpy.types.Menu):
     bl_label = "Devices"
 
     def draw(self, context: bpy.types.Context) -> None:
-        """List them, then loading."""
+        """Draw menu items for built-in devices, the library's, and loading."""
         layout = self.layout
         _list(layout, SYNTHROADS_OT_choose_device.bl_idname, device_names(), device_title)
         _list(layout, SYNTHROADS_OT_choose_device.bl_idname, library_files("devices"), device_title)
@@ -248,23 +248,23 @@ class SYNTHROADS_MT_devices(bpy.types.Menu):
 
 
 def next_seed(seed: int) -> int:
-    """Return the seed that Random Road draws after this one: always the same."""
+    """Return the seed that Random Road uses after this one, deterministically."""
     return int(stream(seed, "random road").integers(1, LARGEST_INTEGER))
 
 
 def library_files(kind: str) -> list[str]:
-    """Return the JSON files of the library's ``scenarios`` or ``devices``."""
+    """Return the sorted paths of JSON files in the library's folder ``scenarios`` or ``devices``."""
     return sorted(str(path) for path in preferences().library(kind).glob("*.json"))
 
 
 def device_title(name: str) -> str:
-    """Return a device's title, or the file's name with a question mark where it can't be read."""
+    """Return a device's title, or its file name with a question mark if it can't be read."""
     device = device_of(name)
     return device.title if device else f"{Path(name).name}?"
 
 
 def scenario_title(name: str) -> str:
-    """Return a built-in scenario's title, or a file's name, as the title in it may be anything."""
+    """Return a built-in scenario's title, or a file's stem."""
     return _built_in_title(name) if name in scenario_names() else Path(name).stem
 
 

@@ -30,7 +30,7 @@ def _shown_road(state: Any) -> int:
 
 
 def _choose_road(state: Any, number: int) -> None:
-    """Show a road, and make its root the active object, so that it can be moved at once."""
+    """Make a road the one that the panels are about, and its root the only selected and active object."""
     context = bpy.context
     root = roads(context.scene)[number]
     choose_road(context.scene, root)
@@ -42,7 +42,7 @@ def _choose_road(state: Any, number: int) -> None:
 
 
 class SYNTHROADS_PG_roads(bpy.types.PropertyGroup):
-    """The road that the panels are about."""
+    """Choice of the scene's road that the panels are about."""
 
     shown: bpy.props.EnumProperty(
         name="Road",
@@ -53,8 +53,8 @@ class SYNTHROADS_PG_roads(bpy.types.PropertyGroup):
     )
 
 
-def draw_choice(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw which road it is, and the button that builds one more; nothing without a road."""
+def draw_road_choice(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the choice of the road and a button to build another one; nothing without a road."""
     if find_road(context.scene) is None:
         return
     row = layout.row(align=True)
@@ -63,8 +63,8 @@ def draw_choice(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     row.operator(SYNTHROADS_OT_build.bl_idname, text="", icon="ADD").beside = True
 
 
-def draw_shown(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Say which road a button is about where the scene has several."""
+def draw_road_name(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
+    """Draw the name of the road that a button applies to, if the scene has several."""
     found = roads(context.scene)
     if len(found) > 1 and (shown := find_road(context.scene)):
         draw_text(layout, shown.name, "EMPTY_ARROWS")

@@ -25,15 +25,15 @@ from ..work.long_operator import FileOperator
 from ..work.pictures import ShowPicture, keep_picture
 from ..work.view import look_along, view_of
 from .presets import JsonFileChooser
-from .rules import road_now
+from .rules import edited_parameters
 
 _FROM_FILE, _NAME = "file", "parameters.json"
 FIT_PICTURE = "SynthRoads Axis Fit"
 """Name of the image that shows how far an axis was missed."""
 
 
-def source_of(road: bpy.types.Object) -> str | None:
-    """Return the name of the file that a road was built from; None if the panel's settings made it."""
+def source_file_name(road: bpy.types.Object) -> str | None:
+    """Return the name of the file that a road was built from; None if it was built from settings."""
     try:
         what, name = json.loads(road[BUILT_FROM])
     except (KeyError, TypeError, ValueError):
@@ -41,8 +41,8 @@ def source_of(road: bpy.types.Object) -> str | None:
     return str(name) if what == _FROM_FILE else None
 
 
-class _Load(FileOperator):
-    """Base of what builds a road from a file."""
+class _RoadLoader(FileOperator):
+    """Base of operators that build a road from a file, read in a thread."""
 
     filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
     bl_options = {"UNDO"}  # noqa: RUF012 (Blender reads a plain set)
@@ -50,17 +50,17 @@ class _Load(FileOperator):
     _first = False
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Take the file that was dropped, else ask for one."""
+        """Build from the file that was dropped, or open the file browser if there is none."""
         return self.begin(context) if self.filepath else super().invoke(context, event)
 
     def job(self, context: bpy.types.Context) -> PanelJob[str]:
-        """Return the reading and the building."""
+        """Return the job that reads the file in a thread and builds its road."""
         self._first = find_road(context.scene) is None
         path, scenario = Path(bpy.path.abspath(self.filepath)), context.scene.synthroads.scenario()
         return PanelJob("Build", self._work(path, scenario, shown_place(context.scene)))
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[str]) -> str:
-        """Show the first road that is built."""
+        """Turn the view to the road if it is the first; return the message."""
         road, space = find_road(context.scene), view_of(context)
         if self._first and not bpy.app.background and road and space:
             look_along(space, recall_parameters(road))
@@ -72,11 +72,11 @@ class _Load(FileOperator):
         return message
 
     def read(self, path: Path, scenario: Scenario) -> tuple[RoadParameters, str]:
-        """Return the road that a file stands for, and what to say when it is built; called in a thread."""
+        """Return a file's road parameters and the message for when it is built; runs in a thread."""
         raise NotImplementedError
 
 
-class SYNTHROADS_OT_load_road(_Load, bpy.types.Operator):
+class SYNTHROADS_OT_load_road(_RoadLoader, bpy.types.Operator):
     """Build the road of a parameter set, at the panel's fidelity. It takes the place of the road built before"""
 
     bl_idname = "synthroads.load_road"
@@ -84,12 +84,12 @@ class SYNTHROADS_OT_load_road(_Load, bpy.types.Operator):
     filter_glob: bpy.props.StringProperty(default="*.json", options={"HIDDEN"})
 
     def read(self, path: Path, scenario: Scenario) -> tuple[RoadParameters, str]:
-        """Read the parameter set."""
+        """Return the parameter set in a file, and the message for when it is built."""
         parameters, _ = RoadSource(scenario, parameters=path).read()
         return parameters, f"Built {parameters.alignment.length:,.0f} m of road from {path.name}"
 
 
-class SYNTHROADS_OT_load_axis(_Load, bpy.types.Operator):
+class SYNTHROADS_OT_load_axis(_RoadLoader, bpy.types.Operator):
     """Fit a road to a measured centreline (CSV with x, y, z, or GeoJSON), with the panel's cross-section and map coordinate system. It takes the place of the road built before"""  # noqa: E501 (a tooltip is one line)
 
     bl_idname = "synthroads.load_axis"
@@ -97,7 +97,7 @@ class SYNTHROADS_OT_load_axis(_Load, bpy.types.Operator):
     filter_glob: bpy.props.StringProperty(default="*.csv;*.txt;*.geojson;*.json", options={"HIDDEN"})
 
     def read(self, path: Path, scenario: Scenario) -> tuple[RoadParameters, str]:
-        """Fit the alignment and sample the road along it."""
+        """Fit an alignment to the file's centreline; return a road sampled along it, and the message."""
         parameters, report = RoadSource(scenario, axis=path).read()
         fit = report["axis"]
         across, up = (fit[name]["worst"] for name in ("horizontal", "height"))
@@ -105,7 +105,7 @@ class SYNTHROADS_OT_load_axis(_Load, bpy.types.Operator):
         return parameters, f"Built {parameters.alignment.length:,.0f} m of road along {path.name}: {deviations}"
 
     def refuse(self, error: InputError) -> set[str]:
-        """Say what is wrong; of a fit that misses its points, keep a picture."""
+        """Report an error; if the fit misses its points, also keep a picture of it."""
         if not isinstance(error, AxisRefusedError):
             return super().refuse(error)
         keep_picture(FIT_PICTURE, axis_picture(error.fit, error.name))
@@ -130,18 +130,18 @@ class SYNTHROADS_OT_save_road(JsonFileChooser, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """There must be a road."""
+        """Return whether the scene has a road."""
         return has_road(cls, context)
 
     def suggest(self, context: bpy.types.Context) -> None:
-        """Suggest a file beside the .blend file."""
+        """Set the file browser's path to `parameters.json` beside the .blend file, if none is set."""
         if not self.filepath:
             self.filepath = str(Path(bpy.data.filepath).with_name(_NAME)) if bpy.data.filepath else _NAME
 
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
-        """Write the file; the file browser has asked whether one that is there may be replaced."""
-        parameters, path = road_now(context.scene), Path(bpy.path.abspath(self.filepath)).with_suffix(".json")
+        """Write the road's parameter set with edits read back; an existing file is replaced."""
+        parameters, path = edited_parameters(context.scene), Path(bpy.path.abspath(self.filepath)).with_suffix(".json")
         assert parameters  # poll() has seen the road
         with output_folder(path.parent, [path.name], overwrite=True) as folder:
             (folder / path.name).write_text(parameters.to_json(), encoding="utf-8")
@@ -149,7 +149,7 @@ class SYNTHROADS_OT_save_road(JsonFileChooser, bpy.types.Operator):
 
 
 def draw_road_files(layout: bpy.types.UILayout) -> None:
-    """Draw the buttons."""
+    """Draw buttons to load and save a parameter set and to fit an axis, and to show a missed fit."""
     column = layout.column(align=True)
     row = buttons_row(column, ("Load Set", "Save Set"), align=True)
     row.operator(SYNTHROADS_OT_load_road.bl_idname, text="Load Set", icon="IMPORT")

@@ -21,7 +21,7 @@ from ...road.section import Carriageway, LineMarking
 from ..fields.room import draw_text, fits, is_narrow, text_width
 from ..work.common import Sidebar, has_road, redraw_sidebars, refusing, right_label
 from ..work.view import Marker, look_at_place, redraw_views, view_of
-from .road_choice import draw_shown
+from .road_choice import draw_road_name
 
 _STATION_SHARE, _NAME_SHARE = 0.25, 0.45
 """Shares of the list's width that station and rule have where all three columns fit."""
@@ -36,8 +36,8 @@ _SURENESS = {
 }
 
 
-class Checked:
-    """The road that was checked, and whether the one in the scene has changed since.
+class CheckedRoad:
+    """The road that was checked last, and whether the scene's road has changed since.
 
     Attributes:
         parameters: what was checked; None before.
@@ -49,33 +49,33 @@ class Checked:
 
     def __init__(self) -> None:
         self.marker = Marker()
-        self.take(None)
+        self.keep(None)
 
-    def take(self, parameters: RoadParameters | None, road: str = "") -> None:
-        """Keep the road that was checked, which the scene's is compared with; None for no road."""
+    def keep(self, parameters: RoadParameters | None, road: str = "") -> None:
+        """Keep the parameters that were checked and their road's id, as up to date; None for no road."""
         self.parameters, self.road, self.asked, self.stale = parameters, road, False, False
 
     def forget(self) -> None:
-        """Clear the findings."""
-        self.take(None)
+        """Drop the checked road and hide the marker."""
+        self.keep(None)
         self.marker.hide()
 
     def is_outdated(self, scene: bpy.types.Scene) -> bool:
-        """Return whether the road has changed; reading it takes long enough to do so after changes only."""
+        """Return whether the road differs from the checked one, compared only after possible changes."""
         if self.asked and self.parameters is not None:
             try:
-                self.stale = road_now(scene, self.road) != self.parameters
+                self.stale = edited_parameters(scene, self.road) != self.parameters
             except InputError:
                 self.stale = True
             self.asked = False
         return self.stale
 
 
-checked = Checked()
+checked = CheckedRoad()
 
 
-def road_now(scene: bpy.types.Scene, road: str = "") -> RoadParameters | None:
-    """Return the parameter set of a road as it is edited now; None without a road.
+def edited_parameters(scene: bpy.types.Scene, road: str = "") -> RoadParameters | None:
+    """Return a road's parameter set with edits read back from the scene; None without a road.
 
     Args:
         scene: that it is in.
@@ -90,13 +90,13 @@ def road_now(scene: bpy.types.Scene, road: str = "") -> RoadParameters | None:
 
 
 def shown_id(scene: bpy.types.Scene) -> str:
-    """Return the id of the road that the panels show; empty without a road."""
+    """Return the id of the road that the panels are about; empty without a road."""
     root = find_road(scene)
     return "" if root is None else str(root[ROAD])
 
 
-def offset_of(geometry: RoadGeometry, violation: Violation) -> float:
-    """Return the offset (m) of where a rule is broken: its object's, else of the middle of its carriageway."""
+def violation_offset(geometry: RoadGeometry, violation: Violation) -> float:
+    """Return the offset of a broken rule's place, m: its object's, else the middle of its carriageway, else 0."""
     item = geometry.parameters.objects.get(violation.object)
     station = float(np.clip(violation.station, 0.0, geometry.length))
     if isinstance(item, LineMarking):
@@ -112,8 +112,8 @@ def offset_of(geometry: RoadGeometry, violation: Violation) -> float:
     return 0.0
 
 
-def _jump(rules: "SYNTHROADS_PG_rules", context: bpy.types.Context) -> None:
-    """Look at the chosen line's place."""
+def _look_at_entry(rules: "SYNTHROADS_PG_rules", context: bpy.types.Context) -> None:
+    """Show the marker and turn the view to the place of the selected list entry."""
     if not 0 <= rules.index < len(rules.violations) or checked.parameters is None:
         return
     row = rules.violations[rules.index]
@@ -126,7 +126,7 @@ def _jump(rules: "SYNTHROADS_PG_rules", context: bpy.types.Context) -> None:
 
 
 class SYNTHROADS_PG_violation(bpy.types.PropertyGroup):
-    """A broken rule: `Violation` with its offset. The name, by which Blender searches lists, is the rule's title."""
+    """A list entry for a broken rule: its `Violation` with an offset; `name` is the rule's title."""
 
     rule: bpy.props.StringProperty()
     object: bpy.props.StringProperty()
@@ -139,10 +139,10 @@ class SYNTHROADS_PG_violation(bpy.types.PropertyGroup):
 
 
 class SYNTHROADS_PG_rules(bpy.types.PropertyGroup):
-    """The broken rules of the road that was checked last."""
+    """List of the rules that the last checked road breaks."""
 
     violations: bpy.props.CollectionProperty(type=SYNTHROADS_PG_violation)
-    index: bpy.props.IntProperty(update=_jump, description="Click to look at the place")
+    index: bpy.props.IntProperty(update=_look_at_entry, description="Click to look at the place")
 
 
 class SYNTHROADS_OT_check_rules(bpy.types.Operator):
@@ -154,17 +154,17 @@ class SYNTHROADS_OT_check_rules(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """There must be a road."""
+        """Return whether the scene has a road."""
         return has_road(cls, context)
 
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
-        """Check the road and fill the list."""
-        parameters = road_now(context.scene)
+        """Check the road with its edits and fill the list of broken rules."""
+        parameters = edited_parameters(context.scene)
         assert parameters  # poll() has seen the road
         violations = check(parameters)
         _clear(context.window_manager)
-        checked.take(parameters, shown_id(context.scene))
+        checked.keep(parameters, shown_id(context.scene))
         _fill(context.window_manager.synthroads_rules, parameters, violations)
         self.report({"INFO"}, _count(len(violations)))
         redraw_views(context)
@@ -181,12 +181,12 @@ class SYNTHROADS_OT_show_violation(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Rules must have been checked, and some be broken."""
+        """Return whether the list of broken rules has entries."""
         return len(context.window_manager.synthroads_rules.violations) > 0
 
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
-        """Choose the line, which jumps there."""
+        """Select the list entry `index`, which turns the view to its place."""
         rules = context.window_manager.synthroads_rules
         if self.index >= len(rules.violations):
             raise InputError("index", self.index, f"must be 0 to {len(rules.violations) - 1}")
@@ -201,14 +201,14 @@ class SYNTHROADS_OT_clear_rules(bpy.types.Operator):
     bl_options = {"INTERNAL"}  # noqa: RUF012
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Forget what was found."""
+        """Clear the list of broken rules and hide the marker."""
         _clear(context.window_manager)
         redraw_views(context)
         return {"FINISHED"}
 
 
 class SYNTHROADS_UL_violations(bpy.types.UIList):
-    """A line for each broken rule: where, which, what was found and what is allowed."""
+    """List of broken rules, a row each: station, rule, value and limit."""
 
     def draw_item(
         self,
@@ -220,14 +220,14 @@ class SYNTHROADS_UL_violations(bpy.types.UIList):
         active_data: SYNTHROADS_PG_rules,
         active_property: str,
     ) -> None:
-        """Draw one line."""
+        """Draw one row of the list."""
         names = [row.name for row in data.violations]
-        _columns(layout, (f"{item.station:,.0f} m", item.name, item.found), names)
+        _draw_columns(layout, (f"{item.station:,.0f} m", item.name, item.found), names)
 
     def filter_items(
         self, context: bpy.types.Context, data: SYNTHROADS_PG_rules, field: str
     ) -> tuple[list[int], list[int]]:
-        """Search the titles, and order the lines along the road, or by title if that is asked for."""
+        """Return filter flags by title, and the order of rows by station, or by title if asked for."""
         rows = getattr(data, field)
         helper = bpy.types.UI_UL_list
         shown = helper.filter_items_by_name(self.filter_name, self.bitflag_filter_item, rows, "name")
@@ -237,7 +237,7 @@ class SYNTHROADS_UL_violations(bpy.types.UIList):
 
 
 class SYNTHROADS_PT_rules(Sidebar, bpy.types.Panel):
-    """The rules of the guidelines that the road breaks."""
+    """Panel of the guidelines' rules that the road breaks."""
 
     bl_label = "Rules"
     bl_parent_id = "SYNTHROADS_PT_road"
@@ -245,9 +245,9 @@ class SYNTHROADS_PT_rules(Sidebar, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Show the button, the list, and the chosen line in full."""
+        """Draw the buttons, the list, and details of the selected entry."""
         layout, rules = self.layout, context.window_manager.synthroads_rules
-        draw_shown(layout, context)
+        draw_road_name(layout, context)
         row = layout.row(align=True)
         row.operator(SYNTHROADS_OT_check_rules.bl_idname, icon="CHECKMARK")
         if checked.parameters is None:
@@ -259,14 +259,14 @@ class SYNTHROADS_PT_rules(Sidebar, bpy.types.Panel):
         draw_text(layout, _count(count), "ERROR" if count else "CHECKMARK")
         if not count:
             return
-        _columns(layout.row(), (_STATION, "Rule", _FOUND), [row.name for row in rules.violations])
+        _draw_columns(layout.row(), (_STATION, "Rule", _FOUND), [row.name for row in rules.violations])
         layout.template_list("SYNTHROADS_UL_violations", "", rules, "violations", rules, "index", rows=4)
         if 0 <= rules.index < count:
-            _details(layout, rules)
+            _draw_details(layout, rules)
 
 
-def _columns(layout: bpy.types.UILayout, texts: tuple[str, str, str], names: Sequence[str]) -> None:
-    """Draw one line of the list, or its head: where, which and what was found, or of that as much as fits.
+def _draw_columns(layout: bpy.types.UILayout, texts: tuple[str, str, str], names: Sequence[str]) -> None:
+    """Draw one row of the list, or its head: station, rule and value, as many columns as fit.
 
     Args:
         layout: a row.
@@ -291,7 +291,7 @@ def _columns(layout: bpy.types.UILayout, texts: tuple[str, str, str], names: Seq
     right_label(rest, texts[2])
 
 
-def _details(layout: bpy.types.UILayout, rules: SYNTHROADS_PG_rules) -> None:
+def _draw_details(layout: bpy.types.UILayout, rules: SYNTHROADS_PG_rules) -> None:
     item = rules.violations[rules.index]
     rule = RULES[item.rule]
     box = layout.box().column(align=True)
@@ -321,9 +321,9 @@ def _fill(rules: SYNTHROADS_PG_rules, parameters: RoadParameters, violations: li
         row = rules.violations.add()
         row.name = RULES[violation.rule].title
         row.rule, row.object, row.text = violation.rule, violation.object, violation.text
-        row.station, row.offset = violation.station, offset_of(geometry, violation)
+        row.station, row.offset = violation.station, violation_offset(geometry, violation)
         row.value, row.limit = (_write_number(number, violation.unit) for number in (violation.value, violation.limit))
-        row.found = f"{_brief(violation.value)} / {_brief(violation.limit)} {violation.unit}".removesuffix(" 1")
+        row.found = f"{_digits(violation.value)} / {_digits(violation.limit)} {violation.unit}".removesuffix(" 1")
     rules["index"] = -1  # past its update: nothing was clicked yet
 
 
@@ -340,8 +340,8 @@ def _write_number(value: float, unit: str) -> str:
     return f"{value:,.6g}" + (f" {unit}" if unit != "1" else "")
 
 
-def _brief(value: float) -> str:
-    """Return a number with as many decimals as a narrow column has room for."""
+def _digits(value: float) -> str:
+    """Return a number as short text, with fewer decimals the larger it is."""
     size = abs(value)
     if size >= 1e6:
         return f"{value:.3g}"
@@ -350,8 +350,8 @@ def _brief(value: float) -> str:
 
 
 @persistent
-def _look_for_changes(scene: bpy.types.Scene, graph: bpy.types.Depsgraph | None = None) -> None:
-    """Notice that the road may have been edited, built again or undone."""
+def _note_changes(scene: bpy.types.Scene, graph: bpy.types.Depsgraph | None = None) -> None:
+    """Handler: note that the road may have changed, by an edit, rebuild or undo, to be compared when drawn."""
     updates = graph.updates if graph else []
     changes = [update.id for update in updates if update.is_updated_geometry or update.is_updated_transform]
     if graph is None or any(isinstance(item, bpy.types.Object) and (ROLE in item or ROAD in item) for item in changes):
@@ -362,11 +362,11 @@ def _look_for_changes(scene: bpy.types.Scene, graph: bpy.types.Depsgraph | None 
 
 @persistent
 def _other_file(path: str) -> None:
-    """Forget the road of the file that was open before."""
+    """Handler: clear the list of broken rules when another file is loaded."""
     _clear(bpy.data.window_managers[0])
 
 
-HANDLERS = dict.fromkeys(("depsgraph_update_post", "undo_post", "redo_post"), _look_for_changes)
+HANDLERS = dict.fromkeys(("depsgraph_update_post", "undo_post", "redo_post"), _note_changes)
 HANDLERS["load_post"] = _other_file
 
 ATTACHED = (bpy.types.WindowManager, "synthroads_rules", SYNTHROADS_PG_rules)

@@ -27,7 +27,7 @@ def _class_items(settings: Any, context: Any) -> list[tuple[str, str, str]]:
 
 
 class SYNTHROADS_PG_scene_scan(bpy.types.PropertyGroup):
-    """How a scene without a road is scanned."""
+    """Settings of the scan of a scene without a road."""
 
     guide: bpy.props.PointerProperty(
         name="Along",
@@ -56,13 +56,13 @@ class SYNTHROADS_OT_set_class(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Objects must be selected."""
+        """Return whether objects are selected."""
         if not context.selected_objects:
             cls.poll_message_set("Select objects first")
         return bool(context.selected_objects)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Set the property."""
+        """Set the panel's class as custom property of all selected objects."""
         chosen, items = context.scene.synthroads_scene_scan.point_class, context.selected_objects
         for item in items:
             item[CLASS_PROPERTY] = chosen
@@ -71,7 +71,7 @@ class SYNTHROADS_OT_set_class(bpy.types.Operator):
 
 
 def unclassified(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """Return the visible objects with faces that have no class by a property or by a collection's name."""
+    """Return visible objects with faces that have no class by custom property or by a collection's name."""
     names = {row.name for row in classes()}
     collections = [item for item in context.scene.collection.children_recursive if item.name in names]
     named = {item for collection in collections for item in collection.all_objects}
@@ -83,7 +83,7 @@ def unclassified(context: bpy.types.Context) -> list[bpy.types.Object]:
 
 
 def draw_scene_scan(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Draw what a scan without a road needs to know."""
+    """Draw the settings of a scan without a road, and how many objects have no class."""
     settings = context.scene.synthroads_scene_scan
     draw_text(layout, "No road: what is visible is scanned", "INFO")
     if context.scene.synthroads.scan.platform.kind != "trajectory":

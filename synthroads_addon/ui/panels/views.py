@@ -11,7 +11,7 @@ from ...blender.views.daylight import VIEW, add_views, cameras_of
 from ..fields.room import buttons_row, draw_text
 from ..work.common import Sidebar, column, has_road, refusing
 from ..work.view import view_of
-from .rules import road_now
+from .rules import edited_parameters
 
 
 class SYNTHROADS_OT_add_views(bpy.types.Operator):
@@ -23,13 +23,13 @@ class SYNTHROADS_OT_add_views(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """There must be a road."""
+        """Return whether the scene has a road."""
         return has_road(cls, context)
 
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
-        """Add them, as the road is edited now."""
-        parameters, root = road_now(context.scene), find_road(context.scene)
+        """Add sun, sky, haze and cameras for the road with its edits, replacing earlier ones."""
+        parameters, root = edited_parameters(context.scene), find_road(context.scene)
         assert parameters  # poll() has seen the road
         assert root
         add_views(context.scene, parameters, Matrix(root.matrix_world))
@@ -45,7 +45,7 @@ class SYNTHROADS_OT_look_through(bpy.types.Operator):
     camera: bpy.props.StringProperty(name="Camera", options={"SKIP_SAVE"})
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Make it the scene's, and turn the view to it."""
+        """Make `camera` the scene's camera and show its view."""
         found = dict(cameras_of(context.scene)).get(self.camera)
         if found is None:
             self.report({"ERROR"}, "Add the cameras first")
@@ -58,7 +58,7 @@ class SYNTHROADS_OT_look_through(bpy.types.Operator):
 
 
 class SYNTHROADS_PT_views(Sidebar, bpy.types.Panel):
-    """Sun, sky, haze and cameras."""
+    """Panel of sun, sky, haze and cameras for the user's own pictures."""
 
     bl_label = "Light and Cameras"
     bl_parent_id = "SYNTHROADS_PT_environment"
@@ -66,7 +66,7 @@ class SYNTHROADS_PT_views(Sidebar, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}  # noqa: RUF012
 
     def draw(self, context: bpy.types.Context) -> None:
-        """Show the button, and one for each camera."""
+        """Draw the button that adds lights and cameras, and a button for each camera."""
         layout = column(self)
         if find_road(context.scene) is None:
             draw_text(layout, "Build a road first", "INFO")

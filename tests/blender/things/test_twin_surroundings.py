@@ -9,9 +9,9 @@ from synthroads_addon.base.arrays import Float
 from synthroads_addon.road.alignment import clip_offset
 from synthroads_addon.road.things.vehicles import VEHICLE_TYPES
 from synthroads_addon.scanning.scene.mesh import SceneMesh
-from synthroads_addon.twin.ground import GROUND_TOLERANCE, ground_beside
+from synthroads_addon.twin.ground import GROUND_TOLERANCE, triangulate_ground
 from synthroads_addon.twin.plants import placed_plants
-from synthroads_addon.twin.surfaces import on_ground, road_stations
+from synthroads_addon.twin.surfaces import road_stations, surface_points
 from synthroads_addon.twin.vehicles import placed_vehicles
 from tests.helpers.scenes.furnished_road import Data, FurnishedRoad, cast_down, tree_of
 from tests.helpers.scenes.scan_scenes import mesh_of
@@ -40,7 +40,7 @@ def road() -> FurnishedRoad:
 def ground_mesh(road: FurnishedRoad, raised: float = 0.0) -> tuple[SceneMesh, float]:
     """Return the twin's ground, in the scene's coordinates, and the deviation that it tells."""
     geometry = road.geometry
-    ground = ground_beside(geometry, road.parameters.terrain, road_stations(geometry, 0.005), 0.005)
+    ground = triangulate_ground(geometry, road.parameters.terrain, road_stations(geometry, 0.005), 0.005)
     points, polygons = [], []
     for faces in ground.faces:
         polygons += (faces.corners.reshape(-1, 3) + len(points)).tolist()
@@ -56,7 +56,7 @@ def ground_differences(road: FurnishedRoad, raised: float = 0.0) -> tuple[Float,
     edges = road.geometry.offsets(station)
     beside = (offset > edges[:, 0] + 0.1) | (offset < edges[:, -1] - 0.1)
     beside &= clip_offset(offset, road.geometry.alignment.curvature(station)) == offset
-    exact = on_ground(road.geometry, station[beside], offset[beside]) - road.origin
+    exact = surface_points(road.geometry, station[beside], offset[beside]) - road.origin
     mine, model = cast_down(tree_of(mesh), exact[:, :2]), road.surface(exact[:, :2])
     there = np.isfinite(mine) & np.isfinite(model)
     assert there.sum() > 1500

@@ -17,7 +17,7 @@ from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scanned_scene
 from synthroads_addon.cloud.points import PointBlock
 from synthroads_addon.jobs.choose.knobs import ModelKnobs
-from synthroads_addon.jobs.choose.table import table_of
+from synthroads_addon.jobs.choose.table import shipped_table
 from synthroads_addon.jobs.choose.trial import Trial
 from synthroads_addon.jobs.generate import Job, generate
 from synthroads_addon.jobs.measure.errors import beam_errors
@@ -114,7 +114,7 @@ def test_much_time_takes_the_best_by_trials_for_a_tolerance_and_else_by_the_ship
         assert choice["chosen"]["vegetation_detail"] == 1.0
         assert choice["chosen"]["scan.relief_octaves"] == 6
         assert choice["chosen"]["geometric_tolerance"] <= 0.005
-    assert by_table["expected"]["errors"]["relief"] == table_of("uav").relief["6"]
+    assert by_table["expected"]["errors"]["relief"] == shipped_table("uav").relief["6"]
 
 
 @pytest.mark.usefixtures("few_lines")

@@ -62,7 +62,7 @@ def test_a_quick_run_measures_every_line(tmp_path: Path, capfd: pytest.CaptureFi
 def test_bad_input_is_refused_before_anything_is_measured(
     capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("headless.benchmark._all", lambda _: pytest.fail("measured"))
+    monkeypatch.setattr("headless.benchmark._measure_all", lambda _: pytest.fail("measured"))
     assert main(["benchmark", "--cores", "0"]) == 2
     assert "--cores is 0: must be 1 to" in capfd.readouterr().err
     assert main(["benchmark", "--cores", "1", "--set", 'outputs=["parameters"]']) == 2
@@ -75,7 +75,7 @@ def test_an_occupied_folder_is_refused_before_anything_is_measured(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "benchmark.md").write_text("mine")
-    monkeypatch.setattr("headless.benchmark._all", lambda _: pytest.fail("measured"))
+    monkeypatch.setattr("headless.benchmark._measure_all", lambda _: pytest.fail("measured"))
     assert main(["benchmark", "--cores", "1", "--output", str(tmp_path)]) == 2
     assert "already holds benchmark.md" in capfd.readouterr().err
     assert (tmp_path / "benchmark.md").read_text() == "mine"

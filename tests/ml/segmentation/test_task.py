@@ -262,7 +262,7 @@ def test_commands_train_evaluate_and_predict(data: Path, tmp_path: Path, capsys:
 
         parser = argparse.ArgumentParser()
         module.add_arguments(parser)
-        commands.complete_arguments(parser)
+        commands.add_shared_options(parser)
         code = commands.run(module.run, parser.parse_args([*map(str, arguments), "--json"]))
         out = capsys.readouterr()
         assert code == 0, out.err

@@ -254,7 +254,7 @@ def _axis_alone(geometry: RoadGeometry, folder: Path) -> Any:
     ifc = IfcFile("axis", Trace(geometry))
     write_project(ifc, geometry.parameters)
     write_alignment(ifc, geometry)
-    ifc.relate()
+    ifc.write_relations()
     ifc.write(folder / "axis.ifc", "", "")
     return ifcopenshell.open(str(folder / "axis.ifc"))
 

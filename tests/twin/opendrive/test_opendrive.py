@@ -26,7 +26,7 @@ from synthroads_addon.road.things.gantry import Gantry
 from synthroads_addon.road.things.overpass import Overpass
 from synthroads_addon.road.things.sign import TrafficSign
 from synthroads_addon.sampling.road import sample_road
-from synthroads_addon.twin.opendrive.pieces import chords, cubics, runs
+from synthroads_addon.twin.opendrive.pieces import chord_stations, fit_cubics, join_cubics
 from synthroads_addon.twin.opendrive.writer import geo_reference, write_opendrive
 from synthroads_addon.twin.plants import placed_plants
 from tests.helpers.files.opendrive_reader import (
@@ -724,11 +724,11 @@ def test_cubics_are_what_they_stand_for(kinks: list[float], values: list[float])
         line = np.interp(s, borders, values[: len(borders)])
         return np.column_stack([line, np.minimum(line, values[7]) + values[8] * (s / 100.0) ** 3])
 
-    found = cubics(function, borders)
+    found = fit_cubics(function, borders)
     s = np.linspace(0.0, 100.0, 777)
     steepest = 10.0 / max(np.diff(borders).min(), 1e-3)
     for f in range(2):
-        starts, coefficients = zip(*runs(found.borders, found.coefficients[:, f]), strict=True)
+        starts, coefficients = zip(*join_cubics(found.borders, found.coefficients[:, f]), strict=True)
         piece = np.searchsorted(starts, s, side="right") - 1
         a, b, c, d = np.array(coefficients)[piece].T
         u = s - np.array(starts)[piece]
@@ -737,8 +737,8 @@ def test_cubics_are_what_they_stand_for(kinks: list[float], values: list[float])
 
 def test_a_short_piece_goes_on_as_the_long_one_does() -> None:
     borders = np.array([0.0, 0.05, 100.0, 100.1])
-    found = cubics(lambda s: ((s / 37.0) ** 3 + 0.1 * s)[:, None], borders)
-    ((start, coefficients),) = runs(found.borders, found.coefficients[:, 0])
+    found = fit_cubics(lambda s: ((s / 37.0) ** 3 + 0.1 * s)[:, None], borders)
+    ((start, coefficients),) = join_cubics(found.borders, found.coefficients[:, 0])
     assert start == 0.0
     assert coefficients == pytest.approx([0.0, 0.1, 0.0, 37.0**-3], abs=1e-9)
 
@@ -749,7 +749,7 @@ def test_chords_stay_within_the_tolerance(wavelength: float, tolerance: float) -
     def function(s: np.ndarray) -> np.ndarray:
         return np.sin(s[:, None] / wavelength)
 
-    found = chords(function, np.array([0.0, 50.0, 100.0]), tolerance)
+    found = chord_stations(function, np.array([0.0, 50.0, 100.0]), tolerance)
     s = np.linspace(0.0, 100.0, 5001)
     assert np.abs(np.interp(s, found, function(found)[:, 0]) - function(s)[:, 0]).max() < 1.5 * tolerance
 

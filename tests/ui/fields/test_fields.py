@@ -139,7 +139,7 @@ def test_any_scenario_comes_back_to_the_last_digit(data: dict[str, Any]) -> None
     except InputError:
         assume(False)
     panel = bpy.context.scene.synthroads
-    panel.take(scenario)
+    panel.show_scenario(scenario)
     assert panel.scenario() == scenario
     assert json.dumps(panel.scenario().to_dict()) == json.dumps(scenario.to_dict())
 
@@ -150,7 +150,7 @@ def test_what_the_panel_lacks_is_refused_not_ignored(name: str) -> None:
     before = panel.scenario()
     scenario = Scenario.from_dict({"tolerance": {"height": "5mm"}} if name == "tolerance" else {"time_budget": "60s"})
     with pytest.raises(InputError, match=f"^{name} .*only synthroads generate chooses"):
-        panel.take(scenario)
+        panel.show_scenario(scenario)
     assert panel.scenario() == before
 
 
@@ -163,7 +163,7 @@ def test_without_the_loaded_text_numbers_are_the_nearest_of_32_bits(data: dict[s
     except InputError:
         assume(False)
     panel = bpy.context.scene.synthroads
-    panel.take(scenario)
+    panel.show_scenario(scenario)
     panel.loaded = ""
     near(read_fields(FIELDS, panel, None), json.loads(scenario.to_json()))
 
@@ -187,7 +187,7 @@ def test_untouched_settings_are_the_demo_at_draft_fidelity(panel: Any) -> None:
 @pytest.mark.parametrize("name", scenario_names())
 def test_a_built_in_scenario_keeps_seed_and_fidelity(panel: Any, name: str) -> None:
     panel.seed, panel.fidelity = 99, "high"
-    panel.take_preset(name)
+    panel.show_preset(name)
     assert panel.scenario() == load_scenario(name, ["fidelity=high", "seed=99", PANELS_OUTPUTS])
 
 
@@ -443,7 +443,7 @@ OWN = sorted(
 
 @pytest.mark.parametrize("path", OWN)
 def test_a_value_of_ones_own_begins_with_what_was_shown(panel: Any, path: str) -> None:
-    panel.take(Scenario())
+    panel.show_scenario(Scenario())
     if path == "scan.weather.visibility":
         panel.scan.own_weather = True
     field = PATHS[path]
@@ -458,7 +458,7 @@ def test_a_value_of_ones_own_begins_with_what_was_shown(panel: Any, path: str) -
 
 
 def test_what_is_inherited_is_what_the_scenario_has(panel: Any) -> None:
-    panel.take(Scenario(fidelity="high"))
+    panel.show_scenario(Scenario(fidelity="high"))
     scenario = panel.scenario()
     numbers, colour = scenario.settings(), scenario.colour.settings("high")
     assert PATHS["geometric_tolerance"].inherited(panel) == numbers.tolerance
@@ -469,7 +469,7 @@ def test_what_is_inherited_is_what_the_scenario_has(panel: Any) -> None:
 
 @pytest.mark.parametrize("pulses", [7, 5_000_000_000, 40_000_000_001, MOST_POSSIBLE])
 def test_a_scan_may_have_more_pulses_than_fit_into_32_bits(panel: Any, pulses: int) -> None:
-    panel.take(Scenario.from_dict({"scan": {"most_pulses": pulses}}))
+    panel.show_scenario(Scenario.from_dict({"scan": {"most_pulses": pulses}}))
     assert panel.scenario().scan.most_pulses == pulses
 
 
@@ -481,7 +481,7 @@ def test_a_limit_of_pulses_begins_where_it_refuses_nothing(panel: Any) -> None:
 
 
 def test_a_seed_too_long_for_blender_is_kept_until_another_is_given(panel: Any) -> None:
-    panel.take(Scenario(seed=10**15))
+    panel.show_scenario(Scenario(seed=10**15))
     assert (panel.scenario().seed, panel.exact_seed()) == (10**15, 10**15)
     panel.seed = 5
     assert (panel.scenario().seed, panel.exact_seed()) == (5, 5)

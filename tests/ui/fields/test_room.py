@@ -59,7 +59,7 @@ def test_no_label_is_cut_off(width: float, monkeypatch: pytest.MonkeyPatch) -> N
 @pytest.mark.parametrize("width", WIDTHS)
 def test_no_label_of_any_part_is_cut_off(width: float, monkeypatch: pytest.MonkeyPatch) -> None:
     widen(monkeypatch, width)
-    for item in edit.parts(bpy.context.scene).values():
+    for item in edit.editable_parts(bpy.context.scene).values():
         bpy.context.view_layer.objects.active = item
         layout = drawn(edit.SYNTHROADS_PT_edit, bpy.context)
         assert [text for text, place, needed in layout.texts(room.row_width()) if needed > place] == [], item.name

@@ -54,7 +54,7 @@ def test_buttons_fit_and_save_what_the_library_does(settings: Any, tmp_path: Pat
     assert (tmp_path / "panel.json").read_bytes() == (tmp_path / "library.json").read_bytes()
     result = calibration.latest
     assert result.to_dict() == wanted.to_dict()
-    lines = calibration.lines_of(result.compared[0])
+    lines = calibration.result_lines(result.compared[0])
     assert "50 zeros left out" in lines[1]
     assert lines[-1].startswith("Error / IQR: ")
     image = bpy.data.images[calibration.PICTURE]

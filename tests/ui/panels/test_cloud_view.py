@@ -146,9 +146,9 @@ def test_a_cloud_of_elsewhere_is_told_apart(shown: Any, tmp_path: Path) -> None:
     near, far = make_points(10), make_points(10, origin=(394_000.0, 5_628_000.0, 180.0))
     bpy.ops.synthroads.show_cloud(filepath=str(write(tmp_path / "a.laz", near)))
     assert view.cloud
-    assert [text for text, _ in cloud_view.notes(view.cloud, bpy.context.scene)] == ["10 of 10 points"]
+    assert [text for text, _ in cloud_view.cloud_notes(view.cloud, bpy.context.scene)] == ["10 of 10 points"]
     bpy.ops.synthroads.show_cloud(filepath=str(write(tmp_path / "b.laz", far)))
-    assert any("100 km from the road" in text for text, _ in cloud_view.notes(view.cloud, bpy.context.scene))
+    assert any("100 km from the road" in text for text, _ in cloud_view.cloud_notes(view.cloud, bpy.context.scene))
 
 
 def test_without_a_road_it_is_drawn_near_the_middle_and_looked_at(shown: Any, tmp_path: Path) -> None:
@@ -156,7 +156,7 @@ def test_without_a_road_it_is_drawn_near_the_middle_and_looked_at(shown: Any, tm
     bpy.ops.synthroads.show_cloud(filepath=str(write(tmp_path / "a.laz", make_points(1_000))))
     assert view.cloud
     assert np.abs(view.cloud.xyz).max() < 700.0
-    assert any("No road" in text for text, _ in cloud_view.notes(view.cloud, bpy.context.scene))
+    assert any("No road" in text for text, _ in cloud_view.cloud_notes(view.cloud, bpy.context.scene))
     space = next(area for area in bpy.context.screen.areas if area.type == "VIEW_3D").spaces.active
     middle = (view.cloud.xyz.min(axis=0) + view.cloud.xyz.max(axis=0)) / 2
     assert np.allclose(space.region_3d.view_location, middle, atol=0.01)

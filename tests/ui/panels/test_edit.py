@@ -56,7 +56,7 @@ def state() -> Any:
 
 
 def road_parts() -> dict[str, bpy.types.Object]:
-    return edit.parts(bpy.context.scene)
+    return edit.editable_parts(bpy.context.scene)
 
 
 def now() -> Any:
@@ -95,7 +95,7 @@ def test_every_input_that_is_shown_is_carried_back() -> None:
     parameters = recall_parameters(find_road(bpy.context.scene))
     count = 0
     for item in road_parts().values():
-        for heading, inputs in edit.sections(parameters, item):
+        for heading, inputs in edit.input_sections(parameters, item):
             for name, identifier in inputs:
                 data, prop = shown_input(edit._modifier(item), identifier)
                 before = data[prop[2:-2]] if prop.startswith("[") else getattr(data, prop)
@@ -203,7 +203,7 @@ def test_layout_of_the_sub_panel(part: str) -> None:
     for name in wanted.get(part, ["Batter Slope", "Half Width"]):
         assert f"label {name!r}" in text, name
     assert text.count("input") == sum(
-        len(i) for _, i in edit.sections(edit.open_parameters(bpy.context.scene), road_parts()[part])
+        len(i) for _, i in edit.input_sections(edit.open_parameters(bpy.context.scene), road_parts()[part])
     )
     assert "Instance" not in text
 

@@ -142,7 +142,7 @@ def states(settings: Any) -> Iterator[None]:
     chosen += [(kind, "direct", "snow") for kind in PLATFORMS]
     chosen += [("uav", "direct", condition) for condition in WEATHERS]
     for kind, path, condition in chosen:
-        settings.take(Scenario())
+        settings.show_scenario(Scenario())
         settings.scan.platform.kind, settings.scan.platform.path = kind, path
         settings.road.cross_section = BY_HAND
         for field in PATHS.values():

@@ -15,7 +15,7 @@ from synthroads_addon.jobs.generate import Job, RoadSource, generate
 from synthroads_addon.road.parameters import RoadParameters, read_parameters
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import Scenario, load_scenario
-from synthroads_addon.ui.panels.road_files import source_of
+from synthroads_addon.ui.panels.road_files import source_file_name
 from tests.helpers.scenes.panel_road import SAME, cheap, road, road_file, settings, small_pictures
 
 __all__ = ["cheap", "road", "road_file", "settings", "small_pictures"]
@@ -54,7 +54,7 @@ def test_a_loaded_road_is_the_files_at_the_panels_fidelity(cheap: Any, tmp_path:
     assert parameters == read_parameters(path)
     assert kept == cheap.scenario()
     assert kept.fidelity == "standard"
-    assert source_of(find_road(bpy.context.scene)) == "road.json"
+    assert source_file_name(find_road(bpy.context.scene)) == "road.json"
 
 
 def test_a_scan_of_a_loaded_road_is_the_librarys(cheap: Any, tmp_path: Path) -> None:
@@ -77,7 +77,7 @@ def test_a_fitted_road_is_the_librarys(cheap: Any, tmp_path: Path) -> None:
     assert report["axis"]["horizontal"]["worst"] < 0.01
     assert parameters.metadata.epsg == 25833
     assert parameters.alignment.length == pytest.approx(200.0, abs=0.01)
-    assert source_of(find_road(bpy.context.scene)) == "axis.csv"
+    assert source_file_name(find_road(bpy.context.scene)) == "axis.csv"
 
 
 def test_a_fit_that_leaves_its_points_is_refused_with_a_picture(cheap: Any, tmp_path: Path) -> None:
@@ -114,7 +114,7 @@ def test_a_saved_set_comes_back(cheap: Any, tmp_path: Path) -> None:
 def test_the_panel_names_a_file_only_where_the_road_is_its(cheap: Any, tmp_path: Path) -> None:
     bpy.ops.synthroads.load_road(filepath=str(set_file(tmp_path)))
     bpy.ops.synthroads.build()
-    assert source_of(find_road(bpy.context.scene)) is None
+    assert source_file_name(find_road(bpy.context.scene)) is None
 
 
 def test_the_users_own_things_stay(cheap: Any, tmp_path: Path) -> None:

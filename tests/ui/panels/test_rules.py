@@ -134,7 +134,7 @@ def test_the_place_of_any_object_is_beside_the_road(found: Any) -> None:
     for key in [*parameters.objects, "no such object"]:
         for station in (-5.0, 20.0, 1e6):
             violation = rules.Violation("object-range", key, station, 0.0, 0.0, "m", "")
-            assert abs(rules.offset_of(geometry, violation)) < 200.0
+            assert abs(rules.violation_offset(geometry, violation)) < 200.0
 
 
 def test_the_list_says_when_the_road_has_changed(found: Any) -> None:
@@ -150,7 +150,7 @@ def test_the_list_says_when_the_road_has_changed(found: Any) -> None:
     assert not rules.checked.asked  # the user's own objects are none of the road's
     for item in [item for item in bpy.data.objects if ROLE in item]:
         bpy.data.objects.remove(item)
-    rules._look_for_changes(scene)
+    rules._note_changes(scene)
     assert rules.checked.is_outdated(scene)
     assert not bpy.ops.synthroads.check_rules.poll()
 
@@ -195,7 +195,7 @@ def test_a_line_that_is_not_there_is_a_message(found: Any) -> None:
     + [(1234.56, "1,234.6"), (1.7976931348623157e308, "1.8e+308"), (100.0, "100"), (10.0, "10")],
 )
 def test_numbers_fit_a_narrow_column(value: float, text: str) -> None:
-    assert rules._brief(value) == text
+    assert rules._digits(value) == text
 
 
 def test_the_panel_shows_the_list_and_the_chosen_line_in_full(found: Any) -> None:

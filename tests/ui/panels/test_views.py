@@ -37,7 +37,7 @@ def build(visibility: float) -> Any:
     end = text.index("\n", start) if "\n" in text[start:] else len(text)
     old = text[start:end].rstrip(",}")
     root["synthroads_parameters"] = text.replace(old, f'"visibility": {visibility}')
-    parameters = rules.road_now(bpy.context.scene)
+    parameters = rules.edited_parameters(bpy.context.scene)
     assert parameters
     assert parameters.environment.visibility == visibility
     return parameters
