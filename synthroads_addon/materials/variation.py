@@ -5,6 +5,7 @@ that what the camera sees and what the laser measures change alike. Facets and r
 paint has lost its beads with its film, and beads under water retro-reflect little.
 """
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -12,8 +13,10 @@ import numpy as np
 from ..road.surroundings import Environment, MaterialVariation
 from .table import Material, materials
 
-ASPHALT_OF_AGE = (0.6, 1.6)
-"""Factor on new and on old asphalt: binder is black, bare aggregate bright."""
+ASPHALT_OF_AGE = (0.38, 0.96, 1.06)
+"""Factor on asphalt under its binder's black film, on the bare aggregate below it, and on old asphalt."""
+_FILM_LASTS = 0.05
+"""Age at which traffic has left 1/e of the binder's film: about a year of twenty."""
 DRY_GRASS = (0.27, 0.22, 0.11)
 WET_BASE, WET_SPECULAR, WET_ROUGHNESS = 0.45, 0.5, 0.6
 """Share that water takes of a porous surface's base colour, of what it reflects at 905 nm, and of its roughness."""
@@ -71,8 +74,9 @@ def _age_material(name: str, table: Mapping[str, Material], variation: MaterialV
 
 
 def _of_age(variation: MaterialVariation) -> float:
-    new, old = ASPHALT_OF_AGE
-    return new + (old - new) * variation.asphalt_age
+    film, bare, old = ASPHALT_OF_AGE
+    age = variation.asphalt_age
+    return bare + (film - bare) * math.exp(-age / _FILM_LASTS) + (old - bare) * age
 
 
 def _scale_color(mean: Material, factor: float, specular: float | None = None) -> Material:

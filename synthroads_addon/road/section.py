@@ -65,6 +65,9 @@ class Patch(Model):
         min_length=3, max_length=32, description="Stations and offsets (m) of its corners; it is convex."
     )
     age: float = quantity(0.5, ge=0, le=1, unit="1", description="0 new and black, 1 as old as what is around it.")
+    height: float = quantity(
+        0.001, ge=-0.03, le=0.03, unit="m", description="Height above the pavement; negative where it has sunk."
+    )
 
 
 class Crack(Model):
@@ -73,6 +76,9 @@ class Crack(Model):
     kind: Literal["longitudinal", "transverse", "alligator"] = Field(description="How it runs; alligator is a net.")
     width: float = quantity(ge=0.001, le=0.2, unit="m", description="Width of the gap, or of the band that seals it.")
     sealed: bool = Field(False, description="Whether it is sealed.")
+    depth: float = quantity(
+        0.005, ge=-0.01, le=0.2, unit="m", description="Depth below the pavement; negative where its seal stands out."
+    )
     lines: tuple[Annotated[tuple[Corner, ...], Field(min_length=2, max_length=1000)], ...] = Field(
         min_length=1, max_length=1000, description="Stations and offsets (m) along each of its lines."
     )
@@ -83,6 +89,17 @@ class Pavement(Model):
 
     kind: Literal["asphalt", "concrete"] = Field("asphalt", description="Surface course.")
     slab_length: float = quantity(5.0, ge=2, le=20, unit="m", description="Distance of a concrete pavement's joints.")
+    joint_depth: float = quantity(0.002, ge=0, le=0.05, unit="m", description="Depth of joints below the pavement.")
+    wheel_track_depth: float = quantity(
+        0.003, ge=0, le=0.02, unit="m", description="Depth of the outermost lane's wheel tracks where it has no ruts."
+    )
+    unevenness: float = quantity(
+        8.0,
+        ge=0,
+        le=512,
+        unit="cm3",
+        description="Spectral density of the heights at 0.1 cycles/m (ISO 8608: class A to 32, B to 128, C to 512).",
+    )
     ruts: tuple[Rut, ...] = Field((), description="Rutting.")
     potholes: tuple[Pothole, ...] = Field((), description="Spalling and potholes.")
     patches: tuple[Patch, ...] = Field((), description="Repaired places.")

@@ -22,6 +22,10 @@ CRACKS_PER_KM = _LONG_PER_KM + _ACROSS_PER_KM + _NETS_PER_KM
 _LENGTH = {"long": (4.0, 25.0), "net": (1.0, 4.0), "patch": (1.5, 12.0)}
 _GAP, _BAND = (0.003, 0.012), (0.04, 0.06)
 """Widths of open cracks and of sealing bands, m."""
+_GAP_DEPTH, _BAND_DEPTH = (0.004, 0.03), (-0.002, 0.001)
+"""Depths of open cracks, which are filled with dirt below, and of bands, which mostly stand out, m."""
+_PATCH_HEIGHT = (-0.004, 0.004)
+"""Heights of patches above the pavement, m."""
 _TRACK = 0.9
 """Distance of a wheel track from the lane's middle, m."""
 _STEP, _CELL = 0.6, 0.2
@@ -49,11 +53,12 @@ class PavementDamage:
         drawn = draw_materials(limits, seed)
         self._patch_density, self._crack_density = drawn["patch_density"], drawn["crack_density"]
         self._seed, self._side, self._length, self._edges = seed, side, length, edges
+        self._depths = stream(seed, "crack depths", side)
         self._sign = 1.0 if side == "left" else -1.0
 
     def patches(self) -> tuple[Patch, ...]:
         """Return drawn patches along lanes, each as wide as the lane or one of its halves."""
-        rng = stream(self._seed, "patches", self._side)
+        rng, heights = (stream(self._seed, purpose, self._side) for purpose in ("patches", "patch heights"))
         result = []
         for _ in range(_count(self._patch_density * self._length / 100.0, rng)):
             outer, inner = self._lane(rng)
@@ -62,7 +67,8 @@ class PavementDamage:
             low, high = low + 0.15, high - 0.15  # beside the markings
             start, end = self._stretch(_LENGTH["patch"], rng)
             corners = [(start, low), (end, low), (end, high), (start, high)]
-            result.append(Patch(outline=tuple(map(self._corner, corners)), age=draw_between(rng, (0.0, 1.0))))
+            age, height = draw_between(rng, (0.0, 1.0)), draw_between(heights, _PATCH_HEIGHT)
+            result.append(Patch(outline=tuple(map(self._corner, corners)), age=age, height=height))
         return tuple(result)
 
     def cracks(self) -> tuple[Crack, ...]:
@@ -108,7 +114,9 @@ class PavementDamage:
     def _crack(self, kind: str, lines: list[np.ndarray], rng: np.random.Generator, sealed: float) -> Crack:
         closed = bool(rng.random() < sealed)
         corners = tuple(tuple(self._corner((float(s), float(d))) for s, d in line) for line in lines)
-        return Crack(kind=kind, width=draw_between(rng, _BAND if closed else _GAP), sealed=closed, lines=corners)
+        width = draw_between(rng, _BAND if closed else _GAP)
+        depth = draw_between(self._depths, _BAND_DEPTH if closed else _GAP_DEPTH)
+        return Crack(kind=kind, width=width, sealed=closed, depth=depth, lines=corners)
 
     def _lane(self, rng: np.random.Generator) -> tuple[float, float]:
         """Return the distances (m) of outer and inner edge of a drawn lane, mostly an outer one: of heavy vehicles."""

@@ -35,7 +35,7 @@ from ..road.things.limits import Interval
 from ..road.turnout_geometry import BLEND, NOSE_BEFORE_END, NOSE_WIDTH, STEP
 from ..scenario.road import FreeCrossSection, RoadScenario
 from .pavement_damage import PavementDamage
-from .placing.draw import draw_between
+from .placing.draw import draw, draw_between
 
 FeatureKind = Literal["exit", "entry", "emergency_bay", "lane_change"]
 
@@ -335,12 +335,19 @@ class CarriagewaySampler:
             crossfall=crossfall_points(self.scenario.design_class, side, section.paved_width / 2.0, axis),
             pavement=Pavement(
                 kind="concrete" if self.concrete else "asphalt",
+                **self._relief(side),
                 ruts=self._ruts(lanes, rng),
                 potholes=self._potholes(side, lanes, rng),
                 patches=damage.patches(),
                 cracks=damage.cracks(),
             ),
         )
+
+    def _relief(self, side: Side) -> dict[str, float]:
+        """Return the depths of wheel tracks and joints, and the unevenness."""
+        rng, limits = stream(self.seed, "pavement relief", side), self.scenario.pavement
+        names = ("wheel_track_depth", "joint_depth", "unevenness")
+        return {name: draw(rng, getattr(limits, name)) for name in names}
 
     def _lane_edges(self, lanes: tuple[Lane, ...]) -> tuple[float, ...]:
         """Return the distances (m) from the centreline of the boundaries of steady lanes, outermost first."""

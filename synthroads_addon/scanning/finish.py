@@ -7,9 +7,9 @@ import numpy as np
 
 from ..base.arrays import AnyArray, Float
 from ..cloud.layers import optional_arrays
-from ..cloud.points import NO_MATERIAL, PointBlock
-from ..materials.reflectance import reflectivity, returned_share
-from ..materials.surfaces import Surfaces, brightness_of
+from ..cloud.points import NO_MATERIAL
+from ..materials.reflectance import reflectivity
+from ..materials.surfaces import Surfaces
 from .colour.colour import LayerSource, LayerValues, SeenPoints, sample_points
 from .devices.device import ScannerSetting
 from .plan import ScanPlan
@@ -43,9 +43,15 @@ class Finish:
             result = self._with_layers(result, result.seen)
         points = result.points
         if result.seen is not None and plan.relief is not None:
-            place = result.seen.position + plan.frame_origin
+            pavement, seen = plan.pavement, result.seen.position
             points = shift_along_normals(
-                points, place, plan.relief, plan.relief_strength, plan.seed, plan.relief_octaves
+                points,
+                seen + plan.frame_origin,
+                plan.relief,
+                plan.relief_strength,
+                plan.seed,
+                plan.relief_octaves,
+                None if pavement is None else pavement.heights(points.instance_id, seen + plan.target.origin),
             )
         changes: dict[str, AnyArray | None] = dict.fromkeys(points.attributes().keys() & OPTIONAL - plan.kept_layers)
         if plan.range_corrected:
@@ -62,7 +68,7 @@ class Finish:
         changes["color_source"] = values.source
         if plan.detects_after_layers:
             assert plan.material_means is not None
-            factors = layer_brightness(plan.material_means, plan.surfaces, result.points, seen, values)
+            factors = layer_brightness(plan.material_means, seen, values)
             changes["intensity"] = result.points.intensity * factors
         result = replace(result, points=result.points.with_arrays(changes))
         if plan.detects_after_layers:
@@ -71,34 +77,21 @@ class Finish:
         return replace(result, sources=np.bincount(result.points.color_source, minlength=256))
 
 
-def layer_brightness(
-    means: Surfaces, surfaces: Surfaces, points: PointBlock, seen: SeenPoints, values: LayerValues
-) -> Float:
+def layer_brightness(means: Surfaces, seen: SeenPoints, values: LayerValues) -> Float:
     """Return factors (N,) by which points are brighter by their own layers than by their materials' means.
 
-    A return has the layers of what gave most of it. What beads and prisms send back doesn't depend on them, nor does
-    what comes from the air.
+    A return has the layers of what gave most of it. Dirt, print and wear dim what beads and prisms send back as they
+    dim the rest. What comes from the air doesn't change.
 
     Args:
         means: of the scene's materials, which the layers vary around.
-        surfaces: of these, as the beam meets them.
-        points: N points.
-        seen: where.
+        seen: N points.
         values: their layers.
     """
     by_layers = reflectivity(*(values.arrays[name] for name in ("base_color", "metallic", "specular")))
     usual = np.take(means.reflectivity, seen.material, mode="clip")
     factor = np.asarray(by_layers / np.maximum(usual, _DARKEST))
     factor[seen.material == NO_MATERIAL] = 1.0
-    if not surfaces.retroreflective:
-        return factor
-    shining = np.flatnonzero(np.append(surfaces.shining, False).take(seen.material, mode="clip"))
-    material = seen.material[shining]
-    cosine = np.cos(np.deg2rad(points.incidence_deg[shining].astype(np.float64)))
-    facets = (surfaces.facet_a[material], surfaces.facet_b[material])
-    usual = brightness_of(surfaces, material, cosine)
-    beads = usual - returned_share(cosine, surfaces.reflectivity[material], *facets)
-    factor[shining] = (factor[shining] * (usual - beads) + beads) / np.maximum(usual, _DARKEST)
     return factor
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Literal, Protocol, Self
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from ..base.arrays import Float
 from ..materials.surfaces import Surfaces
 from ..materials.table import Material
+from ..road.geometry import RoadGeometry
 from ..road.parameters import RoadParameters
 from ..road.surroundings import Environment, MaterialVariation
 from .beam import BeamPattern, beam_pattern
@@ -21,6 +23,7 @@ from .devices.device import ScannerSetting
 from .effects import EchoEffect
 from .forecast import ScanForecast, forecast_scan
 from .noise import Noise
+from .pavement_relief import PavementRelief
 from .platforms.path import Path, Strip
 from .relief import MicroRelief
 from .scene.caster import Caster
@@ -72,6 +75,11 @@ class ScanConditions:
         """Return the conditions that a road's parameters set; the defaults, clear and dry, for None."""
         return cls() if road is None else cls(road.environment, road.materials, road.metadata.epsg, road)
 
+    @cached_property
+    def pavement(self) -> PavementRelief | None:
+        """The heights of the road's pavement; None if there is no road."""
+        return None if self.road is None else PavementRelief(RoadGeometry(self.road))
+
 
 @dataclass(frozen=True)
 class ScanPlan:
@@ -103,6 +111,7 @@ class ScanPlan:
         relief: micro-relief of the materials; None without.
         relief_strength: factor on it.
         relief_octaves: of it.
+        pavement: heights of the pavement, which points have as well where there is a micro-relief; None without.
         threads: blocks that are worked on at once; 0 for every core.
         request: colours and layers that are asked of the scene.
         services: of the program that shows the scene, for these; None where points stay as they are measured.
@@ -132,6 +141,7 @@ class ScanPlan:
     relief: MicroRelief | None = None
     relief_strength: float = 0.0
     relief_octaves: int = 4
+    pavement: PavementRelief | None = None
     threads: int = 0
     request: LayerRequest | None = None
     services: SceneServices | None = None

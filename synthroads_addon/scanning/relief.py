@@ -6,12 +6,12 @@ Strength 1 is the relief that pavements and soils have been measured to have (`R
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Float
+from ..base.arrays import Float, Index
 from ..base.errors import InputError
 from ..base.noise import noise_field
 from ..cloud.points import PointBlock
@@ -101,12 +101,18 @@ def relief_of_roughness(row: Material) -> Relief:
 
 
 def shift_along_normals(
-    points: PointBlock, position: Float, relief: MicroRelief, strength: float, seed: int, octaves: int = 4
+    points: PointBlock,
+    position: Float,
+    relief: MicroRelief,
+    strength: float,
+    seed: int,
+    octaves: int = 4,
+    raised: Float | None = None,
 ) -> PointBlock:
     """Return the points with `xyz` shifted along the normal, and `range` to match; all else is kept.
 
     The range becomes the distance to the shifted point: less by the height times the cosine of the incidence angle.
-    `true_xyz` and `true_range` stay those of the mean surface; intensity, normal and incidence angle stay as well.
+    `true_xyz` and `true_range` are without the relief; intensity, normal and incidence angle stay.
     With strength 0, or if nothing has relief, the very same block is returned.
 
     Args:
@@ -117,6 +123,8 @@ def shift_along_normals(
         strength: factor on every amplitude, 0 to `MAX_STRENGTH`.
         seed: the scene's.
         octaves: see `OCTAVES`.
+        raised: (N,) heights of the surface that are added whatever the strength, m; `true_xyz` and `true_range` have
+            these as well.
 
     Raises:
         InputError: strength out of range.
@@ -129,15 +137,26 @@ def shift_along_normals(
     if points.normal is None or points.material is None:
         raise ValueError("the roughness adjustment needs the points' normals and materials")
     # Points in the air, whose number is beyond all materials', have none.
-    uneven = np.flatnonzero(np.take(np.append(relief.amplitude, 0.0), points.material, mode="clip"))
-    if len(uneven) == 0:
-        return points
-    rough = uneven if len(uneven) < len(points) else slice(None)
+    rough = np.flatnonzero(np.take(np.append(relief.amplitude, 0.0), points.material, mode="clip"))
     material = points.material[rough]
+    if raised is not None:
+        points = _shift(points, np.flatnonzero(raised), raised, ("true_xyz", "true_range"))
+    if len(rough) == 0 and raised is None:
+        return points
+    height = np.zeros(len(points)) if raised is None else raised.copy()
     texture = noise_field(position[rough], relief.wavelength[material], seed, octaves)
-    height = strength * relief.amplitude[material] * texture
-    xyz, distance = points.xyz.copy(), points.range.copy()
-    xyz[rough] += height[:, None] * points.normal[rough]
-    before, cosine = distance[rough], np.cos(np.radians(points.incidence_deg[rough].astype(np.float64)))
-    distance[rough] = np.sqrt(before**2 - 2.0 * before * height * cosine + height**2)
-    return replace(points, xyz=xyz, range=distance)
+    height[rough] += strength * relief.amplitude[material] * texture
+    return _shift(points, np.flatnonzero(height), height)
+
+
+def _shift(points: PointBlock, rows: Index, height: Float, arrays: tuple[str, str] = ("xyz", "range")) -> PointBlock:
+    """Return the points of which some rows (K,) have arrays of places and ranges shifted by heights (N,), m."""
+    place, distance = (points.array(name) for name in arrays)
+    if place is None or distance is None or not len(rows):
+        return points
+    assert points.normal is not None
+    place, distance, height = place.copy(), distance.copy(), height[rows]
+    place[rows] += height[:, None] * points.normal[rows]
+    before, cosine = distance[rows], np.cos(np.radians(points.incidence_deg[rows].astype(np.float64)))
+    distance[rows] = np.sqrt(before**2 - 2.0 * before * height * cosine + height**2)
+    return points.with_arrays({arrays[0]: place, arrays[1]: distance})

@@ -74,6 +74,13 @@ class PavementLimits(ClosedModel):
     rutted: float = share(0.3, "Probability that a carriageway's outer lane is rutted.", title="Ruts in the Outer Lane")
     rut_depth: Interval = interval(0.004, 0.025, "m", "Depth of ruts.")
     rut_width: Interval = interval(0.6, 1.0, "m", "Width of a wheel track.")
+    wheel_track_depth: Interval = interval(
+        0.0025, 0.005, "m", "Depth of the outermost lane's wheel tracks where it has no ruts."
+    )
+    joint_depth: Interval = interval(0.001, 0.004, "m", "Depth of joints below the pavement.")
+    unevenness: Interval = interval(
+        2.0, 20.0, "cm3", "Spectral density of the heights at 0.1 cycles/m (ISO 8608: class A to 32)."
+    )
     potholes_per_km: Interval = interval(0.0, 8.0, "1/km", "Potholes per km of carriageway.", title="Potholes (per km)")
     pothole_size: Interval = interval(0.1, 0.8, "m", "Diameters of potholes.")
     pothole_depth: Interval = interval(0.01, 0.06, "m", "Depth of potholes.")
@@ -146,12 +153,12 @@ class MaterialLimits(ClosedModel):
     former_fields: ClassVar = frozenset({"soil_brightness"})
 
     asphalt_age: Interval = interval(0.0, 1.0, "1", "0 new and black, 1 old and bright.")
-    asphalt_brightness: Interval = interval(0.85, 1.2, "1", "Factor on the base colour.")
+    asphalt_brightness: Interval = interval(0.9, 1.1, "1", "Factor on the base colour.")
     patch_density: Interval = interval(0.0, 2.0, "1/100 m", "Repaired patches per 100 m of each carriageway.")
     crack_density: Interval = interval(0.0, 0.6, "1", "0 no cracks, 1 cracked all over.")
     wheel_track_polish: Interval = interval(0.0, 0.6, "1", "Polish of the wheel tracks.")
     concrete_brightness: Interval = interval(0.85, 1.2, "1", "Factor on the base colour.")
-    paint_wear: Interval = interval(0.0, 0.5, "1", "Share of the markings' film worn off.")
+    paint_wear: Interval = interval(0.1, 0.35, "1", "Share of the markings' film worn off.")
     grass_dryness: Interval = interval(0.0, 0.8, "1", "0 green, 1 dry.")
 
 

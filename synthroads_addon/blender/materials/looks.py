@@ -149,7 +149,8 @@ _PAVEMENTS = {
 
 def _pavement(shade: Shade, kind: str, wear: Wear) -> None:
     """Pavement: its field of station and offset, and its texture."""
-    texture, look = _PAVEMENTS[kind], pavement_look(shade, kind, wear)
+    texture = _PAVEMENTS[kind]
+    look, height = pavement_look(shade, kind, wear)
     grain, mottle = shade.noise(texture.grain[1], 1.0), shade.noise(texture.mottle[1], 4.0)
     shade.scale(look.brightness)
     shade.vary(texture.grain[0], grain)
@@ -158,7 +159,7 @@ def _pavement(shade: Shade, kind: str, wear: Wear) -> None:
         shade.vary(texture.wide[0], shade.noise(texture.wide[1], 2.0))
     shade.roughness = look.roughness + mottle * texture.rough + shade.mean.roughness
     shade.specular = look.brightness * (grain * texture.gloss + 1.0) * shade.mean.specular
-    shade.relief = grain * texture.relief
+    shade.relief = grain * texture.relief + height
 
 
 _BEFORE_NOISES: dict[str, Callable[[Shade], None]] = {

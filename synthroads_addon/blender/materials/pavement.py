@@ -4,13 +4,22 @@ from __future__ import annotations
 
 import bpy
 
-from ...road.pavement.field import Look, Place, Wear, asphalt_look, concrete_look
+from ...road.pavement.field import (
+    Look,
+    Place,
+    Shape,
+    Wear,
+    asphalt_height,
+    asphalt_look,
+    concrete_height,
+    concrete_look,
+)
 from ..nodes import operations as op
 from ..nodes.builder import Operand, Tree, Value, node_group
 from .shading import Shade
 
-ATTRIBUTE, SLABS = "pavement", "slab_length"
-"""Attributes of a pavement's mesh: place and length of the slabs; see SR Pavement Place."""
+ATTRIBUTE, SHAPE = "pavement", "pavement_shape"
+"""Attributes of a pavement's mesh: place; slabs' length, depths of joints and tracks. See SR Pavement Place."""
 
 
 class NodeCalculus:
@@ -74,21 +83,23 @@ def _build(tree: Tree, kind: str) -> None:
     )
     calculus = NodeCalculus(tree)
     # As a vector: a number taken from a colour is its luminance, whose weights don't add up to 1 exactly.
-    slabs = (
-        tree.input("Slabs", "Vector", description="Distance of joints (m), three times") if kind == "concrete" else None
-    )
+    shapes = tree.input("Shape", "Vector", description="Length of slabs, depths of joints and wheel tracks (m)")
     with tree.frame("Field of station and offset"):
         parts = Place(*(op.component(place, axis) for axis in "XYZ"))
-        if slabs is None:
-            look = asphalt_look(calculus, parts, wear)
+        slabs, joints, tracks = (op.component(shapes, axis) for axis in "XYZ")
+        shape = Shape(tracks, joints)
+        if kind == "asphalt":
+            look, height = asphalt_look(calculus, parts, wear), asphalt_height(calculus, parts, shape)
         else:
-            look = concrete_look(calculus, parts, wear, op.component(slabs, "X"))
+            look = concrete_look(calculus, parts, wear, slabs)
+            height = concrete_height(calculus, parts, shape, slabs)
     tree.output("Brightness", look.brightness, description="Factor on base colour and specular")
     tree.output("Roughness", look.roughness, description="What is added to the roughness")
+    tree.output("Height", height, description="Height above the mean surface (m)")
 
 
-def pavement_look(shade: Shade, kind: str, wear: Wear) -> Look:
-    """Add the look of a pavement to a material and return it.
+def pavement_look(shade: Shade, kind: str, wear: Wear) -> tuple[Look, Value]:
+    """Add the look of a pavement to a material and return it, and the height (m).
 
     Args:
         shade: the material.
@@ -101,7 +112,9 @@ def pavement_look(shade: Shade, kind: str, wear: Wear) -> Look:
     place = tree.node("ShaderNodeAttribute", attribute_name=ATTRIBUTE)["Vector"]
     tree.group.links.new(place.source(), raw.inputs["Place"])
     raw.inputs["Polish"].default_value, raw.inputs["Seed"].default_value = wear
-    if kind == "concrete":
-        slab = tree.node("ShaderNodeAttribute", attribute_name=SLABS)["Vector"]
-        tree.group.links.new(slab.source(), raw.inputs["Slabs"])
-    return Look(*(Value(tree, raw.outputs[name], "VALUE") for name in ("Brightness", "Roughness")))
+    shape = tree.node("ShaderNodeAttribute", attribute_name=SHAPE)["Vector"]
+    tree.group.links.new(shape.source(), raw.inputs["Shape"])
+    brightness, roughness, height = (
+        Value(tree, raw.outputs[name], "VALUE") for name in ("Brightness", "Roughness", "Height")
+    )
+    return Look(brightness, roughness), height

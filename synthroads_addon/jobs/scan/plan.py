@@ -122,6 +122,7 @@ def plan_scan(
         relief=relief,
         relief_strength=scan.relief,
         relief_octaves=settings.relief_octaves,
+        pavement=conditions.pavement if shifts else None,
         threads=scan.threads,
         request=LayerRequest(
             settings=colour,

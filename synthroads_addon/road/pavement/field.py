@@ -1,4 +1,4 @@
-"""How brightness and roughness of a pavement differ from its material's mean, as a field of station and offset.
+"""How brightness, roughness and height of a pavement differ from their means, as a field of station and offset.
 
 Written once for two evaluators: NumPy arrays here, a node group in Blender's materials. Either hands in a `Calculus`.
 
@@ -14,6 +14,8 @@ What is in it, and where its figures come from:
 - **Slabs** of concrete: joints every slab length and between lanes, sealed (ZTV Beton-StB: 8 to 10 mm wide); each slab
   is of its own pour.
 - **Patches** are new and black, or older; open cracks are dark; sealed ones are a smooth band of bitumen.
+- **Heights**: wheel tracks are as deep as they are worn, with the mean of a lane at 0; joints lie lower. Patches and
+  cracks have heights of their own, and waves are `unevenness`.
 
 Amplitudes: airborne scans of two German dual carriageways have medians of intensity, by offset, that are 0.15 to 0.3 dB
 higher in the tracks than between them, with 0.1 to 0.3 dB from lane to lane, averaged over 300 to 1,100 m.
@@ -105,6 +107,18 @@ class Place(NamedTuple):
     code: Any
 
 
+class Shape(NamedTuple):
+    """Depths of a pavement.
+
+    Attributes:
+        tracks: of the outermost lane's wheel tracks below what is beside them, m.
+        joints: of joints below the pavement, m.
+    """
+
+    tracks: Any
+    joints: Any
+
+
 class Look(NamedTuple):
     """Difference of a place from its material's mean.
 
@@ -169,12 +183,38 @@ def _slow(m: Calculus, place: Place, owner: Any, seed: Any) -> Any:
     return first + (second - first) * weight
 
 
-def _days(m: Calculus, place: Place, owner: Any, seed: Any) -> tuple[Any, Any]:
-    """Return a brightness from -1 to 1 of each day's work, and 1 on the joints between."""
-    day = m.floor(place.station / _DAY)
+def _asphalt_joint(m: Calculus, place: Place, strip: _Strip) -> Any:
+    """Return 1 on the paver's joints: beside each lane's outer boundary, and between two days' work."""
     within = place.station % _DAY
-    edge = m.smaller(within, _DAY - within)
-    return _signed_hash(m, owner, day, seed), _line(m, edge, _SEAM)
+    day = _line(m, m.smaller(within, _DAY - within), _SEAM)
+    seam = m.below(strip.kind, SHOULDER - 0.5) * _line(m, m.absolute(place.across + _SEAM_INWARDS - strip.half), _SEAM)
+    return m.larger(seam, day)
+
+
+def _slab_joint(m: Calculus, place: Place, strip: _Strip, slab_length: Any) -> Any:
+    """Return 1 on the joints between slabs of concrete."""
+    within = place.station % slab_length  # exact in float32 as well, which a difference of large quotients isn't
+    across = m.smaller(within, slab_length - within)
+    along = m.absolute(m.absolute(place.across) - strip.half) + (1.0 - m.below(strip.kind, SHOULDER - 0.5))
+    return _line(m, m.smaller(across, along), _SLAB_JOINT)
+
+
+def _height(m: Calculus, strip: _Strip, joint: Any, shape: Shape) -> Any:
+    """Return the height (m) of a strip of pavement, 0 of all else."""
+    paved = strip.strip * (1.0 - m.below(strip.owner, 0.5))
+    return (strip.wear * strip.track * shape.tracks + joint * shape.joints) * paved * -1.0
+
+
+def asphalt_height(m: Calculus, place: Place, shape: Shape) -> Any:
+    """Return the height (m) of asphalt above its mean surface at places; 0 on patches and cracks."""
+    strip = _decode(m, place)
+    return _height(m, strip, _asphalt_joint(m, place, strip), shape)
+
+
+def concrete_height(m: Calculus, place: Place, shape: Shape, slab_length: Any) -> Any:
+    """Return the height (m) of concrete above its mean surface at places; 0 on patches and cracks."""
+    strip = _decode(m, place)
+    return _height(m, strip, _slab_joint(m, place, strip, slab_length), shape)
 
 
 def _repaired(m: Calculus, strip: _Strip, look: Look) -> Look:
@@ -200,11 +240,10 @@ def asphalt_look(m: Calculus, place: Place, wear: Wear) -> Look:
         wear: parameters.
     """
     strip = _decode(m, place)
-    own, day_joint = _days(m, place, strip.owner, wear.seed)
+    own = _signed_hash(m, strip.owner, m.floor(place.station / _DAY), wear.seed)
     slow = _slow(m, place, strip.owner, wear.seed)
     polished = strip.wear * strip.track * wear.polish
-    seam = m.below(strip.kind, SHOULDER - 0.5) * _line(m, m.absolute(place.across + _SEAM_INWARDS - strip.half), _SEAM)
-    joint = m.larger(seam, day_joint)
+    joint = _asphalt_joint(m, place, strip)
     used = 1.0 + 0.55 * polished - 0.14 * strip.wear * strip.oil
     brightness = (1.0 + 0.09 * own + 0.04 * slow) * used * (1.0 - 0.35 * joint)
     roughness = 0.05 * own + 0.02 * slow - 0.3 * polished - 0.1 * joint
@@ -222,10 +261,7 @@ def concrete_look(m: Calculus, place: Place, wear: Wear, slab_length: Any) -> Lo
     """
     strip = _decode(m, place)
     slab = m.floor(place.station / slab_length)
-    within = place.station % slab_length  # exact in float32 as well, which a difference of large quotients isn't
-    across = m.smaller(within, slab_length - within)
-    along = m.absolute(m.absolute(place.across) - strip.half) + (1.0 - m.below(strip.kind, SHOULDER - 0.5))
-    joint = _line(m, m.smaller(across, along), _SLAB_JOINT)
+    joint = _slab_joint(m, place, strip, slab_length)
     own = _signed_hash(m, strip.owner, slab, wear.seed)
     slow = _slow(m, place, strip.owner, wear.seed)
     polished = strip.wear * strip.track * wear.polish

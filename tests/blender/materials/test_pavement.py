@@ -10,7 +10,7 @@ from synthroads_addon.base.arrays import Float
 from synthroads_addon.blender.cameras.calculator import calculator
 from synthroads_addon.blender.casters.embree import EmbreeCaster
 from synthroads_addon.blender.materials import WEAR, material, vary
-from synthroads_addon.blender.materials.pavement import ATTRIBUTE, SLABS, look_group
+from synthroads_addon.blender.materials.pavement import ATTRIBUTE, SHAPE, look_group
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.road.damage import DAMAGES
@@ -19,8 +19,11 @@ from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.pavement.field import (
     ArrayCalculus,
     Place,
+    Shape,
     Wear,
+    asphalt_height,
     asphalt_look,
+    concrete_height,
     concrete_look,
     place_code,
 )
@@ -43,17 +46,23 @@ def test_nodes_and_arrays_give_the_same_field(kind: str) -> None:
     across = rng.uniform(-2.5, 2.5, PLACES)
     values = np.zeros((PLACES, 4), np.float32)
     values[:, :3] = np.column_stack([rng.uniform(-20.0, 3000.0, PLACES), across, code])
-    slabs = np.full((PLACES, 4), slab, np.float32)
-    feed = {SurfaceInput("attribute", ATTRIBUTE): values, SurfaceInput("attribute", SLABS): slabs}
-    outputs = {"roughness": "Brightness", "specular": "Roughness"}
+    shape = Shape(0.5, 0.25)
+    shapes = np.tile(np.array([slab, shape.joints, shape.tracks, 0.0], np.float32), (PLACES, 1))
+    feed = {SurfaceInput("attribute", ATTRIBUTE): values, SurfaceInput("attribute", SHAPE): shapes}
+    outputs = {"roughness": "Brightness", "specular": "Roughness", "metallic": "Height"}
     with calculator({0: _probe(kind, wear, outputs)}, tuple(outputs)) as work:
         found = work.calculate(np.zeros(PLACES, np.intp), {what: feed[what] for what in work.inputs})
     calculus, place = ArrayCalculus(), Place(*values[:, :3].T.astype(np.float64))
-    look = asphalt_look(calculus, place, wear) if kind == "asphalt" else concrete_look(calculus, place, wear, slab)
+    if kind == "asphalt":
+        look, height = asphalt_look(calculus, place, wear), asphalt_height(calculus, place, shape)
+    else:
+        look, height = concrete_look(calculus, place, wear, slab), concrete_height(calculus, place, shape, slab)
     assert np.ptp(look.brightness) > 0.3
     assert np.ptp(look.roughness) > 0.1
     assert found["roughness"][:, 0] == pytest.approx(look.brightness, abs=1e-5)
     assert found["specular"][:, 0] == pytest.approx(look.roughness, abs=1e-5)
+    assert np.ptp(height) > 0.4
+    assert found["metallic"][:, 0] == pytest.approx(height, abs=1e-5)
 
 
 def _probe(kind: str, wear: Wear, outputs: dict[str, str]) -> bpy.types.Material:
@@ -66,11 +75,10 @@ def _probe(kind: str, wear: Wear, outputs: dict[str, str]) -> bpy.types.Material
     group = nodes.new("ShaderNodeGroup")
     group.node_tree = look_group(kind)
     group.inputs["Polish"].default_value, group.inputs["Seed"].default_value = wear
-    for name, entry in ((ATTRIBUTE, "Place"), (SLABS, "Slabs")):
-        if entry in group.inputs:
-            attribute = nodes.new("ShaderNodeAttribute")
-            attribute.attribute_name = name
-            links.new(attribute.outputs["Vector"], group.inputs[entry])
+    for name, entry in ((ATTRIBUTE, "Place"), (SHAPE, "Shape")):
+        attribute = nodes.new("ShaderNodeAttribute")
+        attribute.attribute_name = name
+        links.new(attribute.outputs["Vector"], group.inputs[entry])
     for layer, output in outputs.items():
         end = nodes.new("ShaderNodeOutputAOV")
         end.aov_name = layer
@@ -84,26 +92,26 @@ def test_the_mesh_says_where_on_the_pavement_its_points_are() -> None:
     geometry = RoadGeometry(parameters)
     road = build_road(parameters, 0.005, 1.0, {"road"}).objects["Road"]
     mesh = road.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-    columns = {name: np.empty(len(mesh.vertices), np.float32) for name in ("offset", SLABS)}
-    for name, column in columns.items():
-        mesh.attributes[name].data.foreach_get("value", column)
-    place = np.empty(3 * len(mesh.vertices), np.float32)
-    mesh.attributes[ATTRIBUTE].data.foreach_get("vector", place)
-    station, across, code = place.reshape(-1, 3).T.astype(np.float64)
+    offset, place, shape = (np.empty((len(mesh.vertices), parts), np.float32) for parts in (1, 3, 3))
+    mesh.attributes["offset"].data.foreach_get("value", offset.ravel())
+    for name, values in ((ATTRIBUTE, place), (SHAPE, shape)):
+        mesh.attributes[name].data.foreach_get("vector", values.ravel())
+    offset = offset[:, 0]
+    station, across, code = place.T.astype(np.float64)
     paved = np.flatnonzero(code > 0.0)
     assert len(paved) > 100
     for side, sign in (("left", 1.0), ("right", -1.0)):
-        rows = paved[sign * columns["offset"][paved] > 0.0]
+        rows = paved[sign * offset[paved] > 0.0]
         section = geometry.sections[side]
         # Points on a boundary belong to the strips on both of its sides: a hair to either one is one of them.
         found = [
-            pavement_places(section, station[rows], columns["offset"][rows].astype(np.float64) + nudge)
-            for nudge in (-1e-4, 1e-4)
+            pavement_places(section, station[rows], offset[rows].astype(np.float64) + nudge) for nudge in (-1e-4, 1e-4)
         ]
         off = [np.abs(one.across - across[rows]) + np.abs(one.code - code[rows]) for one in found]
         assert np.minimum(*off).max() < 1e-3, side
-        slab = section.carriageway.pavement.slab_length
-        assert columns[SLABS][rows] == pytest.approx(slab)
+        pavement = section.carriageway.pavement
+        values = (pavement.slab_length, pavement.joint_depth, pavement.wheel_track_depth)
+        assert shape[rows] == pytest.approx(np.tile(values, (len(rows), 1)))
 
 
 def test_a_road_has_its_own_polish_and_seed() -> None:

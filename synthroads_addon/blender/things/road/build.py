@@ -70,6 +70,8 @@ def _road_inputs(
             instance=carriageway.instance,
             first_station=zero,
             slab_length=carriageway.pavement.slab_length,
+            joint_depth=carriageway.pavement.joint_depth,
+            wheel_track_depth=carriageway.pavement.wheel_track_depth,
         )
     for median in parameters.of_type(Median).values():
         if len(parameters.of_type(Carriageway)) == 2:

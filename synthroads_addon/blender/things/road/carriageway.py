@@ -99,13 +99,16 @@ class _PavementPlace(Inputs):
     kind = integer(0, (0, 64), "What the strip is: 1 the outermost lane, 9 the hard shoulder; 32 more on the left")
     first_station = metres(0.0, (-1e6, 1e6), "Station that the backbone's stations count from")
     slab_length = metres(5.0, (2.0, 20.0), "Distance of a concrete pavement's joints")
+    joint_depth = metres(0.002, (0.0, 0.05), "Depth of joints below the pavement")
+    wheel_track_depth = metres(0.003, (0.0, 0.02), "Depth of the outermost lane's wheel tracks")
 
 
 @makes_group("SR Pavement Place")
 def pavement_place_group(tree: Tree) -> None:
     """A strip of pavement whose points know where they lie on it, for the materials.
 
-    The attribute ``pavement`` is the station, the distance from the lane's middle, a code of strip and lane's width.
+    The attribute ``pavement`` is the station, the distance from the lane's middle, a code of strip and lane's width;
+    ``pavement_shape`` the slabs' length, the depths of joints and of wheel tracks.
     """
     lane = _PavementPlace(tree)
     with tree.frame("Middle and half width of the lane at each row"):
@@ -118,7 +121,8 @@ def pavement_place_group(tree: Tree) -> None:
     with tree.frame("Attributes that the materials read"):
         station = op.named_attribute(tree, "station") + lane.first_station
         mesh = op.store(lane.strip, "pavement", op.vector(tree, station, across, code))
-        mesh = op.store(mesh, "slab_length", lane.slab_length)
+        shape = op.vector(tree, lane.slab_length, lane.joint_depth, lane.wheel_track_depth)
+        mesh = op.store(mesh, "pavement_shape", shape)
     tree.output("Mesh", mesh, description="The strip")
 
 
@@ -151,6 +155,8 @@ class SideInputs(Inputs):
     pavement_material = material_of("the pavement", "asphalt")
     first_station = metres(0.0, (-1e6, 1e6), "Station that the backbone's stations count from")
     slab_length = metres(5.0, (2.0, 20.0), "Distance of a concrete pavement's joints")
+    joint_depth = metres(0.002, (0.0, 0.05), "Depth of joints below the pavement")
+    wheel_track_depth = metres(0.003, (0.0, 0.02), "Depth of the outermost lane's wheel tracks")
 
 
 class _Place(Inputs):
@@ -209,6 +215,8 @@ def _build(tree: Tree, lanes: int, turnouts: bool) -> None:
                     kind=on_left + kind,
                     first_station=side.first_station,
                     slab_length=side.slab_length,
+                    joint_depth=side.joint_depth,
+                    wheel_track_depth=side.wheel_track_depth,
                 ).value
             parts.append(mesh)
         at_row = op.sample_index(backbone, distances[-1], op.named_attribute(tree, "row", "INT"))

@@ -1,0 +1,152 @@
+"""Heights of a road's pavement above its analytic surface, as the parameters say: tracks, joints, waves, damage."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...base.arrays import Bool, Float, Index
+from ...base.random_streams import stream
+from ..geometry import RoadGeometry
+from ..objects import Side
+from ..section import Crack, Patch, Pavement
+from .field import ArrayCalculus, Shape, asphalt_height, concrete_height
+from .outlines import crack_outlines, patch_outline
+from .places import pavement_places
+from .unevenness import unevenness
+
+_CELL = 10.0
+"""Length of the stretches that damage is looked up by, m."""
+
+
+@dataclass(frozen=True)
+class _Area:
+    """A convex face of a patch or crack.
+
+    Attributes:
+        edges: (K, 3) normal and distance of each edge in stations and offsets, inside where all are below 0.
+        low, high: lowest and highest station, m.
+        height: above the pavement, m.
+        levels: whether wheel tracks end at it, as joints do.
+    """
+
+    edges: Float
+    low: float
+    high: float
+    height: float
+    levels: bool
+
+    def covers(self, station: Float, offset: Float) -> Bool:
+        """Return which places (N,) lie within."""
+        normal, distance = self.edges[:, :2], self.edges[:, 2]
+        across = np.column_stack([station, offset]) @ normal.T - distance
+        return np.asarray((across <= 0.0).all(axis=1))
+
+
+class PavementSurface:
+    """Heights of a road's pavement above `RoadGeometry.elevation`.
+
+    Args:
+        geometry: the road's.
+    """
+
+    def __init__(self, geometry: RoadGeometry) -> None:
+        self.geometry = geometry
+        self._seed = int(stream(geometry.parameters.metadata.seed, "pavement unevenness").integers(1 << 31))
+
+    def height(self, station: ArrayLike, offset: ArrayLike) -> Float:
+        """Return the heights (N,) of places, m: of patches and cracks where these are; 0 beside the pavement."""
+        station, offset = (np.asarray(value, np.float64).ravel() for value in np.broadcast_arrays(station, offset))
+        result = np.zeros(len(station))
+        for side, section in self.geometry.sections.items():
+            mine = np.flatnonzero(self.is_paved(side, station, offset))
+            if len(mine):
+                places = self.geometry.alignment.place(station[mine], offset[mine])
+                result[mine] = self.worn_height(side, station[mine], offset[mine])
+                self._lay_damage(side, station, offset, mine, result)
+                result[mine] += self.waves(section.carriageway.pavement, places)
+        return result
+
+    def is_paved(self, side: Side, station: Float, offset: Float) -> Bool:
+        """Return which places (N,) lie on a carriageway's pavement."""
+        section = self.geometry.sections[side]
+        distances, distance = section.distances(station), section.carriageway.sign * offset
+        paved = (distance >= distances[:, 0]) & (distance <= distances[:, -2])
+        if "island" in section.kinds:
+            inner, outer = section.boundaries_of("island", station)
+            paved &= (distance <= inner) | (distance >= outer)
+        return np.asarray(paved)
+
+    def worn_height(self, side: Side, station: Float, offset: Float, joints: bool = True) -> Float:
+        """Return the heights (N,) of a carriageway's wheel tracks and joints, m, as if there were no damage.
+
+        Args:
+            side: the carriageway's.
+            station, offset: (N,) places on it.
+            joints: whether there are joints.
+        """
+        section = self.geometry.sections[side]
+        pavement, place = section.carriageway.pavement, pavement_places(section, station, offset)
+        shape = Shape(pavement.wheel_track_depth, pavement.joint_depth if joints else 0.0)
+        calculus = ArrayCalculus()
+        if pavement.kind == "concrete":
+            return np.asarray(concrete_height(calculus, place, shape, pavement.slab_length))
+        return np.asarray(asphalt_height(calculus, place, shape))
+
+    def waves(self, pavement: Pavement, place: Float) -> Float:
+        """Return the heights (N,) of the unevenness at places (N, 2 or 3) in the road's local frame, m."""
+        if pavement.unevenness == 0.0:
+            return np.zeros(len(place))
+        return unevenness(place, pavement.unevenness, self._seed)
+
+    def _lay_damage(self, side: Side, station: Float, offset: Float, rows: Index, result: Float) -> None:
+        """Give the rows on cracks and patches their heights: patches lie over cracks, later ones over earlier ones."""
+        cell = np.floor(station[rows] / _CELL).astype(np.int64)
+        for number in np.unique(cell).tolist():
+            mine = rows[cell == number]
+            for area in self._areas[side].get(number, ()):
+                inside = mine[area.covers(station[mine], offset[mine])]
+                result[inside] = area.height + (0.0 if area.levels else self._tracks(side, station, offset, inside))
+
+    def _tracks(self, side: Side, station: Float, offset: Float, rows: Index) -> Float:
+        return self.worn_height(side, station[rows], offset[rows], joints=False)
+
+    @cached_property
+    def _areas(self) -> dict[Side, dict[int, list[_Area]]]:
+        """The faces of cracks, then of patches, of each side by the stretch that they lie on."""
+        result: dict[Side, dict[int, list[_Area]]] = {}
+        for side, section in self.geometry.sections.items():
+            cells: dict[int, list[_Area]] = {}
+            for area in _faces(section.carriageway.pavement):
+                for cell in range(int(area.low // _CELL), int(area.high // _CELL) + 1):
+                    cells.setdefault(cell, []).append(area)
+            result[side] = cells
+        return result
+
+
+def _faces(pavement: Pavement) -> Iterator[_Area]:
+    for crack in pavement.cracks:
+        for outline in crack_outlines(crack):
+            yield _area(outline, damage_height(crack), levels=False)
+    for patch in pavement.patches:
+        outline = patch_outline(patch)
+        if len(outline) > 2:
+            yield _area(outline, damage_height(patch), levels=True)
+
+
+def damage_height(item: Patch | Crack) -> float:
+    """Return the height (m) of a patch or crack above the pavement around it."""
+    return item.height if isinstance(item, Patch) else -item.depth
+
+
+def _area(outline: Float, height: float, levels: bool) -> _Area:
+    """Return the face of a convex outline (K, 2) that goes against the clock."""
+    edges = np.roll(outline, -1, axis=0) - outline
+    normal = np.column_stack([edges[:, 1], -edges[:, 0]])
+    distance = np.einsum("ij,ij->i", normal, outline)
+    low, high = outline[:, 0].min(), outline[:, 0].max()
+    return _Area(np.column_stack([normal, distance]), float(low), float(high), height, levels)

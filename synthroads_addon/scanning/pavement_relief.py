@@ -1,0 +1,120 @@
+"""Heights of the pavement at points: wheel tracks, joints, waves, patches and cracks, as the parameters say."""
+
+from collections.abc import Iterator
+from typing import NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.arrays import Float
+from ..road.geometry import RoadGeometry
+from ..road.objects import Side
+from ..road.pavement.outlines import CRACK_FILM, PATCH_FILM
+from ..road.pavement.surface import PavementSurface, damage_height
+from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Turnout
+
+
+class _Kind(NamedTuple):
+    """How the pavement goes on in what lies on it.
+
+    Attributes:
+        side: of the carriageway.
+        tracks, joints: whether there are wheel tracks, and joints as well.
+    """
+
+    side: Side
+    tracks: bool = True
+    joints: bool = True
+
+
+_KINDS = tuple(_Kind(side, *worn) for side in get_args(Side) for worn in ((False, False), (True, False), (True, True)))
+
+
+class _Block(NamedTuple):
+    """Instance numbers side by side of what lies on a carriageway.
+
+    Attributes:
+        first, end: the numbers; ``end`` isn't among them.
+        kind: what it is.
+        height: of its faces above the pavement around it, m; what of it the mesh has already is taken off.
+    """
+
+    first: int
+    end: int
+    kind: _Kind
+    height: float = 0.0
+
+
+class PavementRelief:
+    """Heights of pavements above their mesh.
+
+    Args:
+        geometry: the whole road's.
+    """
+
+    def __init__(self, geometry: RoadGeometry) -> None:
+        self._surface = PavementSurface(geometry)
+        blocks = sorted(_blocks(geometry))
+        self._first = np.array([block.first for block in blocks], np.int64)
+        self._end = np.array([block.end for block in blocks], np.int64)
+        self._height = np.array([block.height for block in blocks])
+        self._kind = np.array([_KINDS.index(block.kind) for block in blocks], np.int64)
+        self._origin = np.array(geometry.parameters.transform.translate[:2])
+
+    def heights(self, instance: NDArray[np.integer], place: Float) -> Float:
+        """Return the heights (N,) of points on pavements and on what is painted there, m; 0 of others.
+
+        Args:
+            instance: (N,) their instance numbers.
+            place: (N, 3) where they are, map coordinates, m.
+        """
+        result = np.zeros(len(instance))
+        if not len(self._first):
+            return result
+        block = np.searchsorted(self._first, instance, "right") - 1
+        known = np.flatnonzero((block >= 0) & (instance < self._end[block]))
+        for number, kind in enumerate(_KINDS):
+            rows = known[self._kind[block[known]] == number]
+            if len(rows):
+                local = place[rows, :2] - self._origin
+                result[rows] = self._height[block[rows]] + self._kind_heights(kind, local)
+        return result
+
+    def _kind_heights(self, kind: _Kind, place: Float) -> Float:
+        """Return the heights (K,) of the pavement at places (K, 2) in the road's local frame, as a kind has it."""
+        surface = self._surface
+        waves = surface.waves(surface.geometry.sections[kind.side].carriageway.pavement, place)
+        if not kind.tracks:
+            return waves
+        station, offset = surface.geometry.alignment.project(place)
+        worn = surface.worn_height(kind.side, station, offset, kind.joints)
+        return np.where(surface.is_paved(kind.side, station, offset), waves + worn, 0.0)
+
+
+def _blocks(geometry: RoadGeometry) -> Iterator[_Block]:
+    parameters, parts = geometry.parameters, geometry.numbers.parts
+    for name, item in parameters.objects.items():
+        if isinstance(item, Carriageway):
+            yield _Block(item.instance, item.instance + 1, _Kind(item.side))
+            if name in parts:
+                yield from _damage_blocks(item, parts[name].first)
+        elif isinstance(item, Turnout | Arrow | Hatching | LineMarking):
+            side = parameters.carriageway_of(item).side
+            # Traffic seldom drives along lines, and paint fills joints.
+            kind = _Kind(side, isinstance(item, Turnout | Arrow), isinstance(item, Turnout))
+            yield _Block(item.instance, item.instance + 1, kind)
+            if name in parts:
+                yield _Block(parts[name].first, parts[name].first + parts[name].room, kind)
+
+
+def _damage_blocks(carriageway: Carriageway, first: int) -> Iterator[_Block]:
+    pavement, side = carriageway.pavement, carriageway.side
+    number = first + len(pavement.ruts) + len(pavement.potholes)
+    if number > first:
+        yield _Block(first, number, _Kind(side))
+    for patch in pavement.patches:
+        yield _Block(number, number + 1, _Kind(side, False, False), damage_height(patch) - PATCH_FILM)
+        number += 1
+    for crack in pavement.cracks:
+        yield _Block(number, number + 1, _Kind(side, True, False), damage_height(crack) - CRACK_FILM)
+        number += 1
