@@ -1,7 +1,7 @@
 """The material table (`presets/materials.json`): the means that renderer and scanner share.
 
 The speculars are calibrated for a laser of 905 nm: with them `Material.reflectivity` gives measured
-reflectances (asphalt 0.18, paint 0.65, grass and leaves 0.5), though leaves are dark in visible light.
+reflectances (asphalt 0.22, markings in use 0.36, grass and leaves 0.5), though leaves are dark in visible light.
 
 What only the scanner reads is assumed as follows; `docs/radiometry.md` has the reasons and the sources.
 
