@@ -1,4 +1,4 @@
-"""Geometric-semantic models of a road in open formats: CityJSON, IFC, OpenDRIVE and GeoJSON.
+"""Geometric-semantic models of a road in open formats: CityJSON, IFC, OpenDRIVE, GeoJSON and OpenCRG.
 
 All come from the parameter set and its analytic geometry (`RoadGeometry`), in map coordinates. Objects keep their ids
 and their ``instance`` numbers, which the points of a cloud carry as well.
@@ -58,6 +58,12 @@ FORMATS = {
     ),
     "geojson": FormatEntry(
         "GeoJSON", "Lines, areas and points for geographic information systems", "twin.geojson", ".geojson"
+    ),
+    "opencrg": FormatEntry(
+        "OpenCRG",
+        "Heights of the pavement on a grid, with its waves and damage, for vehicle dynamics (ASAM OpenCRG)",
+        "twin.crg",
+        ".opencrg",
     ),
 }
 """Every format by its name."""

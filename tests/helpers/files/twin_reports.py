@@ -71,7 +71,9 @@ def numbers_of(road: RoadParameters) -> dict[int, str]:
 def numbers_in(folder: Path, name: str) -> Callable[[Entity], int]:
     """Return what looks an entity of a report up in its format's file, and returns the instance number there."""
     path = folder / FORMATS[name].file
-    return {"cityjson": _city, "ifc": _ifc, "opendrive": _opendrive, "geojson": _geojson}[name](path)
+    return {"cityjson": _city, "ifc": _ifc, "opendrive": _opendrive, "geojson": _geojson, "opencrg": _opencrg}[name](
+        path
+    )
 
 
 def _city(path: Path) -> Callable[[Entity], int]:
@@ -122,3 +124,9 @@ def _opendrive(path: Path) -> Callable[[Entity], int]:
 def _geojson(path: Path) -> Callable[[Entity], int]:
     features = json.loads(path.read_text(encoding="utf-8"))["features"]
     return lambda entity: int(features[entity["feature"]]["properties"]["instance"])
+
+
+def _opencrg(path: Path) -> Callable[[Entity], int]:
+    header = path.read_bytes().partition(b"$" * 72)[0].decode("ascii").splitlines()
+    comments = [line for line in header if line.startswith("instance ")]
+    return lambda entity: int(comments[entity["comment"]].partition(":")[0].removeprefix("instance "))

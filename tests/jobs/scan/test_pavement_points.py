@@ -23,13 +23,19 @@ FILMS = {"patch": PATCH_FILM, "longitudinal crack": CRACK_FILM, "sealed longitud
 
 
 def damaged_road() -> RoadParameters:
-    """Return a road whose right pavement has a sunken dark patch, an open and a sealed crack, all wide enough to see."""
+    """Return a road whose right pavement has a sunken dark patch, an open and a sealed crack, wide enough to see."""
     data = deepcopy(base_road({}))
     data["objects"]["right"]["pavement"] = {
         "patches": [{"outline": [[5, -5.0], [25, -5.0], [25, -3.5], [5, -3.5]], "age": 0.0, "height": -0.006}],
         "cracks": [
             {"kind": "longitudinal", "width": 0.15, "depth": 0.012, "lines": [[[8, -5.4], [55, -6.4]]]},
-            {"kind": "longitudinal", "width": 0.15, "depth": -0.002, "sealed": True, "lines": [[[8, -7.4], [55, -8.6]]]},
+            {
+                "kind": "longitudinal",
+                "width": 0.15,
+                "depth": -0.002,
+                "sealed": True,
+                "lines": [[[8, -7.4], [55, -8.6]]],
+            },
         ],
     }
     return RoadParameters.from_dict(data)
@@ -69,9 +75,11 @@ def test_points_on_cracks_joints_and_patches_are_as_deep_and_as_dark_as_said() -
         medians[kind] = float(np.median(points.intensity[rows]))
     lane = -float(geometry.sections["right"].lane_boundaries(30.0)[0, :2].mean())
     beside = np.abs(offset - (lane + 0.9)) < 0.3
-    assert raised[beside & paved & (damage == "none")].mean() < raised[
-        paved & (np.abs(offset - lane) < 0.2) & (damage == "none")
-    ].mean() - 0.5 * parameters.carriageway("right").pavement.wheel_track_depth
+    assert (
+        raised[beside & paved & (damage == "none")].mean()
+        < raised[paved & (np.abs(offset - lane) < 0.2) & (damage == "none")].mean()
+        - 0.5 * parameters.carriageway("right").pavement.wheel_track_depth
+    )
     # Factors of the field, by what the laser sees of them.
     assert medians["patch"] / medians["none"] == pytest.approx(0.72, abs=0.1)
     assert medians["longitudinal crack"] / medians["none"] == pytest.approx(0.45, abs=0.1)
