@@ -47,7 +47,7 @@ def write_opencrg(parameters: RoadParameters, path: Path, tolerance: float) -> T
     """
     geometry = RoadGeometry(parameters)
     grid, trace = _Grid(geometry), Trace(geometry, "heights on a grid", _WITHIN, _LOST)
-    comments = []
+    comments: list[str] = []
     for instance, about in _places(geometry, grid):
         trace.found(instance, comment=len(comments))
         comments.append(f"instance {instance}: {about}")

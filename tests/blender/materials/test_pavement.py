@@ -51,7 +51,7 @@ def test_nodes_and_arrays_give_the_same_field(kind: str) -> None:
     feed = {SurfaceInput("attribute", ATTRIBUTE): values, SurfaceInput("attribute", SHAPE): shapes}
     outputs = {"roughness": "Brightness", "specular": "Roughness", "metallic": "Height"}
     with calculator({0: _probe(kind, wear, outputs)}, tuple(outputs)) as work:
-        found = work.calculate(np.zeros(PLACES, np.intp), {what: feed[what] for what in work.inputs})
+        found = work.calculate(np.zeros(PLACES, np.intp), {what: feed[what] for what in work.inputs_of(0)})
     calculus, place = ArrayCalculus(), Place(*values[:, :3].T.astype(np.float64))
     if kind == "asphalt":
         look, height = asphalt_look(calculus, place, wear), asphalt_height(calculus, place, shape)
