@@ -154,7 +154,7 @@ class TestBuilder:
     def test_a_group_of_the_same_version_is_used_again(self, monkeypatch: pytest.MonkeyPatch) -> None:
         first = strip_group()
         assert strip_group() == first
-        monkeypatch.setattr(builder, "_sources", lambda: b"changed")
+        monkeypatch.setattr(builder, "_sources_digest", lambda: b"changed")
         second = strip_group()
         assert second != first
         assert second.name == "SR Strip"
