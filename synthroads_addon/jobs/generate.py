@@ -82,7 +82,7 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
     files, scene = JobFiles(job.scenario), None
     with output_folder(job.output, files.names, job.overwrite) as folder:
         road, report = make_road(source, timer)
-        check_sections(job.scenario, road.length)
+        job.scenario.check_sections(road.length)
         check_asset_classes(job.scenario.cloud.scheme(), road.parameters)
         if set(job.scenario.outputs) & {"scene", *OF_POINTS}:
             from ..blender.files import empty_file  # Blender takes a second to start: other outputs need none
@@ -122,18 +122,3 @@ def make_road(source: RoadSource, timer: StageTimer) -> tuple[RoadGeometry, dict
     with timer.stage("parameters"):
         parameters, axis_report = source.read()
         return RoadGeometry(parameters), axis_report
-
-
-def check_sections(scenario: Scenario, length: float) -> None:
-    """Raise an InputError if the road is built by sections and the job needs all of its model at once."""
-    section = scenario.section_length(length)
-    if section is None:
-        return
-    if scenario.chooses:
-        name = "time_budget" if scenario.tolerance is None else "tolerance"
-        text = f"can't be kept on a road of {length:g} m, which is built by sections of {section:g} m: choose on a "
-        raise InputError(name, getattr(scenario, name), f"{text}shorter road, and set what was chosen")
-    if "scene" in scenario.outputs:
-        text = f"can't have scene: a road of {length:g} m is built by sections of {section:g} m; leave scene out, or "
-        text += f"set scan.section_length to {length / 2.0:g} or more"
-        raise InputError("outputs", list(scenario.outputs), text)

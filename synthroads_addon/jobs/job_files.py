@@ -77,8 +77,7 @@ class JobFiles:
         """
         bpy = sys.modules.get("bpy")  # not there if nothing needed Blender
         scenario = self.scenario.to_dict()
-        report = {"type": "Report", "generator": generator()} | told
-        report |= {
+        report = {"type": "Report", "generator": generator()} | told | {
             "seed": self.scenario.seed,
             "settings": asdict(self.scenario.settings()),
             "scenario": {name: value for name, value in scenario.items() if self.road or name != "road"},

@@ -84,12 +84,8 @@ class RoadScene:
         settings, parameters = self.scenario.settings(), self.road.parameters
         self.model, self.scene = build_road(parameters, settings.tolerance, settings.vegetation_detail), None
         if self.scenario.materials_table:
-            vary(
-                parameters.materials,
-                parameters.environment,
-                self.scenario.own_materials(),
-                parameters.metadata.seed,
-            )
+            seed, own = parameters.metadata.seed, self.scenario.own_materials()
+            vary(parameters.materials, parameters.environment, own, seed)
         return self.model
 
     def read(self) -> ScannedScene:
@@ -126,8 +122,7 @@ class RoadScene:
         if scenario.section_length(self.road.length) is not None:
             return scan_by_section(self.site, self.road, folder, timer)
         with timer.stage("model"):
-            model = self.model or self.build()
-            remember(model.root, self.road.parameters, scenario, "")
+            remember((self.model or self.build()).root, self.road.parameters, scenario, "")
         counts = self.scan(folder, timer) if set(scenario.outputs) & set(OF_POINTS) else {}
         if "scene" in scenario.outputs:
             with timer.stage("scene file"):

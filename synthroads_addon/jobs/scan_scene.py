@@ -112,11 +112,10 @@ def check_scene_scan(job: SceneScan) -> ClassMapping | None:
         read_axis(job.path)
     if job.epsg is not None:
         wkt(job.epsg)
-    known = job.scenario.cloud.scheme().source_ids()
     if job.classes is None:
         return None
     mapping = ClassMapping.from_dict(read_json(job.classes), source=str(job.classes))
-    mapping.check(known, str(job.classes))
+    mapping.check(job.scenario.cloud.scheme().source_ids(), str(job.classes))
     return mapping
 
 
@@ -151,8 +150,8 @@ def open_and_read(
         road = RoadGeometry(parameters) if parameters else None
         scene = scanned_scene(None, None, mapping, road, factor, number_objects=True, **further)
         if not len(scene.static) and not scene.moving:
-            name = str(job.scene) if job.scene else "open scene"
-            raise InputError(name, None, "holds nothing visible with faces that could be scanned")
+            what = "holds nothing visible with faces that could be scanned"
+            raise InputError(str(job.scene or "open scene"), None, what)
         if job.origin is not None:
             scene = replace(scene, static=replace(scene.static, origin=np.array(job.origin, dtype=np.float64)))
         warnings = open_scene_warnings()
@@ -168,22 +167,22 @@ def scene_site(job: SceneScan, mesh: SceneMesh, road: RoadGeometry | None) -> Si
     conditions = ScanConditions.of(road.parameters if road else None)
     if job.epsg is not None:
         conditions = replace(conditions, epsg=job.epsg)
-    view = None
-    if "previews" in job.scenario.outputs:
-        scheme = job.scenario.cloud.scheme().sources()
-        low, high = body_bounds(mesh) + mesh.origin
-        view = TopView.over_road(road, scheme) if road else TopView.over_box(low, high, scheme)
     path = path_over(job.scenario.scan.platform, mesh, road, job.path, job.tripods)
-    return Site(job.scenario, path, conditions, view)
+    return Site(job.scenario, path, conditions, _view_over(job.scenario, mesh, road))
 
 
 def route_site(scenario: Scenario, route: SceneRoute, mesh: SceneMesh) -> Site:
     """Return the site of a scan along a route through a scene without a road."""
-    view = None
-    if "previews" in scenario.outputs:
-        low, high = body_bounds(mesh) + mesh.origin
-        view = TopView.over_box(low, high, scenario.cloud.scheme().sources())
-    return Site(scenario, route.path(scenario.scan.platform, mesh), ScanConditions.of(None), view)
+    path = route.path(scenario.scan.platform, mesh)
+    return Site(scenario, path, ScanConditions.of(None), _view_over(scenario, mesh, None))
+
+
+def _view_over(scenario: Scenario, mesh: SceneMesh, road: RoadGeometry | None) -> TopView | None:
+    """Return the raster of the previews, over the road or else the mesh's box; None if no previews are wanted."""
+    if "previews" not in scenario.outputs:
+        return None
+    scheme, (low, high) = scenario.cloud.scheme().sources(), body_bounds(mesh) + mesh.origin
+    return TopView.over_road(road, scheme) if road else TopView.over_box(low, high, scheme)
 
 
 def warnings_of_counts(counts: dict[str, Any]) -> list[str]:

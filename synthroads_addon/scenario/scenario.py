@@ -164,6 +164,20 @@ class Scenario(ClosedModel):
         section, longest = (SECTION_LENGTH, LONGEST_WHOLE) if given is None else (given, 2.0 * given)
         return section if length > longest else None
 
+    def check_sections(self, length: float) -> None:
+        """Raise an InputError if a road of a length (m) is scanned by sections and the job needs all of its model."""
+        section = self.section_length(length)
+        if section is None:
+            return
+        if self.chooses:
+            name = "time_budget" if self.tolerance is None else "tolerance"
+            text = f"can't be kept on a road of {length:g} m, which is built by sections of {section:g} m: choose on a "
+            raise InputError(name, getattr(self, name), f"{text}shorter road, and set what was chosen")
+        if "scene" in self.outputs:
+            text = f"can't have scene: a road of {length:g} m is built by sections of {section:g} m; leave scene out, "
+            text += f"or set scan.section_length to {length / 2.0:g} or more"
+            raise InputError("outputs", list(self.outputs), text)
+
     def settings(self) -> Settings:
         """Return the settings that the fidelity stands for, with the scenario's own values in their place."""
         values: dict[str, Any] = {

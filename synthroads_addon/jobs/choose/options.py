@@ -113,9 +113,8 @@ def best_in_time(
 def too_short_error(seconds: float, fastest: float, tolerance: bool = False) -> InputError:
     """Return the InputError for a time budget that even the fastest settings exceed, in seconds."""
     which = "that keep the tolerance " if tolerance else ""
-    left = f"{max(seconds, 0.0):.0f} s of it can still be used"
-    text = f"too short: {left}, and the fastest settings {which}take about {fastest:.0f} s"
-    return InputError("time_budget", None, text)
+    text = f"too short: {max(seconds, 0.0):.0f} s of it can still be used, and the fastest settings {which}take about "
+    return InputError("time_budget", None, f"{text}{fastest:.0f} s")
 
 
 def _loss(choice: Option, reference: Mapping[str, float]) -> tuple[float, float, float]:
