@@ -49,7 +49,7 @@ def write_opencrg(parameters: RoadParameters, path: Path, tolerance: float) -> T
     grid, trace = _Grid(geometry), Trace(geometry, "heights on a grid", _WITHIN, _LOST)
     comments: list[str] = []
     for instance, about in _places(geometry, grid):
-        trace.found(instance, comment=len(comments))
+        trace.record_entity(instance, comment=len(comments))
         comments.append(f"instance {instance}: {about}")
     with path.open("wb") as file:
         file.write("\n".join([*grid.header(comments), ""]).encode("ascii"))
@@ -60,7 +60,7 @@ def write_opencrg(parameters: RoadParameters, path: Path, tolerance: float) -> T
         file.write(np.full(-written % _RECORD // 4, np.nan, ">f4").tobytes())
     for name, item in parameters.of_type(Turnout).items():
         if item.ramp is not None:
-            trace.reduce(name, f"without its ramp beyond {_BESIDE:g} m from the main road")
+            trace.record_loss(name, f"without its ramp beyond {_BESIDE:g} m from the main road")
     return trace
 
 
