@@ -251,11 +251,6 @@ def las_codes() -> NDArray[np.uint8]:
     return class_scheme("17").las_codes()
 
 
-def class_colors() -> NDArray[np.uint8]:
-    """Return a (256, 3) uint8 table of preview colours by the full table's ``class_id``; unlabelled is magenta."""
-    return class_scheme("17").colors()
-
-
 def _read_rows(path: Path) -> tuple[PointClass, ...]:
     return _rows(_read_table(path).classes)
 

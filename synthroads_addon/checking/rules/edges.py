@@ -215,7 +215,7 @@ class Edges:
         return EdgeDistances(inner, lanes, base + full, outer, gap_low, gap_high)
 
     def inner(self, station: Float) -> Float:
-        """Return the distance (N,) of the inner paved edge at N stations, m."""
+        """Return the distance (N,), m, never negative, of the inner paved edge from the centreline at N stations."""
         return self._inner(station)
 
     def between(self, start: float, end: float) -> Float:

@@ -78,7 +78,7 @@ class TopView:
         self.raster.add(block, (relative @ self.along, across), height)
 
     def save(self, folder: Path, epsg: int | None, has_color: bool = True) -> list[Path]:
-        """Write the pictures ``preview_class``, ``_intensity`` and (with colours) ``_rgb``, PNG; return their paths."""
+        """Write PNGs by class, intensity and, if asked, RGB, with the EPSG code in their title; return their paths."""
         raster = self.raster
         pictures: dict[str, tuple[AnyArray, Legend]] = {
             "class": _class_colors(raster, self.scheme),

@@ -100,7 +100,7 @@ class JobTimes:
         return self.pulses * self.table.pulse_seconds(rays) * self.speed
 
     def model_seconds(self, number: int) -> float:
-        """Return the seconds to build a model: number 0 is the one with few plants, 1 the one with all."""
+        """Return the seconds expected here for building a model: number 0 is the one with few plants, 1 with all."""
         return 1e-6 * self.table.model[number] * self.area * self.speed
 
     def relief_seconds(self, octaves: int) -> float:

@@ -56,7 +56,7 @@ def knob_rows(knobs: Iterable[str]) -> Iterator[tuple[str, Any]]:
 
 
 def row_scenario(scenario: str, knob: str, value: Any, changes: Iterable[str] = ()) -> Scenario:
-    """Return the scenario of one row: a built-in one with further changes, then those of the knob's value.
+    """Return a row's scenario: a built-in one at standard fidelity, further changes, then those of the knob's value.
 
     What a knob doesn't change is as in the standard fidelity, so that its errors aren't drowned by those of a coarser
     one. Spacings and pixels of images are those for a range of 60 m, and farther apart and coarser from farther away.

@@ -139,7 +139,7 @@ def _faces(pavement: Pavement) -> Iterator[_Area]:
 
 
 def damage_height(item: Patch | Crack) -> float:
-    """Return the height (m) of a patch or crack above the pavement around it."""
+    """Return the height (m) above the pavement around of a patch, or of a crack: minus its depth."""
     return item.height if isinstance(item, Patch) else -item.depth
 
 

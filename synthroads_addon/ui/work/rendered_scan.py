@@ -93,7 +93,7 @@ class SavedScene:
             while not ended:
                 # Asked before reading: its last lines are read as well.
                 ended = process.poll() is not None
-                messages.take(lines.read())
+                messages.update(lines.read())
                 report(messages.share)
                 if not ended:
                     _wait(process)
@@ -124,8 +124,8 @@ class _Messages:
     done: dict[str, Any] | None = None
     _rest: str = field(default="", repr=False)
 
-    def take(self, text: str) -> None:
-        """Read on: lines of ours, and others of Blender's own."""
+    def update(self, text: str) -> None:
+        """Update the state from new output of the scan: marked lines are JSON, those of Blender itself are left out."""
         *lines, self._rest = (self._rest + text).split("\n")
         for line in lines:
             # Blender may have left a line of its own unfinished.

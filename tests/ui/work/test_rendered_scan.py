@@ -175,7 +175,7 @@ def test_the_other_blender_ends_with_this_one(road: Any, tmp_path: Path) -> None
 def test_what_it_says_is_read_however_it_comes_in() -> None:
     told = _Messages()
     for part in ("Fra:1 Mem", f'ory\nunfinished{MARK}{{"sha', 're": 0.5}\n', f"{MARK}", '{"share": 0.75', "}"):
-        told.take(part)
+        told.update(part)
     assert told.share == 0.5
-    told.take(os.linesep)
+    told.update(os.linesep)
     assert told.share == 0.75
