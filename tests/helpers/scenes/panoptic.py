@@ -28,7 +28,6 @@ from synthroads_addon.scanning.scan import BlockScan
 from synthroads_addon.scanning.scene.caster import FacePlanes
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scenario.scenario import Scenario
-from synthroads_addon.twin.formats import TWIN_FORMATS
 from tests.helpers.files.cityjson_files import read_city, triangles_of_rings
 from tests.helpers.files.twin_reports import TwinReport, read_report
 from tests.helpers.scenes.scan_scenes import mesh_of
@@ -141,6 +140,6 @@ def panoptic_set(scenario: Scenario, folder: Path) -> PanopticSet:
     road = RoadGeometry(read_parameters(folder / "parameters.json"))
     with open_cloud(folder / "cloud.npz") as cloud:
         numbers = np.unique(np.concatenate([part.instance_id for part in cloud.blocks()]))
-    reports = {name: read_report(folder, name) for name in TWIN_FORMATS}
+    reports = {name: read_report(folder, name) for name in scenario.twin}
     shown, traffic = RoadScene(scenario, road), scenario.scan.traffic_speed_factor > 0.0
     return PanopticSet(road, set(numbers.tolist()), reports, shown.plan(), shown.read().static, traffic, folder)

@@ -16,7 +16,7 @@ from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scanned_scene
 from synthroads_addon.jobs.measure.rows import measure_row
-from synthroads_addon.jobs.measure.tradeoff import KNOBS, SCENES, row_scenario, rows
+from synthroads_addon.jobs.measure.tradeoff import KNOBS, SCENES, knob_rows, row_scenario
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.scene.height_errors import mesh_height_errors
@@ -169,5 +169,5 @@ def test_heights_are_within_the_tolerance_but_where_the_pavement_changes_at_once
 
 def test_every_row_is_a_scenario() -> None:
     for scene in SCENES:
-        for knob, value in rows(KNOBS):
+        for knob, value in knob_rows(KNOBS):
             row_scenario(scene, knob, value)

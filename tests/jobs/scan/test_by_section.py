@@ -37,6 +37,8 @@ CUT = 30.0
 """How far (m) from a stretch's ends the model is no longer that of where it is cut."""
 OF_THE_FACE = ("incidence", "intensity", "red", "green", "blue")
 """Fields of a point that follow from the slope of the face that the ray met."""
+ROUNDED = ("range", "true_range", "X", "Y", "Z")
+"""Lengths in steps of the file: of the same edge computed from another face the last may differ."""
 
 
 def barriers() -> RoadParameters:
@@ -116,9 +118,11 @@ def test_the_points_don_t_depend_on_the_sections(tmp_path: Path, traffic: float)
     assert report["counts"]["sections"] == 3
     assert report["counts"]["triangles"] < whole["counts"]["triangles"]
     assert len(wanted) > 13_000
-    for name in set(wanted.dtype.names) - {"material", *OF_THE_FACE}:
+    for name in set(wanted.dtype.names) - {"material", *OF_THE_FACE, *ROUNDED}:
         np.testing.assert_array_equal(found[name], wanted[name], err_msg=name)
-    on_other_faces = np.any([found[name] != wanted[name] for name in OF_THE_FACE], axis=0)
+    for name in ROUNDED:
+        assert np.abs(found[name].astype(np.int64) - wanted[name]).max() <= 1, name
+    on_other_faces = np.any([found[name] != wanted[name] for name in (*OF_THE_FACE, *ROUNDED)], axis=0)
     assert on_other_faces.sum() <= 1e-4 * len(wanted)
     same = ("pulses", "rays", "points", "below_threshold", "saturated", "points_by_class", "intensity_scale")
     assert {name: report["counts"][name] for name in same} == {name: whole["counts"][name] for name in same}
