@@ -96,6 +96,21 @@ def buttons_row(layout: bpy.types.UILayout, texts: Sequence[str], align: bool = 
     return layout.row(align=align) if side_by_side else layout.column(align=align)
 
 
+def draw_menu(layout: bpy.types.UILayout, menu: str, title: str, label: str) -> None:
+    """Draw a menu's button with the title of what is chosen; where that has no room it stands above, and `label` on it.
+
+    Args:
+        layout: a column.
+        menu: the menu's name in Blender.
+        title: of what is chosen.
+        label: what the menu offers.
+    """
+    if not fits(title, icons=2):
+        draw_text(layout, title)
+        title = label
+    layout.menu(menu, text=title, icon="PRESET")
+
+
 def value_row(layout: bpy.types.UILayout, label: str) -> bpy.types.UILayout:
     """Draw a label and return the layout for its value: beside it if both fit, else below."""
     if not is_narrow() and fits(label, NAMES_SHARE):

@@ -9,7 +9,7 @@ import bpy
 from ...blender.model.store import BUILT_FROM, find_road
 from ...blender.things.model_builder import ROLE
 from ..fields.preferences import preferences
-from ..fields.room import buttons_row, draw_flag, draw_text, value_row
+from ..fields.room import buttons_row, draw_flag, draw_menu, draw_text, value_row
 from ..fields.sheets import SHEETS, PanelFields, fields_of
 from ..work.build import SYNTHROADS_OT_build
 from ..work.common import Sidebar, column, large_button
@@ -54,7 +54,7 @@ class MainPanel(SheetPanel):
     def draw(self, context: bpy.types.Context) -> None:
         """Draw the menu of scenarios and the sheet's fields."""
         layout, settings = column(self), context.scene.synthroads
-        layout.menu(SYNTHROADS_MT_scenarios.bl_idname, text=scenario_title(settings.preset), icon="PRESET")
+        draw_menu(layout, SYNTHROADS_MT_scenarios.bl_idname, scenario_title(settings.preset), "Scenario")
         self.draw_fields(layout, settings)
 
 
@@ -92,7 +92,7 @@ class ScannerPanel(SheetPanel):
         """Draw the sheet's fields; the device is a menu."""
         for field in fields_of(self.sheet):
             if field.path == "scan.device":
-                layout.menu(SYNTHROADS_MT_devices.bl_idname, text=device_title(settings.scan.device), icon="PRESET")
+                draw_menu(layout, SYNTHROADS_MT_devices.bl_idname, device_title(settings.scan.device), "Device")
             else:
                 field.draw(layout, settings)
 

@@ -10,7 +10,7 @@ import bpy
 
 from ...blender.model.roads import choose_road
 from ...blender.model.store import find_road, roads
-from ..fields.room import draw_text
+from ..fields.room import draw_text, fits
 from ..work.build import SYNTHROADS_OT_build
 
 _items: list[tuple[str, str, str, str, int]] = []
@@ -55,8 +55,11 @@ class SYNTHROADS_PG_roads(bpy.types.PropertyGroup):
 
 def draw_road_choice(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """Draw the choice of the road and a button to build another one; nothing without a road."""
-    if find_road(context.scene) is None:
+    shown = find_road(context.scene)
+    if shown is None:
         return
+    if not fits(shown.name, icons=3):
+        draw_text(layout, shown.name)
     row = layout.row(align=True)
     row.use_property_split = False
     row.prop(context.window_manager.synthroads_roads, "shown", text="")

@@ -139,8 +139,8 @@ class FakeLayout:
         return SimpleNamespace()
 
     def menu(self, idname: str, text: str | None = None, icon: str = "NONE") -> None:
-        known = getattr(bpy.types, idname)
-        self._say(f"menu {known.bl_label if text is None else text!r} {idname}{_icon(icon)}")
+        shown = getattr(bpy.types, idname).bl_label if text is None else text
+        self._say(f"menu {shown!r} {idname}{_icon(icon)}", shown, 1 + _has(icon))
 
     def progress(self, factor: float = 0.0, text: str = "") -> None:
         self._say(f"progress {text!r}")

@@ -9,7 +9,7 @@ import pytest
 import synthroads_addon
 from synthroads_addon.blender.compat import set_modifier_input
 from synthroads_addon.ui.fields import room
-from synthroads_addon.ui.panels import calibration, cloud_view, edit, panels, rules
+from synthroads_addon.ui.panels import calibration, cloud_view, edit, panels, presets, rules
 from synthroads_addon.ui.work.long_operator import FileChooser
 from tests.helpers.scenes.fake_layout import drawn
 from tests.helpers.scenes.panel_road import choose
@@ -79,15 +79,6 @@ def test_every_broken_rule_is_told_in_full(monkeypatch: pytest.MonkeyPatch) -> N
             assert row.text in said
 
 
-def test_long_words_are_broken_and_none_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
-    widen(monkeypatch, 150.0)
-    text = "carriageway-right-marking-edge-outer is wider than its lane"
-    lines = room.text_lines(text)
-    assert "".join(lines).replace(" ", "") == text.replace(" ", "")
-    assert len(lines) > 2
-    assert all(room.fits(line) for line in lines)
-
-
 def choosers(base: type = FileChooser) -> Iterator[type]:
     for found in base.__subclasses__():
         yield from choosers(found)
@@ -100,3 +91,26 @@ def test_the_file_browsers_button_has_room_for_what_it_does() -> None:
     labels = {found.bl_label for found in choosers()}  # type: ignore[attr-defined]
     assert len(labels) > 8
     assert [label for label in labels if room.text_width(label) > BROWSER_BUTTON] == []
+
+
+@pytest.mark.keep_scene
+def test_names_without_room_stand_above_their_menus(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = {}
+    for width in (200.0, 600.0):
+        widen(monkeypatch, width)
+        layouts = [drawn(panel, bpy.context) for panel in panels.CLASSES]
+        found[width] = " ".join(text for layout in layouts for text, _, _ in layout.texts(room.row_width()))
+    title = presets.scenario_title(bpy.context.scene.synthroads.preset)
+    assert f"{title} Scenario" in found[200.0]
+    assert "SynthRoads Road" in found[200.0]
+    assert title in found[600.0]
+    assert "SynthRoads Road" not in found[600.0]
+
+
+def test_long_words_are_broken_and_none_is_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    widen(monkeypatch, 150.0)
+    text = "carriageway-right-marking-edge-outer is wider than its lane"
+    lines = room.text_lines(text)
+    assert "".join(lines).replace(" ", "") == text.replace(" ", "")
+    assert len(lines) > 2
+    assert all(room.fits(line) for line in lines)
