@@ -46,7 +46,7 @@ CASES = {
     "cloud ": {"info", "subsample", "map-intensity", "convert", "preview"},
     "cloud convert mine --classes 1": {"17"},
     "tradeoff --knobs fid": {"fidelity"},
-    "twin mine.json --twin open": {"opendrive"},
+    "twin mine.json --twin opend": {"opendrive"},
     "parameters --cross-section RQ4": {"RQ43.5"},
     "--print-completion ": {"bash", "fish", "zsh"},
 }

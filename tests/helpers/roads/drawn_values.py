@@ -84,6 +84,10 @@ def _damage(kind: str, *names: str) -> Extractor:
     return extract
 
 
+def _of_pavement(name: str) -> Extractor:
+    return lambda objects, _: (getattr(road.pavement, name) for road in objects["Carriageway"])
+
+
 def _of_scene(part: str, name: str) -> Extractor:
     return lambda _, parameters: iter([getattr(getattr(parameters, part), name)])
 
@@ -173,6 +177,9 @@ EXTRACTORS: dict[str, Extractor] = {
     "turnouts.bay_width": _turnout(lambda item: item.lane_width, bay=True),
     "pavement.rut_depth": _damage("ruts", "depth"),
     "pavement.rut_width": _damage("ruts", "width"),
+    "pavement.wheel_track_depth": _of_pavement("wheel_track_depth"),
+    "pavement.joint_depth": _of_pavement("joint_depth"),
+    "pavement.unevenness": _of_pavement("unevenness"),
     "pavement.potholes_per_km": _damages("potholes", 1000.0),
     "pavement.pothole_size": _damage("potholes", "length", "width"),
     "pavement.pothole_depth": _damage("potholes", "depth"),
