@@ -1,4 +1,4 @@
-"""Work with point cloud files (LAZ, LAS, PLY, E57, NPZ): describe, thin out, map intensities, convert, draw."""
+"""Work with point cloud files (LAZ, LAS, PLY, E57, NPZ): describe, thin out, convert, merge, crop, tile, draw, ..."""
 
 import argparse
 import sys
@@ -39,15 +39,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     change = tools.add_parser("convert", help="write another format, or merged classes")
     _file_arguments(change)
     _preview_arguments(tools.add_parser("preview", help="draw from above and a cross-section"))
+    together = tools.add_parser("merge", help="put several clouds into one")
+    together.add_argument("files", type=Path, nargs="+", metavar="FILE", help="clouds, in the order of their points")
+    together.add_argument("--output", required=True, type=Path, metavar="FILE", help="file to write")
+    part = tools.add_parser("crop", help="keep what lies within a box, heights or a polygon")
+    _file_arguments(part)
+    _crop_arguments(part)
+    tiles = tools.add_parser("tile", help="cut into square tiles, thinned out if wanted")
+    _tile_arguments(tiles)
     for tool in (thin, change):
         tool.add_argument("--classes", metavar="NAME_OR_FILE", help="5, or a .json file of classes (the cloud's own)")
-    for tool in (thin, mapping, change):
+    for tool in (thin, mapping, change, together, part, tiles):
         tool.add_argument("--overwrite", action="store_true", help="replace a file that is already there")
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run a tool of `synthroads cloud`; return exit code, result as JSON data and printed text."""
     actions = {"info": _info, "subsample": _subsample, "map-intensity": _map_intensity, "convert": _convert}
+    actions |= {"merge": _merge, "crop": _crop, "tile": _tile}
     return actions.get(arguments.tool, _preview)(arguments)
 
 
@@ -92,6 +101,50 @@ def _preview_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--line", type=float, nargs=4, metavar=("X1", "Y1", "X2", "Y2"), help="cut along this line")
     parser.add_argument("--depth", type=_positive, default=1.0, metavar="M", help="thickness of the cut, m (1)")
     parser.add_argument("--overwrite", action="store_true", help="replace pictures that are already there")
+
+
+def _crop_arguments(parser: argparse.ArgumentParser) -> None:
+    names = ("X1", "Y1", "X2", "Y2")
+    parser.add_argument("--box", type=float, nargs=4, metavar=names, help="least x and y, then largest, map")
+    parser.add_argument("--heights", type=float, nargs=2, metavar=("LOW", "HIGH"), help="least and largest z")
+    parser.add_argument("--polygon", type=Path, metavar="FILE", help="GeoJSON polygons in the map's coordinates")
+
+
+def _tile_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", type=Path, metavar="FILE", help="cloud (.laz, .las, .ply, .e57, .npz)")
+    parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the tiles")
+    parser.add_argument("--size", type=float, default=60.0, metavar="M", help="edge of a tile, m (60)")
+    text = "keep one point per cell of this edge, m, e.g. 0.04 (all points)"
+    parser.add_argument("--grid", type=float, metavar="M", help=text)
+    count = whole_number(10**9, "a thousand million")
+    parser.add_argument("--fewest", type=count, default=1, metavar="N", help="leave out tiles with fewer points (1)")
+    text = "laz, las, ply, e57, npz (the cloud's own)"
+    parser.add_argument("--format", choices=("laz", "las", "ply", "e57", "npz"), metavar="KIND", help=text)
+
+
+def _merge(arguments: argparse.Namespace) -> Outcome:
+    from synthroads_addon.cloud.tools.divide import merge
+
+    done = merge(arguments.files, arguments.output, arguments.overwrite, progress_bar(arguments))
+    return 0, done, f"{done['points']:,} points of {len(arguments.files)} clouds written to {arguments.output}"
+
+
+def _crop(arguments: argparse.Namespace) -> Outcome:
+    from synthroads_addon.cloud.tools.divide import crop
+
+    box, heights = (None if part is None else tuple(part) for part in (arguments.box, arguments.heights))
+    where = (box, heights, arguments.polygon)
+    done = crop(arguments.file, arguments.output, *where, arguments.overwrite, progress_bar(arguments))
+    return 0, done, f"{done['points']:,} of {done['points_read']:,} points written to {arguments.output}"
+
+
+def _tile(arguments: argparse.Namespace) -> Outcome:
+    from synthroads_addon.cloud.tools.divide import tile
+
+    settings = (arguments.size, arguments.grid, arguments.fewest, arguments.format, arguments.overwrite)
+    done = tile(arguments.file, arguments.output, *settings, progress_bar(arguments))
+    points = sum(row["points"] for row in done["tiles"])
+    return 0, done, f"{len(done['tiles'])} tiles with {points:,} points written to {arguments.output}"
 
 
 def _info(arguments: argparse.Namespace) -> Outcome:

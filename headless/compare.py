@@ -62,6 +62,7 @@ def summary(data: dict[str, Any], output: Path) -> str:
             )
     shares = ", ".join(f"{group} {value:.2f}" for group, value in data["realism"].items())
     lines.append(f"realism, 1 where a real cloud is told apart as surely: {shares}")
+    lines.append(f"density-aware Chamfer distance of patches, over that of real ones: {data['chamfer']:.2f}")
     for name, (told, real) in list(data["giveaways"].items())[:_GIVEAWAYS]:
         medians = [", ".join(f"{row['medians'][name]:.3g}" for row in data[side]) for side in ("synthetic", "real")]
         lines.append(f"  {name} gives away {told:.2f} (real {real:.2f}): {medians[0]} against {medians[1]}")

@@ -24,6 +24,7 @@ from headless.commands import (
 )
 from headless.messages import detail, progress_bar
 from synthroads_addon.scenario.scenario import load_scenario, scenario_names
+from synthroads_addon.scenario.without import EFFECTS, scenario_without
 
 _FIELDS = {
     "device": "scan.device",
@@ -52,13 +53,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_allow_large_argument(parser)
     add_twin_argument(parser)
     add_changes_argument(parser)
+    add_without_argument(parser)
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
+
+
+def add_without_argument(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--without``, which leaves an effect of the sensor out."""
+    text = f"leave an effect out, with the same rays and seed (can be repeated): {', '.join(EFFECTS)}"
+    parser.add_argument("--without", action="append", default=[], choices=list(EFFECTS), metavar="EFFECT", help=text)
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads generate`; return exit code, the job's report as JSON data and printed text."""
     begun = time.perf_counter()
     scenario = load_scenario(arguments.scenario, [*choice_changes(arguments), *all_changes(arguments, _FIELDS)])
+    scenario = scenario_without(scenario, arguments.without)
     detail("scenario", scenario.to_dict())
     from synthroads_addon.jobs.generate import Job, generate
 

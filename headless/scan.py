@@ -25,6 +25,7 @@ from headless.commands import (
 from headless.messages import detail, progress_bar
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.scenario.scenario import Scenario, load_scenario, parse_change, scenario_names, with_changes
+from synthroads_addon.scenario.without import scenario_without
 
 _FIELDS = {
     "device": "scan.device",
@@ -63,6 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = f"take the scan from it: {names}, or a .json file (the defaults of a scenario)"
     parser.add_argument("--scenario", metavar="NAME_OR_FILE", help=text)
     add_changes_argument(parser)
+    generate.add_without_argument(parser)
     parser.add_argument("--seed", type=int, metavar="N", help="seed of the noise (the scenario's own)")
     text = "point on the trade-off (the scenario's own)"
     parser.add_argument("--fidelity", choices=("draft", "standard", "high"), help=text)
@@ -78,7 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads scan`; return exit code, the job's report as JSON data and printed text."""
     begun = time.perf_counter()
-    scenario = scenario_of(arguments)
+    scenario = scenario_without(scenario_of(arguments), arguments.without)
     detail("scenario", scenario.to_dict())
     from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
 

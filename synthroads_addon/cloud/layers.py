@@ -135,6 +135,16 @@ LAYERS: dict[str, Layer] = {
         _scalar("damage", "damage", "uint8", None, "1", "damage of pavement, 0 none"),
         {"damage": "uint8"},
     ),
+    "power": Layer(
+        "Received Power",
+        _scalar("power_db", "power_db", "int16", 0.01, "dB", "received power, dB"),
+        {"power_db": "float32"},
+    ),
+    "channel": Layer(
+        "Laser",
+        _scalar("channel", "channel", "uint8", None, "1", "number of the laser"),
+        {"channel": "uint8"},
+    ),
     "scanner": Layer(
         "Scanner",
         _vector(("scanner_x", "scanner_y", "scanner_z"), "scanner", "int32", 1e-3, "m", "pulse's origin, m,"),

@@ -20,6 +20,7 @@ from sklearn.model_selection import StratifiedGroupKFold
 
 from ..base.arrays import Bool, Float, Index
 from ..base.errors import InputError
+from .chamfer import mean_chamfer
 from .patches import FEATURES, GROUPS, Patches, match_density
 
 FOLDS = 5
@@ -42,19 +43,21 @@ class Distinction:
         auc: by group of `GROUPS`, and ``all``.
         features: AUC of each statistic alone, 0.5 to 1.
         mmd: squared maximum mean discrepancy of all statistics.
+        chamfer: mean density-aware Chamfer distance of the patches' points, 0 to 1.
     """
 
     patches: int
     auc: dict[str, float]
     features: dict[str, float]
     mmd: float
+    chamfer: float
 
     def to_dict(self) -> dict[str, Any]:
         """Return patch count, AUC and squared maximum mean discrepancy as JSON data."""
         shown = {
             name: {key: round(value, 4) for key, value in getattr(self, name).items()} for name in ("auc", "features")
         }
-        return {"patches": self.patches, **shown, "mmd": round(self.mmd, 6)}
+        return {"patches": self.patches, **shown, "mmd": round(self.mmd, 6), "chamfer": round(self.chamfer, 5)}
 
 
 def distinguish(one: Patches, other: Patches, seed: int, name: str) -> Distinction:
@@ -84,7 +87,8 @@ def distinguish(one: Patches, other: Patches, seed: int, name: str) -> Distincti
     columns = {"all": list(range(len(FEATURES))), **columns}
     auc = {group: _auc(values[:, chosen], truth, blocks, seed) for group, chosen in columns.items()}
     features = {name: _auc_alone(values[:, number], truth) for number, name in enumerate(FEATURES)}
-    return Distinction(len(first), auc, features, squared_discrepancy(values[truth], values[~truth]))
+    discrepancy = squared_discrepancy(values[truth], values[~truth])
+    return Distinction(len(first), auc, features, discrepancy, mean_chamfer(first, second))
 
 
 def _blocks(patches: Patches, side: int) -> Index:

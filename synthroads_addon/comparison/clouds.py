@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from ..base.errors import InputError
+from ..base.errors import InputError, nearest_name
 from ..base.schema import ClosedModel, Finite, quantity, read_yaml
 from ..cloud.formats.registry import ENDINGS
 from ..cloud.selection.classes import RealClass, RealCloud, class_by_label, read_real_cloud
@@ -41,6 +41,13 @@ class ListedCloud(ClosedModel):
         if (self.axis is None) != (not self.paved):
             raise ValueError("axis and paved tell the pavement together: one of them is missing")
         return self
+
+
+class UnlistedCloud(ListedCloud):
+    """A cloud without a list: of the usual classes those that it has are compared."""
+
+    marking: str | None = "road_marking"
+    vegetation: str | None = "vegetation"
 
 
 class CloudList(ClosedModel):
@@ -76,14 +83,14 @@ def find_clouds(path: Path) -> list[tuple[Path, ListedCloud]]:
     files = sorted(file for file in path.rglob("*") if file.suffix.lower() in ENDINGS) if path.is_dir() else [path]
     if not files:
         raise InputError(str(path), None, f"holds no cloud ({', '.join(ENDINGS)})")
-    return [(file, ListedCloud(cloud=file.name, marking="road_marking", vegetation="vegetation")) for file in files]
+    return [(file, UnlistedCloud(cloud=file.name)) for file in files]
 
 
 def read_compared(path: Path, row: ListedCloud) -> ComparedCloud:
     """Read a cloud file and return its points of the compared classes, with linear intensities.
 
     Raises:
-        InputError: the file can't be read, or has too few points of the road.
+        InputError: the file can't be read, has too few points of the road, or a list names a class that it has none of.
     """
     cloud = read_real_cloud(path, row.class_field)
     if row.axis is not None:
@@ -91,21 +98,33 @@ def read_compared(path: Path, row: ListedCloud) -> ComparedCloud:
         found = {ROAD: beside["paved"]} | ({"marking": beside["line"]} if "line" in beside else {})
     else:
         found = {ROAD: class_by_label(cloud, row.road)}
-        found |= _other_classes(cloud, row)
+        found |= _other_classes(cloud, row, path.name)
     return ComparedCloud(path.stem, {name: _with_view(points, row) for name, points in found.items()})
 
 
-def _other_classes(cloud: RealCloud, row: ListedCloud) -> dict[str, RealClass]:
+def _other_classes(cloud: RealCloud, row: ListedCloud, file: str) -> dict[str, RealClass]:
     """Return the marking and vegetation points, by class, as far as the cloud has enough of them."""
     found = {}
     for name in CLASSES[1:]:
         code = getattr(row, name)
         if code is not None:
+            if not isinstance(row, UnlistedCloud):
+                _check_class(cloud, code, f"{file}: {name}")
             try:
                 found[name] = class_by_label(cloud, code)
             except InputError:  # a cloud may well have none of them
                 continue
     return found
+
+
+def _check_class(cloud: RealCloud, code: str, field: str) -> None:
+    """Refuse the name of a class that a cloud's scheme doesn't have."""
+    if code.lstrip("-").isdigit():
+        return
+    names = [row.name for row in cloud.scheme.rows] if cloud.scheme else []
+    if code not in names:
+        allowed = f"one of {', '.join(names)}" if names else "a number: the attribute has no names"
+        raise InputError(field, code, f"must be {allowed}{nearest_name(code, names)}")
 
 
 def _with_view(points: RealClass, row: ListedCloud) -> RealClass:

@@ -79,12 +79,18 @@ class CloudComparison:
         told, real = (float(np.mean([max(one.mmd, 0.0) for one in rows])) for rows in (self.told, self.yardstick))
         return told / max(real, 1e-6)
 
+    def chamfer(self) -> float:
+        """Return the mean density-aware Chamfer distance of synthetic patches to real ones over the yardstick's."""
+        told, real = (float(np.mean([one.chamfer for one in rows])) for rows in (self.told, self.yardstick))
+        return told / max(real, 1e-6)
+
     def to_dict(self) -> dict[str, Any]:
         """Return the comparison's measures and all clouds' figures as JSON data."""
         return {
             "type": "CloudComparison",
             "realism": {group: round(value, 4) for group, value in self.realism().items()},
             "discrepancy": round(self.discrepancy(), 3),
+            "chamfer": round(self.chamfer(), 4),
             "giveaways": {name: [round(value, 4) for value in pair] for name, pair in self.giveaways().items()},
             "synthetic": _joined(self.synthetic, self.told),
             "real": _joined(self.real, self.yardstick),

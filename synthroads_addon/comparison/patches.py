@@ -46,18 +46,21 @@ class Patches:
         place: (P, 2) corner of each, map, m.
         density: (P,) points per m2.
         values: (P, F) in the order of `FEATURES`.
+        points: of each patch (N, 3): place from its corner, and height over its plane, m.
     """
 
     place: Float
     density: Float
     values: Float
+    points: tuple[Float, ...] = ()
 
     def __len__(self) -> int:
         return len(self.place)
 
     def select(self, rows: Index) -> Patches:
-        """Return the patches at these rows."""
-        return Patches(self.place[rows], self.density[rows], self.values[rows])
+        """Return the chosen patches."""
+        points = tuple(self.points[row] for row in rows) if self.points else ()
+        return Patches(self.place[rows], self.density[rows], self.values[rows], points)
 
 
 def join_patches(parts: list[Patches]) -> Patches:
@@ -67,6 +70,7 @@ def join_patches(parts: list[Patches]) -> Patches:
         np.concatenate([part.place + shift for part, shift in zip(parts, shifts, strict=True)]),
         np.concatenate([part.density for part in parts]),
         np.concatenate([part.values for part in parts]),
+        tuple(points for part in parts for points in part.points),
     )
 
 
@@ -86,7 +90,14 @@ def make_patches(road: RealClass, name: str) -> Patches:
     if not whole:
         raise InputError(name, None, f"has no {EDGE:g} m of pavement with {FEWEST} points or more")
     values = np.array([points.describe(rows[number]) for number in whole])
-    return Patches(corners[whole] * EDGE, count[whole] / EDGE**2, values)
+    places = tuple(_above_plane(road.place[rows[number]], corners[number] * EDGE) for number in whole)
+    return Patches(corners[whole] * EDGE, count[whole] / EDGE**2, values, places)
+
+
+def _above_plane(place: Float, corner: AnyArray) -> Float:
+    """Return a patch's points (N, 3) from its corner, with heights over its plane, m."""
+    residual, _ = _fit_surface(place)
+    return np.column_stack([place[:, :2] - corner, residual])
 
 
 def _is_whole(place: Float, corner: AnyArray) -> bool:

@@ -11,10 +11,11 @@ from ..cloud.points import NO_MATERIAL
 from ..materials.reflectance import reflectivity
 from ..materials.surfaces import Surfaces
 from .colour.colour import LayerSource, LayerValues, SeenPoints, sample_points
-from .devices.device import ScannerSetting
+from .detector import Readout
 from .plan import ScanPlan
-from .radiometry import saturate
+from .radiometry import DARKEST_DB, decibels
 from .relief import shift_along_normals
+from .response import range_corrected
 from .returns import number_returns
 from .scan import BlockResult
 
@@ -55,7 +56,7 @@ class Finish:
             )
         changes: dict[str, AnyArray | None] = dict.fromkeys(points.attributes().keys() & OPTIONAL - plan.kept_layers)
         if plan.range_corrected:
-            changes["intensity"] = points.intensity * points.range**2
+            changes["intensity"] = range_corrected(points.intensity, points.range, plan.setting)
         return replace(result, points=points.with_arrays(changes), seen=None)
 
     def _with_layers(self, result: BlockResult, seen: SeenPoints) -> BlockResult:
@@ -70,9 +71,11 @@ class Finish:
             assert plan.material_means is not None
             factors = layer_brightness(plan.material_means, seen, values)
             changes["intensity"] = result.points.intensity * factors
+            if (power := result.points.array("power_db")) is not None:
+                changes["power_db"] = np.maximum(power + decibels(factors), DARKEST_DB)
         result = replace(result, points=result.points.with_arrays(changes))
         if plan.detects_after_layers:
-            result = detect_echoes(result, plan.setting)
+            result = read_echoes(result, plan)
         assert result.points.color_source is not None
         return replace(result, sources=np.bincount(result.points.color_source, minlength=256))
 
@@ -95,25 +98,26 @@ def layer_brightness(means: Surfaces, seen: SeenPoints, values: LayerValues) -> 
     return factor
 
 
-def detect_echoes(result: BlockResult, setting: ScannerSetting) -> BlockResult:
+def read_echoes(result: BlockResult, plan: ScanPlan) -> BlockResult:
     """Return a block as the detector records it: weak and surplus echoes lost, the rest renumbered and saturated.
 
     Weak echoes are lost, those beyond the device's largest number as well, and what is left is numbered anew and
     saturates. The returns of a pulse have one time and lie side by side.
     """
-    points = result.points
-    strong = np.flatnonzero(points.intensity >= setting.threshold)
+    points, readout, setting = result.points, result.readout or Readout(), plan.setting
+    strong = np.flatnonzero(readout.detected(points.intensity, setting.threshold))
     time, strip = points.gps_time[strong], points.strip[strong]
     begins = np.ones(len(strong), dtype=bool)
     begins[1:] = (time[1:] != time[:-1]) | (strip[1:] != strip[:-1])
     recorded, number, returns = number_returns(np.cumsum(begins), setting.device.maximum_returns)
     rows = strong[recorded]
     points = points.select(rows)
-    intensity, clipped = saturate(points.intensity, setting.saturation)
+    intensity, clipped = readout.select(rows).read(points.intensity, points.range, setting, plan.gains)
     return replace(
         result,
         points=replace(points, intensity=intensity, return_number=number, number_of_returns=returns),
         seen=None if result.seen is None else result.seen.select(rows),
         below_threshold=result.below_threshold + len(result.points) - len(strong),
         saturated=clipped,
+        readout=None,
     )

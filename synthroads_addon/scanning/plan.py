@@ -9,6 +9,7 @@ from typing import Any, Literal, Protocol, Self
 import numpy as np
 
 from ..base.arrays import Float
+from ..base.classes import UNLABELLED
 from ..materials.surfaces import Surfaces
 from ..materials.table import Material
 from ..road.geometry import RoadGeometry
@@ -26,9 +27,11 @@ from .noise import Noise
 from .pavement_relief import PavementRelief
 from .platforms.path import Path, Strip
 from .relief import MicroRelief
+from .response import laser_gains
 from .scene.caster import Caster
 from .scene.mesh import SceneMesh
 from .scene.target import Target
+from .strip_errors import StripErrors, strip_error_report
 
 _SPARE = 2
 """Factor on the returns of a pulse that are kept meanwhile: some are lost to the threshold later."""
@@ -93,8 +96,10 @@ class ScanPlan:
         rings: rays on each ring around the beam's axis.
         seed: of everything random.
         noise: random errors of the measurement.
+        strip_errors: systematic errors of its strips.
         attenuation: of the beam by the air, 1/m of range.
         effects: effects that change the echoes of pulses, in the order in which they act.
+        air_class: ``class_id`` of the echoes that these add.
         beam: whether the rays of a pulse diverge from the aperture or run parallel.
         measured_layers: names of the optional per-point layers that the scan itself fills.
         records_seen_points: whether blocks tell where each point was seen (`BlockResult.seen`), for colours and relief.
@@ -116,6 +121,8 @@ class ScanPlan:
         request: colours and layers that are asked of the scene.
         services: of the program that shows the scene, for these; None where points stay as they are measured.
         progress: shares of a larger scan that are done before this one, and after it.
+        pattern: rays of a pulse.
+        gains: (256,) of the lasers.
     """
 
     target: Target
@@ -125,8 +132,10 @@ class ScanPlan:
     rings: tuple[int, ...]
     seed: int
     noise: Noise = Noise()  # noqa: RUF009 (frozen)
+    strip_errors: StripErrors = StripErrors()  # noqa: RUF009 (frozen)
     attenuation: float = 0.0
     effects: tuple[EchoEffect, ...] = ()
+    air_class: int = UNLABELLED
     beam: Literal["conical", "cylindrical"] = "conical"
     measured_layers: frozenset[str] = frozenset()
     records_seen_points: bool = False
@@ -147,9 +156,11 @@ class ScanPlan:
     services: SceneServices | None = None
     progress: tuple[float, float] = (0.0, 1.0)
     pattern: BeamPattern = field(init=False)
+    gains: Float = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pattern", beam_pattern(self.rings))
+        object.__setattr__(self, "gains", laser_gains(self.setting, self.seed))
 
     @property
     def sun(self) -> Float | None:
@@ -191,10 +202,11 @@ class ScanPlan:
         return self.cut.count() if self.chosen_blocks is None else len(self.chosen_blocks)
 
     def summary(self) -> dict[str, Any]:
-        """Return triangles, vertices, caster and attenuation (1/m), known before the scan begins, as JSON data."""
+        """Return the figures that are known before the scan begins, as JSON data."""
+        strip_errors = strip_error_report(self.strip_errors, self.seed, self.path.strips)
         return {
             "triangles": self.target.triangles,
             "vertices": self.target.vertices,
             "caster": self.target.caster.name,
             "attenuation": self.attenuation,
-        }
+        } | ({"strip_errors": strip_errors} if strip_errors else {})

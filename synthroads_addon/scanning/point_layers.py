@@ -8,6 +8,7 @@ import numpy as np
 from ..base.arrays import AnyArray, Float, Index
 from .devices.device import ScannerSetting
 from .pulses import Pulses
+from .radiometry import decibels
 from .scene.target import Target
 
 
@@ -88,6 +89,16 @@ def _true_range(points: MeasuredPoints) -> AnyArray:
 def _true_xyz(points: MeasuredPoints) -> AnyArray:
     pulses, origin = points.pulses, points.target.origin
     return place_points(pulses.origin, pulses.direction, points.pulse, points.distance, origin)
+
+
+@fills("power_db")
+def _power(points: MeasuredPoints) -> AnyArray:
+    return decibels(points.intensity)
+
+
+@fills("channel")
+def _channel(points: MeasuredPoints) -> AnyArray:
+    return points.pulses.channel[points.pulse]
 
 
 @fills("material")

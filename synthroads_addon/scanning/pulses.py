@@ -23,12 +23,16 @@ class Errors:
         angle: (2, P) rad; None without.
         lost: (P, returns) bool; None without.
         speckle: (P, returns) factors on the intensities, 1 on average; None without.
+        receiver: (2, P) noise of the receiver, in units of one sigma, see `receiver.values_of_echoes`; None without.
+        tails: as `range`: factors on these; None without.
     """
 
     range: Float32 | None
     angle: Float | None
     lost: Bool | None
     speckle: Float32 | None = None
+    receiver: Float32 | None = None
+    tails: Float32 | None = None
 
     def range_errors(self, pulse: Index, number: UInt8, most: int) -> Float32:
         """Return (N,) range errors of returns, in units of one sigma.
@@ -43,10 +47,14 @@ class Errors:
         """
         assert self.range is not None
         count = self.range.shape[1]
-        result = np.take(self.range[0], pulse)
         later = np.flatnonzero(number > 1)
-        place = pulse[later] + (number[later].astype(np.intp) - 2) * max(1, count // most)
-        result[later] = self.range[1][place % count]
+        place = (pulse[later] + (number[later].astype(np.intp) - 2) * max(1, count // most)) % count
+        result = np.take(self.range[0], pulse)
+        result[later] = self.range[1][place]
+        if self.tails is not None:
+            factor = np.take(self.tails[0], pulse)
+            factor[later] = self.tails[1][place]
+            result *= factor
         return result
 
 
@@ -72,6 +80,7 @@ class Pulses:
     Attributes:
         time: (P,) s since the first strip's start.
         scan_angle: (P,) rad, see `patterns.base.PulseRays`.
+        channel: (P,) number of the laser that fires it.
         origin: (3, P) where each leaves the scanner, m.
         direction: (3, P) unit vectors of the beam's axis.
         in_plane: (3, P) unit vectors across the beam, in the scan plane; None for a single ray.
@@ -81,6 +90,7 @@ class Pulses:
 
     time: Float
     scan_angle: Float
+    channel: UInt8
     origin: Float
     direction: Float
     in_plane: Float | None

@@ -8,8 +8,10 @@ at 1 m, gives 1.
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.arrays import Float
+from ..base.arrays import Float, Float32
 
+DARKEST_DB = -300.0
+"""Received power in decibels of what sends nothing back."""
 NEAREST = 1e-3
 """Nearer than this, m, 1/d^2 doesn't grow on: the law holds far from the aperture only, and stays finite."""
 
@@ -32,6 +34,11 @@ def received_intensity(share: ArrayLike, distance: ArrayLike, attenuation: float
             left = np.asarray(reach * -attenuation)
             intensity *= np.exp(left, out=left)
     return intensity if far else np.where(distance > 0.0, intensity, 0.0)
+
+
+def decibels(power: ArrayLike) -> Float32:
+    """Return powers in decibels, at least `DARKEST_DB`."""
+    return np.asarray(10.0 * np.log10(np.maximum(power, 10.0 ** (DARKEST_DB / 10.0))), dtype=np.float32)
 
 
 def saturate(intensity: Float, limit: float) -> tuple[Float, int]:

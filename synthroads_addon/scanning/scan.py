@@ -4,12 +4,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.arrays import Bool, Float, Float32, Index, Int
+from ..base.arrays import Bool, Float, Index, Int, UInt8
 from ..base.random_streams import stream
 from ..cloud.points import PointBlock, concatenate, make_block
 from ..materials.surfaces import brightness_of, spread_factors
 from .beam import conical_directions, cylindrical_offsets
 from .colour.colour import SeenPoints
+from .detector import Readout, detect_echoes
 from .devices.shots import shots
 from .effects import apply_effect
 from .knots import Track
@@ -18,17 +19,17 @@ from .plan import ScanPlan
 from .platforms.path import Strip
 from .point_layers import MeasuredPoints, fill_layers, place_points
 from .pulses import Errors, Poses, Pulses, may_hit_scene, turn_vectors
-from .radiometry import received_intensity, saturate
+from .radiometry import received_intensity
+from .range_noise import range_sigma, tail_factors
 from .returns import LEAST_REFLECTANCE, BothSignals, Echoes, HitSignals, group_returns, number_returns
+from .strip_errors import with_strip_errors
 from .trace import Hits, Rays, TracedRays, trace
+from .waveform import merge_peaks
 
 _MOTION_KNOTS = 0.01
 """Seconds between two poses of a moving vehicle: it turns by less than a milliradian meanwhile."""
 _OFF_SURFACE = 1e-3
 """How far from its surface a ray towards the sun begins, m."""
-PROVISIONAL_THRESHOLD = 0.25
-"""Share of the detector's threshold that keeps an echo while its intensity is still to change: no echo is expected to
-become four times as bright as its material's mean makes it."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,7 @@ class BlockResult:
         below_threshold, saturated: returns that the detector lost or clipped.
         sources: (256,) points by the source of their colour, once they are finished.
         blocks: how many blocks these are.
+        readout: what the receiver is still to make of the points; None once it is done.
     """
 
     points: PointBlock
@@ -52,11 +54,13 @@ class BlockResult:
     saturated: int
     sources: Int | None = None
     blocks: int = 1
+    readout: Readout | None = None
 
 
 def join_results(results: list[BlockResult]) -> BlockResult:
     """Return the results of several blocks, none of them finished yet, joined into one in their order."""
     seen = [result.seen for result in results if result.seen is not None]
+    readouts = [result.readout for result in results if result.readout is not None]
 
     def total(name: str) -> int:
         return sum(getattr(result, name) for result in results)
@@ -69,6 +73,7 @@ def join_results(results: list[BlockResult]) -> BlockResult:
         below_threshold=total("below_threshold"),
         saturated=total("saturated"),
         blocks=total("blocks"),
+        readout=Readout.join(readouts) if readouts else None,
     )
 
 
@@ -110,19 +115,20 @@ class BlockScan:
             random = stream(plan.seed, f"effect {effect.name}", strip.index, key)
             traced, signals = apply_effect(effect, random, setting, plan.attenuation, pulses, traced, signals)
         echoes = group_returns(*signals, traced.pulse, setting.range_resolution)
+        if setting.receiver.echo_separation == "waveform":
+            echoes = merge_peaks(echoes, setting.range_resolution)
         if plan.surfaces.varying:
             echoes = self.vary_brightness(traced, echoes, poses.motions)
-        if errors.speckle is not None:
-            echoes = _speckle_echoes(echoes, errors.speckle[number])
-        strong = np.flatnonzero(
-            echoes.intensity >= setting.threshold * (PROVISIONAL_THRESHOLD if plan.detects_after_layers else 1.0)
-        )
-        weak = len(echoes.pulse) - len(strong)
-        if weak:
-            echoes = echoes.select(strong)
-        if errors.lost is not None:
-            echoes = _drop_lost_echoes(echoes, errors.lost[number])
-        points, seen, clipped = self._points(strip, pulses, traced, echoes, errors, number, poses.motions)
+        provisional = plan.detects_after_layers
+        echoes, readout, weak = detect_echoes(echoes, errors, number, pulses.channel, setting, provisional=provisional)
+        keep, *numbers = number_returns(echoes.pulse, plan.most_returns)
+        if not keep.all():
+            echoes, readout = echoes.select(keep), readout.select(keep)
+        points, seen = self._points(strip, pulses, traced, echoes, numbers, errors, number, poses.motions)
+        if provisional:
+            return BlockResult(points, seen, count, traced.first.face.size, weak, 0, readout=readout)
+        intensity, clipped = readout.read(points.intensity, points.range, setting, plan.gains)
+        points = replace(points, intensity=intensity)
         return BlockResult(points, seen, count, traced.first.face.size, weak, clipped)
 
     @property
@@ -137,30 +143,37 @@ class BlockScan:
         def source(purpose: str) -> np.random.Generator:
             return stream(plan.seed, purpose, strip.index, key)
 
-        shape = (count, plan.most_returns)
+        shape, receiver = (count, plan.most_returns), plan.setting.receiver
         angle, dropout, ranges = plan.noise.angle_sigma_mrad * 1e-3, plan.noise.dropout, plan.setting.range_sigma
         return Errors(
             source("range noise").standard_normal((2, max(shape)), dtype=np.float32) if ranges else None,
             source("angle noise").normal(scale=angle, size=(2, count)) if angle else None,
             source("dropouts").random(shape, dtype=np.float32) < dropout if dropout else None,
             speckle_factors(source("speckle"), plan.noise.speckle, shape) if plan.noise.speckle else None,
+            source("receiver noise").standard_normal((2, max(shape)), dtype=np.float32)
+            if receiver.noise_sigma(plan.setting.threshold)
+            else None,
+            tail_factors(source("range tails"), receiver.range_tails, (2, max(shape)))
+            if ranges and receiver.range_tails
+            else None,
         )
 
     def poses_between(self, strip: Strip, begin: float, end: float) -> Poses:
         """Return the tracks of the scanner and of the target's moving parts between two times, s."""
         path, noise, spacing = self.plan.path, self.plan.noise, self.plan.path.knot_spacing
+        strip_errors, seed = self.plan.strip_errors, self.plan.seed
 
         def true(time: Float) -> tuple[Float, Float, Float]:
             position, rotation = path.pose(strip, time)
             return rotation, position, np.ones(len(time))
 
         def measured(time: Float) -> tuple[Float, Float, Float]:
-            errors = trajectory_errors(noise, self.plan.seed, strip, time)
-            position, rotation = measured_pose(*path.pose(strip, time), errors)
+            pose = measured_pose(*path.pose(strip, time), trajectory_errors(noise, seed, strip, time))
+            position, rotation = with_strip_errors(strip_errors, seed, strip, time, pose)
             return rotation, position, np.ones(len(time))
 
         track = Track.between(true, begin, end, spacing)
-        noisy = noise.position_sigma or noise.attitude_sigma_deg or noise.heading_sigma_deg
+        noisy = noise.position_sigma or noise.attitude_sigma_deg or noise.heading_sigma_deg or strip_errors.any
         return Poses(
             track,
             # Linear between knots, errors would lose some of their spread if they changed much meanwhile.
@@ -191,7 +204,11 @@ class BlockScan:
                 believed /= np.sqrt(np.einsum("ij,ij->j", believed, believed))
             rotation, measured_origin, _ = poses.measured.at(time)
             measured_direction = turn_vectors(rotation, believed)
-        return Pulses(time, shot.scan_angle, origin, direction, in_plane, across, measured_origin, measured_direction)
+        assert shot.beam is not None
+        channel = shot.beam.astype(np.uint8)
+        return Pulses(
+            time, shot.scan_angle, channel, origin, direction, in_plane, across, measured_origin, measured_direction
+        )
 
     def rays(self, pulses: Pulses, motions: list[Track]) -> Rays:
         """Return the K rays that sample each pulse's footprint; a cylindrical beam is cast once to find its range."""
@@ -247,34 +264,35 @@ class BlockScan:
         pulses: Pulses,
         traced: TracedRays,
         echoes: Echoes,
+        numbers: list[UInt8],
         errors: Errors,
         number_in_block: Index,
         motions: list[Track],
-    ) -> tuple[PointBlock, SeenPoints | None, int]:
-        """Return the points of the echoes, where they were seen (None if not asked for), and how many saturated."""
+    ) -> tuple[PointBlock, SeenPoints | None]:
+        """Return the points of the echoes, with intensities as they arrive, and where they were seen."""
         plan, setting, target = self.plan, self.plan.setting, self.plan.target
-        keep, number, returns = number_returns(echoes.pulse, plan.most_returns)
-        if not keep.all():
-            echoes = echoes.select(keep)
+        number, returns = numbers
         pulse, hit = echoes.pulse, echoes.hit
         face, along = traced.pick("face", hit), traced.pick("along", hit)
         distance = echoes.range + plan.noise.range_bias
         if errors.range is not None:
             range_errors = errors.range_errors(number_in_block[pulse], number, plan.most_returns)
-            distance = distance + setting.range_sigma * range_errors
-        intensity, clipped = saturate(echoes.intensity, np.inf if plan.detects_after_layers else setting.saturation)
+            distance = distance + range_sigma(setting, echoes.range, along, echoes.intensity) * range_errors
         normal = None
         if plan.records_seen_points or "normal" in plan.measured_layers:
             normal = target.normals(face, along, pulses.time[pulse], motions)
             if self._in_air:
                 air = np.flatnonzero(face < 0)
                 normal[:, air] = -np.take(traced.rays.direction.reshape(3, -1), traced.ray_of(hit[air]), axis=1)
+        class_id = target.face_values("class_id", face)
+        if self._in_air:
+            class_id = np.where(face < 0, np.uint8(plan.air_class), class_id)
         measured = MeasuredPoints(setting, target, pulses, pulse, echoes.range, echoes.intensity, face, normal)
         points = make_block(
             xyz=place_points(pulses.measured_origin, pulses.measured_direction, pulse, distance, target.origin),
-            intensity=intensity,
+            intensity=echoes.intensity,
             rgb=np.zeros((len(pulse), 3), dtype=np.uint16),
-            class_id=target.face_values("class_id", face),
+            class_id=class_id,
             instance_id=target.instances(face, pulses.time[pulse]),
             return_number=number,
             number_of_returns=returns,
@@ -289,7 +307,7 @@ class BlockScan:
         if plan.records_seen_points and normal is not None:
             ray, reach = traced.ray_of(hit), traced.pick("distance", hit)
             seen = self._seen_targets(traced.rays, ray, reach, face, normal, motions)
-        return points, seen, clipped
+        return points, seen
 
     def _seen_targets(
         self, rays: Rays, ray: Index, reach: Float, face: Index, normal: Float, motions: list[Track]
@@ -329,23 +347,3 @@ def _ray_ends(rays: Rays, ray: Index, reach: Float) -> tuple[Float, Float]:
     """Return the ends of rays after ``reach`` (m) and their origins, (3, N) each, local, m."""
     scanner = np.take(rays.origin.reshape(3, -1), ray if rays.origin.shape[1] > 1 else ray % len(rays.time), axis=1)
     return scanner + reach * np.take(rays.direction.reshape(3, -1), ray, axis=1), scanner
-
-
-def _speckle_echoes(echoes: Echoes, factors: Float32) -> Echoes:
-    """Return the echoes with intensities times speckle factors (P, returns), by their return numbers.
-
-    Those beyond the last number that is recorded are left as they are.
-    """
-    keep, number, _ = number_returns(echoes.pulse, factors.shape[1])
-    chosen = np.flatnonzero(keep)
-    intensity = echoes.intensity.copy()
-    intensity[chosen] *= factors[echoes.pulse[chosen], number - 1]
-    return replace(echoes, intensity=intensity)
-
-
-def _drop_lost_echoes(echoes: Echoes, lost: Bool) -> Echoes:
-    """Return the echoes without those lost at random, by a mask (P, returns) over their return numbers."""
-    keep, number, _ = number_returns(echoes.pulse, lost.shape[1])
-    chosen = np.flatnonzero(keep)
-    chosen = chosen[~lost[echoes.pulse[chosen], number - 1]]
-    return echoes.select(chosen)

@@ -8,6 +8,7 @@ from ..base.schema import notes, quantity
 from ..scanning.devices.device import DeviceChoice, ScannerSetting, load_device, setting_of
 from ..scanning.noise import Noise
 from ..scanning.platforms.registry import PlatformModel, make_platform
+from ..scanning.strip_errors import StripErrors
 from ..scanning.sway import Motion
 from ..scanning.weather.registry import WeatherModel
 
@@ -21,6 +22,7 @@ class ScanScenario(DeviceChoice):
 
     platform: PlatformModel = Field(make_platform(), description="Platform and path.")
     noise: Noise = Field(Noise(), description="Measurement noise.")
+    strip_errors: StripErrors = Field(StripErrors(), description="Systematic errors of the strips.")
     motion: Motion = Field(Motion(), description="How the platform sways about its path.")
     relief: float = quantity(
         1.0, "1", "Strength of the surfaces' micro-relief in the cloud; 0 is none.", (0, 100), title="Micro-Relief"

@@ -98,6 +98,17 @@ def test_the_same_clouds_give_the_same_report(folder: Path) -> None:
         ("type: CloudList\nclouds: [{cloud: real-0.laz, axis: a.csv}]", "axis and paved tell the pavement together"),
         ("type: CloudList\nclouds: [{cloud: real-0.laz, roads: 3}]", "unknown key 'roads' (did you mean 'road'?)"),
         ("type: CloudList\nclouds: [{cloud: real-0.laz, class_field: user_data, road: '7'}]", "--class is 7"),
+        (
+            f"type: CloudList\nclouds: [{{cloud: real-0.laz, road: '{ROAD}', marking: road_markings}}]",
+            "real-0.laz: marking is 'road_markings': must be one of ",
+        ),
+        (
+            (
+                "type: CloudList\nclouds: "
+                f"[{{cloud: real-0.laz, class_field: classification, road: '{ROAD}', vegetation: tree}}]"
+            ),
+            "real-0.laz: vegetation is 'tree': must be a number: the attribute has no names",
+        ),
     ],
 )
 def test_wrong_lists_are_refused_by_name(

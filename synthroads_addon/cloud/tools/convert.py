@@ -43,13 +43,13 @@ def convert(
         InputError: a file can't be read, or the scheme is unknown or doesn't suit the cloud.
         OutputError: the output is there already or can't be written.
     """
-    _check_output(source, output, overwrite)
+    check_output(source, output, overwrite)
     with open_cloud(source) as cloud:
-        scheme = _scheme_of(cloud, classes)
-        with _writer_like(cloud, output, scheme) as writer:
-            for points in _pass_with_progress(cloud.blocks(block), cloud.header.count, progress, "convert"):
+        scheme = scheme_of(cloud, classes)
+        with writer_like(cloud, output, scheme) as writer:
+            for points in pass_with_progress(cloud.blocks(block), cloud.header.count, progress, "convert"):
                 writer.write(points)
-        return _summary(cloud, writer)
+        return summary_of(cloud, writer)
 
 
 def subsample(
@@ -62,15 +62,15 @@ def subsample(
     block: int = BLOCK,
 ) -> dict[str, Any]:
     """Write one point per occupied cell (edge in m) of a cubic grid; return what was done as JSON data."""
-    _check_output(source, output, overwrite)
+    check_output(source, output, overwrite)
     with open_cloud(source) as cloud, GridSubsampler(cell, output.parent) as grid:
-        scheme = _scheme_of(cloud, classes)
-        for points in _pass_with_progress(cloud.blocks(block), cloud.header.count, progress, "read"):
+        scheme = scheme_of(cloud, classes)
+        for points in pass_with_progress(cloud.blocks(block), cloud.header.count, progress, "read"):
             grid.add(points)
-        with _writer_like(cloud, output, scheme) as writer:
+        with writer_like(cloud, output, scheme) as writer:
             for points in grid.blocks():
                 writer.write(points)
-        return _summary(cloud, writer) | {"grid": cell, "points_read": grid.points_read}
+        return summary_of(cloud, writer) | {"grid": cell, "points_read": grid.points_read}
 
 
 def map_intensity(
@@ -82,14 +82,14 @@ def map_intensity(
     progress: Progress = silent,
 ) -> dict[str, Any]:
     """Write a cloud with its intensities mapped onto another's distribution; return what was done as JSON data."""
-    _check_output(source, output, overwrite)
-    _check_output(target, output, overwrite)
+    check_output(source, output, overwrite)
+    check_output(target, output, overwrite)
     with open_cloud(source) as cloud, open_cloud(target) as other:
         mapping = IntensityMapping(cloud, other, per_class)
-        with _writer_like(cloud, output, _scheme_of(cloud, None), mapping.scale) as writer:
-            for block in _pass_with_progress(mapping.blocks(cloud), cloud.header.count, progress, "map"):
+        with writer_like(cloud, output, scheme_of(cloud, None), mapping.scale) as writer:
+            for block in pass_with_progress(mapping.blocks(cloud), cloud.header.count, progress, "map"):
                 writer.write(block)
-        result = _summary(cloud, writer) | {
+        result = summary_of(cloud, writer) | {
             "target": other.header.path.name,
             "distance_before": mapping.distance_before(),
             "distance_after": mapping.distance_after(),
@@ -259,7 +259,7 @@ def _cross_cut(
     return path[at] + along * (station - stations[at]), np.array([along[1], -along[0]]), reach
 
 
-def _scheme_of(cloud: CloudReader, classes: str | None) -> ClassScheme:
+def scheme_of(cloud: CloudReader, classes: str | None) -> ClassScheme:
     """Return the class scheme to write a cloud with; raise `InputError` if the cloud's classes don't suit it."""
     header = cloud.header
     if classes is None or (header.labelled and classes == header.scheme.name):
@@ -274,9 +274,17 @@ def _scheme_of(cloud: CloudReader, classes: str | None) -> ClassScheme:
     return scheme
 
 
-def _writer_like(
+def writer_like(
     cloud: CloudReader, output: Path, scheme: ClassScheme, intensity_scale: float | None = None
 ) -> CloudWriter:
+    """Return the writer of a cloud that has what another one has; a context manager.
+
+    Args:
+        cloud: the other one.
+        output: file to write.
+        scheme: classes to write it with.
+        intensity_scale: 16-bit steps per unit of intensity; the other one's if None.
+    """
     header, offset = cloud.header, cloud.header.offset
     if not header.labelled and not np.any(offset):
         first = next((block.xyz[0] for block in cloud.blocks(1)), None)
@@ -286,7 +294,8 @@ def _writer_like(
     return open_writer(output, crs, offset, scale, header.attributes, scheme, header.crs_text)
 
 
-def _summary(cloud: CloudReader, writer: CloudWriter) -> dict[str, Any]:
+def summary_of(cloud: CloudReader, writer: CloudWriter) -> dict[str, Any]:
+    """Return what was written of a cloud as JSON data."""
     return {
         "file": cloud.header.path.name,
         "output": str(writer.path),
@@ -297,7 +306,7 @@ def _summary(cloud: CloudReader, writer: CloudWriter) -> dict[str, Any]:
     }
 
 
-def _check_output(source: Path, output: Path, overwrite: bool) -> None:
+def check_output(source: Path, output: Path, overwrite: bool) -> None:
     """Raise an error if the output file's ending, place or rights won't do, before any work."""
     check_ending(output, "--output")
     check_ending(source)
@@ -313,9 +322,10 @@ def _check_output(source: Path, output: Path, overwrite: bool) -> None:
         raise OutputError("--output", str(output), "cannot be written (Permission denied)")
 
 
-def _pass_with_progress(
+def pass_with_progress(
     blocks: Iterable[PointBlock], count: int, progress: Progress, stage: str
 ) -> Iterator[PointBlock]:
+    """Yield blocks, and tell which share of a number of points is done."""
     done = 0
     for block in blocks:
         yield block

@@ -25,6 +25,7 @@ from ...scanning.platforms.stretches import scatter_stretches
 from ...scanning.record import record_as_measured
 from ...scanning.scan import BlockResult, join_results
 from ...scanning.scene.motion import ScannedScene
+from ...scanning.strip_errors import StripErrors
 from ..measure.errors import (
     CONVERGED,
     FINEST,
@@ -70,7 +71,10 @@ class Trial:
     @classmethod
     def of(cls, site: Site, scene: ScannedScene) -> Self:
         """Return a trial of a scene, without range noise; plans the scan and builds its ray casters."""
-        quiet = site.scenario.scan.model_copy(update={"noise": Noise(range_sigma=0.0)})
+        receiver = site.scenario.scan.receiver.model_copy(update={"threshold_to_noise": 0.0})
+        quiet = site.scenario.scan.model_copy(
+            update={"noise": Noise(range_sigma=0.0), "receiver": receiver, "strip_errors": StripErrors()}
+        )
         colour = site.scenario.colour.model_copy(update={"intensity_from_layers": "never"})
         scenario = site.scenario.model_copy(update={"scan": quiet, "colour": colour})
         site = replace(site, scenario=scenario, view=None)

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,10 @@ from ...cloud.tools.previews import TopView
 from ...cloud.tools.subsample import GridSubsampler
 from ...scanning.colour.colour import shares_by_source
 from ...scanning.plan import ScanPlan
+from ...scanning.receiver import Response
 from ...scanning.record import record
 from ...scanning.scan import BlockResult
+from ...scenario.scan import scanner_setting
 from ...scenario.scenario import Scenario
 
 _logger = logging.getLogger("synthroads")
@@ -83,12 +86,21 @@ class CloudFiles:
     def intensity_scale(self) -> float:
         """Return the 16-bit steps per unit of intensity: the scenario's, or one from the usual range.
 
+        A device's own numbers are shares of its full scale, which fill the 16 bits.
+
         16 bits are full for a white target at a right angle at half the usual range: only what is nearer or a
         retro-reflector is brighter, and the weakest echoes still have hundreds of steps.
         """
-        corrected = self.scenario.cloud.intensity == "range_corrected"
+        corrected, response = self.scenario.cloud.intensity == "range_corrected", self._response
+        if not corrected and response not in (None, "power"):
+            return self.scenario.cloud.intensity_scale or 65535.0
         usual = 65535.0 / 4.0 * (1.0 if corrected else max(2.0, self.typical_range) ** 2)
         return self.scenario.cloud.intensity_scale or usual
+
+    @cached_property
+    def _response(self) -> Response | None:
+        """Return what number the scanner makes of the received power."""
+        return scanner_setting(self.scenario.scan).receiver.response
 
     @contextmanager
     def open(self) -> Iterator[None]:

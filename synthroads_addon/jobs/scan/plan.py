@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from ...base.arrays import Float
+from ...base.classes import UNLABELLED
 from ...base.errors import InputError
 from ...base.progress import StageTimer
 from ...cloud.layers import optional_arrays
@@ -36,6 +37,9 @@ from ...scenario.choice import check_choice
 from ...scenario.scan import scanner_setting
 from ...scenario.scenario import OF_POINTS, Scenario
 from .files import CloudFiles, record_to_files
+
+AIR_CLASS = "noise"
+"""Class of what rain, snow and fog send back, in schemes that have it; without one it is unlabelled."""
 
 
 def check_scan(scenario: Scenario, foreign: bool = False) -> None:
@@ -108,8 +112,10 @@ def plan_scan(
         rings=rings,
         seed=scenario.seed,
         noise=scan.noise,
+        strip_errors=scan.strip_errors,
         attenuation=weather.attenuation(setting.device.wavelength_nm) if loss is None else loss,
         effects=weather.effects() if loss is None else (),
+        air_class=scenario.cloud.scheme().source_ids().get(AIR_CLASS, UNLABELLED),
         beam=scan.beam,
         measured_layers=(kept & optional_arrays("scan")) | ({"normal", "material"} if shifts else set()),
         records_seen_points=bool(coloured) or by_layers or shifts,

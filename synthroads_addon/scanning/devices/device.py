@@ -11,6 +11,7 @@ from ...base.files import PRESETS, preset_names, preset_path
 from ...base.schema import ClosedModel, Model, first_repeated, notes, quantity, read_json
 from ..patterns.base import PulseTiming
 from ..patterns.registry import PatternModel
+from ..receiver import Receiver
 
 DEVICES = PRESETS / "devices"
 SPEED_OF_LIGHT = 299_792_458.0
@@ -50,6 +51,7 @@ class DeviceChoice(ClosedModel):
         "a clock of its own.",
         json_schema_extra=notes(unset="The device's", labels={"locked": "In step", "free": "Free"}),
     )
+    receiver: Receiver = Field(Receiver(), description="How echoes are detected.")
 
 
 class PulseMode(Model):
@@ -107,6 +109,7 @@ class Device(Model):
         "locked",
         description="Whether mirror or head turn in step with the pulses (locked), or by a clock of their own (free).",
     )
+    receiver: Receiver = Field(Receiver(), description="How echoes are detected.")
     finest_angle_deg: float = quantity(..., "deg", "Smallest angle between two pulses.", gt=0, le=10)
     modes: tuple[PulseMode, ...] = Field(
         min_length=1, description="Pulse rates that can be chosen; the first is the default."
@@ -167,6 +170,7 @@ class ScannerSetting:
         saturation: the intensity above which the receiver saturates: threshold x 10^(dynamic range / 10 dB).
         range_sigma: standard deviation of the range, m.
         free_mirror: whether mirror and pulses go by clocks of their own.
+        receiver: how echoes are detected.
     """
 
     device: Device
@@ -181,6 +185,7 @@ class ScannerSetting:
     saturation: float
     range_sigma: float
     free_mirror: bool = False
+    receiver: Receiver = Receiver()  # noqa: RUF009 (frozen)
 
     @property
     def shot_rate(self) -> float:
@@ -253,6 +258,7 @@ def setting_of(device: Device, scan: DeviceChoice, range_sigma: float | None = N
         saturation=threshold * 10.0 ** (device.dynamic_range_db / 10.0),
         range_sigma=device.range_sigma if range_sigma is None else range_sigma,
         free_mirror=(scan.mirror_clock or device.mirror_clock) == "free",
+        receiver=scan.receiver.over(device.receiver),
     )
     _check_step(setting, scan)
     return setting

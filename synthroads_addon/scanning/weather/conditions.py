@@ -1,13 +1,18 @@
 """The shipped weathers: clear air, haze, fog and dust by their visibility, rain and snow by that or by their rate."""
 
+import math
 from collections.abc import Mapping
 from typing import ClassVar, Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from ...base.schema import quantity
+from ..effects import EchoChanges, EchoEffect, PulseHits
 from .base import Weather
 from .extinction import kim_exponent, kruse_exponent, per_metre, snow_extinction
+from .particles import ParticleSpectrum, particle_echoes, rain_spectrum, snow_spectrum
+from .soft_target import soft_echoes
 
 
 class Clear(Weather):
@@ -37,12 +42,22 @@ class Haze(Weather):
 
 
 class Fog(Weather):
-    """Fog, by its visibility; the same at every wavelength (Pierce; Kim below 500 m)."""
+    """Fog, by its visibility; the same at every wavelength (Pierce; Kim below 500 m). Its droplets may give an echo."""
 
     order: ClassVar[int] = 3
     usual: ClassVar[Mapping[str, float]] = {"visibility": 400.0}
+    name: ClassVar[str] = "fog"
 
     condition: Literal["fog"] = Field("fog", description="Weather.")
+    echoes: bool = Field(False, description="Whether the droplets give an echo of their own.")
+
+    def effects(self) -> tuple[EchoEffect, ...]:
+        """Return the droplets' echo if it is wanted."""
+        return (self,) if self.echoes else ()
+
+    def change_echoes(self, hits: PulseHits, random: np.random.Generator) -> EchoChanges:
+        """Return the droplets' echo of each pulse; see `soft_target`."""
+        return soft_echoes(self.extinction(hits.setting.device.wavelength_nm), hits)
 
 
 class Dust(Weather):
@@ -64,6 +79,7 @@ class Precipitation(Weather):
     rate_mm_h: float | None = quantity(
         None, "mm/h", "Rain, or snow as water; instead of the visibility.", gt=0, le=200, unset="By the visibility"
     )
+    echoes: bool = Field(False, description="Whether drops or flakes give echoes of their own.")
 
     @model_validator(mode="after")
     def _refuse_two_measures(self) -> Self:
@@ -81,12 +97,33 @@ class Precipitation(Weather):
         """Return the extinction coefficient, 1/m of path, at a rate in mm of water per hour."""
         raise NotImplementedError
 
+    def spectrum(self, rate_mm_h: float) -> ParticleSpectrum:
+        """Return the particles in the air at a rate in mm of water per hour."""
+        raise NotImplementedError
+
+    def rate(self, wavelength_nm: float) -> float:
+        """Return the rate, mm of water per hour; without one that whose extinction is that of the visibility."""
+        if self.rate_mm_h is not None:
+            return self.rate_mm_h
+        one, two = (self.rate_extinction(rate, wavelength_nm) for rate in (1.0, 2.0))
+        return float((self.extinction(wavelength_nm) / one) ** (1.0 / math.log2(two / one)))
+
+    def effects(self) -> tuple[EchoEffect, ...]:
+        """Return the particles' echoes if they are wanted."""
+        return (self,) if self.echoes else ()
+
+    def change_echoes(self, hits: PulseHits, random: np.random.Generator) -> EchoChanges:
+        """Return the particles' echoes; see `particles`."""
+        return particle_echoes(self.spectrum(self.rate(hits.setting.device.wavelength_nm)), hits, random)
+
 
 class Rain(Precipitation):
     """Rain, by its visibility or by its rate; the same at every wavelength."""
 
     order: ClassVar[int] = 4
     usual: ClassVar[Mapping[str, float]] = {"visibility": 7000.0}
+
+    name: ClassVar[str] = "rain"
 
     condition: Literal["rain"] = Field("rain", description="Weather.")
 
@@ -97,6 +134,10 @@ class Rain(Precipitation):
         """
         return per_metre(1.076 * rate_mm_h**0.67)
 
+    def spectrum(self, rate_mm_h: float) -> ParticleSpectrum:
+        """Return the drops."""
+        return rain_spectrum(rate_mm_h)
+
 
 class Snow(Precipitation):
     """Snow, by its visibility, then the same at every wavelength, or by its rate, as wet snow."""
@@ -104,8 +145,14 @@ class Snow(Precipitation):
     order: ClassVar[int] = 5
     usual: ClassVar[Mapping[str, float]] = {"visibility": 1500.0}
 
+    name: ClassVar[str] = "snow"
+
     condition: Literal["snow"] = Field("snow", description="Weather.")
 
     def rate_extinction(self, rate_mm_h: float, wavelength_nm: float) -> float:
         """Return the extinction coefficient of wet snow, 1/m of path, at a rate in mm of water per hour."""
         return snow_extinction(rate_mm_h, wavelength_nm)
+
+    def spectrum(self, rate_mm_h: float) -> ParticleSpectrum:
+        """Return the flakes."""
+        return snow_spectrum(rate_mm_h)

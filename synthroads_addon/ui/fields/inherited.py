@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, cast
 
 from ...base.errors import InputError
@@ -13,6 +14,7 @@ from ...sampling.alignment import WIDEST_RADIUS
 from ...sampling.markings import LANE_DASH, LANE_GAP
 from ...scanning.devices.device import DeviceChoice, ScannerSetting, setting_of
 from ...scanning.platforms.registry import PLATFORMS
+from ...scanning.receiver import Receiver
 from ...scenario.colour import USUAL_RANGE, ColourScenario
 from ...scenario.scan import ScanScenario
 from ...scenario.scenario import FIDELITIES
@@ -24,6 +26,8 @@ DEVICE_SETTINGS = tuple(
     name for name, info in DeviceChoice.model_fields.items() if (note_of(info, "inherits") or "").startswith("device.")
 )
 """Fields of a scan that set its device."""
+RECEIVER_SETTINGS = tuple(name for name, info in Receiver.model_fields.items() if note_of(info, "inherits"))
+"""Numbers of a scan's receiver that are the device's while they aren't given."""
 
 
 def section_of(settings: Any) -> StandardCrossSection | None:
@@ -54,7 +58,8 @@ def scanner_setting(settings: Any, without: str = "") -> ScannerSetting | None:
 
 def _of_device(settings: Any, name: str) -> Value:
     setting = scanner_setting(settings, without=name)
-    return None if setting is None else float(f"{_DEVICE[name](setting):.6g}")
+    value = None if setting is None else _DEVICE[name](setting)
+    return None if value is None else float(f"{value:.6g}")
 
 
 def _of_fidelity(settings: Any, name: str) -> Value:
@@ -81,12 +86,17 @@ def _of_images(settings: Any, name: str) -> Value:
     return cast(Value, getattr(colour.settings(settings.fidelity, seen_from or USUAL_RANGE), name))
 
 
-_DEVICE: Mapping[str, Callable[[ScannerSetting], float]] = {
+def _of_receiver(name: str, setting: ScannerSetting) -> float | None:
+    return cast(float | None, getattr(setting.device.receiver, name))
+
+
+_DEVICE: Mapping[str, Callable[[ScannerSetting], float | None]] = {
     "pulse_rate_khz": lambda setting: setting.pulse_rate / 1e3,
     "field_of_view_deg": lambda setting: math.degrees(setting.field_of_view),
     "lines_per_second": lambda setting: setting.lines_per_second,
     "angle_step_deg": lambda setting: math.degrees(setting.angle_step),
     "range_sigma": lambda setting: setting.device.range_sigma,
+    **{name: partial(_of_receiver, name) for name in RECEIVER_SETTINGS},
 }
 _SECTION: Mapping[str, Callable[[StandardCrossSection], float]] = {
     "lanes": lambda section: len(section.lanes),

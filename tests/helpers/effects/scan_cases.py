@@ -47,6 +47,7 @@ RAYS = {"scan.rays_per_pulse": 7}
 OPEN = {"scan.rays_per_pulse": None, "scan.noise.range_sigma": 0.0}
 """Nothing is given that a tolerance may choose."""
 CHOSEN_COLOURS = {"colour": {"source": "auto"}, "cloud.attributes": ["roughness"]}
+LOGARITHMIC = {"scan.receiver.response": "logarithmic"}
 SWAYING = {"scan.motion.position_sigma": 0.2}
 DAMPED = {"scan.noise.position_sigma": 0.05}
 BY_RATE = {"scan.weather.visibility": None}
@@ -93,6 +94,8 @@ def _weather_cases() -> dict[str, ScanCase]:
         cases[f"scan.weather[{name}].visibility"] = ScanCase(value=0.5 * visibility, given=given)
         given = {"scan.weather": {"condition": name, "rate_mm_h": 5.0}}
         cases[f"scan.weather[{name}].rate_mm_h"] = ScanCase(value=10.0, given=given)
+        given = {"scan.weather": {"condition": name, "visibility": 100.0 if name == "fog" else 300.0}}
+        cases[f"scan.weather[{name}].echoes"] = ScanCase(given=given)
     return cases
 
 
@@ -124,6 +127,18 @@ CASES: dict[str, ScanCase] = {
     "scan.noise.range_sigma": ScanCase(value=0.03),
     "scan.noise.correlation_time": ScanCase(given=DAMPED),
     "scan.mirror_clock": ScanCase(value="free"),
+    "scan.receiver.threshold_to_noise": ScanCase(value=5.0),
+    "scan.receiver.overlap_begin": ScanCase(value=10.0, given={"scan.receiver.overlap_full": 60.0}),
+    "scan.receiver.overlap_full": ScanCase(value=60.0),
+    "scan.receiver.response": ScanCase(value="logarithmic"),
+    "scan.receiver.bits": ScanCase(value=6, given=LOGARITHMIC),
+    "scan.receiver.full_scale": ScanCase(value=3.0, given={"scan.receiver.response": "range_compensated"}),
+    "scan.receiver.soft_saturation": ScanCase(value=0.5),
+    "scan.receiver.gain_sigma_db": ScanCase(value=1.0),
+    "scan.receiver.faint_range_sigma": ScanCase(value=0.2),
+    "scan.receiver.incidence_range_noise": ScanCase(value=1.0),
+    "scan.receiver.range_tails": ScanCase(value=4.0),
+    "scan.receiver.echo_separation": ScanCase(value="waveform", given=RAYS),
     "scan.motion.shortest_period": ScanCase(value=3.0, given=SWAYING),
     "scan.motion.longest_period": ScanCase(value=9.0, given=SWAYING),
     "scan.relief_octaves": ScanCase(value=4),

@@ -1,0 +1,209 @@
+"""Clouds put together and divided: merge, crop, tile. All in memory that doesn't grow with the cloud."""
+
+from contextlib import ExitStack
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...base.arrays import Bool, Float
+from ...base.errors import InputError
+from ...base.files import output_folder
+from ...base.progress import Progress, silent
+from ...base.schema import read_json
+from ..formats.base import CloudReader
+from ..formats.registry import ENDINGS, open_cloud
+from .convert import check_output, pass_with_progress, scheme_of, summary_of, writer_like
+from .quantile_mapping import steps_per_unit
+from .subsample import TileFiles, keep_one_per_cell
+
+Box = tuple[float, float, float, float]
+
+
+def merge(sources: list[Path], output: Path, overwrite: bool = False, progress: Progress = silent) -> dict[str, Any]:
+    """Write several clouds as one, in the order in which they are named; return what was done as JSON data.
+
+    Strips keep their numbers, points their times. Intensities have the coarsest steps among the clouds.
+
+    Raises:
+        InputError: fewer than two clouds, one can't be read, or it has other classes, attributes or coordinates.
+        OutputError: the output is there already or can't be written.
+    """
+    if len(sources) < 2:
+        raise InputError("FILE", len(sources), "must be two clouds or more")
+    for source in sources:
+        check_output(source, output, overwrite)
+    with ExitStack() as stack:
+        clouds = [stack.enter_context(open_cloud(source)) for source in sources]
+        for other in clouds[1:]:
+            _check_alike(clouds[0], other)
+        total = sum(cloud.header.count for cloud in clouds)
+        blocks = chain.from_iterable(cloud.blocks() for cloud in clouds)
+        scale = min(map(steps_per_unit, clouds))
+        with writer_like(clouds[0], output, scheme_of(clouds[0], None), scale) as writer:
+            for points in pass_with_progress(blocks, total, progress, "merge"):
+                writer.write(points)
+        return summary_of(clouds[0], writer) | {"files": [source.name for source in sources]}
+
+
+def crop(
+    source: Path,
+    output: Path,
+    box: Box | None = None,
+    heights: tuple[float, float] | None = None,
+    polygon: Path | None = None,
+    overwrite: bool = False,
+    progress: Progress = silent,
+) -> dict[str, Any]:
+    """Write the part of a cloud that lies within all that is given; return what was done as JSON data.
+
+    Args:
+        source: the cloud.
+        output: file to write.
+        box: least x and y, then largest, map, m; borders belong to it.
+        heights: least and largest z, m.
+        polygon: GeoJSON file with a Polygon or MultiPolygon in map coordinates; holes are left out.
+        overwrite: whether the output may be replaced.
+        progress: is told how far it is.
+
+    Raises:
+        InputError: nothing to crop by is given, limits are in the wrong order, or nothing lies within.
+        OutputError: the output is there already or can't be written.
+    """
+    check_output(source, output, overwrite)
+    if box is None and heights is None and polygon is None:
+        raise InputError("--box", None, "one of --box, --heights, --polygon says what is kept")
+    if box is not None and not (box[0] <= box[2] and box[1] <= box[3]):
+        raise InputError("--box", list(box), "must be the least x and y, then the largest")
+    if heights is not None and not heights[0] <= heights[1]:
+        raise InputError("--heights", list(heights), "must be the least, then the largest")
+    rings = None if polygon is None else read_polygon(polygon)
+
+    def inside(xyz: Float) -> Bool:
+        kept = np.ones(len(xyz), dtype=bool)
+        if box is not None:
+            kept &= np.all((xyz[:, :2] >= box[:2]) & (xyz[:, :2] <= box[2:]), axis=1)
+        if heights is not None:
+            kept &= (xyz[:, 2] >= heights[0]) & (xyz[:, 2] <= heights[1])
+        if rings is not None:
+            kept &= points_in_rings(xyz[:, :2], rings)
+        return kept
+
+    with open_cloud(source) as cloud:
+        with writer_like(cloud, output, scheme_of(cloud, None)) as writer:
+            for points in pass_with_progress(cloud.blocks(), cloud.header.count, progress, "crop"):
+                writer.write(points.select(inside(points.xyz)))
+            if not writer.count:
+                raise InputError(str(source), None, "has no points within what is to be kept")
+        return summary_of(cloud, writer) | {"points_read": cloud.header.count}
+
+
+def tile(
+    source: Path,
+    folder: Path,
+    size: float = 60.0,
+    grid: float | None = None,
+    fewest: int = 1,
+    kind: str | None = None,
+    overwrite: bool = False,
+    progress: Progress = silent,
+) -> dict[str, Any]:
+    """Cut a cloud into square tiles, each a file named by its corner in whole metres; return JSON data.
+
+    Args:
+        source: the cloud.
+        folder: for ``NAME_X_Y.laz`` and so on: X and Y of the corner of least coordinates, a multiple of the size.
+        size: edge of a tile, m.
+        grid: thin out to one point per cell of this edge, m; all stay if None.
+        fewest: tiles with fewer points aren't written.
+        kind: ending of the files; the cloud's own if None.
+        overwrite: whether files of these names may be replaced.
+        progress: is told how far it is.
+
+    Raises:
+        InputError: a number is out of its limits, or no tile has enough points.
+        OutputError: a file is there already or can't be written.
+    """
+    ending = source.suffix.lower() if kind is None else f".{kind}"
+    if ending not in ENDINGS:
+        raise InputError("--format", kind, f"must be one of {', '.join(name.strip('.') for name in ENDINGS)}")
+    if not 1.0 <= size <= 100_000.0:
+        raise InputError("--size", size, "must be 1 to 100000 m")
+    if grid is not None and not 0.0005 <= grid <= size:
+        raise InputError("--grid", grid, "must be 0.0005 m to the tiles' size")
+    written: list[dict[str, Any]] = []
+    with open_cloud(source) as cloud, ExitStack() as stack:
+        files = stack.enter_context(TileFiles(folder.parent if folder.parent.is_dir() else Path.cwd()))
+        keys: set[tuple[int, int]] = set()
+        for points in pass_with_progress(cloud.blocks(), cloud.header.count, progress, "read"):
+            numbers = np.floor(points.xyz[:, :2] / size).astype(np.int64)
+            keys |= {(int(x), int(y)) for x, y in np.unique(numbers, axis=0)}
+            files.append(points, numbers)
+        names = {key: f"{source.stem}_{_corner(key[0], size)}_{_corner(key[1], size)}{ending}" for key in keys}
+        with output_folder(folder, names.values(), overwrite) as work:
+            for done, (key, points) in enumerate(files.by_tile(), 1):
+                kept = points if grid is None else points.select(np.sort(keep_one_per_cell(points, grid)))
+                progress("tile", done / len(keys))
+                if len(kept) >= fewest:
+                    with writer_like(cloud, work / names[key], scheme_of(cloud, None)) as writer:
+                        writer.write(kept)
+                    written.append({"file": names[key], "points": len(kept)})
+            if not written:
+                raise InputError("--fewest", fewest, "is more than any tile's points")
+    return {"file": source.name, "output": str(folder), "size": size, "grid": grid, "tiles": written}
+
+
+def read_polygon(path: Path) -> list[Float]:
+    """Return the rings (N, 2) of all polygons in a GeoJSON file, holes among them.
+
+    Raises:
+        InputError: it isn't GeoJSON with a polygon.
+    """
+    data = read_json(path)
+    try:
+        shapes = [feature["geometry"] for feature in data["features"]] if "features" in data else [data]
+        shapes = [shape.get("geometry", shape) for shape in shapes]
+        polygons = [shape["coordinates"] for shape in shapes if shape["type"] == "Polygon"]
+        polygons += [part for shape in shapes if shape["type"] == "MultiPolygon" for part in shape["coordinates"]]
+        rings = [np.array([point[:2] for point in ring], dtype=np.float64) for part in polygons for ring in part]
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError):
+        rings = []
+    if not rings or any(ring.ndim != 2 or len(ring) < 4 or not np.isfinite(ring).all() for ring in rings):
+        raise InputError(str(path), None, "must be GeoJSON with a Polygon of 4 points or more in each ring")
+    return rings
+
+
+def points_in_rings(points: Float, rings: list[Float]) -> Bool:
+    """Return which points (N, 2) lie in an odd number of rings: within polygons, but not within their holes."""
+    inside = np.zeros(len(points), dtype=bool)
+    x, y = points.T
+    for ring in rings:
+        begin, end = ring, np.roll(ring, -1, axis=0)
+        near = np.flatnonzero((y >= ring[:, 1].min()) & (y <= ring[:, 1].max()) & (x <= ring[:, 0].max()))
+        for (x1, y1), (x2, y2) in zip(begin, end, strict=True):
+            if y1 == y2:
+                continue
+            crossed = near[(y[near] >= min(y1, y2)) & (y[near] < max(y1, y2))]
+            right = x1 + (y[crossed] - y1) / (y2 - y1) * (x2 - x1) > x[crossed]
+            inside[crossed[right]] ^= True
+    return inside
+
+
+def _corner(number: int, size: float) -> str:
+    """Return a corner's coordinate for a file's name: in whole metres where the size is whole."""
+    return str(int(number * size)) if float(size).is_integer() else f"{number * size:.3f}".rstrip("0")
+
+
+def _check_alike(first: CloudReader, other: CloudReader) -> None:
+    """Refuse a cloud that can't stand in one file with the first."""
+    one, two = first.header, other.header
+    for what, mine, theirs in (
+        ("attributes", sorted(one.attributes), sorted(two.attributes)),
+        ("classes", one.scheme.to_dict() if one.labelled else None, two.scheme.to_dict() if two.labelled else None),
+        ("coordinate system", one.epsg or one.crs_text, two.epsg or two.crs_text),
+        ("colours", one.has_color, two.has_color),
+        ("unit of intensity", one.intensity_scale is None, two.intensity_scale is None),
+    ):
+        if mine != theirs:
+            raise InputError(str(two.path), None, f"has other {what} than {one.path.name}: convert one of them first")

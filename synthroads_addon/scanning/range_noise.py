@@ -1,0 +1,62 @@
+"""Standard deviation of measured ranges: larger for faint echoes and inclined surfaces, with heavy tails if wanted.
+
+The time of an echo of the rms length p (as a range: pulse length x c / 2 / 2.355) is known to p / SNR at best, by the
+bound of Cramer and Rao, and an inclined surface lengthens the echo by the rms depth of the beam's footprint along the
+beam, d = r g / 4 tan t, with the full beam angle g at 1/e^2 and the incidence t. Speckle within that footprint shifts
+the echo's middle by a share k of d, the inverse root of the number of speckles (Gardner 1992, Ranging performance of
+satellite laser altimeters, IEEE Trans. Geosci. Remote Sens. 30, has both terms). So
+
+    sigma^2 = sigma_0^2 + sigma_T^2 (T / S)^2 (1 + d^2 / p^2) + (k d)^2
+
+with sigma_0 that of a strong echo at a right angle and sigma_T what an echo at the threshold T has besides. Errors
+follow a normal distribution, or Student's t of the same standard deviation (Lange, Little and Taylor 1989, Robust
+statistical modeling using the t distribution, JASA 84). None of them has a mean: ranges stay unbiased. All of it is
+left out where sigma_0 is 0.
+"""
+
+import numpy as np
+
+from ..base.arrays import Float, Float32
+from .devices.device import ScannerSetting
+from .waveform import FULL_WIDTH
+
+_LEAST_COSINE = 1e-3
+
+
+def footprint_depth(setting: ScannerSetting, distance: Float, cosine: Float) -> Float:
+    """Return the rms depth (N,) of footprints along the beam, m: at most the range resolution.
+
+    Args:
+        setting: the scanner's.
+        distance: (N,) m.
+        cosine: (N,) of the incidence angle.
+    """
+    cosine = np.clip(np.abs(cosine), _LEAST_COSINE, 1.0)
+    spread = float(np.sqrt(np.mean(np.square(setting.divergence)))) / 4.0
+    depth = distance * spread * np.sqrt(1.0 - cosine**2) / cosine
+    return np.asarray(np.minimum(depth, setting.range_resolution))
+
+
+def range_sigma(setting: ScannerSetting, distance: Float, cosine: Float, intensity: Float) -> Float | float:
+    """Return the standard deviations (N,) of ranges, m, or the one that all have.
+
+    Args:
+        setting: the scanner's.
+        distance: (N,) m.
+        cosine: (N,) of the incidence angle.
+        intensity: (N,) received power.
+    """
+    faint, slant = setting.receiver.faint_range_sigma or 0.0, setting.receiver.incidence_range_noise or 0.0
+    if not setting.range_sigma or not (faint or slant):
+        return setting.range_sigma
+    depth = footprint_depth(setting, distance, cosine)
+    pulse = setting.range_resolution / FULL_WIDTH
+    weakness = setting.threshold / np.maximum(intensity, max(setting.threshold, 1e-300))
+    variance = setting.range_sigma**2 + (faint * weakness) ** 2 * (1.0 + (depth / pulse) ** 2) + (slant * depth) ** 2
+    return np.asarray(np.sqrt(variance))
+
+
+def tail_factors(random: np.random.Generator, freedom: float, shape: tuple[int, ...]) -> Float32:
+    """Return the factors that make normal errors Student's t of the same standard deviation, float32."""
+    squares = np.float32(2.0) * random.standard_gamma(freedom / 2.0, shape, dtype=np.float32)
+    return np.asarray(np.sqrt(np.float32(freedom - 2.0) / squares), dtype=np.float32)

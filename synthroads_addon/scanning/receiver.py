@@ -1,0 +1,170 @@
+"""A scanner's receiver: which echoes it detects, what number it makes of their power, and how well it ranges them.
+
+**Detection.** The receiver's noise adds to the received power of an echo, and what then exceeds the threshold is a
+return. With Gaussian noise of the standard deviation s and the threshold T, an echo of the power S is detected with the
+probability
+
+    P = Phi((S - T) / s) = Phi((T / s) (S / T - 1))
+
+(Richmond and Cain 2010, Direct-Detection LADAR Systems, SPIE; McManamon 2019, LiDAR Technologies and Systems, SPIE):
+one half at the threshold, the more abrupt the larger the threshold-to-noise ratio T / s. Real receivers have ratios of
+4 to 7, as the rate of false alarms falls with exp(-(T / s)^2 / 2).
+
+**Response.** See `response`. **Range.** See `range_noise` and `waveform`.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from ..base.arrays import Float, Float32, Index
+from ..base.schema import ClosedModel, notes, quantity
+
+_LATER = 32
+"""Echoes of one pulse of which no two share a random number."""
+
+FEWEST_FREEDOM = 3.0
+"""Fewest degrees of freedom of the errors of the range: with 2 or fewer they have no standard deviation."""
+Response = Literal["power", "linear", "range_compensated", "logarithmic", "over_threshold"]
+EchoSeparation = Literal["resolution", "waveform"]
+
+
+class Receiver(ClosedModel):
+    """How a receiver detects, reads and ranges echoes. What a scenario's doesn't say is its device's."""
+
+    threshold_to_noise: float | None = quantity(
+        None,
+        "1",
+        "Detection threshold over the standard deviation of the receiver's noise, which makes detection a matter of "
+        "chance near the threshold; 0: no noise, a hard threshold.",
+        (0, 1000),
+        title="Threshold to Noise",
+        inherits="device.threshold_to_noise",
+        unset="No noise",
+    )
+    overlap_begin: float | None = quantity(
+        None,
+        "m",
+        "Range at which the fields of view of laser and receiver begin to overlap.",
+        (0, 20_000),
+        inherits="device.overlap_begin",
+        unset="From the beginning",
+    )
+    overlap_full: float | None = quantity(
+        None,
+        "m",
+        "Range from which on they overlap fully; nearer echoes are fainter. 0: everywhere.",
+        (0, 20_000),
+        inherits="device.overlap_full",
+        unset="Everywhere",
+    )
+    response: Response | None = Field(
+        None,
+        description="What number is made of the received power: the power itself, or a share of the full scale.",
+        json_schema_extra=notes(unset="The device's"),
+    )
+    bits: int | None = quantity(
+        None, "1", "Bits of the number; 16 if device and scenario say nothing.", (1, 16), unset="The device's"
+    )
+    full_scale: float | None = quantity(
+        None,
+        "1",
+        "Reflectance of a surface struck at a right angle that fills the scale of a range-compensated response; 1.",
+        gt=0,
+        le=1e4,
+        title="Full-Scale Reflectance",
+        unset="The device's",
+    )
+    soft_saturation: float | None = quantity(
+        None,
+        "1",
+        "Exponent of a gradual saturation, the smaller the more gradual; 0: clipped.",
+        (0, 20),
+        inherits="device.soft_saturation",
+        unset="Clipped",
+    )
+    gain_sigma_db: float | None = quantity(
+        None,
+        "dB",
+        "Standard deviation of the lasers' gains among each other.",
+        (0, 10),
+        title="Gain of Lasers (dB)",
+        inherits="device.gain_sigma_db",
+        unset="All alike",
+    )
+    faint_range_sigma: float | None = quantity(
+        None,
+        "m",
+        "Standard deviation that the range of an echo at the detection threshold has besides; of stronger ones less.",
+        (0, 10),
+        title="Range of Faint Echoes",
+        inherits="device.faint_range_sigma",
+        unset="None",
+    )
+    incidence_range_noise: float | None = quantity(
+        None,
+        "1",
+        "Standard deviation of the range over the depth of the beam's footprint on an inclined surface.",
+        (0, 2),
+        title="Range at a Slant",
+        inherits="device.incidence_range_noise",
+        unset="None",
+    )
+    range_tails: float | None = quantity(
+        None,
+        "1",
+        "Degrees of freedom of Student's t, which the errors of the range follow; 0: normal ones.",
+        (0, 1000),
+        inherits="device.range_tails",
+        unset="Normal",
+    )
+    echo_separation: EchoSeparation | None = Field(
+        None,
+        description="Echoes are parted by the range resolution alone, or where the sum of their pulses has two peaks.",
+        json_schema_extra=notes(unset="The device's"),
+    )
+
+    @model_validator(mode="after")
+    def _check_tails(self) -> Self:
+        if self.range_tails is not None and 0.0 < self.range_tails < FEWEST_FREEDOM:
+            raise ValueError(f"range_tails must be 0, or {FEWEST_FREEDOM:g} or more (not {self.range_tails:g})")
+        return self
+
+    def over(self, device: Self) -> Self:
+        """Return the receiver with the device's values where it has none of its own."""
+        given = {name: value for name in type(self).model_fields if (value := getattr(self, name)) is not None}
+        return device.model_copy(update=given)
+
+    def noise_sigma(self, threshold: float) -> float:
+        """Return the standard deviation of the noise in the unit of the threshold; 0 without noise."""
+        return threshold / self.threshold_to_noise if self.threshold_to_noise else 0.0
+
+
+def values_of_echoes(values: Float32, pulse: Index, number: Index) -> Float:
+    """Return the random numbers of echoes (N,), out of two rows for a block's pulses.
+
+    First echoes have a number each. Later ones, which are few, take theirs from the second row, the third and fourth of
+    a pulse a good part of the block away from the second.
+
+    Args:
+        values: (2, P), P being at least the number of pulses.
+        pulse: (N,) within the block.
+        number: (N,) of each echo in its pulse, from 1.
+    """
+    count = values.shape[1]
+    result = np.take(values[0], pulse).astype(np.float64)
+    later = np.flatnonzero(number > 1)
+    place = pulse[later] + (number[later] - 2) * max(1, count // _LATER)
+    result[later] = values[1][place % count]
+    return result
+
+
+def number_echoes(pulse: Index) -> Index:
+    """Return the numbers (N,) of echoes in their pulses, from 1; pulses (N,) are non-decreasing."""
+    begins = np.ones(len(pulse), dtype=bool)
+    begins[1:] = pulse[1:] != pulse[:-1]
+    starts = np.flatnonzero(begins)
+    return np.asarray(np.arange(len(pulse)) - starts[np.cumsum(begins) - 1] + 1)

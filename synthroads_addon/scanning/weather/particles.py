@@ -1,0 +1,99 @@
+"""Echoes of falling drops and flakes.
+
+Particles of the diameter D (mm, flakes as melted) are N0 exp(-s D) to the m^3 and mm (Marshall and Palmer 1948, The
+distribution of raindrops with size; Gunn and Marshall 1958, The distribution with size of aggregate snowflakes). One at
+the range r takes the share (D / b)^2 of a beam as wide as b = divergence x r, at most all of it, and sends back what
+its surface reflects at a right angle (Kilic et al. 2021, Lidar light scattering augmentation, arXiv:2107.07004). So the
+echoes of a pulse that are at least as intense as I are a Poisson process along the beam, of
+
+    pi / 4 b^2 N0 / s exp(-s D(r)),   D(r) = max(0.05 mm, b r sqrt(I / reflectance))
+
+to the metre without attenuation, and diameters beyond D(r) are exponential.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.arrays import Float
+from ..detector import PROVISIONAL_THRESHOLD
+from ..devices.device import ScannerSetting
+from ..effects import EchoChanges, PulseHits
+
+SMALLEST = 0.05
+"""Diameter of the smallest particles, mm."""
+_STEPS = 4096
+"""Ranges at which the number of echoes up to there is worked out."""
+_NEAREST = 0.05
+_MILLIMETRES = 1e3
+
+
+@dataclass(frozen=True)
+class ParticleSpectrum:
+    """Falling particles in the air.
+
+    Attributes:
+        intercept: N0, 1/(m^3 mm).
+        slope: s, 1/mm.
+        reflectance: of a particle's surface at a right angle.
+    """
+
+    intercept: float
+    slope: float
+    reflectance: float
+
+
+def fresnel_reflectance(refractive_index: float) -> float:
+    """Return the share of light that a surface reflects at a right angle."""
+    return ((refractive_index - 1.0) / (refractive_index + 1.0)) ** 2
+
+
+def rain_spectrum(rate_mm_h: float) -> ParticleSpectrum:
+    """Return Marshall and Palmer's drops at a rate of rain."""
+    return ParticleSpectrum(8000.0, 4.1 * rate_mm_h**-0.21, fresnel_reflectance(1.328))
+
+
+def snow_spectrum(rate_mm_h: float) -> ParticleSpectrum:
+    """Return Gunn and Marshall's flakes at a rate of snow in mm of water an hour."""
+    return ParticleSpectrum(3800.0 * rate_mm_h**-0.87, 2.55 * rate_mm_h**-0.48, fresnel_reflectance(1.3031))
+
+
+def smallest_seen(spectrum: ParticleSpectrum, setting: ScannerSetting, distance: Float, intensity: float) -> Float:
+    """Return the diameters (N,) of particles at ranges (N,), m, that give an intensity without attenuation, mm."""
+    brightness = intensity * distance**2
+    beam = _beam_width(setting, distance)
+    diameter = beam * np.sqrt(brightness / spectrum.reflectance)
+    diameter[brightness > spectrum.reflectance] = np.inf
+    return np.maximum(diameter, SMALLEST)
+
+
+def echoes_per_metre(spectrum: ParticleSpectrum, setting: ScannerSetting, distance: Float, intensity: float) -> Float:
+    """Return how many echoes (N,) a pulse has to the metre at ranges (N,), m, that are at least as intense."""
+    area = np.pi / 4.0 * (_beam_width(setting, distance) / _MILLIMETRES) ** 2
+    smallest = smallest_seen(spectrum, setting, distance, intensity)
+    return np.asarray(area * spectrum.intercept / spectrum.slope * np.exp(-spectrum.slope * smallest))
+
+
+def particle_echoes(spectrum: ParticleSpectrum, hits: PulseHits, random: np.random.Generator) -> EchoChanges:
+    """Return the echoes of particles before what a block of pulses meets first.
+
+    Those are drawn that the receiver might detect; it decides itself.
+    """
+    setting = hits.setting
+    faintest = PROVISIONAL_THRESHOLD * setting.threshold
+    begin, end = max(setting.minimum_range, _NEAREST), setting.maximum_range
+    grid = np.geomspace(begin, end, _STEPS)
+    density = echoes_per_metre(spectrum, setting, grid, faintest)
+    number = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(grid))])
+    before = np.interp(np.minimum(hits.distance.min(axis=0), end), grid, number)
+    pulse = np.repeat(np.arange(len(before)), random.poisson(before))
+    distance = np.interp(random.random(len(pulse)) * before[pulse], number, grid)
+    diameter = smallest_seen(spectrum, setting, distance, faintest)
+    diameter += random.exponential(1.0 / spectrum.slope, len(pulse))
+    taken = np.minimum(diameter / np.maximum(_beam_width(setting, distance), 1e-9), 1.0) ** 2
+    return EchoChanges(pulse, np.zeros(len(pulse), dtype=np.intp), distance, spectrum.reflectance * taken)
+
+
+def _beam_width(setting: ScannerSetting, distance: Float) -> Float:
+    """Return the geometric mean of the beam's widths at 1/e^2 (N,) at ranges (N,), mm."""
+    return np.asarray(distance * np.sqrt(setting.divergence[0] * setting.divergence[1]) * _MILLIMETRES)

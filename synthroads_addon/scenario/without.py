@@ -1,0 +1,60 @@
+"""A scenario with one effect of the sensor off: the same rays and random numbers, so that clouds are pairs.
+
+All random numbers are keyed by what they are for: leaving an effect out changes none of the others'.
+"""
+
+from collections.abc import Iterable
+
+from ..base.errors import InputError, nearest_name
+from .scenario import Scenario, parse_change, with_changes
+
+EFFECTS: dict[str, tuple[str, ...]] = {
+    "noise": tuple(
+        f"scan.noise.{name}=0"
+        for name in (
+            "range_bias",
+            "range_sigma",
+            "angle_sigma_mrad",
+            "position_sigma",
+            "attitude_sigma_deg",
+            "heading_sigma_deg",
+        )
+    ),
+    "range-noise": tuple(
+        f"scan.receiver.{name}=0" for name in ("faint_range_sigma", "incidence_range_noise", "range_tails")
+    ),
+    "speckle": ("scan.noise.speckle=0",),
+    "dropout": ("scan.noise.dropout=0",),
+    "detection": ("scan.receiver.threshold_to_noise=0",),
+    "response": (
+        "scan.receiver.response=power",
+        *(f"scan.receiver.{name}=0" for name in ("soft_saturation", "gain_sigma_db", "overlap_full")),
+    ),
+    "mixed-points": ("scan.receiver.echo_separation=resolution",),
+    "motion": tuple(f"scan.motion.{name}=0" for name in ("position_sigma", "attitude_sigma_deg", "heading_sigma_deg")),
+    "mirror-clock": ("scan.mirror_clock=locked",),
+    "strip-errors": tuple(
+        f"scan.strip_errors.{name}=0" for name in ("boresight_sigma_deg", "lever_arm_sigma", "drift_sigma")
+    ),
+    "weather": ("scan.weather=null", "scan.attenuation=0"),
+    "weather-echoes": ("scan.weather.echoes=false",),
+    "relief": ("scan.relief=0",),
+    "surface-variation": ("colour.intensity_from_layers=never",),
+}
+"""Effect -> the changes of a scenario that leave it out. `range-noise` is what exceeds the device's usual precision."""
+
+
+def scenario_without(scenario: Scenario, effects: Iterable[str]) -> Scenario:
+    """Return a scenario without some effects.
+
+    Raises:
+        InputError: there is no such effect.
+    """
+    changes: list[str] = []
+    for effect in effects:
+        if effect not in EFFECTS:
+            allowed = f"must be one of {', '.join(EFFECTS)}{nearest_name(effect, EFFECTS)}"
+            raise InputError("--without", effect, allowed)
+        if effect != "weather-echoes" or getattr(scenario.scan.weather, "echoes", False):
+            changes += EFFECTS[effect]
+    return Scenario.from_dict(with_changes(scenario.to_dict(), map(parse_change, changes))) if changes else scenario

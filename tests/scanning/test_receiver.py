@@ -1,0 +1,97 @@
+"""Laws of the receiver: how often an echo is detected, and what noise its intensity has."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from synthroads_addon.cloud.points import PointBlock, concatenate
+from synthroads_addon.scanning.devices.device import Device
+from synthroads_addon.scanning.plan import ScanPlan
+from synthroads_addon.scanning.receiver import Receiver, number_echoes, values_of_echoes
+from tests.helpers.scenes.scan_scenes import Standing, plane, scan_block, scan_of
+from tests.helpers.scenes.scanners import device
+
+RATIO = 5.0
+NOISY = Receiver(threshold_to_noise=RATIO)
+
+
+def received(plan: ScanPlan, blocks: int = 1, **changes) -> PointBlock:
+    """Return the points of the first blocks of a scan with another setting."""
+    changed = replace(plan, setting=replace(plan.setting, **changes))
+    return concatenate([scan_block(changed, changed.path.strips[0], block).points for block in range(blocks)])
+
+
+def chi_square(found: np.ndarray, chance: np.ndarray, bins: int = 8) -> float:
+    """Return how probable deviations as large are of pulses (P,) that were detected with a chance (P,) each."""
+    edges = np.quantile(chance[(chance > 0.02) & (chance < 0.98)], np.linspace(0, 1, bins + 1))
+    number = np.digitize(chance, edges[1:-1])
+    inside = (chance >= edges[0]) & (chance <= edges[-1])
+    excess, spread = (np.bincount(number[inside], values[inside]) for values in (found - chance, chance * (1 - chance)))
+    assert spread.min() > 10.0
+    return float(stats.chi2.sf(np.sum(excess**2 / spread), len(spread)))
+
+
+@pytest.mark.parametrize("rays", [1, 7])
+def test_asphalt_is_detected_by_chance_over_signal_to_noise(rays: int) -> None:
+    """A scanner 2 m above a road whose asphalt thins out from 8 to 30 m on."""
+    plan = scan_of(plane(), rays, Standing(2.0))
+    calm = received(plan, rays)
+    threshold = float(np.interp(12.0, np.sort(calm.range), calm.intensity[np.argsort(calm.range)]))
+    noisy = received(plan, rays, threshold=threshold, receiver=NOISY)
+    chance = stats.norm.cdf(RATIO * (calm.intensity / threshold - 1.0))
+    found = np.isin(calm.gps_time, noisy.gps_time)
+    assert chi_square(found, chance) > 0.001
+    near, far = calm.range < 9.0, calm.range > 20.0
+    assert found[near].all()
+    assert not found[far].any()
+    assert 0 < found[(calm.range > 11.0) & (calm.range < 13.0)].mean() < 1
+
+
+def test_noise_of_detected_echoes_is_a_normal_distribution_cut_off_at_the_threshold() -> None:
+    plan = scan_of(plane(), 1, Standing(2.0))
+    calm = received(plan)
+    threshold = float(np.median(calm.intensity[calm.range < 12.0]))
+    noisy = received(plan, threshold=threshold, receiver=NOISY)
+    sigma = threshold / RATIO
+    mean = calm.intensity[np.isin(calm.gps_time, noisy.gps_time)]
+    assert noisy.intensity.min() >= threshold
+    share = stats.truncnorm.cdf(noisy.intensity, (threshold - mean) / sigma, np.inf, mean, sigma)
+    assert stats.kstest(share, "uniform").pvalue > 0.001
+
+
+def test_a_hard_threshold_stays_and_noise_moves_no_point() -> None:
+    plan = scan_of(plane(), 1, Standing(2.0), range_sigma=0.01)
+    calm = received(plan)
+    threshold = float(np.median(calm.intensity))
+    hard = received(plan, threshold=threshold)
+    none = received(plan, threshold=threshold, receiver=Receiver(threshold_to_noise=0.0))
+    noisy = received(plan, threshold=threshold, receiver=NOISY)
+    assert hard.intensity.min() >= threshold
+    np.testing.assert_array_equal(hard.xyz, none.xyz)
+    here, there = (np.isin(a.gps_time, b.gps_time) for a, b in ((hard, noisy), (noisy, hard)))
+    np.testing.assert_array_equal(hard.xyz[here], noisy.xyz[there])
+
+
+def test_each_echo_of_a_pulse_has_a_number_of_its_own() -> None:
+    values = np.random.default_rng(1).standard_normal((2, 500), dtype=np.float32)
+    pulse = np.repeat(np.arange(500), 6)
+    number = number_echoes(pulse)
+    np.testing.assert_array_equal(number.reshape(500, 6), np.tile(np.arange(1, 7), (500, 1)))
+    dealt = values_of_echoes(values, pulse, number).reshape(500, 6)
+    np.testing.assert_array_equal(dealt[:, 0], values[0])
+    assert all(len(set(row)) == 6 for row in dealt.tolist())
+    # An echo less in some pulse leaves all others as they are.
+    kept = np.arange(len(pulse)) != 11
+    np.testing.assert_array_equal(
+        values_of_echoes(values, pulse[kept], number_echoes(pulse[kept])), dealt.ravel()[kept]
+    )
+
+
+def test_a_scenario_changes_what_it_names_and_a_device_says_the_rest() -> None:
+    shared = Receiver(threshold_to_noise=4.0)
+    assert Receiver().over(shared) == shared
+    assert Receiver(threshold_to_noise=0.0).over(shared).noise_sigma(2.0) == 0.0
+    assert NOISY.over(Receiver()).noise_sigma(2.0) == pytest.approx(2.0 / RATIO)
+    assert isinstance(device(receiver=shared.to_dict()), Device)

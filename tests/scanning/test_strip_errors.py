@@ -1,0 +1,56 @@
+"""Errors of strips: their distribution, what they do to points, and that the report says them."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy import stats
+
+from synthroads_addon.scanning.platforms.path import Strip
+from synthroads_addon.scanning.strip_errors import StripErrors, boresight, drift, lever_arm, strip_error_report
+from tests.helpers.scenes.scan_scenes import Standing, plane, scan_block, scan_of
+
+ERRORS = StripErrors(boresight_sigma_deg=0.02, lever_arm_sigma=0.05, drift_sigma=0.1)
+
+
+class TwoStrips(Standing):
+    """Two strips from the same place."""
+
+    strips = (Strip(0, 0.0, 0.2), Strip(1, 10.2, 0.2))
+
+
+def test_errors_are_normal_and_each_strip_drifts_by_itself() -> None:
+    seeds = range(400)
+    drifts = [np.concatenate(drift(ERRORS, seed, strip)) for seed in seeds for strip in (0, 1)]
+    values = [
+        np.rad2deg([boresight(ERRORS, seed) for seed in seeds]) / 0.02,
+        np.array([lever_arm(ERRORS, seed) for seed in seeds]) / 0.05,
+        np.array(drifts).reshape(400, 12) / 0.1,
+    ]
+    for part in values:
+        counts = np.bincount((stats.norm.cdf(part.ravel()) * 20).astype(int), minlength=20)
+        assert stats.chisquare(counts).pvalue > 0.001
+    together = np.corrcoef(np.concatenate(values, axis=1).T)
+    assert np.abs(together[~np.eye(18, dtype=bool)]).max() < 5 / np.sqrt(400)
+
+
+def test_points_are_off_by_what_the_report_says_and_the_truth_is_kept() -> None:
+    plan = scan_of(plane(), 1, TwoStrips())
+    wrong = replace(plan, strip_errors=ERRORS)
+    report = wrong.summary()["strip_errors"]
+    roll, pitch, yaw = np.deg2rad(report["boresight_deg"])
+    for strip, row in zip(plan.path.strips, report["drift"], strict=True):
+        calm, points = (scan_block(one, strip, 0).points for one in (plan, wrong))
+        np.testing.assert_array_equal(points.true_xyz, calm.xyz)
+        share = (points.gps_time - strip.start_time) / strip.duration
+        arm = calm.xyz - calm.scanner
+        # Small angles: the scanner's axes are the local ones here. Pitch is nose up.
+        turned = np.cross(np.array([roll, -pitch, yaw]), arm)
+        shift = np.array(row["begin"]) + share[:, None] * (np.array(row["end"]) - np.array(row["begin"]))
+        expected = shift + np.array(report["lever_arm"]) + turned
+        np.testing.assert_allclose(points.xyz - calm.xyz, expected, atol=1e-3)
+    assert report["drift"][0]["begin"] != report["drift"][1]["begin"]
+
+
+def test_nothing_is_reported_or_moved_without_errors() -> None:
+    assert strip_error_report(StripErrors(), 1, TwoStrips.strips) == {}
+    assert "strip_errors" not in scan_of(plane()).summary()
