@@ -18,7 +18,8 @@ def errors_and_sigma(**receiver):
     plan = scan_of(plane(), 1, Standing(2.0), range_sigma=SIGMA)
     strip = plan.path.strips[0]
     calm = scan_block(replace(plan, setting=replace(plan.setting, range_sigma=0.0)), strip, 0).points
-    threshold = float(calm.intensity.min())
+    threshold = float(calm.intensity[calm.range < 20.0].min())
+    calm = calm.select(np.flatnonzero(calm.intensity >= threshold))
     setting = replace(plan.setting, threshold=threshold, receiver=Receiver(**receiver))
     noisy = scan_block(replace(plan, setting=setting), strip, 0).points
     assert len(noisy) == len(calm)
@@ -43,7 +44,7 @@ def test_errors_of_ranges_follow_their_law_in_every_ring(receiver) -> None:
     for low, high in ((0.0, 4.0), (4.0, 10.0), (10.0, np.inf)):
         here = (reach >= low) & (reach < high)
         counts = np.bincount((share[here] * 20).astype(int), minlength=20)
-        assert here.sum() > 400
+        assert here.sum() > 300
         assert stats.chisquare(counts).pvalue > 0.001
 
 
