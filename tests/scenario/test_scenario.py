@@ -38,7 +38,7 @@ def test_another_kind_of_platform_or_weather_begins_anew() -> None:
     fog = load_scenario(
         "rq31-600m", ['scan.weather={"condition": "rain", "rate_mm_h": 5}', "scan.weather.condition=fog"]
     )
-    assert fog.scan.weather.to_dict() == {"condition": "fog"}
+    assert fog.scan.weather.to_dict() == {"condition": "fog", "echoes": False}
 
 
 TYPED = {
