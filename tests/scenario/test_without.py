@@ -34,6 +34,24 @@ EVERYTHING = Scenario.from_dict(
 )
 
 
+OFF = {
+    "noise": lambda scan: not any((scan.noise.range_sigma, scan.noise.angle_sigma_mrad, scan.noise.position_sigma)),
+    "range-noise": lambda scan: not any((scan.receiver.faint_range_sigma, scan.receiver.range_tails)),
+    "speckle": lambda scan: scan.noise.speckle == 0,
+    "dropout": lambda scan: scan.noise.dropout == 0,
+    "detection": lambda scan: scan.receiver.threshold_to_noise == 0,
+    "response": lambda scan: scan.receiver.response == "power",
+    "mixed-points": lambda scan: scan.receiver.echo_separation == "resolution",
+    "motion": lambda scan: not scan.motion.sigma.any(),
+    "mirror-clock": lambda scan: scan.mirror_clock == "locked",
+    "strip-errors": lambda scan: not scan.strip_errors.any,
+    "weather": lambda scan: scan.weather is None and scan.attenuation == 0,
+    "weather-echoes": lambda scan: scan.weather.condition == "rain" and not scan.weather.effects(),
+    "relief": lambda scan: scan.relief == 0,
+}
+"""Effect -> whether a scan is without it; `surface-variation` is one of the colours."""
+
+
 def leaves(data, path: str = "") -> dict[str, object]:
     """Return the values of JSON data by their paths."""
     if not isinstance(data, dict):
@@ -47,6 +65,9 @@ def test_one_effect_is_off_and_all_else_as_it_was(effect: str) -> None:
     changed = {f"{path.strip('.')}" for path in before | after if before.get(path) != after.get(path)}
     named = {change.partition("=")[0] for change in EFFECTS[effect]}
     assert changed
+    if effect != "surface-variation":
+        assert not OFF[effect](EVERYTHING.scan)
+        assert OFF[effect](scenario_without(EVERYTHING, [effect]).scan)
     assert all(any(path == name or path.startswith(f"{name}.") for name in named) for path in changed)
     assert scenario_without(scenario_without(EVERYTHING, [effect]), [effect]) == scenario_without(EVERYTHING, [effect])
 
