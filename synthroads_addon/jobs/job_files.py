@@ -77,21 +77,25 @@ class JobFiles:
         """
         bpy = sys.modules.get("bpy")  # not there if nothing needed Blender
         scenario = self.scenario.to_dict()
-        report = {"type": "Report", "generator": generator()} | told | {
-            "seed": self.scenario.seed,
-            "settings": asdict(self.scenario.settings()),
-            "scenario": {name: value for name, value in scenario.items() if self.road or name != "road"},
-            "seconds": round(timer.seconds, 3),
-            "stages": timer.stages,
-            "versions": {
-                "synthroads": version(),
-                "blender": bpy.app.version_string if bpy else None,
-                "python": machine.python_version(),
-                "numpy": np.__version__,
-                "laspy": laspy.__version__,
-            },
-            "cores": available_cores(),
-        }
+        report = (
+            {"type": "Report", "generator": generator()}
+            | told
+            | {
+                "seed": self.scenario.seed,
+                "settings": asdict(self.scenario.settings()),
+                "scenario": {name: value for name, value in scenario.items() if self.road or name != "road"},
+                "seconds": round(timer.seconds, 3),
+                "stages": timer.stages,
+                "versions": {
+                    "synthroads": version(),
+                    "blender": bpy.app.version_string if bpy else None,
+                    "python": machine.python_version(),
+                    "numpy": np.__version__,
+                    "laspy": laspy.__version__,
+                },
+                "cores": available_cores(),
+            }
+        )
         (folder / "report.json").write_text(canonical_json(report), encoding="utf-8")
         return report
 
