@@ -23,10 +23,12 @@ class Readout(ArrayRows):
     Attributes:
         noise: (N,) that adds to the intensity; None without.
         channel: (N,) number of the laser; None where all have one gain.
+        speckle: (N,) factors by which speckle has changed the power; None without.
     """
 
     noise: Float | None = None
     channel: UInt8 | None = None
+    speckle: Float | None = None
 
     def read(self, intensity: Float, distance: Float, setting: ScannerSetting, gains: Float) -> tuple[Float, int]:
         """Return the numbers (N,) that the receiver gives, see `response.read_power`, and how many of them saturated.
@@ -60,13 +62,14 @@ def detect_echoes(
     """
     if (share := overlap_share(setting, echoes.range)) is not None:
         echoes = replace(echoes, intensity=echoes.intensity * share)
+    noise = speckle = None
     if errors.speckle is not None:
-        echoes = _speckle_echoes(echoes, errors.speckle[number])
-    noise = None
+        speckle = _speckle_of_echoes(echoes, errors.speckle[number])
+        echoes = replace(echoes, intensity=echoes.intensity * speckle)
     if errors.receiver is not None:
         noise = values_of_echoes(errors.receiver, number[echoes.pulse], number_echoes(echoes.pulse))
         noise *= setting.receiver.noise_sigma(setting.threshold)
-    readout = Readout(noise, channel[echoes.pulse] if setting.receiver.gain_sigma_db else None)
+    readout = Readout(noise, channel[echoes.pulse] if setting.receiver.gain_sigma_db else None, speckle)
     brightest = echoes.intensity / PROVISIONAL_THRESHOLD if provisional else echoes.intensity
     strong = np.flatnonzero(readout.detected(brightest, setting.threshold))
     weak = len(echoes.pulse) - len(strong)
@@ -78,16 +81,16 @@ def detect_echoes(
     return echoes, readout, weak
 
 
-def _speckle_echoes(echoes: Echoes, factors: Float32) -> Echoes:
-    """Return the echoes with their intensities as speckle and detector change them, by their number in the pulse.
+def _speckle_of_echoes(echoes: Echoes, factors: Float32) -> Float:
+    """Return the factors (N,) by which speckle changes echoes, from those of pulses (P, returns), by their numbers.
 
-    Those beyond the last number that is recorded are left as they are.
+    They are 1 beyond the last number that is recorded.
     """
     keep, number, _ = number_returns(echoes.pulse, factors.shape[1])
     chosen = np.flatnonzero(keep)
-    intensity = echoes.intensity.copy()
-    intensity[chosen] *= factors[echoes.pulse[chosen], number - 1]
-    return replace(echoes, intensity=intensity)
+    result = np.ones(len(echoes.pulse))
+    result[chosen] = factors[echoes.pulse[chosen], number - 1]
+    return result
 
 
 def _kept_echoes(echoes: Echoes, lost: Bool) -> Index:

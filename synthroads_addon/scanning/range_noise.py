@@ -12,6 +12,11 @@ with sigma_0 that of a strong echo at a right angle and sigma_T what an echo at 
 follow a normal distribution, or Student's t of the same standard deviation (Lange, Little and Taylor 1989, Robust
 statistical modeling using the t distribution, JASA 84). None of them has a mean: ranges stay unbiased. All of it is
 left out where sigma_0 is 0.
+
+A bright echo passes a fixed threshold earlier than a faint one and is ranged nearer: range walk (Amann et al. 2001,
+Laser ranging: a critical review of usual techniques for distance measurement, Opt. Eng. 40). Scanners correct for it by the
+power that a surface usually gives; what is left follows the power's noise. So a part of the error goes with the
+logarithm of the speckle, which has its mean taken off.
 """
 
 import numpy as np
@@ -21,6 +26,7 @@ from .devices.device import ScannerSetting
 from .waveform import FULL_WIDTH
 
 _LEAST_COSINE = 1e-3
+_DECIBELS = 10.0 / np.log(10.0)
 
 
 def footprint_depth(setting: ScannerSetting, distance: Float, cosine: Float) -> Float:
@@ -54,6 +60,20 @@ def range_sigma(setting: ScannerSetting, distance: Float, cosine: Float, intensi
     weakness = setting.threshold / np.maximum(intensity, max(setting.threshold, 1e-300))
     variance = setting.range_sigma**2 + (faint * weakness) ** 2 * (1.0 + (depth / pulse) ** 2) + (slant * depth) ** 2
     return np.asarray(np.sqrt(variance))
+
+
+def range_walk(setting: ScannerSetting, speckle: Float, sigma: float) -> Float:
+    """Return by how much farther echoes (N,) are ranged for what speckle does to their power, m.
+
+    Args:
+        setting: the scanner's.
+        speckle: (N,) factors on the power, gamma distributed with mean 1.
+        sigma: their standard deviation.
+    """
+    looks = 1.0 / sigma**2
+    # The mean logarithm of a gamma variable over its mean, digamma(m) - ln m, by its asymptotic series.
+    mean = -0.5 / looks - 1.0 / (12.0 * looks**2) + 1.0 / (120.0 * looks**4)
+    return np.asarray((setting.receiver.range_walk or 0.0) * _DECIBELS * (mean - np.log(np.maximum(speckle, 1e-12))))
 
 
 def tail_factors(random: np.random.Generator, freedom: float, shape: tuple[int, ...]) -> Float32:

@@ -113,6 +113,14 @@ class Receiver(ClosedModel):
         inherits="device.incidence_range_noise",
         unset="None",
     )
+    range_walk: float | None = quantity(
+        None,
+        "m/dB",
+        "How much nearer an echo is ranged for each dB by which speckle makes it brighter.",
+        (0, 0.1),
+        inherits="device.range_walk",
+        unset="None",
+    )
     range_tails: float | None = quantity(
         None,
         "1",

@@ -20,9 +20,9 @@ from .platforms.path import Strip
 from .point_layers import MeasuredPoints, fill_layers, place_points
 from .pulses import Errors, Poses, Pulses, may_hit_scene, turn_vectors
 from .radiometry import received_intensity
-from .range_noise import range_sigma, tail_factors
+from .range_noise import range_sigma, range_walk, tail_factors
 from .returns import LEAST_REFLECTANCE, BothSignals, Echoes, HitSignals, group_returns, number_returns
-from .strip_errors import with_strip_errors
+from .strip_errors import strip_gain, with_strip_errors
 from .trace import Hits, Rays, TracedRays, trace
 from .waveform import merge_peaks
 
@@ -119,12 +119,15 @@ class BlockScan:
             echoes = merge_peaks(echoes, setting.range_resolution)
         if plan.surfaces.varying:
             echoes = self.vary_brightness(traced, echoes, poses.motions)
+        if (gain := strip_gain(plan.strip_errors, plan.seed, strip.index)) != 1.0:
+            echoes = replace(echoes, intensity=echoes.intensity * gain)
         provisional = plan.detects_after_layers
         echoes, readout, weak = detect_echoes(echoes, errors, number, pulses.channel, setting, provisional=provisional)
         keep, *numbers = number_returns(echoes.pulse, plan.most_returns)
         if not keep.all():
             echoes, readout = echoes.select(keep), readout.select(keep)
-        points, seen = self._points(strip, pulses, traced, echoes, numbers, errors, number, poses.motions)
+        found = (echoes, numbers, readout.speckle)
+        points, seen = self._points(strip, pulses, traced, *found, errors, number, poses.motions)
         if provisional:
             return BlockResult(points, seen, count, traced.first.face.size, weak, 0, readout=readout)
         intensity, clipped = readout.read(points.intensity, points.range, setting, plan.gains)
@@ -265,6 +268,7 @@ class BlockScan:
         traced: TracedRays,
         echoes: Echoes,
         numbers: list[UInt8],
+        speckle: Float | None,
         errors: Errors,
         number_in_block: Index,
         motions: list[Track],
@@ -278,6 +282,8 @@ class BlockScan:
         if errors.range is not None:
             range_errors = errors.range_errors(number_in_block[pulse], number, plan.most_returns)
             distance = distance + range_sigma(setting, echoes.range, along, echoes.intensity) * range_errors
+            if speckle is not None and setting.receiver.range_walk:
+                distance = distance + range_walk(setting, speckle, plan.noise.speckle)
         normal = None
         if plan.records_seen_points or "normal" in plan.measured_layers:
             normal = target.normals(face, along, pulses.time[pulse], motions)

@@ -4,7 +4,8 @@ A point's place is that of the platform, plus the platform's rotation times bore
 2006, Rigorous approach to bore-sight self-calibration in airborne laser scanning, ISPRS J. 61). Errors of these two are
 constant in the scanner's frame and the same in all strips, so that strips flown to and fro disagree; a strip's position
 errs by an offset that changes evenly from its beginning to its end, other ones in each strip. All are normally
-distributed and drawn from the scan's seed, and the report says them.
+distributed and drawn from the scan's seed, and the report says them. A strip's echoes have a gain as well, as the
+laser's power and the air differ from strip to strip.
 """
 
 from typing import Any
@@ -31,9 +32,11 @@ class StripErrors(ClosedModel):
         0.0, "m", "Position at a strip's beginning and at its end, each axis.", (0, 10), title="Drift"
     )
 
+    gain_sigma_db: float = quantity(0.0, "dB", "Brightness of each strip's echoes.", (0, 10), title="Gain (dB)")
+
     @property
     def any(self) -> bool:
-        """Return whether there are errors."""
+        """Return whether there are errors of the position."""
         return any((self.boresight_sigma_deg, self.lever_arm_sigma, self.drift_sigma))
 
 
@@ -51,6 +54,13 @@ def drift(errors: StripErrors, seed: int, strip: int) -> tuple[Float, Float]:
     """Return the errors of the position at a strip's beginning and at its end, (3,) each, along the local axes, m."""
     begin, end = errors.drift_sigma * stream(seed, "strip drift", strip).standard_normal((2, 3))
     return begin, end
+
+
+def strip_gain(errors: StripErrors, seed: int, strip: int) -> float:
+    """Return the factor on the power of a strip's echoes, log-normal with a median of 1."""
+    if not errors.gain_sigma_db:
+        return 1.0
+    return float(10.0 ** (errors.gain_sigma_db / 10.0 * stream(seed, "strip gain", strip).standard_normal()))
 
 
 def with_strip_errors(
@@ -75,14 +85,15 @@ def with_strip_errors(
 
 def strip_error_report(errors: StripErrors, seed: int, strips: tuple[Strip, ...]) -> dict[str, Any]:
     """Return the errors of a scan as JSON data; empty without any."""
-    if not errors.any:
+    if not errors.any and not errors.gain_sigma_db:
         return {}
-    drifts = []
+    rows = []
     for strip in strips:
         begin, end = drift(errors, seed, strip.index)
-        drifts.append({"strip": strip.index, "begin": _rounded(begin), "end": _rounded(end)})
+        gain = round(float(10.0 * np.log10(strip_gain(errors, seed, strip.index))), 7)
+        rows.append({"strip": strip.index, "begin": _rounded(begin), "end": _rounded(end), "gain_db": gain})
     angles = np.rad2deg(boresight(errors, seed))
-    return {"boresight_deg": _rounded(angles), "lever_arm": _rounded(lever_arm(errors, seed)), "drift": drifts}
+    return {"boresight_deg": _rounded(angles), "lever_arm": _rounded(lever_arm(errors, seed)), "strips": rows}
 
 
 def _rounded(values: Float) -> list[float]:

@@ -21,7 +21,8 @@ EFFECTS: dict[str, tuple[str, ...]] = {
         )
     ),
     "range-noise": tuple(
-        f"scan.receiver.{name}=0" for name in ("faint_range_sigma", "incidence_range_noise", "range_tails")
+        f"scan.receiver.{name}=0"
+        for name in ("faint_range_sigma", "incidence_range_noise", "range_walk", "range_tails")
     ),
     "speckle": ("scan.noise.speckle=0",),
     "dropout": ("scan.noise.dropout=0",),
@@ -34,7 +35,8 @@ EFFECTS: dict[str, tuple[str, ...]] = {
     "motion": tuple(f"scan.motion.{name}=0" for name in ("position_sigma", "attitude_sigma_deg", "heading_sigma_deg")),
     "mirror-clock": ("scan.mirror_clock=locked",),
     "strip-errors": tuple(
-        f"scan.strip_errors.{name}=0" for name in ("boresight_sigma_deg", "lever_arm_sigma", "drift_sigma")
+        f"scan.strip_errors.{name}=0"
+        for name in ("boresight_sigma_deg", "lever_arm_sigma", "drift_sigma", "gain_sigma_db")
     ),
     "weather": ("scan.weather=null", "scan.attenuation=0"),
     "weather-echoes": ("scan.weather.echoes=false",),

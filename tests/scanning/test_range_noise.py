@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from synthroads_addon.scanning.noise import Noise
 from synthroads_addon.scanning.range_noise import range_sigma
 from synthroads_addon.scanning.receiver import Receiver
 from tests.helpers.scenes.scan_scenes import Standing, plane, scan_block, scan_of
@@ -65,3 +66,16 @@ def test_a_strong_echo_at_a_right_angle_has_the_device_s_sigma() -> None:
     setting = replace(setting, receiver=Receiver(faint_range_sigma=1.0, incidence_range_noise=1.0))
     sigma = range_sigma(setting, np.array([50.0]), np.array([1.0]), np.array([1.0]))
     np.testing.assert_allclose(sigma, SIGMA, rtol=1e-6)
+
+
+def test_bright_speckle_is_ranged_nearer_without_a_bias() -> None:
+    plan = scan_of(plane(), 1, range_sigma=1e-9)
+    plan = replace(plan, noise=Noise(speckle=0.3))
+    strip = plan.path.strips[0]
+    walking = replace(plan.setting, receiver=Receiver(range_walk=0.004))
+    calm, points = (scan_block(p, strip, 0).points for p in (plan, replace(plan, setting=walking)))
+    level = 10 * np.log10(points.intensity / (points.intensity * points.range**3).mean() * points.range**3)
+    shift = points.range - calm.range
+    slope, _ = np.polyfit(level, shift, 1)
+    assert slope == pytest.approx(-0.004, rel=1e-3)
+    assert abs(shift.mean()) < min(1e-4, 5 * shift.std() / np.sqrt(len(shift)))

@@ -6,7 +6,14 @@ import numpy as np
 from scipy import stats
 
 from synthroads_addon.scanning.platforms.path import Strip
-from synthroads_addon.scanning.strip_errors import StripErrors, boresight, drift, lever_arm, strip_error_report
+from synthroads_addon.scanning.strip_errors import (
+    StripErrors,
+    boresight,
+    drift,
+    lever_arm,
+    strip_error_report,
+    strip_gain,
+)
 from tests.helpers.scenes.scan_scenes import Standing, plane, scan_block, scan_of
 
 ERRORS = StripErrors(boresight_sigma_deg=0.02, lever_arm_sigma=0.05, drift_sigma=0.1)
@@ -38,7 +45,7 @@ def test_points_are_off_by_what_the_report_says_and_the_truth_is_kept() -> None:
     wrong = replace(plan, strip_errors=ERRORS)
     report = wrong.summary()["strip_errors"]
     roll, pitch, yaw = np.deg2rad(report["boresight_deg"])
-    for strip, row in zip(plan.path.strips, report["drift"], strict=True):
+    for strip, row in zip(plan.path.strips, report["strips"], strict=True):
         calm, points = (scan_block(one, strip, 0).points for one in (plan, wrong))
         np.testing.assert_array_equal(points.true_xyz, calm.xyz)
         share = (points.gps_time - strip.start_time) / strip.duration
@@ -48,7 +55,18 @@ def test_points_are_off_by_what_the_report_says_and_the_truth_is_kept() -> None:
         shift = np.array(row["begin"]) + share[:, None] * (np.array(row["end"]) - np.array(row["begin"]))
         expected = shift + np.array(report["lever_arm"]) + turned
         np.testing.assert_allclose(points.xyz - calm.xyz, expected, atol=1e-3)
-    assert report["drift"][0]["begin"] != report["drift"][1]["begin"]
+    assert report["strips"][0]["begin"] != report["strips"][1]["begin"]
+
+
+def test_strips_are_as_bright_as_the_report_says() -> None:
+    plan = scan_of(plane(), 1, TwoStrips())
+    brighter = replace(plan, strip_errors=StripErrors(gain_sigma_db=1.0))
+    for strip, row in zip(plan.path.strips, brighter.summary()["strip_errors"]["strips"], strict=True):
+        calm, points = (scan_block(one, strip, 0).points for one in (plan, brighter))
+        np.testing.assert_allclose(points.intensity, calm.intensity * 10 ** (row["gain_db"] / 10), rtol=1e-6)
+        np.testing.assert_array_equal(points.xyz, calm.xyz)
+    levels = [10 * np.log10(strip_gain(brighter.strip_errors, seed, 3)) for seed in range(400)]
+    assert stats.kstest(levels, "norm").pvalue > 0.001
 
 
 def test_nothing_is_reported_or_moved_without_errors() -> None:

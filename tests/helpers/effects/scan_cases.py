@@ -137,6 +137,7 @@ CASES: dict[str, ScanCase] = {
     "scan.receiver.gain_sigma_db": ScanCase(value=1.0),
     "scan.receiver.faint_range_sigma": ScanCase(value=0.2),
     "scan.receiver.incidence_range_noise": ScanCase(value=1.0),
+    "scan.receiver.range_walk": ScanCase(value=0.05, given={"scan.noise.speckle": 0.3}),
     "scan.receiver.range_tails": ScanCase(value=4.0),
     "scan.receiver.echo_separation": ScanCase(value="waveform", given=RAYS),
     "scan.motion.shortest_period": ScanCase(value=3.0, given=SWAYING),
