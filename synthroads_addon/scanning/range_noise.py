@@ -14,8 +14,8 @@ statistical modeling using the t distribution, JASA 84). None of them has a mean
 left out where sigma_0 is 0.
 
 A bright echo passes a fixed threshold earlier than a faint one and is ranged nearer: range walk (Amann et al. 2001,
-Laser ranging: a critical review of usual techniques for distance measurement, Opt. Eng. 40). Scanners correct for it by the
-power that a surface usually gives; what is left follows the power's noise. So a part of the error goes with the
+Laser ranging: a critical review of usual techniques for distance measurement, Opt. Eng. 40). Scanners correct for it
+by the power that a surface usually gives; what is left follows the power's noise. So a part of the error goes with the
 logarithm of the speckle, which has its mean taken off.
 """
 
