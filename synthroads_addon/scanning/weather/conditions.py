@@ -76,6 +76,8 @@ class Dust(Weather):
 class Precipitation(Weather):
     """Rain or snow, by its visibility or by its rate."""
 
+    name: ClassVar[str]
+
     rate_mm_h: float | None = quantity(
         None, "mm/h", "Rain, or snow as water; instead of the visibility.", gt=0, le=200, unset="By the visibility"
     )
