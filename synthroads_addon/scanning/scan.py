@@ -123,11 +123,11 @@ class BlockScan:
             echoes = replace(echoes, intensity=echoes.intensity * gain)
         provisional = plan.detects_after_layers
         echoes, readout, weak = detect_echoes(echoes, errors, number, pulses.channel, setting, provisional=provisional)
-        keep, *numbers = number_returns(echoes.pulse, plan.most_returns)
+        keep, return_number, returns = number_returns(echoes.pulse, plan.most_returns)
         if not keep.all():
             echoes, readout = echoes.select(keep), readout.select(keep)
-        found = (echoes, numbers, readout.speckle)
-        points, seen = self._points(strip, pulses, traced, *found, errors, number, poses.motions)
+        recorded = (return_number, returns, readout.speckle)
+        points, seen = self._points(strip, pulses, traced, echoes, recorded, errors, number, poses.motions)
         if provisional:
             return BlockResult(points, seen, count, traced.first.face.size, weak, 0, readout=readout)
         intensity, clipped = readout.read(points.intensity, points.range, setting, plan.gains)
@@ -267,15 +267,18 @@ class BlockScan:
         pulses: Pulses,
         traced: TracedRays,
         echoes: Echoes,
-        numbers: list[UInt8],
-        speckle: Float | None,
+        recorded: tuple[UInt8, UInt8, Float | None],
         errors: Errors,
         number_in_block: Index,
         motions: list[Track],
     ) -> tuple[PointBlock, SeenPoints | None]:
-        """Return the points of the echoes, with intensities as they arrive, and where they were seen."""
+        """Return the points of the echoes, with intensities as they arrive, and where they were seen.
+
+        Args:
+            recorded: number of each echo and of its pulse's returns, and the factor of its speckle (None without).
+        """
         plan, setting, target = self.plan, self.plan.setting, self.plan.target
-        number, returns = numbers
+        number, returns, speckle = recorded
         pulse, hit = echoes.pulse, echoes.hit
         face, along = traced.pick("face", hit), traced.pick("along", hit)
         distance = echoes.range + plan.noise.range_bias
