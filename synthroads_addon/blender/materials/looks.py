@@ -103,13 +103,14 @@ def _joints(shade: Shade) -> None:
     shade.scale((1.0 - joint * 0.8) / (1.0 - 0.8 * _JOINT / ELEMENT))
 
 
-def _film(shade: Shade) -> None:
-    """Film of a marking: worn and dirty in spots as large as tyres' prints and along stretches; with beads in it."""
+def _film(shade: Shade, wear: Wear) -> None:
+    """Film of a marking: worn where traffic crosses it, in spots as large as tyres' prints; with beads in it."""
+    look, _ = pavement_look(shade, "paint", wear)
     spots, stretches, beads = shade.noise(0.25, 3.0), shade.noise(2.5, 2.0), shade.noise(0.05, 3.0)
-    film = (spots * 0.9 + 1.0) * (stretches * 0.7 + 1.0)
+    film = look.brightness * (spots * 0.9 + 1.0) * (stretches * 0.7 + 1.0)
     shade.scale(film)
     shade.vary(0.18, beads)
-    shade.roughness = spots * 0.2 + shade.mean.roughness
+    shade.roughness = look.roughness + spots * 0.2 + shade.mean.roughness
     shade.specular = film * shade.mean.specular
 
 
@@ -159,7 +160,7 @@ def _pavement(shade: Shade, kind: str, wear: Wear) -> None:
         shade.vary(texture.wide[0], shade.noise(texture.wide[1], 2.0))
     shade.roughness = look.roughness + mottle * texture.rough + shade.mean.roughness
     shade.specular = look.brightness * (grain * texture.gloss + 1.0) * shade.mean.specular
-    shade.relief = grain * texture.relief + height
+    shade.relief = grain * texture.relief + (0.0 if height is None else height)
 
 
 _BEFORE_NOISES: dict[str, Callable[[Shade], None]] = {
@@ -169,17 +170,18 @@ _BEFORE_NOISES: dict[str, Callable[[Shade], None]] = {
     "tarpaulin": lambda shade: _paint(shade, _COVER_TINT),
 }
 _AFTER_NOISES = {
-    "paint_white": _film,
-    "paint_yellow": _film,
     "barrier_concrete": _joints,
     "birch_bark": _scars,
     "acrylic_glass": _clear,
 }
 
 
+_PAINTS = ("paint_white", "paint_yellow")
+
+
 def is_worn(name: str) -> bool:
     """Return whether the traffic's wear shows on a material of the table."""
-    return name in _PAVEMENTS
+    return name in _PAVEMENTS or name in _PAINTS
 
 
 def vary_color(name: str, wear: Wear, shade: Shade) -> None:
@@ -190,5 +192,7 @@ def vary_color(name: str, wear: Wear, shade: Shade) -> None:
         _BEFORE_NOISES[name](shade)
     for noise in _NOISES.get(name, ()):
         shade.vary(noise.amount, shade.noise(noise.wavelength, noise.detail, noise.stretch))
+    if name in _PAINTS:
+        _film(shade, wear)
     if name in _AFTER_NOISES:
         _AFTER_NOISES[name](shade)

@@ -1,4 +1,4 @@
-"""SR Asphalt Look and SR Concrete Look: the pavement's field as a node group, and how materials take it."""
+"""SR Asphalt Look, SR Concrete Look, SR Paint Look: the pavement's field as node groups, and how materials take it."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from ...road.pavement.field import (
     asphalt_look,
     concrete_height,
     concrete_look,
+    paint_look,
 )
 from ..nodes import operations as op
 from ..nodes.builder import Operand, Tree, Value, node_group
@@ -66,7 +67,7 @@ class NodeCalculus:
 
 
 def look_group(kind: str) -> bpy.types.NodeTree:
-    """Return the group of a pavement's look: ``asphalt`` or ``concrete``.
+    """Return the group of the look of ``asphalt``, ``concrete``, or the ``paint`` of markings.
 
     Its inputs are the place, as the attribute has it, and the field's parameters.
     """
@@ -78,43 +79,48 @@ def _build(tree: Tree, kind: str) -> None:
     about = "Station (m), distance from the lane's middle (m), code of strip and lane's width"
     place = tree.input("Place", "Vector", description=about)
     wear = Wear(
-        tree.number("Polish", 0.3, (0.0, 1.0), description="Polish of the wheel tracks"),
+        tree.number("Polish", 0.3, (0.0, 1.0), description="Polish of the wheel tracks") if kind != "paint" else 0.0,
         tree.number("Seed", 0.0, (0.0, 65535.0), description="Seed of all that is random"),
     )
-    calculus = NodeCalculus(tree)
+    calculus, height = NodeCalculus(tree), None
     # As a vector: a number taken from a colour is its luminance, whose weights don't add up to 1 exactly.
-    shapes = tree.input("Shape", "Vector", description="Length of slabs, depths of joints and wheel tracks (m)")
+    about = "Length of slabs, depths of joints and wheel tracks (m)"
+    shapes = tree.input("Shape", "Vector", description=about) if kind != "paint" else None
     with tree.frame("Field of station and offset"):
         parts = Place(*(op.component(place, axis) for axis in "XYZ"))
-        slabs, joints, tracks = (op.component(shapes, axis) for axis in "XYZ")
-        shape = Shape(tracks, joints)
-        if kind == "asphalt":
-            look, height = asphalt_look(calculus, parts, wear), asphalt_height(calculus, parts, shape)
+        if shapes is None:
+            look = paint_look(calculus, parts, wear)
         else:
-            look = concrete_look(calculus, parts, wear, slabs)
-            height = concrete_height(calculus, parts, shape, slabs)
+            slabs, joints, tracks = (op.component(shapes, axis) for axis in "XYZ")
+            shape = Shape(tracks, joints)
+            if kind == "asphalt":
+                look, height = asphalt_look(calculus, parts, wear), asphalt_height(calculus, parts, shape)
+            else:
+                look = concrete_look(calculus, parts, wear, slabs)
+                height = concrete_height(calculus, parts, shape, slabs)
     tree.output("Brightness", look.brightness, description="Factor on base colour and specular")
     tree.output("Roughness", look.roughness, description="What is added to the roughness")
-    tree.output("Height", height, description="Height above the mean surface (m)")
+    if height is not None:
+        tree.output("Height", height, description="Height above the mean surface (m)")
 
 
-def pavement_look(shade: Shade, kind: str, wear: Wear) -> tuple[Look, Value]:
-    """Add the look of a pavement to a material and return it, and the height (m).
+def pavement_look(shade: Shade, kind: str, wear: Wear) -> tuple[Look, Value | None]:
+    """Add the look of a pavement or marking to a material and return it, and the pavement's height (m).
 
     Args:
         shade: the material.
-        kind: ``asphalt`` or ``concrete``.
+        kind: ``asphalt``, ``concrete`` or ``paint``.
         wear: parameters of the field, as numbers.
     """
     tree = shade.tree
     raw = tree.group.nodes.new("ShaderNodeGroup")
     raw.node_tree = look_group(kind)
-    place = tree.node("ShaderNodeAttribute", attribute_name=ATTRIBUTE)["Vector"]
-    tree.group.links.new(place.source(), raw.inputs["Place"])
-    raw.inputs["Polish"].default_value, raw.inputs["Seed"].default_value = wear
-    shape = tree.node("ShaderNodeAttribute", attribute_name=SHAPE)["Vector"]
-    tree.group.links.new(shape.source(), raw.inputs["Shape"])
-    brightness, roughness, height = (
-        Value(tree, raw.outputs[name], "VALUE") for name in ("Brightness", "Roughness", "Height")
-    )
-    return Look(brightness, roughness), height
+    for name, value in zip(("Polish", "Seed"), wear, strict=True):
+        if name in raw.inputs:
+            raw.inputs[name].default_value = value
+    for name, entry in ((ATTRIBUTE, "Place"), (SHAPE, "Shape")):
+        if entry in raw.inputs:
+            attribute = tree.node("ShaderNodeAttribute", attribute_name=name)["Vector"]
+            tree.group.links.new(attribute.source(), raw.inputs[entry])
+    outputs = {output.name: Value(tree, output, "VALUE") for output in raw.outputs}
+    return Look(outputs["Brightness"], outputs["Roughness"]), outputs.get("Height")

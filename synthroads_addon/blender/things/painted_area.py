@@ -12,8 +12,17 @@ from numpy.typing import NDArray
 from ...base.classes import class_id
 from ...base.stepper import run_aside
 from ...road.paint import arrow_outlines, cut_outline, hatching_outlines
-from ...road.pavement.field import OPEN_CRACK, PATCH, SEALED_CRACK, damage_code
+from ...road.pavement.field import (
+    OPEN_CRACK,
+    PAINT_AREA,
+    PAINT_IN_LANE,
+    PATCH,
+    SEALED_CRACK,
+    damage_code,
+    place_code,
+)
 from ...road.pavement.outlines import CRACK_FILM, PATCH_FILM, crack_outlines, patch_outline
+from ...road.pavement.places import pavement_places
 from ...road.section import Arrow, Carriageway, Hatching
 from ..nodes import operations as op
 from ..nodes.backbone import height_on, look_up, station_ribbon
@@ -43,7 +52,8 @@ class _Paint(Inputs):
 def painted_area_group(tree: Tree) -> None:
     """Faces given by stations and offsets, laid on the pavement.
 
-    Their points carry ``film`` (m), ``instance`` and ``yellow`` (0 or 1).
+    Their points carry ``film`` (m), ``instance``, ``yellow`` (0 or 1), and ``pavement``, the place that the materials
+    read.
     """
     outlines, paint = _Outlines(tree), _Paint(tree)
     mesh = _lay(outlines)
@@ -99,7 +109,24 @@ def build_painted_areas(builder: ModelBuilder) -> None:
     attribute(mesh, "film", np.repeat([item.film_thickness for item in items], sizes))
     attribute(mesh, "yellow", np.repeat([float(item.color == "yellow") for item in items], sizes))
     attribute(mesh, "instance", np.repeat(signed_instance([item.instance for item in items]), sizes))
+    attribute(mesh, "pavement", run_aside(lambda: _painted_places(builder, outlines)))
     builder.add("Painted Areas", mesh, painted_area_group())
+
+
+def _painted_places(
+    builder: ModelBuilder, outlines: list[tuple[NDArray[np.float64], Hatching | Arrow]]
+) -> NDArray[np.float64]:
+    """Return what the materials read (N, 3) at the corners of painted areas, one outline after the other."""
+    road, result = builder.geometry.parameters, []
+    for outline, item in outlines:
+        carriageway = road.carriageway_of(item)
+        section = builder.geometry.sections[carriageway.side]
+        across = pavement_places(section, outline[:, 0], outline[:, 1]).across
+        kind = PAINT_IN_LANE if isinstance(item, Arrow) else PAINT_AREA
+        # Beside whole numbers, so that rounding doesn't make another one of them.
+        code = place_code(kind, int(carriageway.side == "left")) + 0.25
+        result.append(np.column_stack([outline[:, 0], across, np.full(len(outline), code)]))
+    return np.concatenate(result)
 
 
 @model_part("damaged_areas", 31, on_the_road=True)

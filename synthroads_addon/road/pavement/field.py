@@ -13,6 +13,7 @@ What is in it, and where its figures come from:
   day's work, sealed by bitumen; what was paved at once is as bright as itself and differs from its neighbours.
 - **Slabs** of concrete: joints every slab length and between lanes, sealed (ZTV Beton-StB: 8 to 10 mm wide); each slab
   is of its own pour.
+- **Markings** lose their film where tyres cross them: lines between lanes, arrows in the wheel tracks.
 - **Patches** are new and black, or older; open cracks are dark; sealed ones are a smooth band of bitumen.
 - **Heights**: wheel tracks are as deep as they are worn, with the mean of a lane at 0; joints lie lower. Patches and
   cracks have heights of their own, and waves are `unevenness`.
@@ -35,8 +36,11 @@ share of 16 m; of a patch it is the age."""
 LANE, SHOULDER, BAY = 1, 9, 10
 """Kinds of strips: of the outermost lane, those of the others follow; those that no lane's traffic wears. 0 is a place
 of which nothing is known: it has its material's mean."""
+PAINT_CROSSED, PAINT_BESIDE, PAINT_AREA, PAINT_IN_LANE = 16, 17, 18, 19
+"""Kinds of markings by the traffic that wears them: lines that lane changes cross, lines beside the lanes, hatched
+areas, and what lies in a lane, of which `Place.across` counts from the lane's middle."""
 PATCH, OPEN_CRACK, SEALED_CRACK = 24, 25, 26
-"""Kinds of repaired and damaged places; above the strips'."""
+"""Kinds of repaired and damaged places; above the strips' and the markings'."""
 
 _TRACK, _TRACK_WIDTH, _OIL_WIDTH = 1.8, 0.3, 0.35
 """Distance between a lane's tracks; standard deviations across of a track and of the oil strip, m."""
@@ -46,8 +50,12 @@ _LESS_INWARDS = 0.6
 """By how much the wear of a lane falls behind with each lane outside of it."""
 _DAY = 650.0
 """Length that is paved in a day, m."""
-_SLOW = 30.0
-"""Distance of the knots of the slow variation along a lane, m."""
+_SLOW, _CHANGES = 30.0, 7.0
+"""Distances of the knots of the slow variation along a lane, and of where lane changes cross a line, m: at a speed of
+30 m/s a change takes 100 m, in which a tyre is on the line for 10 m."""
+_CROSSED, _BESIDE, _AREA, _IN_LANE = 1.0, 0.2, 0.4, 0.6
+"""Wear of lines that lane changes cross, of lines beside the lanes, of hatched areas, of arrows between the wheel
+tracks; in a wheel track it is 1."""
 _SEAM, _SEAM_INWARDS, _RAMP = 0.02, 0.13, 0.004
 """Width of a paver's joint, its distance from the lane's boundary, and over which its edge fades, m."""
 _SLAB_JOINT = 0.010
@@ -173,9 +181,9 @@ def _line(m: Calculus, distance: Any, width: float) -> Any:
     return m.smaller(m.larger((width / 2.0 - distance) * (1.0 / _RAMP) + 0.5, 0.0), 1.0)
 
 
-def _slow(m: Calculus, place: Place, owner: Any, seed: Any) -> Any:
-    """Return a smooth variation along the road from -1 to 1, of each lane for itself."""
-    knots = place.station * (1.0 / _SLOW)
+def _slow(m: Calculus, place: Place, owner: Any, seed: Any, spacing: float = _SLOW) -> Any:
+    """Return a smooth variation along the road from -1 to 1, of each lane for itself, by knots (m) apart."""
+    knots = place.station * (1.0 / spacing)
     knot = m.floor(knots)
     share = knots - knot
     weight = share * share * (3.0 - 2.0 * share)
@@ -269,6 +277,27 @@ def concrete_look(m: Calculus, place: Place, wear: Wear, slab_length: Any) -> Lo
     brightness = (1.0 + 0.06 * own + 0.03 * slow) * used * (1.0 - 0.6 * joint)
     roughness = 0.05 * own + 0.02 * slow - 0.25 * polished - 0.25 * joint
     return _repaired(m, strip, Look(brightness, roughness))
+
+
+def paint_look(m: Calculus, place: Place, wear: Wear) -> Look:
+    """Return how a marking differs from its mean at places: its film goes where traffic crosses it.
+
+    Args:
+        m: functions for the operands.
+        place: N places, of which `across` matters in lanes only.
+        wear: parameters, whose polish says nothing here.
+    """
+    strip = _decode(m, place)
+    beside = 1.0 - m.below(strip.kind, PAINT_BESIDE - 0.5)
+    area = 1.0 - m.below(strip.kind, PAINT_AREA - 0.5)
+    in_lane = 1.0 - m.below(strip.kind, PAINT_IN_LANE - 0.5)
+    lines = _CROSSED + beside * (_BESIDE - _CROSSED) + area * (_AREA - _BESIDE)
+    traffic = lines + in_lane * ((strip.track + _TRACKS_MEAN) * (1.0 - _IN_LANE) + _IN_LANE - _AREA)
+    long = _slow(m, place, strip.owner, wear.seed)
+    short = _slow(m, place, strip.owner, wear.seed + 1.0, _CHANGES)
+    known = 1.0 - m.below(strip.owner, 0.5)
+    worn = traffic * (1.0 + 0.5 * long + 0.5 * short) * known
+    return Look(1.0 + known * 0.05 - worn * 0.22, worn * -0.06)  # 1 over all of a road's film, mostly edge lines
 
 
 class ArrayCalculus:

@@ -17,6 +17,10 @@ from synthroads_addon.road.damage import DAMAGES
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.pavement.field import (
+    CODES,
+    PAINT_BESIDE,
+    PAINT_CROSSED,
+    PAINT_IN_LANE,
     ArrayCalculus,
     Place,
     Shape,
@@ -25,6 +29,7 @@ from synthroads_addon.road.pavement.field import (
     asphalt_look,
     concrete_height,
     concrete_look,
+    paint_look,
     place_code,
 )
 from synthroads_addon.road.pavement.outlines import crack_outlines, patch_outline
@@ -39,7 +44,7 @@ from tests.helpers.effects.road_cases import base_road
 PLACES = 100_000
 
 
-@pytest.mark.parametrize("kind", ["asphalt", "concrete"])
+@pytest.mark.parametrize("kind", ["asphalt", "concrete", "paint"])
 def test_nodes_and_arrays_give_the_same_field(kind: str) -> None:
     rng, wear, slab = np.random.default_rng(7), Wear(0.5, 4711.0), 4.5
     code = place_code(rng.integers(0, 27, PLACES), rng.integers(0, 2, PLACES), 1.75)
@@ -49,18 +54,22 @@ def test_nodes_and_arrays_give_the_same_field(kind: str) -> None:
     shape = Shape(0.5, 0.25)
     shapes = np.tile(np.array([slab, shape.joints, shape.tracks, 0.0], np.float32), (PLACES, 1))
     feed = {SurfaceInput("attribute", ATTRIBUTE): values, SurfaceInput("attribute", SHAPE): shapes}
-    outputs = {"roughness": "Brightness", "specular": "Roughness", "metallic": "Height"}
+    outputs = {"roughness": "Brightness", "specular": "Roughness"} | ({"metallic": "Height"} if kind != "paint" else {})
     with calculator({0: _probe(kind, wear, outputs)}, tuple(outputs)) as work:
         found = work.calculate(np.zeros(PLACES, np.intp), {what: feed[what] for what in work.inputs_of(0)})
     calculus, place = ArrayCalculus(), Place(*values[:, :3].T.astype(np.float64))
-    if kind == "asphalt":
+    if kind == "paint":
+        look, height = paint_look(calculus, place, wear), None
+    elif kind == "asphalt":
         look, height = asphalt_look(calculus, place, wear), asphalt_height(calculus, place, shape)
     else:
         look, height = concrete_look(calculus, place, wear, slab), concrete_height(calculus, place, shape, slab)
     assert np.ptp(look.brightness) > 0.3
-    assert np.ptp(look.roughness) > 0.1
+    assert np.ptp(look.roughness) > 0.08
     assert found["roughness"][:, 0] == pytest.approx(look.brightness, abs=1e-5)
     assert found["specular"][:, 0] == pytest.approx(look.roughness, abs=1e-5)
+    if height is None:
+        return
     assert np.ptp(height) > 0.4
     assert found["metallic"][:, 0] == pytest.approx(height, abs=1e-5)
 
@@ -74,8 +83,12 @@ def _probe(kind: str, wear: Wear, outputs: dict[str, str]) -> bpy.types.Material
     nodes.clear()
     group = nodes.new("ShaderNodeGroup")
     group.node_tree = look_group(kind)
-    group.inputs["Polish"].default_value, group.inputs["Seed"].default_value = wear
+    for name, value in zip(("Polish", "Seed"), wear, strict=True):
+        if name in group.inputs:
+            group.inputs[name].default_value = value
     for name, entry in ((ATTRIBUTE, "Place"), (SHAPE, "Shape")):
+        if entry not in group.inputs:
+            continue
         attribute = nodes.new("ShaderNodeAttribute")
         attribute.attribute_name = name
         links.new(attribute.outputs["Vector"], group.inputs[entry])
@@ -98,7 +111,7 @@ def test_the_mesh_says_where_on_the_pavement_its_points_are() -> None:
         mesh.attributes[name].data.foreach_get("vector", values.ravel())
     offset = offset[:, 0]
     station, across, code = place.T.astype(np.float64)
-    paved = np.flatnonzero(code > 0.0)
+    paved = np.flatnonzero((code > 0.0) & (code % CODES < PAINT_CROSSED))
     assert len(paved) > 100
     for side, sign in (("left", 1.0), ("right", -1.0)):
         rows = paved[sign * offset[paved] > 0.0]
@@ -112,6 +125,27 @@ def test_the_mesh_says_where_on_the_pavement_its_points_are() -> None:
         pavement = section.carriageway.pavement
         values = (pavement.slab_length, pavement.joint_depth, pavement.wheel_track_depth)
         assert shape[rows] == pytest.approx(np.tile(values, (len(rows), 1)))
+
+
+def test_lines_that_lane_changes_cross_are_more_worn_than_those_beside_the_lanes() -> None:
+    """Their film's mean brightness by the field at the places that the mesh tells; arrows are between both."""
+    objects = {"arrow": {"type": "Arrow", "carriageway": "right", "kind": "straight", "station": 20, "offset": -8.375}}
+    edge = {"type": "LineMarking", "carriageway": "right", "kind": "outer_edge", "width": 0.15, "dash_length": 0.0}
+    objects["edge"] = edge | {"gap_length": 0.0, "start_station": 0.0, "end_station": 60.0}
+    parameters = RoadParameters.from_dict(base_road(objects))
+    model = build_road(parameters, 0.005, 1.0, {"road", "painted_areas"})
+    brightness = {}
+    for name in ("Road", "Painted Areas"):
+        mesh = model.objects[name].evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+        place = np.empty((len(mesh.vertices), 3), np.float32)
+        mesh.attributes[ATTRIBUTE].data.foreach_get("vector", place.ravel())
+        kind = np.floor(place[:, 2]) % 32
+        look = paint_look(ArrayCalculus(), Place(*place.T.astype(np.float64)), Wear(0.0, 7.0))
+        brightness |= {number: look.brightness[kind == number] for number in (16, 17, 19) if (kind == number).any()}
+        station = place[(kind == 16) | (kind == 17), 0]
+        assert not len(station) or (station.min() < 9.0 and station.max() > 49.0)
+    assert brightness[PAINT_CROSSED].mean() < brightness[PAINT_BESIDE].mean() - 0.1
+    assert brightness[PAINT_CROSSED].mean() < brightness[PAINT_IN_LANE].mean() < brightness[PAINT_BESIDE].mean()
 
 
 def test_a_road_has_its_own_polish_and_seed() -> None:

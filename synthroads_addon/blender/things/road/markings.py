@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from ....road.pavement.field import CODES, PAINT_BESIDE, PAINT_CROSSED
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group, node_group
 from ...nodes.inputs import Inputs, backbone_socket, inputs_class, metres
@@ -90,19 +91,31 @@ def _build(tree: Tree, lanes: int, turnouts: bool, lines: tuple[MarkingLayout, .
     )(tree)
     white = tree.material("Material", "paint_white", description="Material of the lines")
     yellow = tree.material("Yellow Material", "paint_yellow", description="Material of temporary lines")
+    first = metres(0.0, (-1e6, 1e6), "Station that the backbone's stations count from")
+    first_station = inputs_class("Stations", {"first_station": first})(tree).values["first_station"]
     inputs = [declare_line(tree, line, line.name) for line in lines]
+    # Beside whole numbers, so that rounding doesn't make another one of them.
+    on_left = op.switch(section.left_side, 0.25, 0.25 + CODES)
     parts = []
     with tree.frame("Lines"):
         for line, values in zip(lines, inputs, strict=True):
             boundary = boundaries.values.get(f"boundary_{_boundary(line, lanes, strips)}")
             values |= {"distance": _middle(line, values, boundary)}
-            parts.append(tree.call(
+            mesh = tree.call(
                 carriageway_marking_group(),
                 backbone=backbone,
                 **section.values,
                 **values,
                 material=yellow if line.yellow else white,
-            ).value)  # fmt: skip
+            ).value
+            wear = PAINT_CROSSED if line.kind in ("lane", "block") else PAINT_BESIDE
+            place = op.vector(
+                tree,
+                op.named_attribute(tree, "station") + first_station,
+                0.0,
+                on_left + float(wear + 2 * CODES * line.boundary),
+            )
+            parts.append(op.store(mesh, "pavement", place))
         mesh = op.join(*parts)
     tree.output("Mesh", mesh, description="Lines whose faces look up")
 

@@ -177,6 +177,7 @@ def _markings(tree: Tree, backbone: Value, side: _Side, materials: _RoadMaterial
         left_side=layout.left,
         crossfall=op.named_attribute(tree, f"crossfall_{layout.side.lower()}"),
         verge_slope=side.inputs.verge_slope,
+        first_station=side.inputs.first_station,
         material=materials.marking_material,
         yellow_material=materials.yellow_marking_material,
         **{name.lower().replace(" ", "_"): value for name, value in values.items()},
