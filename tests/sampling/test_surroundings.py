@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import Counter, defaultdict
 from collections.abc import Iterable
@@ -13,6 +14,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
+from synthroads_addon.materials.variation import vary_material
 from synthroads_addon.road.guidelines import OBSTACLE_DISTANCE
 from synthroads_addon.road.objects import width_at
 from synthroads_addon.road.parameters import (
@@ -25,7 +27,7 @@ from synthroads_addon.road.parameters import (
     read_parameters,
 )
 from synthroads_addon.road.section import Carriageway
-from synthroads_addon.road.surroundings import SPECIES, MaterialVariation, Terrain, Vegetation, Vehicle
+from synthroads_addon.road.surroundings import SPECIES, Environment, MaterialVariation, Terrain, Vegetation, Vehicle
 from synthroads_addon.road.things.beacon import ConstructionBeacon
 from synthroads_addon.road.things.limits import Interval
 from synthroads_addon.road.things.temporary_barrier import TemporaryBarrier
@@ -461,3 +463,15 @@ def test_it_takes_no_time() -> None:
         return (time.process_time() - start) / len(sites)
 
     assert min(seconds() for _ in range(5)) < 2e-3
+
+
+def test_markings_of_nearly_all_roads_stand_out_from_asphalt_as_those_of_real_ones() -> None:
+    """Airborne scans of real roads have 3.9 to 5.1 dB; the means of what 40 seeds' roads have, seen from above."""
+    contrast = []
+    for seed in range(1, 41):
+        variation = sample_materials(RoadScenario(), seed)
+        paint, asphalt = (vary_material(name, variation, Environment()) for name in ("paint_white", "asphalt"))
+        contrast.append(10.0 * math.log10((paint.reflectivity + paint.retroreflection) / asphalt.reflectivity))
+    assert 4.4 < np.median(contrast) < 4.9
+    assert np.mean([3.9 < value < 5.15 for value in contrast]) >= 0.85
+    assert max(contrast) < 7.0
