@@ -121,9 +121,10 @@ def _load_crops(
         pin_memory=configuration.device != "cpu" and torch.cuda.is_available(),
         worker_init_fn=silence_lost_pipes,
     )
-    with defer_interrupt():
-        batches = iter(loader)
+    batches: Iterator[Item] = iter(())
     try:
+        with defer_interrupt():
+            batches = iter(loader)
         yield from batches
     finally:
         # PyTorch calls it an error if a worker was ended by a signal, as all are that are interrupted: where only the
