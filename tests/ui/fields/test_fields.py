@@ -413,7 +413,7 @@ def test_what_excludes_each_other_is_never_given_together(panel: Any) -> None:
     scan.weather.rate_mm_h = 5.0
     assert panel.scenario().scan.weather.visibility is None
     scan.weather.condition = "fog"
-    assert panel.scenario().scan.weather.to_dict() == {"condition": "fog"}
+    assert panel.scenario().scan.weather.to_dict() == {"condition": "fog", "echoes": False}
     scan.rays_per_pulse = "19"
     scan.beam_rings = "6, 12"
     assert (panel.scenario().scan.rays_per_pulse, panel.scenario().scan.beam_rings) == (None, (6, 12))
