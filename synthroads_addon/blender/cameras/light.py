@@ -17,7 +17,7 @@ from ...scanning.colour.light import SunAndSky, expose_light, sun_direction
 from ..sky import SUN_ANGLE, SUN_COLOR, SUN_STRENGTH, fill_sky, new_sun
 from .stage import SUN_GROUP, Passes, stage
 
-_PROBE_SAMPLES = 128
+_PROBE_SAMPLES = 1024
 
 
 @dataclass(frozen=True)
@@ -98,6 +98,8 @@ def _sky_radiance(sky: _Sky) -> tuple[float, float, float]:
     """
     with ExitStack() as stack:
         world = stack.enter_context(_world(sky))
+        # A map of where the sky is bright would cost more than the many samples that do without.
+        world.cycles.sampling_method = "NONE"
         mesh = bpy.data.meshes.new("SR Probe")
         stack.callback(lambda: bpy.data.meshes.remove(mesh))
         mesh.from_pydata([(-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (1.0, 1.0, 0.0), (-1.0, 1.0, 0.0)], [], [(0, 1, 2, 3)])
