@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
+from itertools import count
 from pathlib import Path
+from threading import Event
 from typing import Any
 
 import bpy
@@ -10,11 +13,15 @@ import laspy
 import numpy as np
 import pytest
 
+from synthroads_addon.blender.cameras.nodes import NodeLayers
 from synthroads_addon.blender.files import empty_file
+from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.jobs.scan.files import CloudFiles
 from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
 from synthroads_addon.materials.reflectance import reflectivity
+from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning import record
+from synthroads_addon.scanning.colour.colour import LayerValues
 from synthroads_addon.scenario.scenario import load_scenario
 from tests.helpers.scenes.checkered_scene import APART, build_checkered_scene, expected_colors
 
@@ -25,9 +32,11 @@ SCAN += ["scan.rays_per_pulse=1", 'outputs=["cloud"]', "colour.mode=unlit", "clo
 SCAN += ["scan.reflection=lambert", 'cloud.attributes=["incidence","color_source"]']
 
 
-def scanned(folder: Path, scene: Path | None, *changes: str) -> tuple[dict[str, Any], laspy.LasData]:
+def scanned(
+    folder: Path, scene: Path | None, *changes: str, tripods: tuple[tuple[float, ...], ...] = (PLACE,)
+) -> tuple[dict[str, Any], laspy.LasData]:
     scenario = load_scenario("tripod-200m", [*SCAN, *changes])
-    job = SceneScan(scenario, folder, scene, tripods=(PLACE,))
+    job = SceneScan(scenario, folder, scene, tripods=tripods)
     report = scan_scene(job)
     return report, laspy.read(folder / "cloud.laz")
 
@@ -59,6 +68,7 @@ def test_points_have_their_fields_colour_and_its_luminance(tmp_path: Path, suffi
     assert wanted[inside].std() > 0.2 * wanted[inside].mean(), "fields differ"
 
 
+SHORT = ["scan.platform.turn_seconds=1"]
 LIT = ["colour.mode=lit", "scan.lines_per_second=150"]
 
 
@@ -85,19 +95,47 @@ def test_threads_change_no_byte(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 def test_an_error_while_others_wait_to_be_rendered_ends_the_scan(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """The second lot asks the main thread after this has gone on to its end."""
     monkeypatch.setattr(record, "RETURNS_AT_ONCE", 4_000)
-    monkeypatch.setattr(CloudFiles, "write", lambda *_: 1 / 0)
+    failed, lots, sample = Event(), count(), NodeLayers.sample
+
+    def ask_late(*arguments: Any) -> LayerValues:
+        if next(lots) > 0:
+            failed.wait(60.0)
+        return sample(*arguments)
+
+    def fail(*_: Any) -> None:
+        failed.set()
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(NodeLayers, "sample", ask_late)
+    monkeypatch.setattr(CloudFiles, "write", fail)
     shaded_scene(tmp_path)
     with pytest.raises(ZeroDivisionError):
-        scanned(tmp_path / "out", None, *LIT, "scan.threads=3")
+        scanned(tmp_path / "out", None, *SHORT, "scan.threads=3")
 
 
 @pytest.mark.slow
-def test_casters_give_the_same_colours(tmp_path: Path) -> None:
-    shaded_scene(tmp_path)
-    one, other = (scanned(tmp_path / name, None, *LIT, f"scan.caster={name}")[1] for name in ("embree", "bvhtree"))
-    assert len(other) == len(one)
+@pytest.mark.parametrize("road", [False, True])
+def test_casters_give_the_same_layers(tmp_path: Path, road: bool) -> None:
+    """Lit boards with a shadow on them, and base colour and layers of a road."""
+    if road:
+        empty_file()
+        scenario = load_scenario("rq31-600m", ["road.length=40", "road.half_width=20", "vegetation_detail=0.2"])
+        build_road(sample_road(scenario.road, scenario.seed), 0.02, 0.2)
+        bpy.context.view_layer.update()
+    else:
+        shaded_scene(tmp_path)
+    layers = ("roughness", "metallic", "specular")
+    changes = [f"cloud.attributes={json.dumps(layers)}", f"colour.mode={'unlit' if road else 'lit'}"]
+    changes += SHORT if road else []
+    one, other = (
+        scanned(tmp_path / name, None, *changes, f"scan.caster={name}", tripods=() if road else (PLACE,))[1]
+        for name in ("embree", "bvhtree")
+    )
+    assert len(other) == len(one) > 10_000
     same = np.ones(len(one), bool)
-    for name in ("red", "green", "blue", "intensity"):
-        same &= np.asarray(one[name]) == np.asarray(other[name])
+    for name in ("red", "green", "blue", "intensity", *layers):
+        same &= np.isclose(np.asarray(one[name], float), np.asarray(other[name], float), rtol=0.0, atol=1.01e-4)
     assert same.mean() > 0.9995
+    assert not road or all(np.ptp(np.asarray(one[name], float)) > 0.01 for name in ("red", "roughness", "specular"))
