@@ -1,8 +1,8 @@
 """`record`: a scan from its plan to the points, block by block, into whatever takes them."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from dataclasses import replace
 from itertools import islice
 from threading import current_thread, main_thread
@@ -66,8 +66,9 @@ def record(plan: ScanPlan, sink: Sink, timer: StageTimer | None = None) -> dict[
     total, done = plan.block_count(), 0
     with ExitStack() as stack:
         source = _open_layers(plan, stack, timer)
-        with timer.stage("scan"):
-            for result in scan_blocks(plan, source):
+        # Closed at once after an error, and not when the last of its traceback is gone: its threads use the source.
+        with timer.stage("scan"), closing(scan_blocks(plan, source)) as results:
+            for result in results:
                 sink.write(result)
                 done += result.blocks
                 timer.progress("scan", begin + (end - begin) * done / total)
@@ -94,7 +95,7 @@ def _open_layers(plan: ScanPlan, stack: ExitStack, timer: StageTimer) -> LayerSo
         return stack.enter_context(plan.services.layers(plan.request, lambda share: timer.progress("images", share)))
 
 
-def scan_blocks(plan: ScanPlan, source: LayerSource | None = None) -> Iterator[BlockResult]:
+def scan_blocks(plan: ScanPlan, source: LayerSource | None = None) -> Generator[BlockResult, None, None]:
     """Scan a plan's blocks in parallel and yield their results in order; only a few are held at a time.
 
     Where materials are worked out or rendered return by return, several blocks come as one.
