@@ -20,7 +20,7 @@ from synthroads_addon.jobs.scan.files import CloudFiles
 from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
 from synthroads_addon.materials.reflectance import reflectivity
 from synthroads_addon.sampling.road import sample_road
-from synthroads_addon.scanning import record
+from synthroads_addon.scanning import blocks, record
 from synthroads_addon.scanning.colour.colour import LayerValues
 from synthroads_addon.scenario.scenario import load_scenario
 from tests.helpers.scenes.checkered_scene import APART, build_checkered_scene, expected_colors
@@ -96,7 +96,8 @@ def test_an_error_while_others_wait_to_be_rendered_ends_the_scan(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The second lot asks the main thread after this has gone on to its end."""
-    monkeypatch.setattr(record, "RETURNS_AT_ONCE", 4_000)
+    monkeypatch.setattr(blocks, "RAYS_PER_BLOCK", 1 << 13)
+    monkeypatch.setattr(record, "RETURNS_AT_ONCE", 500)
     failed, lots, sample = Event(), count(), NodeLayers.sample
 
     def ask_late(*arguments: Any) -> LayerValues:
@@ -113,6 +114,7 @@ def test_an_error_while_others_wait_to_be_rendered_ends_the_scan(
     shaded_scene(tmp_path)
     with pytest.raises(ZeroDivisionError):
         scanned(tmp_path / "out", None, *SHORT, "scan.threads=3")
+    assert next(lots) > 1
 
 
 @pytest.mark.slow
