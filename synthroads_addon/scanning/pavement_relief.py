@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from ..base.arrays import Float
 from ..road.geometry import RoadGeometry
 from ..road.objects import Side
+from ..road.pavement.cover import LineFilms
 from ..road.pavement.outlines import CRACK_FILM, PATCH_FILM
 from ..road.pavement.surface import PavementSurface, damage_height
 from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Turnout
@@ -20,14 +21,17 @@ class _Kind(NamedTuple):
     Attributes:
         side: of the carriageway.
         tracks, joints: whether there are wheel tracks, and joints as well.
+        lifted: whether its faces lie on the films of lines where these are.
     """
 
     side: Side
     tracks: bool = True
     joints: bool = True
+    lifted: bool = False
 
 
-_KINDS = tuple(_Kind(side, *worn) for side in get_args(Side) for worn in ((False, False), (True, False), (True, True)))
+_WORN = ((False, False), (True, False), (True, False, True), (True, True))
+_KINDS = tuple(_Kind(side, *worn) for side in get_args(Side) for worn in _WORN)
 
 
 class _Block(NamedTuple):
@@ -54,6 +58,7 @@ class PavementRelief:
 
     def __init__(self, geometry: RoadGeometry) -> None:
         self._surface = PavementSurface(geometry)
+        self._films = {side: LineFilms(geometry, side) for side in geometry.sections}
         blocks = sorted(_blocks(geometry))
         self._first = np.array([block.first for block in blocks], np.int64)
         self._end = np.array([block.end for block in blocks], np.int64)
@@ -88,6 +93,8 @@ class PavementRelief:
             return waves
         station, offset = surface.geometry.alignment.project(place)
         worn = surface.worn_height(kind.side, station, offset, kind.joints)
+        if kind.lifted:
+            worn = worn - self._films[kind.side].thickness(station, offset)
         return np.where(surface.is_paved(kind.side, station, offset), waves + worn, 0.0)
 
 
@@ -116,5 +123,5 @@ def _damage_blocks(carriageway: Carriageway, first: int) -> Iterator[_Block]:
         yield _Block(number, number + 1, _Kind(side, False, False), damage_height(patch) - PATCH_FILM)
         number += 1
     for crack in pavement.cracks:
-        yield _Block(number, number + 1, _Kind(side, True, False), damage_height(crack) - CRACK_FILM)
+        yield _Block(number, number + 1, _Kind(side, True, False, True), damage_height(crack) - CRACK_FILM)
         number += 1

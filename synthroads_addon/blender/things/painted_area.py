@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ...base.classes import class_id
 from ...base.stepper import run_aside
 from ...road.paint import arrow_outlines, cut_outline, hatching_outlines
+from ...road.pavement.cover import LineFilms
 from ...road.pavement.field import (
     OPEN_CRACK,
     PAINT_AREA,
@@ -164,11 +165,13 @@ def _damaged(builder: ModelBuilder) -> Iterator[_Area]:
             for piece in _pieces(patch_outline(patch), *builder.stretch):
                 yield _Area(piece, PATCH_FILM, instance, code, False)
             part += 1
+        films = LineFilms(builder.geometry, carriageway.side)
         for crack in pavement.cracks:
             instance, code = numbers.part(name, part)[1], damage_code(SEALED_CRACK if crack.sealed else OPEN_CRACK)
-            for outline in crack_outlines(crack):
-                for piece in _pieces(outline, *builder.stretch):
-                    yield _Area(piece, CRACK_FILM, instance, code, pavement.kind == "concrete" and not crack.sealed)
+            legs = [piece for outline in crack_outlines(crack) for piece in _pieces(outline, *builder.stretch)]
+            for piece, film in films.cut(legs):
+                concrete = pavement.kind == "concrete" and not crack.sealed
+                yield _Area(piece, film + CRACK_FILM, instance, code, concrete)
             part += 1
 
 

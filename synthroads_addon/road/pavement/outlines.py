@@ -8,7 +8,8 @@ from ...base.arrays import Float
 from ..section import Corner, Crack, Patch
 
 CRACK_FILM, PATCH_FILM = 0.0004, 0.0008
-"""Height of the faces of cracks and patches above the pavement, m: below any marking's film, patches over cracks."""
+"""Height of the faces of cracks and patches above the pavement, m, patches over cracks. On a line cracks lie as far
+above its film, see `cover`; patches lie below any."""
 _SHARPEST = 0.5
 """Cosine of half the turn beyond which a line's corner is not mitred any further."""
 

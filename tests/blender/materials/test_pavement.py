@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
+
 import bpy
 import numpy as np
 import pytest
@@ -32,10 +34,11 @@ from synthroads_addon.road.pavement.field import (
     paint_look,
     place_code,
 )
-from synthroads_addon.road.pavement.outlines import crack_outlines, patch_outline
+from synthroads_addon.road.pavement.outlines import CRACK_FILM, crack_outlines, patch_outline
 from synthroads_addon.road.pavement.places import pavement_places
 from synthroads_addon.road.section import Patch
 from synthroads_addon.road.surroundings import Environment, MaterialVariation
+from synthroads_addon.scanning.pavement_relief import PavementRelief
 from synthroads_addon.scanning.scene.motion import ScannedScene
 from synthroads_addon.scanning.scene.surface_values import SurfaceInput
 from synthroads_addon.scanning.scene.target import Target
@@ -181,6 +184,31 @@ def test_patches_and_cracks_lie_where_the_parameters_say() -> None:
             assert np.min([_outside(places, other) for other in others], axis=0).max() < 0.02, kind
     target = Target(ScannedScene(mesh), EmbreeCaster, damages)
     assert set(np.unique(target.damage)) >= {DAMAGES.index(kind) for kind in ("none", "patch", "longitudinal crack")}
+
+
+def test_cracks_go_through_lines_and_are_as_deep_there_as_beside_them() -> None:
+    """Seen from above a crack is topmost all across a dash; its points lie as far below the pavement as beside it."""
+    data = deepcopy(base_road({}))
+    crack = {"kind": "transverse", "width": 0.04, "depth": 0.01, "lines": [[[11.0, -8.0], [11.0, -5.0]]]}
+    data["objects"]["right"]["pavement"] = {"cracks": [crack], "unevenness": 0.0, "wheel_track_depth": 0.0}
+    parameters = RoadParameters.from_dict(data)
+    geometry = RoadGeometry(parameters)
+    mesh = scene_mesh(objects=list(build_road(parameters, 0.005, 1.0, {"road", "damaged_areas"}).objects.values()))
+    station, offset = np.repeat([11.0, 11.5], 7), np.tile(np.linspace(-6.8, -6.2, 7), 2)
+    place = geometry.point(station, offset) + parameters.transform.translate
+    above = place - mesh.origin + [0.0, 0.0, 5.0]
+    faces = EmbreeCaster(mesh).cast(
+        above.astype(np.float32), np.tile(np.array([0.0, 0.0, -1.0], np.float32), (14, 1)), 20.0
+    )
+    (number,) = geometry.numbers.damages()
+    assert (mesh.instance_id[faces[:7]] == number).all()
+    on_film = np.abs(offset + 6.5) < 0.075
+    assert set(mesh.instance_id[faces[7:]][on_film[7:]]) == {geometry.numbers.parts["line"].first}
+    height = mesh.vertices[mesh.triangles[faces]].mean(axis=1)[:, 2] - (place - mesh.origin)[:, 2]
+    film = parameters.objects["line"].film_thickness
+    assert np.ptp(height[:7]) > film / 2.0
+    raised = PavementRelief(geometry).heights(np.full(7, number), place[:7])
+    assert raised == pytest.approx(-0.01 - CRACK_FILM - film * on_film[:7], abs=1e-6)
 
 
 def _inside(shape: Float, rng: np.random.Generator) -> Float:
