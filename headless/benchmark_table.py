@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from headless.text_table import markdown_table
+from synthroads_addon.base.text_table import markdown_table
 
 TABLE = "benchmark"
 """Name of the tables in a document."""

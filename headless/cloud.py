@@ -10,7 +10,7 @@ if __name__ == "__main__":
 
 from headless.commands import Outcome, entry, whole_number
 from headless.messages import progress_bar
-from headless.text_table import text_table
+from synthroads_addon.base.text_table import text_table
 
 _COLUMNS = (
     ("points", "points", "{:,}"),

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from headless.text_table import markdown_table
+from synthroads_addon.base.text_table import markdown_table
 from synthroads_addon.jobs.measure.tradeoff import ALIKE, KNOBS
 from synthroads_addon.scenario.colour import USUAL_RANGE, image_scale
 from synthroads_addon.scenario.scenario import load_scenario

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from headless.text_table import text_table
 from synthroads_addon.base.arrays import Float, Int
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.text_table import text_table
 
 from ..data.classes import IGNORED
 from .metrics import Metric, Spread, finite_values, markdown, nan_to_none

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
-from ..base.main_thread import MainThreadCalls
+from ..base.turns.main_thread import MainThreadCalls
 from ..materials.table import Material
 from ..scanning.colour.colour import LayerSource, takes_nodes
 from ..scanning.colour.request import LayerRequest, material_layers

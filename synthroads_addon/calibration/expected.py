@@ -2,9 +2,9 @@
 
 Everything that a scan does to a point's intensity is done here by the scanner's own functions: the surface
 (`materials.surfaces.brightness_of`), its variation (`materials.surfaces`), the footprint's rays
-(`scanning.beam`), distance and air (`scanning.radiometry.received_intensity`). Only the casting is left out: what is
-seen is a plane of the material, or a strip of it on another one. Linear intensities are as in `PointBlock`: a white
-target struck at a right angle at 1 m gives 1; `Receiver` says what a device writes into its files for that.
+(`scanning.beam`), distance and air (`scanning.receiving.radiometry.received_intensity`). Only the casting is left
+out: what is seen is a plane of the material, or a strip of it on another one. Linear intensities are as in
+`PointBlock`: a white target struck at a right angle at 1 m gives 1; `Receiver` says what a device writes for that.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from ..materials.surfaces import Reflection, brightness_of, spread_factors, surf
 from ..materials.table import Material
 from ..scanning.beam import RINGS, beam_pattern, beam_radii
 from ..scanning.colour.colour import decode_srgb
-from ..scanning.radiometry import received_intensity
+from ..scanning.receiving.radiometry import received_intensity
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 from ..base.arrays import Float, Index
 from .devices.device import ScannerSetting
 from .pulses import Pulses
-from .radiometry import received_intensity
+from .receiving.radiometry import received_intensity
 from .returns import LEAST_REFLECTANCE, BothSignals, HitSignals
 from .trace import Hits, TracedRays
 

@@ -11,11 +11,11 @@ from ..cloud.points import NO_MATERIAL
 from ..materials.reflectance import reflectivity
 from ..materials.surfaces import Surfaces
 from .colour.colour import LayerSource, LayerValues, SeenPoints, sample_points
-from .detector import Readout
 from .plan import ScanPlan
-from .radiometry import DARKEST_DB, decibels
+from .receiving.detector import Readout
+from .receiving.radiometry import DARKEST_DB, decibels
+from .receiving.response import range_corrected
 from .relief import shift_along_normals
-from .response import range_corrected
 from .returns import number_returns
 from .scan import BlockResult
 

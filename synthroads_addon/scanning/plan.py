@@ -26,8 +26,8 @@ from .forecast import ScanForecast, forecast_scan
 from .noise import Noise
 from .pavement_relief import PavementRelief
 from .platforms.path import Path, Strip
+from .receiving.response import laser_gains
 from .relief import MicroRelief
-from .response import laser_gains
 from .scene.caster import Caster
 from .scene.mesh import SceneMesh
 from .scene.target import Target

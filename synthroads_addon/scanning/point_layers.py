@@ -8,7 +8,7 @@ import numpy as np
 from ..base.arrays import AnyArray, Float, Index
 from .devices.device import ScannerSetting
 from .pulses import Pulses
-from .radiometry import decibels
+from .receiving.radiometry import decibels
 from .scene.target import Target
 
 

@@ -10,7 +10,6 @@ from ..cloud.points import PointBlock, concatenate, make_block
 from ..materials.surfaces import brightness_of, spread_factors
 from .beam import conical_directions, cylindrical_offsets
 from .colour.colour import SeenPoints
-from .detector import Readout, detect_echoes
 from .devices.shots import shots
 from .effects import apply_effect
 from .knots import Track
@@ -19,12 +18,13 @@ from .plan import ScanPlan
 from .platforms.path import Strip
 from .point_layers import MeasuredPoints, fill_layers, place_points
 from .pulses import Errors, Poses, Pulses, may_hit_scene, turn_vectors
-from .radiometry import received_intensity
-from .range_noise import range_sigma, range_walk, tail_factors
+from .receiving.detector import Readout, detect_echoes
+from .receiving.radiometry import received_intensity
+from .receiving.range_noise import range_sigma, range_walk, tail_factors
+from .receiving.waveform import merge_peaks
 from .returns import LEAST_REFLECTANCE, BothSignals, Echoes, HitSignals, group_returns, number_returns
 from .strip_errors import strip_gain, with_strip_errors
 from .trace import Hits, Rays, TracedRays, trace
-from .waveform import merge_peaks
 
 _MOTION_KNOTS = 0.01
 """Seconds between two poses of a moving vehicle: it turns by less than a milliradian meanwhile."""

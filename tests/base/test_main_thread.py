@@ -8,7 +8,7 @@ from threading import current_thread, main_thread
 import pytest
 
 from synthroads_addon.base.errors import Cancelled
-from synthroads_addon.base.main_thread import MainThreadCalls
+from synthroads_addon.base.turns.main_thread import MainThreadCalls
 
 
 def where() -> bool:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import pytest
 
 from synthroads_addon.base.errors import Cancelled
-from synthroads_addon.base.stepper import Stepper, run_aside, run_in_caller, yield_if_due, yield_now
+from synthroads_addon.base.turns.stepper import Stepper, run_aside, run_in_caller, yield_if_due, yield_now
 
 
 def straight(work: Callable[[], object]) -> object:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from synthroads_addon.materials.reflectance import facet_terms, returned_share
-from synthroads_addon.scanning.radiometry import received_intensity
+from synthroads_addon.scanning.receiving.radiometry import received_intensity
 
 
 def intensity_of(

@@ -43,7 +43,7 @@ CASES = {
     "scan scene.glb -d velodyne-hdl": {"velodyne-hdl-32e", "velodyne-hdl-64e"},
     "dataset re": {"reference", "recipe.yaml"},
     "train centerline-s": {"centerline-sequence", "centerline-single"},
-    "cloud ": {"info", "subsample", "map-intensity", "convert", "preview"},
+    "cloud ": {"info", "subsample", "map-intensity", "convert", "preview", "merge", "crop", "tile"},
     "cloud convert mine --classes 1": {"17"},
     "tradeoff --knobs fid": {"fidelity"},
     "twin mine.json --twin opend": {"opendrive"},

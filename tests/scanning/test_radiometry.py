@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from synthroads_addon.materials.reflectance import EDGE_ON, facet_slope, facet_terms, reflectivity, returned_share
-from synthroads_addon.scanning.radiometry import NEAREST, received_intensity, saturate
+from synthroads_addon.scanning.receiving.radiometry import NEAREST, received_intensity, saturate
 from tests.helpers.laser_equation import intensity_of
 
 RANGES = np.array([1.0, 1.7, 5.0, 20.0, 60.0, 123.4, 250.0, 500.0])

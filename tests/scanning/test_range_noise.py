@@ -7,8 +7,8 @@ import pytest
 from scipy import stats
 
 from synthroads_addon.scanning.noise import Noise
-from synthroads_addon.scanning.range_noise import range_sigma
 from synthroads_addon.scanning.receiver import Receiver
+from synthroads_addon.scanning.receiving.range_noise import range_sigma
 from tests.helpers.scenes.scan_scenes import Standing, plane, scan_block, scan_of
 
 SIGMA = 0.01

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from synthroads_addon.scanning.receiver import Receiver
-from synthroads_addon.scanning.response import laser_gains, overlap_share, range_corrected, read_power
+from synthroads_addon.scanning.receiving.response import laser_gains, overlap_share, range_corrected, read_power
 from tests.helpers.scenes.scan_scenes import Standing, plane, scan_block, scan_of
 from tests.helpers.scenes.scanners import preset
 

@@ -6,8 +6,8 @@ import numpy as np
 from scipy import stats
 
 from synthroads_addon.scanning.receiver import Receiver
+from synthroads_addon.scanning.receiving.waveform import FULL_WIDTH, have_one_peak, merge_peaks
 from synthroads_addon.scanning.returns import Echoes
-from synthroads_addon.scanning.waveform import FULL_WIDTH, have_one_peak, merge_peaks
 from tests.helpers.scenes.scan_scenes import ORIGIN, mesh_of, middle_pulses, scan_of
 
 WIDTH = 0.75

@@ -8,7 +8,7 @@ from contextlib import ExitStack, contextmanager
 import bpy
 
 from ...base.errors import InputError
-from ...base.main_thread import MainThreadCalls
+from ...base.turns.main_thread import MainThreadCalls
 from ...scanning.colour.colour import (
     MATERIAL_LAYERS,
     ColourSettings,

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ...base.arrays import AnyArray, Bool, Float32, Index, UInt16
-from ...base.main_thread import MainThreadCalls
+from ...base.turns.main_thread import MainThreadCalls
 from ...scanning.colour.colour import (
     FROM_NODES,
     LayerSource,

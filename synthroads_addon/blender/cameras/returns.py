@@ -12,7 +12,7 @@ import numpy as np
 from mathutils import Matrix
 from numpy.typing import NDArray
 
-from ...base.main_thread import MainThreadCalls
+from ...base.turns.main_thread import MainThreadCalls
 from ...scanning.colour.colour import FROM_MATERIAL, FROM_RETURN, LayerValues, MaterialLayers, SeenPoints
 from .exr import write_image
 from .stage import SKY_GROUP, SUN_GROUP, RenderStage

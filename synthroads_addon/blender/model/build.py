@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.errors import InputError
-from ...base.stepper import Stepper
+from ...base.turns.stepper import Stepper
 from ...road.geometry import RoadGeometry
 from ...road.objects import LineObject, PointObject
 from ...road.parameters import RoadParameters

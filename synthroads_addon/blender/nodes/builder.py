@@ -29,7 +29,7 @@ from typing import Any
 import bpy
 
 from ...base.files import PRESETS
-from ...base.stepper import yield_if_due
+from ...base.turns.stepper import yield_if_due
 from .layout import arrange
 
 KEY = "synthroads_key"

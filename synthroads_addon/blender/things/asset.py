@@ -11,7 +11,7 @@ import numpy as np
 from mathutils import Vector
 
 from ...base.errors import InputError
-from ...base.stepper import run_in_caller
+from ...base.turns.stepper import run_in_caller
 from ...road.terrain import surface_elevation
 from ...road.things.asset import Asset
 from ...scanning.scene.mesh_files import check_mesh_file

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.stepper import run_aside, yield_if_due, yield_now
+from ...base.turns.stepper import run_aside, yield_if_due, yield_now
 from ...road.geometry import RoadGeometry
 from ...road.objects import PointObject, RoadObject
 from ...road.parameters import RoadParameters

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.classes import class_id
-from ...base.stepper import run_aside
+from ...base.turns.stepper import run_aside
 from ...road.paint import arrow_outlines, cut_outline, hatching_outlines
 from ...road.pavement.cover import LineFilms
 from ...road.pavement.field import (

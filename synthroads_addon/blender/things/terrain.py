@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.classes import class_id
-from ...base.stepper import run_aside
+from ...base.turns.stepper import run_aside
 from ...road.alignment import clip_offset
 from ...road.geometry import RoadGeometry
 from ...road.surroundings import Terrain

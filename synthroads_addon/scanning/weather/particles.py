@@ -16,9 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.arrays import Float
-from ..detector import PROVISIONAL_THRESHOLD
 from ..devices.device import ScannerSetting
 from ..effects import EchoChanges, PulseHits
+from ..receiving.detector import PROVISIONAL_THRESHOLD
 
 SMALLEST = 0.05
 """Diameter of the smallest particles, mm."""

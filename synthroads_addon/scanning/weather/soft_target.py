@@ -18,8 +18,8 @@ import numpy as np
 from ...base.arrays import Float
 from ..devices.device import ScannerSetting
 from ..effects import EchoChanges, PulseHits
-from ..radiometry import received_intensity
-from ..response import overlap_share
+from ..receiving.radiometry import received_intensity
+from ..receiving.response import overlap_share
 
 _BACKSCATTER = 0.046
 """Backscatter times the meteorological optical range, 1/sr."""

@@ -20,7 +20,7 @@ from threading import Event, Thread
 from typing import Any, Generic, TypeAlias, TypeVar
 
 from ...base.errors import Cancelled
-from ...base.main_thread import MainThreadCalls
+from ...base.turns.main_thread import MainThreadCalls
 
 T = TypeVar("T")
 Report: TypeAlias = Callable[[float], None]

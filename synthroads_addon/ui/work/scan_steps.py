@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Self
 
 from ...base.files import output_folder
-from ...base.main_thread import MainThreadCalls
 from ...base.progress import StageTimer
 from ...base.scratch.folders import scratch_folder
+from ...base.turns.main_thread import MainThreadCalls
 from ...blender.scene.evaluated import CopiedScene
 from ...blender.services import SnapshotServices
 from ...scanning.colour.colour import takes_nodes

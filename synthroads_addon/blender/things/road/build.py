@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ....base.stepper import run_aside
+from ....base.turns.stepper import run_aside
 from ....road.geometry import RoadGeometry, sections_of
 from ....road.objects import nominal_width
 from ....road.parameters import RoadParameters

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ....base.stepper import run_aside
+from ....base.turns.stepper import run_aside
 from ....road.section import Median
 from ....road.surroundings import Terrain, Vegetation
 from ....road.vegetation.plants import ROADSIDE_SHARE, SEEDS, WILD_GRASSES, plant_places

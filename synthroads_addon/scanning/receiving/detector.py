@@ -4,12 +4,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.arrays import ArrayRows, Bool, Float, Float32, Index, UInt8
-from .devices.device import ScannerSetting
-from .pulses import Errors
-from .receiver import number_echoes, values_of_echoes
+from ...base.arrays import ArrayRows, Bool, Float, Float32, Index, UInt8
+from ..devices.device import ScannerSetting
+from ..pulses import Errors
+from ..receiver import number_echoes, values_of_echoes
+from ..returns import Echoes, number_returns
 from .response import overlap_share, read_power
-from .returns import Echoes, number_returns
 
 PROVISIONAL_THRESHOLD = 0.25
 """Share of the detector's threshold that keeps an echo while its intensity is still to change: no echo is expected to

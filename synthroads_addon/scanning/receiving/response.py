@@ -23,9 +23,9 @@ broadcasting system).
 
 import numpy as np
 
-from ..base.arrays import Float, Index, UInt8
-from ..base.random_streams import stream
-from .devices.device import ScannerSetting
+from ...base.arrays import Float, Index, UInt8
+from ...base.random_streams import stream
+from ..devices.device import ScannerSetting
 from .radiometry import saturate
 
 MOST_CHANNELS = 256

@@ -9,7 +9,7 @@ from queue import Empty, SimpleQueue
 from threading import Lock, current_thread, main_thread
 from typing import Any, TypeVar
 
-from .errors import Cancelled
+from ..errors import Cancelled
 
 T = TypeVar("T")
 

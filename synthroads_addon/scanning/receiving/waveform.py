@@ -13,8 +13,8 @@ behind it. The peak is found by the fixed point r = sum of w r / sum of w with t
 
 import numpy as np
 
-from ..base.arrays import Bool, Float, Index
-from .returns import Echoes
+from ...base.arrays import Bool, Float, Index
+from ..returns import Echoes
 
 FULL_WIDTH = 2.0 * np.sqrt(2.0 * np.log(2.0))
 """Full width at half height of a Gaussian over its rms width."""

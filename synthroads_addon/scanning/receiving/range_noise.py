@@ -21,8 +21,8 @@ logarithm of the speckle, which has its mean taken off.
 
 import numpy as np
 
-from ..base.arrays import Float, Float32
-from .devices.device import ScannerSetting
+from ...base.arrays import Float, Float32
+from ..devices.device import ScannerSetting
 from .waveform import FULL_WIDTH
 
 _LEAST_COSINE = 1e-3

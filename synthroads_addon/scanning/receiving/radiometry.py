@@ -8,7 +8,7 @@ at 1 m, gives 1.
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.arrays import Float, Float32
+from ...base.arrays import Float, Float32
 
 DARKEST_DB = -300.0
 """Received power in decibels of what sends nothing back."""
