@@ -12,7 +12,7 @@ from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import load_scenario
 
-CHECKSUM = "5b25c765546f2cf66720fee259eea97d0d79eac2a65900f2290eab1f11a24653"
+CHECKSUM = "2ebfc839cd3eac303cf3896705f1965acc9c9b8042f5b5fffefab0fe6389f0fc"
 EVERYTHING = ["exits=1", "entries=1", "emergency_bays=1"]
 
 
