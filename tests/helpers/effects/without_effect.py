@@ -32,9 +32,8 @@ def twin(name: str) -> Callable[[RoadParameters], Any]:
 
 
 SAYS: dict[str, Callable[[RoadParameters], Any]] = {
-    **{f"metadata.{name}": set_of for name in ("identifier", "title", "seed", "generator", "referenceSystem")},
+    **{f"metadata.{name}": set_of for name in ("identifier", "title", "generator", "referenceSystem")},
     "design_class": findings,
-    "Arrow.carriageway": twin("cityjson"),
     **{f"Asset.twin_types.{name}": twin(name) for name in ("cityjson", "ifc", "opendrive")},
     "LineMarking.turnout": findings,
 }
