@@ -4,7 +4,7 @@ Everything that a scan does to a point's intensity is done here by the scanner's
 (`materials.surfaces.brightness_of`), its variation (`materials.surfaces`), the footprint's rays
 (`scanning.beam`), distance and air (`scanning.receiving.radiometry.received_intensity`). Only the casting is left
 out: what is seen is a plane of the material, or a strip of it on another one. Linear intensities are as in
-`PointBlock`: a white target struck at a right angle at 1 m gives 1; `Receiver` says what a device writes for that.
+`PointBlock`: a white target struck at a right angle at 1 m gives 1; `ReceiverModel` says what a device writes for that.
 """
 
 from dataclasses import dataclass
@@ -104,7 +104,7 @@ class Views:
 
 
 @dataclass(frozen=True)
-class Receiver:
+class ReceiverModel:
     """Model of a device's response: beam divergence, attenuation, range correction, and linear or dB storage.
 
     Attributes:
@@ -157,7 +157,7 @@ class Expectation:
     def __init__(
         self,
         views: Views,
-        receiver: Receiver,
+        receiver: ReceiverModel,
         reflection: Reflection = "lambert",
         texture: Texture | None = None,
         strip: float | None = None,

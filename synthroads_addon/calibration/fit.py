@@ -13,7 +13,7 @@ from ..base.noise import noise_field
 from ..materials.reflectance import LUMINANCE, facet_terms
 from ..materials.surfaces import OCTAVES
 from ..materials.table import Material
-from .expected import Expectation, Receiver
+from .expected import Expectation, ReceiverModel
 
 Function = Callable[[Float], Float]
 
@@ -56,7 +56,7 @@ def fit_level_and_spreads(
     expectation: Expectation,
     material: Material,
     quantiles: Float,
-    receiver: Receiver,
+    receiver: ReceiverModel,
     beside: tuple[Material, float] | None = None,
     spread: bool = True,
 ) -> Fit:

@@ -18,7 +18,7 @@ from ..cloud.selection.pavement import RoadClasses, road_classes
 from ..materials.surfaces import Reflection
 from ..materials.table import Material, materials, read_material_table, write_material_table
 from ..scanning.devices.device import load_device
-from .expected import Expectation, Receiver, Texture, Views, chosen_views, read_texture
+from .expected import Expectation, ReceiverModel, Texture, Views, chosen_views, read_texture
 from .fit import (
     FITTED,
     SHOWN,
@@ -71,7 +71,7 @@ class CalibrationJob:
         scanner: map coordinates of the one place that it was seen from, instead of angles and ranges.
         reflection: as in a scenario.
         attenuation: of the air, 1/m of range.
-        range_corrected, decibels: see `Receiver`.
+        range_corrected, decibels: see `ReceiverModel`.
         fit: whether materials and gain are fitted; else only the gain is, if there is a cloud.
         parts: what is fitted besides the brightness.
         hold: material whose brightness stays as it is.
@@ -98,10 +98,10 @@ class CalibrationJob:
     scene: Mapping[str, Material] = field(default_factory=dict)
 
     @property
-    def receiver(self) -> Receiver:
+    def receiver(self) -> ReceiverModel:
         """Return the response model of the job's device, a ray without divergence if none is named."""
         mrad = load_device(self.device).divergence_mrad if self.device else (0.0, 0.0)
-        return Receiver((mrad[0] * 1e-3, mrad[1] * 1e-3), self.attenuation, self.range_corrected, self.decibels)
+        return ReceiverModel((mrad[0] * 1e-3, mrad[1] * 1e-3), self.attenuation, self.range_corrected, self.decibels)
 
     def initial_materials(self) -> dict[str, Material]:
         """Return the materials, by name, that the calibration starts from: shipped, the scene's, the user's table's."""

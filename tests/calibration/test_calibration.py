@@ -13,7 +13,14 @@ from headless.cli import main
 from synthroads_addon.base.arrays import otsu_threshold
 from synthroads_addon.base.errors import InputError, OutputError
 from synthroads_addon.base.noise import noise_field
-from synthroads_addon.calibration.expected import Expectation, Receiver, Views, chosen_views, read_texture, texture_of
+from synthroads_addon.calibration.expected import (
+    Expectation,
+    ReceiverModel,
+    Views,
+    chosen_views,
+    read_texture,
+    texture_of,
+)
 from synthroads_addon.calibration.fit import BRIGHTEST, brighten_material, common_gain, fitted_slope, fitted_wavelength
 from synthroads_addon.calibration.job import (
     Calibration,
@@ -43,7 +50,7 @@ def even(**values: float) -> Material:
 @pytest.mark.parametrize("reflection", ["lambert", "oren_nayar"])
 def test_expected_intensities_are_the_laser_equations(reflection) -> None:
     views = chosen_views((0.0, 30.0, 75.0), (20.0, 90.0))
-    expectation = Expectation(views, Receiver(attenuation=0.002), reflection)
+    expectation = Expectation(views, ReceiverModel(attenuation=0.002), reflection)
     args = (np.cos(expectation.incidence), expectation.distance)
     wanted = intensity_of(ASPHALT.reflectivity, *args, ASPHALT.slope if reflection == "oren_nayar" else 0.0, 0.002)
     assert expectation.linear_intensities(ASPHALT) == pytest.approx(wanted)
@@ -55,24 +62,24 @@ def test_expected_intensities_are_the_laser_equations(reflection) -> None:
 
 def test_many_views_are_a_sample_of_all() -> None:
     distance = np.linspace(50.0, 100.0, 100_000)
-    seen = Expectation(Views(np.zeros(len(distance)), distance), Receiver()).distance
+    seen = Expectation(Views(np.zeros(len(distance)), distance), ReceiverModel()).distance
     assert np.quantile(seen, (0.1, 0.5, 0.9)) == pytest.approx([55.0, 75.0, 95.0], rel=0.01)
 
 
 def test_spread_keeps_the_mean_and_is_two_sided() -> None:
-    expectation = Expectation(chosen_views((0.0,), (1.0,)), Receiver())
+    expectation = Expectation(chosen_views((0.0,), (1.0,)), ReceiverModel())
     values = expectation.linear_intensities(even(spread_below=0.4, spread_above=0.2))
     assert values.mean() == pytest.approx(ASPHALT.reflectivity, rel=0.01)
     low, middle, high = np.log(np.quantile(values, (0.25, 0.5, 0.75)))
     assert (middle - low) / (high - middle) == pytest.approx(2.0, rel=0.06)
-    again = Expectation(chosen_views((0.0,), (1.0,)), Receiver())
+    again = Expectation(chosen_views((0.0,), (1.0,)), ReceiverModel())
     assert np.array_equal(values, again.linear_intensities(even(spread_below=0.4, spread_above=0.2)))
 
 
 def test_a_strip_narrower_than_the_footprint_is_mixed_with_what_lies_beside() -> None:
     views = chosen_views((0.0,), (100.0,))
     wide, narrow = (
-        Expectation(views, Receiver((2e-3, 2e-3), range_corrected=True), strip=width) for width in (2.0, 0.05)
+        Expectation(views, ReceiverModel((2e-3, 2e-3), range_corrected=True), strip=width) for width in (2.0, 0.05)
     )
     assert np.median(wide.linear_intensities(PAINT, ASPHALT)) == pytest.approx(
         PAINT.reflectivity + PAINT.retroreflection
@@ -86,8 +93,8 @@ def test_a_strip_narrower_than_the_footprint_is_mixed_with_what_lies_beside() ->
 
 def test_receiver_writes_linear_numbers_or_decibels_and_back() -> None:
     values = np.array([1e-6, 0.2, 5.0])
-    assert np.array_equal(Receiver().to_stored(values), values)
-    decibels = Receiver(decibels=30.0)
+    assert np.array_equal(ReceiverModel().to_stored(values), values)
+    decibels = ReceiverModel(decibels=30.0)
     assert decibels.to_stored(np.array([1.0, 10.0])) == pytest.approx([0.0, 65535.0 / 3.0])
     assert decibels.to_linear(decibels.to_stored(values)) == pytest.approx(values)
 
@@ -99,7 +106,7 @@ def test_a_texture_gives_the_spread_of_its_pixels_over_the_footprint(tmp_path: P
     assert texture.values.mean() == pytest.approx(1.0)
     assert texture.mean_color == pytest.approx((0.2, 0.2, 0.2), abs=0.01)
     views = chosen_views((0.0,), (50.0,))
-    expectations = (Expectation(views, Receiver((d, d)), texture=texture) for d in (0.0, 2e-3))
+    expectations = (Expectation(views, ReceiverModel((d, d)), texture=texture) for d in (0.0, 2e-3))
     fine, coarse = (expectation.linear_intensities(ASPHALT) for expectation in expectations)
     ratio = (ASPHALT.specular + 0.15) / (ASPHALT.specular + 0.05)
     assert np.quantile(fine, 0.9) / np.quantile(fine, 0.1) == pytest.approx(ratio, rel=1e-6)

@@ -6,7 +6,7 @@ import bpy
 
 from ...road.pavement.field import (
     Look,
-    Place,
+    PavementPlace,
     Shape,
     Wear,
     asphalt_height,
@@ -87,7 +87,7 @@ def _build(tree: Tree, kind: str) -> None:
     about = "Length of slabs, depths of joints and wheel tracks (m)"
     shapes = tree.input("Shape", "Vector", description=about) if kind != "paint" else None
     with tree.frame("Field of station and offset"):
-        parts = Place(*(op.component(place, axis) for axis in "XYZ"))
+        parts = PavementPlace(*(op.component(place, axis) for axis in "XYZ"))
         if shapes is None:
             look = paint_look(calculus, parts, wear)
         else:

@@ -38,7 +38,7 @@ LANE, SHOULDER, BAY = 1, 9, 10
 of which nothing is known: it has its material's mean."""
 PAINT_CROSSED, PAINT_BESIDE, PAINT_AREA, PAINT_IN_LANE = 16, 17, 18, 19
 """Kinds of markings by the traffic that wears them: lines that lane changes cross, lines beside the lanes, hatched
-areas, and what lies in a lane, of which `Place.across` counts from the lane's middle."""
+areas, and what lies in a lane, of which `PavementPlace.across` counts from the lane's middle."""
 PATCH, OPEN_CRACK, SEALED_CRACK = 24, 25, 26
 """Kinds of repaired and damaged places; above the strips' and the markings'."""
 
@@ -101,7 +101,7 @@ class Wear(NamedTuple):
     seed: Any
 
 
-class Place(NamedTuple):
+class PavementPlace(NamedTuple):
     """Where a place lies on the pavement.
 
     Attributes:
@@ -161,7 +161,7 @@ class _Strip(NamedTuple):
     oil: Any
 
 
-def _decode(m: Calculus, place: Place) -> _Strip:
+def _decode(m: Calculus, place: PavementPlace) -> _Strip:
     owner = m.floor(place.code)
     kind = owner - m.floor(owner * (1.0 / CODES)) * CODES
     aside = m.absolute(place.across) - _TRACK / 2.0
@@ -181,7 +181,7 @@ def _line(m: Calculus, distance: Any, width: float) -> Any:
     return m.smaller(m.larger((width / 2.0 - distance) * (1.0 / _RAMP) + 0.5, 0.0), 1.0)
 
 
-def _slow(m: Calculus, place: Place, owner: Any, seed: Any, spacing: float = _SLOW) -> Any:
+def _slow(m: Calculus, place: PavementPlace, owner: Any, seed: Any, spacing: float = _SLOW) -> Any:
     """Return a smooth variation along the road from -1 to 1, of each lane for itself, by knots (m) apart."""
     knots = place.station * (1.0 / spacing)
     knot = m.floor(knots)
@@ -191,7 +191,7 @@ def _slow(m: Calculus, place: Place, owner: Any, seed: Any, spacing: float = _SL
     return first + (second - first) * weight
 
 
-def _asphalt_joint(m: Calculus, place: Place, strip: _Strip) -> Any:
+def _asphalt_joint(m: Calculus, place: PavementPlace, strip: _Strip) -> Any:
     """Return 1 on the paver's joints: beside each lane's outer boundary, and between two days' work."""
     within = place.station % _DAY
     day = _line(m, m.smaller(within, _DAY - within), _SEAM)
@@ -199,7 +199,7 @@ def _asphalt_joint(m: Calculus, place: Place, strip: _Strip) -> Any:
     return m.larger(seam, day)
 
 
-def _slab_joint(m: Calculus, place: Place, strip: _Strip, slab_length: Any) -> Any:
+def _slab_joint(m: Calculus, place: PavementPlace, strip: _Strip, slab_length: Any) -> Any:
     """Return 1 on the joints between slabs of concrete."""
     within = place.station % slab_length  # exact in float32 as well, which a difference of large quotients isn't
     across = m.smaller(within, slab_length - within)
@@ -213,13 +213,13 @@ def _height(m: Calculus, strip: _Strip, joint: Any, shape: Shape) -> Any:
     return (strip.wear * strip.track * shape.tracks + joint * shape.joints) * paved * -1.0
 
 
-def asphalt_height(m: Calculus, place: Place, shape: Shape) -> Any:
+def asphalt_height(m: Calculus, place: PavementPlace, shape: Shape) -> Any:
     """Return the height (m) of asphalt above its mean surface at places; 0 on patches and cracks."""
     strip = _decode(m, place)
     return _height(m, strip, _asphalt_joint(m, place, strip), shape)
 
 
-def concrete_height(m: Calculus, place: Place, shape: Shape, slab_length: Any) -> Any:
+def concrete_height(m: Calculus, place: PavementPlace, shape: Shape, slab_length: Any) -> Any:
     """Return the height (m) of concrete above its mean surface at places; 0 on patches and cracks."""
     strip = _decode(m, place)
     return _height(m, strip, _slab_joint(m, place, strip, slab_length), shape)
@@ -239,7 +239,7 @@ def _repaired(m: Calculus, strip: _Strip, look: Look) -> Look:
     )
 
 
-def asphalt_look(m: Calculus, place: Place, wear: Wear) -> Look:
+def asphalt_look(m: Calculus, place: PavementPlace, wear: Wear) -> Look:
     """Return how asphalt differs from its mean at places.
 
     Args:
@@ -258,7 +258,7 @@ def asphalt_look(m: Calculus, place: Place, wear: Wear) -> Look:
     return _repaired(m, strip, Look(brightness, roughness))
 
 
-def concrete_look(m: Calculus, place: Place, wear: Wear, slab_length: Any) -> Look:
+def concrete_look(m: Calculus, place: PavementPlace, wear: Wear, slab_length: Any) -> Look:
     """Return how concrete differs from its mean at places.
 
     Args:
@@ -279,7 +279,7 @@ def concrete_look(m: Calculus, place: Place, wear: Wear, slab_length: Any) -> Lo
     return _repaired(m, strip, Look(brightness, roughness))
 
 
-def paint_look(m: Calculus, place: Place, wear: Wear) -> Look:
+def paint_look(m: Calculus, place: PavementPlace, wear: Wear) -> Look:
     """Return how a marking differs from its mean at places: its film goes where traffic crosses it.
 
     Args:

@@ -7,7 +7,7 @@ import numpy as np
 from ...base.arrays import Float
 from ..section_geometry import CarriagewaySection
 from ..turnout_geometry import TURNOUT_STRIPS
-from .field import BAY, LANE, SHOULDER, Place, place_code
+from .field import BAY, LANE, SHOULDER, PavementPlace, place_code
 
 
 def strip_lanes(kinds: tuple[str, ...], lanes: int) -> list[tuple[int, int]]:
@@ -30,7 +30,7 @@ def strip_lanes(kinds: tuple[str, ...], lanes: int) -> list[tuple[int, int]]:
     return result
 
 
-def pavement_places(section: CarriagewaySection, station: Float, offset: Float) -> Place:
+def pavement_places(section: CarriagewaySection, station: Float, offset: Float) -> PavementPlace:
     """Return the places (N,) of stations and offsets (N,) on a carriageway."""
     distances = section.distances(station)
     distance = section.carriageway.sign * offset
@@ -39,4 +39,4 @@ def pavement_places(section: CarriagewaySection, station: Float, offset: Float) 
     rows = np.arange(len(distance))
     inner, outer = distances[rows, source], distances[rows, source + 1]
     code = place_code(kind, int(section.carriageway.side == "left"), (outer - inner) / 2.0)
-    return Place(np.asarray(station, np.float64), distance - (inner + outer) / 2.0, code)
+    return PavementPlace(np.asarray(station, np.float64), distance - (inner + outer) / 2.0, code)

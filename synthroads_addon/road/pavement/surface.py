@@ -24,7 +24,7 @@ _CELL = 10.0
 
 
 @dataclass(frozen=True)
-class _Area:
+class _DamageArea:
     """A convex face of a patch or crack.
 
     Attributes:
@@ -116,11 +116,11 @@ class PavementSurface:
         return self.worn_height(side, station[rows], offset[rows], joints=False)
 
     @cached_property
-    def _areas(self) -> dict[Side, dict[int, list[_Area]]]:
+    def _areas(self) -> dict[Side, dict[int, list[_DamageArea]]]:
         """The faces of cracks, then of patches, of each side by the stretch that they lie on."""
-        result: dict[Side, dict[int, list[_Area]]] = {}
+        result: dict[Side, dict[int, list[_DamageArea]]] = {}
         for side, section in self.geometry.sections.items():
-            cells: dict[int, list[_Area]] = {}
+            cells: dict[int, list[_DamageArea]] = {}
             for area in _faces(section.carriageway.pavement):
                 for cell in range(int(area.low // _CELL), int(area.high // _CELL) + 1):
                     cells.setdefault(cell, []).append(area)
@@ -128,7 +128,7 @@ class PavementSurface:
         return result
 
 
-def _faces(pavement: Pavement) -> Iterator[_Area]:
+def _faces(pavement: Pavement) -> Iterator[_DamageArea]:
     for crack in pavement.cracks:
         for outline in crack_outlines(crack):
             yield _area(outline, damage_height(crack), levels=False)
@@ -143,10 +143,10 @@ def damage_height(item: Patch | Crack) -> float:
     return item.height if isinstance(item, Patch) else -item.depth
 
 
-def _area(outline: Float, height: float, levels: bool) -> _Area:
+def _area(outline: Float, height: float, levels: bool) -> _DamageArea:
     """Return the face of a convex outline (K, 2) that goes against the clock."""
     edges = np.roll(outline, -1, axis=0) - outline
     normal = np.column_stack([edges[:, 1], -edges[:, 0]])
     distance = np.einsum("ij,ij->i", normal, outline)
     low, high = outline[:, 0].min(), outline[:, 0].max()
-    return _Area(np.column_stack([normal, distance]), float(low), float(high), height, levels)
+    return _DamageArea(np.column_stack([normal, distance]), float(low), float(high), height, levels)

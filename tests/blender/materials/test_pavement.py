@@ -24,7 +24,7 @@ from synthroads_addon.road.pavement.field import (
     PAINT_CROSSED,
     PAINT_IN_LANE,
     ArrayCalculus,
-    Place,
+    PavementPlace,
     Shape,
     Wear,
     asphalt_height,
@@ -60,7 +60,7 @@ def test_nodes_and_arrays_give_the_same_field(kind: str) -> None:
     outputs = {"roughness": "Brightness", "specular": "Roughness"} | ({"metallic": "Height"} if kind != "paint" else {})
     with calculator({0: _probe(kind, wear, outputs)}, tuple(outputs)) as work:
         found = work.calculate(np.zeros(PLACES, np.intp), {what: feed[what] for what in work.inputs_of(0)})
-    calculus, place = ArrayCalculus(), Place(*values[:, :3].T.astype(np.float64))
+    calculus, place = ArrayCalculus(), PavementPlace(*values[:, :3].T.astype(np.float64))
     if kind == "paint":
         look, height = paint_look(calculus, place, wear), None
     elif kind == "asphalt":
@@ -143,7 +143,7 @@ def test_lines_that_lane_changes_cross_are_more_worn_than_those_beside_the_lanes
         place = np.empty((len(mesh.vertices), 3), np.float32)
         mesh.attributes[ATTRIBUTE].data.foreach_get("vector", place.ravel())
         kind = np.floor(place[:, 2]) % 32
-        look = paint_look(ArrayCalculus(), Place(*place.T.astype(np.float64)), Wear(0.0, 7.0))
+        look = paint_look(ArrayCalculus(), PavementPlace(*place.T.astype(np.float64)), Wear(0.0, 7.0))
         brightness |= {number: look.brightness[kind == number] for number in (16, 17, 19) if (kind == number).any()}
         station = place[(kind == 16) | (kind == 17), 0]
         assert not len(station) or (station.min() < 9.0 and station.max() > 49.0)
