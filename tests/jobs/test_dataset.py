@@ -174,6 +174,7 @@ def test_wrong_input_is_one_line(
         assert words in said
 
 
+@pytest.mark.slow
 def test_a_split_alone_is_as_in_the_whole_set(undisturbed: tuple[Path, Path], tmp_path: Path) -> None:
     """Also: scenes that are made one after the other have the bytes of those that were made at once."""
     recipe, whole = undisturbed

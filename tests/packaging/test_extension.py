@@ -156,6 +156,7 @@ def test_a_wheel_with_another_hash_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "wheels").exists()
 
 
+@pytest.mark.slow
 def test_same_source_gives_the_same_bytes(archive: Path, tmp_path: Path) -> None:
     again = _build(tmp_path)
     for first, second in zip(sorted(archive.parent.glob("*.zip")), sorted(again.parent.glob("*.zip")), strict=True):

@@ -29,7 +29,8 @@ def short_roads(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Mo
     "only",
     [
         "materials-base_color",
-        *(pytest.param(name, marks=pytest.mark.any_blender) for name in ("materials-lit", "scene-rural-driver")),
+        pytest.param("scene-rural-driver", marks=pytest.mark.any_blender),
+        pytest.param("materials-lit", marks=[pytest.mark.any_blender, pytest.mark.slow]),
     ],
 )
 def test_a_picture_is_made(tmp_path: Path, only: str, capsys: pytest.CaptureFixture[str]) -> None:

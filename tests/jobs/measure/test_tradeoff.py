@@ -81,6 +81,7 @@ def test_a_knob_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
         assert measured.items() >= again.items()
 
 
+@pytest.mark.slow
 @pytest.mark.any_blender
 def test_plants_that_are_left_out_are_an_error(tmp_path: Path) -> None:
     """On a wide strip: beside the road itself hardly anything grows."""
@@ -139,6 +140,7 @@ def test_a_pixel_per_return_is_the_truth_or_says_what_it_needs(tmp_path: Path) -
         assert "Blender 5.0" in result["left_out"]
 
 
+@pytest.mark.slow
 @pytest.mark.any_blender
 def test_relief_and_spacing_leave_their_errors(tmp_path: Path) -> None:
     bare = ("road.length=20", "vegetation_detail=0")

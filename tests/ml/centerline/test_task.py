@@ -84,7 +84,9 @@ class Stop:
             raise Cancelled
 
 
-@pytest.mark.parametrize("name", ["single", "sequence", "transformer"])
+@pytest.mark.parametrize(
+    "name", ["transformer", *(pytest.param(name, marks=pytest.mark.slow) for name in ("single", "sequence"))]
+)
 def test_resumed_training_ends_with_the_same_bits(trained: Trained, data: Path, tmp_path: Path, name: str):
     """As another one without a break, too; and a training that was interrupted isn't used."""
     whole = trained(name)

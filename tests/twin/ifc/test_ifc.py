@@ -617,6 +617,7 @@ def test_both_kernels_read_the_same_surface(road) -> None:
     assert np.abs(np.unique(quick.round(6), axis=0) - np.unique(exact.round(6), axis=0)).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_no_face_is_thinner_than_points_are_apart(tmp_path) -> None:
     """Where a gore begins it is micrometres wide; ifcopenshell's kernel for meshes refuses corners that near."""
     file = written(full_road(), tmp_path)
