@@ -5,11 +5,14 @@ import numpy as np
 from ...base.arrays import Float
 from ...base.classes import class_id
 from ...base.random_streams import stream
+from ...road.damage import DAMAGES
 from ...road.geometry import RoadGeometry
 from .mesh import SceneMesh
 
 _BESIDE_STEPS = 0.01
 """To either side of a step, m: faces at it may begin a little aside."""
+_PATCH = DAMAGES.index("patch")
+"""From this kind of damage on each has faces of its own."""
 
 
 def mesh_height_errors(
@@ -18,7 +21,8 @@ def mesh_height_errors(
     """Return signed height errors (N,), m, of random points of a mesh's road against the analytic surface.
 
     Without the centimetres along which the pavement changes at once, at noses and ends of ramps: faces there go
-    slantwise from one cross-section to quite another one.
+    slantwise from one cross-section to quite another one. And without patches and cracks, thin faces that lie on the
+    surface as paint does; the heights of points on them come from the pavement itself.
 
     Args:
         mesh: scene mesh in local coordinates.
@@ -27,7 +31,9 @@ def mesh_height_errors(
         names: classes of the faces that belong to the analytic surface.
     """
     rng = stream(0, "mesh height errors")
-    faces = np.flatnonzero(np.isin(mesh.class_id, [class_id(name) for name in names]))
+    laid_on = [number for number, kind in geometry.numbers.damages().items() if kind >= _PATCH]
+    of_surface = np.isin(mesh.class_id, [class_id(name) for name in names]) & ~np.isin(mesh.instance_id, laid_on)
+    faces = np.flatnonzero(of_surface)
     area = mesh.areas()[faces]
     chosen = faces[rng.choice(len(faces), size=samples, p=area / area.sum())]
     corners = mesh.vertices[mesh.triangles[chosen]].astype(np.float64)
