@@ -130,7 +130,8 @@ def _load_crops(
         # PyTorch calls it an error if a worker was ended by a signal, as all are that are interrupted: where only the
         # garbage collector hears of it, that is a traceback on standard error.
         with suppress(RuntimeError):
-            getattr(batches, "_shutdown_workers", int)()
+            if end_workers := getattr(batches, "_shutdown_workers", None):  # there only where workers are
+                end_workers()
 
 
 def silence_lost_pipes(_worker: int) -> None:

@@ -10,16 +10,15 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..base.arrays import Bool, Float
 from ..base.version import generator
 from ..road.geometry import RoadGeometry
+from ..road.objects import Side
 from ..road.parameters import RoadParameters
 from ..road.pavement.surface import PavementSurface
 from ..road.section import Turnout
 from .trace import Trace
-
-Float = NDArray[np.float64]
 
 ALONG, ACROSS = 0.1, 0.05
 """Distances between cross sections and between long sections, m."""
@@ -88,9 +87,9 @@ class _Grid:
         self.offsets = np.arange(-right, left + 1) * ACROSS
         self._base = float(np.floor(geometry.profile.elevation(np.zeros(1))[0]))
 
-    def _edge(self, side: str) -> float:
+    def _edge(self, side: Side) -> float:
         """Return the largest distance (m) of a carriageway's pavement from the centreline that the grid has."""
-        section = self._geometry.sections[side]  # type: ignore[index]
+        section = self._geometry.sections[side]
         station = np.linspace(0.0, self._geometry.length, max(2, int(self._geometry.length)))
         farthest = np.minimum(section.paved_edge(station), section.main_edge(station) + _BESIDE)
         return float(farthest.max())
@@ -159,7 +158,7 @@ class _Grid:
         result[inside] = self._geometry.elevation(along, across) + self._surface.height(along, across) - self._base
         return result.reshape(len(station), -1)
 
-    def _is_inside(self, station: Float, offset: Float) -> NDArray[np.bool_]:
+    def _is_inside(self, station: Float, offset: Float) -> Bool:
         """Return which places (N,) lie between the outermost edges of pavement: many readers allow no gaps between."""
         bounds = []
         for side, section in self._geometry.sections.items():
