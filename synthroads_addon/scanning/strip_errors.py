@@ -75,6 +75,8 @@ def with_strip_errors(
         time: (K,) s since the first strip's start.
         pose: positions (K, 3), m, and rotations (K, 3, 3) from the scanner's frame.
     """
+    if not errors.any:
+        return pose
     position, rotation = pose
     begin, end = drift(errors, seed, strip.index)
     share = np.clip((time - strip.start_time) / max(strip.duration, 1e-9), 0.0, 1.0)[:, None]
