@@ -27,6 +27,10 @@ if TYPE_CHECKING:
 TESTS = Path(__file__).resolve().parent
 HAS_BPY = importlib.util.find_spec("bpy") is not None
 
+# What checks IRIs for jsonschema builds 38 grammars when imported, more than a second in each process, and no file of
+# ours has one. URIs are checked by another package.
+sys.modules["rfc3987_syntax"] = None  # type: ignore[assignment]
+
 # Before anything imports bpy: it must not read the user's settings and extensions, whose wheels would shadow ours.
 BLENDER_FOLDER = Path(tempfile.mkdtemp(prefix="synthroads-blender-"))
 os.environ["BLENDER_USER_RESOURCES"] = str(BLENDER_FOLDER)

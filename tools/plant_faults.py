@@ -1,12 +1,13 @@
 """Plant small faults in the source, one at a time, and see whether the tests find them.
 
 Cosmic-ray knows where a fault can be planted (another operator, another number, a condition turned round). A seed
-draws the same number of places from each area; the tests that a coverage record has seen on a fault's line are run
-with the fault, until the first that fails. Three steps, in an environment with the extra `faults`:
+draws the same number of places from each area, and a mark is put at each place that notes the tests that come by;
+these are then run with the fault, until the first that fails. Four steps, in an environment with the extra `faults`:
 
-    python -m pytest -m "not slow" --cov --cov-context=test --cov-report=    # in both parts: tests of Blender, the rest
     python tools/plant_faults.py draw --seed 1 faults.json
-    python tools/plant_faults.py run faults.json --coverage .coverage --output found.json
+    python tools/plant_faults.py mark faults.json marks.txt
+    python -m pytest -m "not slow"    # in both parts: tests of Blender, the rest; then put the source back (git checkout)
+    python tools/plant_faults.py run faults.json --marks marks.txt --output found.json
 
 The source is changed while it runs and put back after each fault: run it in a clone of its own.
 """
@@ -14,6 +15,7 @@ The source is changed while it runs and put back after each fault: run it in a c
 from __future__ import annotations
 
 import argparse
+import ast
 import json
 import random
 import re
@@ -21,14 +23,13 @@ import subprocess
 import sys
 import time
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from cosmic_ray.ast import ast_nodes, get_ast
 from cosmic_ray.mutating import mutate_code
 from cosmic_ray.plugins import get_operator, operator_names
-from coverage import CoverageData
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
@@ -46,6 +47,21 @@ HARMLESS = ("BitOr", "RemoveDecorator", "ExceptionReplacer", "Variable")
 """Operators that are left out: most of theirs change an annotation or stop the import."""
 SECONDS = 1200.0
 """Tests that run longer with a fault than this have found it: it keeps them from ending."""
+
+
+MARKS = """import os
+
+seen = set()
+
+
+def reach(number):
+    test = os.environ.get("PYTEST_CURRENT_TEST", "")
+    if (number, test) not in seen:
+        seen.add((number, test))
+        with open({path!r}, "a") as marks:
+            marks.write(f"{{number}}\\t{{test}}\\n")
+"""
+"""A module that notes a number and the test that runs, also in the processes that the test has started."""
 
 
 @dataclass(frozen=True)
@@ -91,34 +107,68 @@ def _faults(area: str, file: str, names: list[str]) -> Iterator[Fault]:
         yield from (Fault(area, file, line, name, number) for number, (line, _) in enumerate(places))
 
 
-def covering_tests(coverage: list[Path], fault: Fault) -> list[str]:
-    """Return the ids of the tests that run a fault's line, by coverage records, and of those sharing such a fixture.
+def marked_places(code: str, line: int) -> list[int]:
+    """Return the lines before which a fault's marks go: the first of the statement that its line is part of.
 
     A line that the import alone runs names a constant or a field: the lines that use the name stand in its place, or
-    else the whole file.
+    else the beginnings of all functions of the file.
     """
-    code = (ROOT / fault.file).read_text(encoding="utf-8").splitlines()
-    name = re.match(r"\s*([A-Za-z_]\w*)\s*(?::[^=]*)?=", code[fault.line - 1])
-    uses = {number for number, text in enumerate(code, 1) if name and re.search(rf"\b{name[1]}\b", text)}
-    records = []
-    for path in coverage:
-        data = CoverageData(str(path))
-        data.read()
-        records += [(data, measured) for measured in data.measured_files() if measured.endswith(fault.file)]
-    for lines in ({fault.line}, uses, set(range(1, len(code) + 1))):
-        if tests := set().union(*(_tests_on(lines, data, measured) for data, measured in records)):
-            return sorted(tests)
+    lines = code.splitlines()
+    tree = ast.parse(code)
+    name = re.match(r"\s*([A-Za-z_]\w*)\s*(?::[^=]*)?=", lines[line - 1])
+    uses = [number for number, text in enumerate(lines, 1) if name and re.search(rf"\b{name[1]}\b", text)]
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    bodies = [node.body[1:] if ast.get_docstring(node) else node.body for node in functions]
+    for wanted in ([line], uses, [body[0].lineno for body in bodies if body]):
+        if places := {place for number in wanted if (place := _statement_of(number, functions, lines)) is not None}:
+            return sorted(places)
     return []
 
 
-def _tests_on(lines: set[int], data: CoverageData, measured: str) -> set[str]:
-    tests = set()
-    for contexts in (contexts for line, contexts in data.contexts_by_lineno(measured).items() if line in lines):
-        for test, _, phase in (context.rpartition("|") for context in contexts if context):
-            shared = f"{test.partition('::')[0]}::"
-            every = (context.rpartition("|")[0] for context in data.measured_contexts() if context.startswith(shared))
-            tests |= set(every) if phase == "setup" else {test}
-    return tests
+def _statement_of(line: int, functions: list[ast.FunctionDef], lines: list[str]) -> int | None:
+    """Return the first line of the innermost statement of a function that a line is in, where one can go before it."""
+    first = None
+    for statement in (inner for function in functions for inner in ast.walk(function) if inner is not function):
+        if isinstance(statement, ast.stmt) and statement.lineno <= line <= (statement.end_lineno or 0):
+            text = lines[statement.lineno - 1]
+            stands_alone = not text[: statement.col_offset].strip() and not text.lstrip().startswith(("elif", "@"))
+            first = max(first or 0, statement.lineno) if stands_alone else first
+    return first
+
+
+def put_marks(faults: list[Fault], marks: Path) -> None:
+    """Change the source so that each test that reaches a fault's place is noted in a file."""
+    helper = MARKS.format(path=str(marks.resolve()))
+    (ROOT / ADDON / "marks.py").write_text(helper, encoding="utf-8")
+    by_file: dict[str, list[tuple[int, int]]] = defaultdict(list)
+    for number, fault in enumerate(faults):
+        code = (ROOT / fault.file).read_text(encoding="utf-8")
+        by_file[fault.file] += [(place, number) for place in marked_places(code, fault.line)]
+    for file, places in by_file.items():
+        lines = (ROOT / file).read_text(encoding="utf-8").splitlines()
+        for place, number in sorted(places, reverse=True):
+            indent = re.match(r"\s*", lines[place - 1])[0]
+            lines.insert(place - 1, f'{indent}__import__("{ADDON}.marks", fromlist=["reach"]).reach({number})')
+        (ROOT / file).write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def reaching_tests(fault: Fault, number: int, marks: Iterable[str]) -> list[str]:
+    """Return the ids of the tests that a file of marks names for a fault, those of the fault's own folder first.
+
+    Where a fixture has reached the place, all tests of its file may rest on it.
+    """
+    tests: set[str] = set()
+    for place, _, entry in (line.partition("\t") for line in marks):
+        test, _, phase = entry.rpartition(" (")
+        if int(place) == number and test:
+            tests.add(test.partition("::")[0] if phase.startswith("setup") else test)
+    return sorted(tests, key=lambda test: (-_parts_in_common(test, fault.file), test))
+
+
+def _parts_in_common(test: str, file: str) -> int:
+    """Return how many of the parts of a source file's path a test file's path has too, as tests mirror the source."""
+    words = {re.sub(r"^test_|\.py$", "", part) for part in Path(test.partition("::")[0]).parts}
+    return len(words & {part.removesuffix(".py") for part in Path(file).parts})
 
 
 def run_tests(tests: list[str], options: list[str]) -> tuple[bool, str]:
@@ -139,9 +189,8 @@ def run_tests(tests: list[str], options: list[str]) -> tuple[bool, str]:
     return False, ""
 
 
-def judge(fault: Fault, coverage: list[Path], options: list[str]) -> dict[str, object]:
+def judge(fault: Fault, tests: list[str], options: list[str]) -> dict[str, object]:
     """Plant a fault, run the tests that reach it and restore the file; return the outcome as JSON data."""
-    tests = covering_tests(coverage, fault)
     path = ROOT / fault.file
     code = path.read_text(encoding="utf-8")
     changed = fault.planted(code)
@@ -164,9 +213,12 @@ def main() -> int:
     drawing.add_argument("faults", type=Path, help="file to write them to (JSON)")
     drawing.add_argument("--seed", type=int, required=True)
     drawing.add_argument("--each", type=int, default=10, help="faults of each area (10)")
+    marking = steps.add_parser("mark", help="change the source so that it notes which tests reach the faults' places")
+    marking.add_argument("faults", type=Path, help="file that they were written to")
+    marking.add_argument("marks", type=Path, help="file that the tests are noted in")
     running = steps.add_parser("run", help="plant them one at a time and run the tests that reach them")
     running.add_argument("faults", type=Path, help="file that they were written to")
-    running.add_argument("--coverage", type=Path, nargs="+", required=True, help="records with the tests as contexts")
+    running.add_argument("--marks", type=Path, required=True, help="file that the tests were noted in")
     running.add_argument("--markers", default="not slow", help="which tests, as pytest's -m takes it ('not slow')")
     running.add_argument("--deselect", nargs="+", default=[], metavar="TEST", help="that fail without a fault too")
     running.add_argument("--numbers", type=int, nargs="+", help="plant these alone, counted from 0")
@@ -176,11 +228,15 @@ def main() -> int:
         faults = draw_faults(arguments.each, arguments.seed)
         arguments.faults.write_text(json.dumps([asdict(fault) for fault in faults], indent=1), encoding="utf-8")
         return 0
-    options = ["-m", arguments.markers, *(f"--deselect={test}" for test in arguments.deselect)]
     faults = [Fault(**fault) for fault in json.loads(arguments.faults.read_text(encoding="utf-8"))]
+    if arguments.step == "mark":
+        put_marks(faults, arguments.marks)
+        return 0
+    options = ["-m", arguments.markers, *(f"--deselect={test}" for test in arguments.deselect)]
+    marks = arguments.marks.read_text(encoding="utf-8").splitlines()
     with arguments.output.open("a", encoding="utf-8") as output:
         for number in arguments.numbers or range(len(faults)):
-            result = {"number": number, **judge(faults[number], arguments.coverage, options)}
+            result = {"number": number, **judge(faults[number], reaching_tests(faults[number], number, marks), options)}
             print(json.dumps(result), file=output, flush=True)
             outcome = "found" if result["found"] else "NOT FOUND"
             print(number, faults[number].file, faults[number].line, outcome, flush=True)

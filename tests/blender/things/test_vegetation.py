@@ -231,7 +231,7 @@ class TestOnTheRoad:
         row = int(before[0]) - road.geometry.numbers.parts["birch"].first
         stands[row].value = 0
         item.data.update()
-        bpy.context.view_layer.update()
+        road.update()
         assert np.unique(road.mesh("birch").instance_id).tolist() == before[1:].tolist()
         # A stand that was edited decides for itself.
         edited = road.edit("birch", "Band End", 34.9)

@@ -47,15 +47,18 @@ class FurnishedRoad:
         self.geometry = RoadGeometry(self.parameters)
         self.model = build_road(self.parameters, 0.005, detail, {"road", "terrain", *parts}, stretch)
         self.origin = self.model.origin - np.array(self.parameters.transform.translate)
-        self._surface: BVHTree | None = None
+        self._surface: tuple[BVHTree, BVHTree] | None = None
+        self._meshes: dict[tuple[str, ...], SceneMesh] = {}
 
     def instance(self, name: str) -> int:
         """Return an object's number."""
         return self.parameters.objects[name].instance
 
     def mesh(self, *roles: str) -> SceneMesh:
-        """Return the triangles of some of its objects."""
-        return scene_mesh(objects=[self.model.objects[role] for role in roles])
+        """Return the triangles of some of its objects, read once until `edit` or `update`."""
+        if roles not in self._meshes:
+            self._meshes[roles] = scene_mesh(objects=[self.model.objects[role] for role in roles])
+        return self._meshes[roles]
 
     def located(self, vertices: NDArray[Any]) -> tuple[Float, Float]:
         """Return station and offset of scene points (N, 3)."""
@@ -78,8 +81,13 @@ class FurnishedRoad:
     def edit(self, role: str, name: str, value: Any) -> SceneMesh:
         """Set an input of an object's modifier; return its mesh afterwards."""
         set_modifier_input(self.model.objects[role].modifiers[0], name, value)
-        bpy.context.view_layer.update()
+        self.update()
         return self.mesh(role)
+
+    def update(self) -> None:
+        """Have Blender evaluate what was changed by other ways than `edit`."""
+        bpy.context.view_layer.update()
+        self._meshes.clear()
 
 
 def corners(mesh: SceneMesh, chosen: NDArray[np.bool_] | slice = slice(None)) -> Float:
