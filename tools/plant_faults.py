@@ -2,11 +2,12 @@
 
 Cosmic-ray knows where a fault can be planted (another operator, another number, a condition turned round). A seed
 draws the same number of places from each area, and a mark is put at each place that notes the tests that come by;
-these are then run with the fault, until the first that fails. Four steps, in an environment with the extra `faults`:
+these are then run with the fault, until the first that fails. Five steps, in an environment with the extra `faults`:
 
     python tools/plant_faults.py draw --seed 1 faults.json
     python tools/plant_faults.py mark faults.json marks.txt
-    python -m pytest -m "not slow"    # in both parts: tests of Blender, the rest; then put the source back (git checkout)
+    python -m pytest -m "not slow"    # in both parts, tests of Blender and the rest
+    git checkout synthroads_addon
     python tools/plant_faults.py run faults.json --marks marks.txt --output found.json
 
 The source is changed while it runs and put back after each fault: run it in a clone of its own.
@@ -147,7 +148,7 @@ def put_marks(faults: list[Fault], marks: Path) -> None:
     for file, places in by_file.items():
         lines = (ROOT / file).read_text(encoding="utf-8").splitlines()
         for place, number in sorted(places, reverse=True):
-            indent = re.match(r"\s*", lines[place - 1])[0]
+            indent = lines[place - 1][: -len(lines[place - 1].lstrip())]
             lines.insert(place - 1, f'{indent}__import__("{ADDON}.marks", fromlist=["reach"]).reach({number})')
         (ROOT / file).write_text("\n".join(lines) + "\n", encoding="utf-8")
 

@@ -319,8 +319,7 @@ class ChainFit:
     @cached_property
     def linear(self) -> tuple[Float, Float]:
         """Return R (F, F) and b (F,): but for a constant |R d + b|^2 is the sum of squares after a step d (F,)."""
-        q, r = np.linalg.qr(self.data.jacobian(self.chain, self.stations))
-        return r, q.T @ self.residuals
+        return triangular(self.data.jacobian(self.chain, self.stations), self.residuals)
 
 
 def knot_room(chain: Chain, least: float) -> Float:
@@ -342,8 +341,16 @@ def apply_step(data: AxisData, chain: Chain, step: Float) -> Chain:
 
 def least_squares(matrix: Float, wanted: Float) -> Float:
     """Return the least-squares solution of ``matrix x = wanted`` (full rank), by QR: chains are ill-conditioned."""
-    q, r = np.linalg.qr(matrix)
-    return np.linalg.solve(r, q.T @ wanted)
+    return np.linalg.solve(*triangular(matrix, wanted))
+
+
+def triangular(matrix: Float, wanted: Float) -> tuple[Float, Float]:
+    """Return R (P, P) and Q' b (P,) of a matrix Q R (N, P), N > P, and a right side b (N,).
+
+    The right side is taken along as one more column, so that Q, the greater part of the work, is never put together.
+    """
+    both = np.asarray(np.linalg.qr(np.column_stack((matrix, wanted)), mode="r"))
+    return both[: matrix.shape[1], :-1], both[: matrix.shape[1], -1]
 
 
 def knot_penalty(data: AxisData, chain: Chain, width: int) -> Float:
@@ -389,9 +396,9 @@ def _system(fit: ChainFit, basis: Float, free_knots: bool) -> tuple[Float, ...]:
     """Return R (P, P), right side (P,), the knots' penalty (M - 1, P) and the scale (P,) of the linear problem."""
     matrix = fit.data.jacobian(fit.chain, fit.stations) @ basis
     scale = column_scale(matrix)
-    q, r = np.linalg.qr(matrix / scale)
+    r, projected = triangular(matrix / scale, fit.residuals)
     held = knot_penalty(fit.data, fit.chain, len(scale)) / scale if free_knots else np.zeros((0, len(scale)))
-    return r, -(q.T @ fit.residuals), held, scale
+    return r, -projected, held, scale
 
 
 def column_scale(matrix: Float) -> Float:

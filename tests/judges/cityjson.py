@@ -38,9 +38,10 @@ def version() -> str | None:
 
 def verdict(samples: Samples) -> list[str]:
     """Return what doesn't fit the schema."""
-    from tests.helpers.files.cityjson_files import OfficialSchema
+    import jsonschema_rs
 
-    return OfficialSchema(official_schema()).errors(json.loads(samples.text("twin.city.json")))
+    validator = jsonschema_rs.Draft7Validator(official_schema())
+    return [error.message[:200] for error in validator.iter_errors(json.loads(samples.text("twin.city.json")))]
 
 
 def with_wrong_semantics(samples: Samples) -> Samples:

@@ -7,7 +7,7 @@ import sys
 from collections import defaultdict
 from typing import Any, NoReturn
 
-import jsonschema
+import jsonschema_rs
 import numpy as np
 import pytest
 
@@ -69,7 +69,7 @@ def test_no_rule_is_broken_on_twenty_kilometres(design_class: str, cross_section
 
 @pytest.mark.parametrize(("design_class", "cross_section"), ROADS)
 def test_sampled_sets_are_written_and_read_to_the_same_bytes(design_class: str, cross_section: str) -> None:
-    validator = jsonschema.Draft202012Validator(parameters_schema())
+    validator = jsonschema_rs.Draft202012Validator(parameters_schema())
     for seed, length in enumerate((1.0, 120.0, 600.0)):
         text = sample_road(scenario_of(design_class, cross_section, length), seed).to_json()
         assert RoadParameters.from_dict(json.loads(text)).to_json() == text

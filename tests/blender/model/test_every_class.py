@@ -16,6 +16,8 @@ from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scenario.scenario import load_scenario
 
+pytestmark = [pytest.mark.any_blender, pytest.mark.first_python]  # one long thing
+
 
 @pytest.fixture(scope="module")
 def parameters() -> RoadParameters:

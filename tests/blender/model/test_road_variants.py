@@ -116,7 +116,7 @@ def test_every_cross_section_follows_the_analytic_surface(design_class: str, cro
 @pytest.mark.parametrize(
     "fidelity",
     [
-        pytest.param(name, marks={"high": (), "draft": pytest.mark.any_blender}.get(name, pytest.mark.slow))
+        pytest.param(name, marks=pytest.mark.any_blender if name in ("high", "draft") else pytest.mark.slow)
         for name in TOLERANCES
     ],
 )
@@ -191,6 +191,7 @@ def test_strips_of_turnouts_carry_the_turnouts_instances() -> None:
     assert np.mean(mesh.instance_id[chosen] != wanted) < 2e-3  # but for slivers across a border
 
 
+@pytest.mark.any_blender
 def test_painted_areas_lie_on_the_pavement() -> None:
     road = built(sample_road(everything("EKA1A", "RQ31", 1500.0), 3), parts=("road", "painted_areas"))
     mesh = road.mesh("Painted Areas")
@@ -253,6 +254,7 @@ class TestEdits:
 
 
 class TestStretches:
+    @pytest.mark.any_blender
     def test_stretches_join_to_the_whole(self) -> None:
         parameters = sample_road(everything("EKA1A", "RQ31", 450.0), 3)
         parts = ("road", "painted_areas", "terrain", "guardrails", "delineators")

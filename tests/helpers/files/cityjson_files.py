@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import jsonschema
 import numpy as np
 
 from synthroads_addon.road.geometry import RoadGeometry
@@ -156,59 +155,6 @@ def faults_of(city: City) -> list[str]:
             if shape["type"] not in SURFACES:
                 found += [f"{name}: {fault}" for fault in _body_faults(city, rings)]
     return found
-
-
-class OfficialSchema:
-    """The official JSON schema, each city object and geometry checked against the part for its type.
-
-    The whole is a choice among 34 types of objects and 8 of geometries, which a validator tries one after the other;
-    as their types exclude each other, the one of an object's type says the same.
-    """
-
-    def __init__(self, schema: dict[str, Any]) -> None:
-        self.whole = jsonschema.Draft7Validator(schema)
-        self.objects, self.geometries = {}, {}
-        for choice in schema["properties"]["CityObjects"]["additionalProperties"]["oneOf"]:
-            names = [p["type"]["const"] for p in _properties(choice) if "const" in p.get("type", ()) and "lod" not in p]
-            shapes = [s for p in _properties(choice) for s in p.get("geometry", {}).get("items", {}).get("oneOf", ())]
-            for name in names:
-                self.objects[name] = jsonschema.Draft7Validator(choice)
-                self.geometries[name] = {
-                    shape["properties"]["type"]["const"]: jsonschema.Draft7Validator(shape) for shape in shapes
-                }
-
-    def errors(self, data: dict[str, Any]) -> list[str]:
-        found = [*self.whole.iter_errors(data | {"CityObjects": {}, "vertices": data["vertices"][:100]})]
-        for item in data["CityObjects"].values():
-            found += self.objects[item["type"]].iter_errors({**item, "geometry": []})
-            for shape in item.get("geometry", ()):
-                found += self.geometries[item["type"]][shape["type"]].iter_errors(shape)
-        return [error.message[:200] for error in found]
-
-
-def _properties(schema: Any) -> Iterator[dict[str, Any]]:
-    """Yield what a schema and its parts say of properties."""
-    if isinstance(schema, dict):
-        if isinstance(schema.get("properties"), dict):
-            yield schema["properties"]
-        schema = list(schema.values())
-    if isinstance(schema, list):
-        for part in schema:
-            yield from _properties(part)
-
-
-def thinned(data: dict[str, Any]) -> dict[str, Any]:
-    """Return a file's data with few polygons and vertices: what a schema says holds for one as for all."""
-    objects = {}
-    for name, item in data["CityObjects"].items():
-        shapes = []
-        for shape in item.get("geometry", ()):
-            few = shape | {"boundaries": shape["boundaries"][:3]}
-            if "semantics" in shape:
-                few["semantics"] = shape["semantics"] | {"values": shape["semantics"]["values"][:3]}
-            shapes.append(few)
-        objects[name] = item | ({"geometry": shapes} if shapes else {})
-    return data | {"CityObjects": objects, "vertices": data["vertices"][:10]}
 
 
 def _vertex_faults(city: City) -> Iterator[str]:
