@@ -60,7 +60,7 @@ HANDLERS = {"depsgraph_update_post": _note_moves, "load_pre": _forget}
 
 
 def unregister() -> None:
-    """Forget what was moved."""
+    """Clear the record of objects that were moved and stop the timer that reads them back."""
     _moved.clear()
     if bpy.app.timers.is_registered(_follow_later):
         bpy.app.timers.unregister(_follow_later)

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import os
-import resource
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
-from synthroads_addon.base.errors import InputError
-from synthroads_addon.blender.scene.foreign import open_scene
+from tests.blender.scene.opening_server import ANSWER
 from tests.fuzz.test_bytes import mesh_file
 
-PEAK_MB = 1500
-SECONDS = 20
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def export(path: Path) -> bytes:
@@ -33,31 +33,21 @@ def export(path: Path) -> bytes:
     return path.read_bytes()
 
 
-def in_a_process(path: Path) -> str:
-    """Open a file in a copy of this process; return what came of it."""
-    read, write = os.pipe()
-    child = os.fork()
-    if child == 0:
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, 1)
-        os.dup2(nowhere, 2)
-        resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
-        try:
-            open_scene(path)
-            said = "opened"
-        except InputError as error:
-            said = "refused" if str(error).isprintable() else f"not one line: {error!r}"
-        except BaseException as error:
-            said = f"{type(error).__name__}: {error}"
-        if resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3 > PEAK_MB:
-            said = "took too much memory"
-        os.write(write, said[:500].encode())
-        os._exit(0)
-    os.close(write)
-    said = os.read(read, 1000).decode()
-    os.close(read)
-    _, status = os.waitpid(child, 0)
-    return said if status == 0 else f"ended by {status}"
+@pytest.fixture(scope="module")
+def opened() -> Iterator[Callable[[Path], str]]:
+    """Return what opens a file in a process of its own and says what came of it."""
+    command = [sys.executable, "-m", "tests.blender.scene.opening_server"]
+    with subprocess.Popen(command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as server:
+        assert server.stdin
+        assert server.stdout
+
+        def answer(path: Path) -> str:
+            server.stdin.write(f"{path}\n")
+            server.stdin.flush()
+            return next(line[len(ANSWER) :].rstrip("\n") for line in server.stdout if line.startswith(ANSWER))
+
+        yield answer
+        server.stdin.close()
 
 
 def broken(data: bytes, rng: np.random.Generator) -> bytes:
@@ -87,20 +77,20 @@ def broken(data: bytes, rng: np.random.Generator) -> bytes:
         pytest.param(".usdc", 40, marks=pytest.mark.fuzz),
     ],
 )
-def test_scenes(tmp_path: Path, ending: str, count: int) -> None:
+def test_scenes(opened: Callable[[Path], str], tmp_path: Path, ending: str, count: int) -> None:
     data = export(tmp_path / f"sound{ending}")
     path, rng = tmp_path / f"scene{ending}", np.random.default_rng(7)
-    assert in_a_process(tmp_path / f"sound{ending}") == "opened"
+    assert opened(tmp_path / f"sound{ending}") == "opened"
     for number in range(count):
         content = broken(data, rng)
         path.write_bytes(content)
-        said = in_a_process(path)
+        said = opened(path)
         assert said in ("opened", "refused"), f"file {number}: {said}"
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="copies the process")
-def test_a_face_that_names_no_vertex_does_not_crash_blender(tmp_path: Path) -> None:
+def test_a_face_that_names_no_vertex_does_not_crash_blender(opened: Callable[[Path], str], tmp_path: Path) -> None:
     path = mesh_file(tmp_path / "mesh.ply")
-    assert in_a_process(path) == "opened"
+    assert opened(path) == "opened"
     path.write_bytes(path.read_bytes()[:-4] + (1_000_000).to_bytes(4, "little"))
-    assert in_a_process(path) == "refused"
+    assert opened(path) == "refused"
