@@ -1,6 +1,7 @@
 """Heights of the pavement at points: wheel tracks, joints, waves, patches and cracks, as the parameters say."""
 
 from collections.abc import Iterator
+from itertools import product
 from typing import NamedTuple, get_args
 
 import numpy as np
@@ -30,8 +31,8 @@ class _Kind(NamedTuple):
     lifted: bool = False
 
 
-_WORN = ((False, False), (True, False), (True, False, True), (True, True))
-_KINDS = tuple(_Kind(side, *worn) for side in get_args(Side) for worn in _WORN)
+_KINDS = tuple(_Kind(*fields) for fields in product(get_args(Side), *((False, True),) * 3))
+"""Every kind there can be."""
 
 
 class _Block(NamedTuple):

@@ -176,7 +176,7 @@ class BlockScan:
             return rotation, position, np.ones(len(time))
 
         track = Track.between(true, begin, end, spacing)
-        noisy = noise.position_sigma or noise.attitude_sigma_deg or noise.heading_sigma_deg or strip_errors.any
+        noisy = noise.position_sigma or noise.attitude_sigma_deg or noise.heading_sigma_deg or strip_errors.moves_points
         return Poses(
             track,
             # Linear between knots, errors would lose some of their spread if they changed much meanwhile.

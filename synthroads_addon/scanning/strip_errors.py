@@ -35,8 +35,8 @@ class StripErrors(ClosedModel):
     gain_sigma_db: float = quantity(0.0, "dB", "Brightness of each strip's echoes.", (0, 10), title="Gain (dB)")
 
     @property
-    def any(self) -> bool:
-        """Return whether there are errors of the position."""
+    def moves_points(self) -> bool:
+        """Whether any of the errors is one of position: not of brightness alone."""
         return any((self.boresight_sigma_deg, self.lever_arm_sigma, self.drift_sigma))
 
 
@@ -75,7 +75,7 @@ def with_strip_errors(
         time: (K,) s since the first strip's start.
         pose: positions (K, 3), m, and rotations (K, 3, 3) from the scanner's frame.
     """
-    if not errors.any:
+    if not errors.moves_points:
         return pose
     position, rotation = pose
     begin, end = drift(errors, seed, strip.index)
@@ -87,7 +87,7 @@ def with_strip_errors(
 
 def strip_error_report(errors: StripErrors, seed: int, strips: tuple[Strip, ...]) -> dict[str, Any]:
     """Return the errors of a scan as JSON data; empty without any."""
-    if not errors.any and not errors.gain_sigma_db:
+    if not errors.moves_points and not errors.gain_sigma_db:
         return {}
     rows = []
     for strip in strips:

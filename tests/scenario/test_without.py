@@ -44,7 +44,7 @@ OFF = {
     "mixed-points": lambda scan: scan.receiver.echo_separation == "resolution",
     "motion": lambda scan: not scan.motion.sigma.any(),
     "mirror-clock": lambda scan: scan.mirror_clock == "locked",
-    "strip-errors": lambda scan: not scan.strip_errors.any,
+    "strip-errors": lambda scan: not scan.strip_errors.moves_points,
     "weather": lambda scan: scan.weather is None and scan.attenuation == 0,
     "weather-echoes": lambda scan: scan.weather.condition == "rain" and not scan.weather.effects(),
     "relief": lambda scan: scan.relief == 0,
