@@ -3,8 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from scipy import stats
 
+from synthroads_addon.base.rotations import rotation_matrix
 from synthroads_addon.scanning.platforms.path import Strip
 from synthroads_addon.scanning.strip_errors import (
     StripErrors,
@@ -20,9 +22,17 @@ ERRORS = StripErrors(boresight_sigma_deg=0.02, lever_arm_sigma=0.05, drift_sigma
 
 
 class TwoStrips(Standing):
-    """Two strips from the same place."""
+    """Two strips from the same place, turned to the left of the east by an angle, rad."""
 
     strips = (Strip(0, 0.0, 0.2), Strip(1, 10.2, 0.2))
+
+    def __init__(self, heading: float = 0.0) -> None:
+        super().__init__()
+        self.axes = rotation_matrix(np.array([heading]), np.zeros(1), np.zeros(1))[0]
+
+    def pose(self, strip, time):
+        place, _ = super().pose(strip, time)
+        return place, np.broadcast_to(self.axes, (len(time), 3, 3))
 
 
 def test_errors_are_normal_and_each_strip_drifts_by_itself() -> None:
@@ -40,8 +50,10 @@ def test_errors_are_normal_and_each_strip_drifts_by_itself() -> None:
     assert np.abs(together[~np.eye(18, dtype=bool)]).max() < 5 / np.sqrt(400)
 
 
-def test_points_are_off_by_what_the_report_says_and_the_truth_is_kept() -> None:
-    plan = scan_of(plane(), 1, TwoStrips())
+@pytest.mark.parametrize("heading", [0.0, 2.0])
+def test_points_are_off_by_what_the_report_says_and_the_truth_is_kept(heading: float) -> None:
+    path = TwoStrips(heading)
+    plan = scan_of(plane(), 1, path)
     wrong = replace(plan, strip_errors=ERRORS)
     report = wrong.summary()["strip_errors"]
     roll, pitch, yaw = np.deg2rad(report["boresight_deg"])
@@ -50,10 +62,10 @@ def test_points_are_off_by_what_the_report_says_and_the_truth_is_kept() -> None:
         np.testing.assert_array_equal(points.true_xyz, calm.xyz)
         share = (points.gps_time - strip.start_time) / strip.duration
         arm = calm.xyz - calm.scanner
-        # Small angles: the scanner's axes are the local ones here. Pitch is nose up.
-        turned = np.cross(np.array([roll, -pitch, yaw]), arm)
+        # Small angles, about the scanner's axes. Pitch is nose up.
+        turned = np.cross(path.axes @ np.array([roll, -pitch, yaw]), arm)
         shift = np.array(row["begin"]) + share[:, None] * (np.array(row["end"]) - np.array(row["begin"]))
-        expected = shift + np.array(report["lever_arm"]) + turned
+        expected = shift + path.axes @ np.array(report["lever_arm"]) + turned
         np.testing.assert_allclose(points.xyz - calm.xyz, expected, atol=1e-3)
     assert report["strips"][0]["begin"] != report["strips"][1]["begin"]
 
