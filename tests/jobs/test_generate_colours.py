@@ -33,25 +33,27 @@ def test_without_colours_and_layers_nothing_is_rendered(tmp_path: Path) -> None:
     assert not np.asarray(cloud.red).any()
 
 
-def test_layers_that_no_material_varies_are_its_own_and_not_rendered(tmp_path: Path) -> None:
-    """Asphalt varies in roughness and specular, and is no metal anywhere."""
+def test_layers_are_rendered_where_a_material_varies_and_else_its_own(tmp_path: Path) -> None:
+    """Asphalt varies in roughness and specular, and is no metal anywhere; steel is less of one where it is dirty."""
     counts, cloud = made(tmp_path, "colour.rgb=false", LAYERS, MEANS)
-    assert counts["rendered"]["layers"] == ["roughness", "specular"]
+    assert counts["rendered"]["layers"] == ["roughness", "metallic", "specular"]
     road = of_class(cloud, "road")
     assert len(road) > 1000
     row = materials()["asphalt"]
     assert not np.asarray(cloud["metallic"])[road].any()
     for name in ("roughness", "specular"):
         assert np.asarray(cloud[name])[road].std() >= 0.02
+    rail = of_class(cloud, "guardrail")
+    assert 0.01 < np.asarray(cloud["metallic"])[rail].std() < 0.06
     assert np.mean(np.asarray(cloud["roughness"])[road]) == pytest.approx(row.roughness, abs=0.05)
 
 
 def test_what_is_wanted_is_rendered_and_nothing_else(tmp_path: Path) -> None:
     counts, _ = made(tmp_path / "a", "colour.rgb=false", "colour.intensity_from_layers=true")
-    assert counts["rendered"]["layers"] == ["base_color", "specular"]
+    assert counts["rendered"]["layers"] == ["base_color", "metallic", "specular"]
     counts, cloud = made(tmp_path / "b", LAYERS)
     # What reaches a point of the sun isn't rendered.
-    assert counts["rendered"]["layers"] == ["base_color", "roughness", "specular"]
+    assert counts["rendered"]["layers"] == ["base_color", "roughness", "metallic", "specular"]
     assert counts["points_by_colour_source"] == {"nodes": 1.0}
     counts, cloud = made(tmp_path / "c", LAYERS, "colour.source=images")
     assert "sun" in counts["rendered"]["layers"]

@@ -24,7 +24,7 @@ class Shade:
         mean: the table's entry; the base colour's mean must stay equal to it.
         place: position in the world, m.
         factor: what the base colour is multiplied with; its mean is 1.
-        roughness, specular: what takes the place of the table's values; their means are these.
+        roughness, metallic, specular: what takes the place of the table's values; their means are these.
         relief: height that the surface stands out by, m; nothing for a smooth one.
         transparency: share of the light that passes straight through.
     """
@@ -34,6 +34,7 @@ class Shade:
     place: Value
     factor: Value | None = None
     roughness: Value | None = None
+    metallic: Value | None = None
     specular: Value | None = None
     relief: Value | None = None
     transparency: float = 0.0
@@ -77,7 +78,8 @@ def shade(item: bpy.types.Material, mean: Material, build: Callable[[Shade], Non
             color = tree.node("ShaderNodeVectorMath", mean.base_color, varied.factor, operation="MULTIPLY").value
             tree.group.links.new(color.source(), surface.raw.inputs["Base Color"])
         values = {name: _varied(varied, name) for name in ("roughness", "metallic", "specular")}
-        for name, entry in (("roughness", "Roughness"), ("specular", "Specular IOR Level")):
+        entries = (("roughness", "Roughness"), ("metallic", "Metallic"), ("specular", "Specular IOR Level"))
+        for name, entry in entries:
             if isinstance(value := values[name], Value):
                 tree.group.links.new(value.source(), surface.raw.inputs[entry])
         if varied.relief is not None:
@@ -99,7 +101,7 @@ def shade(item: bpy.types.Material, mean: Material, build: Callable[[Shade], Non
 
 def _varied(shade: Shade, name: str) -> Operand:
     """Return a layer of one number: as it varies, kept between 0 and 1, else the table's value."""
-    value: Value | None = getattr(shade, name, None)
+    value: Value | None = getattr(shade, name)
     if value is None:
         return float(getattr(shade.mean, name))
     return shade.tree.node("ShaderNodeClamp", value).value
