@@ -187,8 +187,12 @@ def test_too_little_memory_at_any_moment(
 @pytest.mark.slow
 @pytest.mark.parametrize("output", ["scene", "cloud", "previews", "parameters"])
 @pytest.mark.parametrize("size", [100, 3000])
-def test_files_that_may_not_grow(output: str, size: int, inputs: Path, tmp_path: Path) -> None:
+def test_files_that_may_not_grow(
+    output: str, size: int, inputs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The limit that a user has for a single file, for each kind of file."""
+    # Python would leave torn bytecode behind, which nothing imports any more.
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
 
     def limit() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
