@@ -10,7 +10,6 @@ from typing import Any, ClassVar
 
 from ..base.progress import StageTimer
 from ..blender.files import save_scene
-from ..blender.materials import vary
 from ..blender.model.build import RoadModel, build_road
 from ..blender.model.store import remember
 from ..blender.scene.evaluated import scanned_scene
@@ -82,10 +81,9 @@ class RoadScene:
     def build(self) -> RoadModel:
         """Build the road's model in the open file, in place of the one before, and return it."""
         settings, parameters = self.scenario.settings(), self.road.parameters
-        self.model, self.scene = build_road(parameters, settings.tolerance, settings.vegetation_detail), None
-        if self.scenario.materials_table:
-            seed, own = parameters.metadata.seed, self.scenario.own_materials()
-            vary(parameters.materials, parameters.environment, own, seed)
+        own = self.scenario.own_materials()
+        self.model = build_road(parameters, settings.tolerance, settings.vegetation_detail, own=own)
+        self.scene = None
         return self.model
 
     def read(self) -> ScannedScene:

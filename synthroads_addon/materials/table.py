@@ -86,6 +86,15 @@ def materials() -> dict[str, Material]:
     return MaterialTable.from_dict(read_json(path), source=str(path)).materials
 
 
+def entry_of(name: str) -> str:
+    """Return the table's entry that a scene's material is of, ``asphalt`` of ``asphalt (SR asphalt.001)``.
+
+    A name that is of no entry is returned as it is.
+    """
+    entry = name.partition(" (")[0]
+    return entry if entry in materials() else name
+
+
 def material_table_path(name_or_file: str) -> Path:
     """Return the path of a shipped material table, given by its name (``shifted``), or of a ``.json`` file.
 

@@ -15,7 +15,7 @@ from ..base.arrays import Float, Index
 from ..base.errors import InputError
 from ..base.noise import noise_field
 from ..cloud.points import PointBlock
-from ..materials.table import UNKNOWN, Material, materials
+from ..materials.table import UNKNOWN, Material, entry_of, materials
 
 MAX_STRENGTH = 100.0
 OCTAVES = {"draft": 2, "standard": 4, "high": 6}
@@ -82,6 +82,7 @@ def micro_relief(names: Sequence[str], rows: Sequence[Material]) -> MicroRelief:
 
 
 def _relief(name: str, row: Material) -> Relief:
+    name = entry_of(name)
     known = RELIEF.get(name) or RELIEF.get(name.rpartition("_")[2])
     if known is not None:
         return known

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from synthroads_addon.blender.files import empty_file
-from synthroads_addon.blender.materials import constants, material, vary
+from synthroads_addon.blender.materials import constants, material
 from synthroads_addon.jobs.generate import Job, generate
 from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
 from synthroads_addon.materials.table import materials, write_material_table
-from synthroads_addon.road.surroundings import Environment, MaterialVariation
 from synthroads_addon.scenario.scenario import Scenario
 from tools.check_calibration import check_table
 
@@ -68,7 +67,6 @@ def test_a_scan_with_a_table_leaves_the_scene_as_it_is(table: Path, tmp_path: Pa
     item = bpy.context.object
     item["synthroads_class"] = "road"
     item.data.materials.append(material("asphalt"))
-    vary(MaterialVariation(), Environment())
     before = json.loads(item.data.materials[0]["synthroads_mean"])
     reports = []
     for name, own in (("own", str(table)), ("plain", None)):

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ...scanning.colour.colour import MATERIAL_LAYERS, SurfaceConstants, surface_constants
-from ..materials import constants, table_name
+from ..materials import constants, scene_name
 from ..materials.surface_layers import LayerNodes, layer_expressions, varies
 
 NUMBER = "sr_material"
@@ -66,5 +66,5 @@ def numbered_materials(names: Sequence[str]) -> Iterator[tuple[int, bpy.types.Ma
     """Yield (index in `names`, material) of the open file's materials that a scene mesh's names stand for."""
     index = {name: number for number, name in enumerate(names)}
     for item in bpy.data.materials:
-        if (name := table_name(item)) in index:
+        if (name := scene_name(item)) in index:
             yield index[name], item

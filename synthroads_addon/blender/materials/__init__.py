@@ -2,86 +2,152 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Iterable, Mapping
-from functools import partial
+from functools import cache, partial
+from typing import Self
 
 import bpy
 
 from ...base.errors import nearest_name
 from ...base.random_streams import stream
-from ...materials.table import UNKNOWN, Material, materials
+from ...materials.table import UNKNOWN, Material, entry_of, materials
 from ...materials.variation import vary_material
+from ...road.parameters import RoadParameters
 from ...road.pavement.field import Wear
 from ...road.surroundings import Environment, MaterialVariation
+from ..nodes.builder import files_digest, source_files
 from .looks import is_worn, vary_color
 from .shading import shade
 from .surface_layers import PROPERTY, layer_expressions, mean_value
 
 MEAN = "synthroads_mean"
-"""Custom property of a Blender material: its mean properties on this road, as JSON."""
-WEAR = "synthroads_wear"
-"""Custom property of a pavement's material: the parameters of its field."""
-_USUAL = Wear(MaterialVariation().wheel_track_polish, 0.0)
+"""Custom property of a Blender material: its mean properties, as JSON."""
+LOOK = "synthroads_look"
+"""Custom property of a Blender material: digest of all that its nodes were made from, by which it is found again."""
+_SOURCES = ("materials/*.py", "nodes/builder.py", "../road/pavement/*.py")
+"""Source files that materials' nodes follow from."""
 
 
-def material(name: str) -> bpy.types.Material:
-    """Return the Blender material of a table entry, made if the file has none; KeyError for other names."""
-    if name not in materials():
-        raise KeyError(f"no material '{name}'{nearest_name(name, materials())}")
-    for existing in bpy.data.materials:
-        if existing.get(PROPERTY) == name:
-            return existing
-    made = bpy.data.materials.new(f"SR {name}")
-    made[PROPERTY] = name
-    _shade(made, materials()[name], _USUAL)
-    return made
+class RoadMaterials:
+    """The Blender materials of one road: the table's entries as its variation, its weather and its seed make them.
 
-
-def vary(
-    variation: MaterialVariation,
-    environment: Environment,
-    own: Mapping[str, Material] | None = None,
-    seed: int = 0,
-) -> None:
-    """Give the materials that the file has their means on a road with this variation and weather.
+    Roads that look alike have the same ones. What the file has already is taken, what it lacks is made, and none that
+    is there is changed: it may be another road's, or the user's.
 
     Args:
         variation, environment: the road's.
+        offset: of what is random on its pavement, a whole number from 0 to 65535.
         own: materials in place of the shipped table's.
-        seed: the road's, for what is random on its pavement.
     """
-    wear = Wear(variation.wheel_track_polish, float(stream(seed, "pavement look").integers(1 << 16)))
-    for item in bpy.data.materials:
-        if PROPERTY in item and item[PROPERTY] in materials():
-            mean = vary_material(item[PROPERTY], variation, environment, own)
-            if mean.to_json() != item.get(MEAN) or (is_worn(item[PROPERTY]) and tuple(item.get(WEAR, ())) != wear):
-                _shade(item, mean, wear)
+
+    def __init__(
+        self,
+        variation: MaterialVariation,
+        environment: Environment,
+        offset: float = 0.0,
+        own: Mapping[str, Material] | None = None,
+    ) -> None:
+        self._variation, self._environment, self._own = variation, environment, own
+        self._wear = Wear(variation.wheel_track_polish, offset)
+        self._looks: dict[str, tuple[Material, str]] = {}
+        self._made: set[int] = set()
+
+    @classmethod
+    def of(cls, parameters: RoadParameters, own: Mapping[str, Material] | None = None) -> Self:
+        """Return the materials of a road, with `own` in place of the shipped table's."""
+        offset = float(stream(parameters.metadata.seed, "pavement look").integers(1 << 16))
+        return cls(parameters.materials, parameters.environment, offset, own)
+
+    def material(self, name: str) -> bpy.types.Material:
+        """Return the material of a table entry, made if the file has none that looks so; KeyError for other names."""
+        if name not in materials():
+            raise KeyError(f"no material '{name}'{nearest_name(name, materials())}")
+        if name not in self._looks:
+            mean = vary_material(name, self._variation, self._environment, self._own)
+            self._looks[name] = mean, _look(name, mean, self._wear if is_worn(name) else None)
+        mean, look = self._looks[name]
+        for existing in bpy.data.materials:
+            if existing.get(LOOK) == look and existing.library is None:
+                return existing
+        made = bpy.data.materials.new(_usual_name(name))
+        made[PROPERTY], made[MEAN], made[LOOK] = name, mean.to_json(), look
+        shade(made, mean, partial(vary_color, name, self._wear))
+        self._made.add(made.session_uid)
+        return made
+
+    def take_usual_names(self) -> None:
+        """Name the materials that were made here anew, as the names of those before them have become free."""
+        for item in [item for item in bpy.data.materials if item.session_uid in self._made]:
+            item.name = _usual_name(str(item[PROPERTY]))
 
 
-def _shade(item: bpy.types.Material, mean: Material, wear: Wear) -> None:
-    shade(item, mean, partial(vary_color, item[PROPERTY], wear))
-    item[MEAN] = mean.to_json()
-    if is_worn(item[PROPERTY]):
-        item[WEAR] = wear
+def material(name: str) -> bpy.types.Material:
+    """Return the Blender material of a table entry with the table's means; KeyError for other names."""
+    return RoadMaterials(MaterialVariation(), Environment()).material(name)
 
 
-def table_name(item: bpy.types.Material | None) -> str:
-    """Return the name that a face's material is known by: the table's, else Blender's own."""
+def used_materials() -> set[int]:
+    """Return Blender's session numbers of the table's materials that something in the file uses."""
+    return {item.session_uid for item in bpy.data.materials if PROPERTY in item and item.users}
+
+
+def remove_unused_materials(numbers: set[int]) -> None:
+    """Remove those of some materials, given by their session numbers, that nothing uses, unless the user named them."""
+    unused = [
+        item
+        for item in bpy.data.materials
+        if item.session_uid in numbers and not item.users and _is_usual_name(item.name, str(item.get(PROPERTY, "")))
+    ]
+    bpy.data.batch_remove(unused)
+
+
+@cache
+def _sources_digest() -> bytes:
+    """Return a digest of the source files of all materials: a change to any makes new materials; cached."""
+    return files_digest(*source_files(_SOURCES))
+
+
+def _look(name: str, mean: Material, wear: Wear | None) -> str:
+    text = repr((name, mean.to_json(), None if wear is None else tuple(wear)))
+    return hashlib.sha256(_sources_digest() + text.encode()).hexdigest()[:16]
+
+
+def _usual_name(entry: str) -> str:
+    return f"SR {entry}"
+
+
+def _is_usual_name(name: str, entry: str) -> bool:
+    """Return whether a material has the name that it was made with, or that with Blender's number behind it."""
+    base, _, number = name.rpartition(".")
+    usual = _usual_name(entry)
+    return name == usual or (base == usual and number.isdigit())
+
+
+def scene_name(item: bpy.types.Material | None) -> str:
+    """Return the name that a material has in a scene that is scanned: no other material of the file has it.
+
+    It is the table's entry, ``asphalt``; where that has several, as roads differ, the others have Blender's name behind
+    it: ``asphalt (SR asphalt.001)``, see `materials.table.entry_of`. Materials of the user's have Blender's name.
+    """
     if item is None:
         return UNKNOWN
-    return str(item.get(PROPERTY, item.name))
+    if PROPERTY not in item:
+        return str(item.name)
+    entry = str(item[PROPERTY])
+    return entry if item.name_full == _usual_name(entry) else f"{entry} ({item.name_full})"
 
 
 def constants(names: Iterable[str]) -> dict[str, Material]:
-    """Return materials' properties by name: this road's, else those of the material's Principled BSDF."""
+    """Return materials' properties by their names in the scene: as they were made, else of their Principled BSDF."""
     table = materials()
-    here = {item[PROPERTY]: item[MEAN] for item in bpy.data.materials if PROPERTY in item and MEAN in item}
+    here = {scene_name(item): item[MEAN] for item in bpy.data.materials if PROPERTY in item and MEAN in item}
 
     def mean(name: str) -> Material:
-        return Material.from_dict(json.loads(here[name])) if name in here else table[name]
+        return Material.from_dict(json.loads(here[name])) if name in here else table[entry_of(name)]
 
-    return {name: mean(name) if name in table else _principled(name) for name in names}
+    return {name: mean(name) if entry_of(name) in table else _principled(name) for name in names}
 
 
 def _principled(name: str) -> Material:

@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 
 from ...base.errors import InputError
 from ...base.turns.stepper import Stepper
+from ...materials.table import Material
 from ...road.geometry import RoadGeometry
 from ...road.objects import LineObject, PointObject
 from ...road.parameters import RoadParameters
 from ...road.surroundings import Vehicle
 from ..compat import modifier_input, object_inputs, set_modifier_input
 from ..labels import CLASS_PROPERTY
-from ..materials import vary
+from ..materials import remove_unused_materials, used_materials
 from ..nodes.builder import remove_unused_groups
 from ..things.model_builder import ROLE, ModelBuilder
 from ..things.registry import model_parts, required_parts
@@ -116,6 +117,7 @@ def build_road(
     stretch: tuple[float, float] | None = None,
     geometry: RoadGeometry | None = None,
     place: BuildTarget = MEANT,
+    own: Mapping[str, Material] | None = None,
 ) -> RoadModel:
     """Build the road's objects in the current scene, replacing the road of `place`; return the model.
 
@@ -129,12 +131,13 @@ def build_road(
         stretch: stations between which it is built, with an origin of its own (see `road.stretches`), from
             and to the nearest rows of the whole road's surface; the whole road if None.
         geometry: of the parameters, if there is one already.
+        own: materials in place of the shipped table's.
 
     Raises:
         ValueError: a part that there is none of.
         InputError: an asset of the set can't be read.
     """
-    work = _Build(parameters, tolerance, vegetation_detail, parts, stretch, geometry, place)
+    work = _Build(parameters, tolerance, vegetation_detail, parts, stretch, geometry, place, own)
     try:
         with work.log.record():
             work.build()
@@ -199,6 +202,7 @@ class _Build:
         stretch: tuple[float, float] | None,
         geometry: RoadGeometry | None = None,
         place: BuildTarget = MEANT,
+        own: Mapping[str, Material] | None = None,
     ) -> None:
         known = model_parts()
         self._wanted = set(known if parts is None else parts)
@@ -217,7 +221,7 @@ class _Build:
                 root = new_root()
                 self._collection.objects.link(root)
         self._road = str(root[ROAD])
-        self._builder = ModelBuilder(parameters, self._collection, tolerance, detail, stretch, geometry, root)
+        self._builder = ModelBuilder(parameters, self._collection, tolerance, detail, stretch, geometry, root, own)
 
     def build(self) -> None:
         """Make the wanted parts' objects, updating `share`; runs within a `Stepper`."""
@@ -242,6 +246,7 @@ class _Build:
     def swap(self) -> RoadModel:
         """Replace the road built before by the new one, label its parts and place its root; return the model."""
         parameters, builder, scene = self._builder.parameters, self._builder, bpy.data.scenes[self._scene]
+        used = used_materials()
         root = next(item for item in scene.objects if item.get(ROAD) == self._road)
         if FRAME in root:
             old = _parts_of(root, self._place)
@@ -265,8 +270,9 @@ class _Build:
         root[BUILT_PARTS] = json.dumps(list(builder.objects))
         origin = np.array(parameters.transform.translate) + builder.origin
         place_root(root, origin, scene, self._place.keep_moves)
+        remove_unused_materials(used)
         remove_unused_groups()
-        vary(parameters.materials, parameters.environment, seed=parameters.metadata.seed)
+        builder.materials.take_usual_names()
         return RoadModel(root, collection, builder.objects, origin)
 
 

@@ -20,7 +20,7 @@ again.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import cache, wraps
 from pathlib import Path
@@ -313,13 +313,30 @@ def _kind(operand: Operand) -> str:
     return "INT" if isinstance(operand, int) else "VALUE"
 
 
+_SOURCES = (
+    *("nodes/*.py", "things/**/*.py"),
+    # One has the colour's attribute, one groups of its own, which are written in the road's field.
+    *("materials/looks.py", "materials/pavement.py", "../road/pavement/*.py"),
+)
+"""Source files that node groups follow from, beside the table of vehicles."""
+
+
 @cache
 def _sources_digest() -> bytes:
     """Return a SHA-256 digest of the source files of all node groups: a change to any makes new groups; cached."""
-    digest, blender = hashlib.sha256(), Path(__file__).parents[1]
-    # Of the materials one has the colour's attribute, one groups of its own, which are written in the road's field.
-    names = ("nodes/*.py", "things/**/*.py", "materials/looks.py", "materials/pavement.py", "../road/pavement/*.py")
-    for path in (*sorted(path for name in names for path in blender.glob(name)), PRESETS / "vehicles.json"):
+    return files_digest(*source_files(_SOURCES), PRESETS / "vehicles.json")
+
+
+def source_files(patterns: Iterable[str]) -> list[Path]:
+    """Return the source files that patterns match, relative to the folder ``blender``; sorted."""
+    blender = Path(__file__).parents[1]
+    return sorted(path for pattern in patterns for path in blender.glob(pattern))
+
+
+def files_digest(*files: Path) -> bytes:
+    """Return a SHA-256 digest of files: what was made from them is told by it from what they make now."""
+    digest = hashlib.sha256()
+    for path in files:
         digest.update(path.read_bytes())
     return digest.digest()
 

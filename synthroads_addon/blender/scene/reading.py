@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from ...base.class_mapping import NameClasses
 from ...base.classes import UNLABELLED
 from ...base.errors import InputError
+from ...materials.table import entry_of
 from ...scanning.scene.mesh import SceneMesh, empty_scene_mesh
 from ...scanning.scene.surface_values import MeshValues, PartValues, SurfaceInput, ValuesBuilder
 from ..labels import Label
-from ..materials import table_name
+from ..materials import scene_name
 from .values import OF_FRAME, OF_OBJECT, mesh_values
 
 Float = NDArray[np.float64]
@@ -87,12 +88,12 @@ class SceneTables:
 
 
 def slot_names(item: bpy.types.Object) -> list[str]:
-    """Return the material-table names of an evaluated object's material slots, at least one."""
-    names = [table_name(material) for material in item.data.materials]
+    """Return the names in the scene of an evaluated object's material slots, at least one."""
+    names = [scene_name(material) for material in item.data.materials]
     for index, slot in enumerate(item.material_slots[: len(names)]):
         if slot.link == "OBJECT":
-            names[index] = table_name(slot.material)
-    return names or [table_name(None)]
+            names[index] = scene_name(slot.material)
+    return names or [scene_name(None)]
 
 
 @dataclass
@@ -224,7 +225,7 @@ def _by_triangle(values: NDArray[Any], face: NDArray[np.int32] | None) -> NDArra
 def _material_classes(
     slots: Iterable[str], materials: dict[str, int], by_name: NameClasses
 ) -> NDArray[np.int16] | None:
-    classes = {materials[name]: by_name.find("materials", name) for name in slots}
+    classes = {materials[name]: by_name.find("materials", entry_of(name)) for name in slots}
     if all(number is None for number in classes.values()):
         return None
     result = np.full(max(classes) + 1, -1, np.int16)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...base.arrays import Float32
 from ...scanning.scene.surface_values import MeshValues, SurfaceInput
-from ..materials import table_name
+from ..materials import scene_name
 from ..materials.calculable import asked_inputs
 
 OF_OBJECT = ("location", "object_color", "object_index", "random", "object_attribute", "object_attribute_fac")
@@ -34,11 +34,11 @@ _DOMAINS = {"POINT": "point", "CORNER": "corner", "FACE": "face"}
 
 
 def asked_by_material() -> dict[str, frozenset[SurfaceInput]]:
-    """Return the surface inputs that the open file's materials read, by material-table name."""
+    """Return the surface inputs that the open file's materials read, by the materials' names in the scene."""
     asked: dict[str, frozenset[SurfaceInput]] = {}
     for item in bpy.data.materials:
         if inputs := asked_inputs(item):
-            asked[table_name(item)] = asked.get(table_name(item), frozenset()) | inputs
+            asked[scene_name(item)] = asked.get(scene_name(item), frozenset()) | inputs
     return asked
 
 

@@ -15,7 +15,7 @@ from ...scanning.scene.mesh import SceneMesh
 from ...scanning.scene.motion import BodyMotion, MovingMesh, ScannedScene
 from ...scanning.scene.surface_values import MeshValues, SurfaceInput
 from ..compat import set_modifier_input
-from ..materials import material
+from ..materials import RoadMaterials
 from ..materials.looks import COLOR
 from ..nodes.builder import usual_materials
 from ..things.vehicle.models import model_group
@@ -28,9 +28,13 @@ class VehicleMeshes:
     """Cache of vehicle meshes by model, each built when first needed; must be used on Blender's main thread.
 
     Materials have one number in all the scenes that one of these put together.
+
+    Args:
+        materials: of the road that they drive on.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, materials: RoadMaterials) -> None:
+        self._road_materials = materials
         self._models: dict[str, SceneMesh] = {}
         self._materials: dict[str, None] = {}
 
@@ -62,11 +66,11 @@ class VehicleMeshes:
 
     def _model(self, model: str) -> SceneMesh:
         if model not in self._models:
-            self._models[model] = _model_mesh(model)
+            self._models[model] = _model_mesh(model, self._road_materials)
         return self._models[model]
 
 
-def _model_mesh(model: str) -> SceneMesh:
+def _model_mesh(model: str, materials: RoadMaterials) -> SceneMesh:
     """Build a vehicle model; return its mesh centred on 0 on the road, x forward, y left, z up, m."""
     item = bpy.data.objects.new("SR Vehicle", bpy.data.meshes.new("SR Vehicle"))
     bpy.context.scene.collection.objects.link(item)
@@ -74,7 +78,7 @@ def _model_mesh(model: str) -> SceneMesh:
         modifier = item.modifiers.new("SynthRoads", "NODES")
         modifier.node_group = model_group(model)
         for key, entry in usual_materials(modifier.node_group).items():
-            set_modifier_input(modifier, key, material(entry))
+            set_modifier_input(modifier, key, materials.material(entry))
         bpy.context.view_layer.update()
         mesh = scene_mesh(objects=[item])
     finally:

@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.turns.stepper import run_aside, yield_if_due, yield_now
+from ...materials.table import Material
 from ...road.geometry import RoadGeometry
 from ...road.objects import PointObject, RoadObject
 from ...road.parameters import RoadParameters
 from ...road.stretches import cut_stretch, frame_of
 from ...road.tessellation import sample_stations
 from ..compat import set_modifier_input
-from ..materials import material
+from ..materials import RoadMaterials
 from ..nodes.builder import usual_materials
 from ..nodes.inputs import input_name
 from .meshes import on_plan, points_mesh, signed_instance
@@ -44,6 +45,7 @@ class ModelBuilder:
     Attributes:
         parameters: the road, with only those objects that stand on the stretch.
         geometry: the whole road's analytic geometry.
+        materials: the road's.
         stretch: stations between which it is built, two of those that the whole road's surface has.
         stations: (N,) m, of the rows of the surface.
         origin: (3,) local coordinates of the scene's origin: near the stretch, as the scene has float32.
@@ -64,13 +66,14 @@ class ModelBuilder:
         stretch: tuple[float, float] | None = None,
         geometry: RoadGeometry | None = None,
         root: bpy.types.Object | None = None,
+        own: Mapping[str, Material] | None = None,
     ) -> None:
         self.geometry = geometry or RoadGeometry(parameters)
         self._given = stretch or (0.0, self.geometry.length)
         self.stations: NDArray[np.float64] = np.zeros(0)
         self.stretch = self._given
         self._whole = stretch is None
-        self.parameters = parameters
+        self.parameters, self.materials = parameters, RoadMaterials.of(parameters, own)
         self.origin, self.zero = np.zeros(3), 0
         self.tolerance = tolerance
         self.detail = detail
@@ -175,7 +178,7 @@ class ModelBuilder:
                 if kind == "NodeSocketObject" and name in self.objects
             }
             for name, value in {**usual_materials(group), **objects, **(inputs or {})}.items():
-                set_modifier_input(modifier, name, _to_input(name, kinds.get(name, ""), value))
+                set_modifier_input(modifier, name, self._to_input(name, kinds.get(name, ""), value))
         self._added(role, item)
 
     def stand(self, role: str, item: PointObject, rotation_deg: float = 0.0) -> None:
@@ -196,6 +199,12 @@ class ModelBuilder:
         self._collection.objects.link(item)
         self._added(role, item)
         return item
+
+    def _to_input(self, name: str, kind: str, value: Any) -> Any:
+        """Return a value converted for a modifier's input: signed instance numbers, materials by their table names."""
+        if name.endswith("Instance"):
+            return int(signed_instance([value])[0])
+        return self.materials.material(value) if kind == "NodeSocketMaterial" else value
 
     def _added(self, role: str, item: bpy.types.Object) -> None:
         self.objects[role] = item
@@ -223,8 +232,3 @@ def named_fields(item: RoadObject, group: bpy.types.NodeTree) -> dict[str, str]:
     return fields
 
 
-def _to_input(name: str, kind: str, value: Any) -> Any:
-    """Return a value converted for a modifier's input: signed instance numbers, materials by their table names."""
-    if name.endswith("Instance"):
-        return int(signed_instance([value])[0])
-    return material(value) if kind == "NodeSocketMaterial" and isinstance(value, str) else value

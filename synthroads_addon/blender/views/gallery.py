@@ -24,6 +24,7 @@ from ...scenario.road import RoadScenario
 from ..files import empty_file
 from ..materials import material
 from ..materials.shading import LAYERS
+from ..materials.surface_layers import PROPERTY
 from ..model.build import build_road
 from ..scene.evaluated import scene_mesh
 from . import pictures
@@ -200,10 +201,8 @@ def _cube(name: str, column: int, row: int) -> None:
 
 def _show_layer(layer: str) -> None:
     """Make every material of the file emit the values of one of its layers, in place."""
-    for name in materials():
-        for item in bpy.data.materials:
-            if item.name != f"SR {name}":
-                continue
+    for item in bpy.data.materials:
+        if PROPERTY in item:
             nodes, links = item.node_tree.nodes, item.node_tree.links
             source = next(node for node in nodes if node.type == "OUTPUT_AOV" and node.aov_name == layer)
             socket = source.inputs["Color" if LAYERS[layer] == "COLOR" else "Value"]

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...base.arrays import Float
 from ...base.progress import StageTimer
-from ...blender.materials import vary
+from ...blender.materials import RoadMaterials
 from ...blender.model.build import build_road, remove_road
 from ...blender.scene.evaluated import scene_mesh
 from ...blender.scene.vehicle_meshes import VehicleMeshes
@@ -62,7 +62,8 @@ class SectionScan:
         self._site, self._scenario, self._road, self.cut = site, site.scenario, road, site.cut
         every = lane_motions(road, self._scenario.scan.traffic_speed_factor)
         self._motions = {name: motion for name, motion in every.items() if not motion.stands}
-        self._vehicles = VehicleMeshes()
+        self._own = self._scenario.own_materials()
+        self._vehicles = VehicleMeshes(RoadMaterials.of(road.parameters, self._own))
         standing = {name: item for name, item in road.parameters.objects.items() if name not in self._motions}
         self.scanned = 0
         self._standing = road.parameters.model_copy(update={"objects": standing})
@@ -102,14 +103,11 @@ class SectionScan:
         """Build a section; return its scene with passing vehicles, and its frame's origin (3,) in the road's, m."""
         settings, whole, stretch = self._scenario.settings(), self._road.parameters, (section.low, section.high)
         tolerance, detail = settings.tolerance, settings.vegetation_detail
-        model = build_road(self._standing, tolerance, detail, stretch=stretch, geometry=self._road)
+        model = build_road(self._standing, tolerance, detail, stretch=stretch, geometry=self._road, own=self._own)
         frame = model.origin - np.array(whole.transform.translate)
         class_ids = self._scenario.cloud.scheme().source_ids()
         static = scene_mesh(objects=list(model.objects.values()), class_ids=class_ids)
         passing = vehicles_through(section, self.cut, self._motions, self._scenario.scan.traffic_speed_factor)
         vehicles = {name: motion.vehicle for name, motion in passing.items()}
         motions = {name: ShiftedMotion(motion, frame) for name, motion in passing.items()}
-        scene = self._vehicles.with_traffic(static, vehicles, motions, self._road.numbers.passes)
-        # The vehicles' materials may be new.
-        vary(whole.materials, whole.environment, self._scenario.own_materials(), whole.metadata.seed)
-        return scene, frame
+        return self._vehicles.with_traffic(static, vehicles, motions, self._road.numbers.passes), frame

@@ -15,7 +15,7 @@ from ...base.progress import StageTimer
 from ...cloud.layers import optional_arrays
 from ...cloud.tools.previews import TopView
 from ...materials.surfaces import surfaces_of
-from ...materials.table import Material
+from ...materials.table import Material, entry_of
 from ...materials.variation import vary_material
 from ...road.geometry import RoadGeometry
 from ...road.instances import InstanceNumbers
@@ -100,7 +100,7 @@ def plan_scan(
     relief = micro_relief(materials, means) if shifts else None
     scanned = [
         vary_material(name, conditions.variation, conditions.environment, table) if name in table else mean
-        for name, mean in zip(materials, means, strict=True)
+        for name, mean in zip(map(entry_of, materials), means, strict=True)
     ]
     by_layers = _intensity_from_layers(scenario, scanned, services, materials)
     return ScanPlan(

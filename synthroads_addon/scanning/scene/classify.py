@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ...base.class_mapping import fits_pattern
 from ...base.classes import ClassScheme, ClassSelector, class_id
 from ...base.errors import InputError, nearest_name
+from ...materials.table import entry_of
 from ...road.instances import InstanceNumbers
 from ...road.objects import RoadObject
 from ...road.parameters import AnyObject, RoadParameters
@@ -92,7 +93,7 @@ class _Rule:
         if self.selector.class_name is not None:
             found &= mesh.class_id == class_id(self.selector.class_name)
         if self.selector.material is not None:
-            materials = [fits_pattern(name, self.selector.material) for name in mesh.materials]
+            materials = [fits_pattern(entry_of(name), self.selector.material) for name in mesh.materials]
             found &= np.array(materials, dtype=bool)[mesh.material]
         if self.names is not None:
             present, faces = np.unique(mesh.instance_id, return_inverse=True)

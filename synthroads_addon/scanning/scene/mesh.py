@@ -31,7 +31,8 @@ class SceneMesh:
         class_id: (T,) uint8, see `base.classes`; 255 is unlabelled.
         instance_id: (T,) uint32, number of the object that the triangle belongs to; 0 is none.
         material: (T,) uint16 indices into `materials`.
-        materials: names of materials, those of the material table or the scene's own.
+        materials: names of materials, each once: entries of the material table (see `materials.table.entry_of`) or the
+            scene's own.
         origin: (3,) float64 map coordinates of the local origin, m.
         surface: what its materials ask of the places on it; None if they ask nothing.
 

@@ -12,7 +12,7 @@ from typing import Any, cast
 import bpy
 
 from ...base.errors import InputError
-from ...blender.materials import constants, table_name
+from ...blender.materials import constants, scene_name
 from ...blender.materials.image import base_color_image, color_image_node
 from ...calibration.expected import texture_of
 from ...calibration.job import CalibrationJob, MaterialTarget, Part, check_job
@@ -26,7 +26,7 @@ _RAY = "RAY"
 
 def _materials(self: Any, context: bpy.types.Context, typed: str) -> Iterator[str]:
     """Yield the names of materials in table and scene that contain the typed text, for a search field."""
-    names = {*materials(), *(table_name(item) for item in bpy.data.materials)}
+    names = {*materials(), *(scene_name(item) for item in bpy.data.materials)}
     yield from sorted(name for name in names if typed.lower() in name.lower())
 
 
@@ -146,12 +146,12 @@ class SYNTHROADS_PG_calibration(bpy.types.PropertyGroup):
 
 def textured_materials() -> set[str]:
     """Return the names of the scene's materials whose base colour is an image."""
-    return {table_name(item) for item in bpy.data.materials if color_image_node(item) is not None}
+    return {scene_name(item) for item in bpy.data.materials if color_image_node(item) is not None}
 
 
 def _scene_materials(names: list[str]) -> dict[str, Material]:
     """Return the constant properties of those scene materials whose names are given, by name."""
-    there = {table_name(item) for item in bpy.data.materials}
+    there = {scene_name(item) for item in bpy.data.materials}
     return dict(constants(name for name in names if name in there))
 
 
@@ -159,7 +159,7 @@ def _material_target(row: Any, scene: dict[str, Material], compared: bool) -> Ma
     real_class = row.told if compared else None
     if not row.texture:
         return MaterialTarget(row.material, real_class)
-    item = next((item for item in bpy.data.materials if table_name(item) == row.material), None)
+    item = next((item for item in bpy.data.materials if scene_name(item) == row.material), None)
     pixels = None if item is None else base_color_image(item)
     if pixels is None:
         raise InputError("Texture", row.material, "the scene's material has no image as its base colour")

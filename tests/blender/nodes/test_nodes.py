@@ -16,6 +16,7 @@ import pytest
 
 from synthroads_addon.blender import nodes, things
 from synthroads_addon.blender.compat import modifier_input, set_modifier_input
+from synthroads_addon.blender.materials import material
 from synthroads_addon.blender.nodes import builder
 from synthroads_addon.blender.nodes import operations as op
 from synthroads_addon.blender.nodes.builder import Tree, Value, node_group
@@ -66,13 +67,14 @@ def all_groups() -> list[bpy.types.NodeTree]:
 
 
 def evaluated(group: bpy.types.NodeTree, **inputs: object) -> bpy.types.Mesh:
-    """Return what a group makes as the modifier of an empty mesh."""
+    """Return what a group makes as the modifier of an empty mesh; materials are named as in their table."""
     item = bpy.data.objects.new("Item", bpy.data.meshes.new("Item"))
     bpy.context.scene.collection.objects.link(item)
     modifier = item.modifiers.new("Nodes", "NODES")
     modifier.node_group = group
     for name, value in inputs.items():
-        set_modifier_input(modifier, name, value)
+        named = isinstance(value, str) and name.endswith("Material")
+        set_modifier_input(modifier, name, material(str(value)) if named else value)
     return item.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
 
 

@@ -11,7 +11,6 @@ import numpy as np
 from ....base.classes import class_id
 from ....road.things import gantry as sizes
 from ....road.things.gantry import Gantry, GantrySign
-from ...materials import material
 from ...nodes import operations as op
 from ...nodes.backbone import height_on
 from ...nodes.builder import Tree, Value, makes_group
@@ -252,9 +251,9 @@ def _display_inputs(sign: GantrySign) -> dict[str, Any]:
     else:
         size = (_LIT * sign.width, _LIT * sign.height)
         inputs = face_inputs(FaceStyle("black", "black", "white"), "rectangle", *size, sign.text)
-    dark = dict.fromkeys(("Ground Material", "Edge Material", "Back Material"), material("display"))
-    ring = material("led_red" if "".join(sign.text).isdigit() else "display")
-    return inputs | dark | {"Border Material": ring, "Writing Material": material("led_white")}
+    dark = dict.fromkeys(("Ground Material", "Edge Material", "Back Material"), "display")
+    ring = "led_red" if "".join(sign.text).isdigit() else "display"
+    return inputs | dark | {"Border Material": ring, "Writing Material": "led_white"}
 
 
 def _signs_mesh(gantry: Gantry) -> bpy.types.Mesh:

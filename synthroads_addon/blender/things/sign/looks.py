@@ -11,7 +11,6 @@ import numpy as np
 from ....road.things.sign import TrafficSign
 from ....road.things.sign_catalogue import sign_type
 from ....road.things.sign_outline import corner_radius
-from ...materials import material
 from .outline import SHAPES
 from .pictograms import NAMES
 from .writing import LINES
@@ -108,11 +107,11 @@ def face_inputs(style: FaceStyle, shape: str, width: float, height: float, text:
         "Flush Left": False,
         "Pictogram": NAMES.index(style.pictogram) if style.pictogram in NAMES else 0,
         **_box_inputs("Pictogram", drawing),
-        "Ground Material": material(f"sheeting_{style.ground}"),
-        "Border Material": material(f"sheeting_{style.border}"),
-        "Edge Material": material("sheeting_white"),
-        "Writing Material": material(f"sheeting_{style.writing}"),
-        "Back Material": material("board_back"),
+        "Ground Material": f"sheeting_{style.ground}",
+        "Border Material": f"sheeting_{style.border}",
+        "Edge Material": "sheeting_white",
+        "Writing Material": f"sheeting_{style.writing}",
+        "Back Material": "board_back",
     }
 
 
