@@ -65,7 +65,15 @@ def _exposed(environment: Environment) -> tuple[SunAndSky, float]:
     """Return sun and sky as white surfaces see them, exposed, and the exposure, see `expose_light`."""
     # A lamp's irradiance, which it keeps as 32 bits, falls on a matt surface, which spreads it over pi.
     facing = np.array(SUN_COLOR) * float(np.float32(SUN_STRENGTH * environment.sun_strength)) / math.pi
-    return expose_light(sun_direction(environment), facing, np.array(_sky_radiance(_Sky.of(environment))))
+    return expose_light(sun_direction(environment), facing, np.array(sky_radiance(environment)))
+
+
+def sky_radiance(environment: Environment) -> tuple[float, float, float]:
+    """Return the radiance (red, green, blue) of a white matt level surface under an environment's sky alone.
+
+    Each sky is rendered once per process, in Blender's main thread.
+    """
+    return _sky_radiance(_Sky.of(environment))
 
 
 class _Sky(NamedTuple):

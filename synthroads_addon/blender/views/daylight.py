@@ -1,5 +1,6 @@
 """Sun, sky, haze and cameras of a road, kept in the file: for the user's own pictures, never for a scan."""
 
+import math
 from collections.abc import Iterator
 
 import bpy
@@ -9,8 +10,10 @@ from numpy.typing import NDArray
 
 from ...road.parameters import RoadParameters
 from ...road.surroundings import Environment
-from ..sky import fill_sky, new_sun
+from ..cameras.light import sky_radiance
+from ..sky import SUN_COLOR, fill_sky, new_sun
 from ..things.model_builder import SUPPORT
+from .haze import haze_body, haze_light, light_below
 from .viewpoints import Viewpoint, aerial_view, driver_view
 
 VIEW = "synthroads_view"
@@ -18,14 +21,10 @@ VIEW = "synthroads_view"
 SUN, SKY, HAZE, DRIVER, AERIAL = "sun", "sky", "haze", "driver", "aerial"
 _NAMES = {SUN: "SR Sun", SKY: "SR Sky", HAZE: "SR Haze", DRIVER: "SR Driver", AERIAL: "SR Aerial"}
 _VIEWS = {DRIVER: driver_view, AERIAL: aerial_view}
-_CONTRAST = 3.912
-"""Optical depth over the meteorological visibility: -ln 0.02, a contrast of 2 % (Koschmieder)."""
 _HAZE_BELOW = 10_000.0
 """Visibility (m) from which on a picture shows no haze."""
 _LOWEST_SKY = 0.02
 """Sine of the elevation whose colour goes on below."""
-_REACH, _HEIGHT = 2500.0, 300.0
-"""Half the width of the body of haze, and its height above the road, m."""
 
 
 def add_views(scene: bpy.types.Scene, parameters: RoadParameters, matrix: Matrix) -> None:
@@ -41,11 +40,11 @@ def add_views(scene: bpy.types.Scene, parameters: RoadParameters, matrix: Matrix
     current = scene.camera.get(VIEW, "") if scene.camera else DRIVER
     remove_views(scene)
     environment = parameters.environment
-    _mark(SUN, new_sun(_NAMES[SUN], environment), scene)
+    sun = _mark(SUN, new_sun(_NAMES[SUN], environment), scene)
     scene.world = _world(scene, environment)
     if environment.visibility < _HAZE_BELOW:
         middle = matrix @ Vector(driver_view(parameters).place.tolist())
-        _mark(HAZE, _haze(environment.visibility, middle), scene)
+        _add_haze(scene, environment, sun, middle)
     for name, view in _VIEWS.items():
         camera = _mark(name, _camera(_NAMES[name], view(parameters), matrix), scene)
         if name == current:
@@ -106,6 +105,18 @@ def _go_on_below_horizon(world: bpy.types.World) -> None:
     links.new(joined.outputs[0], sky.inputs["Vector"])
 
 
+def _add_haze(scene: bpy.types.Scene, environment: Environment, sun: bpy.types.Object, middle: Vector) -> None:
+    """Add the environment's haze around a place, and dim the scene's sun and sky by it."""
+    across = np.array(SUN_COLOR) * sun.data.energy
+    elevation = math.radians(environment.sun_elevation_deg)
+    level = math.pi * np.array(sky_radiance(environment))
+    light = haze_light(environment.visibility, elevation, across, level)
+    sun.data.energy *= light.sun
+    light_below(scene.world, light)
+    item = _mark(HAZE, haze_body(_NAMES[HAZE], environment.visibility, light.air, middle), scene)
+    item[SUPPORT] = True  # scans leave it out: they have weather of their own
+
+
 def _camera(name: str, view: Viewpoint, matrix: Matrix) -> bpy.types.Object:
     data = bpy.data.cameras.new(name)
     data.lens, data.clip_start, data.clip_end = view.lens, 0.05, 5000.0
@@ -114,33 +125,6 @@ def _camera(name: str, view: Viewpoint, matrix: Matrix) -> bpy.types.Object:
     item.location = eye
     item.rotation_euler = (target - eye).to_track_quat("-Z", "Y").to_euler()
     return item
-
-
-def _haze(visibility: float, middle: Vector) -> bpy.types.Object:
-    """Create an object of scattering air for a visibility (m) around a place; scans and selection leave it out."""
-    mesh = bpy.data.meshes.new(_NAMES[HAZE])
-    corners = [(x, y, z) for z in (-60.0, _HEIGHT) for y in (-_REACH, _REACH) for x in (-_REACH, _REACH)]
-    faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
-    mesh.from_pydata(corners, [], faces)
-    mesh.materials.append(_air(visibility))
-    item = bpy.data.objects.new(_NAMES[HAZE], mesh)
-    item.location = middle
-    item.display_type, item.hide_select, item.visible_shadow = "BOUNDS", True, False
-    item[SUPPORT] = True  # scans leave it out: they have weather of their own
-    return item
-
-
-def _air(visibility: float) -> bpy.types.Material:
-    material = bpy.data.materials.get(_NAMES[HAZE]) or bpy.data.materials.new(_NAMES[HAZE])
-    if material.node_tree is None:
-        material.use_nodes = True
-    nodes = material.node_tree.nodes
-    nodes.clear()
-    volume, output = nodes.new("ShaderNodeVolumeScatter"), nodes.new("ShaderNodeOutputMaterial")
-    volume.inputs["Density"].default_value = _CONTRAST / visibility
-    volume.inputs["Anisotropy"].default_value = 0.6
-    material.node_tree.links.new(volume.outputs[0], output.inputs["Volume"])
-    return material
 
 
 def _list(point: NDArray[np.float64]) -> list[float]:

@@ -1,1 +1,1 @@
-"""Long work of the panel, and its buttons."""
+"""Long-running work of the panel, and the operators that start it."""

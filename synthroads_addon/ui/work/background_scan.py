@@ -1,4 +1,4 @@
-"""Scan in a Blender of its own, without a window, started by `rendered_scan`: of a road in a copy of the user's file.
+"""Entry point of a second Blender without a window, which `rendered_scan` starts to scan a copy of the user's file.
 
 It says on its standard output, in lines of JSON after `MARK`, how far it is and how it ended.
 """
@@ -33,7 +33,7 @@ MARK = "synthroads-scan: "
 
 
 def main(path: str) -> NoReturn:
-    """Do a job that `rendered_scan.save_open_scene` has written, and end the process."""
+    """Run the job file that `rendered_scan.save_open_scene` has written, and end the process."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
     code = 0
     try:
@@ -49,7 +49,7 @@ def main(path: str) -> NoReturn:
 
 
 def _scan(job: dict[str, Any]) -> dict[str, Any]:
-    """Open the copy and scan it; return the counts and the stages."""
+    """Open the copied file and scan it; return the counts of points and the timed stages."""
     bpy.ops.wm.open_mainfile(filepath=job["file"], load_ui=False, use_scripts=job["scripts"])
     scene = bpy.data.scenes[job["scene"]]
     window = bpy.context.window_manager.windows[0]
@@ -106,7 +106,7 @@ def _say(**what: Any) -> None:
 
 
 def _end_with_parent() -> None:
-    """Wait until standard input is closed, which happens when the parent ends however it ends; then end at once."""
+    """End this process as soon as standard input closes, which it does when the parent process ends in any way."""
     while os.read(0, 1024):
         pass
     os._exit(130)

@@ -1,4 +1,4 @@
-"""The button that builds the road.
+"""Operators that build the road, and the work that they do.
 
 Annotations are not postponed here: Blender reads the properties from them.
 """
@@ -36,14 +36,14 @@ class SYNTHROADS_OT_build(LongOperator, bpy.types.Operator):
     _first = False
 
     def job(self, context: bpy.types.Context) -> PanelJob[RoadModel]:
-        """Return the building of the road that the panel asks for."""
+        """Return the job that builds a road from the panel's settings."""
         settings = context.scene.synthroads
         self._first = find_road(context.scene) is None
         place = BuildTarget(beside=True) if self.beside else shown_place(context.scene)
         return PanelJob("Build", build_work(settings.scenario(), settings.road_values(), place))
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[RoadModel]) -> str:
-        """Show the first road that is built."""
+        """Make the new road the current one, look along it if it is the scene's first, and return the message."""
         assert job.result
         parameters = recall(job.result.root)[0]
         choose_road(context.scene, job.result.root)
@@ -64,35 +64,35 @@ class SYNTHROADS_OT_build_edited(LongOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """There must be a road."""
+        """Return whether the scene has a road and no other work is running."""
         return is_free(cls, context) and has_road(cls, context)
 
     def job(self, context: bpy.types.Context) -> PanelJob[RoadModel]:
-        """Return the building of the shown road as it is edited now."""
+        """Return the job that rebuilds the current road with its edits."""
         root = find_road(context.scene)
         assert root  # poll() has seen it
         return PanelJob("Build", edited_work(str(root[ROAD]), read_road(root, context.scene)))
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[RoadModel]) -> str:
-        """Return how long the road is."""
+        """Return the message, with the road's length."""
         assert job.result
         return f"Built {recall(job.result.root)[0].alignment.length:,.0f} m of road as it was edited"
 
 
 def edited_work(road: str, edited: EditedRoad) -> Work[RoadModel]:
-    """Build a road again as it was edited; see `settle_steps`."""
+    """Generator that rebuilds an edited road in its place, as a job's work; see `settle_steps`."""
     yield Step(0.0, "Building")
     return (yield from settle_steps(road, edited))
 
 
 def shown_place(scene: bpy.types.Scene) -> BuildTarget:
-    """Return the place of the road that the panel shows: it stays that one, whatever is clicked during the work."""
+    """Return the build target that replaces the current road, by its id: clicks during the work don't change it."""
     root = find_road(scene)
     return MEANT if root is None else BuildTarget(str(root[ROAD]))
 
 
 def build_work(scenario: Scenario, built_from: str, place: BuildTarget = MEANT) -> Work[RoadModel]:
-    """Sample a road and build it in the open scene.
+    """Generator that samples a road and builds it in the open scene, as a job's work.
 
     Args:
         scenario: the road's limits, and the model's fidelity.
@@ -109,7 +109,7 @@ def build_work(scenario: Scenario, built_from: str, place: BuildTarget = MEANT) 
 def road_work(
     parameters: RoadParameters, scenario: Scenario, built_from: str, place: BuildTarget = MEANT
 ) -> Work[RoadModel]:
-    """Build a road that is given in the open scene; see `build_work`."""
+    """Generator that builds a road from given parameters, as a job's work; see `build_work`."""
     fidelity = scenario.settings()
     yield Step(0.02, "Building")
     steps = build_steps(parameters, fidelity.tolerance, fidelity.vegetation_detail, place=place)

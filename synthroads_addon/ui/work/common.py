@@ -1,4 +1,4 @@
-"""Parts that the panel's modules share: places of panels, buttons and messages, when a button may be pressed."""
+"""Helpers that panels and operators share: layout, conditions under which an operator may run, error messages."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _PIP = "pip install 'synthroads[twin]'"
 
 
 class Sidebar:
-    """Base of panels: the 3D view's sidebar."""
+    """Mixin of panels that places them in the 3D view's sidebar."""
 
     bl_category = "SynthRoads"
     bl_space_type = "VIEW_3D"
@@ -24,7 +24,7 @@ class Sidebar:
 
 
 def column(panel: bpy.types.Panel) -> bpy.types.UILayout:
-    """Return a panel's layout with names to the left of values."""
+    """Return a panel's layout, set to draw names to the left of values."""
     layout = panel.layout
     layout.use_property_split = True
     layout.use_property_decorate = False
@@ -32,21 +32,21 @@ def column(panel: bpy.types.Panel) -> bpy.types.UILayout:
 
 
 def large_button(layout: bpy.types.UILayout) -> bpy.types.UILayout:
-    """Return a row for a button that does much."""
+    """Return a new row with a taller button, for a panel's main action."""
     row = layout.row()
     row.scale_y = 1.4
     return row
 
 
 def right_label(layout: bpy.types.UILayout, text: str) -> None:
-    """Draw a text at the right end of what is left of a row."""
+    """Draw a text aligned to the right in the rest of a row."""
     row = layout.row()
     row.alignment = "RIGHT"
     row.label(text=text)
 
 
 def is_free(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """Return whether long work may begin, for an operator's `poll`; else say why not."""
+    """Return whether long work may begin, for an operator's `poll`; else set its tooltip to the reason."""
     job = running_job()
     if job is not None:
         operator.poll_message_set(f"{job.title} is still at work")
@@ -58,7 +58,7 @@ def is_free(operator: type[bpy.types.Operator], context: bpy.types.Context) -> b
 
 
 def has_road(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """Return whether the scene has a road, for an operator's `poll`; else say that it needs one."""
+    """Return whether the scene has a road, for an operator's `poll`; else set its tooltip to the reason."""
     if find_road(context.scene) is None:
         operator.poll_message_set("Build a road first")
     return find_road(context.scene) is not None
@@ -69,7 +69,7 @@ Execute = Callable[[Any, bpy.types.Context], set[str]]
 
 
 def refusing(execute: Callable[[Any, bpy.types.Context], None]) -> Execute:
-    """Return an operator's `execute` that ends well, or shows the `InputError` that the function raises."""
+    """Decorate an operator's `execute` to return FINISHED, or to report an `InputError` and return CANCELLED."""
 
     @wraps(execute)
     def execute_or_refuse(self: bpy.types.Operator, context: bpy.types.Context) -> set[str]:
@@ -83,7 +83,7 @@ def refusing(execute: Callable[[Any, bpy.types.Context], None]) -> Execute:
 
 
 def refuse(operator: bpy.types.Operator, error: InputError) -> set[str]:
-    """Show what is wrong in the panel's words."""
+    """Report an error with command-line options replaced by the panel's labels; return CANCELLED."""
     message = str(error).replace("--overwrite replaces it", "tick Replace Files, or choose another folder")
     message = message.replace("--allow-large", "the command's --allow-large")
     if str(__package__).startswith("bl_ext."):  # as an extension there is no pip
@@ -93,7 +93,7 @@ def refuse(operator: bpy.types.Operator, error: InputError) -> set[str]:
 
 
 def redraw_sidebars(context: bpy.types.Context) -> None:
-    """Have the sidebars of all 3D views drawn again."""
+    """Tag the sidebars of all 3D views for redraw."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             for region in area.regions:

@@ -1,4 +1,4 @@
-"""Edits of the roads, for the panels: read a moment after each change, never while they are drawn."""
+"""Cache of the roads' edits for the panels, updated by a timer a moment after each change, never while drawing."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _DELAY = 0.5
 
 
 class Edits:
-    """The last reading of each road that was shown.
+    """Cache of the last reading of each road's edits.
 
     Attributes:
         by_road: what was read, or what is wrong, by the road's id.
@@ -34,17 +34,17 @@ class Edits:
         self.objects = 0
 
     def forget(self) -> None:
-        """Forget all readings."""
+        """Empty the cache."""
         self.by_road.clear()
         self.objects = 0
 
     def shown(self, scene: bpy.types.Scene) -> EditedRoad | str | None:
-        """Return the reading of the road that the panels show, or what is wrong with it; None if it isn't read yet."""
+        """Return the cached reading of the current road, or its error message; None if it hasn't been read yet."""
         root = find_road(scene)
         return self.by_road.get(str(root[ROAD])) if root is not None else None
 
     def read(self, scene: bpy.types.Scene) -> None:
-        """Read the road that the panels show."""
+        """Read the current road's edits into the cache."""
         root = find_road(scene)
         if root is not None:
             self.by_road[str(root[ROAD])] = _read(scene, str(root[ROAD]))
@@ -63,7 +63,7 @@ def _read(scene: bpy.types.Scene, road: str) -> EditedRoad | str:
 
 
 def _read_later() -> float | None:
-    """Read the shown road, unless something is at work."""
+    """Timer that reads the current road and redraws the panels; waits while a job is running."""
     if running_job() is not None:
         return _DELAY
     edits.read(bpy.context.scene)
@@ -73,7 +73,7 @@ def _read_later() -> float | None:
 
 @persistent
 def _note_changes(scene: bpy.types.Scene, graph: bpy.types.Depsgraph | None = None) -> None:
-    """Have the road read again after a change of one of its objects."""
+    """Handler that schedules a reading after a change to one of a road's objects."""
     changes = [update.id for update in graph.updates] if graph else []
     count, edits.objects = edits.objects, len(scene.objects)
     touched = (
@@ -97,7 +97,7 @@ def _other_file(*_: Any) -> None:
 
 
 def draw_edits(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """Say what of the shown road was edited by hand, and whether it is built again before a scan."""
+    """Draw the current road's edits: fit of the axis, button to rebuild, parts edited by hand with the reasons."""
     edited = edits.shown(context.scene)
     if edited is None:
         return
@@ -121,7 +121,7 @@ HANDLERS["load_post"] = _other_file
 
 
 def unregister() -> None:
-    """Forget what was read."""
+    """Empty the cache and cancel the timer."""
     edits.forget()
     if bpy.app.timers.is_registered(_read_later):
         bpy.app.timers.unregister(_read_later)

@@ -1,4 +1,4 @@
-"""Guardrails and all else along a road follow it at once when the user has moved them: see `settle.move_line`."""
+"""Update of guardrails and other things along the road right after the user moved them, see `settle.move_line`."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _moved: set[str] = set()
 
 @persistent
 def _note_moves(scene: bpy.types.Scene, graph: bpy.types.Depsgraph) -> None:
-    """Note the parts that are being moved."""
+    """Handler that records which parts are being moved."""
     for update in graph.updates:
         item = update.id
         if update.is_updated_transform and isinstance(item, bpy.types.Object) and ROLE in item:
@@ -30,7 +30,7 @@ def _note_moves(scene: bpy.types.Scene, graph: bpy.types.Depsgraph) -> None:
 
 
 def _follow_later() -> float | None:
-    """Wait until the user has let go, then have what was moved follow the road."""
+    """Timer that updates the moved parts once no transform operator is running any more."""
     windows = bpy.context.window_manager.windows
     running = (operator for window in windows for operator in getattr(window, "modal_operators", ()))
     if any(operator.bl_idname.startswith("TRANSFORM_OT") for operator in running):
@@ -40,7 +40,7 @@ def _follow_later() -> float | None:
 
 
 def follow(scene: bpy.types.Scene) -> list[str]:
-    """Have the noted parts of a scene follow the road; return the names of those that moved along or across it."""
+    """Write the recorded parts' moves to their station and offset inputs; return the changed parts' names."""
     names, moved = sorted(_moved), []
     _moved.clear()
     for name in names:
@@ -52,7 +52,7 @@ def follow(scene: bpy.types.Scene) -> list[str]:
 
 @persistent
 def _forget(*_: Any) -> None:
-    """Forget the moves in a file that was open before."""
+    """Handler that clears the records when another file is opened."""
     _moved.clear()
 
 
@@ -60,7 +60,7 @@ HANDLERS = {"depsgraph_update_post": _note_moves, "load_pre": _forget}
 
 
 def unregister() -> None:
-    """Clear the record of objects that were moved and stop the timer that reads them back."""
+    """Clear the records and cancel the timer."""
     _moved.clear()
     if bpy.app.timers.is_registered(_follow_later):
         bpy.app.timers.unregister(_follow_later)

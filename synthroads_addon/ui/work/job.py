@@ -1,4 +1,4 @@
-"""Long work of the panel, in one way for all of it: in steps between which the window lives, or in a thread.
+"""Long-running jobs: generators that run step by step in the main thread or in threads beside the window.
 
 What a job does is a generator. It runs in Blender's main thread up to its next `yield`, and says there how far it is:
 
@@ -39,7 +39,7 @@ _LOOK_AGAIN = 0.001
 
 
 class WorkPace:
-    """How long turns last: where the graphics card draws slowly, most of the time is for the work all the same.
+    """Time budget of a job's turns in the main thread: slow drawing of the window makes them longer.
 
     Args:
         clock: returns seconds.
@@ -55,24 +55,24 @@ class WorkPace:
         self.drawing = drawing
 
     def budget(self) -> float:
-        """Return the seconds of the turn that begins now, by how long the window took since the last one."""
+        """Return the budget (s) of the turn that begins now, from the time that the window took since the last turn."""
         if self._left is not None:
             self.drawing = max(self._clock() - self._left - TICK, 0.0)
         return min(max(BUDGET, _WORK_FOR_DRAWING * self.drawing), _LONGEST)
 
     @property
     def patience(self) -> float:
-        """Return how long (s) a turn waits for what is computed aside: to have the window drawn takes as long."""
+        """Return how long (s) a turn waits for a thread: as long as drawing the window would take."""
         return min(self.drawing, _MOST_PATIENCE)
 
     def leave(self) -> None:
-        """Note that a turn has ended."""
+        """Record the end of a turn."""
         self._left = self._clock()
 
 
 @dataclass(frozen=True)
 class Aside:
-    """Part of a job that is done in a thread; the generator gets what it returns.
+    """Request of a job to run a function in a thread; the generator is sent its result.
 
     Attributes:
         work: gets a `Report` to call now and then; touches no data-block of Blender.
@@ -90,7 +90,7 @@ class Aside:
 
 @dataclass(frozen=True)
 class Step:
-    """A step that is done: its share, and what comes next, in words for the window."""
+    """Progress of a job after a step: share of the whole, and a text of what comes next."""
 
     share: float
     state: str = ""
@@ -101,7 +101,7 @@ Work: TypeAlias = Generator[float | Step | Aside | None, Any, T]
 
 
 class PanelJob(Generic[T]):
-    """Work that may take long. Across a part in a thread it holds on to no data of the file: an undo may take it away.
+    """Long-running job of the panel. While a thread runs it must hold no data-blocks: an undo may free them.
 
     Args:
         title: what is done, as a noun: "Scan".
@@ -130,7 +130,7 @@ class PanelJob(Generic[T]):
 
     @classmethod
     def aside(cls, title: str, work: Callable[[Report], T], state: str = "") -> PanelJob[T]:
-        """Return a job that is done in a thread as a whole; `state` is what it does, in words for the window."""
+        """Return a job that runs one function in a thread; `state` is the text in the window."""
 
         def steps() -> Work[T]:
             return (yield Aside(work, state or title))
@@ -139,23 +139,23 @@ class PanelJob(Generic[T]):
 
     @property
     def running(self) -> bool:
-        """Return whether it has begun in the window and not ended yet."""
+        """Return whether the job was started and hasn't ended yet."""
         return running_job() is self and not self._ended
 
     @property
     def state(self) -> str:
-        """Return what it is doing, in words for the window."""
+        """Return the text of the current step with the share done, as shown in the window."""
         if self._stopping.is_set():
             return "Stopping"
         return f"{self._state or self.title} {self.share:.0%}"
 
     @property
     def touches_scene(self) -> bool:
-        """Return whether it may hold on to data of the file: what is true but for a part in a thread."""
+        """Return whether the job may hold data-blocks of the file: not while a thread runs, nor after its end."""
         return not self._ended and self._thread is None
 
     def run(self) -> T:
-        """Do the whole work at once; raise what goes wrong."""
+        """Run the whole job in this thread and return its result; raises the job's error."""
         while not self._ended:
             self._advance(self._do_at_once)
         if self.error is not None:
@@ -163,7 +163,7 @@ class PanelJob(Generic[T]):
         return self.result  # type: ignore[return-value]
 
     def start(self) -> None:
-        """Do the first step, so that what is refused is refused at once, and be the job that runs; raise what is wrong.
+        """Run the first step and become the running job; raises that step's error, so that wrong input is refused.
 
         `tick` does the rest.
         """
@@ -175,7 +175,7 @@ class PanelJob(Generic[T]):
         _running = self
 
     def tick(self, seconds: float = BUDGET, patience: float = 0.0) -> bool:
-        """Go on for about so long in the main thread, by one step at least; return whether the job still runs.
+        """Run steps in the main thread for about a given time, at least one; return whether the job is still running.
 
         Args:
             seconds: how long.
@@ -203,7 +203,7 @@ class PanelJob(Generic[T]):
         return not self._ended
 
     def stop(self, wait: bool = False) -> None:
-        """Have it stop after the step at hand; `wait` until it has."""
+        """Request the job to stop after the current step; `wait` blocks until it has."""
         self._stopping.set()
         if not wait or self._ended:
             return
@@ -215,7 +215,7 @@ class PanelJob(Generic[T]):
         self._close(Cancelled(f"{self.title} was cancelled"))
 
     def _make_calls(self, deadline: float, idle_until: float) -> None:
-        """Do what the thread asks the main thread for, until a time; where there is nothing, wait until another."""
+        """Make the thread's main-thread calls until the deadline; without any wait until `idle_until`."""
         calls = None if self._aside is None else self._aside.calls
         while calls is not None:
             idle = not calls.make_next()
@@ -226,7 +226,7 @@ class PanelJob(Generic[T]):
                 time.sleep(_LOOK_AGAIN)
 
     def _advance(self, begin: Callable[[Aside], None]) -> None:
-        """Do one step."""
+        """Run the generator up to its next `yield`."""
         if self._stopping.is_set() and not self._idle:
             self._close(Cancelled(f"{self.title} was cancelled"))
             return
@@ -242,7 +242,7 @@ class PanelJob(Generic[T]):
             self._note(outcome, begin)
 
     def _note(self, found: float | Step | Aside | None, begin: Callable[[Aside], None]) -> None:
-        """Take over what the work says at a `yield`."""
+        """Update progress from the value that the generator yielded; if it is an `Aside`, begin its thread."""
         self._idle = found is None
         if isinstance(found, Aside):
             self._aside, self._state, self.share = found, found.state or self._state, found.first
@@ -263,7 +263,7 @@ class PanelJob(Generic[T]):
         self._thread.start()
 
     def _take_over(self) -> None:
-        """Keep what the thread made for the generator, or what went wrong: it may have to clean up."""
+        """Store the ended thread's result or error, to be sent to the generator."""
         assert self._thread is not None
         thread, self._thread = self._thread, None
         self._answer, self._failure = thread.result, thread.error
@@ -275,7 +275,7 @@ class PanelJob(Generic[T]):
             self.share = self._aside.first + share * (self._aside.last - self._aside.first)
 
     def _close(self, error: BaseException) -> None:
-        """End early."""
+        """End the job early with an error, closing the generator."""
         self.error = error
         try:
             self._work.close()
@@ -292,7 +292,7 @@ class PanelJob(Generic[T]):
 
 
 class _Thread(Thread):
-    """A thread that keeps what it made, or what went wrong."""
+    """Thread that stores its function's result or error."""
 
     def __init__(self, work: Callable[[], Any], name: str) -> None:
         super().__init__(name=name)
@@ -311,11 +311,11 @@ _running: PanelJob[Any] | None = None
 
 
 def running_job() -> PanelJob[Any] | None:
-    """Return the job that is at work in the window, if there is one."""
+    """Return the running job; None if there is none."""
     return _running
 
 
 def stop_job() -> None:
-    """Stop what is at work, and wait until it has."""
+    """Stop the running job, if any, and wait until it has ended."""
     if _running is not None:
         _running.stop(wait=True)

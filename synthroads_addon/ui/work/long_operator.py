@@ -1,4 +1,4 @@
-"""Base of operators that take long: the window lives on, the status bar shows how far they are, Esc stops.
+"""Base of long-running operators: the window stays responsive, the status bar shows progress, Esc cancels.
 
 A subclass says what is to be done in `job`, and what to say at the end in `succeed`; its annotations and `poll` are its
 own. Called from Python (``bpy.ops.synthroads.scan()``) it does the same at once.
@@ -18,7 +18,7 @@ from .job import TICK, PanelJob, WorkPace, running_job, stop_job
 
 
 class LongOperator:
-    """Base of operators whose work is a `PanelJob`. Give it `bl_options` without REGISTER: Repeat Last would block."""
+    """Base of operators that run a `PanelJob`; `bl_options` must lack REGISTER, as Repeat Last would block."""
 
     nothing_done = "nothing was changed"
     """Message after the job was cancelled."""
@@ -38,27 +38,27 @@ class LongOperator:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Object mode, and nothing else at work."""
+        """Return whether Blender is in object mode and no job is running."""
         return is_free(cast("type[bpy.types.Operator]", cls), context)
 
     def job(self, context: bpy.types.Context) -> PanelJob[Any]:
-        """Return the work; raise `InputError` if it can't be done."""
+        """Return the job to run; raises `InputError` if the input is wrong."""
         raise NotImplementedError
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[Any]) -> str:
-        """Return the message at the end; the job has its result."""
+        """Take over the ended job's result and return the message to report."""
         raise NotImplementedError
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Begin."""
+        """Start the job when the button is pressed."""
         return self.begin(context)
 
     def refuse(self, error: InputError) -> set[str]:
-        """Say what is wrong."""
+        """Report an input error in the panel's words; return CANCELLED."""
         return refuse(cast("bpy.types.Operator", self), error)
 
     def begin(self, context: bpy.types.Context) -> set[str]:
-        """Do the first turn; the window's timer does the rest."""
+        """Start the job, run its first turn, and continue by a timer if that wasn't all."""
         try:
             self._job = self.job(context)
             self._job.start()
@@ -76,7 +76,7 @@ class LongOperator:
         return {"RUNNING_MODAL"}
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Do a piece of the work, or end."""
+        """Run a turn of the job at each timer event; cancel it on Esc."""
         job = self._job
         assert job
         if event.type == "ESC" and event.value == "PRESS" and job.running:
@@ -97,13 +97,13 @@ class LongOperator:
         return self._end(context, job)
 
     def cancel(self, context: bpy.types.Context) -> None:
-        """Stop: another file is opened, or the window closed."""
+        """Stop the job when Blender ends the operator, as another file is opened or the window is closed."""
         if self._job is not None:
             self._job.stop(wait=True)
         self._leave(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Do the whole work at once, without a window."""
+        """Run the whole job before returning, as calls from Python do."""
         try:
             job = self.job(context)
             job.run()
@@ -136,10 +136,10 @@ class LongOperator:
 
 
 class FileChooser:
-    """Base of operators that ask for a file, or for a folder, before they work on it."""
+    """Base of operators that open the file browser first and then work on the chosen file or folder."""
 
     def suggest(self, context: bpy.types.Context) -> None:
-        """Set what the file browser shows at first, if there is something."""
+        """Set the path that the file browser opens with."""
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Open the file browser, which calls `execute`."""
@@ -149,17 +149,17 @@ class FileChooser:
 
 
 class FileOperator(FileChooser, LongOperator):
-    """Base of operators that take long with a file which the user chooses. Called from Python they do it at once."""
+    """Base of long-running operators on a file that the user chooses; called from Python they run to the end."""
 
     _asked = False
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Open the file browser; the `execute` that it calls mustn't hold up the window."""
+        """Open the file browser, and note that `execute` is to run beside the window."""
         self._asked = True
         return super().invoke(context, event)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Work beside the window after the file browser, else at once."""
+        """Run the job beside the window after the file browser, else to its end."""
         return self.begin(context) if self._asked else super().execute(context)
 
 
@@ -170,7 +170,7 @@ class SYNTHROADS_OT_cancel(bpy.types.Operator):
     bl_label = "Cancel"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Have it stop; its own operator notices when it has."""
+        """Request the running job to stop."""
         job = running_job()
         if job is not None:
             job.stop()
@@ -178,7 +178,7 @@ class SYNTHROADS_OT_cancel(bpy.types.Operator):
 
 
 def draw_job(layout: bpy.types.UILayout) -> bool:
-    """Draw how far the running job is, with a button to cancel it; return whether there is one."""
+    """Draw the running job's progress bar and cancel button; return whether a job is running."""
     job = running_job()
     if job is None:
         return False
@@ -190,7 +190,7 @@ def draw_job(layout: bpy.types.UILayout) -> bool:
 
 
 def _draw_status(header: bpy.types.Header, context: bpy.types.Context) -> None:
-    """Draw the status bar while a job is at work."""
+    """Draw the status bar with the running job's progress."""
     job, layout = running_job(), header.layout
     if job is None:
         return
@@ -204,13 +204,13 @@ def _draw_status(header: bpy.types.Header, context: bpy.types.Context) -> None:
 
 
 def _reset_status() -> None:
-    """Give the status bar back to Blender; what draws it is the same in every workspace."""
+    """Restore Blender's own status bar, in all workspaces."""
     bpy.data.workspaces[0].status_text_set(None)
 
 
 @bpy.app.handlers.persistent
 def _before_history(*_: object) -> None:
-    """Give up what holds on to data that an undo, a redo or another file is about to take away."""
+    """Handler that stops a job before undo, redo or opening a file frees the data-blocks it may hold."""
     job = running_job()
     if job is not None and job.touches_scene:
         job.stop(wait=True)
@@ -218,7 +218,7 @@ def _before_history(*_: object) -> None:
 
 @bpy.app.handlers.persistent
 def _after_history(*_: object) -> None:
-    """Remove a half-built road that an undo step or a file holds."""
+    """Handler that removes half-built roads contained in an undo step or a file."""
     if running_job() is None:
         remove_staged()
 
@@ -228,6 +228,6 @@ HANDLERS |= {f"{change}_post": _after_history for change in ("undo", "redo", "lo
 
 
 def unregister() -> None:
-    """Stop what is at work."""
+    """Stop the running job and restore the status bar."""
     stop_job()
     _reset_status()

@@ -1,4 +1,4 @@
-"""Diagrams as images of the file, and an editor that shows them."""
+"""Diagrams stored as images in the open file, and operators that show them in an image editor."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from PIL import Image
 
 
 def keep_picture(name: str, picture: Image.Image) -> bpy.types.Image:
-    """Return the image of a name that shows a picture; made, or drawn anew where the file has it."""
+    """Store a picture as the file's image of a name, replacing its pixels if it exists; return the image."""
     drawn = np.asarray(picture.convert("RGBA"), dtype=np.float32)[::-1] / 255.0
     height, width = drawn.shape[:2]
     image = bpy.data.images.get(name)
@@ -22,7 +22,7 @@ def keep_picture(name: str, picture: Image.Image) -> bpy.types.Image:
 
 
 class ShowPicture:
-    """Base of operators that show an image of the file in an editor.
+    """Base of operators that show one of the file's images in an image editor.
 
     Attributes:
         picture: the image's name.
@@ -32,11 +32,11 @@ class ShowPicture:
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """There is the image, and a window to show it in."""
+        """Return whether the image exists and Blender has a window."""
         return cls.picture in bpy.data.images and context.window is not None
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Show it in an editor that is open, else in a window of its own."""
+        """Show the image in an open image editor, else in a new window."""
         areas = [area for window in context.window_manager.windows for area in window.screen.areas]
         area = next((area for area in areas if area.type == "IMAGE_EDITOR"), None)
         if area is None:

@@ -1,4 +1,4 @@
-"""A scan that renders, beside the window: a copy of the open file, and another Blender that scans it."""
+"""Scans that need rendering, by a second Blender on a copy of the open file, so that the window stays responsive."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _JOB, _LINES, _ERRORS = "job.json", "lines.txt", "errors.txt"
 
 @dataclass(frozen=True)
 class Scanned:
-    """Result of the other Blender: the counts as JSON data, and its stages, see `StageTimer`."""
+    """Result of the second Blender's scan: counts as JSON data, and its timed stages, see `StageTimer`."""
 
     counts: dict[str, Any]
     stages: dict[str, Any]
@@ -36,7 +36,7 @@ class Scanned:
 
 @dataclass(frozen=True)
 class SavedScene:
-    """A copy of a file with what is to be done with it, in a folder of its own.
+    """Copy of the open file with the scan to do on it, in a folder of its own.
 
     Attributes:
         place: the folder; `scan` removes it.
@@ -47,7 +47,7 @@ class SavedScene:
     command: tuple[str, ...]
 
     def scan(self, report: Report) -> Scanned:
-        """Scan it; the cloud and the previews are then in the folder that holds `place`. Runs in any thread.
+        """Scan the copy by a second Blender into the folder that holds `place`: cloud and previews; for any thread.
 
         Raises:
             InputError: that of the other Blender; or it can't be started, or was ended by someone else.
@@ -64,7 +64,7 @@ class SavedScene:
 
     @contextmanager
     def _process(self) -> Iterator[subprocess.Popen[bytes]]:
-        """Yield the other Blender; afterwards it has ended, whatever happens."""
+        """Context of the second Blender's process, which is ended on exit whatever happens."""
         # What a Blender that is killed leaves behind is removed with the folder.
         environment = os.environ | dict.fromkeys(("TMPDIR", "TEMP", "TMP"), str(self.place))
         with (self.place / _LINES).open("wb") as lines, (self.place / _ERRORS).open("wb") as errors:
@@ -87,7 +87,7 @@ class SavedScene:
                     process.kill()
 
     def _watch(self, process: subprocess.Popen[bytes], messages: _Messages, report: Report) -> None:
-        """Pass on what the other Blender says until it ends."""
+        """Report the second Blender's progress until it ends."""
         with (self.place / _LINES).open(encoding="utf-8", errors="replace") as lines:
             ended = False
             while not ended:
@@ -111,7 +111,7 @@ class SavedScene:
 
 @dataclass
 class _Messages:
-    """Messages of the other Blender so far.
+    """Messages of the second Blender so far.
 
     Attributes:
         share: of the scan that is done.
@@ -125,7 +125,7 @@ class _Messages:
     _rest: str = field(default="", repr=False)
 
     def update(self, text: str) -> None:
-        """Update the state from new output of the scan: marked lines are JSON, those of Blender itself are left out."""
+        """Update progress and result from new output: marked lines are JSON, Blender's own lines are left out."""
         *lines, self._rest = (self._rest + text).split("\n")
         for line in lines:
             # Blender may have left a line of its own unfinished.
@@ -142,7 +142,7 @@ def _wait(process: subprocess.Popen[bytes]) -> None:
 
 
 def save_open_scene(scenario: Scenario, folder: Path, scanned: Mapping[str, Any]) -> SavedScene:
-    """Save a copy of the open file for a scan in the background; the open file keeps its name and state.
+    """Save a copy of the open file for a scan by a second Blender; the open file keeps its name and state.
 
     Args:
         scenario: what is scanned and rendered, and how.
@@ -177,7 +177,7 @@ def save_open_scene(scenario: Scenario, folder: Path, scanned: Mapping[str, Any]
 
 
 def _command(job: Path) -> tuple[str, ...]:
-    """Return the command that runs `background_scan` in another Blender of this version.
+    """Return the command line that runs `background_scan` in a second Blender of this version.
 
     It finds the add-on, and the packages that it needs, where this one did, whether it is enabled there or not.
     """

@@ -1,4 +1,4 @@
-"""The button that scans: a scan of the open scene's road into a folder.
+"""The operator that scans, and the work of scanning the open scene's road into a folder.
 
 The scene is read in the window's thread, and scanned in another, which has the window's work out materials' nodes.
 Where the scene itself must be rendered, that takes the main thread of a Blender for long: that of another one, which
@@ -50,7 +50,7 @@ from .scene_scan import VisibleScan, class_mapping, route_of, visible_scan_work
 
 @dataclass(frozen=True)
 class RoadScan:
-    """Request for a scan, and where the files go.
+    """Request to scan a road, with the target folder.
 
     Attributes:
         scenario: the road's and the scan's settings.
@@ -68,7 +68,7 @@ class RoadScan:
 
     @cached_property
     def road(self) -> RoadGeometry:
-        """The road that the scene shows."""
+        """Return the analytic geometry of the road as edited."""
         return RoadGeometry(self.edited.parameters)
 
 
@@ -77,7 +77,7 @@ _Measure: TypeAlias = Callable[[Report], dict[str, Any]]
 
 
 def scan_work(scan: RoadScan) -> Work[Written]:
-    """Scan the open scene; nothing half-written is ever left, and the scene is only read.
+    """Generator that scans the open scene's road into files, as a job's work; leaves nothing half-written.
 
     Raises:
         InputError: a setting is wrong or the folder can't be written; in its first step.
@@ -105,7 +105,7 @@ def scan_work(scan: RoadScan) -> Work[Written]:
 
 
 def _save_copy(scan: RoadScan, work: Workplace) -> Generator[Step, None, _Measure]:
-    """Save a copy of the open file; return what has another Blender scan it."""
+    """Save a copy of the open file; return the function that has a second Blender scan it."""
     scanned = {"parameters": json.loads(scan.edited.parameters.to_json()), "road": scan.road_id}
     with work.timer.stage("scene copy"):
         saved = save_open_scene(scan.scenario, work.folder, scanned)
@@ -120,7 +120,7 @@ def _save_copy(scan: RoadScan, work: Workplace) -> Generator[Step, None, _Measur
 
 
 def _read_open_scene(scan: RoadScan, work: Workplace) -> Generator[Step, None, _Measure | None]:
-    """Read the open scene; return what scans it, or None if it must be rendered for some of its materials."""
+    """Copy the open scene; return the function that scans it, or None if some materials must be rendered."""
     timer = work.timer
     speed_factor, class_ids = scan.scenario.scan.traffic_speed_factor, scan.scenario.cloud.scheme().source_ids()
     with timer.stage("scene mesh"):
@@ -146,7 +146,7 @@ def _read_open_scene(scan: RoadScan, work: Workplace) -> Generator[Step, None, _
 
 
 def _no_share(steps: Generator[float | None, None, RoadModel]) -> Generator[Step | None, None, None]:
-    """Pass on the steps of building as no share of the whole."""
+    """Generator that runs the steps of a build without counting them as progress of the scan."""
     with closing(steps):
         for share in steps:
             yield None if share is None else Step(0.0)
@@ -155,7 +155,7 @@ def _no_share(steps: Generator[float | None, None, RoadModel]) -> Generator[Step
 
 
 def _write_files(scan: RoadScan, work: Workplace, measure: Callable[[], dict[str, Any]]) -> int:
-    """Write all files; return the number of points. Runs in a thread: it touches no data of Blender."""
+    """Write all files of the scan and return the number of points; for a thread, as it touches no data-blocks."""
     folder, timer = work.folder, work.timer
     files = JobFiles(scan.scenario)
     files.write_road(folder, scan.road, timer)
@@ -177,17 +177,17 @@ class SYNTHROADS_OT_scan(LongOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Nothing else must be at work."""
+        """Return whether no job is running and Blender is in object mode."""
         return is_free(cls, context)
 
     def job(self, context: bpy.types.Context) -> PanelJob[Written]:
-        """Return the scan that the panel asks for: the road as it is edited now, the scanner as it is set now."""
+        """Return the job that scans the current road as edited, or all that is visible, with the panel's settings."""
         if find_road(context.scene) is None:
             return PanelJob("Scan", visible_scan_work(requested_visible_scan(context)))
         return PanelJob("Scan", scan_work(requested_scan(context)))
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[Written]) -> str:
-        """Keep what was written, and return it in words."""
+        """Remember the result as the last scan's and return the message."""
         global _last
         assert job.result
         _last = job.result
@@ -195,7 +195,7 @@ class SYNTHROADS_OT_scan(LongOperator, bpy.types.Operator):
 
 
 def requested_scan(context: bpy.types.Context) -> RoadScan:
-    """Return what the panel's button scans; raise `InputError` if that can't be done."""
+    """Return the request to scan the current road with the panel's settings; `InputError` if one is wrong."""
     settings, road = context.scene.synthroads, find_road(context.scene)
     assert road  # the operator has seen it
     _, built = recall(road)
@@ -208,7 +208,7 @@ def requested_scan(context: bpy.types.Context) -> RoadScan:
 
 
 def _of_known(scenario: Scenario, edited: EditedRoad) -> Scenario:
-    """Return what can be written of a road: no file of parameters where its surface was edited by hand."""
+    """Return the scenario without files of the road's parameters if its surface was edited by hand."""
     if not edited.lost:
         return scenario
     outputs = tuple(name for name in scenario.outputs if name not in ("parameters", "centerline"))
@@ -216,7 +216,7 @@ def _of_known(scenario: Scenario, edited: EditedRoad) -> Scenario:
 
 
 def requested_visible_scan(context: bpy.types.Context) -> VisibleScan:
-    """Return what the panel's button scans where there is no road; raise `InputError` if that can't be done."""
+    """Return the request to scan a scene without a road; `InputError` if a setting is wrong."""
     settings, choices = context.scene.synthroads, context.scene.synthroads_scene_scan
     scenario = with_preferences(settings.scenario())
     check_scan(scenario, foreign=True)
@@ -232,5 +232,5 @@ _last: Written | None = None
 
 
 def last_written() -> Written | None:
-    """Return what the last scan of this session has written."""
+    """Return the result of this session's last scan; None before the first."""
     return _last

@@ -1,4 +1,4 @@
-"""Parts that scans of roads and of other scenes share: what they have written, and how far they are."""
+"""Helpers that scans of roads and of other scenes share: working folders, progress, services, result."""
 
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing, contextmanager
@@ -23,7 +23,7 @@ _SHARES = {"images": (0.05, 0.05), "scan": (0.05, 1.0), "files": (1.0, 1.0)}
 
 @dataclass(frozen=True)
 class Workplace:
-    """Folders and calls that a scan works with.
+    """Working folders, main-thread calls and timer of one scan.
 
     Attributes:
         folder: where its files are made.
@@ -40,26 +40,26 @@ class Workplace:
     @classmethod
     @contextmanager
     def opened(cls, target: Path, names: Sequence[str], overwrite: bool) -> Iterator[Self]:
-        """Yield one; in the end the files are in the target folder, or nothing is left, see `output_folder`."""
+        """Context of a workplace whose files are put into the target folder on success, see `output_folder`."""
         with output_folder(target, names, overwrite) as folder, scratch_folder() as scratch:
             yield cls(folder, scratch)
 
 
 @dataclass(frozen=True)
 class Written:
-    """Result of a scan: so many points into a folder."""
+    """Result of a scan: number of points, and target folder."""
 
     points: int
     target: Path
 
 
 def renders_scene(scenario: Scenario) -> bool:
-    """Return whether the scene itself may have to be rendered for a scan, whatever its materials are."""
+    """Return whether a scenario's colours need the scene rendered, whatever its materials are."""
     return scenario.may_render and not takes_nodes(scenario.colour.settings(scenario.fidelity))
 
 
 def pass_on_reading(steps: Generator[float, None, CopiedScene]) -> Generator[Step, None, CopiedScene]:
-    """Pass on the steps of reading a scene as shares of the whole."""
+    """Generator that runs the steps of copying a scene, scaled to the whole scan's progress."""
     with closing(steps):
         while True:
             try:
@@ -70,7 +70,7 @@ def pass_on_reading(steps: Generator[float, None, CopiedScene]) -> Generator[Ste
 
 
 def snapshot_services(scenario: Scenario, materials: Sequence[str], work: Workplace) -> SnapshotServices | None:
-    """Return services for a scan of a scene that was read; None if the scene must be rendered for some materials.
+    """Return the services for scanning a copied scene; None if some of its materials need the scene rendered.
 
     Args:
         scenario: the job.
@@ -82,5 +82,5 @@ def snapshot_services(scenario: Scenario, materials: Sequence[str], work: Workpl
 
 
 def follow_scan(timer: StageTimer, report: Report) -> None:
-    """Have the stages of a scan report the share of the whole that is done."""
+    """Connect a scan's stage timer to the job's progress."""
     timer.progress = lambda stage, share: report(_SHARES[stage][0] * (1.0 - share) + _SHARES[stage][1] * share)

@@ -1,4 +1,4 @@
-"""A scan of whatever is visible, where the scene has no road: along a curve, from a camera, or over its extent."""
+"""Scan of all that is visible in a scene without a road: along a curve, from a camera, or over the scene's extent."""
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ _MOST_POSES = 100
 
 @dataclass(frozen=True)
 class VisibleScan:
-    """Request for a scan of what is visible, and where the files go.
+    """Request to scan all that is visible, with the target folder.
 
     Attributes:
         scenario: scan, colours, files; its road isn't looked at.
@@ -54,7 +54,7 @@ class VisibleScan:
 
 
 def visible_scan_work(scan: VisibleScan) -> Work[Written]:
-    """Scan what is visible in the open scene; nothing half-written is ever left, and the scene is only read.
+    """Generator that scans all that is visible into files, as a job's work; leaves nothing half-written.
 
     Raises:
         InputError: a setting is wrong, the folder can't be written, or nothing that could be scanned is visible.
@@ -82,7 +82,7 @@ def visible_scan_work(scan: VisibleScan) -> Work[Written]:
 
 
 def _read(scan: VisibleScan, work: Workplace) -> Generator[Step, None, Callable[[Report], Any] | None]:
-    """Read the open scene; return what scans it, or None if it must be rendered for some of its materials."""
+    """Copy the open scene; return the function that scans it, or None if some materials must be rendered."""
     settings, class_ids = scan.scenario.scan, scan.scenario.cloud.scheme().source_ids()
     timer = work.timer
     with timer.stage("scene mesh"):
@@ -108,7 +108,7 @@ def _read(scan: VisibleScan, work: Workplace) -> Generator[Step, None, Callable[
 
 
 def _save_copy(scan: VisibleScan, work: Workplace) -> Generator[Step, None, Callable[[Report], Any]]:
-    """Save a copy of the open file; return what has another Blender scan it."""
+    """Save a copy of the open file; return the function that has a second Blender scan it."""
     classes = scan.classes.to_dict() if scan.classes else None
     with work.timer.stage("scene copy"):
         saved = save_open_scene(scan.scenario, work.folder, {"route": scan.route.to_dict(), "classes": classes})
@@ -123,7 +123,7 @@ def _save_copy(scan: VisibleScan, work: Workplace) -> Generator[Step, None, Call
 
 
 def route_of(guide: bpy.types.Object | None, scene: bpy.types.Scene, tripod: bool) -> SceneRoute:
-    """Return the way that an object stands for: a curve's line, a camera's place or its frames; the extent for none.
+    """Return the scanner's route by an object: a curve's line, a camera's place or frames; the scene's extent if None.
 
     Args:
         guide: curve or camera of the scene.
@@ -164,7 +164,7 @@ def _route_of_camera(camera: bpy.types.Object, scene: bpy.types.Scene, tripod: b
 
 
 def _camera_places(camera: bpy.types.Object, scene: bpy.types.Scene) -> Any:
-    """Return the places (N, 3) of a camera over the scene's frames; the scene is at its frame again afterwards."""
+    """Return a camera's places (N, 3) over the scene's frames; the current frame is restored."""
     frame = scene.frame_current, scene.frame_subframe
     count = min(scene.frame_end - scene.frame_start + 1, _MOST_POSES)
     poses = []
@@ -178,7 +178,7 @@ def _camera_places(camera: bpy.types.Object, scene: bpy.types.Scene) -> Any:
 
 
 def class_mapping(path: str, scenario: Scenario) -> ClassMapping | None:
-    """Return the classes by name of a JSON file; None if none is named.
+    """Return the mapping of names to classes read from a JSON file; None for an empty path.
 
     Raises:
         InputError: it can't be read, or names a class that the scheme doesn't have.

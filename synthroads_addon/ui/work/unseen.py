@@ -1,4 +1,4 @@
-"""A road that grows unseen: drawing it after each step takes far longer than building it."""
+"""Building with the new road hidden until it is complete: to draw it after each step takes longer."""
 
 from collections.abc import Generator, Iterator
 from contextlib import closing
@@ -12,7 +12,7 @@ T = TypeVar("T")
 
 
 def build_unseen(steps: Generator[float | None, None, T]) -> Generator[float | None, None, T]:
-    """Pass on the steps of a build whose road is shown at the end; until then Blender evaluates it, but draws nothing.
+    """Generator that runs a build's steps with its road evaluated but not drawn, and shows it at the end.
 
     Args:
         steps: see `build_steps`.
@@ -30,7 +30,7 @@ def build_unseen(steps: Generator[float | None, None, T]) -> Generator[float | N
 
 
 def _hide() -> set[int]:
-    """Hide what is being built as the eye in the outliner does; return Blender's numbers of the collections."""
+    """Hide the staging collections as the outliner's eye does; return their session numbers."""
     found = [layer for layer in _layers() if STAGING in layer.collection and not layer.hide_viewport]
     for layer in found:
         layer.hide_viewport = True  # `hide_viewport` of the collection itself would also keep it from being evaluated
@@ -38,14 +38,14 @@ def _hide() -> set[int]:
 
 
 def _show(hidden: set[int]) -> None:
-    """Show the collections that were hidden and have become the road's."""
+    """Show the collections of these session numbers again."""
     for layer in _layers():
         if layer.collection.session_uid in hidden:
             layer.hide_viewport = False
 
 
 def _layers() -> Iterator[bpy.types.LayerCollection]:
-    """Yield every collection of the view layer at work."""
+    """Yield all layer collections of the current view layer."""
     waiting = [bpy.context.view_layer.layer_collection]
     while waiting:
         layer = waiting.pop()

@@ -1,4 +1,4 @@
-"""Views of the road: along the whole of it as it was built, and at one place of it, which is marked."""
+"""Views along the road and at one marked place of it, and helpers for drawing over the 3D view."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _MARKER_COLOR = (1.0, 0.35, 0.1, 1.0)
 
 
 def look_along(space: bpy.types.SpaceView3D, parameters: RoadParameters) -> None:
-    """Turn a 3D view to look along the road from behind its beginning, and make it reach that far."""
+    """Set a 3D view to look along the whole road from behind its start, with clipping far enough."""
     geometry = RoadGeometry(parameters)
     reach = min(geometry.length, _FARTHEST)
     stations = np.array([0.0, 0.3 * reach])
@@ -35,7 +35,7 @@ def look_along(space: bpy.types.SpaceView3D, parameters: RoadParameters) -> None
 
 
 def look_at_place(space: bpy.types.SpaceView3D, geometry: RoadGeometry, station: float, offset: float) -> None:
-    """Turn a 3D view to look along the road at one place of it, from 40 m."""
+    """Set a 3D view to look along the road at one place from 40 m away."""
     target = Vector(surface_point(geometry, station, offset))
     _, heading, _ = geometry.alignment.frame(_on_road(geometry, station))
     ahead = Vector((np.cos(heading), np.sin(heading), 0.0))
@@ -44,14 +44,14 @@ def look_at_place(space: bpy.types.SpaceView3D, geometry: RoadGeometry, station:
 
 
 def surface_point(geometry: RoadGeometry, station: float, offset: float) -> tuple[float, float, float]:
-    """Return the local point of a station and offset; beside the road it is as high as the centreline."""
+    """Return the surface's local point at a station and offset; beside the road at the centreline's height."""
     at = _on_road(geometry, station)
     x, y, z = geometry.point(at, offset)[0]
     return float(x), float(y), float(geometry.profile.elevation(at) if np.isnan(z) else z)
 
 
 def view_of(context: bpy.types.Context) -> bpy.types.SpaceView3D | None:
-    """Return the 3D view that the user works in, else the window's largest, or None if it has none."""
+    """Return the 3D view that the operator was called in, else the largest; None if there is none."""
     if isinstance(context.space_data, bpy.types.SpaceView3D):
         return context.space_data
     areas = [area for area in context.screen.areas if area.type == "VIEW_3D"] if context.screen else []
@@ -60,7 +60,7 @@ def view_of(context: bpy.types.Context) -> bpy.types.SpaceView3D | None:
 
 
 def frame_points(space: bpy.types.SpaceView3D, points: NDArray[np.float32], offset: Vector | None = None) -> None:
-    """Turn a 3D view to look at all of many points (N, 3), an offset added, from the south-west and above."""
+    """Set a 3D view to frame points (N, 3), shifted by an offset, from the south-west and above."""
     low, high = points.min(axis=0).astype(np.float64), points.max(axis=0).astype(np.float64)
     middle = Vector((low + high) / 2.0) + (offset or Vector())
     reach = float(np.linalg.norm(high - low)) + 1.0
@@ -69,7 +69,7 @@ def frame_points(space: bpy.types.SpaceView3D, points: NDArray[np.float32], offs
 
 
 def redraw_views(context: bpy.types.Context) -> None:
-    """Have all 3D views drawn again, their sidebars included."""
+    """Tag all 3D views for redraw, sidebars included."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":
@@ -77,7 +77,7 @@ def redraw_views(context: bpy.types.Context) -> None:
 
 
 class Marker:
-    """A post and a line across the road, drawn over the 3D views: nothing is added to the scene for it.
+    """Overlay of a post and a line across the road at one place, drawn without adding anything to the scene.
 
     Attributes:
         corners: (x, y, z) of the ends of its lines, two after two; empty while it is hidden.
@@ -88,7 +88,7 @@ class Marker:
         self._handler: object | None = None
 
     def show(self, geometry: RoadGeometry, station: float, offset: float) -> None:
-        """Stand at a place of the road."""
+        """Show the marker at a place of the road."""
         foot = surface_point(geometry, station, offset)
         across = geometry.offsets(_on_road(geometry, station))[0]
         line = [surface_point(geometry, station, value) for value in across]
@@ -98,7 +98,7 @@ class Marker:
             self._handler = bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_VIEW")
 
     def hide(self) -> None:
-        """Be drawn no more."""
+        """Remove the marker from the views."""
         self.corners = []
         if self._handler is not None:
             bpy.types.SpaceView3D.draw_handler_remove(self._handler, "WINDOW")
@@ -109,7 +109,7 @@ class Marker:
 
 
 def draw_lines(corners: Sequence[tuple[float, float, float]], color: Sequence[float], width: float) -> None:
-    """Draw lines between pairs of points, from a draw handler; ``width`` in pixels."""
+    """Draw line segments between pairs of points, in a draw handler; `width` in pixels."""
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
     shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
     shader.uniform_float("lineWidth", width)

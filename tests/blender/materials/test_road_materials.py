@@ -10,7 +10,7 @@ import pytest
 
 from synthroads_addon.blender.files import empty_file
 from synthroads_addon.blender.materials import LOOK, constants, scene_name
-from synthroads_addon.blender.model.build import BuildTarget, RoadModel, build_steps
+from synthroads_addon.blender.model.build import BuildTarget, RoadModel
 from synthroads_addon.blender.model.roads import ROAD, renew_ids
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.blender.views import pictures
@@ -163,14 +163,3 @@ def test_roads_that_look_alike_share_and_copies_and_appended_ones_keep_theirs(tm
     build_small(parameters(**WET | {"seed": 22}), parts=PARTS, place=BuildTarget(str(root[ROAD])))
     assert {item.name for item in bpy.data.materials} < set(names)
     assert {line for line in before if "SR asphalt]" in line} <= set(described())
-
-
-def test_a_build_that_is_given_up_leaves_no_materials() -> None:
-    build_small(parameters(), parts=PARTS)
-    before = described()
-    steps = build_steps(parameters(**WET), 0.05, 0.0, PARTS, place=BESIDE)
-    count = len(bpy.data.materials)
-    while len(bpy.data.materials) == count:
-        next(steps)
-    steps.close()
-    assert described() == before

@@ -55,7 +55,7 @@ def test_the_button_lights_the_road_and_looks_along_it(panel: Any, tmp_path: Pat
     bpy.context.view_layer.update()
     towards = np.array(found["sun"].matrix_world)[:3, 2]
     assert towards == pytest.approx(sun_direction(parameters.environment), abs=1e-6)
-    density = found["haze"].data.materials[0].node_tree.nodes["Volume Scatter"].inputs["Density"].default_value
+    density = found["haze"].data.materials[0].node_tree.nodes["Volume Absorption"].inputs["Density"].default_value
     assert density == pytest.approx(3.912 / 800.0)
     road = next(item for item in bpy.data.objects if item.get(ROLE) == "Road")
     for name in ("driver", "aerial"):
