@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..base.arrays import Bool
 from ..base.errors import InputError
-from .damage import damage_numbers
+from .damage import DAMAGES, damage_numbers
 from .objects import RoadObject
 from .parameters import RoadParameters
 from .section import Carriageway, LineMarking, Pavement
@@ -133,6 +133,11 @@ class InstanceNumbers:
             for name, item in self._parameters.of_type(Carriageway).items()
             for part, kind in enumerate(damage_numbers(item.pavement))
         }
+
+    def patches_and_cracks(self) -> list[int]:
+        """Return the instance numbers of the damages that have faces of their own on the pavement."""
+        in_the_surface = {DAMAGES.index(name) for name in ("rut", "pothole")}
+        return [number for number, kind in self.damages().items() if kind not in in_the_surface]
 
     def owner(self, number: int) -> str | None:
         """Return the id of the object that an instance number is of, or of a part of; None if it is unused."""

@@ -50,7 +50,7 @@ def test_the_page_leads_from_a_scheme_to_a_network(tmp_path: Path) -> None:
         of_class = np.asarray(written["class_id"]) == number
         assert of_class.sum() == counts[name] > 0
         assert set(np.asarray(written.classification)[of_class].tolist()) == {code}
-    assert "road" not in counts, "all of the pavement is of concrete"
+    assert counts["road"] < 0.1 * counts["concrete_pavement"], "all of the pavement but patches is of concrete"
     (scores,) = told["evaluate"]["tests"].values()
     by_class = scores["classes"]
     assert {name: by_class[name]["support"] for name in NEW} == {name: counts[name] for name in NEW}

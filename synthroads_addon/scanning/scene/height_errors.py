@@ -5,14 +5,11 @@ import numpy as np
 from ...base.arrays import Float
 from ...base.classes import class_id
 from ...base.random_streams import stream
-from ...road.damage import DAMAGES
 from ...road.geometry import RoadGeometry
 from .mesh import SceneMesh
 
 _BESIDE_STEPS = 0.01
 """To either side of a step, m: faces at it may begin a little aside."""
-_PATCH = DAMAGES.index("patch")
-"""From this kind of damage on each has faces of its own."""
 
 
 def mesh_height_errors(
@@ -31,7 +28,7 @@ def mesh_height_errors(
         names: classes of the faces that belong to the analytic surface.
     """
     rng = stream(0, "mesh height errors")
-    laid_on = [number for number, kind in geometry.numbers.damages().items() if kind >= _PATCH]
+    laid_on = geometry.numbers.patches_and_cracks()
     of_surface = np.isin(mesh.class_id, [class_id(name) for name in names]) & ~np.isin(mesh.instance_id, laid_on)
     faces = np.flatnonzero(of_surface)
     area = mesh.areas()[faces]

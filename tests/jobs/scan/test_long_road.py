@@ -157,10 +157,11 @@ def test_a_long_road(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = tmp_path / f"{LONG:g}"
     parameters = read_parameters(folder / "parameters.json")
     geometry = RoadGeometry(parameters)
-    worst = 0.0
+    worst, laid_on = 0.0, geometry.numbers.patches_and_cracks()  # a patch fills the ruts below
     with laspy.open(folder / "cloud.laz") as file:
         for chunk in file.chunk_iterator(1_000_000):
-            xyz = np.column_stack([chunk.x, chunk.y, chunk.z])[np.asarray(chunk["class_id"]) == class_id("road")]
+            surface = (chunk["class_id"] == class_id("road")) & ~np.isin(chunk["instance_id"], laid_on)
+            xyz = np.column_stack([chunk.x, chunk.y, chunk.z])[surface]
             assert (xyz[:, 1] > 5.4e6).all()
             local = xyz - np.array(parameters.transform.translate)
             error = local[:, 2] - geometry.elevation(*geometry.alignment.project(local[:, :2]))
