@@ -250,6 +250,8 @@ def test_ids_and_instances_are_those_of_the_set_and_the_cloud(
     city = full_city if index is None else cities(index)
     wanted = {name: item.instance for name, item in road.objects.items()}
     found = {name: item["attributes"]["instance"] for name, item in city.objects.items()}
+    childless = {item["type"] for item in city.objects.values() if not item.get("children", True)}
+    assert childless <= {"CityObjectGroup"}, "only a group says that it has no members"
     kinds = ("TransportationMarking", "TransportationHole", "+PavementDamage")
     surfaces = (about for kind in kinds for _, about, _ in city.surfaces(kind))
     painted = {about["id"]: about["instance"] for about in surfaces}
