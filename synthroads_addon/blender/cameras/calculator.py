@@ -23,6 +23,10 @@ from .stage import Passes, RenderStage, new_stage
 WIDTH = 1024
 """Width of the largest plane, px."""
 _NARROWEST = 64
+_LOWEST = 4
+"""Least height of an image, px: Blender renders none that is lower."""
+_FIRST_FRAME = -1_000_000
+"""Frame that no scene comes before."""
 _ABOVE = 10.0
 """Height of the camera above the plane: an image of it is one unit wide for each pixel."""
 
@@ -75,9 +79,9 @@ class Calculator:
         begins = np.cumsum([0, *rows])
         # Where each place lies among the pixels, row by row from below.
         pixel = np.repeat(begins[:-1] * width - starts, counts) + np.arange(len(material))
-        height = int(begins[-1])
+        height = max(int(begins[-1]), _LOWEST)
         self._fill(values, pixel, width, height)
-        with self._plane(numbers.tolist(), begins, width):
+        with self._plane(numbers.tolist(), begins, width, height):
             camera = self.stage.camera
             camera.data.type, camera.data.ortho_scale = "ORTHO", float(max(width, height))
             camera.location = (width / 2.0, height / 2.0, _ABOVE)
@@ -102,9 +106,11 @@ class Calculator:
                 node.image = self._images.get(what)
 
     @contextmanager
-    def _plane(self, numbers: list[int], begins: np.ndarray, width: int) -> Iterator[None]:
-        """Context in which the stage shows a plane with one face per material, of rows `begins` to the next."""
-        height = float(begins[-1])
+    def _plane(self, numbers: list[int], begins: np.ndarray, width: int, height: int) -> Iterator[None]:
+        """Context in which the stage shows a plane with one face per material, of rows `begins` to the next.
+
+        The images that the materials read are `width` and `height` pixels large.
+        """
         corners: list[tuple[float, float, float]] = []
         faces: list[tuple[int, ...]] = []
         maps: list[float] = []
@@ -166,12 +172,16 @@ def opened_calculator(copies: dict[int, ReadingCopy], layers: Sequence[str]) -> 
 
 @contextmanager
 def reading_copy(item: bpy.types.Material, layers: Sequence[str]) -> Iterator[ReadingCopy]:
-    """Context of a copy of a material that outputs only the layers, its inputs read from images; removed on exit."""
+    """Context of a copy of a material that outputs only the layers, its inputs read from images; removed on exit.
+
+    What is animated in the material stays in the copy as it is in the current scene's frame.
+    """
     copied = item.copy()
     groups: list[bpy.types.NodeTree] = []
     try:
         tree = copied.node_tree
         groups = copy_groups(tree)
+        _freeze(copied, groups, bpy.context.scene.frame_current)
         expressions = layer_expressions(copied)
         nodes = LayerNodes(tree)
         kept = {node.aov_name: node for node in tree.nodes if node.type == "OUTPUT_AOV" and node.aov_name in layers}
@@ -194,6 +204,26 @@ def reading_copy(item: bpy.types.Material, layers: Sequence[str]) -> Iterator[Re
         bpy.data.materials.remove(copied)
         for group in reversed(groups):
             bpy.data.node_groups.remove(group)
+
+
+def _freeze(item: bpy.types.Material, groups: Sequence[bpy.types.NodeTree], frame: int) -> None:
+    """Have a copied material look at any time, in any scene, as it does now, at a frame of the current scene."""
+    for block in (item, item.node_tree, *groups):
+        block.animation_data_clear()  # values stay as they are; what drives them isn't needed any more
+    for tree in (item.node_tree, *groups):
+        for node in tree.nodes:
+            if node.type == "TEX_IMAGE" and node.image_user.use_auto_refresh:
+                _freeze_sequence(node.image_user, frame)
+
+
+def _freeze_sequence(user: bpy.types.ImageUser, frame: int) -> None:
+    """Have an image sequence or movie show at all times what it shows at a frame of the scene."""
+    shown = frame - user.frame_start + 1
+    if user.use_cyclic:
+        shown = (shown - 1) % user.frame_duration + 1
+    user.frame_offset += min(max(shown, 0), user.frame_duration) - 1
+    # Beyond its end a sequence shows its last image, here the only one.
+    user.frame_start, user.frame_duration, user.use_cyclic = _FIRST_FRAME, 1, False
 
 
 def _new_image(width: int, height: int) -> bpy.types.Image:

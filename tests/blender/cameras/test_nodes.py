@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix
 
-from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA, layer_source
+from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA, MaterialSnapshot, layer_source
 from synthroads_addon.blender.cameras.nodes import NodeLayers
 from synthroads_addon.blender.materials.calculable import asked_inputs, material_needs
 from synthroads_addon.blender.scene.evaluated import scene_mesh
@@ -100,6 +101,89 @@ def test_groups_are_gone_into() -> None:
         values, _ = base_colors(mesh, points, source)
         np.testing.assert_allclose(values.arrays["base_color"], 0.125 * points.position, atol=1e-5)
     assert (len(inner.interface.items_tree), len(bpy.data.node_groups)) == sockets
+
+
+@pytest.mark.parametrize("count", [1, 20, 150])
+def test_few_points_have_their_layers_too(count: int) -> None:
+    """Their image has fewer rows than any that Blender renders."""
+    add_vertex_colored(0)
+    bpy.context.view_layer.update()
+    mesh = scene_mesh()
+    points = points_of(mesh, count)
+    x, y = points.position[:, 0], points.position[:, 1]
+    expected = np.stack([0.5 + x / 10.0, 0.5 + y / 10.0, 0.25 + 0.0 * x], axis=1)
+    np.testing.assert_allclose(base_colors(mesh, points)[0].arrays["base_color"], expected, atol=2e-6)
+
+
+FRAME, BETWEEN, EARLIER = 8, 0.5, 1
+"""Frame of the scene that is scanned, on the way to the next, and one at which its materials look otherwise."""
+AT_FRAME = (0.84375, 0.85, 8.0 / 30.0)
+"""Colour of the animated plane there: by keys (smooth), by a driver, and by an image of a sequence."""
+
+
+def animated_plane(folder: Path) -> None:
+    """Add a plane whose colour changes all the time, and show it after `FRAME`."""
+    item, shader = new_material("Animated")
+    tree = item.node_tree
+    keyed, driven = tree.nodes.new("ShaderNodeValue"), tree.nodes.new("ShaderNodeValue")
+    for frame, value in ((1, 0.0), (11, 1.0)):
+        keyed.outputs[0].default_value = value
+        keyed.outputs[0].keyframe_insert("default_value", frame=frame)
+    cause = bpy.data.objects.new("Cause", None)
+    cause["amount"] = 0.1
+    bpy.context.scene.collection.objects.link(cause)
+    driver = driven.outputs[0].driver_add("default_value").driver
+    amount = driver.variables.new()
+    amount.name, amount.targets[0].id, amount.targets[0].data_path = "amount", cause, '["amount"]'
+    driver.expression = "amount * frame"
+    sequence = tree.nodes.new("ShaderNodeTexImage")
+    sequence.image = _image_sequence(folder)
+    sequence.image_user.frame_duration, sequence.image_user.use_auto_refresh = 10, True
+    parts, split = tree.nodes.new("ShaderNodeCombineXYZ"), tree.nodes.new("ShaderNodeSeparateColor")
+    tree.links.new(sequence.outputs["Color"], split.inputs[0])
+    for number, socket in enumerate((keyed.outputs[0], driven.outputs[0], split.outputs[2])):
+        tree.links.new(socket, parts.inputs[number])
+    tree.links.new(parts.outputs[0], shader.inputs["Base Color"])
+    bpy.ops.mesh.primitive_plane_add(size=4.0)
+    bpy.context.object.data.materials.append(item)
+    bpy.context.scene.frame_set(FRAME, subframe=BETWEEN)
+
+
+def _image_sequence(folder: Path) -> bpy.types.Image:
+    """Return an image of ten frames, the n-th of which has a blue of `n / 30`."""
+    for number in range(1, 11):
+        image = bpy.data.images.new("Frame", 8, 8, is_data=True, float_buffer=True)
+        image.pixels.foreach_set(np.tile(np.float32([0.0, 0.0, number / 30.0, 1.0]), 64))
+        image.filepath_raw, image.file_format = str(folder / f"frame_{number:04d}.exr"), "OPEN_EXR"
+        image.save()
+        bpy.data.images.remove(image)
+    sequence = bpy.data.images.load(str(folder / "frame_0001.exr"))
+    sequence.source, sequence.colorspace_settings.name = "SEQUENCE", "Non-Color"
+    return sequence
+
+
+def test_what_is_animated_is_as_at_the_scenes_frame(tmp_path: Path) -> None:
+    animated_plane(tmp_path)
+    mesh = scene_mesh()
+    points = points_of(mesh, 20)
+    for source in ("nodes", *(("returns",) if HAS_RETURN_CAMERA else ())):
+        values, _ = base_colors(mesh, points, source)
+        np.testing.assert_allclose(values.arrays["base_color"], np.tile(AT_FRAME, (20, 1)), atol=1e-3, err_msg=source)
+
+
+def test_a_snapshot_keeps_the_frame(tmp_path: Path) -> None:
+    """Another frame is shown later, and nothing comes into the file with the materials, such as what drives them."""
+    animated_plane(tmp_path)
+    snapshot = MaterialSnapshot(scene_mesh().materials, {0}, tmp_path)
+    bpy.context.scene.frame_set(EARLIER)
+    blocks = len(bpy.data.objects), len(bpy.data.actions)
+    work = snapshot.calculator({0}, ("base_color",))
+    assert work is not None
+    with snapshot.loaded([0]):
+        assert (len(bpy.data.objects), len(bpy.data.actions)) == blocks
+    inputs = {what: np.full((5, 4), 0.5, np.float32) for what in work.inputs_of(0)}
+    found = work.calculate(np.zeros(5, np.intp), inputs)["base_color"]
+    np.testing.assert_allclose(found, np.tile(AT_FRAME, (5, 1)), atol=1e-3)
 
 
 def test_what_stands_in_the_way_is_named_and_left_to_others() -> None:
