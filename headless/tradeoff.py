@@ -16,7 +16,7 @@ from headless.commands import Outcome, entry
 from headless.marked_documents import put_tables
 from headless.messages import progress_bar
 from headless.tradeoff_plot import plot
-from headless.tradeoff_table import markdown
+from headless.tradeoff_table import TABLES, table_texts
 from synthroads_addon.base.errors import InputError, OutputError, nearest_name
 from synthroads_addon.base.files import write_file
 from synthroads_addon.base.progress import Progress
@@ -28,8 +28,8 @@ from synthroads_addon.scenario.scenario import load_scenario
 _ROW = "--row"
 _ROWS = "rows"
 """Folder, within the output's, of what is measured already."""
-_TABLE = "tradeoff {}"
-"""Name of a scene's table in the document."""
+_TABLE = "tradeoff {} {}"
+"""Name in the document of a table of a scene: "tradeoff rq31-600m colours"."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -60,19 +60,24 @@ def run(arguments: argparse.Namespace) -> Outcome:
         return 0, result, json.dumps(result)
     scenes = list(dict.fromkeys(arguments.scenario or SCENES))
     titles = _check_request(arguments, scenes)
+    filled = _filled_tables(arguments)
     progress = progress_bar(arguments)
     results = {}
 
     def measure() -> dict[str, str]:
         tables = {}
         for number, (scene, title) in enumerate(titles.items()):
-            results_of_scene = _measure_all(arguments, scene, title, _part(progress, number, len(titles)))
-            results[title], tables[_TABLE.format(title)] = results_of_scene, markdown(results_of_scene, scene)
-            _write(arguments, title, results_of_scene, tables[_TABLE.format(title)])
-        return tables
+            results[title] = _measure_all(arguments, scene, title, _part(progress, number, len(titles)))
+            texts = table_texts(results[title], scene)
+            tables |= {_TABLE.format(title, table): text for table, text in texts.items()}
+            _write(arguments, title, results[title], "\n".join(texts.values()))
+        printed.update(tables)
+        return {name: text for name, text in tables.items() if name in names}
 
-    tables = put_tables(arguments.document, map(_TABLE.format, titles.values()), measure)
-    return 0, {"scenes": results}, "\n".join([*tables.values(), f"written to {arguments.output}"])
+    printed: dict[str, str] = {}
+    names = [_TABLE.format(title, table) for title in titles.values() for table in filled]
+    put_tables(arguments.document, names, measure)
+    return 0, {"scenes": results}, "\n".join([*printed.values(), f"written to {arguments.output}"])
 
 
 def _check_request(arguments: argparse.Namespace, scenes: Sequence[str]) -> dict[str, str]:
@@ -93,6 +98,24 @@ def _check_request(arguments: argparse.Namespace, scenes: Sequence[str]) -> dict
         target = str(arguments.output)
         raise OutputError("--output", target, f"already holds {present}; --resume keeps it, --overwrite replaces it")
     return titles
+
+
+def _filled_tables(arguments: argparse.Namespace) -> list[str]:
+    """Return the names of the tables that the document gets: those of the knobs that are asked for.
+
+    Raises:
+        InputError: only some of a table's knobs are asked for, so that the document would lose rows of the others.
+    """
+    if arguments.document is None:
+        return []
+    filled = []
+    for table in TABLES:
+        its = [name for name, knob in KNOBS.items() if knob.table == table]
+        absent = [name for name in its if name not in arguments.knobs]
+        if 0 < len(absent) < len(its):
+            raise InputError("--knobs", arguments.knobs, f"the table of {table} has {', '.join(absent)} as well")
+        filled += [] if absent else [table]
+    return filled
 
 
 def _part(progress: Progress, number: int, count: int) -> Progress:

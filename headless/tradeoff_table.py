@@ -92,21 +92,35 @@ def front_lines(results: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def markdown(results: Sequence[Mapping[str, Any]], scenario: str) -> str:
     """Return rows of `jobs.measure.rows.measure_row` as Markdown tables, with the reasons for rows left out."""
-    machines = dict.fromkeys(row["machine"] for row in results if "machine" in row)
-    lines = [f"Scene `{scenario}`: `synthroads tradeoff --scenario {scenario} --output DIR`; {'; '.join(machines)}", ""]
-    for table, costs in TABLES.items():
-        in_table = [row for row in results if KNOBS[row["knob"]].table == table]
-        measured = measured_rows(in_table)
-        if measured:
-            lines += [f"{table.capitalize()}:", "", *_table(measured, costs), ""]
-        left_out = [f"- {row['knob']} {row['value']}: {row['left_out']}" for row in in_table if "left_out" in row]
-        lines += [*left_out, ""] if left_out else []
-    front = front_lines(results)
-    lines += [*front, ""] if front else []
+    return "\n".join(table_texts(results, scenario).values())
+
+
+def table_texts(results: Sequence[Mapping[str, Any]], scenario: str) -> dict[str, str]:
+    """Return the Markdown of each of `TABLES` that has rows, by name, with the command and the machine."""
+    texts = {table: _table_text(results, table, scenario) for table in TABLES}
+    return {table: text for table, text in texts.items() if text}
+
+
+def _table_text(results: Sequence[Mapping[str, Any]], table: str, scenario: str) -> str:
+    """Return the Markdown of one table; empty if no row is in it."""
+    rows = [row for row in results if KNOBS[row["knob"]].table == table]
+    if not rows:
+        return ""
+    machines = dict.fromkeys(row["machine"] for row in rows if "machine" in row)
+    knobs = " ".join(dict.fromkeys(row["knob"] for row in rows))
+    command = f"`synthroads tradeoff --scenario {scenario} --knobs {knobs} --output DIR`"
+    lines = [f"{table.capitalize()}: {'; '.join([command, *machines])}", ""]
+    if measured := measured_rows(rows):
+        lines += [*_table(measured, TABLES[table]), ""]
+    left_out = [f"- {row['knob']} {row['value']}: {row['left_out']}" for row in rows if "left_out" in row]
+    lines += [*left_out, ""] if left_out else []
+    if table == "presets":
+        front = front_lines(results)
+        lines += [*front, ""] if front else []
     scale = image_scale(load_scenario(scenario).scan.platform.typical_range() or USUAL_RANGE)
-    if scale != 1.0 and any(KNOBS[row["knob"]].table == "colours" for row in results):
+    if scale != 1.0 and table == "colours":
         lines += [f"Spacings and pixels of images are for a range of 60 m; here they are {scale:.3g} times as large."]
-    truths = dict.fromkeys(row["colour_truth"] for row in results if "colour_truth" in row)
+    truths = dict.fromkeys(row["colour_truth"] for row in rows if "colour_truth" in row)
     lines += [f"True colours are those of {truth}." for truth in truths]
     return "\n".join(lines).rstrip("\n") + "\n"
 

@@ -110,13 +110,15 @@ def read_echoes(result: BlockResult, plan: ScanPlan) -> BlockResult:
     begins = np.ones(len(strong), dtype=bool)
     begins[1:] = (time[1:] != time[:-1]) | (strip[1:] != strip[:-1])
     recorded, number, returns = number_returns(np.cumsum(begins), setting.device.maximum_returns)
-    rows = strong[recorded]
-    points = points.select(rows)
-    intensity, clipped = readout.select(rows).read(points.intensity, points.range, setting, plan.gains)
+    rows, seen = strong[recorded], result.seen
+    if len(rows) < len(points):
+        points, readout = points.select(rows), readout.select(rows)
+        seen = None if seen is None else seen.select(rows)
+    intensity, clipped = readout.read(points.intensity, points.range, setting, plan.gains)
     return replace(
         result,
         points=replace(points, intensity=intensity, return_number=number, number_of_returns=returns),
-        seen=None if result.seen is None else result.seen.select(rows),
+        seen=seen,
         below_threshold=result.below_threshold + len(result.points) - len(strong),
         saturated=clipped,
         readout=None,

@@ -22,9 +22,9 @@ from ...scanning.colour.surfaces import SceneSurfaces
 from ...scanning.scene.surface_values import SurfaceInput
 from ..materials.inputs import INCOMING, POSITION, TRUE_NORMAL
 
-_OF_POINT: dict[SurfaceInput, Callable[[SeenPoints], AnyArray]] = {
-    TRUE_NORMAL: lambda points: points.normal,
-    INCOMING: lambda points: points.towards_scanner,
+_OF_POINT: dict[SurfaceInput, Callable[[SeenPoints, Index], AnyArray]] = {
+    TRUE_NORMAL: lambda points, rows: points.normal[rows],
+    INCOMING: lambda points, rows: points.select(rows).towards_scanner,
 }
 
 
@@ -163,7 +163,7 @@ class NodeLayers:
             if what == POSITION:
                 values[what][:, :3] = points.position[rows] + self._frame
             elif what in _OF_POINT:
-                values[what][:, :3] = _OF_POINT[what](points.select(rows))
+                values[what][:, :3] = _OF_POINT[what](points, rows)
             else:
                 together.setdefault(tuple(numbers), []).append(what)
         for several, inputs in together.items():

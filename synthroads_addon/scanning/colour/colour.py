@@ -255,7 +255,8 @@ class MaterialLayers:
             layers[name] = self.constants.values[name][points.material]
             if name in channels:
                 use = found & self.constants.varies[name][points.material]
-                layers[name][use] = channels[name][use].reshape(layers[name][use].shape)
+                shape = layers[name].shape
+                np.copyto(layers[name], channels[name].reshape(shape), where=use.reshape(-1, *(1,) * (len(shape) - 1)))
         arrays: dict[str, NDArray[np.generic]] = {name: layers[name] for name in layers.keys() & wanted}
         if "rgb" in wanted:
             arrays["rgb"] = self._rgb(points, layers, channels, found)
@@ -267,11 +268,16 @@ class MaterialLayers:
         color = layers["base_color"]
         if self.mode == "unlit":
             return encode_srgb(color)
-        sun, sky = color * self.light.sunlight(points.normal), color * self.light.sky(points.normal)
-        if "sun" in channels:
-            sun[found] = channels["sun"][found]
+        everywhere = bool(found.all())
+        if everywhere and "sun" in channels:
+            sun = channels["sun"]
+        else:
+            sun = color * self.light.sunlight(points.normal)
+            if "sun" in channels:
+                sun[found] = channels["sun"][found]
+        sky = color * self.light.sky(points.normal)
         if "sky" in channels:
             sky[found] = channels["sky"][found]
         if self.clouds is not None:
-            sun *= self.clouds.transmission(points.position, points.time)[:, None]
+            sun = sun * self.clouds.transmission(points.position, points.time)[:, None]
         return encode_srgb(sun + sky)

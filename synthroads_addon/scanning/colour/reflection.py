@@ -8,6 +8,7 @@ compensation for microfacet models". What the gloss throws back the matt part be
 from __future__ import annotations
 
 from functools import lru_cache
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,19 +121,18 @@ class _AlbedoTables:
     """Tables of GGX albedos over cosine, roughness and reflectance, integrated once and interpolated."""
 
     def __init__(self) -> None:
-        u, v = ((np.arange(_SAMPLES) + 0.5) / _SAMPLES for _ in range(2))
+        u, v = (axis.ravel() for axis in np.meshgrid(*((np.arange(_SAMPLES) + 0.5) / _SAMPLES for _ in range(2))))
         cosine = np.linspace(0.02, 1.0, _COSINES)
         rough = np.linspace(_SMOOTHEST, 1.0, _ROUGHNESSES)
         root = np.linspace(0.0, np.sqrt(_MATT_F0), _LEVELS)
         self._once = np.empty((_ROUGHNESSES, _COSINES), np.float32)
         self._albedo = np.empty((_ROUGHNESSES, _COSINES, _LEVELS), np.float32)
         for i, width in enumerate(rough**2):
-            for j, mu in enumerate(cosine):
-                weight, between = _visible_facets(width, mu, *np.meshgrid(u, v))
-                once = weight.mean()
-                self._once[i, j] = once
-                for k, level in enumerate(root**2):
-                    self._albedo[i, j, k] = (weight * _dielectric(np.asarray(level), between)).mean() / once
+            weight, between = _visible_facets(width, cosine, u, v)
+            once = weight.mean(axis=1)
+            self._once[i] = once
+            for k, level in enumerate(root**2):
+                self._albedo[i, :, k] = np.einsum("ij,ij->i", weight, _dielectric(level, between)) / len(u) / once
         over = np.maximum(np.gradient(cosine**2), 0.0)
         self._average = (self._once * over).sum(axis=1) / over.sum()
         self._cosine, self._rough, self._root = (
@@ -157,8 +157,17 @@ class _AlbedoTables:
         return np.asarray(below * (1.0 - share) + above * share, np.float32)
 
 
-@lru_cache(maxsize=1)
+_building = Lock()
+
+
 def _tables() -> _AlbedoTables:
+    """Return the tables, which the first thread that asks for them makes while others wait."""
+    with _building:
+        return _built_tables()
+
+
+@lru_cache(maxsize=1)
+def _built_tables() -> _AlbedoTables:
     return _AlbedoTables()
 
 
@@ -185,26 +194,33 @@ def _bilinear(
     return np.asarray(low * (1.0 - u) + high * u, np.float32)
 
 
-def _visible_facets(width: float, cosine: float, u: Float, v: Float) -> tuple[Float, Float]:
+def _visible_facets(width: float, cosine: Float, u: Float, v: Float) -> tuple[Float, Float]:
     """Return weights G2 / G1 and cosines to the view of GGX microfacets, sampled by visible normals (Heitz 2018).
 
     The mean of the weights is the share of the light that comes out after one bounce.
+
+    Args:
+        width: alpha of the facets.
+        cosine: (J,) of the view to the surface's normal.
+        u, v: (S,) of 0 to 1: where each sample lies.
+
+    Returns:
+        (J, S) each.
     """
-    view = np.array([np.sqrt(1.0 - cosine * cosine), 0.0, cosine])
-    stretched = np.array([width * view[0], 0.0, view[2]])
-    stretched /= np.linalg.norm(stretched)
-    first = np.array([0.0, 1.0, 0.0])
-    second = np.cross(stretched, first)
+    mu = cosine[:, None]
+    along = width * np.sqrt(1.0 - mu * mu)
+    length = np.sqrt(along * along + mu * mu)
+    along, up = along / length, mu / length  # the view (x, 0, z), seen by facets as wide as high
     radius, angle = np.sqrt(u), 2.0 * np.pi * v
     x, y = radius * np.cos(angle), radius * np.sin(angle)
-    s = 0.5 * (1.0 + stretched[2])
-    y = (1.0 - s) * np.sqrt(np.maximum(1.0 - x * x, 0.0)) + s * y
+    share = 0.5 * (1.0 + up)
+    y = (1.0 - share) * np.sqrt(np.maximum(1.0 - x * x, 0.0)) + share * y
     z = np.sqrt(np.maximum(1.0 - x * x - y * y, 0.0))
-    normal = x[..., None] * first + y[..., None] * second + z[..., None] * stretched
-    half = np.stack([width * normal[..., 0], width * normal[..., 1], np.maximum(normal[..., 2], 1e-9)], axis=-1)
-    half /= np.linalg.norm(half, axis=-1, keepdims=True)
-    between = np.clip(half @ view, 0.0, 1.0)
-    out = 2.0 * between * half[..., 2] - cosine
-    square = width * width
-    seen, both = _smith(np.asarray(square), np.asarray(cosine)), _smith(np.asarray(square), np.maximum(out, 1e-6))
+    half = np.stack([width * (z * along - y * up), np.broadcast_to(width * x, z.shape), y * along + z * up])
+    half[2] = np.maximum(half[2], 1e-9)
+    half /= np.sqrt(np.einsum("kij,kij->ij", half, half))
+    between = np.clip(half[0] * np.sqrt(1.0 - mu * mu) + half[2] * mu, 0.0, 1.0)
+    out = 2.0 * between * half[2] - mu
+    square = np.asarray(width * width)
+    seen, both = _smith(square, mu), _smith(square, np.maximum(out, 1e-6))
     return np.where(out > 0.0, (1.0 + seen) / (1.0 + seen + both), 0.0), between

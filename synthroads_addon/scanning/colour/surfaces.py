@@ -35,7 +35,8 @@ class SceneSurfaces:
             low, high = self._firsts[number], self._firsts[number + 1]
             mine = np.flatnonzero((points.face >= low) & (points.face < high))
             if len(mine):
-                self._read_mesh(number, mesh, points.select(mine), mine, result)
+                part = points if len(mine) == len(points) else points.select(mine)
+                self._read_mesh(number, mesh, part, mine, result)
         return result
 
     def _read_mesh(

@@ -42,16 +42,14 @@ def row(folder: Path, knob: str, value: Any, *more: str) -> dict[str, Any]:
 
 @pytest.mark.any_blender
 def test_a_knob_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    document = tmp_path / "page.md"
-    document.write_text("<!-- table: tradeoff small -->\n<!-- end of table -->\n")
     scenario = str(small_scenario(tmp_path, "road.length=20"))
     words = ["--scenario", scenario, "--output", str(tmp_path / "out"), "--knobs", "caster"]
     pictures = ["--pictures", str(tmp_path / "pictures")]
-    assert commands.command("tradeoff", [*words, "--document", str(document), *pictures]) == 0
+    assert commands.command("tradeoff", [*words, *pictures]) == 0
     out = tmp_path / "out"
     assert sorted(p.name for p in out.iterdir()) == ["rows", "small.json", "small.md", "small.png"]
     assert (tmp_path / "pictures" / "tradeoff-small.png").exists()
-    assert (out / "small.md").read_text().rstrip() in document.read_text()
+    assert "| caster | embree |" in (out / "small.md").read_text()
     slow, fast = json.loads((out / "small.json").read_text())["rows"]
     assert (slow["value"], fast["value"]) == ("bvhtree", "embree")
     assert fast["rays_per_second"] > slow["rays_per_second"]
@@ -82,6 +80,23 @@ def test_a_knob_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
         assert measured.items() >= again.items()
 
 
+@pytest.mark.any_blender
+def test_a_document_gets_the_tables_of_which_all_knobs_are_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What another table in it says stays."""
+    costs = dict.fromkeys(("seconds", "image_seconds", "peak_memory_mb"), 1.0) | {"shares": {}, "errors": {}}
+    monkeypatch.setattr("headless.tradeoff._measured_once", lambda scene, knob, value: costs | {"knob": knob, "value": value})
+    monkeypatch.setattr("headless.tradeoff.plot", lambda rows, path: path.write_bytes(b""))
+    document, other = tmp_path / "page.md", "<!-- table: tradeoff rq31-600m points -->\nolder\n<!-- end of table -->\n"
+    document.write_text(other + "<!-- table: tradeoff rq31-600m light -->\n<!-- end of table -->\n")
+    words = ["--scenario", "rq31-600m", "--output", str(tmp_path / "out"), "--knobs", "samples"]
+    assert commands.command("tradeoff", [*words, "--document", str(document)]) == 0
+    assert document.read_text().startswith(other)
+    assert "--knobs samples --output DIR`" in document.read_text()
+    assert "| samples | 64 | 1.0 | 1.0 | 1 |" in document.read_text()
+
+
 @pytest.mark.slow
 @pytest.mark.any_blender
 def test_plants_that_are_left_out_are_an_error(tmp_path: Path) -> None:
@@ -98,6 +113,7 @@ def test_plants_that_are_left_out_are_an_error(tmp_path: Path) -> None:
         (["--resume", "--overwrite"], "--resume: can't be given with --overwrite"),
         (["--scenario", "rq31-60m"], "did you mean 'rq31-600m'"),
         (["--document", "nowhere.md"], "--document is 'nowhere.md': cannot be read"),
+        (["--document", "page.md", "--knobs", "fidelity"], "the table of presets has between as well"),
     ],
 )
 def test_bad_input_is_refused_before_anything_is_measured(
