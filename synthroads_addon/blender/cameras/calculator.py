@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import bpy
 import numpy as np
@@ -29,6 +30,10 @@ _FIRST_FRAME = -1_000_000
 """Frame that no scene comes before."""
 _ABOVE = 10.0
 """Height of the camera above the plane: an image of it is one unit wide for each pixel."""
+
+
+_Spans: TypeAlias = list[tuple[slice, slice]]
+"""Runs of places, and of the pixels that they are."""
 
 
 @dataclass
@@ -77,18 +82,25 @@ class Calculator:
             width //= 2
         rows = -(-counts // width)
         begins = np.cumsum([0, *rows])
-        # Where each place lies among the pixels, row by row from below.
-        pixel = np.repeat(begins[:-1] * width - starts, counts) + np.arange(len(material))
+        # Where the places of each material lie among the pixels, row by row from below.
+        spans = [
+            (slice(start, start + count), slice(row * width, row * width + count))
+            for start, row, count in zip(starts.tolist(), begins[:-1].tolist(), counts.tolist(), strict=True)
+        ]
         height = max(int(begins[-1]), _LOWEST)
-        self._fill(values, pixel, width, height)
+        self._fill(values, spans, width, height)
         with self._plane(numbers.tolist(), begins, width, height):
             camera = self.stage.camera
             camera.data.type, camera.data.ortho_scale = "ORTHO", float(max(width, height))
             camera.location = (width / 2.0, height / 2.0, _ABOVE)
             rendered = self.stage.render(width, height)
-        return {name: image[::-1].reshape(-1, image.shape[2])[pixel] for name, image in rendered.layers.items()}
+        result = {}
+        for name, image in rendered.layers.items():
+            flat = image[::-1].reshape(-1, image.shape[2])
+            result[name] = np.concatenate([flat[pixels] for _, pixels in spans])
+        return result
 
-    def _fill(self, values: dict[SurfaceInput, Float32], pixel: Index, width: int, height: int) -> None:
+    def _fill(self, values: dict[SurfaceInput, Float32], spans: _Spans, width: int, height: int) -> None:
         """Write the inputs' values into the images that the materials read, made anew if the size changes."""
         if self._size != (width, height):
             self.close()
@@ -97,7 +109,8 @@ class Calculator:
             if what not in self._images:
                 self._images[what] = _new_image(width, height)
             flat = np.zeros((width * height, 4), np.float32)
-            flat[pixel] = entry
+            for places, pixels in spans:
+                flat[pixels] = entry[places]
             image = self._images[what]
             image.pixels.foreach_set(flat.ravel())
             image.update()
