@@ -65,7 +65,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     results = {}
 
     def measure() -> dict[str, str]:
-        tables = {}
+        tables: dict[str, str] = {}
         for number, (scene, title) in enumerate(titles.items()):
             results[title] = _measure_all(arguments, scene, title, _part(progress, number, len(titles)))
             texts = table_texts(results[title], scene)

@@ -84,7 +84,7 @@ def test_a_knob_is_measured(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 def test_a_document_gets_the_tables_of_which_all_knobs_are_measured(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What another table in it says stays."""
+    """Another table in it stays as it is."""
     costs = dict.fromkeys(("seconds", "image_seconds", "peak_memory_mb"), 1.0) | {"shares": {}, "errors": {}}
     monkeypatch.setattr(
         "headless.tradeoff._measured_once", lambda scene, knob, value: costs | {"knob": knob, "value": value}
