@@ -8,6 +8,7 @@ from ...base.schema import note_of, unit_of
 
 UNITS = {
     "deg": "°",
+    "cm3": "cm³",
     "1/km": "per km",
     "1/m2": "per m²",
     "1/ha": "per ha",
