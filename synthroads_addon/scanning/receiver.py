@@ -78,6 +78,22 @@ class Receiver(ClosedModel):
         title="Full-Scale Reflectance",
         unset="The device's",
     )
+    pedestal: float | None = quantity(
+        None,
+        "1",
+        "Power below which the number is 0, over the detection threshold; it is taken off before the number is made.",
+        (0, 1e4),
+        inherits="device.pedestal",
+        unset="None",
+    )
+    compression: float | None = quantity(
+        None,
+        "1",
+        "Exponent of a compressive response, to which the share of the full scale is raised; 1: in proportion.",
+        (0.05, 1),
+        inherits="device.compression",
+        unset="In proportion",
+    )
     soft_saturation: float | None = quantity(
         None,
         "1",

@@ -40,6 +40,24 @@ def test_numbers_are_shares_of_the_full_scale_in_whole_steps(response: str, bits
     assert len(np.unique(number)) <= 2**bits
 
 
+@pytest.mark.parametrize("response", sorted(NUMBERS))
+def test_compressed_numbers_have_powers_of_the_ratios_and_none_below_the_pedestal(response: str) -> None:
+    setting = setting_with(response=response, full_scale=2.5, pedestal=4.0, compression=0.3)
+    number, _ = read_power(POWER, RANGE, None, ONES, setting)
+    power = np.maximum(np.minimum(POWER, M) - 4.0 * T, 0.0)
+    share = {
+        "linear": power / M,
+        "range_compensated": power * RANGE**2 / 2.5,
+        "logarithmic": np.log10(np.maximum(power / T, 1.0)) / 3.0,
+        "over_threshold": (power - T) / (M - T),
+    }[response]
+    np.testing.assert_allclose(number, np.clip(share, 0.0, 1.0) ** 0.3, atol=0.51 / 65535)
+    assert np.all(number[POWER < 4.0 * T] == 0.0)
+    inner = (share > 0.05) & (share < 0.9)
+    back = range_corrected(number, RANGE, setting)[inner]
+    np.testing.assert_allclose(back, (np.minimum(POWER, M) * RANGE**2)[inner], rtol=5e-3)
+
+
 @pytest.mark.parametrize("response", [None, "power", *sorted(NUMBERS)])
 def test_range_corrected_clouds_have_the_power_behind_the_numbers(response: str | None) -> None:
     setting = setting_with(response=response, full_scale=1e3)
@@ -52,7 +70,7 @@ def test_range_corrected_clouds_have_the_power_behind_the_numbers(response: str 
 
 
 def test_power_is_handed_on_as_it_is() -> None:
-    number, _ = read_power(POWER, RANGE, None, ONES, setting_with())
+    number, _ = read_power(POWER, RANGE, None, ONES, setting_with(pedestal=4.0, compression=0.3))
     np.testing.assert_array_equal(number, np.minimum(POWER, M))
 
 

@@ -136,7 +136,9 @@ def test_settings_that_another_device_cannot_do_give_way(device: str) -> None:
 
 def test_settings_that_a_device_can_do_and_those_named_with_it_stay() -> None:
     scan = load_scenario("rq31-600m", ["scan.device=riegl-vux-1uav22"]).scan
-    assert (scan.pulse_rate_khz, scan.field_of_view_deg, scan.lines_per_second) == (None, 180.0, 100.0)
+    assert (scan.pulse_rate_khz, scan.field_of_view_deg, scan.lines_per_second) == (200.0, 180.0, 100.0)
+    scan = load_scenario("rq31-600m", ["scan.device=riegl-vq-780i"]).scan
+    assert (scan.pulse_rate_khz, scan.field_of_view_deg, scan.lines_per_second) == (None, None, 100.0)
     named = load_scenario("rq31-600m", ["scan.device=velodyne-vlp-16", "scan.pulse_rate_khz=200"]).scan
     with pytest.raises(InputError, match=r"pulse_rate_khz is 200\.0: Velodyne VLP-16 fires at 289\.352 kHz"):
         scanner_setting(named)

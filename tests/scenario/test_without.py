@@ -25,6 +25,8 @@ EVERYTHING = Scenario.from_dict(
             "receiver": {
                 "threshold_to_noise": 5.0,
                 "response": "logarithmic",
+                "pedestal": 2.0,
+                "compression": 0.5,
                 "faint_range_sigma": 0.1,
                 "echo_separation": "waveform",
             },
@@ -40,7 +42,9 @@ OFF = {
     "speckle": lambda scan: scan.noise.speckle == 0,
     "dropout": lambda scan: scan.noise.dropout == 0,
     "detection": lambda scan: scan.receiver.threshold_to_noise == 0,
-    "response": lambda scan: scan.receiver.response == "power",
+    "response": lambda scan: (
+        (scan.receiver.response, scan.receiver.pedestal, scan.receiver.compression) == ("power", 0, 1)
+    ),
     "mixed-points": lambda scan: scan.receiver.echo_separation == "resolution",
     "motion": lambda scan: not scan.motion.sigma.any(),
     "mirror-clock": lambda scan: scan.mirror_clock == "locked",

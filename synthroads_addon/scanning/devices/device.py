@@ -93,6 +93,9 @@ class Device(Model):
     pulse_length_ns: float = quantity(..., "ns", "Pulse length (full width, half height).", gt=0, le=100)
     maximum_returns: int = quantity(..., "1", "Most returns recorded of one pulse.", (1, 15))
     minimum_range: float = quantity(..., "m", "Nothing nearer is recorded.", (0, None))
+    farthest_range: float | None = quantity(
+        None, "m", "Nothing farther is recorded, however bright; as far as it is unambiguous if not given.", gt=0
+    )
     range_sigma: float = quantity(..., "m", "Precision of the range (one sigma).", (0, 1))
     dynamic_range_db: float = quantity(
         45.0,
@@ -140,6 +143,11 @@ class Device(Model):
             raise ValueError("modes must not have the same pulse_rate_khz twice")
         for number, mode in enumerate(self.modes):
             rate = mode.pulse_rate_khz * 1e3
+            if self.farthest_range is not None and mode.maximum_range > self.farthest_range:
+                raise ValueError(
+                    f"modes.{number}.maximum_range {mode.maximum_range:g} must be at most the farthest_range "
+                    f"{self.farthest_range:g}"
+                )
             if fault := self.pattern.fault(mode.field_of_view_deg, rate):
                 raise ValueError(f"modes.{number}.field_of_view_deg {mode.field_of_view_deg:g} {fault}")
             reach = self.unambiguous_range(rate)
@@ -163,8 +171,8 @@ class ScannerSetting:
         divergence: full beam angles at 1/e^2, in the scan plane and across it; 0 is a ray.
         range_resolution: echoes closer than this (m) merge into one return: half the pulse's length in air.
         minimum_range: nothing nearer is recorded, m.
-        maximum_range: nothing farther is recorded, m: returns would be taken for a later pulse's, or not even
-            retro-reflective sheeting (`BRIGHTEST`) passes the threshold.
+        maximum_range: nothing farther is recorded, m: the device doesn't, returns would be taken for a later pulse's,
+            or not even retro-reflective sheeting (`BRIGHTEST`) passes the threshold.
         threshold: smallest detected intensity, of an ideal white target at 1 m being 1: that of a 20 % target at a
             right angle at the mode's maximum range, without attenuation.
         saturation: the intensity above which the receiver saturates: threshold x 10^(dynamic range / 10 dB).
@@ -253,7 +261,9 @@ def setting_of(device: Device, scan: DeviceChoice, range_sigma: float | None = N
         divergence=(device.divergence_mrad[0] * 1e-3, device.divergence_mrad[1] * 1e-3),
         range_resolution=SPEED_OF_LIGHT * device.pulse_length_ns * 1e-9 / 2.0,
         minimum_range=device.minimum_range,
-        maximum_range=min(math.sqrt(BRIGHTEST / threshold), device.unambiguous_range(rate)),
+        maximum_range=min(
+            math.sqrt(BRIGHTEST / threshold), device.unambiguous_range(rate), device.farthest_range or math.inf
+        ),
         threshold=threshold,
         saturation=threshold * 10.0 ** (device.dynamic_range_db / 10.0),
         range_sigma=device.range_sigma if range_sigma is None else range_sigma,

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 from .base import FULL_TURN, Numbers, Pattern, PulseRays, PulseTiming
 
 _Elevation = Annotated[float, Field(strict=True, gt=-90, lt=90)]
+_Azimuth = Annotated[float, Field(strict=True, ge=-180, le=180)]
 _Microseconds = Annotated[float, Field(strict=True, ge=0, le=1e6)]
 
 
@@ -25,6 +26,11 @@ class RotatingHead(Pattern):
         description="Elevation of each beam above the horizon; its place in the list is its channel.",
         json_schema_extra={"unit": "deg"},
     )
+    azimuths_deg: tuple[_Azimuth, ...] | None = Field(
+        None,
+        description="How far to the right of the head's direction each beam points; straight on if not given.",
+        json_schema_extra={"unit": "deg"},
+    )
     firing_times_us: tuple[_Microseconds, ...] | None = Field(
         None,
         description="When each beam fires within the sequence; one after the other at equal intervals if not given.",
@@ -32,9 +38,13 @@ class RotatingHead(Pattern):
     )
 
     @model_validator(mode="after")
-    def _check_firing_times(self) -> Self:
-        if self.firing_times_us is not None and len(self.firing_times_us) != len(self.elevations_deg):
-            raise ValueError(f"firing_times_us must be {len(self.elevations_deg)} times, one for each beam")
+    def _check_beams(self) -> Self:
+        for name, values, of in (
+            ("azimuths_deg", self.azimuths_deg, "angles"),
+            ("firing_times_us", self.firing_times_us, "times"),
+        ):
+            if values is not None and len(values) != self.beams:
+                raise ValueError(f"{name} must be {self.beams} {of}, one for each beam (not {len(values)})")
         return self
 
     @property
@@ -79,6 +89,9 @@ class RotatingHead(Pattern):
         if late is not None:
             since, turned = since + late * sequence_time, turned + (late - 0.5)
         azimuth = turned * timing.angle_step + delays[beam] * (FULL_TURN * timing.lines_per_second)
+        if self.azimuths_deg is not None:
+            azimuth = azimuth + np.deg2rad(self.azimuths_deg)[beam]
+            azimuth -= FULL_TURN * np.round(azimuth / FULL_TURN)
         elevation = np.deg2rad(self.elevations_deg)
         up, out = np.sin(elevation)[beam], np.cos(elevation)[beam]
         sine, cosine = np.sin(azimuth), np.cos(azimuth)

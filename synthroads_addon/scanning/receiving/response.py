@@ -14,6 +14,10 @@ power that saturates the receiver, r the measured range. A number is a share of 
 The logarithmic one is the amplitude above the detection limit in dB (Pfennigbauer and Ullrich 2010, Improving quality
 of laser scanning data acquisition through calibrated amplitude and pulse deviation measurement, Proc. SPIE 7684).
 
+With a pedestal p the S of these is S - p T, at least 0: echoes are detected that are too faint for a number other
+than 0. The share of the full scale may be raised to an exponent below 1, as heads compress their numbers that turn
+their lasers down where echoes are strong: ratios of powers then become the exponent's powers of themselves.
+
 The power before that is what is left of it where laser and receiver don't see the same place yet, times
 (r - r1) / (r2 - r1) between two ranges (Rasshofer, Spies and Spies 2011, Influences of weather phenomena on automotive
 laser radar systems, Adv. Radio Sci. 9); times the gain of the laser; and saturated: clipped, or gradually, S / (1 +
@@ -66,6 +70,8 @@ def read_power(
     if receiver.response in (None, "power"):
         return power, clipped
     threshold = setting.threshold
+    if receiver.pedestal:
+        power = np.maximum(power - receiver.pedestal * threshold, 0.0)
     if receiver.response == "linear":
         share = power / limit
     elif receiver.response == "range_compensated":
@@ -74,22 +80,29 @@ def read_power(
         share = np.log(np.maximum(power / threshold, 1.0)) / np.log(limit / threshold)
     else:
         share = (power - threshold) / (limit - threshold)
-    steps = _steps(setting)
-    return np.rint(np.clip(share, 0.0, 1.0) * steps) / steps, clipped
+    share, steps = np.clip(share, 0.0, 1.0), _steps(setting)
+    if receiver.compression:
+        share = share**receiver.compression
+    return np.rint(share * steps) / steps, clipped
 
 
 def range_corrected(number: Float, distance: Float, setting: ScannerSetting) -> Float:
     """Return what software makes of numbers (N,): the power that they stand for, times the squared range."""
     receiver, limit, threshold = setting.receiver, setting.saturation, setting.threshold
+    if receiver.response in (None, "power"):
+        return np.asarray(number * distance**2)
+    if receiver.compression:
+        number = number ** (1.0 / receiver.compression)
+    pedestal = (receiver.pedestal or 0.0) * threshold
     if receiver.response == "range_compensated":
-        return np.asarray(number * _full_scale(setting))
+        return np.asarray(number * _full_scale(setting) + pedestal * distance**2)
     if receiver.response == "linear":
         number = number * limit
     elif receiver.response == "logarithmic":
         number = threshold * (limit / threshold) ** number
-    elif receiver.response == "over_threshold":
+    else:
         number = threshold + number * (limit - threshold)
-    return np.asarray(number * distance**2)
+    return np.asarray((number + pedestal) * distance**2)
 
 
 def _saturated(power: Float, setting: ScannerSetting) -> tuple[Float, int]:

@@ -133,6 +133,8 @@ CASES: dict[str, ScanCase] = {
     "scan.receiver.response": ScanCase(value="logarithmic"),
     "scan.receiver.bits": ScanCase(value=6, given=LOGARITHMIC),
     "scan.receiver.full_scale": ScanCase(value=3.0, given={"scan.receiver.response": "range_compensated"}),
+    "scan.receiver.pedestal": ScanCase(value=2.0, given=LOGARITHMIC),
+    "scan.receiver.compression": ScanCase(value=0.5, given=LOGARITHMIC),
     "scan.receiver.soft_saturation": ScanCase(value=0.5),
     "scan.receiver.gain_sigma_db": ScanCase(value=1.0),
     "scan.receiver.faint_range_sigma": ScanCase(value=0.2),

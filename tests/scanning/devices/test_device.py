@@ -70,7 +70,10 @@ def test_what_follows_from_the_device() -> None:
     s = custom({"type": "polygon_mirror"}, modes=[mode(1, 60, 10)], lines_per_second=[1, 10])
     assert s.maximum_range == pytest.approx(10 * math.sqrt(1000 / 0.2))
     # A head's beams each wait for their own return.
-    assert preset("velodyne-vlp-16").maximum_range == pytest.approx(50 * math.sqrt(1000 / 0.2))
+    endless = load_device("velodyne-vlp-16").model_copy(update={"farthest_range": None})
+    assert setting_of(endless, ScanScenario()).maximum_range == pytest.approx(50 * math.sqrt(1000 / 0.2))
+    # Its numbers for the range end before.
+    assert preset("velodyne-vlp-16").maximum_range == 100.0
 
 
 @pytest.mark.parametrize("divergence", [[0, 0], [100, 100], [0, 100]])
@@ -157,6 +160,7 @@ FAULTS: dict[str, tuple[dict[str, Any], str]] = {
     "one rate twice": ({"modes": [mode(100, 60), mode(100, 50)]}, "same pulse_rate_khz twice"),
     "range beyond the next pulse": ({"modes": [mode(1000, 60, 900)]}, "at most 599.6 m, unambiguous with 4 pulses"),
     "range below the minimum": ({"modes": [mode(100, 60, 0.5)]}, "more than the minimum range"),
+    "range beyond the farthest": ({"farthest_range": 150.0}, "at most the farthest_range 150"),
     "view beyond the zenith": (
         {"pattern": {"type": "polygon_mirror", "centre_from_nadir_deg": 160}},
         "reaches 190 deg from the nadir",
@@ -180,7 +184,11 @@ FAULTS: dict[str, tuple[dict[str, Any], str]] = {
     "no wedge": ({"pattern": {"type": "wedge_prism", "wedges": []}}, "pattern.wedges"),
     "times of other beams": (
         {"pattern": {"type": "rotating_head", "elevations_deg": [0, 1], "firing_times_us": [0]}},
-        "must be 2 times",
+        "firing_times_us must be 2 times",
+    ),
+    "azimuths of other beams": (
+        {"pattern": {"type": "rotating_head", "elevations_deg": [0, 1], "azimuths_deg": [0, 1, 2]}},
+        "azimuths_deg must be 2 angles, one for each beam (not 3)",
     ),
     "firing after the sequence": (
         {"pattern": {"type": "rotating_head", "elevations_deg": [0, 1], "firing_times_us": [0, 20.5]}},

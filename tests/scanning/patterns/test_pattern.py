@@ -93,6 +93,13 @@ def test_rotating_heads_against_their_data_sheets(name: str, m: PulseMode) -> No
             x, y, z = shot.direction[:, mine]
             np.testing.assert_allclose(np.rad2deg(np.arcsin(z)), elevation, atol=1e-10)
             azimuth, time = np.arctan2(-y, x), shot.time[mine]
+            np.testing.assert_allclose(shot.scan_angle[mine], azimuth, atol=1e-12)
+            # The head itself begins half a turn to the left, in whole steps.
+            aside = d.pattern.azimuths_deg[channel] if d.pattern.azimuths_deg else 0.0
+            head = turns * (time[0] - len(azimuth) // 2 * (len(beams) / (m.pulse_rate_khz * 1e3)) / 2)
+            assert math.remainder(azimuth[0] - math.radians(aside) - math.tau * head, math.tau) == pytest.approx(
+                0.0, abs=1e-9
+            )
             step = np.diff(np.unwrap(azimuth))
             sequence = len(beams) / (m.pulse_rate_khz * 1e3)
             n = len(azimuth) // 2  # of the first turn
@@ -370,6 +377,7 @@ def test_a_mirror_by_a_clock_of_its_own(name: str) -> None:
     for number in range(lines):
         usual, shot = (shots(setting, number * line, line) for setting in (locked, free))
         delay, turn = shot.time - usual.time, shot.scan_angle - usual.scan_angle
+        turn -= math.tau * np.round(turn / math.tau)  # angles of a head that looks all around
         # The first head's pulses of a line are all late by the same time, and turned by the same angle.
         assert np.ptp(delay[::heads]) < 1e-9
         assert np.ptp(turn[::heads]) < 1e-6
