@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 from ..base.progress import StageTimer
 from ..blender.files import save_scene
+from ..blender.materials.textures import packed_textures
 from ..blender.model.build import RoadModel, build_road
 from ..blender.model.store import remember
 from ..blender.scene.evaluated import scanned_scene
@@ -123,6 +124,6 @@ class RoadScene:
             remember((self.model or self.build()).root, self.road.parameters, scenario, "")
         counts = self.scan(folder, timer) if set(scenario.outputs) & set(OF_POINTS) else {}
         if "scene" in scenario.outputs:
-            with timer.stage("scene file"):
+            with timer.stage("scene file"), packed_textures():
                 save_scene(folder / "scene.blend")
         return counts

@@ -6,7 +6,7 @@ from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from ..base.schema import Model, quantity, when
+from ..base.schema import Model, first_repeated, quantity, when
 from .objects import Color, RoadObject
 
 TREES = ("maple", "birch", "poplar", "spruce", "pine")
@@ -111,6 +111,14 @@ class Environment(Model):
     visibility: float = quantity(23_000.0, ge=20, le=100_000, unit="m", description="Meteorological visibility.")
 
 
+class MaterialTexture(Model):
+    """A set of images in place of a material's layers."""
+
+    material: str = Field(min_length=1, description="Name of the material in the table.")
+    folder: str = Field(min_length=1, description="Folder of the images, each named after the layer that it gives.")
+    tile: float = quantity(2.0, gt=0, le=1000, unit="m", description="Length that an image's width covers.")
+
+
 class MaterialVariation(Model):
     """How this road's materials differ from the mean ones."""
 
@@ -122,3 +130,17 @@ class MaterialVariation(Model):
     concrete_brightness: float = quantity(1.0, ge=0.5, le=2, unit="1", description="Factor on the base colour.")
     paint_wear: float = quantity(0.2, ge=0, le=1, unit="1", description="Share of the markings' film worn off.")
     grass_dryness: float = quantity(0.3, ge=0, le=1, unit="1", description="0 green, 1 dry.")
+    textures: tuple[MaterialTexture, ...] = Field(
+        (), description="Images in place of materials' layers, at most one set for each material."
+    )
+
+    @model_validator(mode="after")
+    def _name_materials_once(self) -> MaterialVariation:
+        twice = first_repeated([texture.material for texture in self.textures])
+        if twice is not None:
+            raise ValueError(f"textures has '{twice}' twice: one set of images is allowed for each material")
+        return self
+
+    def texture(self, material: str) -> MaterialTexture | None:
+        """Return the set of images of a material; None if it has none."""
+        return next((texture for texture in self.textures if texture.material == material), None)

@@ -10,6 +10,7 @@ import numpy as np
 from ..base.arrays import Bool, Float, Index
 from ..base.random_streams import stream
 from ..base.schema import round_value
+from ..materials.textures import texture_sets
 from ..road.guidelines import OBSTACLE_DISTANCE
 from ..road.objects import AnyWidth, RoadObject, Side, least_width, nominal_width, width_at, width_kinks
 from ..road.parameters import AlignmentObject
@@ -76,9 +77,18 @@ def sample_environment(scenario: RoadScenario, seed: int) -> Environment:
 
 
 def sample_materials(scenario: RoadScenario, seed: int) -> MaterialVariation:
-    """Return the drawn variation of a road's materials from the mean ones."""
+    """Return the drawn variation of a road's materials from the mean ones, with a set of textures where there are any.
+
+    Raises:
+        InputError: the folder of textures can't be read, see `materials.textures.texture_sets`.
+    """
     drawn = draw_materials(scenario.materials, seed)
-    return MaterialVariation(**{name: value for name, value in drawn.items() if name in MaterialVariation.model_fields})
+    values = {name: value for name, value in drawn.items() if name in MaterialVariation.model_fields}
+    sets = {} if scenario.textures is None else texture_sets(scenario.textures)
+    textures = tuple(
+        choices[stream(seed, "textures", name).integers(len(choices))] for name, choices in sorted(sets.items())
+    )
+    return MaterialVariation(**values, textures=textures)
 
 
 # --- plants ----------------------------------------------------------------------------------------------------------

@@ -236,6 +236,12 @@ class RoadScenario(ClosedModel):
     vegetation: VegetationLimits = Field(VegetationLimits(), description="Species and sizes of plants.")
     environment: EnvironmentLimits = Field(EnvironmentLimits(), description="Light and weather.")
     materials: MaterialLimits = Field(MaterialLimits(), description="Variation of materials.")
+    textures: str | None = Field(
+        None,
+        title="Folder of Textures",
+        description="Folder of images in place of materials' layers, with a folder for each material.",
+        json_schema_extra=notes(unset="None"),
+    )
     assets: tuple[str, ...] = Field((), description="Libraries of free assets to place from: roadside, or JSON files.")
 
     @model_validator(mode="before")

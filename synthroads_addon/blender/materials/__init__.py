@@ -10,7 +10,7 @@ from typing import Self
 
 import bpy
 
-from ...base.errors import nearest_name
+from ...base.errors import InputError, nearest_name
 from ...base.random_streams import stream
 from ...materials.table import UNKNOWN, Material, entry_of, materials
 from ...materials.variation import vary_material
@@ -21,6 +21,8 @@ from ..nodes.builder import files_digest, source_files
 from .looks import is_worn, vary_color
 from .shading import shade
 from .surface_layers import PROPERTY, layer_expressions, mean_value
+from .texture_nodes import texture_values
+from .textures import Texture, load_texture, remove_unused_images
 
 MEAN = "synthroads_mean"
 """Custom property of a Blender material: its mean properties, as JSON."""
@@ -40,6 +42,9 @@ class RoadMaterials:
         variation, environment: the road's.
         offset: of what is random on its pavement, a whole number from 0 to 65535.
         own: materials in place of the shipped table's.
+
+    Raises:
+        InputError: there are textures of a material that the table doesn't have.
     """
 
     def __init__(
@@ -52,7 +57,12 @@ class RoadMaterials:
         self._variation, self._environment, self._own = variation, environment, own
         self._wear = Wear(variation.wheel_track_polish, offset)
         self._looks: dict[str, tuple[Material, str]] = {}
+        self._textures: dict[str, Texture] = {}
         self._made: set[int] = set()
+        for name in (texture.material for texture in variation.textures):
+            if name not in materials():
+                text = f"must be a material of the table{nearest_name(name, materials())}"
+                raise InputError("materials.textures.material", name, text)
 
     @classmethod
     def of(cls, parameters: RoadParameters, own: Mapping[str, Material] | None = None) -> Self:
@@ -61,21 +71,48 @@ class RoadMaterials:
         return cls(parameters.materials, parameters.environment, offset, own)
 
     def material(self, name: str) -> bpy.types.Material:
-        """Return the material of a table entry, made if the file has none that looks so; KeyError for other names."""
+        """Return the material of a table entry, made if the file has none that looks so.
+
+        Raises:
+            KeyError: the table has no such entry.
+            InputError: an image of its textures can't be read, see `textures.load_texture`.
+        """
         if name not in materials():
             raise KeyError(f"no material '{name}'{nearest_name(name, materials())}")
+        texture = self._texture(name)
         if name not in self._looks:
-            mean = vary_material(name, self._variation, self._environment, self._own)
-            self._looks[name] = mean, _look(name, mean, self._wear if is_worn(name) else None)
+            mean = vary_material(name, self._variation, self._environment, self._entries(name))
+            self._looks[name] = mean, _look(name, mean, self._wear if is_worn(name) else None, texture)
         mean, look = self._looks[name]
         for existing in bpy.data.materials:
             if existing.get(LOOK) == look and existing.library is None:
                 return existing
         made = bpy.data.materials.new(_usual_name(name))
         made[PROPERTY], made[MEAN], made[LOOK] = name, mean.to_json(), look
-        shade(made, mean, partial(vary_color, name, self._wear))
+        images = texture and partial(
+            texture_values, texture=texture, factors=texture.factors(self._table(name), mean)
+        )
+        shade(made, mean, partial(vary_color, name, self._wear), images)
         self._made.add(made.session_uid)
         return made
+
+    def _texture(self, name: str) -> Texture | None:
+        given = self._variation.texture(name)
+        if given is not None and name not in self._textures:
+            self._textures[name] = load_texture(given, is_worn(name))
+        return self._textures.get(name)
+
+    def _table(self, name: str) -> Material:
+        return (self._own or {}).get(name) or materials()[name]
+
+    def _entries(self, name: str) -> dict[str, Material]:
+        """Return what stands in place of the shipped table: rows of the user's, means of images.
+
+        Of the images of other materials only asphalt's are needed, which shows where a marking is worn.
+        """
+        textures = {entry: texture for entry in (name, "asphalt") if (texture := self._texture(entry))}
+        of_images = {entry: texture.entry(self._table(entry)) for entry, texture in textures.items()}
+        return {**(self._own or {}), **of_images}
 
     def take_usual_names(self) -> None:
         """Name the materials that were made here anew, as the names of those before them have become free."""
@@ -94,13 +131,17 @@ def used_materials() -> set[int]:
 
 
 def remove_unused_materials(numbers: set[int]) -> None:
-    """Remove those of some materials, given by their session numbers, that nothing uses, unless the user named them."""
+    """Remove those of some materials, given by their session numbers, that nothing uses, unless the user named them.
+
+    Images of textures that nothing uses go with them.
+    """
     unused = [
         item
         for item in bpy.data.materials
         if item.session_uid in numbers and not item.users and _is_usual_name(item.name, str(item.get(PROPERTY, "")))
     ]
     bpy.data.batch_remove(unused)
+    remove_unused_images()
 
 
 @cache
@@ -109,8 +150,8 @@ def _sources_digest() -> bytes:
     return files_digest(*source_files(_SOURCES))
 
 
-def _look(name: str, mean: Material, wear: Wear | None) -> str:
-    text = repr((name, mean.to_json(), None if wear is None else tuple(wear)))
+def _look(name: str, mean: Material, wear: Wear | None, texture: Texture | None) -> str:
+    text = repr((name, mean.to_json(), None if wear is None else tuple(wear), texture and texture.key))
     return hashlib.sha256(_sources_digest() + text.encode()).hexdigest()[:16]
 
 

@@ -23,16 +23,23 @@ def color_image_node(item: bpy.types.Material) -> bpy.types.Node | None:
 
 def mean_color(node: bpy.types.Node) -> tuple[float, float, float] | None:
     """Return the mean linear colour of an image texture's image, of a small copy of it; None of other nodes."""
-    if node.type != "TEX_IMAGE" or node.image is None or not node.image.size[0] * node.image.size[1]:
+    return mean_pixel(node.image, _SMALL) if node.type == "TEX_IMAGE" and node.image is not None else None
+
+
+def mean_pixel(image: bpy.types.Image, largest: int) -> tuple[float, float, float] | None:
+    """Return the mean linear colour of an image, of a copy where a side has over `largest` px; None if it has none."""
+    if not image.size[0] * image.size[1]:
         return None
-    small = node.image.copy()
+    small = image.copy() if max(image.size) > largest else None
     try:
-        small.scale(*(min(_SMALL, side) for side in node.image.size))
-        red, green, blue = linear_pixels(small).reshape(-1, 3).mean(axis=0).tolist()
+        if small is not None:
+            small.scale(*(min(largest, side) for side in image.size))
+        red, green, blue = linear_pixels(small or image).reshape(-1, 3).mean(axis=0).tolist()
     except RuntimeError:  # its file is damaged
         return None
     finally:
-        bpy.data.images.remove(small)
+        if small is not None:
+            bpy.data.images.remove(small)
     return red, green, blue
 
 

@@ -135,17 +135,18 @@ def _film(shade: Shade, wear: Wear) -> None:
     """Film of a marking: worn where traffic crosses it, in spots as large as tyres' prints; with beads in it."""
     look, _ = pavement_look(shade, "paint", wear)
     spots, stretches, beads = shade.noise(0.25, 3.0), shade.noise(2.5, 2.0), shade.noise(0.05, 3.0)
-    film = look.brightness * (spots * 0.9 + 1.0) * (stretches * 0.7 + 1.0)
-    shade.scale(film)
+    film = (spots * 0.9 + 1.0) * (stretches * 0.7 + 1.0)
+    shade.scale(look.brightness)
+    shade.scale_texture(film)
     shade.vary(0.18, beads)
-    shade.roughness = look.roughness + spots * 0.2 + shade.mean.roughness
-    shade.specular = film * shade.mean.specular
+    shade.roughness = look.roughness + shade.layer("roughness", spots * 0.2)
+    shade.specular = look.brightness * (shade.images.get("specular") or film * shade.mean.specular)
 
 
 def _scars(shade: Shade) -> None:
     """Dark scars across a white bark."""
     scars = shade.noise(0.12, 1.0, (0.35, 0.35, 1.6))
-    shade.scale(shade.tree.node("ShaderNodeMapRange", scars, 0.25, 0.4, 1.12, 0.25).value)
+    shade.scale_texture(shade.tree.node("ShaderNodeMapRange", scars, 0.25, 0.4, 1.12, 0.25).value)
 
 
 def _clear(shade: Shade) -> None:
@@ -186,9 +187,10 @@ def _pavement(shade: Shade, kind: str, wear: Wear) -> None:
     shade.vary(texture.mottle[0], mottle)
     if texture.wide[0]:
         shade.vary(texture.wide[0], shade.noise(texture.wide[1], 2.0))
-    shade.roughness = look.roughness + mottle * texture.rough + shade.mean.roughness
-    shade.specular = look.brightness * (grain * texture.gloss + 1.0) * shade.mean.specular
-    shade.relief = grain * texture.relief + (0.0 if height is None else height)
+    shade.roughness = look.roughness + shade.layer("roughness", mottle * texture.rough)
+    specular = shade.images.get("specular") or (grain * texture.gloss + 1.0) * shade.mean.specular
+    shade.specular = look.brightness * specular
+    shade.relief = height if "normal" in shade.images else grain * texture.relief + (0.0 if height is None else height)
 
 
 _BEFORE_NOISES: dict[str, Callable[[Shade], None]] = {
@@ -209,10 +211,10 @@ _PAINTS = ("paint_white", "paint_yellow")
 
 def _soil(shade: Shade, dirt: _Dirt, clean: Value) -> None:
     """Make the surface rougher, duller and less metallic where a noise is low."""
-    shade.roughness = shade.mean.roughness - clean * dirt.roughness
-    shade.specular = shade.mean.specular + clean * dirt.specular
+    shade.roughness = shade.layer("roughness", clean * -dirt.roughness)
+    shade.specular = shade.layer("specular", clean * dirt.specular)
     if dirt.metallic:
-        shade.metallic = shade.mean.metallic + clean * dirt.metallic
+        shade.metallic = shade.layer("metallic", clean * dirt.metallic)
 
 
 def is_worn(name: str) -> bool:

@@ -53,8 +53,8 @@ class _Paint(Inputs):
 def painted_area_group(tree: Tree) -> None:
     """Faces given by stations and offsets, laid on the pavement.
 
-    Their points carry ``film`` (m), ``instance``, ``yellow`` (0 or 1), and ``pavement``, the place that the materials
-    read.
+    Their points carry ``film`` (m), ``instance``, ``yellow`` (0 or 1), and ``pavement`` and ``offset``, the place that
+    the materials read.
     """
     outlines, paint = _Outlines(tree), _Paint(tree)
     mesh = _lay(outlines)
@@ -74,8 +74,8 @@ class _Damage(Inputs):
 def damaged_area_group(tree: Tree) -> None:
     """Patches and cracks given by stations and offsets, laid on the pavement, which is no thicker there.
 
-    Their points carry ``film`` (m), ``instance``, ``concrete`` (0 or 1), and ``pavement``, the place that the materials
-    read.
+    Their points carry ``film`` (m), ``instance``, ``concrete`` (0 or 1), and ``pavement`` and ``offset``, the place that
+    the materials read.
     """
     outlines, damage = _Outlines(tree), _Damage(tree)
     mesh = _lay(outlines)
@@ -140,7 +140,9 @@ def build_damaged_areas(builder: ModelBuilder) -> None:
     attribute(mesh, "film", np.repeat([area.film for area in areas], sizes))
     attribute(mesh, "concrete", np.repeat([float(area.concrete) for area in areas], sizes))
     attribute(mesh, "instance", np.repeat(signed_instance([area.instance for area in areas]), sizes))
-    attribute(mesh, "pavement", np.repeat([(0.0, 0.0, area.code) for area in areas], sizes, axis=0))
+    station = np.concatenate([area.outline[:, 0] for area in areas])
+    code = np.repeat([area.code for area in areas], sizes)
+    attribute(mesh, "pavement", np.column_stack([station, np.zeros(len(station)), code]))
     builder.add("Damaged Areas", mesh, damaged_area_group())
 
 
@@ -176,10 +178,14 @@ def _damaged(builder: ModelBuilder) -> Iterator[_Area]:
 
 
 def _polygons_mesh(name: str, polygons: list[NDArray[np.float64]], zero: float) -> tuple[bpy.types.Mesh, list[int]]:
-    """Create a mesh of outlines (K, 2) in station minus `zero` and offset, m; return it and the outlines' sizes."""
+    """Create a mesh of outlines (K, 2) in station minus `zero` and offset, m; return it and the outlines' sizes.
+
+    Its points keep the offset as an attribute.
+    """
     sizes, corners = [len(polygon) for polygon in polygons], np.concatenate(polygons)
     mesh = bpy.data.meshes.new(name)
     fill_polygons(mesh, np.column_stack([corners - [zero, 0.0], np.zeros(len(corners))]), sizes)
+    attribute(mesh, "offset", corners[:, 1])
     return mesh, sizes
 
 

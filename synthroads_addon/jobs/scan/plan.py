@@ -98,8 +98,12 @@ def plan_scan(
     damages = InstanceNumbers(road).damages() if road is not None and "damage" in kept else {}
     target = Target(scene, lambda mesh: services.caster(scan.caster, mesh), damages)
     relief = micro_relief(materials, means) if shifts else None
+    variation = conditions.variation
     scanned = [
-        vary_material(name, conditions.variation, conditions.environment, table) if name in table else mean
+        # A textured one has the images' means, and was made with the table.
+        vary_material(name, variation, conditions.environment, table)
+        if name in table and variation.texture(name) is None
+        else mean
         for name, mean in zip(map(entry_of, materials), means, strict=True)
     ]
     by_layers = _intensity_from_layers(scenario, scanned, services, materials)

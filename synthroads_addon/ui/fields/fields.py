@@ -382,8 +382,9 @@ class TextField(Field):
     choice = True
 
     def properties(self, hooks: Hooks) -> dict[str, Any]:
-        """Return the string property by name; as a file path if the field names a file."""
-        file = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}} if self.names_file else {}
+        """Return the string property by name; as a path if the field names a file or a folder."""
+        kind = "DIR_PATH" if self._mentions("folder") else "FILE_PATH"
+        file = {"subtype": kind, "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}} if self.names_file else {}
         return {self.name: bpy.props.StringProperty(**self._common(hooks), **file, default=self.text(self.default))}
 
     def text(self, value: Any) -> str:
@@ -392,8 +393,11 @@ class TextField(Field):
 
     @property
     def names_file(self) -> bool:
-        """Return whether the field is optional and its name or tooltip mentions a file."""
-        return self.optional and "file" in f"{self.name} {self.tooltip}".lower()
+        """Return whether the field is optional and its name or tooltip mentions a file or a folder."""
+        return self.optional and (self._mentions("file") or self._mentions("folder"))
+
+    def _mentions(self, word: str) -> bool:
+        return word in f"{self.name} {self.tooltip}".lower()
 
     def read(self, owner: Any, base: Any) -> Any:
         """Return the text, None if it is empty and optional; Blender's ``//`` in file paths is resolved."""

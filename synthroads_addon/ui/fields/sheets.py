@@ -54,7 +54,7 @@ SHEETS = (
     PanelFields("turnouts", "Turnouts", "road", 2, "road.turnouts.*"),
     PanelFields("pavement", "Pavement", "road", 3, "road.pavement.*"),
     PanelFields("markings", "Markings", "road", 4, "road.markings.*"),
-    PanelFields("materials", "Materials", "road", 5, "road.materials.* materials_table"),
+    PanelFields("materials", "Materials", "road", 5, "road.materials.* materials_table road.textures"),
     PanelFields("map", "Map", "road", 6, "title road.epsg road.map_origin"),
     PanelFields(
         "objects",

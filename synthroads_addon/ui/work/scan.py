@@ -18,6 +18,7 @@ from typing import Any, TypeAlias
 import bpy
 
 from ...blender.files import save_scene
+from ...blender.materials.textures import packed_textures
 from ...blender.model.build import RoadModel
 from ...blender.model.roads import ROAD
 from ...blender.model.settle import settle_steps
@@ -94,7 +95,7 @@ def scan_work(scan: RoadScan) -> Work[Written]:
         if measure is None:
             measure = yield from _save_copy(scan, work)
         if "scene" in scenario.outputs:
-            with work.timer.stage("scene file"):
+            with work.timer.stage("scene file"), packed_textures():
                 save_scene(work.folder / "scene.blend")
 
         def write(report: Report) -> int:

@@ -1,0 +1,137 @@
+"""Images of a road's textures in the open file, and what they give in place of a material's means."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+
+from ...base.errors import InputError
+from ...base.files import change_stamp
+from ...base.turns.stepper import run_in_caller
+from ...materials.table import Material
+from ...materials.textures import texture_files
+from ...road.surroundings import MaterialTexture
+from .image import mean_pixel
+
+SOURCE, STAMP, MEAN_PIXEL = "synthroads_texture", "synthroads_stamp", "synthroads_mean"
+"""Custom properties of an image: its file, when that was last changed and its size, its mean linear colour."""
+_NUMBERS = ("roughness", "metallic", "specular")
+_LARGEST = 1024
+"""Side beyond which an image's mean is taken of a smaller copy, px."""
+
+
+@dataclass(frozen=True)
+class Texture:
+    """Images in place of a material's layers.
+
+    Attributes:
+        images: by the layer that each gives.
+        tile: length (m) that an image's width covers.
+        along: whether they lie by station and offset where the mesh says these, else by the place in the world.
+    """
+
+    images: Mapping[str, bpy.types.Image]
+    tile: float
+    along: bool
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        """Return what tells these images from others, and from what they were before their files changed."""
+        files = [(layer, image[SOURCE], image[STAMP]) for layer, image in self.images.items()]
+        return *files, self.tile, self.along
+
+    def entry(self, table: Material) -> Material:
+        """Return a table's material with the images' means in place of its own."""
+        means = {layer: tuple(image[MEAN_PIXEL]) for layer, image in self.images.items()}
+        update = {name: means[name][0] for name in _NUMBERS if name in means}
+        return table.model_copy(
+            update=update | ({"base_color": means["base_color"]} if "base_color" in means else {})
+        )
+
+    def factors(self, table: Material, varied: Material) -> dict[str, float | tuple[float, float, float]]:
+        """Return by what each layer's image is multiplied so that its mean is that of the road's varied material."""
+        entry = self.entry(table)
+        factors: dict[str, float | tuple[float, float, float]] = {
+            name: _ratio(getattr(varied, name), getattr(entry, name)) for name in _NUMBERS
+        }
+        red, green, blue = map(_ratio, varied.base_color, entry.base_color)
+        return factors | {"base_color": (red, green, blue)}
+
+
+def load_texture(texture: MaterialTexture, along: bool) -> Texture:
+    """Return a set of images, taken from the open file or read into it.
+
+    Where its folder is gone, the file's own images of it are taken: it was made elsewhere.
+
+    Raises:
+        MissingFileError: the folder or a file isn't there or can't be read.
+        InputError: a file's name is no layer's, or it is no image; see `texture_files`.
+    """
+    images = _kept_images(texture.folder) if not Path(texture.folder).exists() else {}
+    if not images:
+        files = sorted(texture_files(texture.folder).items())
+        images = {layer: _image(path.absolute(), f"SR {texture.material} {layer}", layer) for layer, path in files}
+    return Texture(images, texture.tile, along)
+
+
+def remove_unused_images() -> None:
+    """Remove the textures' images that no material uses from the file."""
+    bpy.data.batch_remove([image for image in bpy.data.images if SOURCE in image and not image.users])
+
+
+@contextmanager
+def packed_textures() -> Iterator[None]:
+    """Context in which the file holds the textures' images itself, so that it can be saved for elsewhere."""
+    packed = [image for image in bpy.data.images if SOURCE in image and image.packed_file is None]
+    for image in packed:
+        image.pack()
+    try:
+        yield
+    finally:
+        for image in packed:
+            image.unpack(method="REMOVE")
+
+
+def _ratio(value: float, mean: float) -> float:
+    return value / mean if mean > 0.0 else 1.0
+
+
+def _kept_images(folder: str) -> dict[str, bpy.types.Image]:
+    """Return the file's images that were read from a folder, by layer."""
+    place = Path(folder).absolute()
+    found = {
+        Path(image[SOURCE]).stem.lower(): image
+        for image in bpy.data.images
+        if SOURCE in image and Path(image[SOURCE]).parent == place and image.library is None
+    }
+    return dict(sorted(found.items()))
+
+
+def _image(path: Path, name: str, layer: str) -> bpy.types.Image:
+    """Return an image of a file, read unless the open file has it already as it is now."""
+    stamp = "-".join(map(str, change_stamp(str(path), "an image is needed here")))
+    for image in bpy.data.images:
+        if image.get(SOURCE) == str(path) and image.get(STAMP) == stamp and image.library is None:
+            return image
+    image: bpy.types.Image = run_in_caller(lambda: _read(path))
+    image.name, image.alpha_mode = name, "NONE"
+    if layer != "base_color":
+        image.colorspace_settings.name = "Non-Color"
+    mean = mean_pixel(image, _LARGEST)
+    if mean is None:
+        bpy.data.images.remove(image)
+        raise InputError(str(path), None, "cannot be read as an image: it is damaged, or of a kind that Blender lacks")
+    image[SOURCE], image[STAMP] = str(path), stamp
+    image[MEAN_PIXEL] = [min(1.0, max(0.0, value)) for value in mean]
+    return image
+
+
+def _read(path: Path) -> bpy.types.Image:
+    try:
+        return bpy.data.images.load(str(path), check_existing=False)
+    except RuntimeError as error:
+        raise InputError(str(path), None, f"cannot be read as an image ({str(error).strip()})") from None
