@@ -14,7 +14,6 @@
 What is no image is left alone in all of them, such as a licence; so is what begins with a dot.
 """
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -109,7 +108,7 @@ def _folders(folder: Path) -> list[Path]:
 def _entries(folder: Path) -> list[Path]:
     """Return what lies in a folder, sorted by name, without what is hidden."""
     try:
-        return sorted(folder / name for name in os.listdir(folder) if not name.startswith("."))
+        return sorted(path for path in folder.iterdir() if not path.name.startswith("."))
     except (OSError, ValueError) as error:  # ValueError: its name holds a null byte
         reason = getattr(error, "strerror", None) or error
         raise MissingFileError(str(folder), None, f"{_WANTED} ({reason})") from None

@@ -294,7 +294,9 @@ def test_entries_of_csv_that_are_too_long(tmp_path: Path) -> None:
     refused(lambda: read_axis(tmp_path / "axis.csv"), r"axis\.csv:2 is '1,22.*: a line of CSV is needed")
 
 
-@pytest.mark.parametrize("field", ["road.elevation_model", "materials_table", "scan.device", "road.assets"])
+@pytest.mark.parametrize(
+    "field", ["road.elevation_model", "road.textures", "materials_table", "scan.device", "road.assets"]
+)
 def test_null_bytes_in_the_names_of_files(field: str) -> None:
     value = json.dumps(["a\0.json"] if field == "road.assets" else "a\0.json")
     scenario = load_scenario("rq31-600m", [f"{field}={value}", "road.length=40", "road.surroundings=true"][:2])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 
 import pytest
@@ -82,8 +81,8 @@ def test_a_folder_or_an_image_that_cannot_be_read_is_named(tmp_path: Path) -> No
     image.write_bytes(b"GIF89a")
     with pytest.raises(InputError, match=r"base_color.png: is no PNG, JPEG, OpenEXR or TIFF image$"):
         texture_sets(str(tmp_path))
-    os.remove(image)
-    os.symlink(tmp_path / "gone.png", image)
+    image.unlink()
+    image.symlink_to(tmp_path / "gone.png")
     with pytest.raises(MissingFileError, match=r"base_color.png: an image is needed here \(No such file"):
         texture_sets(str(tmp_path))
 

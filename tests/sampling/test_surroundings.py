@@ -112,7 +112,7 @@ def test_terrain_names_its_elevation_model() -> None:
 def test_materials_cover_their_limits() -> None:
     scenario = RoadScenario()
     drawn = [sample_materials(scenario, seed) for seed in SEEDS]
-    for name in MaterialVariation.model_fields:
+    for name in MaterialVariation.model_fields.keys() - {"textures"}:
         assert_covers((getattr(item, name) for item in drawn), getattr(scenario.materials, name))
 
 

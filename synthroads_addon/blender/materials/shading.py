@@ -108,11 +108,7 @@ def shade(
         for name, entry in entries:
             if isinstance(value := values[name], Value):
                 tree.group.links.new(value.source(), surface.raw.inputs[entry])
-        normal = images.get("normal")
-        if varied.relief is not None:
-            turned = {"normal": normal} if normal else {}
-            normal = tree.node("ShaderNodeBump", distance=1.0, height=varied.relief, **turned).value
-        if normal is not None:
+        if (normal := _normal(varied)) is not None:
             tree.group.links.new(normal.source(), surface.raw.inputs["Normal"])
         seen = surface.value
         if varied.transparency:
@@ -136,6 +132,15 @@ def _varied(shade: Shade, name: str) -> Operand:
     if value is None:
         return float(getattr(shade.mean, name))
     return shade.tree.node("ShaderNodeClamp", value).value
+
+
+def _normal(shade: Shade) -> Value | None:
+    """Return the normal of the surface as its relief and its image turn it; None for the mesh's own."""
+    image = shade.images.get("normal")
+    if shade.relief is None:
+        return image
+    turned = {} if image is None else {"normal": image}
+    return shade.tree.node("ShaderNodeBump", distance=1.0, height=shade.relief, **turned).value
 
 
 def _layer(tree: Tree, name: str, **value: Operand) -> None:

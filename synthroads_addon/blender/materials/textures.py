@@ -48,9 +48,7 @@ class Texture:
         """Return a table's material with the images' means in place of its own."""
         means = {layer: tuple(image[MEAN_PIXEL]) for layer, image in self.images.items()}
         update = {name: means[name][0] for name in _NUMBERS if name in means}
-        return table.model_copy(
-            update=update | ({"base_color": means["base_color"]} if "base_color" in means else {})
-        )
+        return table.model_copy(update=update | ({"base_color": means["base_color"]} if "base_color" in means else {}))
 
     def factors(self, table: Material, varied: Material) -> dict[str, float | tuple[float, float, float]]:
         """Return by what each layer's image is multiplied so that its mean is that of the road's varied material."""

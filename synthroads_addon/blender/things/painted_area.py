@@ -74,8 +74,8 @@ class _Damage(Inputs):
 def damaged_area_group(tree: Tree) -> None:
     """Patches and cracks given by stations and offsets, laid on the pavement, which is no thicker there.
 
-    Their points carry ``film`` (m), ``instance``, ``concrete`` (0 or 1), and ``pavement`` and ``offset``, the place that
-    the materials read.
+    Their points carry ``film`` (m), ``instance``, ``concrete`` (0 or 1), and ``pavement`` and ``offset``, the place
+    that the materials read.
     """
     outlines, damage = _Outlines(tree), _Damage(tree)
     mesh = _lay(outlines)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-from tests.helpers.effects.road_cases import ELEVATIONS
+from tests.helpers.effects.road_cases import ELEVATIONS, TEXTURES
 
 Data = dict[str, Any]
 
@@ -71,6 +71,7 @@ CASES: dict[str, LimitCase] = {
     "elevation_model": LimitCase(value=str(ELEVATIONS), given={"length": 60.0, "half_width": 30.0}),
     "barriers.noise_barrier_length.maximum": LimitCase(given=PLAIN | {"barriers": {"noise_barrier": 1.0}}),
     "epsg": LimitCase(value=25833),
+    "textures": LimitCase(value=str(TEXTURES)),
     "assets": LimitCase(value=["roadside"]),
 }
 """Path of a limit -> how it is looked at; see `LimitCase`."""

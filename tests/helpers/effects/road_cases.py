@@ -14,6 +14,7 @@ Data = dict[str, Any]
 
 FILES = Path(__file__).parent / "files"
 OTHER_LIBRARY, ELEVATIONS = FILES / "library.json", FILES / "elevations.asc"
+TEXTURES = FILES / "textures"
 LENGTH = 60.0
 """Length of the road, m."""
 SIGN = {"shape": "rectangle", "width": 2.0, "height": 1.6, "text": ["Ausfahrt"], "posts": 2}
@@ -102,11 +103,17 @@ class Case:
     scan: Data = field(default_factory=dict)
 
 
+CHECKS = {"material": "asphalt", "folder": str(TEXTURES / "asphalt" / "checks")}
+CHECKERED = {"materials.textures": [CHECKS]}
 OTHER_ROAD = Case(value="left")
 OTHER_TURNOUT = Case(value="entry")
 BAY = TURNOUTS["bay"]
 CASES: dict[str, Case] = {
     "environment.visibility": Case(given={"environment.weather": "fog", "environment.visibility": 300.0}),
+    "materials.textures": Case(value=[CHECKS]),
+    "materials.textures[].material": Case(given=CHECKERED, value="concrete"),
+    "materials.textures[].folder": Case(given=CHECKERED, value=str(TEXTURES / "asphalt" / "red")),
+    "materials.textures[].tile": Case(given=CHECKERED, value=3.0, scan={"colour.source": "nodes"}),
     "metadata.identifier": Case(value="another"),
     "metadata.title": Case(value="Another"),
     "metadata.generator": Case(value="another hand"),

@@ -209,7 +209,10 @@ EXTRACTORS: dict[str, Extractor] = {
     "environment.sun_elevation_deg": _of_scene("environment", "sun_elevation_deg"),
     "environment.cloud_cover": _of_scene("environment", "cloud_cover"),
     "environment.wetness": _wetness,
-    **{f"materials.{name}": _of_scene("materials", name) for name in MaterialVariation.model_fields},
+    **{
+        f"materials.{name}": _of_scene("materials", name)
+        for name in MaterialVariation.model_fields.keys() - {"textures"}
+    },
     "materials.patch_density": _damages("patches", 100.0),
     "materials.crack_density": _damages("cracks", 1000.0 / CRACKS_PER_KM),
 }

@@ -109,7 +109,8 @@ def _scalars(kind: Any, metadata: list[Any]) -> st.SearchStrategy[Any]:
         pattern = next((item.pattern for item in metadata if getattr(item, "pattern", None)), None)
         if pattern:
             return st.from_regex(pattern.strip("^$"), fullmatch=True)
-        return st.text(max_size=_limit(metadata, annotated_types.MaxLen, 5))
+        least = _limit(metadata, annotated_types.MinLen, 0)
+        return st.text(min_size=least, max_size=_limit(metadata, annotated_types.MaxLen, 5))
     return {type(None): st.none(), bool: st.booleans()}[kind]
 
 
@@ -167,6 +168,11 @@ def _gantry(data: dict[str, Any]) -> dict[str, Any]:
     return {"left_offset": left, "right_offset": right} if right < left else {"left_offset": 10.0, "right_offset": 0.0}
 
 
+def _materials(data: dict[str, Any]) -> dict[str, Any]:
+    textures = {texture["material"]: texture for texture in data.get("textures", ())}
+    return {"textures": list(textures.values())}
+
+
 _RULES = {
     "AlignmentObject": _axis,
     "HorizontalElement": _element,
@@ -174,6 +180,7 @@ _RULES = {
     "Turnout": _turnout,
     "Vegetation": _plants,
     "Gantry": _gantry,
+    "MaterialVariation": _materials,
 }
 
 
@@ -256,5 +263,6 @@ LIBRARY_ONLY = {
     "an arc's curvatures are equal, a clothoid's differ": "kind '(arc|clothoid)' contradicts",
     "a vegetation's band and heights end after they begin": "must not be less than band_start and height_min",
     "a gantry's left end lies left of its right end": "left_offset must be greater than right_offset",
+    "a material has one set of textures at most": "textures has '.*' twice",
 }
 """Conditions that JSON Schema can't express -> what the library says. docs/parameters.md lists them."""
