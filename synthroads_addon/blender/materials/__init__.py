@@ -89,7 +89,9 @@ class RoadMaterials:
                 return existing
         made = bpy.data.materials.new(_usual_name(name))
         made[PROPERTY], made[MEAN], made[LOOK] = name, mean.to_json(), look
-        images = texture and partial(texture_values, texture=texture, factors=texture.factors(self._table(name), mean))
+        images = None
+        if texture is not None:
+            images = partial(texture_values, texture=texture, factors=texture.factors(self._table(name), mean))
         shade(made, mean, partial(vary_color, name, self._wear), images)
         self._made.add(made.session_uid)
         return made

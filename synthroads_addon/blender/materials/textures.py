@@ -112,9 +112,9 @@ def _kept_images(folder: str) -> dict[str, bpy.types.Image]:
 def _image(path: Path, name: str, layer: str) -> bpy.types.Image:
     """Return an image of a file, read unless the open file has it already as it is now."""
     stamp = "-".join(map(str, change_stamp(str(path), "an image is needed here")))
-    for image in bpy.data.images:
-        if image.get(SOURCE) == str(path) and image.get(STAMP) == stamp and image.library is None:
-            return image
+    for existing in bpy.data.images:
+        if existing.get(SOURCE) == str(path) and existing.get(STAMP) == stamp and existing.library is None:
+            return existing
     image: bpy.types.Image = run_in_caller(lambda: _read(path))
     image.name, image.alpha_mode = name, "NONE"
     if layer != "base_color":
