@@ -31,7 +31,7 @@ SIZE, ROWS, STONES = 512, 8, 4
 """Side of the images, px; rows of stones in them, and stones in a row."""
 TILE = 2.0
 SEED = 4
-LIMITS = ("road.length=160", "road.barriers.noise_barrier=1", "road.pavement.concrete=0", "road.vehicles.per_km=0")
+LIMITS = ("road.length=160", "road.barriers.noise_barrier=1", "road.pavement.concrete=0")
 
 
 def main() -> None:

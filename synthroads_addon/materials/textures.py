@@ -29,7 +29,7 @@ SETTINGS = "texture.json"
 """File beside the images of a set, or of all sets of a material, that says how large they are."""
 
 _SIGNATURES = (b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"\x76\x2f\x31\x01", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
-"""What files of images begin with: PNG, JPEG, OpenEXR, TIFF and BigTIFF of either byte order."""
+"""First bytes of files of images: PNG, JPEG, OpenEXR, TIFF and BigTIFF of either byte order."""
 _WANTED = "a folder of textures is needed here"
 _LAYERS_NAMED = f"{', '.join(TEXTURE_LAYERS[:-1])} or {TEXTURE_LAYERS[-1]}"
 

@@ -72,7 +72,7 @@ def base_color(points: PointBlock) -> Float:
 
 
 def test_points_have_the_images_values_at_their_station_and_offset(tmp_path: Path) -> None:
-    """What wear and rain do to the pavement stays on top, on a patch as beside it; the image gives the rest."""
+    """Wear and rain stay on top, on a patch as beside it; the image gives the rest."""
     parameters = textured_road(tmp_path)
     geometry, points = RoadGeometry(parameters), scan(parameters)
     place = points.array("true_xyz")[:, :2] - parameters.transform.translate[:2]
