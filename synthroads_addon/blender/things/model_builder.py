@@ -230,5 +230,3 @@ def named_fields(item: RoadObject, group: bpy.types.NodeTree) -> dict[str, str]:
         if field in type(item).model_fields and type(getattr(item, field)) in _KINDS.get(socket.socket_type, ()):
             fields[socket.name] = field
     return fields
-
-
