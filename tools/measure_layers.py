@@ -47,7 +47,7 @@ FEW = 64
 """Points that bring the scene into the renderer, before the time is taken."""
 
 
-def compare_sources(name: str, length: float, stretches: int, seconds: float) -> dict[str, float]:
+def compare_sources(name: str, length: float, stretches: int, seconds: float, *changes: str) -> dict[str, float]:
     """Return differences between both sources on a scenario's points, and the processor seconds per million points.
 
     Args:
@@ -55,9 +55,10 @@ def compare_sources(name: str, length: float, stretches: int, seconds: float) ->
         length: of its road, m.
         stretches: of each strip, spread evenly over it.
         seconds: duration of each.
+        changes: further ones of the scenario.
     """
     empty_file()
-    scenario = load_scenario(name, [f"road.length={length}", 'outputs=["cloud"]'])
+    scenario = load_scenario(name, [f"road.length={length}", 'outputs=["cloud"]', *changes])
     shown = RoadScene(scenario, RoadGeometry(sample_road(scenario.road, scenario.seed)))
     shown.build()
     plan = shown.plan()

@@ -29,7 +29,7 @@ def short_roads(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Mo
     "only",
     [
         "materials-base_color",
-        pytest.param("scene-rural-driver", marks=pytest.mark.any_blender),
+        pytest.param("scene-rural-driver", marks=[pytest.mark.any_blender, pytest.mark.slow]),
         pytest.param("materials-lit", marks=[pytest.mark.any_blender, pytest.mark.slow]),
     ],
 )

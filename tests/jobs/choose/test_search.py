@@ -82,6 +82,7 @@ def test_a_tolerance_takes_what_keeps_it_and_leaves_what_is_given(tmp_path: Path
     assert report_of(tmp_path / "twice", *words)["choice"]["chosen"] == choice["chosen"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("few_lines")
 def test_what_cannot_be_kept_is_refused_with_the_best(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"tolerance.intensity is 0.01: can't be kept here: the best to be had is"):
