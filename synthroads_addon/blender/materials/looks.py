@@ -97,8 +97,8 @@ _DIRT: dict[str, _Dirt] = {
     "sheeting_black": _Dirt(specular=0.03),
 }
 """Materials that aren't in it stay as the table has them: lamps, displays, glass, chrome, reflectors."""
-_FILM_OF_DIRT = _Noise(0.0, 0.4, 3.0, (1.0, 1.0, 0.5))
-"""Where dirt lies on what has no noise of its own."""
+_FILM_OF_DIRT = (0.4, 3.0, (1.0, 1.0, 0.5))
+"""Wavelength (m), detail and stretch of the noise of dirt on what has none of its own."""
 
 
 def _attribute(shade: Shade, name: str) -> Value:
@@ -209,7 +209,7 @@ _AFTER_NOISES = {
 _PAINTS = ("paint_white", "paint_yellow")
 
 
-def _soil(shade: Shade, dirt: _Dirt, clean: Value) -> None:
+def _lay_dirt(shade: Shade, dirt: _Dirt, clean: Value) -> None:
     """Make the surface rougher, duller and less metallic where a noise is low."""
     shade.roughness = shade.layer("roughness", clean * -dirt.roughness)
     shade.specular = shade.layer("specular", clean * dirt.specular)
@@ -233,7 +233,7 @@ def vary_color(name: str, wear: Wear, shade: Shade) -> None:
     for noise, field in zip(noises, fields, strict=True):
         shade.vary(noise.amount, field)
     if name in _DIRT:
-        _soil(shade, _DIRT[name], fields[-1] if fields else shade.noise(*_FILM_OF_DIRT[1:]))
+        _lay_dirt(shade, _DIRT[name], fields[-1] if fields else shade.noise(*_FILM_OF_DIRT))
     if name in _PAINTS:
         _film(shade, wear)
     if name in _AFTER_NOISES:

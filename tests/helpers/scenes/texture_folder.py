@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import struct
-import zlib
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 from synthroads_addon.base.arrays import AnyArray, Float
 
@@ -38,15 +37,8 @@ def plain(red: int, green: int, blue: int) -> AnyArray:
 
 def write_png(path: Path, pixels: AnyArray) -> None:
     """Write pixels (height, width, 3) of 8 bits, the lowest row first, as PNG; makes the folder."""
-
-    def chunk(kind: bytes, data: bytes) -> bytes:
-        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-
-    rows = b"".join(b"\0" + row.tobytes() for row in np.ascontiguousarray(pixels)[::-1])
-    head = struct.pack(">IIBBBBB", pixels.shape[1], pixels.shape[0], 8, 2, 0, 0, 0)
-    data = chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + data)
+    Image.fromarray(np.ascontiguousarray(pixels[::-1])).save(path, format="PNG")
 
 
 def write_set(folder: Path, tile: float | None = None, **images: AnyArray) -> None:
