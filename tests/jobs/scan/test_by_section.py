@@ -130,20 +130,22 @@ def test_the_points_don_t_depend_on_the_sections(tmp_path: Path, traffic: float)
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("source", "median", "most", "layers"),
+    ("source", "median", "most", "share", "layers"),
     [
         # Images stand elsewhere along a section's part of the path: both clouds err, as docs/tradeoff.md measures.
-        ("images", 1.0, 9.0, 300),
-        ("nodes", 1e-6, 0.01, 0),
+        ("images", 1.0, 9.0, 0.95, 300),
+        ("nodes", 1e-6, 0.01, 1.0, 0),
         pytest.param(
-            *("returns", 0.01, 0.1, 0), marks=pytest.mark.skipif(not HAS_RETURN_CAMERA, reason="needs Blender 5")
+            # Positions of 32 bits in another section's frame: a pixel at a material's border may be beyond it.
+            *("returns", 0.01, 0.1, 0.999, 2),
+            marks=pytest.mark.skipif(not HAS_RETURN_CAMERA, reason="needs Blender 5"),
         ),
     ],
 )
 def test_rendered_colours_don_t_depend_on_the_sections(
-    tmp_path: Path, source: str, median: float, most: float, layers: int
+    tmp_path: Path, source: str, median: float, most: float, share: float, layers: int
 ) -> None:
-    """Layers (1e-4) and colours (CIEDE2000) of the same places differ by no more than what their source errs by."""
+    """Colours (CIEDE2000), and layers (1e-4) of a share of the places, differ by no more than their source errs by."""
     clouds = []
     for section in (100.0, 57.0):
         data = job(tmp_path, section, traffic_speed_factor=0.0).to_dict()
@@ -155,7 +157,7 @@ def test_rendered_colours_don_t_depend_on_the_sections(
         np.testing.assert_array_equal(cut[name], whole[name], err_msg=name)
     for name in ("roughness", "specular"):
         off = np.abs(cut[name].astype(np.int64) - whole[name])
-        assert (np.quantile(off, 0.95) if source == "images" else off.max()) <= layers
+        assert np.quantile(off, share) <= layers
     seen = [np.mean(points["color_source"] != FROM_MATERIAL) for points in clouds]
     assert min(seen) > 0.9
     assert seen[1] == pytest.approx(seen[0], abs=0.01)
