@@ -2,7 +2,7 @@
 
 A tolerance takes the cheapest settings whose errors, measured on short stretches of the user's own scene with a margin
 for what other stretches may show, are within it. That depends on nothing but the scene, so that the same job gives the
-same bytes. A time is held against the shipped table's times, scaled by one short run on the scene; errors are the
+same bytes. A time is held against the shipped table's times, scaled by short runs on the scene; errors are the
 table's then, unless a tolerance is to be kept as well.
 """
 
@@ -23,12 +23,14 @@ from . import knobs as choices
 from .knobs import ModelKnobs
 from .options import Knobs, Option, best_in_time, cheapest, too_short_error
 from .table import JobTimes, nearest_row, shipped_table
-from .trial import LINES, Trial
+from .trial import LINES, TIMED_SHARE, Trial
 
 _BEAM = frozenset({"position", "intensity", "labels", "density"})
 _COLOURS = frozenset({"colour", "layers"})
 _SURE = 0.8
 """Share of the time left that settings may be expected to take: the table's ratios differ from scene to scene."""
+_TIMING = 0.1
+"""Share of the time left that timing many rays per pulse, beside few, may be expected to take."""
 _HOPELESS = 4.0
 """A time that the shipped table says is exceeded so many times isn't tried out."""
 
@@ -129,9 +131,18 @@ class _Search:
         times.calibrate(fewest, *self._try_model(self.models[0]).time_scan(self.rays[fewest]))
         if (fastest := times.scan_seconds(fewest) + times.other_seconds(self.scenario)) > left():
             raise too_short_error(left(), fastest)
+        self._time_many_rays(_TIMING * left())
         # The error of the height follows from the model, without a measurement.
         found = self._measure() if set(self.limits) - {"height"} else self._table_errors()
         return found, best_in_time(self._options(found), _SURE * left(), self._reference_errors(), self.limits)
+
+    def _time_many_rays(self, most: float) -> None:
+        """Time the largest number of rays per pulse whose timing is expected to take at most so many seconds."""
+        while True:
+            fitting = [rays for rays in self.rays if 2.0 * TIMED_SHARE * self.times.scan_seconds(rays) <= most]
+            if (rays := max(fitting, default=0)) <= max(self.times.timed):
+                return
+            self.times.calibrate(rays, *self._trial.time_scan(self.rays[rays]))
 
     def _measure(self) -> _Findings:
         """Return errors measured in trials; those of beam and colours only if the tolerance limits them."""

@@ -4,7 +4,7 @@ Made by ``python tools/make_tradeoff_prior.py`` on one built-in scenario of each
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from itertools import pairwise
 from typing import Any
@@ -74,7 +74,7 @@ def nearest_row(rows: Mapping[str, Any], number: int) -> Any:
 
 @dataclass
 class JobTimes:
-    """Expected seconds of a job's parts on this machine: the table's times scaled by one short run.
+    """Expected seconds of a job's parts on this machine: the table's times scaled by short runs.
 
     Attributes:
         table: the platform's.
@@ -82,6 +82,7 @@ class JobTimes:
         pulses: of the whole path.
         points: of the whole scan, once they are known.
         speed: seconds here for a second of the table, once that is known.
+        timed: seconds of the whole scan by rays per pulse, projected from short runs.
     """
 
     table: Table
@@ -89,15 +90,29 @@ class JobTimes:
     pulses: int
     points: int = 0
     speed: float = 1.0
+    timed: dict[int, float] = field(default_factory=dict)
 
     def calibrate(self, rays: int, seconds: float, points: int) -> None:
-        """Set the machine's speed and the number of points from a timed scan with a number of rays per pulse."""
-        self.speed = seconds / max(self.pulses * self.table.pulse_seconds(rays), 1e-9)
+        """Set the number of points, and the machine's speed, from a timed scan with a number of rays per pulse."""
+        self.speed = seconds / max(self._table_seconds(rays), 1e-9)
         self.points = points
+        self.timed[rays] = seconds
 
     def scan_seconds(self, rays: int) -> float:
-        """Return the seconds of the scan into files, with the coarsest relief and the materials' mean colours."""
-        return self.pulses * self.table.pulse_seconds(rays) * self.speed
+        """Return the seconds of the scan into files, with the coarsest relief and the materials' mean colours.
+
+        Of two timed scans the table only says how far between or beyond them a number of rays lies.
+        """
+        seconds = self._table_seconds(rays)
+        if len(self.timed) > 1:
+            (few, less), *_, (many, more) = sorted(self.timed.items())
+            begin, end = self._table_seconds(few), self._table_seconds(many)
+            if begin < end and less < more:  # else the clock or the table shows no difference
+                return less + (more - less) * (seconds - begin) / (end - begin)
+        return seconds * self.speed
+
+    def _table_seconds(self, rays: int) -> float:
+        return self.pulses * self.table.pulse_seconds(rays)
 
     def model_seconds(self, number: int) -> float:
         """Return the seconds expected here for building a model: number 0 is the one with few plants, 1 with all."""

@@ -42,9 +42,9 @@ from ..scan.plan import Site
 LINES, PULSES = 64, 1024
 """Stretches that errors are taken of, and the pulses of each."""
 _TIMED_PULSES = 1 << 15
-"""Pulses of each stretch that is timed: as many as blocks are worth."""
+"""Least pulses of each stretch that is timed; a whole block if that is more, as every block costs time by itself."""
 _TIMED = 4
-_TIMED_SHARE = 0.1
+TIMED_SHARE = 0.1
 """Stretches that are timed at least, and the largest share of the path that twice as many may be."""
 _COLOURED = 8
 """Scan lines that errors of colours are taken of."""
@@ -147,7 +147,7 @@ class Trial:
         """
         workers = self.plan.threads or available_cores()
         few = workers * -(-_TIMED // workers)  # no worker waits for another at the end
-        turns = ((few, _TIMED_SHARE / 2.0), (few, _TIMED_SHARE / 2.0), (2 * few, _TIMED_SHARE))
+        turns = ((few, TIMED_SHARE / 2.0), (few, TIMED_SHARE / 2.0), (2 * few, TIMED_SHARE))
         _, (less, soon, _), (more, late, points) = [self._time_stretches(rings, *turn) for turn in turns]
         rate = late / more
         if more > less and late > soon:  # else the clock shows no difference, or other work on the machine
@@ -156,13 +156,14 @@ class Trial:
 
     def _time_stretches(self, rings: tuple[int, ...], count: int, share: float) -> tuple[int, float, int]:
         """Scan so many stretches, at most a share of the path, into files; return pulses, seconds, points."""
-        path = scatter_stretches(self.plan.path, count, _TIMED_PULSES / self.plan.setting.shot_rate, 0.5, share)
         request = self.layer_request({"colour.source": "material"})
-        plan = replace(self.plan, path=path, rings=rings, relief_octaves=2, request=request)
+        plan = replace(self.plan, rings=rings, relief_octaves=2, request=request)
+        pulses = max(plan.cut.size, _TIMED_PULSES)
+        plan = replace(plan, path=scatter_stretches(plan.path, count, pulses / plan.setting.shot_rate, 0.5, share))
         with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
             files = self.site.files(Path(folder), plan.target.origin)
             begin = self.clock()
             record_to_files([plan], files, StageTimer(), announce=False)
             seconds = self.clock() - begin
         # Pulses come in whole lines, so that stretches hold fewer of them than their duration says.
-        return sum(map(self.plan.pulse_count, path.strips)), seconds, files.counts.points
+        return sum(map(plan.pulse_count, plan.path.strips)), seconds, files.counts.points

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from synthroads_addon.base.progress import StageTimer
+from synthroads_addon.jobs.choose.table import JobTimes, shipped_table
 from synthroads_addon.jobs.choose.trial import Trial
 from synthroads_addon.jobs.scan.files import CloudFiles
 from synthroads_addon.jobs.scan.plan import Site
@@ -27,11 +28,12 @@ class MadeUpScans:
     each: float
     now: float = 100.0
     first: bool = True
+    block: float = 0.0
 
     def record(self, plans: Iterable[ScanPlan], files: CloudFiles, timer: StageTimer, announce: bool) -> dict[str, Any]:
         for plan in plans:
             pulses = sum(map(plan.pulse_count, plan.path.strips))
-            self.now += self.each + RATE * pulses + (FIRST if self.first else 0.0)
+            self.now += self.each + RATE * pulses + (FIRST if self.first else 0.0) + self.block * plan.cut.count()
             self.first = False
             files.counts.points += pulses // 2
         return {}
@@ -47,3 +49,23 @@ def test_a_scan_of_a_fixed_time_and_a_rate_is_predicted_exactly(each: float, mon
     assert trial.pulses > 1e6
     assert seconds == pytest.approx(each + RATE * trial.pulses, rel=1e-9)
     assert points == pytest.approx(trial.pulses / 2, rel=1e-4)
+
+
+def test_what_every_block_takes_counts_as_often_as_there_are_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    scans = MadeUpScans(0.0, block=1.0)
+    monkeypatch.setattr("synthroads_addon.jobs.choose.trial.record_to_files", scans.record)
+    plan = planned(StandIns(), seconds=1500.0)
+    trial = Trial(Site(Scenario.from_dict({"fidelity": "draft"}), plan.path), plan, clock=lambda: scans.now)
+    seconds, _ = trial.time_scan(())
+    assert seconds == pytest.approx(RATE * trial.pulses + plan.cut.count(), rel=0.02)
+
+
+def test_two_timed_scans_tell_what_a_ray_costs_here() -> None:
+    table = shipped_table("uav")
+    times = JobTimes(table, area=1e4, pulses=10**6)
+    times.calibrate(1, 3.0, 5)
+    assert times.scan_seconds(61) == pytest.approx(3.0 * table.pulse_seconds(61) / table.pulse_seconds(1))
+    times.calibrate(19, 5.0, 5)
+    assert (times.scan_seconds(1), times.scan_seconds(19)) == (pytest.approx(3.0), pytest.approx(5.0))
+    steps = table.pulse_seconds(61) - table.pulse_seconds(1), table.pulse_seconds(19) - table.pulse_seconds(1)
+    assert times.scan_seconds(61) == pytest.approx(3.0 + 2.0 * steps[0] / steps[1])
