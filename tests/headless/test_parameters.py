@@ -36,6 +36,7 @@ def test_many_sets_are_lines_of_consecutive_seeds() -> None:
     assert sets[2] == json.loads(command("--seed", "7").stdout)
 
 
+@pytest.mark.slow
 def test_two_processes_write_the_same_bytes() -> None:
     arguments = ["--count", "20", "--length", "3000", "--cross-section", "RQ43.5"]
     first, second = (command(*arguments, hash_seed=seed).stdout for seed in ("1", "2"))

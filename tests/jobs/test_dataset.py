@@ -119,6 +119,7 @@ def test_holds_what_its_manifest_says(undisturbed: tuple[Path, Path], capfd: pyt
     assert capfd.readouterr().out.split()[1:3] == ["files", "of"]
 
 
+@pytest.mark.slow
 def test_a_resumed_set_has_the_same_bytes(
     undisturbed: tuple[Path, Path], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -363,6 +363,7 @@ leave(lambda: run(work, argparse.Namespace(json=False, quiet=False)))
     assert (done.returncode, done.stderr) == (130, "interrupted; nothing was left half-written\n")
 
 
+@pytest.mark.slow
 def test_an_interrupt_in_a_callback_of_blender_reaches_the_command() -> None:
     """Blender's operators print what is raised in Python that they call, and go on."""
     code = """

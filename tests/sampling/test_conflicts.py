@@ -133,6 +133,7 @@ def ranges(low: float, high: float) -> st.SearchStrategy:
     return ends.map(lambda pair: {"minimum": min(pair), "maximum": max(pair)})
 
 
+@pytest.mark.slow
 @given(
     pair=st.sampled_from(PAIRS),
     length=st.floats(1.0, 4000.0),

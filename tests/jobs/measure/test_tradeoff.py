@@ -126,6 +126,7 @@ def test_bad_input_is_refused_before_anything_is_measured(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_colours_of_images_are_nearer_to_the_truth_than_the_materials(tmp_path: Path) -> None:
     small = ("road.half_width=30", "road.length=30")
     material, images = (row(tmp_path, "colour_source", value, *small) for value in ("material", "images"))
@@ -188,6 +189,7 @@ def test_heights_are_within_the_tolerance_but_where_the_pavement_changes_at_once
     assert 0.001 < errors.max() < 0.005
 
 
+@pytest.mark.slow
 @pytest.mark.any_blender
 def test_what_lies_on_the_pavement_is_no_error_of_its_height() -> None:
     """Patches and cracks are thin faces on it, here raised by a centimetre."""

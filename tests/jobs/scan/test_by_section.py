@@ -105,6 +105,7 @@ def cloud_of(folder: Path, scenario: Scenario) -> tuple[dict[str, Any], Any]:
     return report, points[np.lexsort((points["point_source_id"], cloud.return_number, points["gps_time"]))]
 
 
+@pytest.mark.slow
 @pytest.mark.any_blender
 @pytest.mark.parametrize("traffic", [0.0])
 def test_the_points_don_t_depend_on_the_sections(tmp_path: Path, traffic: float) -> None:

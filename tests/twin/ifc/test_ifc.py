@@ -267,6 +267,7 @@ FLAT = [
 ]
 
 
+@pytest.mark.slow
 def test_clothoids_between_nearly_equal_radii(tmp_path) -> None:
     # All in one file, to the left and the right in turn: what an IFC clothoid is worst at.
     elements = []
@@ -868,6 +869,7 @@ def test_only_with_ifcopenshell(monkeypatch, tmp_path) -> None:
         write_ifc(sample_road(scenario(length=20.0), 1), tmp_path / "twin.ifc")
 
 
+@pytest.mark.slow
 def test_whatever_is_a_road_can_be_written(tmp_path_factory: pytest.TempPathFactory) -> None:
     written_roads = 0
 

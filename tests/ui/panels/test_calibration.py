@@ -34,6 +34,7 @@ def labels(settings: Any, cloud: Path) -> None:
     settings.range_corrected, settings.decibels = True, 30.0
 
 
+@pytest.mark.slow
 @pytest.mark.any_blender
 def test_buttons_fit_and_save_what_the_library_does(settings: Any, tmp_path: Path) -> None:
     cloud = labelled(tmp_path / "real.laz", 30.0, 40.0)

@@ -80,6 +80,7 @@ def test_a_fitted_road_is_the_librarys(cheap: Any, tmp_path: Path) -> None:
     assert source_file_name(find_road(bpy.context.scene)) == "axis.csv"
 
 
+@pytest.mark.slow
 def test_a_fit_that_leaves_its_points_is_refused_with_a_picture(cheap: Any, tmp_path: Path) -> None:
     along = np.arange(0.0, 200.0, 5.0)
     points = np.vstack([np.column_stack([along + begin, 0.0 * along]) for begin in (0.0, 400.0, 200.0)])
