@@ -1,4 +1,4 @@
-"""What `make demo`, `make test` and the others do, as sessions of nox: `nox -l` lists them.
+"""Sessions of nox behind `make demo`, `make test` and the others: `nox -l` lists them.
 
 `nox -s tests-3.11 -- tests/road -k curve` hands arguments to pytest. In the environment TEST_WORKERS=N sets how many
 processes test side by side, TEST_MARKERS which tests, PYTHON that only the Python that runs nox is tested.
@@ -26,12 +26,12 @@ EXTRAS = {
     "tests-3.11": "blender,dev,judges,ml",
     "tests-3.13": "blender,dev,judges",
 }
-"""What of pyproject.toml is installed into each environment."""
+"""Extras of pyproject.toml that are installed into each environment."""
 BLENDER_TESTS = ("tests/blender", "tests/jobs", "tests/ui")
 PARTS = {"blender": [*BLENDER_TESTS], "others": ["tests", *(f"--ignore={folder}" for folder in BLENDER_TESTS)]}
 """The tests in two processes: once ifcopenshell has worked in one, Blender 5.2's OBJ exporter aborts there."""
 ALONE = ["-n", "0", "-m", "alone", *BLENDER_TESTS]
-"""What the tests that measure the clock are called with, after the others: they are slow ones, all of Blender."""
+"""Arguments for the tests that measure the clock, which run after the others: slow ones, all of Blender."""
 QUICK = "not slow and not fuzz and not cluster"
 """Marker expression of the tests of `make test`."""
 SLOW = "slow"
@@ -47,7 +47,7 @@ nox.options.reuse_venv = "yes"
 nox.options.download_python = "never"
 
 outcomes: dict[str, str] = {}
-"""What the tests came to, by Python."""
+"""Outcome of the tests by Python."""
 
 
 def pyenv_folders(root: Path) -> list[str]:
