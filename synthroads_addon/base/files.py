@@ -124,8 +124,8 @@ def output_folder(target: Path, names: Iterable[str], overwrite: bool) -> Iterat
         try:
             target.mkdir(parents=True, exist_ok=True)
             if made:
-                record_folder(target)
                 stack.callback(_remove_if_empty, target)
+                record_folder(target)
             scratch = stack.enter_context(scratch_folder(target))
             (work := scratch / NEW).mkdir()
         except OSError as error:

@@ -111,7 +111,13 @@ def record_folders_in(descriptor: int) -> None:
 def record_folder(folder: Path) -> None:
     """Append the path of a folder that was just made to the file of `record_folders_in`, if there is one."""
     if _journal is not None:
-        os.write(_journal, os.fsencode(folder.absolute()) + b"\0")
+        _write(_journal, os.fsencode(folder.absolute()) + b"\0")
+
+
+def _write(descriptor: int, data: bytes) -> None:
+    """Write all of some bytes to an open file, of which the system may take only a part where there is little room."""
+    while data:
+        data = data[os.write(descriptor, data) :]
 
 
 def remove_recorded_folders(descriptor: int) -> None:
@@ -134,8 +140,8 @@ def _make_folder(parent: Path, prefix: str) -> Path:
     """Return a new scratch folder with its lock file, tried anew where an empty one was taken for a leftover."""
     while True:
         folder = Path(tempfile.mkdtemp(prefix=f"{prefix}{os.getpid()}-", dir=parent))
-        record_folder(folder)
         try:
+            record_folder(folder)
             lock = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o644)
         except FileNotFoundError:
             continue
@@ -144,7 +150,7 @@ def _make_folder(parent: Path, prefix: str) -> Path:
             raise
         _mine[folder] = lock
         try:
-            os.write(lock, this_process(try_lock(lock) is True).to_json().encode())
+            _write(lock, this_process(try_lock(lock) is True).to_json().encode())
         except OSError:  # the disk is full
             _remove(folder)
             raise

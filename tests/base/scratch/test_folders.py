@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import subprocess
@@ -13,6 +14,8 @@ from pathlib import Path
 
 import pytest
 
+from synthroads_addon.base.errors import OutputError
+from synthroads_addon.base.files import output_folder
 from synthroads_addon.base.scratch import folders, locks
 from synthroads_addon.base.scratch.folders import (
     LOCK,
@@ -162,6 +165,30 @@ def test_a_full_disk_leaves_no_folder(tmp_path: Path, monkeypatch: pytest.Monkey
     with pytest.raises(OSError, match="No space"), scratch_folder(tmp_path):
         pass
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("room", [0, 20, 80, 100])
+def test_a_limit_on_the_size_of_files_leaves_no_folder(
+    room: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The file that names the folders, and the lock, take as many bytes as there is room for, and fail after that."""
+    write, limited = os.write, {}
+
+    def limited_write(descriptor: int, data: bytes) -> int:
+        left = room - limited.get(descriptor, 0)
+        if left <= 0:
+            raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
+        limited[descriptor] = limited.get(descriptor, 0) + min(left, len(data))
+        return write(descriptor, data[:left])
+
+    journal = os.open(tmp_path / "journal", os.O_RDWR | os.O_CREAT)
+    monkeypatch.setattr(folders, "_journal", journal)
+    monkeypatch.setattr(os, "write", limited_write)
+    target = tmp_path / ("out" * 10)
+    with pytest.raises(OutputError, match="File too large"), output_folder(target, [], overwrite=False):
+        pytest.fail("there was no room for a lock")
+    os.close(journal)
+    assert [path.name for path in tmp_path.iterdir()] == ["journal"]
 
 
 def test_before_the_process_ends_at_once_its_folders_go(tmp_path: Path) -> None:
