@@ -69,11 +69,12 @@ def generated(folder: Path, length: float) -> dict[str, Any]:
 def exact_triangles(geometry: RoadGeometry, low: float, high: float, scan: ScanPlan, frame: Float) -> Float:
     """Return the triangles (T, 3, 3) of a section's pavement in the road's frame, their corners in float64.
 
-    They are the model's; only where its corners lie is worked out anew, from the road's rows and boundaries.
+    They are the model's but for patches and cracks, which lie on it between its rows; only where its corners lie is
+    worked out anew, from the road's rows and boundaries.
     """
     rows = sample_stations(geometry, TOLERANCE, low, high)
     mesh = MESH[id(scan)]
-    chosen = mesh.triangles[mesh.class_id == class_id("road")]
+    chosen = mesh.triangles[(mesh.class_id == class_id("road")) & ~is_laid_on(geometry, mesh.instance_id)]
     used, corner = np.unique(chosen, return_inverse=True)
     given = mesh.vertices[used].astype(np.float64) + frame
     station, offset = geometry.alignment.project(given[:, :2])
@@ -85,6 +86,11 @@ def exact_triangles(geometry: RoadGeometry, low: float, high: float, scan: ScanP
     away = np.linalg.norm(exact - given, axis=1)
     assert away.max() < 0.001, f"a corner of the model lies {away.max() * 1000:.2f} mm off"
     return exact[corner.reshape(-1, 3)]
+
+
+def is_laid_on(geometry: RoadGeometry, instance: Any) -> Any:
+    """Return which of some instances are patches or cracks: a patch fills the ruts below it."""
+    return np.isin(instance, geometry.numbers.patches_and_cracks())
 
 
 MESH: dict[int, Any] = {}
@@ -135,7 +141,7 @@ def errors_of_a_section(work: SectionScan, road: RoadGeometry, section: Any, mon
         times = (work.cut.time(strip, number) for number in (first, first + PULSES - 1))
         pulses = emit_pulses(scan, strip, *times, first, PULSES)
     monkeypatch.undo()
-    paved = result.select(np.flatnonzero(result.class_id == class_id("road")))
+    paved = result.select(np.flatnonzero((result.class_id == class_id("road")) & ~is_laid_on(road, result.instance_id)))
     rows = np.searchsorted(pulses.time, paved.gps_time)
     assert np.array_equal(pulses.time[rows], paved.gps_time)
     origin, direction = pulses.origin.T[rows] + scan.frame_origin, pulses.direction.T[rows]
@@ -157,10 +163,10 @@ def test_a_long_road(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = tmp_path / f"{LONG:g}"
     parameters = read_parameters(folder / "parameters.json")
     geometry = RoadGeometry(parameters)
-    worst, laid_on = 0.0, geometry.numbers.patches_and_cracks()  # a patch fills the ruts below
+    worst = 0.0
     with laspy.open(folder / "cloud.laz") as file:
         for chunk in file.chunk_iterator(1_000_000):
-            surface = (chunk["class_id"] == class_id("road")) & ~np.isin(chunk["instance_id"], laid_on)
+            surface = (chunk["class_id"] == class_id("road")) & ~is_laid_on(geometry, chunk["instance_id"])
             xyz = np.column_stack([chunk.x, chunk.y, chunk.z])[surface]
             assert (xyz[:, 1] > 5.4e6).all()
             local = xyz - np.array(parameters.transform.translate)
