@@ -64,10 +64,11 @@ _BLOCK = re.compile(r"(?P<kind>\w+)\[(?P<name>[^\]]*)\]")
 
 
 def is_there(line: str) -> bool:
-    """Return whether a line's data-block is there; node groups go with the last road that uses them."""
+    """Return whether a line's data-block is there; node groups and materials go with the last road that uses them."""
     block = _BLOCK.match(line)
     assert block
-    return block["kind"] != "node_groups" or block["name"] in bpy.data.node_groups
+    shared = {"node_groups": bpy.data.node_groups, "materials": bpy.data.materials}.get(block["kind"])
+    return shared is None or block["name"] in shared
 
 
 def names_of(root: bpy.types.Object) -> set[str]:
