@@ -11,7 +11,7 @@ from headless.commands import Outcome, add_changes_argument, entry
 from headless.messages import detail, progress_bar
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.dataset.manifest import Manifest, faults, read_manifest
-from synthroads_addon.dataset.recipe import Recipe, load_recipe, recipe_names
+from synthroads_addon.dataset.recipe import Recipe, load_recipe, path_within, recipe_names
 from synthroads_addon.scenario.scenario import parse_change
 
 
@@ -48,7 +48,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
         raise InputError("--jobs", arguments.jobs, "must be 1 to 1024")
     if arguments.worker_timeout is not None and not (arguments.scheduler and 1.0 <= arguments.worker_timeout < 1e9):
         raise InputError("--worker-timeout", arguments.worker_timeout, "must be 1 s or more, and goes with --scheduler")
-    recipe = _change_recipe(load_recipe(arguments.recipe), arguments.changes)
+    recipe = change_recipe(load_recipe(arguments.recipe), arguments.changes)
     detail("recipe", recipe.to_dict())
     from headless.dataset_run import DatasetRun, dask_workers, local_processes
 
@@ -64,14 +64,16 @@ def run(arguments: argparse.Namespace) -> Outcome:
     return 3 if failed else 0, manifest.to_dict(), summary(manifest, arguments.output)
 
 
-def _change_recipe(recipe: Recipe, changes: list[str]) -> Recipe:
+def change_recipe(recipe: Recipe, changes: list[str]) -> Recipe:
     """Return a copy of a recipe with further changes (``path=value``) to the scenarios of all its groups."""
     if not changes:
         return recipe
     values = dict(parse_change(change) for change in changes)
     groups = []
     for group in recipe.groups:
-        update = {"set": group.set | values, "variants": tuple(each | values for each in group.variants)}
+        draw = {path: drawn for path, drawn in group.draw.items() if not any(path_within(path, set_) for set_ in values)}
+        variants = tuple(each | values for each in group.variants)
+        update = {"set": group.set | values, "draw": draw, "variants": variants}
         groups.append(group.model_copy(update=update))
     return Recipe.from_dict(recipe.model_copy(update={"groups": tuple(groups)}).to_dict(), "recipe")
 

@@ -23,6 +23,8 @@ MAX_OCTAVES = 12
 DECAY = 0.5
 """Variance of an octave as a share of the variance of the octave twice as long: a spectrum that falls with the square
 of the frequency, as that of unevenness (ISO 8608, waviness 2) and of soils with exponential covariance."""
+_CORRELATED = 0.58
+"""Length, in cells, that an octave's correlation falls to 1/e over."""
 CHUNK = 1 << 15
 """Points worked on at once, so that the arrays stay in a core's own cache. No result depends on it."""
 
@@ -35,7 +37,13 @@ _TURN = ((15.0, 6.0, -10.0), (6.0, 10.0, 15.0), (10.0, -15.0, 6.0))
 each axis at least 18 degrees off every axis and diagonal of the lattice (the best of all with whole numbers to 60)."""
 
 
-def noise_field(position: Float, wavelength: float | Float, seed: int, octaves: int = 4) -> Float:
+def noise_field(
+    position: Float,
+    wavelength: float | Float,
+    seed: int,
+    octaves: int = 4,
+    averaged: tuple[Float, Float] | None = None,
+) -> Float:
     """Return a random field (N,) at positions (N, 3): mean 0, standard deviation 1, nearly normal from 3 octaves on.
 
     The correlation falls to 1/e at about 0.28 of the wavelength (4 octaves) and is 0 beyond 1.75 of it.
@@ -45,6 +53,8 @@ def noise_field(position: Float, wavelength: float | Float, seed: int, octaves: 
         wavelength: (N,) or one number, longest wavelength (two cells of the coarsest lattice), m; positive.
         seed: of the field.
         octaves: 1 to `MAX_OCTAVES`, each of half the wavelength and half the variance of the one before.
+        averaged: standard deviations (N,) along both axes, m, of the Gaussian patch of a surface over which each value
+            is a mean: octaves have the deviations of such means, see `mean_deviation`. None: values of places.
 
     Returns:
         (N,) values.
@@ -63,12 +73,31 @@ def noise_field(position: Float, wavelength: float | Float, seed: int, octaves: 
         part = slice(first, first + CHUNK)
         point = [position[part, axis] * cells[part] for axis in range(3)]
         total = np.zeros(len(point[0]), dtype=np.float32)
+        patch = None if averaged is None else [axis[part] * cells[part] for axis in averaged]
         for key, gain in zip(keys, gains, strict=False):
             point = _turn_coordinates(point)
-            total += gain * _octave(point, key)
+            octave = gain * _octave(point, key)
+            if patch is not None:
+                octave *= mean_deviation(patch[0], patch[1])
+                patch = [axis * 2.0 for axis in patch]
+            total += octave
             point = [coordinate * 2.0 for coordinate in point]
         result[part] = total
     return result
+
+
+def mean_deviation(long: Float, short: Float) -> Float32:
+    """Return the standard deviation (N,) of means of an octave over Gaussian patches of a surface, 0 to 1.
+
+    The correlation of an octave falls nearly as exp(-(x / l)^2) with l of 0.58 cells, as means over patches of 0.1 to
+    3 cells show; of means over a Gaussian patch the variance of such a field is 1 / sqrt((1 + 2 a^2 / l^2) (1 + 2 b^2
+    / l^2)). It is kept to 4 % of the octave's variance.
+
+    Args:
+        long, short: standard deviations a, b (N,) of the patch along its two axes, in cells.
+    """
+    scale = 2.0 / _CORRELATED**2
+    return np.asarray(((1.0 + scale * long**2) * (1.0 + scale * short**2)) ** -0.25, dtype=np.float32)
 
 
 def _turn_coordinates(point: list[Float]) -> list[Float]:

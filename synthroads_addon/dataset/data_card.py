@@ -51,8 +51,16 @@ def _how(recipe: Recipe, jobs: Sequence[SceneJob]) -> list[str]:
         f"- Fidelity: {count_names(job.scenario.fidelity for job in jobs)}",
         f"- Laser scanner: {count_names(job.scenario.scan.device for job in jobs)}",
         f"- Platform: {count_names(job.scenario.scan.platform.kind for job in jobs)}",
+        *_drawn_fields(recipe),
         "",
     ]
+
+
+def _drawn_fields(recipe: Recipe) -> list[str]:
+    """Return a list of the fields of which each scene has its own value; empty if the recipe draws none."""
+    parts = [("", recipe.draw), *((f" ({group.name})", group.draw) for group in recipe.groups)]
+    rows = [f"  - `{path}`{where}: {drawn.text()}" for where, draws in parts for path, drawn in draws.items()]
+    return ["- Drawn for each scene, evenly unless said:", *rows] if rows else []
 
 
 def _content(manifest: Manifest) -> list[str]:

@@ -1,14 +1,18 @@
 """`Recipe`: a data set in one file: groups of scenes, each scene with a seed of its own."""
 
+import json
+from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import product
 from typing import Annotated, Any, Literal, Self
 
+import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from ..base.errors import InputError
 from ..base.files import PRESETS, preset_names, preset_path
 from ..base.random_streams import stream
-from ..base.schema import ClosedModel, first_repeated, quantity, read_yaml
+from ..base.schema import ClosedModel, Finite, first_repeated, quantity, read_yaml
 from ..scenario.scenario import Scenario, load_scenario, with_changes
 
 RECIPES = PRESETS / "recipes"
@@ -21,10 +25,71 @@ NEEDED_OUTPUTS = ("parameters", "cloud", "centerline")
 _UNSTABLE = "scene"
 """A .blend file is never the same twice, so that its checksum would say nothing."""
 _LARGEST_SEED = 2**63
+_DIGITS = 4
+"""Digits of drawn numbers: enough to tell them apart, and few enough to read."""
+
+
+class DrawnValue(ClosedModel):
+    """Values of a field of which each scene draws one: any number of a range, or one of some values."""
+
+    minimum: Finite | None = Field(None, description="Smallest number that is drawn.")
+    maximum: Finite | None = Field(None, description="Largest number that is drawn.")
+    scale: Literal["linear", "logarithmic"] = Field(
+        "linear", description="All numbers of a range are as likely, or all ratios."
+    )
+    one_of: tuple[Any, ...] = Field((), description="Values that are drawn alike often, instead of a range.")
+
+    @model_validator(mode="after")
+    def _check_range(self) -> Self:
+        limits = (self.minimum, self.maximum)
+        if self.one_of:
+            if limits != (None, None):
+                raise ValueError("one_of and a range, minimum and maximum, can't both be given")
+        elif None in limits:
+            raise ValueError("minimum and maximum, or one_of, must be given")
+        elif self.minimum >= self.maximum:  # type: ignore[operator]
+            raise ValueError(f"minimum {self.minimum:g} must be below maximum, {self.maximum:g}")
+        elif self.scale == "logarithmic" and self.minimum <= 0.0:  # type: ignore[operator]
+            raise ValueError(f"minimum {self.minimum:g} must be above 0 on a logarithmic scale")
+        return self
+
+    def draw(self, random: np.random.Generator) -> Any:
+        """Return a value, a number of a range to `_DIGITS` digits."""
+        if self.one_of:
+            return self.one_of[int(random.integers(len(self.one_of)))]
+        assert self.minimum is not None
+        assert self.maximum is not None
+        share = float(random.random())
+        if self.scale == "logarithmic":
+            value = self.minimum * (self.maximum / self.minimum) ** share
+        else:
+            value = self.minimum + share * (self.maximum - self.minimum)
+        return min(max(float(f"{value:.{_DIGITS}g}"), self.minimum), self.maximum)
+
+    def text(self) -> str:
+        """Return the range or the values in words, for people."""
+        if self.one_of:
+            return "one of " + ", ".join(json.dumps(value) for value in self.one_of)
+        return f"{self.minimum:g} to {self.maximum:g}" + (", by ratio" if self.scale == "logarithmic" else "")
+
+
+Draws = dict[str, DrawnValue]
+
+
+def path_within(path: str, whole: str) -> bool:
+    """Return whether a field, by its dotted path, is another one or a part of it."""
+    return path == whole or path.startswith(f"{whole}.")
+
+
+def _check_draws(changed: Iterable[str], draws: Iterable[str]) -> None:
+    """Refuse a field that is drawn and also set, as a whole or in part, in the same place."""
+    for path, drawn in product(changed, draws):
+        if path_within(path, drawn):
+            raise ValueError(f"set and draw both name {path}")
 
 
 class SceneGroup(ClosedModel):
-    """Scenes that differ in their seeds and variants."""
+    """Scenes that differ in their seeds, variants and drawn values."""
 
     name: Name = Field(description="Name of the group; its scenes are NAME-01, NAME-02 and so on.")
     scenes: int = quantity(..., "1", "Number of scenes.", (1, 10_000))
@@ -33,12 +98,16 @@ class SceneGroup(ClosedModel):
     )
     scenario: str | None = Field(None, description="Built-in scenario or file; the recipe's if not given.")
     set: dict[str, Any] = Field({}, description="Changes of the scenario, path: value, after the recipe's own.")
+    draw: Draws = Field(
+        {}, description="Fields of the scenario of which each scene draws its own value, path: range or values."
+    )
     variants: tuple[dict[str, Any], ...] = Field(
         (), description="Further changes of which each scene gets one: all as often, in an order drawn from the seed."
     )
 
     @model_validator(mode="after")
     def _check_split(self) -> Self:
+        _check_draws(self.set, self.draw)
         if isinstance(self.split, dict) and (sum(self.split.values()) != self.scenes or min(self.split.values()) < 0):
             raise ValueError(f"split counts {dict(self.split)} must add up to scenes, {self.scenes}")
         return self
@@ -61,6 +130,9 @@ class Recipe(ClosedModel):
     seed: int = quantity(1, "1", "Seed of everything random.", (0, _LARGEST_SEED - 1))
     scenario: str = Field("rq31-600m", description="Built-in scenario or file that the groups start from.")
     set: dict[str, Any] = Field({}, description="Changes of every group's scenario, path: value.")
+    draw: Draws = Field(
+        {}, description="Fields of which each scene of every group draws its own value, path: range or values."
+    )
     layouts: tuple[Layout, ...] = Field((), description="Layouts for training, beside each scene's own files.")
     tile: float = quantity(60.0, "m", "Edge of the layouts' tiles.", (5, 1000))
     point_spacing: float | None = quantity(
@@ -75,6 +147,11 @@ class Recipe(ClosedModel):
         if (twice := first_repeated([group.name for group in groups])) is not None:
             raise ValueError(f"two groups are named {twice}")
         return groups
+
+    @model_validator(mode="after")
+    def _check_fields(self) -> Self:
+        _check_draws(self.set, self.draw)
+        return self
 
 
 @dataclass(frozen=True)
@@ -133,7 +210,8 @@ def scene_jobs(recipe: Recipe) -> list[SceneJob]:
 
 def _scenario(recipe: Recipe, group: SceneGroup, name: str, place: int) -> Scenario:
     seed = int(stream(recipe.seed, "scene", name).integers(_LARGEST_SEED))
-    changes = [{"seed": seed}, recipe.set, group.set]
+    drawn = [_drawn_values(recipe.seed, name, part.draw) for part in (recipe, group)]
+    changes = [{"seed": seed}, recipe.set, drawn[0], group.set, drawn[1]]
     if group.variants:
         turn, place_in_turn = divmod(place, len(group.variants))
         order = stream(recipe.seed, "variants", group.name, turn).permutation(len(group.variants))
@@ -145,6 +223,11 @@ def _scenario(recipe: Recipe, group: SceneGroup, name: str, place: int) -> Scena
         raise InputError("outputs", list(scenario.outputs), f"a data set can't hold {_UNSTABLE}: it differs each time")
     outputs = dict.fromkeys((*NEEDED_OUTPUTS, *(name for name in scenario.outputs if name != _UNSTABLE)))
     return scenario.model_copy(update={"outputs": tuple(outputs)})
+
+
+def _drawn_values(seed: int, scene: str, draws: Draws) -> dict[str, Any]:
+    """Return the values that a scene draws, by path: each depends on seed, scene and path alone."""
+    return {path: value.draw(stream(seed, "draw", scene, path)) for path, value in draws.items()}
 
 
 def group_outputs(group: SceneGroup, recipe: Recipe) -> list[str]:

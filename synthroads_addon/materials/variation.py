@@ -45,6 +45,11 @@ def vary_material(
     return result
 
 
+def water_film(name: str, environment: Environment) -> float:
+    """Return the share of a material's surface that a film of water covers, 0 to 1: of porous ones as they are wet."""
+    return environment.wetness if name in _POROUS else 0.0
+
+
 def _wet_material(dry: Material, wet: float) -> Material:
     """Return a porous material under a film of water, ``wet`` 0 to 1: darker, smoother, less retro-reflective."""
     smoother = 1.0 - WET_ROUGHNESS * wet

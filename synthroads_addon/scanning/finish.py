@@ -53,6 +53,7 @@ class Finish:
                 plan.seed,
                 plan.relief_octaves,
                 None if pavement is None else pavement.heights(points.instance_id, seen + plan.target.origin),
+                plan.setting.beam_angle,
             )
         changes: dict[str, AnyArray | None] = dict.fromkeys(points.attributes().keys() & OPTIONAL - plan.kept_layers)
         if plan.range_corrected:

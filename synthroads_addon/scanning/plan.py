@@ -23,6 +23,7 @@ from .colour.request import LayerRequest
 from .devices.device import ScannerSetting
 from .effects import EchoEffect
 from .forecast import ScanForecast, forecast_scan
+from .multipath import Multipath
 from .noise import Noise
 from .pavement_relief import PavementRelief
 from .platforms.path import Path, Strip
@@ -99,6 +100,7 @@ class ScanPlan:
         strip_errors: systematic errors of its strips.
         attenuation: of the beam by the air, 1/m of range.
         effects: effects that change the echoes of pulses, in the order in which they act.
+        multipath: ghost echoes over surfaces that mirror; None without.
         air_class: ``class_id`` of the echoes that these add.
         beam: whether the rays of a pulse diverge from the aperture or run parallel.
         measured_layers: names of the optional per-point layers that the scan itself fills.
@@ -135,6 +137,7 @@ class ScanPlan:
     strip_errors: StripErrors = StripErrors()  # noqa: RUF009 (frozen)
     attenuation: float = 0.0
     effects: tuple[EchoEffect, ...] = ()
+    multipath: Multipath | None = None
     air_class: int = UNLABELLED
     beam: Literal["conical", "cylindrical"] = "conical"
     measured_layers: frozenset[str] = frozenset()

@@ -25,6 +25,7 @@ class Errors:
         speckle: (P, returns) factors on the intensities, 1 on average; None without.
         receiver: (2, P) noise of the receiver, in units of one sigma, see `receiver.values_of_echoes`; None without.
         tails: as `range`: factors on these; None without.
+        number: (2, P) shares, 0 to 1, that say whose number is lost, see `receiver.values_of_echoes`; None without.
     """
 
     range: Float32 | None
@@ -33,6 +34,7 @@ class Errors:
     speckle: Float32 | None = None
     receiver: Float32 | None = None
     tails: Float32 | None = None
+    number: Float32 | None = None
 
     def range_errors(self, pulse: Index, number: UInt8, most: int) -> Float32:
         """Return (N,) range errors of returns, in units of one sigma.

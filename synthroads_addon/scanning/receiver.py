@@ -94,6 +94,14 @@ class Receiver(ClosedModel):
         inherits="device.compression",
         unset="In proportion",
     )
+    lost_numbers: float | None = quantity(
+        None,
+        "1",
+        "Share of the echoes whose number is 0 however bright they are.",
+        (0, 1),
+        inherits="device.lost_numbers",
+        unset="None",
+    )
     soft_saturation: float | None = quantity(
         None,
         "1",

@@ -1,7 +1,8 @@
 """Roughness adjustment: points are shifted along the surface's normal by the material's micro-relief.
 
 The scene's surfaces are smooth; real ones have texture. Its heights are a random field in space (`base.noise`), one for
-each wavelength: the same place has the same height in every strip, and pulses near each other have similar ones.
+each wavelength: the same place has the same height in every strip, and pulses near each other have similar ones. A
+scanner sees the mean over its beam's footprint, which is all the flatter the larger and the more slanting that is.
 Strength 1 is the relief that pavements and soils have been measured to have (`RELIEF`), 0 none, more an exaggeration.
 """
 
@@ -20,6 +21,9 @@ from ..materials.table import UNKNOWN, Material, entry_of, materials
 MAX_STRENGTH = 100.0
 OCTAVES = {"draft": 2, "standard": 4, "high": 6}
 """Octaves of the relief by fidelity: each halves the shortest wavelength; the standard deviation is the same."""
+
+_LEAST_COSINE = 0.02
+"""Of the incidence angle, below which footprints don't grow on."""
 
 
 class Relief(NamedTuple):
@@ -109,6 +113,7 @@ def shift_along_normals(
     seed: int,
     octaves: int = 4,
     raised: Float | None = None,
+    divergence: float = 0.0,
 ) -> PointBlock:
     """Return the points with `xyz` shifted along the normal, and `range` to match; all else is kept.
 
@@ -126,6 +131,7 @@ def shift_along_normals(
         octaves: see `OCTAVES`.
         raised: (N,) heights of the surface that are added whatever the strength, m; `true_xyz` and `true_range` have
             these as well.
+        divergence: full angle of the beam at 1/e^2, rad, over whose footprint the relief is averaged; 0: points.
 
     Raises:
         InputError: strength out of range.
@@ -145,9 +151,17 @@ def shift_along_normals(
     if len(rough) == 0 and raised is None:
         return points
     height = np.zeros(len(points)) if raised is None else raised.copy()
-    texture = noise_field(position[rough], relief.wavelength[material], seed, octaves)
+    footprint = _footprint(points, rough, divergence) if divergence else None
+    texture = noise_field(position[rough], relief.wavelength[material], seed, octaves, footprint)
     height[rough] += strength * relief.amplitude[material] * texture
     return _shift(points, np.flatnonzero(height), height)
+
+
+def _footprint(points: PointBlock, rows: Index, divergence: float) -> tuple[Float, Float]:
+    """Return the standard deviations (K,) of some points' footprints on the surface along and across the slant, m."""
+    across = points.range[rows] * (divergence / 4.0)
+    cosine = np.cos(np.radians(points.incidence_deg[rows].astype(np.float64)))
+    return across / np.maximum(cosine, _LEAST_COSINE), across
 
 
 def _shift(points: PointBlock, rows: Index, height: Float, arrays: tuple[str, str] = ("xyz", "range")) -> PointBlock:

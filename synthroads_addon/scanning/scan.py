@@ -13,6 +13,7 @@ from .colour.colour import SeenPoints
 from .devices.shots import shots
 from .effects import apply_effect
 from .knots import Track
+from .multipath import Multipath
 from .noise import measured_pose, speckle_factors, trajectory_errors
 from .plan import ScanPlan
 from .platforms.path import Strip
@@ -111,6 +112,8 @@ class BlockScan:
         rays = self.rays(pulses, poses.motions)
         traced = trace(target, plan.surfaces, rays, poses.motions, setting.minimum_range, setting.maximum_range)
         signals = self.signals(traced)
+        if plan.multipath is not None:
+            traced, signals = self.add_ghosts(plan.multipath, traced, signals, poses.motions)
         for effect in plan.effects if self._in_air else ():
             random = stream(plan.seed, f"effect {effect.name}", strip.index, key)
             traced, signals = apply_effect(effect, random, setting, plan.attenuation, pulses, traced, signals)
@@ -136,8 +139,13 @@ class BlockScan:
 
     @property
     def _in_air(self) -> bool:
-        """Return whether effects may add echoes that come from no surface."""
+        """Return whether effects may add echoes to pulses that meet no surface."""
         return bool(self.plan.effects and self.plan.target.triangles)
+
+    @property
+    def _off_surfaces(self) -> bool:
+        """Return whether there may be echoes that come from no surface: of the air, or ghosts."""
+        return self._in_air or self.plan.multipath is not None
 
     def draw_errors(self, strip: Strip, count: int, key: int) -> Errors:
         """Draw the random errors of a block of ``count`` pulses; ``key`` keys their random streams."""
@@ -159,6 +167,7 @@ class BlockScan:
             tail_factors(source("range tails"), receiver.range_tails, (2, max(shape)))
             if ranges and receiver.range_tails
             else None,
+            source("lost numbers").random((2, max(shape)), dtype=np.float32) if receiver.lost_numbers else None,
         )
 
     def poses_between(self, strip: Strip, begin: float, end: float) -> Poses:
@@ -242,12 +251,23 @@ class BlockScan:
         weight *= hits.share
         return HitSignals(hits.distance, weight, received_intensity(brightness, hits.distance, self.plan.attenuation))
 
+    def add_ghosts(
+        self, multipath: Multipath, traced: TracedRays, signals: BothSignals, motions: list[Track]
+    ) -> tuple[TracedRays, BothSignals]:
+        """Return traced rays and signals with the echoes of what surfaces mirror among those that lie behind."""
+        plan, (first, behind) = self.plan, signals
+        hits, ray, ghosts = multipath.ghosts(
+            plan.target, plan.surfaces, plan.setting, plan.attenuation, traced, motions
+        )
+        traced = replace(traced, behind=Hits.join([traced.behind, hits]), ray=np.concatenate([traced.ray, ray]))
+        return traced, (first, HitSignals.join([behind, ghosts]))
+
     def vary_brightness(self, traced: TracedRays, echoes: Echoes, motions: list[Track]) -> Echoes:
         """Return the echoes with intensities scaled by how their materials' reflectance varies in space."""
         surfaces, target = self.plan.surfaces, self.plan.target
         material = traced.pick("material", echoes.hit)
         uneven = np.flatnonzero(np.take(surfaces.uneven, material, mode="clip"))
-        if self._in_air:
+        if self._off_surfaces:
             uneven = uneven[traced.pick("face", echoes.hit[uneven]) >= 0]
         if not len(uneven):
             return echoes
@@ -290,11 +310,11 @@ class BlockScan:
         normal = None
         if plan.records_seen_points or "normal" in plan.measured_layers:
             normal = target.normals(face, along, pulses.time[pulse], motions)
-            if self._in_air:
+            if self._off_surfaces:
                 air = np.flatnonzero(face < 0)
                 normal[:, air] = -np.take(traced.rays.direction.reshape(3, -1), traced.ray_of(hit[air]), axis=1)
         class_id = target.face_values("class_id", face)
-        if self._in_air:
+        if self._off_surfaces:
             class_id = np.where(face < 0, np.uint8(plan.air_class), class_id)
         measured = MeasuredPoints(setting, target, pulses, pulse, echoes.range, echoes.intensity, face, normal)
         points = make_block(

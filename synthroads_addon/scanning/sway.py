@@ -31,6 +31,9 @@ class Motion(ClosedModel):
         1.0, "s", "Shortest period of the swaying.", (0.02, 1000), title="Shortest Period"
     )
     longest_period: float = quantity(20.0, "s", "Longest period of the swaying.", (0.02, 1000), title="Longest Period")
+    period_exponent: float = quantity(
+        0.0, "1", "Power of a period that its amplitude grows with; 0: all alike.", (0, 3), title="Slow Sway"
+    )
 
     @model_validator(mode="after")
     def _periods_in_order(self) -> "Motion":
@@ -95,8 +98,10 @@ def sway_offsets(motion: Motion, seed: int, strip: int, time: Float) -> tuple[Fl
     low, high = math.log(motion.shortest_period), math.log(motion.longest_period)
     periods = np.exp(random.uniform(low, high, (_AXES, _SINES)))
     phases = random.uniform(0.0, 2.0 * np.pi, (_AXES, _SINES))
+    weights = (periods / motion.longest_period) ** motion.period_exponent
+    weights /= np.sqrt(np.mean(weights**2, axis=1, keepdims=True))
     angle = np.asarray(time, dtype=np.float64)[:, None, None] * (2.0 * np.pi / periods) + phases
-    values = np.sin(angle).sum(axis=2) * (np.sqrt(2.0 / _SINES) * motion.sigma)
+    values = (weights * np.sin(angle)).sum(axis=2) * (np.sqrt(2.0 / _SINES) * motion.sigma)
     return values[:, :3], values[:, 3:]
 
 

@@ -24,6 +24,12 @@ class ScanScenario(DeviceChoice):
     noise: Noise = Field(Noise(), description="Measurement noise.")
     strip_errors: StripErrors = Field(StripErrors(), description="Systematic errors of the strips.")
     motion: Motion = Field(Motion(), description="How the platform sways about its path.")
+    multipath: float = quantity(
+        0.0,
+        "1",
+        "Strength of ghost echoes, of what wet ground, steel and panes mirror: a factor on their power; 0 is none.",
+        (0, 1000),
+    )
     relief: float = quantity(
         1.0, "1", "Strength of the surfaces' micro-relief in the cloud; 0 is none.", (0, 100), title="Micro-Relief"
     )

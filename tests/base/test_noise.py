@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from synthroads_addon.base import noise as noise_module
-from synthroads_addon.base.noise import MAX_OCTAVES, noise_field
+from synthroads_addon.base.noise import MAX_OCTAVES, mean_deviation, noise_field
 from synthroads_addon.base.random_streams import stream
 
 TURN = np.array([[15, 6, -10], [6, 10, 15], [10, -15, 6]]) / 19.0
@@ -136,6 +136,28 @@ def test_map_coordinates_keep_the_field() -> None:
     values = noise_field(position, 0.1, 3, 6)
     assert values.std() == pytest.approx(1.0, abs=0.02)
     assert np.abs(values - noise_field(position + 1e-7, 0.1, 3, 6)).max() < 1e-3
+
+
+@pytest.mark.parametrize("patch", [(0.3, 0.3), (1.0, 0.2), (2.0, 0.6)])
+def test_means_over_patches_deviate_as_stated(patch: tuple[float, float]) -> None:
+    """Means of an octave over Gaussian patches, in cells, on a tilted plane; the noise of 60 places each is taken off."""
+    rng = np.random.default_rng(5)
+    plane = np.array([[1.0, 0.0, 0.0], [0.0, 0.94, 0.34]])
+    place = rng.uniform(-1000, 1000, (1500, 1, 3)) + rng.normal(size=(1500, 60, 2)) * np.array(patch) @ plane
+    values = noise_field(place.reshape(-1, 3), 2.0, 3, 1).reshape(1500, 60)
+    variance = values.mean(axis=1).var() - values.var(axis=1, ddof=1).mean() / 60
+    stated = float(mean_deviation(*(np.array([axis]) for axis in patch))[0]) ** 2
+    assert variance == pytest.approx(stated, abs=0.05)
+
+
+def test_an_averaged_field_is_the_field_with_flatter_octaves() -> None:
+    position, patch = scattered(2000), (np.full(2000, 0.05), np.full(2000, 0.02))
+    flat = noise_field(position, 0.2, 1, 1, patch)
+    factor = mean_deviation(np.array([0.5]), np.array([0.2]))[0]
+    np.testing.assert_allclose(flat, factor * noise_field(position, 0.2, 1, 1), rtol=1e-6)
+    np.testing.assert_array_equal(
+        noise_field(position, 0.2, 1, 4, (np.zeros(2000), np.zeros(2000))), noise_field(position, 0.2, 1, 4)
+    )
 
 
 def test_no_points() -> None:

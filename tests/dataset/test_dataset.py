@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 import yaml
 from numpy.typing import NDArray
+from scipy import stats
 
+from headless.dataset import change_recipe
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError
+from synthroads_addon.base.random_streams import stream
 from synthroads_addon.cloud.formats.registry import open_writer
 from synthroads_addon.cloud.points import PointBlock
 from synthroads_addon.dataset.data_card import data_card
@@ -26,10 +29,12 @@ from synthroads_addon.dataset.manifest import (
     make_manifest,
     write_manifest,
 )
-from synthroads_addon.dataset.recipe import Recipe, load_recipe, recipe_names, scene_jobs
+from synthroads_addon.dataset.recipe import DrawnValue, Recipe, SceneJob, load_recipe, recipe_names, scene_jobs
 from synthroads_addon.materials.table import materials
 from synthroads_addon.road.things.gantry import Gantry
 from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scenario.scan import scanner_setting
+from synthroads_addon.scenario.scenario import Scenario
 from tests.helpers.clouds.random_points import make_points
 
 ORIGIN = np.array([294_000.0, 5_628_000.0, 180.0])
@@ -145,6 +150,126 @@ def test_missing_and_unknown_recipes_are_refused(tmp_path: Path) -> None:
         load_recipe(str(tmp_path / "recipe.yaml"))
     with pytest.raises(InputError, match=r"did you mean 'reference'"):
         load_recipe("referenc")
+
+
+# --- drawn values ----------------------------------------------------------------------------------------------------
+
+PERFECT = {"centerline-airborne-even"}
+"""Recipes of a sensor without errors, for pairs with another one: they draw nothing."""
+ONLY_WITH = {
+    "scan.receiver.range_walk": "scan.noise.speckle",
+    "scan.receiver.faint_range_sigma": "scan.noise.range_sigma",
+    "scan.receiver.full_scale": "scan.receiver.response",
+}
+"""Fields that do nothing without another one."""
+
+
+def value_at(scenario: Any, path: str) -> Any:
+    for name in path.split("."):
+        scenario = getattr(scenario, name)
+    return scenario
+
+
+def drawn_fields(data: Recipe) -> dict[str, DrawnValue]:
+    return {path: value for part in (data, *data.groups) for path, value in part.draw.items()}
+
+
+@pytest.mark.parametrize("name", sorted(set(recipe_names()) - PERFECT))
+def test_built_in_recipes_draw_the_sensor_and_every_drawn_value_is_used(name: str) -> None:
+    """Each lies in its range, differs from scene to scene, and has what it needs to matter."""
+    drawn, jobs = drawn_fields(load_recipe(name)), scene_jobs(load_recipe(name))
+    for part in ("scan.noise.", "scan.receiver.", "scan.platform.", "scan.relief"):
+        assert any(path.startswith(part) for path in drawn), part
+    for path, value in drawn.items():
+        if value.one_of:
+            continue
+        found = [value_at(job.scenario, path) for job in jobs if path.split(".")[1] != "platform" or has(job, path)]
+        low, high = value.minimum, value.maximum
+        assert low is not None
+        assert high is not None
+        # Some groups have a fixed value instead: tripods don't sway.
+        inside = {number for number in found if number is not None and low <= number <= high}
+        assert len(inside) >= 0.4 * len(jobs), path
+        if needed := ONLY_WITH.get(path):
+            assert all(effective(job.scenario, needed) for job in jobs), f"{path} without {needed}"
+
+
+def has(job: SceneJob, path: str) -> bool:
+    return hasattr(job.scenario.scan.platform, path.rpartition(".")[2])
+
+
+def effective(scenario: Scenario, path: str) -> Any:
+    """Return a field's value as the scan has it, the device's included."""
+    if path == "scan.receiver.response":
+        return scanner_setting(scenario.scan).receiver.response == "range_compensated"
+    return value_at(scenario, path)
+
+
+def values_drawn(**fields: Any) -> list[Any]:
+    """Return 400 values that are drawn with seeds of their own, as scenes draw them."""
+    value = DrawnValue.from_dict(fields)
+    return [value.draw(stream(seed, "draw", "a-01", "scan.relief")) for seed in range(400)]
+
+
+@pytest.mark.parametrize("scale", ["linear", "logarithmic"])
+def test_drawn_numbers_are_uniform_on_their_scale(scale: str) -> None:
+    numbers = np.array(values_drawn(minimum=200.0, maximum=800.0, scale=scale))
+    share = (numbers - 200.0) / 600.0 if scale == "linear" else np.log(numbers / 200.0) / np.log(4.0)
+    counts = np.histogram(share, 10, (0.0, 1.0))[0]
+    assert counts.sum() == 400
+    assert stats.chisquare(counts).pvalue > 0.001
+
+
+def test_listed_values_are_drawn_alike_often() -> None:
+    found = values_drawn(one_of=["a", "b", "c", "d"])
+    assert stats.chisquare([found.count(value) for value in "abcd"]).pvalue > 0.001
+
+
+RELIEF = {"scan.relief": {"minimum": 0.5, "maximum": 1.5}}
+
+
+def test_a_scene_draws_the_same_whatever_else_is_drawn() -> None:
+    others = {"scan.noise.speckle": {"minimum": 0.1, "maximum": 0.2}}
+    alone, beside = (scene_jobs(recipe(draw=draw)) for draw in (RELIEF, others | RELIEF))
+    assert [job.scenario.scan.relief for job in alone] == [job.scenario.scan.relief for job in beside]
+
+
+def test_a_group_overrides_what_the_recipe_draws() -> None:
+    groups = [{"name": "a", "scenes": 2, "set": {"scan.relief": 3.0}}, {"name": "b", "scenes": 2, "draw": RELIEF}]
+    jobs = scene_jobs(recipe(draw={"scan.relief": {"minimum": 5.0, "maximum": 6.0}}, groups=groups))
+    assert [job.scenario.scan.relief for job in jobs[:2]] == [3.0, 3.0]
+    assert all(0.5 <= job.scenario.scan.relief <= 1.5 for job in jobs[2:])
+
+
+WRONG_DRAWS = {
+    "both": ({"set": {"scan.relief": 1.0}, "draw": RELIEF}, "set and draw both name scan.relief"),
+    "part": ({"set": {"scan.noise.speckle": 0.1}, "draw": {"scan.noise": {"one_of": [{}]}}}, "both name"),
+    "half": ({"draw": {"scan.relief": {"minimum": 1.0}}}, "minimum and maximum, or one_of"),
+    "turned": ({"draw": {"scan.relief": {"minimum": 2.0, "maximum": 1.0}}}, "must be below maximum, 1"),
+    "two": ({"draw": {"scan.relief": {"minimum": 1.0, "one_of": [1.0]}}}, "can't both be given"),
+    "ratio": ({"draw": {"scan.relief": {"minimum": 0.0, "maximum": 1.0, "scale": "logarithmic"}}}, "above 0"),
+    "field": ({"draw": {"scan.releif": {"minimum": 0.0, "maximum": 1.0}}}, "did you mean 'relief'"),
+    "limits": ({"draw": {"scan.relief": {"minimum": -2.0, "maximum": -1.0}}}, r"groups.a: scan.relief is -1\."),
+}
+
+
+@pytest.mark.parametrize("name", WRONG_DRAWS)
+def test_wrong_draws_are_refused(name: str) -> None:
+    changes, message = WRONG_DRAWS[name]
+    with pytest.raises(InputError, match=message):
+        scene_jobs(recipe(**changes))
+
+
+def test_what_the_command_line_sets_is_not_drawn() -> None:
+    groups = [{"name": "a", "scenes": 3, "draw": RELIEF}]
+    changed = change_recipe(recipe(draw=RELIEF, groups=groups), ["scan.relief=2"])
+    assert {job.scenario.scan.relief for job in scene_jobs(changed)} == {2.0}
+
+
+def test_the_data_card_says_what_is_drawn() -> None:
+    data = recipe(draw=RELIEF, groups=[{"name": "a", "scenes": 1, "draw": {"road.length": {"one_of": [100.0, 200.0]}}}])
+    card = data_card(data, make_manifest("T", "g", "", [], 0), scene_jobs(data))
+    assert "  - `scan.relief`: 0.5 to 1.5\n  - `road.length` (a): one of 100.0, 200.0\n" in card
 
 
 # --- manifests -------------------------------------------------------------------------------------------------------

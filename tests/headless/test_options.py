@@ -16,7 +16,7 @@ from synthroads_addon.dataset.recipe import load_recipe, scene_jobs
 
 
 def test_changes_of_a_data_set_are_of_the_type_of_their_field() -> None:
-    changed = dataset._change_recipe(load_recipe("small-gantries"), ["cloud.classes=5", "title=7", "road.length=200"])
+    changed = dataset.change_recipe(load_recipe("small-gantries"), ["cloud.classes=5", "title=7", "road.length=200"])
     scenarios = [job.scenario for job in scene_jobs(changed)]
     assert {(one.cloud.classes, one.title, one.road.length) for one in scenarios} == {("5", "7", 200.0)}
 
@@ -24,7 +24,7 @@ def test_changes_of_a_data_set_are_of_the_type_of_their_field() -> None:
 def test_changes_of_a_data_set_hold_for_every_variant() -> None:
     recipe = load_recipe("small-roads")
     assert len({job.scenario.road.cross_section for job in scene_jobs(recipe)}) == 4
-    changed = dataset._change_recipe(recipe, ["road.design_class=EKA2", "road.cross_section=RQ28"])
+    changed = dataset.change_recipe(recipe, ["road.design_class=EKA2", "road.cross_section=RQ28"])
     assert {job.scenario.road.cross_section for job in scene_jobs(changed)} == {"RQ28"}
 
 

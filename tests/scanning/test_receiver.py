@@ -95,3 +95,17 @@ def test_a_scenario_changes_what_it_names_and_a_device_says_the_rest() -> None:
     assert Receiver(threshold_to_noise=0.0).over(shared).noise_sigma(2.0) == 0.0
     assert NOISY.over(Receiver()).noise_sigma(2.0) == pytest.approx(2.0 / RATIO)
     assert isinstance(device(receiver=shared.to_dict()), Device)
+
+
+def test_lost_numbers_are_as_many_as_said_whatever_the_power_and_move_no_point() -> None:
+    """Chi-square of the share of zeros over eight groups of the range."""
+    share = 0.1
+    plan = scan_of(plane(), 1, Standing(2.0), range_sigma=0.01)
+    calm = received(plan)
+    losing = received(plan, receiver=Receiver(lost_numbers=share))
+    np.testing.assert_array_equal(calm.xyz, losing.xyz)
+    lost = losing.intensity == 0.0
+    np.testing.assert_array_equal(losing.intensity[~lost], calm.intensity[~lost])
+    group = (stats.rankdata(calm.range, method="ordinal") - 1) * 8 // len(calm)
+    found, total = np.bincount(group, lost), np.bincount(group)
+    assert stats.chi2.sf(np.sum((found - share * total) ** 2 / (share * (1 - share) * total)), 8) > 0.001

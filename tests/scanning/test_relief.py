@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.base.noise import noise_field
+from synthroads_addon.base.noise import mean_deviation, noise_field
 from synthroads_addon.cloud.points import PointBlock, concatenate
 from synthroads_addon.materials.table import Material, materials
 from synthroads_addon.scanning.relief import (
@@ -286,3 +286,17 @@ def test_a_million_points_in_a_second() -> None:
         shift_along_normals(points, position, relief_of("asphalt"), 1.0, 1)
         spent.append(time.process_time() - begin)
     assert min(spent) < 0.1
+
+
+def test_a_wide_beam_sees_a_flatter_relief() -> None:
+    """Of asphalt at 10 m, at a right angle and slanting: as the means over footprints deviate."""
+    rng = np.random.default_rng(2)
+    position = np.column_stack([rng.uniform(0, 200, (20_000, 2)), np.zeros(20_000)])
+    points = scanned(position, np.zeros(20_000, np.uint16), np.array([0.0, 0.0, 1.0]), rng)
+    incidence = np.where(np.arange(20_000) % 2, 0.0, 80.0).astype(np.float32)
+    points = replace(points, range=np.full(20_000, 10.0), incidence_deg=incidence)
+    height = shift_along_normals(points, position, relief_of("asphalt"), 1.0, 1, 1, divergence=2e-3).xyz[:, 2] - ORIGIN[2]
+    for slant, angle in ((height[1::2], 0.0), (height[::2], 80.0)):
+        across = 10.0 * 2e-3 / 4.0 / 0.05  # in cells of half the wavelength
+        stated = mean_deviation(np.array([across / np.cos(np.deg2rad(angle))]), np.array([across]))[0]
+        assert slant.std() == pytest.approx(0.0008 * stated, rel=0.03)

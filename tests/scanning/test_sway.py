@@ -49,6 +49,19 @@ def test_periods_lie_between_the_stated_ones() -> None:
     assert power[outside].sum() < 0.01 * power.sum()
 
 
+def test_slow_sway_is_larger_by_the_power_of_its_period_and_the_deviation_stays() -> None:
+    slow = MOTION.model_copy(update={"period_exponent": 1.0})
+    values = [sway_offsets(slow, seed, 0, np.array([100.0 + seed]))[0] / SIGMA[:3] for seed in range(400)]
+    assert np.std(values) == pytest.approx(1.0, abs=5 * np.sqrt(0.5 / 1200))
+    time = np.arange(0.0, 400.0, 0.1)
+    even, slower = (np.concatenate(sway_offsets(motion, 3, 0, time), axis=1)[:, 0] / SIGMA[0] for motion in (MOTION, slow))
+    before, after = (np.abs(np.fft.rfft(values * np.hanning(len(time)))) for values in (even, slower))
+    frequency = np.fft.rfftfreq(len(time), 0.1)
+    sines = np.flatnonzero((before > 0.5 * before.max()) & (frequency > 0.0))
+    power = np.polyfit(np.log(frequency[sines]), np.log(after[sines] / before[sines]), 1)[0]
+    assert power == pytest.approx(-1.0, abs=0.05)
+
+
 def test_each_strip_and_seed_sways_by_itself() -> None:
     time = np.linspace(100.0, 400.0, 3000)
     first, seed, strip = off_path(1, time), off_path(2, time), off_path(1, time, strip=1)

@@ -16,7 +16,7 @@ from ...cloud.layers import optional_arrays
 from ...cloud.tools.previews import TopView
 from ...materials.surfaces import surfaces_of
 from ...materials.table import Material, entry_of
-from ...materials.variation import vary_material
+from ...materials.variation import vary_material, water_film
 from ...road.geometry import RoadGeometry
 from ...road.instances import InstanceNumbers
 from ...scanning.blocks import Blocks
@@ -24,6 +24,7 @@ from ...scanning.colour.colour import takes_nodes
 from ...scanning.colour.request import LayerRequest
 from ...scanning.finish import OF_INTENSITY
 from ...scanning.forecast import check_scan_size, forecast_scan
+from ...scanning.multipath import Multipath, mirrors_of
 from ...scanning.plan import ScanConditions, ScanPlan, SceneServices
 from ...scanning.platforms.guides import RoadGuide
 from ...scanning.platforms.path import Path as ScanPath
@@ -119,6 +120,7 @@ def plan_scan(
         strip_errors=scan.strip_errors,
         attenuation=weather.attenuation(setting.device.wavelength_nm) if loss is None else loss,
         effects=weather.effects() if loss is None else (),
+        multipath=_multipath(scan.multipath, materials, scanned, conditions),
         air_class=scenario.cloud.scheme().source_ids().get(AIR_CLASS, UNLABELLED),
         beam=scan.beam,
         measured_layers=(kept & optional_arrays("scan")) | ({"normal", "material"} if shifts else set()),
@@ -146,6 +148,16 @@ def plan_scan(
         ),
         services=services,
     )
+
+
+def _multipath(
+    strength: float, names: Sequence[str], rows: Sequence[Material], conditions: ScanConditions
+) -> Multipath | None:
+    """Return the ghost echoes of a scene's materials by name, as scanned; None with the strength 0."""
+    if not strength:
+        return None
+    films = [water_film(entry_of(name), conditions.environment) for name in names]
+    return Multipath(mirrors_of(rows, films), strength)
 
 
 def _intensity_from_layers(

@@ -201,6 +201,11 @@ class ScannerSetting:
         return self.pulse_rate * len(self.device.heads)
 
     @property
+    def beam_angle(self) -> float:
+        """Return the beam's full angle at 1/e^2, rad: the root mean square of both axes."""
+        return math.sqrt((self.divergence[0] ** 2 + self.divergence[1] ** 2) / 2.0)
+
+    @property
     def angle_step(self) -> float:
         """Return the angle between two pulses, rad: sweep of a line x lines per second / pulse rate.
 

@@ -24,11 +24,13 @@ class Readout(ArrayRows):
         noise: (N,) that adds to the intensity; None without.
         channel: (N,) number of the laser; None where all have one gain.
         speckle: (N,) factors by which speckle has changed the power; None without.
+        unread: (N,) whether the number is lost; None where none is.
     """
 
     noise: Float | None = None
     channel: UInt8 | None = None
     speckle: Float | None = None
+    unread: Bool | None = None
 
     def read(self, intensity: Float, distance: Float, setting: ScannerSetting, gains: Float) -> tuple[Float, int]:
         """Return the numbers (N,) that the receiver gives, see `response.read_power`, and how many of them saturated.
@@ -40,7 +42,8 @@ class Readout(ArrayRows):
             gains: (256,) of the lasers.
         """
         power = intensity if self.noise is None else intensity + self.noise
-        return read_power(power, distance, self.channel, gains, setting)
+        number, clipped = read_power(power, distance, self.channel, gains, setting)
+        return (number if self.unread is None else np.where(self.unread, 0.0, number)), clipped
 
     def detected(self, intensity: Float, threshold: float) -> Bool:
         """Return which of the points (N,) are detected."""
@@ -69,7 +72,11 @@ def detect_echoes(
     if errors.receiver is not None:
         noise = values_of_echoes(errors.receiver, number[echoes.pulse], number_echoes(echoes.pulse))
         noise *= setting.receiver.noise_sigma(setting.threshold)
-    readout = Readout(noise, channel[echoes.pulse] if setting.receiver.gain_sigma_db else None, speckle)
+    unread = None
+    if errors.number is not None:
+        shares = values_of_echoes(errors.number, number[echoes.pulse], number_echoes(echoes.pulse))
+        unread = shares < (setting.receiver.lost_numbers or 0.0)
+    readout = Readout(noise, channel[echoes.pulse] if setting.receiver.gain_sigma_db else None, speckle, unread)
     brightest = echoes.intensity / PROVISIONAL_THRESHOLD if provisional else echoes.intensity
     strong = np.flatnonzero(readout.detected(brightest, setting.threshold))
     weak = len(echoes.pulse) - len(strong)

@@ -38,8 +38,7 @@ def footprint_depth(setting: ScannerSetting, distance: Float, cosine: Float) -> 
         cosine: (N,) of the incidence angle.
     """
     cosine = np.clip(np.abs(cosine), _LEAST_COSINE, 1.0)
-    spread = float(np.sqrt(np.mean(np.square(setting.divergence)))) / 4.0
-    depth = distance * spread * np.sqrt(1.0 - cosine**2) / cosine
+    depth = distance * (setting.beam_angle / 4.0) * np.sqrt(1.0 - cosine**2) / cosine
     return np.asarray(np.minimum(depth, setting.range_resolution))
 
 

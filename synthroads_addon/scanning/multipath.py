@@ -1,0 +1,160 @@
+"""Ghost echoes by multipath: light that a surface mirrors onto another one, and that comes back the same way.
+
+A wet road, the steel of a barrier, a pane or the paint of a car mirrors a share F of the beam at the range d. What the
+mirrored beam meets e farther on sends light back over the same mirror, and the scanner places it at the range d + e in
+the direction of the mirror: behind it, below the ground, where the mirrored surface's image is. The echo is as bright as
+that surface at this range, times F^2 and times a share that is lost because the mirror isn't even. F follows from the
+reflectance at a right angle F0 and the incidence angle t by Schlick's approximation (1994, An inexpensive BRDF model for
+physically-based rendering, Computer Graphics Forum 13),
+
+    F = F0 + (1 - F0) (1 - cos t)^5.
+
+Facets with slopes of the standard deviation s turn the light by 2 s, once on each way. A spot that the beam lights e
+behind the mirror is then blurred, as seen from the scanner, to about 4 s e / (d + e), of which a receiver sees what lies
+within its field of view, here the beam's full angle g:
+
+    share = 1 / (1 + (4 s e / ((d + e) g))^2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.arrays import Float, Index
+from ..materials.surfaces import Surfaces, brightness_of
+from ..materials.table import Material
+from .devices.device import BRIGHTEST, ScannerSetting
+from .knots import Track
+from .receiving.detector import PROVISIONAL_THRESHOLD
+from .receiving.radiometry import received_intensity
+from .returns import LEAST_REFLECTANCE, HitSignals
+from .scene.target import Target
+from .trace import Hits, TracedRays
+
+COATED, WATER = 0.04, 0.02
+"""Reflectances at a right angle of paint and glass, with a refractive index of 1.5, and of water, with one of 1.33."""
+FILM_SLOPE = 0.01
+"""Slope of the surface of a film of water, rad: assumed."""
+MATT = 0.1
+"""Surfaces with facets of this slope or more, rad, don't mirror: what they blur is too faint."""
+_OFF_SURFACE = 1e-3
+"""How far from its mirror a mirrored ray begins, m."""
+
+
+@dataclass(frozen=True)
+class Mirrors:
+    """How M materials mirror light.
+
+    Attributes:
+        reflectance: (M,) at a right angle; 0 for those that don't.
+        slope: (M,) of their facets, rad.
+    """
+
+    reflectance: Float
+    slope: Float
+
+
+def mirrors_of(rows: Sequence[Material], films: Sequence[float]) -> Mirrors:
+    """Return how materials mirror light.
+
+    Args:
+        rows: M materials.
+        films: share of each, 0 to 1, that a film of water covers.
+    """
+    slope = np.array([row.slope for row in rows])
+    own = np.array([row.metallic * row.reflectivity + (1.0 - row.metallic) * COATED for row in rows])
+    film = np.asarray(films, dtype=np.float64)
+    wet = film > 0.0
+    reflectance = np.where(wet, film * WATER, np.where(slope < MATT, own, 0.0))
+    return Mirrors(reflectance, np.where(wet, FILM_SLOPE, slope))
+
+
+def mirrored_share(reflectance: Float, cosine: Float) -> Float:
+    """Return the share (N,) of the light that a mirror reflects, by its reflectance at a right angle and cos t."""
+    return np.asarray(reflectance + np.where(reflectance > 0.0, 1.0 - reflectance, 0.0) * (1.0 - cosine) ** 5)
+
+
+def seen_share(slope: Float, before: Float, beyond: Float, angle: float) -> Float:
+    """Return the share (N,) of a blurred image that lies within the receiver's field of view.
+
+    Args:
+        slope: (N,) of the mirror's facets, rad.
+        before, beyond: (N,) range of the mirror, and what the light goes behind it, m.
+        angle: the field of view, rad.
+    """
+    blur = 4.0 * slope * beyond / np.maximum(before + beyond, 1e-9)
+    return np.asarray(1.0 / (1.0 + (blur / max(angle, 1e-9)) ** 2))
+
+
+@dataclass(frozen=True)
+class Multipath:
+    """Ghost echoes of a scan.
+
+    Attributes:
+        mirrors: how the scene's materials mirror light.
+        strength: factor on the echoes' power.
+    """
+
+    mirrors: Mirrors
+    strength: float
+
+    def ghosts(
+        self,
+        target: Target,
+        surfaces: Surfaces,
+        setting: ScannerSetting,
+        attenuation: float,
+        traced: TracedRays,
+        motions: list[Track],
+    ) -> tuple[Hits, Index, HitSignals]:
+        """Return the ghosts of a block's rays as hits in the air, the rays that they are of, and their signals.
+
+        Args:
+            target: the scene.
+            surfaces: its materials.
+            setting: the scanner's.
+            attenuation: 1/m of range.
+            traced: what the rays meet first: only that mirrors.
+            motions: of the target's moving parts.
+        """
+        ray, share = self._mirroring(setting, surfaces, traced)
+        if not len(ray):
+            none, nothing = np.empty(0, dtype=np.intp), np.empty(0)
+            return Hits(none, none, nothing, nothing, nothing), none, HitSignals(nothing, nothing, nothing)
+        first, rays = traced.first, traced.rays
+        before, pulse = np.take(first.distance, ray), ray % len(rays.time)
+        normal = target.normals(np.take(first.face, ray), np.take(first.along, ray), rays.time[pulse], motions)
+        direction = np.take(rays.direction.reshape(3, -1), ray, axis=1)
+        origin = np.take(rays.origin.reshape(3, -1), ray if rays.origin.shape[1] > 1 else pulse, axis=1)
+        place = origin + before * direction + _OFF_SURFACE * normal
+        away = direction - 2.0 * np.einsum("ij,ij->j", direction, normal) * normal
+        met = target.cast(place, away, setting.maximum_range, rays.time[pulse], motions)
+        distance = before + met.distance
+        here = np.flatnonzero((met.face >= 0) & (distance <= setting.maximum_range))
+        ray, share, distance = ray[here], share[here], distance[here]
+        material = np.take(target.material, met.face[here]).astype(np.intp)
+        slope = self.mirrors.slope[np.take(first.material, ray)]
+        share = share * seen_share(slope, before[here], met.distance[here], setting.beam_angle)
+        brightness = share * brightness_of(surfaces, material, np.abs(met.along[here]))
+        none = np.zeros(len(here), dtype=np.intp)
+        # What comes from nowhere has no face; it counts as one that lies across the beam.
+        hits = Hits(none - 1, none, distance, none - 1.0, brightness)
+        weight = np.maximum(brightness, LEAST_REFLECTANCE)
+        return hits, ray, HitSignals(distance, weight, received_intensity(brightness, distance, attenuation))
+
+    def _mirroring(self, setting: ScannerSetting, surfaces: Surfaces, traced: TracedRays) -> tuple[Index, Float]:
+        """Return the rays (N,) whose light may come back over a mirror, and the share (N,) that does so at most."""
+        first = traced.first
+        material = first.material.ravel()
+        reflectance = np.take(self.mirrors.reflectance, material)
+        ray = np.flatnonzero((reflectance > 0.0) & (first.face.ravel() >= 0) & np.isfinite(first.distance.ravel()))
+        cosine = np.minimum(np.abs(np.take(first.along, ray)), 1.0)
+        own = np.take(np.broadcast_to(traced.rays.share, first.face.shape), ray)
+        share = own * self.strength * mirrored_share(reflectance[ray], cosine) ** 2
+        brightest = BRIGHTEST if surfaces.retroreflective else 1.0
+        faintest = PROVISIONAL_THRESHOLD * setting.threshold * np.take(first.distance, ray) ** 2
+        seen = np.flatnonzero(share * brightest > faintest)
+        return ray[seen], share[seen]
