@@ -71,7 +71,9 @@ def change_recipe(recipe: Recipe, changes: list[str]) -> Recipe:
     values = dict(parse_change(change) for change in changes)
     groups = []
     for group in recipe.groups:
-        draw = {path: drawn for path, drawn in group.draw.items() if not any(path_within(path, set_) for set_ in values)}
+        draw = {
+            path: drawn for path, drawn in group.draw.items() if not any(path_within(path, set_) for set_ in values)
+        }
         variants = tuple(each | values for each in group.variants)
         update = {"set": group.set | values, "draw": draw, "variants": variants}
         groups.append(group.model_copy(update=update))

@@ -2,16 +2,16 @@
 
 A wet road, the steel of a barrier, a pane or the paint of a car mirrors a share F of the beam at the range d. What the
 mirrored beam meets e farther on sends light back over the same mirror, and the scanner places it at the range d + e in
-the direction of the mirror: behind it, below the ground, where the mirrored surface's image is. The echo is as bright as
+the mirror's direction: behind it, below the ground, where the mirrored surface's image is. The echo is as bright as
 that surface at this range, times F^2 and times a share that is lost because the mirror isn't even. F follows from the
-reflectance at a right angle F0 and the incidence angle t by Schlick's approximation (1994, An inexpensive BRDF model for
-physically-based rendering, Computer Graphics Forum 13),
+reflectance at a right angle F0 and the incidence angle t by Schlick's approximation (1994, An inexpensive BRDF model
+for physically-based rendering, Computer Graphics Forum 13),
 
     F = F0 + (1 - F0) (1 - cos t)^5.
 
 Facets with slopes of the standard deviation s turn the light by 2 s, once on each way. A spot that the beam lights e
-behind the mirror is then blurred, as seen from the scanner, to about 4 s e / (d + e), of which a receiver sees what lies
-within its field of view, here the beam's full angle g:
+behind the mirror is then blurred, as seen from the scanner, to about 4 s e / (d + e), of which a receiver sees what
+lies within its field of view, here the beam's full angle g:
 
     share = 1 / (1 + (4 s e / ((d + e) g))^2).
 """

@@ -29,7 +29,10 @@ EFFECTS: dict[str, tuple[str, ...]] = {
     "detection": ("scan.receiver.threshold_to_noise=0",),
     "response": (
         "scan.receiver.response=power",
-        *(f"scan.receiver.{name}=0" for name in ("soft_saturation", "gain_sigma_db", "overlap_full", "pedestal", "lost_numbers")),
+        *(
+            f"scan.receiver.{name}=0"
+            for name in ("soft_saturation", "gain_sigma_db", "overlap_full", "pedestal", "lost_numbers")
+        ),
         "scan.receiver.compression=1",
     ),
     "multipath": ("scan.multipath=0",),

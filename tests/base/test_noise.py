@@ -140,7 +140,7 @@ def test_map_coordinates_keep_the_field() -> None:
 
 @pytest.mark.parametrize("patch", [(0.3, 0.3), (1.0, 0.2), (2.0, 0.6)])
 def test_means_over_patches_deviate_as_stated(patch: tuple[float, float]) -> None:
-    """Means of an octave over Gaussian patches, in cells, on a tilted plane; the noise of 60 places each is taken off."""
+    """Means of an octave over Gaussian patches of a tilted plane; the noise of 60 places each is taken off."""
     rng = np.random.default_rng(5)
     plane = np.array([[1.0, 0.0, 0.0], [0.0, 0.94, 0.34]])
     place = rng.uniform(-1000, 1000, (1500, 1, 3)) + rng.normal(size=(1500, 60, 2)) * np.array(patch) @ plane

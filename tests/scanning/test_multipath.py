@@ -1,4 +1,4 @@
-"""Ghost echoes by multipath: they lie where the mirror image of what they show is, and are as bright as the law says."""
+"""Ghost echoes by multipath: they lie where the mirror image of what they show is, as bright as the law says."""
 
 from __future__ import annotations
 

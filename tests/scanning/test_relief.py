@@ -295,7 +295,9 @@ def test_a_wide_beam_sees_a_flatter_relief() -> None:
     points = scanned(position, np.zeros(20_000, np.uint16), np.array([0.0, 0.0, 1.0]), rng)
     incidence = np.where(np.arange(20_000) % 2, 0.0, 80.0).astype(np.float32)
     points = replace(points, range=np.full(20_000, 10.0), incidence_deg=incidence)
-    height = shift_along_normals(points, position, relief_of("asphalt"), 1.0, 1, 1, divergence=2e-3).xyz[:, 2] - ORIGIN[2]
+    height = (
+        shift_along_normals(points, position, relief_of("asphalt"), 1.0, 1, 1, divergence=2e-3).xyz[:, 2] - ORIGIN[2]
+    )
     for slant, angle in ((height[1::2], 0.0), (height[::2], 80.0)):
         across = 10.0 * 2e-3 / 4.0 / 0.05  # in cells of half the wavelength
         stated = mean_deviation(np.array([across / np.cos(np.deg2rad(angle))]), np.array([across]))[0]

@@ -54,7 +54,9 @@ def test_slow_sway_is_larger_by_the_power_of_its_period_and_the_deviation_stays(
     values = [sway_offsets(slow, seed, 0, np.array([100.0 + seed]))[0] / SIGMA[:3] for seed in range(400)]
     assert np.std(values) == pytest.approx(1.0, abs=5 * np.sqrt(0.5 / 1200))
     time = np.arange(0.0, 400.0, 0.1)
-    even, slower = (np.concatenate(sway_offsets(motion, 3, 0, time), axis=1)[:, 0] / SIGMA[0] for motion in (MOTION, slow))
+    even, slower = (
+        np.concatenate(sway_offsets(motion, 3, 0, time), axis=1)[:, 0] / SIGMA[0] for motion in (MOTION, slow)
+    )
     before, after = (np.abs(np.fft.rfft(values * np.hanning(len(time)))) for values in (even, slower))
     frequency = np.fft.rfftfreq(len(time), 0.1)
     sines = np.flatnonzero((before > 0.5 * before.max()) & (frequency > 0.0))
