@@ -27,11 +27,12 @@ from synthroads_addon.calibration.job import (
     check_job,
     save_fitted,
 )
+from synthroads_addon.calibration.sensor_files import fit_sensor, save_device, save_recipe
 from synthroads_addon.cloud.selection.pavement import RoadClasses
 
 _SAME = (
     *("table", "real", "class_field", "device", "incidence_deg", "ranges", "scanner", "reflection", "attenuation"),
-    *("range_corrected", "decibels", "hold", "gain"),
+    *("range_corrected", "decibels", "device_response", "hold", "gain"),
 )
 """Arguments that a calibration's job has under the same name."""
 
@@ -47,6 +48,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     files = parser.add_argument_group("files")
     files.add_argument("--table", type=Path, metavar="FILE", help="material table to begin with (the shipped one)")
     files.add_argument("--save", type=Path, metavar="FILE", help="write the fitted materials to this table (.json)")
+    text = "write the device with the response, noise and spacing of the first material's points (.json)"
+    files.add_argument("--save-device", type=Path, metavar="FILE", help=text)
+    text = "write a recipe that scans roads with it and with the fitted materials (.yaml)"
+    files.add_argument("--save-recipe", type=Path, metavar="FILE", help=text)
     files.add_argument("--plot", type=Path, metavar="FILE", help="draw the distributions (.png)")
     files.add_argument("--overwrite", action="store_true", help="replace files that are already there")
 
@@ -76,6 +81,8 @@ def _view_arguments(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--attenuation", type=float, default=0.0, metavar="1/M", help="of the air, there and back (0)")
     group.add_argument("--range-corrected", action="store_true", help="the device takes out the range's influence")
     group.add_argument("--decibels", type=float, metavar="DB", help="its 16 bits span this many dB (they are linear)")
+    text = "numbers are made as the device's file says: compensated for the range, compressed, or as decibels"
+    group.add_argument("--device-response", action="store_true", help=text)
     text = "take a material's colours from an image that shows a surface M wide (1 m; can be repeated)"
     group.add_argument("--texture", action="append", default=[], metavar="NAME=IMAGE[@M]", help=text)
 
@@ -92,10 +99,18 @@ def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads calibrate`; return exit code, result as JSON data and printed text."""
     job = job_of(arguments)
     check_job(job)
-    for field, path, ending in (("--save", arguments.save, ".json"), ("--plot", arguments.plot, ".png")):
+    files = {
+        "--save": (arguments.save, ".json"),
+        "--save-device": (arguments.save_device, ".json"),
+        "--save-recipe": (arguments.save_recipe, ".yaml"),
+        "--plot": (arguments.plot, ".png"),
+    }
+    for field, (path, ending) in files.items():
         check_target(field, path, ending, arguments.overwrite)
-    if arguments.save and (job.real is None or not job.fit):
-        raise InputError("--save", str(arguments.save), "needs a cloud that materials are fitted to")
+        if path and field.startswith("--save") and (job.real is None or not job.fit):
+            raise InputError(field, str(path), "needs a cloud that materials are fitted to")
+    if arguments.save_recipe and not arguments.save_device:
+        raise InputError("--save-recipe", str(arguments.save_recipe), "needs --save-device, which it scans with")
     progress = progress_bar(arguments)
     result = exhaust(calibration_steps(job), lambda share: progress("calibrate", share))
     if arguments.save:
@@ -104,8 +119,17 @@ def run(arguments: argparse.Namespace) -> Outcome:
         from synthroads_addon.calibration.plot import save_plot
 
         save_plot(result, arguments.plot, arguments.overwrite)
-    written = [str(path) for path in (arguments.save, arguments.plot) if path]
-    return 0, result.to_dict(), "\n".join([*summary(result), *(f"written: {path}" for path in written)])
+    data, lines = result.to_dict(), summary(result)
+    if arguments.save_device:
+        sensor = fit_sensor(result)
+        save_device(sensor, arguments.save_device, arguments.overwrite)
+        if arguments.save_recipe:
+            device, table = arguments.save_device, arguments.save
+            save_recipe(sensor, arguments.save_recipe, device, table, arguments.overwrite)
+        data |= {"sensor": sensor.to_dict()}
+        lines += [f"{name}: {value}" for name, value in data["sensor"]["estimate"].items() if value is not None]
+    written = [str(path) for path, _ in files.values() if path]
+    return 0, data, "\n".join([*lines, *(f"written: {path}" for path in written)])
 
 
 def check_target(field: str, path: Path | None, ending: str, overwrite: bool) -> None:

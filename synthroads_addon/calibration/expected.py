@@ -21,6 +21,7 @@ from ..materials.surfaces import Reflection, brightness_of, spread_factors, surf
 from ..materials.table import Material
 from ..scanning.beam import RINGS, beam_pattern, beam_radii
 from ..scanning.colour.colour import decode_srgb
+from ..scanning.devices.device import ScannerSetting
 from ..scanning.receiving.radiometry import received_intensity
 
 
@@ -105,38 +106,63 @@ class Views:
 
 @dataclass(frozen=True)
 class ReceiverModel:
-    """Model of a device's response: beam divergence, attenuation, range correction, and linear or dB storage.
+    """Model of a device's response: divergence, attenuation, range correction, pedestal, and how numbers are stored.
 
     Attributes:
         divergence: full angles of the beam at 1/e^2, rad.
         attenuation: of the air, 1/m of range.
         range_corrected: whether the device takes the fall-off with the distance out of its intensities.
         decibels: what the 16 bits of its files span, dB; None where they grow in proportion to the light.
+        compression: exponent to which numbers, as shares of the full scale, are raised; 1 for none.
+        pedestal: power that is taken off before the number is made, a white target at 1 m giving 1.
     """
 
     divergence: tuple[float, float] = (0.0, 0.0)
     attenuation: float = 0.0
     range_corrected: bool = False
     decibels: float | None = None
+    compression: float = 1.0
+    pedestal: float = 0.0
 
     def at_range(self, brightness: Float, distance: Float) -> Float:
         """Return linear intensities (N,) of surfaces' brightness at ranges (N,), m, as the device corrects them."""
         if self.range_corrected:
-            return brightness
-        return received_intensity(brightness, distance, self.attenuation)
+            return np.maximum(brightness - self.pedestal * distance**2, 0.0) if self.pedestal else brightness
+        power = received_intensity(brightness, distance, self.attenuation)
+        return np.maximum(power - self.pedestal, 0.0) if self.pedestal else power
 
     def to_stored(self, linear: Float) -> Float:
         """Return the unrounded intensities that the device stores for linear ones times its gain; -inf for 0 in dB."""
         if self.decibels is None:
-            return linear
+            return linear if self.compression == 1.0 else FULL_SCALE * (linear / FULL_SCALE) ** self.compression
         with np.errstate(divide="ignore"):
             return FULL_SCALE / self.decibels * 10.0 * np.log10(linear)
 
     def to_linear(self, stored: Float) -> Float:
         """Return the linear intensities, times the gain, of stored ones: the inverse of `to_stored`."""
         if self.decibels is None:
-            return stored
+            return stored if self.compression == 1.0 else FULL_SCALE * (stored / FULL_SCALE) ** (1.0 / self.compression)
         return np.asarray(10.0 ** (stored * self.decibels / (10.0 * FULL_SCALE)))
+
+
+def receiver_of_device(setting: ScannerSetting, attenuation: float) -> ReceiverModel:
+    """Return the response model of a device's own receiver, as its file has it.
+
+    Raises:
+        InputError: of a gradual saturation: its numbers don't lead back to the power.
+    """
+    receiver, threshold = setting.receiver, setting.threshold
+    if receiver.soft_saturation:
+        raise InputError("--device-response", receiver.soft_saturation, "can't be undone with a gradual saturation")
+    pedestal = (receiver.pedestal or 0.0) * threshold
+    return ReceiverModel(
+        divergence=setting.divergence,
+        attenuation=attenuation,
+        range_corrected=receiver.response == "range_compensated",
+        decibels=setting.device.dynamic_range_db if receiver.response == "logarithmic" else None,
+        compression=receiver.compression or 1.0,
+        pedestal=threshold if receiver.response == "over_threshold" else pedestal,
+    )
 
 
 class Expectation:

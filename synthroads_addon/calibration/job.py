@@ -4,7 +4,7 @@
 """
 
 from collections.abc import Generator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -17,8 +17,16 @@ from ..cloud.selection.classes import RealClass, RealCloud, class_by_label, rang
 from ..cloud.selection.pavement import RoadClasses, road_classes
 from ..materials.surfaces import Reflection
 from ..materials.table import Material, materials, read_material_table, write_material_table
-from ..scanning.devices.device import load_device
-from .expected import Expectation, ReceiverModel, Texture, Views, chosen_views, read_texture
+from ..scanning.devices.device import DeviceChoice, ScannerSetting, load_device, setting_of
+from .expected import (
+    Expectation,
+    ReceiverModel,
+    Texture,
+    Views,
+    chosen_views,
+    read_texture,
+    receiver_of_device,
+)
 from .fit import (
     FITTED,
     SHOWN,
@@ -32,10 +40,12 @@ from .fit import (
     interquartile_range,
 )
 
-Part = Literal["spread", "wavelength", "slope"]
-PARTS: tuple[Part, ...] = ("spread", "wavelength", "slope")
+Part = Literal["spread", "wavelength", "slope", "compression"]
+PARTS: tuple[Part, ...] = ("spread", "wavelength", "slope", "compression")
 _ROAD = ("paved", "line")
 _MOST_VIEWS = 60
+_LEAST_CONTRAST = 1.2
+_COMPRESSIONS = (0.05, 1.1)
 
 
 @dataclass(frozen=True)
@@ -72,6 +82,8 @@ class CalibrationJob:
         reflection: as in a scenario.
         attenuation: of the air, 1/m of range.
         range_corrected, decibels: see `ReceiverModel`.
+        device_response: whether numbers are made as the device's file says, instead of these two.
+        compression: of the numbers, in place of the device's; it is fitted if `parts` says so.
         fit: whether materials and gain are fitted; else only the gain is, if there is a cloud.
         parts: what is fitted besides the brightness.
         hold: material whose brightness stays as it is.
@@ -91,6 +103,8 @@ class CalibrationJob:
     attenuation: float = 0.0
     range_corrected: bool = False
     decibels: float | None = None
+    device_response: bool = False
+    compression: float | None = None
     fit: bool = True
     parts: frozenset[Part] = frozenset({"spread", "wavelength"})
     hold: str | None = None
@@ -100,8 +114,24 @@ class CalibrationJob:
     @property
     def receiver(self) -> ReceiverModel:
         """Return the response model of the job's device, a ray without divergence if none is named."""
+        if self.device_response:
+            model = receiver_of_device(self.setting, self.attenuation)
+            return model if self.compression is None else replace(model, compression=self.compression)
         mrad = load_device(self.device).divergence_mrad if self.device else (0.0, 0.0)
-        return ReceiverModel((mrad[0] * 1e-3, mrad[1] * 1e-3), self.attenuation, self.range_corrected, self.decibels)
+        divergence = (mrad[0] * 1e-3, mrad[1] * 1e-3)
+        compression = self.compression or 1.0
+        return ReceiverModel(divergence, self.attenuation, self.range_corrected, self.decibels, compression)
+
+    @property
+    def setting(self) -> ScannerSetting:
+        """Return the usual setting of the job's device.
+
+        Raises:
+            InputError: it names none.
+        """
+        if self.device is None:
+            raise InputError("--device", None, "is needed for its response and for a device that is to be written")
+        return setting_of(load_device(self.device), DeviceChoice())
 
     def initial_materials(self) -> dict[str, Material]:
         """Return the materials, by name, that the calibration starts from: shipped, the scene's, the user's table's."""
@@ -201,6 +231,7 @@ class Calibration:
             "device": job.device,
             "range_corrected": job.range_corrected,
             "decibels": job.decibels,
+            "compression": None if job.compression is None else _short(job.compression),
             "classes": [entry.to_dict() for entry in self.compared],
         }
 
@@ -224,6 +255,8 @@ def calibration_steps(job: CalibrationJob) -> Generator[float, None, Calibration
     yield 0.02
     real = _real_classes(job)
     yield 0.4
+    if "compression" in job.parts and job.fit and job.real is not None:
+        job = replace(job, compression=_fitted_compression(job, table, real))
     pairs = zip(job.targets, real, strict=True)
     inputs = [_fit_input(job, target, table[target.material], points) for target, points in pairs]
     fits: list[Fit] = []
@@ -275,6 +308,8 @@ def check_job(job: CalibrationJob) -> None:
 
 
 def _check_views(job: CalibrationJob) -> None:
+    if job.device_response and (job.range_corrected or job.decibels is not None):
+        raise InputError("--device-response", True, "can't be given with --range-corrected or --decibels")
     if not job.incidence_deg or not all(0.0 <= angle < 90.0 for angle in job.incidence_deg):
         raise InputError("--incidence-deg", list(job.incidence_deg), "must be 0 to below 90 degrees")
     if not job.ranges or not all(0.0 < distance <= 20_000.0 for distance in job.ranges):
@@ -298,6 +333,31 @@ def _check_road(job: CalibrationJob, road: RoadClasses) -> None:
             raise InputError(option, None, f"is needed to tell what is {name}")
     if not 0.02 <= road.line_width <= 2.0:
         raise InputError("--line-width", road.line_width, "must be 0.02 to 2 m")
+
+
+def _fitted_compression(job: CalibrationJob, table: Mapping[str, Material], real: list[RealClass | None]) -> float:
+    """Return the exponent with which the table's materials explain how far the classes' medians lie apart.
+
+    Raises:
+        InputError: there are fewer than two classes, they are as bright as each other, or no exponent explains them.
+    """
+    if len(job.targets) < 2 or job.decibels is not None:
+        raise InputError("--fit", "compression", "needs two materials or more, and numbers that aren't decibels")
+    plain = replace(job.receiver, compression=1.0)
+    powers, numbers = [], []
+    for target, points in zip(job.targets, real, strict=True):
+        assert points is not None
+        expectation = Expectation(class_views(job, points), plain, job.reflection)
+        powers.append(float(np.log(np.median(expectation.linear_intensities(table[target.material])))))
+        numbers.append(float(np.log(np.median(points.intensity))))
+    if np.ptp(powers) < np.log(_LEAST_CONTRAST):
+        raise InputError("--fit", "compression", "needs materials whose brightness differs by a fifth")
+    exponent = float(np.polyfit(powers, numbers, 1)[0])
+    if not _COMPRESSIONS[0] <= exponent <= _COMPRESSIONS[1]:
+        raise InputError(
+            "--fit", round(exponent, 3), f"compression must be {_COMPRESSIONS[0]:g} to {_COMPRESSIONS[1]:g}"
+        )
+    return min(exponent, 1.0)
 
 
 @dataclass(frozen=True)
@@ -328,7 +388,7 @@ def _fit_input(job: CalibrationJob, target: MaterialTarget, before: Material, re
         given = target.texture
         texture = given if isinstance(given, Texture) else read_texture(given, target.texture_width, before)
         material = before.model_copy(update={"base_color": texture.mean_color})
-    views = _views(job, real)
+    views = class_views(job, real)
     if job.fit and real is not None:
         material = _with_facets(job, material, real, views)
     strip = job.road.line_width if job.road is not None and target.real_class == "line" else None
@@ -349,7 +409,7 @@ def _with_facets(job: CalibrationJob, material: Material, real: RealClass, views
     return material.model_copy(update=update)
 
 
-def _views(job: CalibrationJob, real: RealClass | None) -> Views:
+def class_views(job: CalibrationJob, real: RealClass | None) -> Views:
     """Return the incidence angles and ranges of a class: stored, computed from the scanner's place, or the job's."""
     if real is not None and job.scanner is not None:
         distance, incidence = ranges_and_incidences(real, np.array(job.scanner))

@@ -27,6 +27,7 @@ class RealCloud:
         scheme: what the numbers mean; None for an attribute of the file's own.
         distance, incidence: m and rad; NaN where the file doesn't say.
         returns: how many returns the pulse of each has.
+        time: GPS time, s; None where all have the same, as where none is known.
     """
 
     xyz: Float
@@ -36,6 +37,7 @@ class RealCloud:
     distance: Float
     incidence: Float
     returns: UInt8
+    time: Float | None = None
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,7 @@ class RealClass:
         zeros: how many more there are whose intensity is 0: left out.
         distance, incidence: (N,) m and rad; NaN where unknown.
         returns: (N,) how many returns the pulse of each has.
+        time: (N,) GPS time, s; None where unknown.
     """
 
     selection: str
@@ -58,6 +61,7 @@ class RealClass:
     distance: Float
     incidence: Float
     returns: UInt8
+    time: Float | None = None
 
 
 def read_real_cloud(path: Path, attribute: str | None = None) -> RealCloud:
@@ -85,6 +89,7 @@ def read_real_cloud(path: Path, attribute: str | None = None) -> RealCloud:
         distance=points.range,
         incidence=np.deg2rad(points.incidence_deg.astype(np.float64)),
         returns=points.number_of_returns,
+        time=points.gps_time if len(points) and np.ptp(points.gps_time) > 0.0 else None,
     )
 
 
@@ -138,6 +143,7 @@ def select_class(cloud: RealCloud, chosen: Index, selection: str) -> RealClass:
         distance=cloud.distance[bright],
         incidence=cloud.incidence[bright],
         returns=cloud.returns[bright],
+        time=None if cloud.time is None else cloud.time[bright],
     )
 
 

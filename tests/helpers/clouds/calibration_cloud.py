@@ -15,7 +15,13 @@ def brightness_factors(normal: np.ndarray, below: float, above: float) -> np.nda
     return np.exp(normal * np.where(normal < 0.0, below, above)) / mean_over_median(below, above)
 
 
-def write_las(path: Path, xyz: np.ndarray, intensity: np.ndarray, label: np.ndarray | None = None) -> Path:
+def write_las(
+    path: Path,
+    xyz: np.ndarray,
+    intensity: np.ndarray,
+    label: np.ndarray | None = None,
+    time: np.ndarray | None = None,
+) -> Path:
     """Write points as others do: LAS 1.4 without any notes of ours; ``label`` as an attribute of that name."""
     header = laspy.LasHeader(point_format=6, version="1.4")
     header.scales, header.offsets = np.full(3, 1e-3), np.floor(xyz.min(axis=0))
@@ -26,6 +32,8 @@ def write_las(path: Path, xyz: np.ndarray, intensity: np.ndarray, label: np.ndar
     las.intensity = np.clip(np.rint(intensity), 0, FULL).astype(np.uint16)
     if label is not None:
         las.label = label.astype(np.uint16)
+    if time is not None:
+        las.gps_time = time
     las.write(path)
     return path
 
