@@ -111,12 +111,14 @@ class _Squares:
         height: (N,) residual about the square's parabola, m, with the variance of single points.
         level: (N,) brightness from the square's mean, dB, likewise.
         count: of squares.
+        fitted: share of a point's deviation that the square's parabola follows: its coefficients over its points.
     """
 
     owner: Index
     height: Float
     level: Float
     count: int
+    fitted: float
 
 
 def estimate_sensor(
@@ -148,8 +150,10 @@ def estimate_sensor(
     if strip is not None:
         step = _gain_step(road.place, level, strip)
     azimuth_step, gains = (None, None) if scanner is None else _rings(road.place - scanner, level)
-    steady, faint = _range_noise(ranged, squares.level)
-    walk = float(np.mean(ranged * squares.level)) / max((speckle / _DECIBEL) ** 2, 1e-12)
+    steady, faint = _range_noise(ranged, squares)
+    # What the parabola follows of a point's own deviation is lost to the covariance with its brightness.
+    shared = float(np.mean(ranged * squares.level)) / np.sqrt(1.0 - squares.fitted)
+    walk = shared / max((speckle / _DECIBEL) ** 2, 1e-12)
     known = np.broadcast_to(np.asarray(distance, dtype=np.float64), len(level))
     return SensorEstimate(
         squares=squares.count,
@@ -193,7 +197,8 @@ def _squares_of(place: Float, level: Float, strip: Index) -> tuple[Index, _Squar
     height = [_about_parabola(place[rows]) for rows in groups]
     levels = [(level[rows] - level[rows].mean()) * np.sqrt(len(rows) / (len(rows) - 1.0)) for rows in groups]
     number = np.repeat(np.arange(len(groups)), [len(rows) for rows in groups])
-    return np.concatenate(groups), _Squares(number, np.concatenate(height), np.concatenate(levels), len(groups))
+    fitted = _COEFFICIENTS * len(groups) / len(number)
+    return np.concatenate(groups), _Squares(number, np.concatenate(height), np.concatenate(levels), len(groups), fitted)
 
 
 def _about_parabola(place: Float) -> Float:
@@ -204,8 +209,13 @@ def _about_parabola(place: Float) -> Float:
     return np.asarray(rest * np.sqrt(len(z) / (len(z) - float(_COEFFICIENTS))))
 
 
-def _range_noise(ranged: Float, level: Float) -> tuple[float, float]:
-    """Return the standard deviations of a range: of bright echoes, and what one of the median power has besides, m."""
+def _range_noise(ranged: Float, squares: _Squares) -> tuple[float, float]:
+    """Return the standard deviations of a range: of bright echoes, and what one of the median power has besides, m.
+
+    A residual's variance is that of its own point to the share 1 - h, and the mean of all to the share h that the
+    parabola follows: the slope over 1 / power^2 is too small by 1 - h.
+    """
+    level = squares.level
     edges = np.quantile(level, np.linspace(0.0, 1.0, _LEVELS + 1))
     group = np.clip(np.searchsorted(edges, level, side="right") - 1, 0, _LEVELS - 1)
     power = 10.0 ** (-2.0 * level / 10.0)
@@ -214,7 +224,7 @@ def _range_noise(ranged: Float, level: Float) -> tuple[float, float]:
     spread = [float(np.subtract(*np.quantile(ranged[group == number], (0.75, 0.25)))) for number in range(_LEVELS)]
     variance = (np.array(spread) / 1.349) ** 2
     slope, steady = np.polyfit(weakness, variance, 1)
-    slope = min(max(slope, 0.0), float(np.mean(variance)))
+    slope = min(max(slope / (1.0 - squares.fitted), 0.0), float(np.mean(variance)))
     steady = max(float(np.mean(variance - slope * weakness)), 0.0)
     return float(np.sqrt(steady)), float(np.sqrt(slope))
 

