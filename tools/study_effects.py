@@ -6,7 +6,7 @@
 One scene of a recipe is built once and scanned with all effects, and again without each of those that the recipe asks
 for, with the same rays and random numbers. Each cloud is compared with the real ones as `synthroads compare` does; a
 small network learns on it to tell markings from pavement by point, and is asked about the real clouds; the scan's
-processor time is measured. The table goes to `effects.md`, all figures to `effects.json`.
+processor time is measured. The table goes to `effects.md`, all figures to `effects.json`, a picture to `effects.png`.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from scipy.spatial import cKDTree
 from sklearn.metrics import balanced_accuracy_score
@@ -33,6 +34,9 @@ sys.path.insert(0, str(ROOT))
 from synthroads_addon.base.arrays import Float, Index  # noqa: E402
 from synthroads_addon.base.errors import InputError  # noqa: E402
 from synthroads_addon.base.progress import StageTimer, silent  # noqa: E402
+from synthroads_addon.base.classes import class_scheme  # noqa: E402
+from synthroads_addon.cloud.formats.registry import open_cloud  # noqa: E402
+from synthroads_addon.cloud.points import PointBlock, concatenate  # noqa: E402
 from synthroads_addon.cloud.selection.classes import RealClass  # noqa: E402
 from synthroads_addon.comparison.classifier import distinguish  # noqa: E402
 from synthroads_addon.comparison.clouds import (  # noqa: E402
@@ -49,12 +53,17 @@ from synthroads_addon.jobs.open_scene import RoadScene  # noqa: E402
 from synthroads_addon.scenario.scenario import Scenario, parse_change, with_changes  # noqa: E402
 from synthroads_addon.scenario.without import EFFECTS, scenario_without  # noqa: E402
 
+mpl.use("Agg")
+from matplotlib import pyplot  # noqa: E402
+
 NOTHING = "none: all effects"
 MARKING = "marking"
 _NEIGHBOURS = 8
 _MOST = 4000
 """Points of each class that the network learns from, and is asked about in each real cloud, at most."""
 _SEED = 1
+_COLUMNS, _SQUARE = 5, 6.0
+"""Of the picture: panels side by side, and the square that each shows, m."""
 
 
 @dataclass(frozen=True)
@@ -178,6 +187,56 @@ def table(outcomes: Sequence[Outcome]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def draw(names: Sequence[str], folder: Path, path: Path) -> None:
+    """Draw a square of the pavement without each effect, from above by brightness and from the side, and write it."""
+    clouds = [concatenate(list(blocks_of(folder / name.partition(":")[0] / "cloud.laz"))) for name in names]
+    middle = densest_square(clouds[0])
+    columns = min(len(names), _COLUMNS)
+    rows = -(-len(names) // columns)
+    figure, axes = pyplot.subplots(
+        2 * rows, columns, figsize=(3.0 * columns, 4.2 * rows), height_ratios=[3, 1.1] * rows, squeeze=False
+    )
+    for number, (name, cloud) in enumerate(zip(names, clouds, strict=True)):
+        row, column = divmod(number, columns)
+        draw_square(axes[2 * row, column], axes[2 * row + 1, column], name, cloud, middle)
+    for empty in range(len(names), rows * columns):
+        for part in (0, 1):
+            axes[2 * (empty // columns) + part, empty % columns].set_axis_off()
+    figure.tight_layout()
+    figure.savefig(path, dpi=90)
+
+
+def blocks_of(path: Path) -> Iterator[PointBlock]:
+    """Yield the blocks of a cloud file."""
+    with open_cloud(path) as cloud:
+        yield from cloud.blocks()
+
+
+def densest_square(cloud: PointBlock) -> Float:
+    """Return the middle (2,) of the square of pavement and markings with the most points of both."""
+    scheme = {row.name: row.id for row in class_scheme("5").rows}
+    cell = np.floor(cloud.xyz[:, :2] / _SQUARE).astype(np.int64)
+    cells, owner = np.unique(cell, axis=0, return_inverse=True)
+    road, paint = (np.bincount(owner.ravel(), cloud.class_id == scheme[name]) for name in (ROAD, "road_marking"))
+    return np.asarray((cells[int(np.argmax(np.minimum(road, 8.0 * paint)))] + 0.5) * _SQUARE)
+
+
+def draw_square(above: Any, beside: Any, name: str, cloud: PointBlock, middle: Float) -> None:
+    """Draw one cloud's points in a square from above, by brightness in dB, and from the side."""
+    apart = cloud.xyz[:, :2] - middle
+    inside = np.flatnonzero(np.abs(apart).max(axis=1) < _SQUARE / 2.0)
+    x, y = apart[inside].T
+    level = 10.0 * np.log10(np.maximum(cloud.intensity[inside], 1e-12))
+    height = cloud.xyz[inside, 2]
+    plane = np.column_stack([np.ones_like(x), x, y])
+    height = height - plane @ np.linalg.lstsq(plane, height, rcond=None)[0]
+    above.scatter(x, y, c=level - np.median(level), s=5, vmin=-4, vmax=6, cmap="viridis")
+    above.set(aspect="equal", xticks=[], yticks=[])
+    above.set_title(name if name == NOTHING else f"without {name}", fontsize=9)
+    beside.scatter(x, 1e3 * height, c="#444444", s=2)
+    beside.set(ylim=(-120, 120), xticks=[], ylabel="mm")
+
+
 def scenario_of(recipe: str, scene: str | None, changes: Sequence[str]) -> Scenario:
     """Return the scenario of a recipe's scene (its last one if None) with changes, ``path=value``.
 
@@ -207,6 +266,7 @@ def main() -> None:
         outcomes.append(one)
         print(json.dumps(one.to_dict()), flush=True)
     (arguments.output / "effects.json").write_text(json.dumps([one.to_dict() for one in outcomes], indent=1))
+    draw([one.effect for one in outcomes], arguments.output, arguments.output / "effects.png")
     (arguments.output / "effects.md").write_text(table(outcomes), encoding="utf-8")
 
 
