@@ -32,9 +32,9 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from synthroads_addon.base.arrays import Float, Index  # noqa: E402
+from synthroads_addon.base.classes import class_scheme  # noqa: E402
 from synthroads_addon.base.errors import InputError  # noqa: E402
 from synthroads_addon.base.progress import StageTimer, silent  # noqa: E402
-from synthroads_addon.base.classes import class_scheme  # noqa: E402
 from synthroads_addon.cloud.formats.registry import open_cloud  # noqa: E402
 from synthroads_addon.cloud.points import PointBlock, concatenate  # noqa: E402
 from synthroads_addon.cloud.selection.classes import RealClass  # noqa: E402

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import stats
 
 from synthroads_addon.base.rotations import rotation_matrix
 from synthroads_addon.scanning import noise as module
@@ -50,6 +51,12 @@ def test_every_axis_has_its_standard_deviation_and_no_mean(record: np.ndarray) -
 def test_the_correlation_falls_as_an_exponential(record: np.ndarray, tenths: int) -> None:
     found = (record[tenths:] * record[:-tenths]).mean(axis=0) / record.var(axis=0)
     np.testing.assert_allclose(found, np.exp(-tenths / 10), atol=5 * np.sqrt(2 / RECORD))
+
+
+def test_errors_are_normal(record: np.ndarray) -> None:
+    """A chi-square test of twenty equal shares, of values ten correlation times apart."""
+    counts = np.bincount((stats.norm.cdf(record[::100].ravel()) * 20).astype(int), minlength=20)
+    assert stats.chisquare(counts).pvalue > 0.001
 
 
 def test_axes_and_strips_and_seeds_are_independent(record: np.ndarray) -> None:

@@ -8,6 +8,7 @@ from scipy import stats
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.scanning.noise import Noise
+from synthroads_addon.scanning.scan import BlockScan
 from synthroads_addon.scanning.scene.mesh import empty_scene_mesh
 from tests.helpers.scenes.scan_scenes import (
     ORIGIN,
@@ -78,6 +79,32 @@ def test_speckle_is_gamma_distributed_with_its_own_stream() -> None:
     assert factor.mean() == pytest.approx(1.0, abs=0.01)
     again = scan_block(speckled, strip, 0).points
     np.testing.assert_array_equal(again.intensity, points.intensity)
+
+
+def test_pointing_errors_are_normal_along_both_axes() -> None:
+    """A chi-square test of twenty equal shares of where points lie beside their beams."""
+    scan = replace(scan_of(plane()), noise=Noise(angle_sigma_mrad=2.0))
+    strip = scan.path.strips[0]
+    errors = BlockScan(scan).draw_errors(strip, 8000, 0).angle
+    assert errors is not None
+    for axis in errors:
+        counts = np.bincount((stats.norm.cdf(axis / 2e-3) * 20).astype(int), minlength=20)
+        assert stats.chisquare(counts).pvalue > 0.001
+    assert abs(np.corrcoef(errors)[0, 1]) < 0.05
+    points, calm = (scan_pulses(plan, strip, 450, 100).points for plan in (scan, replace(scan, noise=Noise())))
+    off = np.linalg.norm(points.xyz - calm.xyz, axis=1) / calm.range
+    assert np.sqrt(np.mean(off**2)) == pytest.approx(2e-3 * np.sqrt(2.0), rel=0.2)
+
+
+def test_dropouts_are_as_many_as_said_in_every_part_of_the_scan() -> None:
+    """A chi-square test of the returns that are lost, over ten groups of the scan angle."""
+    scan = scan_of(plane())
+    strip, share = scan.path.strips[0], 0.2
+    calm, left = (scan_block(plan, strip, 0).points for plan in (scan, replace(scan, noise=Noise(dropout=share))))
+    lost = ~np.isin(calm.gps_time, left.gps_time)
+    group = (stats.rankdata(calm.scan_angle_deg, method="ordinal") - 1) * 10 // len(calm)
+    found, total = np.bincount(group, lost), np.bincount(group)
+    assert stats.chi2.sf(np.sum((found - share * total) ** 2 / (share * (1.0 - share) * total)), 10) > 0.001
 
 
 def test_speckle_decides_which_faint_echoes_are_detected() -> None:
