@@ -3,8 +3,8 @@
     python tools/study_effects.py centerline-airborne --scene straight-08 --real real.yaml --output out/effects \\
         --set road.length=200
 
-One scene of a recipe is built once and scanned with all effects, and again without each of those that the recipe asks
-for, with the same rays and random numbers. Each cloud is compared with the real ones as `synthroads compare` does; a
+One scene of a recipe is built once and scanned with all effects, without each of those that the recipe asks for, and
+without all of them, with the same rays and random numbers. Each cloud is compared with the real ones as `synthroads compare` does; a
 small network learns on it to tell markings from pavement by point, and is asked about the real clouds; the scan's
 processor time is measured. The table goes to `effects.md`, all figures to `effects.json`, a picture to `effects.png`.
 """
@@ -56,7 +56,7 @@ from synthroads_addon.scenario.without import EFFECTS, scenario_without  # noqa:
 mpl.use("Agg")
 from matplotlib import pyplot  # noqa: E402
 
-NOTHING = "none: all effects"
+NOTHING, EVERYTHING = "none: all effects", "all of them"
 MARKING = "marking"
 _NEIGHBOURS = 8
 _MOST = 4000
@@ -92,12 +92,12 @@ class Outcome:
 
 
 def variants(scenario: Scenario) -> Iterator[tuple[str, Scenario]]:
-    """Yield the scenario itself and without each effect that it has, by name."""
+    """Yield the scenario itself, without each effect that it has, by name, and without all of these."""
     yield NOTHING, scenario
-    for effect in EFFECTS:
-        other = scenario_without(scenario, [effect])
-        if other != scenario:
-            yield effect, other
+    others = {effect: scenario_without(scenario, [effect]) for effect in EFFECTS}
+    found = {effect: other for effect, other in others.items() if other != scenario}
+    yield from found.items()
+    yield EVERYTHING, scenario_without(scenario, found)
 
 
 def study(scenario: Scenario, real: Path, output: Path) -> Iterator[Outcome]:

@@ -9,7 +9,17 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.cloud.selection.classes import RealClass
 from synthroads_addon.comparison.clouds import ComparedCloud
 from synthroads_addon.scenario.scenario import load_scenario
-from tools.study_effects import MARKING, NOTHING, Outcome, network_score, points_of, scenario_of, table, variants
+from tools.study_effects import (
+    EVERYTHING,
+    MARKING,
+    NOTHING,
+    Outcome,
+    network_score,
+    points_of,
+    scenario_of,
+    table,
+    variants,
+)
 
 
 def cloud(contrast_db: float, seed: int) -> ComparedCloud:
@@ -34,6 +44,8 @@ def test_only_effects_that_a_scenario_has_are_left_out() -> None:
     assert {"speckle", "motion"} <= found.keys()
     assert not {"multipath", "dropout", "weather-echoes", "strip-errors"} & found.keys()
     assert found["speckle"].scan.noise.speckle == 0.0
+    assert list(found)[-1] == EVERYTHING
+    assert found[EVERYTHING].scan.noise.speckle == found[EVERYTHING].scan.motion.position_sigma == 0.0
 
 
 def test_the_network_tells_markings_by_their_contrast() -> None:
