@@ -4,9 +4,10 @@
         --set road.length=200
 
 One scene of a recipe is built once and scanned with all effects, without each of those that the recipe asks for, and
-without all of them, with the same rays and random numbers. Each cloud is compared with the real ones as `synthroads compare` does; a
-small network learns on it to tell markings from pavement by point, and is asked about the real clouds; the scan's
-processor time is measured. The table goes to `effects.md`, all figures to `effects.json`, a picture to `effects.png`.
+without all of them, with the same rays and random numbers. Each cloud is compared with the real ones as `synthroads
+compare` does; a small network learns on it to tell markings from pavement by point, and is asked about the real clouds;
+the scan's processor time is measured. The table goes to `effects.md`, all figures to `effects.json`, a picture to
+`effects.png`.
 """
 
 from __future__ import annotations
