@@ -122,7 +122,7 @@ def test_the_written_device_and_recipe_scan_as_the_cloud_was_measured(
     airborne: tuple[Path, ScanPlan], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Density within 15 %, range noise of echoes as bright as asphalt within 10 %."""
-    cloud, plan = airborne
+    cloud, _ = airborne
     words = ("--device", "riegl-vq-780i", "--range", "800", "--hold", "asphalt")
     found = calibrated(capsys, cloud, tmp_path, *words)["estimate"]
     recipe = load_recipe(str(tmp_path / "recipe.yaml"))
@@ -140,12 +140,12 @@ def test_the_written_device_and_recipe_scan_as_the_cloud_was_measured(
     assert all(abs(value / found["speckle"] - 1.0) < 0.16 for value in speckles)
 
 
+STANDING = {"kind": "tripod", "stations": [20], "turn_seconds": 0.1, "turn_deg": 0, "height": 1.73}
 HEAD = [
     *("scan.device=velodyne-hdl-64e", "scan.pulse_rate_khz=1333.333", "scan.lines_per_second=10"),
     *("scan.noise.range_sigma=0.015", "scan.noise.speckle=0.3", "scan.receiver.gain_sigma_db=0"),
     *("scan.receiver.lost_numbers=0.08", "scan.reflection=oren_nayar", "scan.receiver.compression=0.4"),
-    'scan.platform={"kind": "tripod", "stations": [20], "turn_seconds": 0.1, "turn_deg": 0, "height": 1.73, '
-    '"lateral_offsets": [0]}',
+    f"scan.platform={json.dumps(STANDING | {'lateral_offsets': [0]})}",
 ]
 
 
