@@ -204,7 +204,7 @@ def test_without_times_two_strips_are_told_by_the_two_peaks_of_their_brightness(
 def test_too_little_pavement_is_refused() -> None:
     few, none = np.random.default_rng(1).random((300, 3)), np.zeros(300)
     road = RealClass("", few, none + 1.0, 0, none, none, none.astype(np.uint8))
-    with pytest.raises(InputError, match="squares of 1.5 m with 16 points"):
+    with pytest.raises(InputError, match=r"squares of 1\.5 m with 16 points"):
         estimate_sensor(road, none + 1.0, np.array([800.0]), np.array([0.0]))
 
 
