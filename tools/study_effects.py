@@ -69,7 +69,7 @@ _COLUMNS, _SQUARE = 5, 6.0
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a scan without an effect is like.
+    """Figures of a scan without an effect.
 
     Attributes:
         effect: that is left out.
