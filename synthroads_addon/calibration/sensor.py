@@ -223,7 +223,8 @@ def _range_noise(ranged: Float, squares: _Squares) -> tuple[float, float]:
     # Deviations by quartiles: single points on kerbs and cars don't count.
     spread = [float(np.subtract(*np.quantile(ranged[group == number], (0.75, 0.25)))) for number in range(_LEVELS)]
     variance = (np.array(spread) / 1.349) ** 2
-    slope, steady = np.polyfit(weakness, variance, 1)
+    # Of as many points each, a variance is known to a share of itself.
+    slope = float(np.polyfit(weakness, variance, 1, w=1.0 / np.maximum(variance, 1e-18))[0])
     slope = min(max(slope / (1.0 - squares.fitted), 0.0), float(np.mean(variance)))
     steady = max(float(np.mean(variance - slope * weakness)), 0.0)
     return float(np.sqrt(steady)), float(np.sqrt(slope))

@@ -133,7 +133,7 @@ def test_the_written_device_and_recipe_scan_as_the_cloud_was_measured(
     density = strips / (height * setting.angle_step * speed / setting.lines_per_second)
     assert density == pytest.approx(found["density"], rel=0.15)
     device = load_device(str(tmp_path / "device.json"))
-    assert device.receiver.faint_range_sigma == pytest.approx(0.08, rel=0.25)
+    assert device.receiver.faint_range_sigma == pytest.approx(0.08, rel=0.35)
     assert setting.device == device
     speckles = {job.scenario.scan.noise.speckle for job in scene_jobs(recipe)}
     assert len(speckles) == 8

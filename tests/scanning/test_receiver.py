@@ -106,6 +106,6 @@ def test_lost_numbers_are_as_many_as_said_whatever_the_power_and_move_no_point()
     np.testing.assert_array_equal(calm.xyz, losing.xyz)
     lost = losing.intensity == 0.0
     np.testing.assert_array_equal(losing.intensity[~lost], calm.intensity[~lost])
-    group = (stats.rankdata(calm.range, method="ordinal") - 1) * 8 // len(calm)
+    group = (stats.rankdata(calm.range, method="ordinal").astype(int) - 1) * 8 // len(calm)
     found, total = np.bincount(group, lost), np.bincount(group)
     assert stats.chi2.sf(np.sum((found - share * total) ** 2 / (share * (1 - share) * total)), 8) > 0.001

@@ -102,7 +102,7 @@ def test_dropouts_are_as_many_as_said_in_every_part_of_the_scan() -> None:
     strip, share = scan.path.strips[0], 0.2
     calm, left = (scan_block(plan, strip, 0).points for plan in (scan, replace(scan, noise=Noise(dropout=share))))
     lost = ~np.isin(calm.gps_time, left.gps_time)
-    group = (stats.rankdata(calm.scan_angle_deg, method="ordinal") - 1) * 10 // len(calm)
+    group = (stats.rankdata(calm.scan_angle_deg, method="ordinal").astype(int) - 1) * 10 // len(calm)
     found, total = np.bincount(group, lost), np.bincount(group)
     assert stats.chi2.sf(np.sum((found - share * total) ** 2 / (share * (1.0 - share) * total)), 10) > 0.001
 

@@ -12,6 +12,7 @@ EVERYTHING = Scenario.from_dict(
         "scan": {
             "mirror_clock": "free",
             "relief": 0.5,
+            "multipath": 2.0,
             "weather": {"condition": "rain", "rate_mm_h": 5.0, "echoes": True},
             "noise": {
                 "range_sigma": 0.02,
@@ -46,6 +47,7 @@ OFF = {
         (scan.receiver.response, scan.receiver.pedestal, scan.receiver.compression) == ("power", 0, 1)
     ),
     "mixed-points": lambda scan: scan.receiver.echo_separation == "resolution",
+    "multipath": lambda scan: scan.multipath == 0,
     "motion": lambda scan: not scan.motion.sigma.any(),
     "mirror-clock": lambda scan: scan.mirror_clock == "locked",
     "strip-errors": lambda scan: not scan.strip_errors.moves_points,
