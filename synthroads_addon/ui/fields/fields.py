@@ -338,11 +338,15 @@ class ChoiceField(Field):
         setattr(owner, self.name, AUTOMATIC if value is None else str(value))
 
     def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
-        """Draw the menu, and beside Automatic the greyed value that it stands for."""
-        row = value_row(layout, self.label)
+        """Draw the menu, and beside Automatic, or below where it has no room, the greyed value that it stands for."""
+        row, share = value_row(layout, self.label), value_share(self.label)
         row.prop(owner, self.name, text="")
-        if self.optional and getattr(owner, self.name) == AUTOMATIC:
+        if not self.optional or getattr(owner, self.name) != AUTOMATIC:
+            return
+        if fits(self.inherited_text(settings), 0.5 * share):
             self._draw_inherited(row, settings, share=0.5)
+        else:
+            self._draw_inherited(layout if share == 1.0 else value_row(layout, ""), settings)
 
 
 class ChoicesField(Field):

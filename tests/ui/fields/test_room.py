@@ -56,6 +56,23 @@ def test_no_label_is_cut_off(width: float, monkeypatch: pytest.MonkeyPatch) -> N
 
 
 @pytest.mark.keep_scene
+@pytest.mark.parametrize("width", [*WIDTHS, 292.0])
+def test_no_word_is_broken(width: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    widen(monkeypatch, width)
+    pieces, broken = room._pieces, []
+
+    def watched(word: str, share: float, icons: int) -> list[str]:
+        found = pieces(word, share, icons)
+        broken.extend([word] if len(found) > 1 else [])
+        return found
+
+    monkeypatch.setattr(room, "_pieces", watched)
+    for panel in panels.CLASSES:
+        drawn(panel, bpy.context)
+    assert broken == []
+
+
+@pytest.mark.keep_scene
 @pytest.mark.parametrize("width", WIDTHS)
 def test_no_label_of_any_part_is_cut_off(width: float, monkeypatch: pytest.MonkeyPatch) -> None:
     widen(monkeypatch, width)
