@@ -26,6 +26,7 @@ COMMANDS = {
     "experiment": "train variants of a segmentation with several seeds, and compare their scores",
     "pack": "pack a data set's labelled points into one small file, to train from elsewhere",
     "forecast": "forecast how long a training of a segmentation takes on this machine",
+    "centerline": "find the centreline of the road in a cloud, and where it is to be trusted",
     "reconstruct": "turn a cloud into the parameters of its road",
     "list": "list what comes under a name, and the fields that --set takes",
 }

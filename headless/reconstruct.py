@@ -19,8 +19,9 @@ from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.twin.formats import check_formats, twin_file_names, write_twin
 
 if TYPE_CHECKING:
+    from synthroads_addon.reconstruction.axis import Options
     from synthroads_addon.reconstruction.cloud import RoadCloud
-    from synthroads_addon.reconstruction.reconstruct import Options, Reconstruction
+    from synthroads_addon.reconstruction.reconstruct import Reconstruction
     from synthroads_addon.road.parameters import RoadParameters
 
 PARAMETERS, REPORT, CENTRELINE, PICTURE = (
@@ -40,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--road", choices=("auto", "dual", "single"), default="auto", help=text)
     text = "course of the road, roughly: CSV or GeoJSON in the cloud's coordinates (found in the cloud)"
     parser.add_argument("--path", type=Path, metavar="FILE", help=text)
-    text = "folder of a trained centreline model that tells the axis (the line markings do)"
+    text = "folder of a trained centreline model: one more view of the axis (those that learn nothing)"
     parser.add_argument("--run", type=Path, metavar="DIR", help=text)
     text = "root mean square that the alignment may keep from the measured axis, m (0.03)"
     parser.add_argument("--fit-tolerance", type=float, default=0.03, metavar="M", help=text)
@@ -73,7 +74,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
             result["comparison"] = compared(road.parameters)
         (folder / REPORT).write_text(canonical_json(result), encoding="utf-8")
         write_twin(road.parameters, folder, arguments.twin)
-    return 3 if road.judgement.doubts else 0, result, summary(result, arguments.output)
+    return 3 if road.judgement.doubts or road.judgement.sections else 0, result, summary(result, arguments.output)
 
 
 def _comparison(truth: Path | None) -> Callable[[RoadParameters], dict[str, Any]] | None:
@@ -94,7 +95,7 @@ def _comparison(truth: Path | None) -> Callable[[RoadParameters], dict[str, Any]
 
 
 def _options(arguments: argparse.Namespace, cloud: RoadCloud, folder: Path) -> Options:
-    from synthroads_addon.reconstruction.reconstruct import Options
+    from synthroads_addon.reconstruction.axis import Options
     from synthroads_addon.road.centerline import read_axis
 
     course = read_axis(arguments.path)[:, :2] - cloud.origin[:2] if arguments.path else None
@@ -150,10 +151,13 @@ def summary(result: dict[str, Any], output: Path) -> str:
             f"  within {standard['largest_difference']:.2f} m of the standard cross-section {standard['name']}"
         )
     objects = result["objects"]
-    lines.append(f"  {len(objects['barriers'])} barriers, {len(objects['delineators'])} delineators")
+    bays = f", {len(result['emergency_bays'])} emergency bays" if result["emergency_bays"] else ""
+    lines.append(f"  {len(objects['barriers'])} barriers, {len(objects['delineators'])} delineators{bays}")
     lines += [f"  note: {note}" for note in result["notes"]]
     for doubt in result["judgement"]["doubtful"]:
         lines.append(f"  doubtful from {doubt['start']:.0f} to {doubt['end']:.0f} m: {'; '.join(doubt['why'])}")
+    for doubt in result["judgement"]["other_sections"]:
+        lines.append(f"  another section from {doubt['start']:.0f} to {doubt['end']:.0f} m: {'; '.join(doubt['why'])}")
     if "comparison" in result:
         off = result["comparison"]["centreline"]
         apart = f"{off['mae']:.3f} m on average, {off['largest']:.3f} m at most" if off else "nothing in common"

@@ -113,6 +113,11 @@ class Run(Generic[C]):
             raise InputError(str(path), None, "is no checkpoint of a training of ours")
         return state
 
+    def calibration(self) -> dict[str, Any] | None:
+        """Return the calibration of a model's deviations as JSON data, None if it has none or not yet."""
+        path = self.folder / CALIBRATION
+        return read_json(path) if path.is_file() else None
+
     def record(self, figures: Mapping[str, float]) -> None:
         """Append an epoch's figures to the history, and write the history's file."""
         self.history.append({name: float(value) for name, value in figures.items()})

@@ -8,11 +8,11 @@ import numpy as np
 from synthroads_addon.base.arrays import Float
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import read_json
+from synthroads_addon.reconstruction.axis import Predictor
 from synthroads_addon.reconstruction.cloud import RoadCloud
 from synthroads_addon.reconstruction.path import CloudPath
-from synthroads_addon.reconstruction.reconstruct import Predictor
 
-from ..runs import Run
+from ..shipped import open_run
 from ..tasks import Prediction, task
 
 _USUAL_STD = 0.1  # m, where the model tells none
@@ -23,14 +23,14 @@ def learned_axis(folder: FilePath, cloud_file: FilePath, scratch: FilePath) -> P
     """Return a function (cloud, path) -> (offset, std) of the axis along the path, m, by a trained centreline model.
 
     Args:
-        folder: of the run.
+        folder: of the run, or the name of a shipped model.
         cloud_file: the cloud that the axis is wanted of.
         scratch: folder for what the model writes, which is removed again.
 
     Raises:
         MissingFileError, InputError: it is no run of a centreline model, or its training isn't finished.
     """
-    trained = Run.open(folder)
+    trained = open_run(folder)
     name = trained.configuration.task
     if name != "centerline":
         raise InputError("--run", str(folder), f"is a model for {name}, a centreline model is needed")

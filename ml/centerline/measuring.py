@@ -34,6 +34,7 @@ from ..scores.pictures import PictureView, corridor_picture, lines_picture
 from ..scores.tables import as_data, report, write_tables
 from ..tasks import Evaluation
 from .predictor import CenterlinePredictor, target_errors
+from .rules import views_predictor
 
 if TYPE_CHECKING:
     from .task import CenterlineConfiguration
@@ -66,6 +67,10 @@ def measure_run(
     name = f"{configuration.network.name}, seed {configuration.seed}"
     width = configuration.slices.half_width
     predictors: dict[str, Sequence[Predictor]] = {name: [predictor]}
+    predictors |= {
+        "views": [views_predictor()],
+        f"views with {configuration.network.name}": [views_predictor(predictor)],
+    }
     predictors |= {"skeleton": [skeleton_predictor(SkeletonSettings())], **trivial_predictors(width)}
     progress("measuring", 0.0)
     measured = measure(predictors, lambda seed: shown, [configuration.seed])

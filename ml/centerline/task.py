@@ -14,7 +14,7 @@ from torch import nn
 from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
 from synthroads_addon.base.files import write_file
 from synthroads_addon.base.progress import Progress, silent
-from synthroads_addon.base.schema import canonical_json, read_json
+from synthroads_addon.base.schema import canonical_json
 
 from ..configuration import Configuration
 from ..data.batches import Batches, BatchOptions, DataOptions, Roads, crop_only_effects, fixed_batches, read_roads
@@ -154,13 +154,13 @@ def load_predictor(run: Run[CenterlineConfiguration]) -> CenterlinePredictor:
     """
     configuration = run.configuration
     device = chosen_device(configuration)
-    path = run.folder / CALIBRATION
+    told = run.calibration()
     state = run.last_checkpoint(device)
-    if state is None or int(state["epoch"]) < configuration.schedule.epochs or not path.is_file():
+    if state is None or int(state["epoch"]) < configuration.schedule.epochs or told is None:
         raise InputError(str(run.folder), None, "its training isn't finished; `synthroads train --resume` goes on")
     model = _empty_model(configuration).to(device)
     model.load_state_dict(state["model"])
-    calibration = {name: IntervalCalibration.from_dict(one) for name, one in read_json(path).items()}
+    calibration = {name: IntervalCalibration.from_dict(one) for name, one in told.items()}
     return CenterlinePredictor(model, configuration.slices, configuration.use, calibration)
 
 

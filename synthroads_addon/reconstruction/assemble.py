@@ -1,7 +1,7 @@
 """Measurements as a parameter set: the same kind that is sampled or written by hand."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -13,7 +13,7 @@ from ..fitting.fit import AxisFit, alignment_object
 from ..road.guidelines import LIMITS, STANDARD_CROSS_SECTIONS, design_class_of
 from ..road.objects import RoadObject
 from ..road.parameters import EPSG_URI, RoadParameters
-from ..road.section import Carriageway, CrossfallPoint, Lane, LineMarking, Median
+from ..road.section import Carriageway, CrossfallPoint, Lane, LineMarking, Median, Turnout
 from ..road.surroundings import Terrain
 from ..road.things.concrete_barrier import ConcreteBarrier
 from ..road.things.delineator import Delineator
@@ -23,6 +23,7 @@ from .cloud import RoadCloud
 from .lines import Line
 from .objects import FoundBarrier, FoundPost, GroundShape
 from .section import SIDES, LineKind, MeasuredSection, Side, SideSection, line_width
+from .widenings import Bay
 
 RotationAxis = Literal["carriageway_axis", "inner_edge"]
 
@@ -47,6 +48,7 @@ class RoadMeasurements:
         barriers, posts: what stands.
         ground: what lies beside.
         title: for people.
+        bays: emergency bays.
     """
 
     fit: AxisFit
@@ -59,6 +61,7 @@ class RoadMeasurements:
     posts: list[FoundPost]
     ground: GroundShape
     title: str
+    bays: list[Bay] = field(default_factory=list)
 
 
 def assemble_parameters(measured: RoadMeasurements) -> RoadParameters:
@@ -72,6 +75,7 @@ def assemble_parameters(measured: RoadMeasurements) -> RoadParameters:
         items["median"] = Median(instance=1)
     for side in SIDES:
         items[f"carriageway-{side}"] = _carriageway(measured, measured.section.sides[side])
+    items |= dict(_bays(measured))
     items |= dict(_markings(measured))
     items |= dict(_furniture(measured))
     items["terrain"] = _terrain(measured.ground)
@@ -138,6 +142,27 @@ def _corners(station: Float, value: Float, tolerance: float) -> list[int]:
             kept.add(middle)
             stack += [(low, middle), (middle, high)]
     return sorted(kept)
+
+
+def _bays(measured: RoadMeasurements) -> Iterator[tuple[str, Turnout]]:
+    """Yield the emergency bays by id; tapers are named in the direction of traffic."""
+    for number, bay in enumerate(measured.bays, 1):
+        with_stations = bay.side == "right"
+        tapers = (bay.low_taper, bay.high_taper) if with_stations else (bay.high_taper, bay.low_taper)
+        yield (
+            f"emergency-bay-{number}",
+            Turnout(
+                instance=1,
+                carriageway=f"carriageway-{bay.side}",
+                kind="emergency_bay",
+                start_station=_length(bay.start),
+                taper_in_length=_length(tapers[0]),
+                lane_length=_length(bay.end - bay.start - bay.low_taper - bay.high_taper, 5.0),
+                taper_out_length=_length(tapers[1]),
+                lane_width=_length(bay.width, 2.0, 6.0),
+                edge_strip_width=0.0,
+            ),
+        )
 
 
 def _markings(measured: RoadMeasurements) -> Iterator[tuple[str, LineMarking]]:

@@ -14,6 +14,7 @@ from ..road.things.concrete_barrier import ConcreteBarrier
 from ..road.things.delineator import Delineator
 from ..road.things.guardrail import Guardrail
 from ..road.things.noise_barrier import NoiseBarrier
+from .path import CloudPath
 from .smoothing import difference_figures
 
 BARRIER_DISTANCE, POST_DISTANCE = 0.5, 1.0
@@ -60,6 +61,16 @@ def compare_axis(found: RoadParameters, axis: Float) -> dict[str, Any]:
     here = RoadGeometry(found)
     at, offset = here.alignment.project(axis[:, :2] - np.array(found.transform.translate[:2]))
     covered = (at > 0.0) & (at < here.length)
+    return {"covered": round(float(covered.mean()), 4), "centreline": _figures(offset[covered])}
+
+
+def compare_line(found: CloudPath, axis: Float) -> dict[str, Any]:
+    """Return the lateral offsets, m, of a known line's points (N, 2) from a found one in the same plane, as JSON data.
+
+    As in `compare_axis`: signed offsets of the points that the found line reaches, and their share as ``covered``.
+    """
+    at, offset = found.project(axis)
+    covered = (at > found.start) & (at < found.start + found.length)
     return {"covered": round(float(covered.mean()), 4), "centreline": _figures(offset[covered])}
 
 

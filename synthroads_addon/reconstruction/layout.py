@@ -7,13 +7,13 @@ from typing import Literal
 import numpy as np
 from scipy import ndimage
 
-from ..base.arrays import Float, otsu_threshold
+from ..base.arrays import Bool, Float, otsu_threshold
 from ..base.errors import InputError
 from .edges import paved_edge
-from .lines import USUAL, WAVELENGTH, Line
+from .lines import STANDARD_DASHES, USUAL, WAVELENGTH, Line
 from .path import SPACING
 from .profiles import ACROSS, STRETCH, Grid, Profiles
-from .smoothing import fill_gaps, hidden_std, mean_with_std, robust_scale, smooth
+from .smoothing import bisquare, fill_gaps, hidden_std, mean_with_std, robust_scale, smooth
 
 RoadKind = Literal["dual", "single"]
 
@@ -58,9 +58,10 @@ class Band:
 
     @property
     def middle(self) -> Line | None:
-        """Return the most painted of the lines near the band's middle; None if there is none."""
+        """Return the most painted of the lines near the band's middle, a dashed one first; None if there is none."""
         middle = 0.5 * (self.low + self.high)
         near = [line for line in self.lines if abs(line.offset - middle) < _IN_THE_MIDDLE * self.width]
+        near = [line for line in near if (line.dash, line.gap) in STANDARD_DASHES] or near
         return max(near, key=lambda line: line.length * line.width, default=None)
 
     def guide(self, sign: int) -> Line:
@@ -140,7 +141,8 @@ def paved_by_brightness(profiles: Profiles, lines: list[Line]) -> Grid:
     """Return a mask of pavement (S, U), 1 or 0, told by brightness near the lane lines; NaN without points.
 
     Pavement is what is about as bright as the strips on both sides of the lane lines, after a blur of some metres:
-    grass, soil and gravel are mostly brighter. Otsu's threshold parts the differences from that brightness, if there
+    grass, soil and gravel are mostly brighter. Without a dashed line it is as bright as the smoother of two kinds of
+    ground. Otsu's threshold parts the differences from that brightness, if there
     are two kinds of them; if not, all is pavement.
     """
     brightness = _blur(profiles.brightness)
@@ -155,6 +157,8 @@ def paved_by_brightness(profiles: Profiles, lines: list[Line]) -> Grid:
                 inside = np.isfinite(column) & (column >= 0) & (column < len(profiles.offsets))
                 sure[rows[inside], column[inside].astype(np.int64)] = True
     sure &= known
+    if not any(is_dashed(line) for line in lines):
+        sure = _smoother_ground(profiles, brightness.astype(np.float64))
     if not sure.any():
         return np.where(known, 1.0, np.nan).astype(np.float32)
     counts = np.maximum(sure.sum(axis=1), 1)
@@ -171,9 +175,29 @@ def paved_by_brightness(profiles: Profiles, lines: list[Line]) -> Grid:
     return np.where(known, paved, np.nan).astype(np.float32)
 
 
+def is_dashed(line: Line) -> bool:
+    """Return whether a line has dashes as lane lines have."""
+    return not line.solid and line.dash < 10.0
+
+
+def _smoother_ground(profiles: Profiles, brightness: Float) -> Bool:
+    """Return a mask (S, U) of the smoother of dark and bright ground; of all that is known if that is little."""
+    known = np.isfinite(brightness)
+    if known.sum() < 2:
+        return known
+    dark = known & (brightness <= otsu_threshold(np.asarray(brightness[known], dtype=np.float64)))
+    bright = known & ~dark
+    step = np.abs(np.diff(profiles.height, axis=1, append=np.nan))
+    rough = [
+        float(np.median(of_kind)) if len(of_kind := step[kind & np.isfinite(step)]) else np.inf
+        for kind in (dark, bright)
+    ]
+    return dark if rough[0] <= rough[1] else bright
+
+
 def _lane_lines(lines: list[Line]) -> list[Line]:
     """Return the long dashed lines, or just the longest line if none is dashed."""
-    dashed = [line for line in lines if not line.solid and line.dash < 10.0]
+    dashed = [line for line in lines if is_dashed(line)]
     longest = max((line.length for line in dashed), default=0.0)
     return [line for line in dashed if line.length > 0.5 * longest] or sorted(lines, key=lambda item: -item.length)[:1]
 
@@ -308,6 +332,9 @@ def _vote_axis(lines: list[Line], axis: Float) -> Float:
     spread = np.array([_robust_spread(row - value) for row, value in zip(apart, middle, strict=True)])
     seen = np.isfinite(offsets) & np.isfinite(std)
     weight = np.where(seen, 1.0 / (spread[:, None] ** 2 + np.where(seen, std, 1.0) ** 2 + 1e-6), 0.0)
+    # A line whose distance changes, where a lane begins or ends, has no vote there.
+    away = np.where(seen, apart - middle[:, None], 0.0)
+    weight *= np.array([bisquare(row, max(width, USUAL)) for row, width in zip(away, spread, strict=True)])
     votes = np.where(seen, offsets - middle[:, None], 0.0)
     total = weight.sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -27,7 +27,8 @@ _FULL = 0.3  # of a line's usual width: less is no paint
 _FEWEST_POINTS = 4  # on a line in a stretch
 _SOLID = 0.65  # of its length: a line painted there is solid
 _Track = list[tuple[float, float]]
-_STANDARD_DASHES = ((6.0, 12.0), (4.0, 8.0), (3.0, 6.0), (6.0, 6.0), (3.0, 3.0))
+STANDARD_DASHES = ((6.0, 12.0), (4.0, 8.0), (3.0, 6.0), (6.0, 6.0), (3.0, 3.0))
+"""Usual lengths of dash and gap, m (RMS)."""
 _DASH_TOLERANCE = 0.6  # m
 
 
@@ -319,7 +320,7 @@ def _dashes(stations: Float, cover: Float) -> tuple[float, float, float, float]:
     strength = np.abs((phasor * (wave - wave.mean())).mean(axis=1))
     best = int(strength.argmax())
     period, dash = float(periods[best]), share * float(periods[best])
-    for standard, gap in _STANDARD_DASHES:
+    for standard, gap in STANDARD_DASHES:
         if abs(standard + gap - period) < 0.5 * _DASH_TOLERANCE and abs(standard - dash) < 2.0 * _DASH_TOLERANCE:
             dash, period = standard, standard + gap
     angle = float(np.angle((np.exp(2j * np.pi * stations[known] / period) * (wave - wave.mean())).mean()))

@@ -1,55 +1,31 @@
 """The whole way from a cloud to a parameter set, step by step."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..base.arrays import Float
+from ..base.arrays import Bool, Float
 from ..base.errors import InputError
 from ..base.progress import Progress, silent
 from ..fitting.fit import AxisFit, fit_axis
 from ..road.parameters import RoadParameters
 from .assemble import RoadMeasurements, RotationAxis, assemble_parameters
-from .cloud import PointKind, RoadCloud
+from .axis import FoundRoad, Options, find_axis, straighten_path
+from .cloud import RoadCloud
 from .edges import Surface, fit_surface, paved_edge
-from .judgement import Judgement, judge
-from .layout import FoundAxis, RoadKind, RoadLayout, axis_from_lines, find_layout
+from .judgement import Doubt, Judgement, judge
+from .layout import RoadLayout, find_layout
 from .lines import find_lines
 from .objects import face_guardrails, find_barriers, find_posts, measure_ground, standing_points
-from .path import SPACING, CloudPath, alignment_path, first_path, path_through
-from .profiles import STRETCH, Profiles, make_profiles, register_path
-from .section import SIDES, MeasuredSection, Side, SideSection, measure_section, snap_to_standard
+from .path import SPACING, CloudPath, alignment_path
+from .profiles import STRETCH, Profiles, make_profiles
+from .section import SIDES, MeasuredSection, Side, SideSection, carriageway_middles, measure_section, snap_to_standard
 from .smoothing import robust_scale, smooth
+from .views.fusion import FusedAxis
+from .widenings import Unlike, find_widenings
 
-Predictor = Callable[[RoadCloud, CloudPath], tuple[Float, Float]]
-"""Returns offset and standard deviation (M,) of the axis at each point of a path; NaN where it knows none."""
-
-_HALF_WIDTHS = (12.0, 45.0)  # m: least and largest reach of profiles
-_MARGIN = 8.0  # m of it outside of the surface that the first path was made from
-_AROUND = 12.0  # m beyond that reach in which barriers may stand
-_REGISTRATIONS = 2
-
-
-@dataclass(frozen=True)
-class Options:
-    """Settings of a reconstruction.
-
-    Attributes:
-        road: dual or single carriageway, where it is known.
-        tolerance: of the alignment's fit to the axis, m (`fit_axis`).
-        path: course of the road in local coordinates (K, 2), where the cloud alone doesn't show it.
-        predictor: tells the axis in place of the lines.
-        snap: take the standard cross-section's widths where the measured ones are near enough.
-        title: of the parameter set.
-    """
-
-    road: RoadKind | None = None
-    tolerance: float = 0.03
-    path: Float | None = None
-    predictor: Predictor | None = None
-    snap: bool = False
-    title: str = ""
+_AROUND = 12.0  # m beyond the profiles' reach in which barriers may stand
 
 
 @dataclass(frozen=True)
@@ -59,7 +35,7 @@ class Reconstruction:
     Attributes:
         parameters: the parameter set.
         measured: the same in numbers with standard deviations.
-        centre: the axis as it was measured, along ``path``.
+        centre: the axis as all views of it show it, along ``path``.
         path: parallel to the road, along which the lines were found.
         profiles, layout: along the alignment.
         surfaces: by side, along the alignment.
@@ -69,7 +45,7 @@ class Reconstruction:
 
     parameters: RoadParameters
     measured: RoadMeasurements
-    centre: FoundAxis
+    centre: FusedAxis
     path: CloudPath
     profiles: Profiles
     layout: RoadLayout
@@ -89,11 +65,10 @@ def reconstruct(cloud: RoadCloud, options: Options | None = None, progress: Prog
     path, half = straighten_path(cloud, options)
     whole, cloud = cloud, cloud.near(path, half + _AROUND)
     progress("lines", 0.3)
-    profiles, layout, centre = _axis(cloud, path, half, options)
-    path = path.shift_by(np.interp(path.stations, centre.stations, centre.offsets))
-    profiles, layout, centre = _axis(cloud, path, half, options)  # a straight line is smoothed better than a bent one
+    road = find_axis(cloud, path, half, options)
+    path, profiles, layout = road.path, road.profiles, road.layout
     progress("alignment", 0.5)
-    fit, rotation = fit_axis_and_profile(profiles, layout, centre, options.tolerance)
+    fit, rotation = fit_axis_and_profile(profiles, layout, road.axis, options.tolerance)
     progress("section", 0.6)
     along = alignment_path(fit.alignment)
     profiles = make_profiles(cloud, along, half, exact=True)
@@ -106,6 +81,7 @@ def reconstruct(cloud: RoadCloud, options: Options | None = None, progress: Prog
     ground = measure_ground(whole, along, section, fit.profile.elevation(along.stations))
     standing = standing_points(cloud, along, profiles, section)
     barriers, used = find_barriers(standing)
+    bays, others = find_widenings(section, profiles.middles)
     measured = RoadMeasurements(
         fit=fit,
         cloud=cloud,
@@ -117,55 +93,29 @@ def reconstruct(cloud: RoadCloud, options: Options | None = None, progress: Prog
         posts=find_posts(standing, used),
         ground=ground,
         title=options.title,
+        bays=bays,
     )
     parameters = assemble_parameters(measured)
     notes = [*layout.notes, *_notes(cloud, section, measured)]
-    judgement = judge(profiles, layout, section)
-    return Reconstruction(parameters, measured, centre, path, profiles, layout, surfaces, judgement, notes)
+    judgement = judge(profiles, layout, carriageway_middles(section), _rivals_along(road, along, profiles))
+    judgement = replace(judgement, sections=tuple(map(_section_doubt, others)))
+    return Reconstruction(parameters, measured, road.axis, path, profiles, layout, surfaces, judgement, notes)
 
 
-def straighten_path(cloud: RoadCloud, options: Options) -> tuple[CloudPath, float]:
-    """Return a path parallel to the road, and the half width (m) beside it within which there is something to see."""
-    xy = cloud.xyz[cloud.of(PointKind.PAVEMENT, PointKind.MARKING) if cloud.labelled else cloud.surface, :2]
-    path = path_through(options.path) if options.path is not None else first_path(xy)
-    _, offset = path.project(xy[:: max(1, len(xy) // 200_000)])
-    near = np.abs(offset)[np.abs(offset) < _HALF_WIDTHS[1]]
-    if not len(near):
-        raise InputError("--path", None, "no point of the road lies within 45 m of it")
-    half = float(np.clip(np.percentile(near, 99) + _MARGIN, *_HALF_WIDTHS))
-    for _ in range(_REGISTRATIONS):
-        path = register_path(path, make_profiles(cloud, path, half))
-    return path, half
+def _section_doubt(other: Unlike) -> Doubt:
+    """Return what is said of a stretch whose pavement is unlike the cross-section."""
+    unlike = f"{abs(other.wider_by):.1f} m {'wider' if other.wider_by > 0.0 else 'narrower'}"
+    return Doubt(other.start, other.end, (f"{other.side}: the pavement is {unlike} than the cross-section",))
 
 
-def _axis(cloud: RoadCloud, path: CloudPath, half: float, options: Options) -> tuple[Profiles, RoadLayout, FoundAxis]:
-    """Return exact profiles along a path, the layout of lines that they show, and the axis."""
-    profiles = make_profiles(cloud, path, half, exact=True)
-    layout = find_layout(profiles, find_lines(profiles), options.road)
-    return profiles, layout, _find_axis(cloud, profiles, layout, options)
-
-
-def _find_axis(cloud: RoadCloud, profiles: Profiles, layout: RoadLayout, options: Options) -> FoundAxis:
-    """Return the axis along the path: from the lines, or from the learned predictor if one is given."""
-    by_lines = axis_from_lines(layout)
-    if options.predictor is None:
-        return by_lines
-    offset, std = options.predictor(cloud, profiles.path)
-    along = profiles.path.stations
-    known = np.isfinite(offset)
-    if not known.any():
-        raise InputError("--run", None, "the model tells the axis nowhere in this cloud")
-    stations = by_lines.stations
-    inside = np.isfinite(by_lines.raw)
-    raw = np.interp(stations, along[known], offset[known])
-    deviation = np.interp(stations, along[known], std[known])
-    weights = np.where(inside, 1.0 / np.maximum(deviation, 0.01) ** 2, 0.0)
-    smoothed = smooth(np.where(inside, raw, np.nan), weights, STRETCH * SPACING, 60.0)
-    return FoundAxis(stations, smoothed.values, smoothed.std, np.where(inside, raw, np.nan))
+def _rivals_along(road: FoundRoad, along: CloudPath, profiles: Profiles) -> Bool:
+    """Return a mask (K,) of the alignment's stretches beside which the views of the axis disagree."""
+    station, _ = along.project(road.path.place(road.axis.stations, road.axis.offsets))
+    return np.interp(profiles.middles, station, road.axis.open.astype(np.float64)) > 0.5
 
 
 def fit_axis_and_profile(
-    profiles: Profiles, layout: RoadLayout, centre: FoundAxis, tolerance: float
+    profiles: Profiles, layout: RoadLayout, centre: FusedAxis, tolerance: float
 ) -> tuple[AxisFit, RotationAxis]:
     """Return the fitted alignment and profile, and the line about which the crossfall turns.
 
@@ -178,6 +128,8 @@ def fit_axis_and_profile(
         rotation = "inner_edge"
     right, left = heights[rotation]
     height = np.where(np.isfinite(left) & np.isfinite(right), 0.5 * (left + right), np.fmin(left, right))
+    if not np.isfinite(height).any():
+        height = _ground_heights(profiles, centre)
     known = np.isfinite(centre.raw)
     first, last = np.flatnonzero(known)[[0, -1]]
     kept = slice(int(first), int(last) + 1)
@@ -187,6 +139,17 @@ def fit_axis_and_profile(
     offset = _replace_faults(centre.raw, centre.offsets)[kept]
     plan = profiles.path.place(centre.stations[kept], offset)
     return fit_axis(np.column_stack([plan, _replace_faults(height, smoothed.values)[kept]]), tolerance), rotation
+
+
+def _ground_heights(profiles: Profiles, centre: FusedAxis) -> Float:
+    """Return the median heights (K,), m, of the ground within a metre of the axis, for want of a pavement's."""
+    result = np.full(profiles.stretches, np.nan)
+    for number, offset in enumerate(centre.offsets):
+        rows = slice(number * STRETCH, (number + 1) * STRETCH)
+        near = profiles.height[rows, profiles.column(offset - 1.0) : profiles.column(offset + 1.0) + 1]
+        if np.isfinite(near).any():
+            result[number] = float(np.nanmedian(near))
+    return result
 
 
 def _replace_faults(raw: Float, smoothed: Float) -> Float:
@@ -199,7 +162,7 @@ def _replace_faults(raw: Float, smoothed: Float) -> Float:
     return np.where(np.isfinite(raw) & (apart <= 4.0 * max(usual, 1e-3)), raw, smoothed)
 
 
-def _pivot_heights(profiles: Profiles, layout: RoadLayout, centre: FoundAxis, rotation: str) -> tuple[Float, Float]:
+def _pivot_heights(profiles: Profiles, layout: RoadLayout, centre: FusedAxis, rotation: str) -> tuple[Float, Float]:
     """Return the heights (K,), m, of right and left carriageway at the line that the crossfall turns about."""
     result = []
     axis = centre.offsets

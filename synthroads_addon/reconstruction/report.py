@@ -17,8 +17,6 @@ from .smoothing import difference_figures
 _MOST_POINTS = 400_000
 _FROM_EDGES = 0.1  # m: nearer to an edge of the pavement than this a point may lie beside it
 _FAULT = 0.5  # m: a point farther from the surface is none of it
-_WIDER = 1.0  # m beyond the usual edge, for so long:
-_LONG = 30.0  # m
 
 
 def report(found: Reconstruction, cloud: RoadCloud) -> dict[str, Any]:
@@ -37,7 +35,7 @@ def report(found: Reconstruction, cloud: RoadCloud) -> dict[str, Any]:
         "edges": {name: _edges(side, found, geometry) for name, side in section.sides.items()},
         "lines": _lines(found, geometry),
         "crossfall": {name: _figures(100.0 * _excess_fall(found, geometry, name)) for name in section.sides},
-        "widenings": {name: _widenings(side, found.measured.stations) for name, side in section.sides.items()},
+        "emergency_bays": [_rounded(asdict(bay)) for bay in found.measured.bays],
         "objects": _objects(found),
         "rules_broken": [asdict(violation) for violation in violations],
         "notes": found.notes,
@@ -140,17 +138,8 @@ def _excess_fall(found: Reconstruction, geometry: RoadGeometry, side: Side) -> F
     return found.surfaces[side].fall - modelled
 
 
-def _widenings(side: SideSection, stations: Float) -> list[dict[str, float]]:
-    """Return as JSON data the stretches with wider pavement (exits, entries, bays), which aren't reconstructed."""
-    edge = side.outer_edge.offsets
-    usual = float(np.nanmedian(np.where(side.usual, edge, np.nan))) if side.usual.any() else np.nan
-    wide = np.isfinite(edge) & (edge > usual + _WIDER)
-    result = []
-    for part in np.split(np.arange(len(wide)), np.flatnonzero(np.diff(wide)) + 1):
-        if len(part) and wide[part[0]] and stations[part[-1]] - stations[part[0]] >= _LONG:
-            start, end = (round(float(stations[part[i]]), 1) for i in (0, -1))
-            result.append({"start": start, "end": end, "wider_by": round(float(np.median(edge[part]) - usual), 2)})
-    return result
+def _rounded(values: dict[str, Any]) -> dict[str, Any]:
+    return {name: round(value, 3) if isinstance(value, float) else value for name, value in values.items()}
 
 
 def _objects(found: Reconstruction) -> dict[str, Any]:

@@ -5,6 +5,7 @@ from typing import Any, Literal, Self
 
 import numpy as np
 from scipy import ndimage
+from scipy.signal import find_peaks
 
 from ..base.arrays import Bool, Float
 from ..road.guidelines import STANDARD_CROSS_SECTIONS, StandardCrossSection
@@ -27,6 +28,7 @@ _USUAL_STRIP = 0.5
 _FEWEST_EDGES = 0.2  # of the stretches must show an edge
 _AROUND, _SOLID = 7, 0.8  # stretches around one, and their share of paint: along a dashed line it is less
 _FEWEST_STRETCHES = 6
+_COMMON = 0.35  # of the most common width: others so common may be the usual one
 _MODE = 0.4  # m about the most common width
 _NARROWEST, _WIDEST_LANE, _WIDEST_HALF = 2.3, 5.2, 8.0  # m from a single carriageway's axis to lines and edges
 _WIDEST = 6.0  # m that a strip or shoulder can be
@@ -148,6 +150,14 @@ def measure_section(profiles: Profiles, layout: RoadLayout, marked: bool) -> Mea
         return MeasuredSection("single", {part.side: _half_section(part) for part in parts}, layout.bands[0].middle)
     sides = {part.side: _carriageway(part) if len(part.band.lines) > 1 else _assumed_section(part) for part in parts}
     return MeasuredSection("dual", sides, None, *nearest_standard(sides))
+
+
+def carriageway_middles(section: MeasuredSection) -> list[float]:
+    """Return the offsets, m, of the carriageways' middles, about which is pavement for sure."""
+    if section.kind != "dual":
+        return [0.0]
+    sides = section.sides.values()
+    return [side.sign * (side.inner_offset.value + 0.5 * side.paved_width.value) for side in sides]
 
 
 @dataclass(frozen=True)
@@ -336,7 +346,9 @@ def _usual_stretches(outside: Float, line: Line | None) -> Bool:
     if not usual.any():
         return usual
     count, edges = np.histogram(outside[usual], np.arange(-1.0, 10.0, 0.1))
-    peak = int(ndimage.uniform_filter1d(count.astype(np.float64), 3).argmax())
+    common = ndimage.uniform_filter1d(count.astype(np.float64), 3)
+    # Turnouts make the pavement wider, and on a short road may be longer than what lies between them.
+    peak = int(find_peaks(np.pad(common, 1), height=_COMMON * common.max())[0][0]) - 1
     return usual & (np.abs(outside - edges[peak] - 0.05) < _MODE)
 
 

@@ -120,7 +120,7 @@ class PlyReader(CloudReader):
     def __init__(self, path: Path) -> None:
         self._file = path.open("rb")
         try:
-            count, self._type, notes = _read_header(path, self._file)
+            count, self._type, notes = read_ply_header(path, self._file)
             self._names = set(self._type.names or ())
             if not {"x", "y", "z"} <= self._names:
                 raise InputError(str(path), None, "has no x, y, z")
@@ -168,7 +168,7 @@ def _sixteen_bits(channel: AnyArray) -> UInt16:
     return channel.astype(np.uint16) * np.uint16(257 if channel.dtype.itemsize == 1 else 1)
 
 
-def _read_header(path: Path, file: BinaryIO) -> tuple[int, np.dtype[Any], Any]:
+def read_ply_header(path: Path, file: BinaryIO) -> tuple[int, np.dtype[Any], Any]:
     """Return the number and the record type of a PLY's points, and the project's notes (None without)."""
     if file.readline(8).strip() != b"ply":
         raise InputError(str(path), None, "is not a PLY file")

@@ -49,7 +49,7 @@ def test_where_no_line_is_told_there_is_none(document: object) -> None:
 
 def _run_of(task: str, monkeypatch: pytest.MonkeyPatch) -> Any:
     trained = SimpleNamespace(configuration=SimpleNamespace(task=task))
-    monkeypatch.setattr(learned_axis.Run, "open", lambda folder: trained)
+    monkeypatch.setattr(learned_axis, "open_run", lambda folder: trained)
     return trained
 
 

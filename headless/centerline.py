@@ -1,0 +1,119 @@
+"""Find a road's centreline in a cloud by several views of it, with its deviations and where it isn't to be trusted."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless.commands import Outcome, entry
+from headless.messages import progress_bar
+from synthroads_addon.base.errors import InputError, OutputError
+from synthroads_addon.base.files import write_file
+from synthroads_addon.base.schema import canonical_json
+
+if TYPE_CHECKING:
+    from synthroads_addon.reconstruction.axis import Options, Predictor
+    from synthroads_addon.reconstruction.cloud import RoadCloud
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `synthroads centerline` to its parser."""
+    parser.add_argument("cloud", type=Path, metavar="CLOUD", help="cloud to read (.laz, .las, .ply, .e57, .npz)")
+    text = "centreline (.geojson); a report (.json) is written beside it (centerline.geojson)"
+    parser.add_argument("--output", type=Path, default=Path("centerline.geojson"), metavar="FILE", help=text)
+    text = "kind of road, where it is known (auto: found out)"
+    parser.add_argument("--road", choices=("auto", "dual", "single"), default="auto", help=text)
+    text = "course of the road, roughly: CSV or GeoJSON in the cloud's coordinates (found in the cloud)"
+    parser.add_argument("--path", type=Path, metavar="FILE", help=text)
+    text = "folder of a trained centreline model, or a shipped one's name (`synthroads list models`): one more view of "
+    text += "the axis; none: only those that learn nothing (the shipped model trained on what is most like the cloud)"
+    parser.add_argument("--run", metavar="DIR_OR_NAME", help=text)
+    text = "known axis (CSV, GeoJSON) to compare with afterwards; it changes nothing"
+    parser.add_argument("--truth", type=Path, metavar="FILE", help=text)
+    parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
+
+
+def run(arguments: argparse.Namespace) -> Outcome:
+    """Run `synthroads centerline`; return exit code (3 if doubtful), report as JSON data and printed text."""
+    lines, table = arguments.output, arguments.output.with_suffix(".json")
+    if lines.suffix.lower() != ".geojson":
+        raise InputError("--output", str(lines), "must end in .geojson")
+    for path in (lines, table):
+        if path.exists() and not arguments.overwrite:
+            raise OutputError("--output", str(path), "is there already; --overwrite replaces it")
+    from synthroads_addon.reconstruction.centreline import centreline_geojson, centreline_report, find_centreline
+    from synthroads_addon.reconstruction.cloud import read_road_cloud
+    from synthroads_addon.reconstruction.comparison import compare_line
+    from synthroads_addon.road.centerline import read_axis
+
+    axis = read_axis(arguments.truth) if arguments.truth else None
+    cloud = read_road_cloud(arguments.cloud)
+    network, why = _network(arguments)
+    found = find_centreline(cloud, _options(arguments, cloud, network), progress_bar(arguments))
+    result = centreline_report(found, cloud) | {"network": why}
+    if axis is not None:
+        result["comparison"] = compare_line(found.path, axis[:, :2] - cloud.origin[:2])
+    text = canonical_json(centreline_geojson(found, cloud, arguments.cloud.stem))
+    write_file(lines, text.encode(), overwrite=arguments.overwrite)
+    write_file(table, canonical_json(result).encode(), overwrite=arguments.overwrite)
+    return 3 if found.judgement.doubts else 0, result, summary(result, lines)
+
+
+def _network(arguments: argparse.Namespace) -> tuple[Predictor | None, dict[str, Any]]:
+    """Return the network's view that is asked for, or that of the shipped model for the cloud, and why it is that."""
+    given = arguments.run
+    if given == "none":
+        return None, {"model": None, "why": "no network, as asked"}
+    try:
+        from ml.centerline.learned_axis import learned_axis
+        from ml.choice import choose_model
+    except ModuleNotFoundError as error:
+        if given is not None or error.name != "torch":
+            raise
+        return None, {"model": None, "why": "no network: PyTorch isn't installed"}
+    folder = arguments.output.absolute().parent
+    if given is not None:
+        return learned_axis(Path(given), arguments.cloud, folder), {"model": given, "why": f"{given}, as asked"}
+    try:
+        choice = choose_model(arguments.cloud, "centerline")
+    except InputError as error:
+        return None, {"model": None, "why": f"no network: {error}"}
+    if choice.doubtful:
+        return None, choice.to_dict() | {"model": None, "why": f"no network: {choice.why()}"}
+    return learned_axis(Path(choice.card.name), arguments.cloud, folder), choice.to_dict()
+
+
+def _options(arguments: argparse.Namespace, cloud: RoadCloud, network: Predictor | None) -> Options:
+    from synthroads_addon.reconstruction.axis import Options
+    from synthroads_addon.road.centerline import read_axis
+
+    course = read_axis(arguments.path)[:, :2] - cloud.origin[:2] if arguments.path else None
+    return Options(road=None if arguments.road == "auto" else arguments.road, path=course, predictor=network)
+
+
+def summary(result: dict[str, Any], output: Path) -> str:
+    """Return a centreline's report as text: length, views, doubts, comparison with the truth."""
+    std = result["std"]
+    lines = [f"{result['road']} carriageway, centreline of {result['length']:.0f} m (std {std['mean']:.2f} m)"]
+    for view in result["views"]:
+        beside = view["from_centreline"].get("rms")
+        apart = "" if beside is None else f", {beside:.2f} m rms from it"
+        lines.append(f"  {view['name']}: seen on {view['seen']:.0%}, agrees on {view['used']:.0%}{apart}")
+    lines.append(f"  network: {result['network']['why']}")
+    lines += [f"  note: {note}" for note in result["notes"]]
+    for doubt in result["judgement"]["doubtful"]:
+        lines.append(f"  doubtful from {doubt['start']:.0f} to {doubt['end']:.0f} m: {'; '.join(doubt['why'])}")
+    if "comparison" in result:
+        off = result["comparison"]["centreline"]
+        apart = f"{off['mae']:.3f} m on average, {off['largest']:.3f} m at most" if off else "nothing in common"
+        lines.append(f"  from the truth: {apart}")
+    return "\n".join([*lines, f"written to {output}"])
+
+
+if __name__ == "__main__":
+    entry("centerline")

@@ -1,0 +1,89 @@
+"""Centrelines by the views that learn nothing, and by these with a network's, as predictors that are measured."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from synthroads_addon.base.arrays import Float, UInt8
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.reconstruction.axis import FoundRoad, Options, find_axis, straighten_path
+from synthroads_addon.reconstruction.axis import Predictor as AxisPredictor
+from synthroads_addon.reconstruction.cloud import KIND_OF_CLASS, PointKind, RoadCloud
+from synthroads_addon.reconstruction.path import CloudPath
+from synthroads_addon.reconstruction.views.fusion import DEFINITION
+
+from ..data.axis import MeasuredAxis
+from ..data.frames import Frames
+from ..data.points import UNSORTED_CLASSES
+from ..data.roads import LearningRoad
+from ..scores.evaluation import Predictor
+
+_LABELLED_SHARE, _MARKED_SHARE = 0.01, 0.001
+_FEWEST = 2000
+
+
+def road_cloud(road: LearningRoad) -> RoadCloud:
+    """Return a road's ground points as the reconstruction reads them from a file; unsorted ones count as ground."""
+    table = np.full(256, PointKind.OTHER, dtype=np.uint8)
+    for number, name in road.class_names.items():
+        unsorted = name in UNSORTED_CLASSES
+        table[number] = PointKind.GROUND if unsorted else KIND_OF_CLASS.get(name, PointKind.OTHER)
+    own = np.asarray(road.belonging)
+    kind: UInt8 = table[road.class_id[own]]
+    paved = np.isin(kind, (PointKind.PAVEMENT, PointKind.MARKING))
+    labelled = bool(paved.sum() > _LABELLED_SHARE * len(kind))
+    marked = labelled and bool((kind == PointKind.MARKING).sum() > _MARKED_SHARE * paved.sum())
+    intensity = np.asarray(road.intensity[own], dtype=np.float32)
+    xyz = np.asarray(road.xyz[own], dtype=np.float64)
+    return RoadCloud(xyz, intensity, kind, np.zeros(3), road.epsg, labelled, marked, len(kind), {})
+
+
+def views_predictor(network: Predictor | None = None) -> Predictor:
+    """Return a predictor of centres and deviations (M, 2), m, by all views that learn nothing, and a network's.
+
+    Where no road can be made out nothing is predicted.
+    """
+
+    def predict(road: LearningRoad, frames: Frames) -> Float:
+        view = None if network is None else _network_view(network, road, frames)
+        options = Options(path=frames.position, predictor=view)
+        try:
+            cloud = road_cloud(road)
+            if len(cloud.xyz) < _FEWEST:
+                raise InputError("road", len(cloud.xyz), f"at least {_FEWEST} points are needed")
+            path, half = straighten_path(cloud, options)
+            found = find_axis(cloud, path, half, options)
+        except InputError:
+            return np.full((len(frames), 2), np.nan)
+        return _in_frames(found, frames)
+
+    return predict
+
+
+def _network_view(network: Predictor, road: LearningRoad, frames: Frames) -> AxisPredictor:
+    found = network(road, frames)
+
+    def predict(cloud: RoadCloud, path: CloudPath) -> tuple[Float, Float]:
+        known = np.isfinite(found[:, 0])
+        offset, std = np.full(len(path.points), np.nan), np.full(len(path.points), np.nan)
+        if known.sum() < 2:
+            return offset, std
+        station, beside = path.project(frames.at(found[:, 0])[known])
+        order = np.argsort(station, kind="stable")
+        inside = (path.stations >= station.min()) & (path.stations <= station.max())
+        offset = np.where(inside, np.interp(path.stations, station[order], beside[order]), np.nan)
+        std = np.where(inside, np.interp(path.stations, station[order], found[known, 1][order]), np.nan)
+        return offset, std
+
+    return predict
+
+
+def _in_frames(found: FoundRoad, frames: Frames) -> Float:
+    """Return y (m) at which a found axis crosses each of M frames, and its deviation there, (M, 2)."""
+    axis = found.axis
+    along = found.path.stations
+    points = found.path.place(along, np.interp(along, axis.stations, axis.offsets))
+    y, _ = MeasuredAxis(points).crossing(frames.position, frames.direction)
+    station, _ = found.path.project(frames.position)
+    std = np.hypot(DEFINITION, np.interp(station, axis.stations, axis.std))
+    return np.column_stack([y, np.where(np.isfinite(y), std, np.nan)])

@@ -1,0 +1,108 @@
+"""Weights in the safetensors format: a header that says where each tensor lies, and the tensors' bytes, nothing to run.
+
+The format is that of https://huggingface.co/docs/safetensors: 8 bytes with the header's length, the header as JSON, the
+data. Readers of others open these files, and theirs are read here.
+"""
+
+import json
+from collections.abc import Mapping
+from math import prod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from synthroads_addon.base.errors import InputError, MissingFileError
+from synthroads_addon.base.files import write_file
+
+METADATA = "__metadata__"
+_LENGTH = 8
+_LARGEST_HEADER = 100_000_000
+_ALIGNMENT = 8
+_TYPES: dict[str, torch.dtype] = {
+    "F64": torch.float64,
+    "F32": torch.float32,
+    "F16": torch.float16,
+    "BF16": torch.bfloat16,
+    "I64": torch.int64,
+    "I32": torch.int32,
+    "I16": torch.int16,
+    "I8": torch.int8,
+    "U8": torch.uint8,
+    "BOOL": torch.bool,
+}
+_NAMES = {dtype: name for name, dtype in _TYPES.items()}
+
+
+def write_tensors(
+    path: Path, tensors: Mapping[str, Tensor], metadata: Mapping[str, str], *, overwrite: bool = False
+) -> None:
+    """Write tensors by name, in the order of their names, and texts about them; the same bytes for the same content.
+
+    Raises:
+        OutputError: the file is there already or can't be written.
+    """
+    header: dict[str, Any] = {METADATA: dict(sorted(metadata.items()))}
+    parts: list[bytes] = []
+    begin = 0
+    for name in sorted(tensors):
+        tensor = tensors[name].detach().cpu().contiguous()
+        content = tensor.reshape(-1).view(torch.uint8).numpy().tobytes() if tensor.numel() else b""
+        offsets = [begin, begin + len(content)]
+        header[name] = {"dtype": _NAMES[tensor.dtype], "shape": list(tensor.shape), "data_offsets": offsets}
+        parts.append(content)
+        begin += len(content)
+    text = json.dumps(header, separators=(",", ":"), ensure_ascii=False).encode()
+    text += b" " * (-len(text) % _ALIGNMENT)
+    write_file(path, b"".join([len(text).to_bytes(_LENGTH, "little"), text, *parts]), overwrite=overwrite)
+
+
+def read_metadata(path: Path) -> dict[str, str]:
+    """Return the texts that a safetensors file says of its tensors, without reading these.
+
+    Raises:
+        MissingFileError, InputError: there is no such file, or it is damaged.
+    """
+    return dict(_header(path)[0].get(METADATA, {}))
+
+
+def read_tensors(path: Path) -> dict[str, Tensor]:
+    """Return the tensors of a safetensors file by name, as they are stored.
+
+    Raises:
+        MissingFileError, InputError: there is no such file, or it is damaged.
+    """
+    header, begin = _header(path)
+    content = np.fromfile(path, dtype=np.uint8, offset=begin)
+    return {name: _tensor(path, name, told, content) for name, told in header.items() if name != METADATA}
+
+
+def _header(path: Path) -> tuple[dict[str, Any], int]:
+    """Return a file's header and the offset of its data."""
+    if not path.is_file():
+        raise MissingFileError(str(path), None, "no such file of weights")
+    with path.open("rb") as file:
+        length = int.from_bytes(file.read(_LENGTH), "little")
+        text = file.read(length) if 0 < length <= _LARGEST_HEADER else b""
+    try:
+        header = json.loads(text)
+    except ValueError:
+        header = None
+    if len(text) != length or not isinstance(header, dict):
+        raise InputError(str(path), None, "is no file of weights (safetensors), or damaged")
+    return header, _LENGTH + length
+
+
+def _tensor(path: Path, name: str, told: Any, content: np.ndarray[Any, np.dtype[np.uint8]]) -> Tensor:
+    damaged = InputError(f"{path}: {name}", None, "lies outside of the file, or isn't as long as its shape says")
+    try:
+        dtype, shape, (first, last) = _TYPES[told["dtype"]], [int(size) for size in told["shape"]], told["data_offsets"]
+    except (KeyError, TypeError, ValueError):
+        raise damaged from None
+    size = prod(shape) * dtype.itemsize
+    if not 0 <= first <= last <= len(content) or last - first != size or any(count < 0 for count in shape):
+        raise damaged
+    part = np.array(content[first:last])  # aligned and writable, as torch wants it
+    return torch.from_numpy(part).view(dtype).reshape(shape) if size else torch.empty(shape, dtype=dtype)

@@ -1,0 +1,105 @@
+"""The models that come with the package, opened like runs of one's own; and how a run becomes one of them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from synthroads_addon.base.errors import InputError
+
+from .cards import LARGEST_MB, ModelCard, model_names, read_card
+from .configuration import from_data
+from .runs import Run
+from .safetensors import read_metadata, read_tensors, write_tensors
+
+
+@dataclass
+class ShippedRun(Run[Any]):
+    """A shipped model in the place of a run: configuration, weights and calibration come from one file.
+
+    Attributes:
+        card: of the model.
+    """
+
+    card: ModelCard | None = None
+
+    def last_checkpoint(self, device: torch.device | str = "cpu") -> dict[str, Any] | None:
+        """Return the model's weights in single precision on a device, with its last epoch's number."""
+        tensors = read_tensors(self._weights())
+        model = {name: (value.float() if value.dtype == torch.float16 else value) for name, value in tensors.items()}
+        on_device = {name: value.to(device) for name, value in model.items()}
+        return {"model": on_device, "epoch": self.configuration.schedule.epochs}
+
+    def calibration(self) -> dict[str, Any] | None:
+        """Return the calibration of its deviations as JSON data, None if it has none."""
+        told = read_metadata(self._weights()).get("calibration")
+        return json.loads(told) if told else None
+
+    def _weights(self) -> Path:
+        assert self.card is not None
+        return self.card.weights
+
+
+def open_shipped(name: str) -> ShippedRun:
+    """Open a shipped model by its name.
+
+    Raises:
+        InputError: there is none of this name, or its weights are damaged.
+    """
+    card = read_card(name)
+    told = read_metadata(card.weights).get("configuration", "")
+    try:
+        data = json.loads(told)
+    except ValueError:
+        raise InputError(str(card.weights), None, "says nothing of the network that its weights are of") from None
+    return ShippedRun(card.weights.with_suffix(""), from_data(data, str(card.weights)), card=card)
+
+
+def open_run(run: Path) -> Run[Any]:
+    """Open a trained run by its folder, or a shipped model by its name; a folder of that name comes first.
+
+    Raises:
+        MissingFileError, InputError: there is neither.
+    """
+    if run.is_dir() or len(run.parts) > 1 or str(run) not in model_names():
+        return Run.open(run)
+    return open_shipped(str(run))
+
+
+def ship(run: Run[Any], weights: Path, *, overwrite: bool = False) -> int:
+    """Write a trained run's weights in half precision, with its configuration and calibration; return the bytes.
+
+    The optimiser stays behind, and paths of data and caches are those of the configuration.
+
+    Raises:
+        InputError: the run isn't finished, or the weights take more than `LARGEST_MB`.
+        OutputError: the file is there already, or can't be written.
+    """
+    state = run.last_checkpoint()
+    if state is None or int(state["epoch"]) < run.configuration.schedule.epochs:
+        raise InputError(str(run.folder), None, "its training isn't finished; `synthroads train --resume` goes on")
+    tensors = {name: _halved(value) for name, value in state["model"].items()}
+    size = sum(value.numel() * value.element_size() for value in tensors.values())
+    if size > LARGEST_MB * 1e6:
+        raise InputError(str(run.folder), round(size / 1e6, 1), f"its weights must take less than {LARGEST_MB:g} MB")
+    metadata: Mapping[str, str] = {"format": "pt", "configuration": _as_text(run.configuration.to_dict())}
+    if (calibration := run.calibration()) is not None:
+        metadata = {**metadata, "calibration": _as_text(calibration)}
+    write_tensors(weights, tensors, metadata, overwrite=overwrite)
+    return weights.stat().st_size
+
+
+def _halved(value: torch.Tensor) -> torch.Tensor:
+    """Return a tensor in half precision; integers, and values beyond its range, as they are."""
+    if not value.is_floating_point() or float(value.abs().max() if value.numel() else 0.0) > 6e4:
+        return value
+    return value.half()
+
+
+def _as_text(data: Any) -> str:
+    return json.dumps(data, sort_keys=True, separators=(",", ":"))

@@ -1,0 +1,109 @@
+"""The road found in a cloud: a path parallel to it, the lines beside it, and the axis that all views agree on."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.arrays import Float
+from ..base.errors import InputError
+from .cloud import PointKind, RoadCloud
+from .layout import RoadKind, RoadLayout, find_layout
+from .lines import find_lines
+from .path import CloudPath, first_path, path_through
+from .profiles import Profiles, make_profiles, register_path
+from .views.fusion import FusedAxis
+from .views.look import find_fused_axis
+from .views.view import View
+
+Predictor = Callable[[RoadCloud, CloudPath], tuple[Float, Float]]
+"""Returns offset and standard deviation (M,) of the axis at each point of a path; NaN where it knows none."""
+
+
+_HALF_WIDTHS = (12.0, 45.0)  # m: least and largest reach of profiles
+_MARGIN = 8.0  # m of it outside of the surface that the first path was made from
+_REGISTRATIONS = 2
+
+
+@dataclass(frozen=True)
+class Options:
+    """Settings of a reconstruction.
+
+    Attributes:
+        road: dual or single carriageway, where it is known.
+        tolerance: of the alignment's fit to the axis, m (`fit_axis`).
+        path: course of the road in local coordinates (K, 2), where the cloud alone doesn't show it.
+        predictor: one more view of the axis, beside those that learn nothing.
+        snap: take the standard cross-section's widths where the measured ones are near enough.
+        title: of the parameter set.
+    """
+
+    road: RoadKind | None = None
+    tolerance: float = 0.03
+    path: Float | None = None
+    predictor: Predictor | None = None
+    snap: bool = False
+    title: str = ""
+
+
+@dataclass(frozen=True)
+class FoundRoad:
+    """A road found in a cloud, before anything is fitted to it.
+
+    Attributes:
+        path: parallel to the road.
+        profiles, layout: along the path.
+        axis: that all views of it agree on.
+    """
+
+    path: CloudPath
+    profiles: Profiles
+    layout: RoadLayout
+    axis: FusedAxis
+
+
+def straighten_path(cloud: RoadCloud, options: Options) -> tuple[CloudPath, float]:
+    """Return a path parallel to the road, and the half width (m) beside it within which there is something to see."""
+    xy = cloud.xyz[cloud.of(PointKind.PAVEMENT, PointKind.MARKING) if cloud.labelled else cloud.surface, :2]
+    path = path_through(options.path) if options.path is not None else first_path(xy)
+    _, offset = path.project(xy[:: max(1, len(xy) // 200_000)])
+    near = np.abs(offset)[np.abs(offset) < _HALF_WIDTHS[1]]
+    if not len(near):
+        raise InputError("--path", None, "no point of the road lies within 45 m of it")
+    half = float(np.clip(np.percentile(near, 99) + _MARGIN, *_HALF_WIDTHS))
+    for _ in range(_REGISTRATIONS):
+        path = register_path(path, make_profiles(cloud, path, half))
+    return path, half
+
+
+def find_axis(cloud: RoadCloud, path: CloudPath, half: float, options: Options) -> FoundRoad:
+    """Return profiles along the road, the layout of lines that they show, and the axis that all views agree on.
+
+    Twice: along the path that is given, and along the axis that was found beside it, as a straight line is smoothed
+    better than a bent one, and as a path that has slipped by a lane comes back.
+    """
+    profiles = make_profiles(cloud, path, half, exact=True)
+    layout = find_layout(profiles, find_lines(profiles), options.road)
+    first = find_fused_axis(profiles, layout)
+    path = path.shift_by(np.interp(path.stations, first.stations, first.offsets))
+    profiles = make_profiles(cloud, path, half, exact=True)
+    layout = find_layout(profiles, find_lines(profiles), options.road)
+    return FoundRoad(path, profiles, layout, find_fused_axis(profiles, layout, _learned_view(cloud, profiles, options)))
+
+
+def _learned_view(cloud: RoadCloud, profiles: Profiles, options: Options) -> list[View]:
+    """Return what the learned predictor says of the axis in the profiles' stretches, as a view; nothing without one.
+
+    Raises:
+        InputError: the model tells the axis nowhere in this cloud.
+    """
+    if options.predictor is None:
+        return []
+    offset, std = options.predictor(cloud, profiles.path)
+    along, known = profiles.path.stations, np.isfinite(offset)
+    if not known.any():
+        raise InputError("--run", None, "the model tells the axis nowhere in this cloud")
+    seen = np.interp(profiles.middles, along, known.astype(np.float64)) > 0.5
+    value = np.interp(profiles.middles, along[known], offset[known])
+    deviation = np.interp(profiles.middles, along[known], np.maximum(std[known], 0.01))
+    return [View("network", np.where(seen, value, np.nan), np.where(seen, deviation, np.inf))]

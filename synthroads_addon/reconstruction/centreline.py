@@ -1,0 +1,147 @@
+"""A road's centreline as it is seen in a cloud, without an alignment fitted to it, and how far it is to be trusted."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..base.arrays import Float
+from ..base.progress import Progress, silent
+from .axis import Options, find_axis, straighten_path
+from .cloud import RoadCloud
+from .judgement import Judgement, judge
+from .layout import RoadKind, find_layout
+from .lines import find_lines
+from .path import CloudPath
+from .profiles import Profiles, make_profiles
+from .smoothing import difference_figures, fill_gaps, smooth
+from .views.fusion import DEFINITION, FusedAxis
+
+INTERVALS = {"interval_68": 1.0, "interval_95": 1.96}
+"""Half-widths of the intervals that cover 68 % and 95 %, in standard deviations."""
+_AT_AXIS = 0.5  # m to either side whose ground gives the height
+_WAVELENGTH = 20.0  # m: shorter waves of the ground's height are smoothed away
+_DIGITS = 4
+
+
+@dataclass(frozen=True)
+class Centreline:
+    """A centreline with a vertex each metre, in the cloud's local coordinates.
+
+    Attributes:
+        kind: of the road.
+        path: the line, M vertices.
+        height: (M,) of the ground at it, m.
+        std: (M,) standard deviation across the road, m.
+        axis: the views that it was made from, along another path.
+        judgement: where it isn't to be trusted; stations are those of the path.
+        notes: what a reader must know.
+    """
+
+    kind: RoadKind
+    path: CloudPath
+    height: Float
+    std: Float
+    axis: FusedAxis
+    judgement: Judgement
+    notes: tuple[str, ...]
+
+
+def find_centreline(cloud: RoadCloud, options: Options | None = None, progress: Progress = silent) -> Centreline:
+    """Return the centreline of the road that a cloud shows, by all views of it, with its deviations and doubts.
+
+    Raises:
+        InputError: no road can be made out in it.
+    """
+    options = options or Options()
+    progress("path", 0.0)
+    path, half = straighten_path(cloud, options)
+    progress("views", 0.4)
+    road = find_axis(cloud.near(path, half), path, half, options)
+    shown = _seen_part(road.path, road.axis)
+    offsets = np.interp(shown.stations, road.axis.stations, road.axis.offsets)
+    line = shown.shift_by(offsets)
+    progress("judging", 0.8)
+    profiles = make_profiles(cloud, line, half, exact=True)
+    layout = find_layout(profiles, find_lines(profiles), options.road)
+    cores = [0.5 * (band.low + band.high) for band in layout.bands] if layout.kind == "dual" else [0.0]
+    beside, _ = line.project(road.path.place(road.axis.stations, road.axis.offsets))
+    rivals = np.interp(profiles.middles, beside, road.axis.open.astype(np.float64)) > 0.5
+    std = np.hypot(DEFINITION, np.interp(line.stations, beside, road.axis.std))
+    judgement = judge(profiles, layout, cores, rivals)
+    return Centreline(layout.kind, line, _heights(profiles), std, road.axis, judgement, layout.notes)
+
+
+def _seen_part(path: CloudPath, axis: FusedAxis) -> CloudPath:
+    """Return the part of a path from the first to the last stretch in which any view sees the axis."""
+    seen = axis.stations[np.isfinite(axis.raw)]
+    if not len(seen):
+        return path
+    inside = (path.stations >= seen[0] - 2.5) & (path.stations <= seen[-1] + 2.5)
+    first = int(np.flatnonzero(inside)[0])
+    return CloudPath(path.points[inside], path.heading[inside], path.start + first)
+
+
+def _heights(profiles: Profiles) -> Float:
+    """Return the ground's height (M,), m, at the profiles' axis, smoothed and bridged; NaN without any ground."""
+    near = np.abs(profiles.offsets) < _AT_AXIS
+    bins = profiles.height[:, near].astype(np.float64)
+    known = np.isfinite(bins)
+    count = known.sum(axis=1)
+    mean = np.where(count > 0, np.where(known, bins, 0.0).sum(axis=1) / np.maximum(count, 1), np.nan)
+    if not np.isfinite(mean).any():
+        return np.full(len(profiles.path.points), np.nan)
+    smoothed = smooth(mean, np.isfinite(mean).astype(np.float64), 1.0, _WAVELENGTH).values
+    held = fill_gaps(np.where(np.isfinite(mean), smoothed, np.nan))
+    return np.interp(profiles.path.stations, profiles.stations, held)
+
+
+def centreline_geojson(found: Centreline, cloud: RoadCloud, name: str) -> dict[str, Any]:
+    """Return a centreline as a GeoJSON FeatureCollection in map coordinates, m.
+
+    Its feature has, per vertex, the station along it, the standard deviation across it and the half-widths of the
+    intervals that cover 68 % and 95 %, and the stretches where it isn't to be trusted.
+    """
+    height = np.where(np.isfinite(found.height), found.height, 0.0)
+    points = np.column_stack([found.path.points, height]) + cloud.origin
+    properties = {
+        "feature": "centerline",
+        "stations": _rounded(found.path.stations - found.path.start),
+        "std": _rounded(found.std),
+        **{key: _rounded(factor * found.std) for key, factor in INTERVALS.items()},
+        "doubtful": _from_start(found),
+    }
+    geometry = {"type": "LineString", "coordinates": np.round(points, _DIGITS).tolist()}
+    collection: dict[str, Any] = {"type": "FeatureCollection", "name": name}
+    if cloud.epsg is not None:
+        collection["crs"] = {"type": "name", "properties": {"name": f"urn:ogc:def:crs:EPSG::{cloud.epsg}"}}
+    return collection | {"features": [{"type": "Feature", "properties": properties, "geometry": geometry}]}
+
+
+def centreline_report(found: Centreline, cloud: RoadCloud) -> dict[str, Any]:
+    """Return what the views of a centreline say, and how far it is to be trusted, as JSON data; lengths in m."""
+    views = []
+    for view in found.axis.views:
+        member = found.axis.members[view.name]
+        beside = difference_figures(view.offsets - found.axis.offsets, "mean", "rms", "largest")
+        used = round(float(member.mean()), 4)
+        views.append({"name": view.name, "seen": round(view.seen, 4), "used": used, "from_centreline": beside})
+    return {
+        "road": found.kind,
+        "length": round(found.path.length, 2),
+        "points": cloud.read,
+        "views": views,
+        "std": {"mean": round(float(found.std.mean()), 4), "largest": round(float(found.std.max()), 4)},
+        "judgement": found.judgement.to_dict() | {"doubtful": _from_start(found)},
+        "notes": list(found.notes),
+    }
+
+
+def _from_start(found: Centreline) -> list[dict[str, Any]]:
+    """Return the doubtful stretches as JSON data, stations counted from the line's first vertex."""
+    start, data = found.path.start, found.judgement.to_dict()["doubtful"]
+    return [one | {"start": round(one["start"] - start, 1), "end": round(one["end"] - start, 1)} for one in data]
+
+
+def _rounded(values: Float) -> list[float | None]:
+    return [round(value, _DIGITS) + 0.0 if np.isfinite(value) else None for value in values.tolist()]

@@ -1,0 +1,108 @@
+"""Several views of the axis become one: those that agree are averaged by their stated deviations, rivals are named."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from ...base.arrays import Bool, Float
+from ..path import SPACING
+from ..profiles import STRETCH
+from ..smoothing import smooth
+from .view import View
+
+AGREEING = 2.0
+"""Views agree where they lie within so many standard deviations of their difference."""
+APART = 1.0
+"""Views that lie farther apart, m, and weigh as much, leave the axis open."""
+_RIVAL = 0.5  # of the leading views' trust that others together need to be a rival
+_STEADY = 9  # stretches over which the lead is judged
+_TRUST = 0.1  # m beside a view's deviation: the surest isn't trusted above all others together
+_VAGUE = 0.5  # m: a view less sure than this leads the less
+_WAVELENGTH = 60.0  # m
+DEFINITION = 0.15
+"""Standard deviation, m, of where a road's axis is said to lie about where its markings and edges put it."""
+_DRIFT = 0.02  # m per m of a gap that the axis may leave its course by
+
+
+@dataclass(frozen=True)
+class FusedAxis:
+    """The axis that several views agree on, in K stretches along a path.
+
+    Attributes:
+        stations: (K,) m along the path.
+        offsets: (K,) m; smoothed, bridged where no view sees anything.
+        std: (K,) standard deviation, m.
+        raw: (K,) m before smoothing; NaN where no view sees anything.
+        open: (K,) whether other views, as trustworthy together, lie more than `APART` elsewhere.
+        members: by view's name (K,) whether it is one of those that agree.
+        views: what was fused.
+    """
+
+    stations: Float
+    offsets: Float
+    std: Float
+    raw: Float
+    open: Bool
+    members: dict[str, Bool]
+    views: tuple[View, ...]
+
+
+def fuse(stations: Float, views: Sequence[View]) -> FusedAxis:
+    """Return the axis that views (at least one) agree on at stations (K,), m.
+
+    In each stretch the views that agree with each other and are trusted most, there and in its neighbourhood, lead;
+    they are averaged by inverse variances, and the mean's deviation is widened by how much they scatter.
+    """
+    offsets = np.array([view.offsets for view in views])
+    std = np.array([view.std for view in views])
+    seen = np.isfinite(offsets)
+    together = _agreement(offsets, std, seen)
+    trust = np.where(seen, 1.0 / (_TRUST + np.where(seen, std, 1.0)), 0.0)
+    mass = np.einsum("vwk,wk->vk", together.astype(np.float64), trust)
+    mass *= np.minimum(1.0, _VAGUE / np.where(seen, std, 1.0))  # what agrees with everything leads nowhere
+    steady = np.where(seen, ndimage.uniform_filter1d(mass, _STEADY, axis=1, mode="nearest"), -1.0)
+    leader = steady.argmax(axis=0)
+    columns = np.arange(len(stations))
+    member = together[leader, :, columns].T & seen
+    raw, deviation = _weighted_mean(offsets, std, member)
+    against = seen & ~member & (np.abs(offsets - raw) > APART)
+    lead, rival = (trust * member).sum(axis=0), (trust * against).sum(axis=0)
+    opened = ndimage.binary_opening(rival > _RIVAL * lead, np.ones(3))
+    smoothed, wide = _along(stations, raw, deviation)
+    names = {view.name: member[number] for number, view in enumerate(views)}
+    return FusedAxis(stations, smoothed, wide, raw, opened, names, tuple(views))
+
+
+def _agreement(offsets: Float, std: Float, seen: Bool) -> Bool:
+    """Return (V, V, K) whether two views agree in a stretch; each seen one agrees with itself."""
+    with np.errstate(invalid="ignore"):
+        apart = np.abs(offsets[:, None] - offsets[None])
+        allowed = AGREEING * np.hypot(std[:, None], std[None])
+        return np.asarray(seen[:, None] & seen[None] & (apart <= allowed))
+
+
+def _weighted_mean(offsets: Float, std: Float, member: Bool) -> tuple[Float, Float]:
+    """Return the mean (K,) of the members by inverse variances, and its deviation, m; NaN and infinity without any."""
+    weight = np.where(member, 1.0 / np.square(np.where(member, std, 1.0)), 0.0)
+    total = weight.sum(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.where(total > 0.0, (weight * np.where(member, offsets, 0.0)).sum(axis=0) / total, np.nan)
+        square = (weight * np.square(np.where(member, offsets - mean, 0.0))).sum(axis=0)
+        scatter = square / np.maximum(member.sum(axis=0) - 1, 1)
+        return mean, np.sqrt(np.maximum(1.0, scatter) / total)
+
+
+def _along(stations: Float, raw: Float, deviation: Float) -> tuple[Float, Float]:
+    """Return the axis (K,), m, smoothed along the road, and its deviation, which grows in gaps."""
+    known = np.isfinite(raw)
+    if not known.any():
+        return np.zeros(len(raw)), np.full(len(raw), np.inf)
+    weights = np.where(known, 1.0 / np.square(np.where(known, deviation, 1.0)), 0.0)
+    smoothed = smooth(raw, weights, STRETCH * SPACING, _WAVELENGTH, usual=0.03)
+    values = np.interp(stations, stations[known], smoothed.values[known])  # no curve is guessed where nothing was seen
+    gap = STRETCH * SPACING * ndimage.distance_transform_edt(~known)
+    std = np.interp(stations, stations[known], deviation[known])
+    own = np.where(known, np.abs(np.where(known, raw, 0.0) - values), 0.0)
+    return values, np.sqrt(std**2 + ndimage.uniform_filter1d(own, 5) ** 2 + np.square(_DRIFT * gap))

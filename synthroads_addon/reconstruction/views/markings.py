@@ -1,0 +1,34 @@
+"""The line markings that frame the axis, or the pavement's edges where no line does."""
+
+import numpy as np
+from scipy import ndimage
+
+from ..layout import FoundAxis, RoadLayout, axis_guides
+from ..path import SPACING
+from ..profiles import STRETCH, Profiles
+from .view import View
+
+_PAINTED = 0.10  # m that lines found by brightness are off the axis where nothing scatters
+_CLASSED = 0.01  # by class
+_EDGES = 0.20  # edges in place of lines
+_CARRIED, _FAR = 0.5, 30.0  # m off where other lines carry the axis on, so far (m) from where its own were seen
+
+
+def view_lines(profiles: Profiles, layout: RoadLayout, axis: FoundAxis) -> View:
+    """Return the view of the axis by lines (`axis_from_lines`), or by the pavement's edges in their place.
+
+    Args:
+        profiles: along a path parallel to the road.
+        layout: that these profiles show.
+        axis: that its lines agree on.
+    """
+    painted = all(guide.width > 0.0 for guide in axis_guides(layout))
+    exact = profiles.points is not None
+    floor = (_CLASSED if exact else _PAINTED) if painted else (_CLASSED if exact else _EDGES)
+    known = np.isfinite(axis.raw)
+    framed = np.all([np.isfinite(guide.measured) for guide in axis_guides(layout)], axis=0)
+    away = STRETCH * SPACING * ndimage.distance_transform_edt(~framed) if framed.any() else np.full(len(known), np.inf)
+    carried = _CARRIED * np.clip(away / _FAR, 0.0, 1.0)
+    std = np.where(known & np.isfinite(axis.std), np.hypot(axis.std, axis.raw - axis.offsets), 0.0)
+    deviation = np.where(known, np.sqrt(floor**2 + std**2 + carried**2), np.inf)
+    return View("lines" if painted else "edges", axis.raw, deviation)

@@ -1,0 +1,94 @@
+"""The markings' period: dashed lines found by the beat of their dashes, however faint their paint.
+
+Along each offset the paint's wave at the usual periods is compared with its scatter, over a window long enough for some
+dashes. Of a single carriageway the dashed line between its lanes is the axis; of two carriageways with as many dashed
+lines each, the axis lies midway between the innermost two.
+"""
+
+import numpy as np
+from scipy import ndimage
+from scipy.signal import find_peaks
+
+from ...base.arrays import Float
+from ..profiles import ACROSS, STRETCH, Grid, Profiles
+from .view import View
+
+PERIODS = (18.0, 12.0, 9.0, 6.0)
+"""Dash and gap together, m: 6 + 12, 4 + 8 and 6 + 6, 3 + 6, 3 + 3 (RMS)."""
+_WINDOW = 90  # m
+_FEWEST_ROWS = 45
+_CLEAR = 12.0  # power over that of noise, whose mean is 1
+_WIDTH = 3  # bins across that count as one: about a line and the points beside it
+_LANE = 2.3  # m: dashed lines are at least this far apart
+_RIVAL = 0.5  # of the best's power: another dashed line so strong leaves a single carriageway's axis open
+_FLOOR = 0.12  # m that a dashed line is off the axis where nothing scatters
+
+
+def view_period(profiles: Profiles, dual: bool, middle: float) -> View:
+    """Return the view of the axis by dashed lines.
+
+    Args:
+        profiles: along a path parallel to the road.
+        dual: whether the road has two carriageways.
+        middle: offset between the carriageways, or of a single one's middle, m: roughly.
+    """
+    rows, paint = len(profiles.stations), _widened(profiles.paint)
+    offsets = np.full(profiles.stretches, np.nan)
+    for number in range(profiles.stretches):
+        centre = number * STRETCH + STRETCH // 2
+        first = int(np.clip(centre - _WINDOW // 2, 0, max(0, rows - _WINDOW)))
+        window = slice(first, min(rows, first + _WINDOW))
+        power = dash_power(paint[window], profiles.stations[window])
+        offsets[number] = _axis_of(power, profiles.offsets, dual, middle)
+    return View.of("marking period", offsets, _FLOOR)
+
+
+def _widened(paint: Grid) -> Float:
+    """Return the paint (S, U), clipped, as the mean of the known ones of three bins across; NaN without any."""
+    known = np.isfinite(paint)
+    size = (1, _WIDTH)
+    total = ndimage.uniform_filter(np.where(known, np.clip(paint, 0.0, 1.0), 0.0).astype(np.float64), size)
+    share = ndimage.uniform_filter(known.astype(np.float64), size)
+    return np.where(share > 0.5 / _WIDTH, total / np.maximum(share, 1e-9), np.nan)
+
+
+def dash_power(paint: Float, stations: Float) -> Float:
+    """Return by offset (U,) the power of the paint's wave at the best of the usual periods, in units of noise's mean.
+
+    Args:
+        paint: (R, U) share of paint; NaN where unknown.
+        stations: (R,) m.
+    """
+    known = np.isfinite(paint)
+    count = known.sum(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.where(known, paint, 0.0).sum(axis=0) / count
+        level = np.where(known, paint - mean, 0.0)
+        variance = np.maximum((level**2).sum(axis=0) / count, 1e-4)
+        waves = np.exp(-2j * np.pi * stations[None, :] / np.array(PERIODS)[:, None])
+        power = np.abs(waves @ level) ** 2 / (count * variance)
+    return np.where(count >= _FEWEST_ROWS, power.max(axis=0), 0.0)
+
+
+def _axis_of(power: Float, offsets: Float, dual: bool, middle: float) -> float:
+    """Return the axis' offset, m, that dashed lines at the peaks of a power (U,) show; NaN where they don't."""
+    blurred = ndimage.gaussian_filter1d(power, 1.0)
+    peaks = find_peaks(blurred, height=_CLEAR, distance=round(_LANE / ACROSS))[0]
+    places = [_centre_of_peak(blurred, at, offsets) for at in peaks]
+    if not dual:
+        if not len(peaks):
+            return np.nan
+        order = np.argsort(-blurred[peaks])
+        if len(order) > 1 and blurred[peaks[order[1]]] > _RIVAL * blurred[peaks[order[0]]]:
+            return np.nan
+        return places[int(order[0])]
+    right, left = [at for at in places if at < middle], [at for at in places if at > middle]
+    if not right or len(right) != len(left):
+        return np.nan
+    return 0.5 * (max(right) + min(left))
+
+
+def _centre_of_peak(values: Float, at: int, offsets: Float) -> float:
+    """Return the centre of gravity, m, of a peak's bins."""
+    near = slice(max(0, at - 3), at + 4)
+    return float(np.average(offsets[near], weights=np.maximum(values[near], 1e-9)))

@@ -1,0 +1,89 @@
+"""The dark skeleton: the ridge line of what is dark in the cloud seen from above, as far from light on either side.
+
+Unlike the view of the brightness it knows nothing of the ground on the lanes: one threshold parts dark from light in
+the whole cloud (Otsu 1979), and the ridge is that of the distance to the nearest light place in the plane.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import ndimage
+
+from ...base.arrays import Bool, Float, otsu_threshold
+from ..profiles import ACROSS, STRETCH, Profiles
+from .view import View
+
+_CELL = 3  # bins across of one cell: square cells of a metre along would be too coarse across
+_MEDIAN = (7, 5)  # cells along and across whose median is a cell's brightness
+_PAINT = 5  # cells: narrower light strips are paint
+_NARROWEST, _WIDEST = 1.2, 12.0  # m from the ridge to the dark's edge
+_RIDGE = 0.9  # of the largest distance in a row: nearer to it is the ridge
+_FEWEST = 0.5  # of the cells about a ridge must be known
+_FLOOR = 0.35  # m that the ridge is off the axis where nothing scatters
+
+
+def view_skeleton(profiles: Profiles, cores: Sequence[float]) -> View:
+    """Return the view of the ridge of the dark about a carriageway's middle, or of the middle between two ridges.
+
+    Args:
+        profiles: along a path parallel to the road.
+        cores: offsets of the carriageways' middles, m: one or two.
+    """
+    dark, known, offsets = _dark_cells(profiles)
+    if not dark.any():
+        return View.of("skeleton", np.full(profiles.stretches, np.nan), _FLOOR)
+    # Where the cloud ends nothing is known of what lies beyond: distances across count in metres as those along do.
+    distance = ndimage.distance_transform_edt(dark, sampling=(1.0, _CELL * ACROSS))
+    ridges = [_ridge(distance, dark, known, offsets, core) for core in cores]
+    rows = np.mean(ridges, axis=0)
+    return View.of("skeleton", _by_stretch(rows, profiles.stretches), _FLOOR)
+
+
+def _dark_cells(profiles: Profiles) -> tuple[Bool, Bool, Float]:
+    """Return masks (S, C) of the dark and of the known cells, and the cells' middles across (C,), m."""
+    count = len(profiles.offsets) // _CELL
+    cells = profiles.brightness[:, : count * _CELL].reshape(len(profiles.stations), count, _CELL)
+    filled = np.isfinite(cells)
+    total = np.where(filled, cells, 0.0).sum(axis=2)
+    number = filled.sum(axis=2)
+    known = ndimage.binary_closing(number > 0, np.ones((5, 3)))
+    if not (number > 0).any():
+        return known & False, known, profiles.offsets[1::_CELL][:count]
+    mean = np.where(number > 0, total / np.maximum(number, 1), np.nan)
+    usual = float(np.nanmedian(mean))
+    median = ndimage.median_filter(np.where(np.isfinite(mean), mean, usual), _MEDIAN)
+    dark = known & (median <= otsu_threshold(np.asarray(median[known], dtype=np.float64)))
+    dark = ndimage.binary_closing(dark, np.ones((1, _PAINT))) & known
+    offsets = profiles.offsets[: count * _CELL].reshape(count, _CELL).mean(axis=1)
+    return np.asarray(dark), np.asarray(known), offsets
+
+
+def _ridge(distance: Float, dark: Bool, known: Bool, offsets: Float, core: float) -> Float:
+    """Return the ridge's offset (S,), m, in the dark run nearest to a core; NaN without one, or at the border."""
+    result = np.full(len(distance), np.nan)
+    border = round(1.0 / (_CELL * ACROSS))
+    for number, (row, on, seen) in enumerate(zip(distance, dark, known, strict=True)):
+        label, count = ndimage.label(on)
+        if not count:
+            continue
+        middles = np.asarray(ndimage.mean(offsets, label, np.arange(1, count + 1)))
+        run = np.flatnonzero(label == int(np.abs(middles - core).argmin()) + 1)
+        widest = float(row[run].max())
+        first, last = int(run[0]), int(run[-1])
+        ends = seen[max(0, first - border) : first], seen[last + 1 : last + 1 + border]
+        if not _NARROWEST <= widest <= _WIDEST or min(end.mean() if len(end) else 0.0 for end in ends) < _FEWEST:
+            continue
+        ridge = run[row[run] >= _RIDGE * widest]
+        result[number] = float(offsets[ridge].mean())
+    return result
+
+
+def _by_stretch(rows: Float, stretches: int) -> Float:
+    """Return the medians (K,) of the rows' values (S,) by stretch; NaN where most rows have none."""
+    padded = np.full(stretches * STRETCH, np.nan)
+    padded[: len(rows)] = rows
+    blocks = padded.reshape(stretches, STRETCH)
+    result = np.full(stretches, np.nan)
+    enough = 2 * np.isfinite(blocks).sum(axis=1) > STRETCH
+    result[enough] = np.nanmedian(blocks[enough], axis=1)
+    return result

@@ -1,0 +1,118 @@
+"""The cross-profile's symmetry: a road is the same to both sides of its axis, in brightness, paint and shape.
+
+Whatever lies within reach counts, seen or not seen as a line: each place pairs with its mirror image, so that a cloud
+that is cut off on one side loses the pairs there and is not pulled to the other.
+"""
+
+import numpy as np
+from scipy import ndimage
+from scipy.signal import fftconvolve
+
+from ...base.arrays import Float
+from ..profiles import ACROSS, Profiles
+from ..smoothing import fill_gaps, robust_scale
+from .pavement import median_profile, remove_grade
+from .view import View
+
+_REACH = 8.0  # m to either side of the path that the axis is looked for in
+_LIMIT = 2.5  # spreads: what is farther off the middle counts as that far
+_APART = 0.6  # m: places nearer to each other than twice this are alike anyway
+_INDEPENDENT = 0.4  # m across that one independent value takes
+_FEWEST = 3.0  # m on either side that must have mirror images
+_CLEAR = 3.0  # standard deviations that the best axis lies above what chance gives
+_RIVAL = 0.75  # of the best: another place so good and farther than `_OTHER` away leaves the axis open
+_OTHER = 1.0  # m
+_NEAR_BEST = 0.92  # of the best: how wide the peak is there says how sure it is
+_FLOOR = 0.25  # m that the axis of symmetry is off the axis where nothing scatters
+
+
+def view_symmetry(profiles: Profiles) -> View:
+    """Return the view of the axis about which brightness, paint and shape of the cross profiles are symmetric."""
+    height = remove_grade(profiles.height)
+    offsets, width = np.full(profiles.stretches, np.nan), np.full(profiles.stretches, np.inf)
+    for number in range(profiles.stretches):
+        offsets[number], width[number] = _axis_of(_signals(profiles, height, number), profiles.offsets)
+    known = np.isfinite(offsets)
+    return View.of("cross-profile", offsets, _FLOOR, np.where(known, width, 0.0))
+
+
+def _signals(profiles: Profiles, height: Float, stretch: int) -> Float:
+    """Return brightness, paint and bend of the ground (3, U) about a stretch, in spreads; NaN where unknown."""
+    rows = [
+        median_profile(profiles.brightness, stretch),
+        median_profile(profiles.paint, stretch),
+        _bend(median_profile(height, stretch)),
+    ]
+    return np.array([_in_spreads(row) for row in rows])
+
+
+def _bend(height: Float) -> Float:
+    """Return the second difference (U,) of a height profile over half a metre: kerbs and verges, not the crossfall."""
+    if np.isfinite(height).sum() < 20:
+        return np.full(len(height), np.nan)
+    filled = ndimage.gaussian_filter1d(fill_gaps(height), 2.5)
+    bend = np.gradient(np.gradient(filled))
+    return np.where(np.isfinite(height), bend, np.nan)
+
+
+def _in_spreads(values: Float) -> Float:
+    known = values[np.isfinite(values)]
+    if len(known) < 20:
+        return np.full(len(values), np.nan)
+    middle = float(np.median(known))
+    spread = max(robust_scale(known - middle), 0.3 * float(known.std()), 1e-9)
+    return np.clip((values - middle) / spread, -_LIMIT, _LIMIT)
+
+
+def _axis_of(signals: Float, offsets: Float) -> tuple[float, float]:
+    """Return offset and half-width of the peak, m, of the best axis of symmetry; NaN where there is none or two."""
+    score, pairs = _symmetry(signals)
+    if not np.isfinite(score).any():
+        return np.nan, np.inf
+    place = offsets[0] + 0.5 * ACROSS * np.arange(len(score))
+    allowed = (np.abs(place) <= _REACH) & (pairs * ACROSS >= _FEWEST)
+    judged = np.where(allowed, score, -np.inf)
+    best = int(judged.argmax())
+    if not judged[best] >= _CLEAR:
+        return np.nan, np.inf
+    near = np.abs(place - place[best]) < _OTHER
+    if float(np.where(near, -np.inf, judged).max()) > _RIVAL * judged[best]:
+        return np.nan, np.inf
+    peak = near & (judged >= _NEAR_BEST * judged[best])
+    return float(np.average(place[peak], weights=judged[peak])), 0.5 * float(np.ptp(place[peak]))
+
+
+def _symmetry(values: Float) -> tuple[Float, Float]:
+    """Return by place of the axis, each half bin, how much more alike mirror images are than chance, and their pairs.
+
+    Args:
+        values: (C, U) signals in spreads; NaN where unknown.
+
+    Returns:
+        (2 U - 1,) standard deviations above what unrelated values give, and number of pairs.
+    """
+    bins = values.shape[1]
+    total, pairs = np.zeros(2 * bins - 1), np.zeros(2 * bins - 1)
+    for row in values:
+        known = np.isfinite(row)
+        variance = float(row[known].var()) if known.any() else 0.0
+        if variance <= 0.0:
+            continue
+        level = np.where(known, row - row[known].mean(), 0.0)
+        product = 0.5 * (fftconvolve(level, level) - _too_near(level * known, bins))
+        count = 0.5 * (fftconvolve(known.astype(float), known.astype(float)) - _too_near(known.astype(float), bins))
+        count = np.maximum(np.rint(count), 0.0)
+        independent = np.maximum(count * ACROSS / _INDEPENDENT, 1.0)
+        total += np.where(count > 0.0, product / np.maximum(count, 1.0) / variance * np.sqrt(independent), 0.0)
+        pairs = np.maximum(pairs, count)
+    return total / np.sqrt(len(values)), pairs
+
+
+def _too_near(values: Float, bins: int) -> Float:
+    """Return by place of the axis the sum of products of pairs that lie within `_APART` of it, counted both ways."""
+    reach = round(_APART / ACROSS)
+    result = np.zeros(2 * bins - 1)
+    for step in range(reach + 1):  # pairs (i, i + step) have their axis at 2 i + step half bins
+        products = values[: bins - step] * values[step:]
+        result[step : 2 * bins - 1 - step : 2] += products * (1.0 if step == 0 else 2.0)
+    return result

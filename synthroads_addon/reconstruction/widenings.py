@@ -1,0 +1,161 @@
+"""Where the pavement is wider or narrower than the cross-section says: emergency bays, and what isn't reconstructed.
+
+An emergency bay opens over a taper, keeps its width and closes again, beside an edge line that goes on. Whatever else
+changes the pavement's width (exits, entries, lanes that begin or end) is found as well, but left to the reader.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+from scipy.optimize import least_squares
+
+from ..base.arrays import Bool, Float
+from ..road.guidelines import EMERGENCY_BAY_LENGTH, EMERGENCY_BAY_TAPER, EMERGENCY_BAY_WIDTH
+from .path import SPACING
+from .profiles import STRETCH
+from .section import MeasuredSection, Side, SideSection
+from .smoothing import robust_scale
+
+APART = 0.75
+"""An edge of the pavement so far, m, from the usual one is another cross-section's."""
+SHORTEST = 25.0
+"""A shorter stretch, m, is a fault in the picture."""
+_CLOSING = 3  # stretches that an edge may not be seen within a run
+_AROUND = 40.0  # m before and behind a run that its shape is fitted to
+_NEAREST = 10.0  # m from a bay to where the road's edge is first or last seen
+_MISFIT = 0.25  # m rms that a bay's shape may keep from its edge
+_NARROWEST, _WIDEST = 0.6 * EMERGENCY_BAY_WIDTH, 5.0  # m: of a bay
+_SHORTEST_BAY = 0.4 * EMERGENCY_BAY_LENGTH
+_PAINTED = 0.6  # of a bay's length must be beside the edge line's paint, where that is seen
+_LEAST_TAPER = 5.0  # m
+
+
+@dataclass(frozen=True)
+class Bay:
+    """An emergency bay, measured.
+
+    Attributes:
+        side: that it lies on.
+        start, end: stations between which the pavement is wider, m.
+        low_taper, high_taper: lengths over which it opens and closes, at the lower and the higher station, m.
+        width: m, and its standard deviation.
+    """
+
+    side: Side
+    start: float
+    end: float
+    low_taper: float
+    high_taper: float
+    width: float
+    width_std: float
+
+
+@dataclass(frozen=True)
+class Unlike:
+    """A stretch whose pavement isn't as wide as the reconstructed cross-section: stations, and by how much, m."""
+
+    side: Side
+    start: float
+    end: float
+    wider_by: float
+
+
+def find_widenings(section: MeasuredSection, stations: Float) -> tuple[list[Bay], list[Unlike]]:
+    """Return the emergency bays beside a road, and the stretches whose width remains unlike the cross-section.
+
+    Args:
+        section: measured.
+        stations: (K,) of its stretches, m.
+    """
+    bays, others = [], []
+    for side in section.sides.values():
+        for run in _runs(side, stations):
+            bay = _bay(side, stations, run) if section.kind == "dual" else None
+            if bay is not None:
+                bays.append(bay)
+            else:
+                others.append(_unlike(side, stations, run))
+    return bays, others
+
+
+def excess(side: SideSection) -> Float:
+    """Return how much farther outside than usual the pavement's outer edge lies in each of K stretches, m."""
+    edge = side.outer_edge.offsets
+    usual = edge[side.usual]
+    return edge - float(np.nanmedian(usual)) if len(usual) and np.isfinite(usual).any() else np.full(len(edge), np.nan)
+
+
+def _runs(side: SideSection, stations: Float) -> Iterator[slice]:
+    """Yield the runs of stretches in which the edge isn't the usual one."""
+    beside = excess(side)
+    unusual = np.isfinite(beside) & (np.abs(beside) > APART)
+    unusual = ndimage.binary_closing(np.pad(unusual, _CLOSING), np.ones(_CLOSING))[_CLOSING:-_CLOSING]
+    label, _ = ndimage.label(unusual)
+    for (run,) in ndimage.find_objects(label):
+        if stations[run.stop - 1] - stations[run.start] + STRETCH * SPACING >= SHORTEST:
+            yield run
+
+
+def _bay(side: SideSection, stations: Float, run: slice) -> Bay | None:
+    """Return the emergency bay that a run of wider pavement is; None if it is none."""
+    beside = excess(side)
+    seen = np.flatnonzero(np.isfinite(beside))
+    first, last = stations[run.start], stations[run.stop - 1]
+    inside = first - stations[seen[0]] >= _NEAREST and stations[seen[-1]] - last >= _NEAREST
+    if not inside or np.nanmedian(beside[run]) < _NARROWEST or not _beside_line(side, run):
+        return None
+    near = np.isfinite(beside) & (stations > first - _AROUND) & (stations < last + _AROUND)
+    shape, residual = _fit_trapezoid(stations[near], beside[near], first, last)
+    start, low, length, high, width = shape
+    fits = robust_scale(residual) < _MISFIT and float(np.sqrt(np.mean(residual**2))) < 2.0 * _MISFIT
+    if not fits or not _NARROWEST <= width <= _WIDEST or length < _SHORTEST_BAY:
+        return None
+    top = (stations[near] > start + low) & (stations[near] < start + low + length)
+    std = max(robust_scale(residual[top]) if top.sum() > 2 else np.inf, 0.02) / np.sqrt(max(int(top.sum()), 1))
+    return Bay(side.side, float(start), float(start + low + length + high), float(low), float(high), float(width), std)
+
+
+def _beside_line(side: SideSection, run: slice) -> bool:
+    """Return whether the outermost line goes on as a solid one beside a run, as far as it is seen."""
+    line = side.lines[-1]
+    if line is None:
+        return False
+    cover = line.cover[run]
+    known = cover[np.isfinite(cover)]
+    return line.solid and len(known) > 0 and float(known.mean()) > _PAINTED
+
+
+def _fit_trapezoid(stations: Float, beside: Float, first: float, last: float) -> tuple[Float, Float]:
+    """Return start, low taper, length, high taper and width (5,), m, of the best trapezoid, and the residuals (N,)."""
+
+    def residual(shape: Float) -> Float:
+        start, low, length, high, width = shape
+        rising = (stations - start) / low
+        falling = (start + low + length + high - stations) / high
+        return np.asarray(width * np.clip(np.minimum(rising, falling), 0.0, 1.0) - beside)
+
+    width = float(np.percentile(beside[(stations >= first) & (stations <= last)], 70))
+    taper = min(EMERGENCY_BAY_TAPER, 0.3 * (last - first) + _LEAST_TAPER)
+    begin = np.array([first - 0.3 * taper, taper, max(last - first - 1.4 * taper, 5.0), taper, width])
+    low = np.array([first - _AROUND, _LEAST_TAPER, 1.0, _LEAST_TAPER, 0.1])
+    high = np.array([last, 80.0, last - first + _AROUND, 80.0, 10.0])
+    found = least_squares(
+        residual, np.clip(begin, low + 1e-6, high - 1e-6), bounds=(low, high), loss="soft_l1", f_scale=0.2
+    )
+    return np.asarray(found.x), residual(found.x)
+
+
+def _unlike(side: SideSection, stations: Float, run: slice) -> Unlike:
+    half = 0.5 * STRETCH * SPACING
+    by = float(np.nanmedian(excess(side)[run]))
+    return Unlike(
+        side.side, round(stations[run.start] - half, 1), round(stations[run.stop - 1] + half, 1), round(by, 2)
+    )
+
+
+def unlike_mask(others: list[Unlike], stations: Float) -> Bool:
+    """Return a mask (K,) of the stretches that lie in any of the stretches that are unlike the cross-section."""
+    inside = [(stations >= one.start) & (stations <= one.end) for one in others]
+    return np.any(inside, axis=0) if inside else np.zeros(len(stations), dtype=bool)

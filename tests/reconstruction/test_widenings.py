@@ -1,0 +1,103 @@
+"""Emergency bays come back, whatever else makes the pavement wider is marked: on drawn edges and generated roads."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from synthroads_addon.base.arrays import Float
+from synthroads_addon.reconstruction.cloud import read_road_cloud
+from synthroads_addon.reconstruction.comparison import compare
+from synthroads_addon.reconstruction.reconstruct import reconstruct
+from synthroads_addon.reconstruction.section import _usual_stretches
+from synthroads_addon.reconstruction.widenings import find_widenings
+from synthroads_addon.road.objects import width_at
+from synthroads_addon.road.section import Carriageway, Turnout
+from tests.helpers.clouds.road_clouds import cloud_of, road, write
+
+STATIONS: Float = 5.0 * np.arange(80) + 2.5
+USUAL = 11.5
+
+
+def trapezoid(start: float, low: float, length: float, high: float, width: float) -> Float:
+    """Return how much wider the pavement of a bay is at the stations, m."""
+    rising, falling = (STATIONS - start) / low, (start + low + length + high - STATIONS) / high
+    return width * np.clip(np.minimum(rising, falling), 0.0, 1.0)
+
+
+def section(wider: Float, solid: bool = True, side: str = "right", noise: float = 0.02) -> Any:
+    """Return a dual carriageway's section of one side, its edge as far outside as usual and some more."""
+    edge = USUAL + wider + np.random.default_rng(3).normal(0.0, noise, len(wider))
+    line = SimpleNamespace(solid=solid, cover=np.full(len(wider), 0.9 if solid else 0.5))
+    usual = np.abs(wider) < 0.1
+    one = SimpleNamespace(side=side, outer_edge=SimpleNamespace(offsets=edge), usual=usual, lines=[None, line])
+    return SimpleNamespace(kind="dual", sides={side: one})
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_a_bay_is_measured(side: str) -> None:
+    ((bay,), others) = find_widenings(section(trapezoid(150.0, 20.0, 45.0, 30.0, 3.0), side=side), STATIONS)
+    assert others == []
+    assert bay.side == side
+    assert bay.width == pytest.approx(3.0, abs=0.03)
+    assert bay.width_std < 0.03
+    assert (bay.start, bay.end) == pytest.approx((150.0, 245.0), abs=1.5)
+    assert (bay.low_taper, bay.high_taper) == pytest.approx((20.0, 30.0), abs=2.0)
+
+
+@pytest.mark.parametrize(
+    ("wider", "solid", "by"),
+    [
+        (np.where(STATIONS > 200.0, 3.5, 0.0), True, 3.5),
+        (np.where(STATIONS < 120.0, -3.5, 0.0), True, -3.5),
+        (trapezoid(150.0, 20.0, 45.0, 30.0, 3.0), False, 3.0),
+        (trapezoid(100.0, 60.0, 1.0, 1.0, 6.0), True, 3.3),
+    ],
+    ids=["a lane is gained", "a lane is missing", "beside a dashed line", "an exit"],
+)
+def test_whatever_else_is_wider_is_marked(wider: Float, solid: bool, by: float) -> None:
+    bays, (other,) = find_widenings(section(wider, solid), STATIONS)
+    assert bays == []
+    assert other.wider_by == pytest.approx(by, abs=0.6)
+    inside = np.abs(wider) > 1.0
+    assert other.start == pytest.approx(STATIONS[inside][0] - 2.5, abs=7.5)
+    assert other.end == pytest.approx(STATIONS[inside][-1] + 2.5, abs=7.5)
+
+
+def test_a_short_fault_or_a_slight_one_is_nothing() -> None:
+    fault = np.where(np.abs(STATIONS - 200.0) < 7.0, 3.0, 0.0)
+    for wider in (fault, np.full(80, 0.0), trapezoid(100.0, 20.0, 60.0, 20.0, 0.5)):
+        assert find_widenings(section(wider), STATIONS) == ([], [])
+
+
+def test_the_usual_width_is_that_beside_turnouts_even_where_these_are_longer() -> None:
+    outside = np.where((STATIONS > 80.0) & (STATIONS < 330.0), 6.5, 3.5)
+    usual = _usual_stretches(outside, None)
+    assert np.array_equal(usual, outside < 4.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_generated_bays_and_lane_changes_come_back_or_are_marked(tmp_path: Path, seed: int) -> None:
+    limits = {"turnouts": {"exits": 0.0, "entries": 0.0, "emergency_bays": 1.0}, "lane_changes": {"share": 0.5}}
+    truth = road(("RQ31", "RQ36", "RQ31")[seed - 1], "EKA1A", 500.0, seed, **limits)
+    found = reconstruct(read_road_cloud(write(tmp_path / "cloud.laz", cloud_of(truth, 12.0, seed))))
+    off = compare(found.parameters, truth)
+    assert off["centreline"]["largest"] < 0.10
+    marked = {doubt.reasons[0].split(":")[0] for doubt in found.judgement.sections}
+    true = {item.carriageway: item for item in truth.of_type(Turnout).values()}
+    bays = {item.carriageway: item for item in found.parameters.of_type(Turnout).values()}
+    for name, one in truth.of_type(Carriageway).items():
+        changes = any(np.ptp(width_at(lane.width, np.array([0.0, 1e5]))) > 1.0 for lane in one.lanes)
+        if changes:
+            assert one.side in marked
+            continue
+        side = found.measured.section.sides[one.side]
+        assert side.shoulder.value == pytest.approx(float(width_at(one.hard_shoulder_width, 0.0)), abs=0.15)
+        if name in true and one.side not in marked:
+            assert bays[name].lane_width == pytest.approx(true[name].lane_width, abs=0.15)
+            assert bays[name].start_station == pytest.approx(true[name].start_station, abs=8.0)
