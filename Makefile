@@ -15,7 +15,7 @@ NOX = $(RUNNER)/bin/python -m nox
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test test-slow test-cluster fuzz lint judges docs extension clean distclean
+.PHONY: help demo test test-slow test-cluster fuzz lint judges docs weights extension clean distclean
 
 help: ## say what there is
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{ printf "%-18s %s\n", $$1, $$2 }'
@@ -41,6 +41,9 @@ lint docs judges: $(RUNNER)/made
 lint: ## check the source: style, who imports whom, types, known dangers
 judges: ## have programs of others judge the files that SynthRoads writes
 docs: ## build the documentation: build/site/index.html
+
+weights: $(RUNNER)/made ## make the models that come with the package anew (resumable): ml/weights
+	@$(NOX) -s weights -- --work $(OUT)/weights
 
 extension: $(RUNNER)/made ## build the Blender extensions: dist/*.zip (PLATFORM=windows-x64, macos-arm64 or all)
 	@$(NOX) -s extension -- $(if $(PLATFORM),--platform $(PLATFORM))

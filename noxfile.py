@@ -121,6 +121,12 @@ def lint(session: nox.Session) -> None:
 
 
 @nox.session(python=False)
+def weights(session: nox.Session) -> None:
+    """Make the models that come with the package anew; arguments are those of tools/make_weights.py."""
+    session.run(python_of(session, f"tests-{HERE}"), "tools/make_weights.py", *session.posargs)
+
+
+@nox.session(python=False)
 def judges(session: nox.Session) -> None:
     """Have the programs of others judge files of a small road, and print what they say."""
     session.run(python_of(session, f"tests-{HERE}"), "-m", "tests.judges", *session.posargs)

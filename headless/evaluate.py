@@ -13,21 +13,25 @@ from headless.messages import progress_bar
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads evaluate` to its parser."""
-    parser.add_argument("run", type=Path, metavar="RUN", help="folder of a trained run")
+    parser.add_argument("run", type=Path, metavar="RUN", help="folder of a trained run, or name of a shipped model")
     parser.add_argument("data", type=Path, nargs="+", metavar="DATA", help="data sets' folders or clouds")
     parser.add_argument("--split", default="test", metavar="NAME", help="split of the data sets (test)")
     parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for tables and pictures")
     text = "classes of clouds of others, for segmentation: semantickitti, ign or a JSON file (the cloud's own)"
     parser.add_argument("--mapping", metavar="MAPPING", help=text)
+    text = (
+        "public data set that the folders hold, for segmentation (`synthroads list yardsticks`) or a JSON file (ours)"
+    )
+    parser.add_argument("--yardstick", metavar="NAME", help=text)
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads evaluate`; return exit code, scores as JSON data and printed tables."""
-    from ml.runs import Run
+    from ml.shipped import open_run
     from ml.tasks import Evaluation, task
 
-    trained = Run.open(arguments.run)
-    evaluation = Evaluation(arguments.data, arguments.split, arguments.output, arguments.mapping)
+    trained = open_run(arguments.run)
+    evaluation = Evaluation(arguments.data, arguments.split, arguments.output, arguments.mapping, arguments.yardstick)
     scores, tables = task(trained.configuration.task).evaluate(trained, evaluation, progress_bar(arguments))
     written = f"written to {arguments.output}: {', '.join(scores['files'])}"
     return 0, scores, f"{tables}\n\n{written}"

@@ -1,4 +1,4 @@
-"""Use a trained run on a cloud: label its points, or find its road's centreline and corridor."""
+"""Use a trained model on a cloud: label its points, or find its road's centreline and corridor."""
 
 import argparse
 import sys
@@ -10,14 +10,20 @@ if __name__ == "__main__":
 from headless.commands import Outcome, entry
 from headless.messages import progress_bar
 from headless.train import summary
+from synthroads_addon.base.errors import InputError
+
+_ENDINGS = {"segmentation": "-labelled.laz", "centerline": "-centerline.geojson"}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads predict` to its parser."""
-    parser.add_argument("run", type=Path, metavar="RUN", help="folder of a trained run")
-    parser.add_argument("cloud", type=Path, metavar="CLOUD", help="cloud to read (.laz, .las, .ply, ...)")
-    text = "labelled cloud (.laz, .las) for segmentation, centreline (.geojson) for a centreline model"
-    parser.add_argument("--output", required=True, type=Path, metavar="FILE", help=text)
+    text = "cloud to read (.laz, .las, .ply, ...); before it the folder of a trained run, or a shipped model's name of "
+    text += "`synthroads list models` (the shipped segmentation that was trained on what is most like the cloud)"
+    parser.add_argument("files", nargs="*", metavar="[RUN] CLOUD", help=text)
+    parser.words = "files"  # type: ignore[attr-defined]
+    text = "labelled cloud (.laz, .las) for segmentation, centreline (.geojson) for a centreline model "
+    text += "(CLOUD-labelled.laz or CLOUD-centerline.geojson in the folder that the command runs in)"
+    parser.add_argument("--output", type=Path, metavar="FILE", help=text)
     text = "line along the road that a centreline model begins with, CSV or GeoJSON (found in the cloud)"
     parser.add_argument("--path", type=Path, metavar="FILE", help=text)
     text = "write the classes' LAS codes to the field classification, besides predicted_class (segmentation)"
@@ -26,15 +32,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
-    """Run `synthroads predict`; return exit code, metrics as JSON data and printed text."""
-    from ml.runs import Run
+    """Run `synthroads predict`; return exit code (3 if doubtful), metrics as JSON data and printed text."""
+    if not 1 <= len(arguments.files) <= 2:
+        raise InputError("CLOUD", " ".join(arguments.files), "one cloud is needed, perhaps with a RUN before it")
+    *given, cloud = map(Path, arguments.files)
+    from ml.choice import choose_model
+    from ml.shipped import open_run
     from ml.tasks import Prediction, task
 
-    trained = Run.open(arguments.run)
-    files = (arguments.cloud, arguments.output, arguments.path)
+    choice = None if given else choose_model(cloud, "segmentation")
+    trained = open_run(given[0] if choice is None else Path(choice.card.name))
+    name = trained.configuration.task
+    output = arguments.output or Path(cloud.stem + _ENDINGS[name])
+    files = (cloud, output, arguments.path)
     prediction = Prediction(*files, overwrite=arguments.overwrite, classification=arguments.classification)
-    metrics = task(trained.configuration.task).predict(trained, prediction, progress_bar(arguments))
-    return 0, metrics, f"written {arguments.output}: {summary(metrics)}"
+    metrics = task(name).predict(trained, prediction, progress_bar(arguments))
+    text = f"written {output}: {summary(metrics)}"
+    if choice is None:
+        return 0, metrics, text
+    return 3 if choice.doubtful else 0, metrics | {"choice": choice.to_dict()}, f"{choice.why()}\n{text}"
 
 
 if __name__ == "__main__":

@@ -1,0 +1,78 @@
+"""The shipped model is chosen by what can be measured on a cloud, and the choice says why."""
+
+from __future__ import annotations
+
+from math import inf
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from ml.cards import Domain, Figure, ModelCard
+from ml.choice import CloudTraits, cloud_traits, domain_distance, nearest
+from synthroads_addon.base.errors import InputError
+from tests.helpers.clouds.road_clouds import block_of, write
+
+
+def card(name: str, density: tuple[float, float], *platforms: Any, needs: tuple[Any, ...] = ()) -> ModelCard:
+    """Return the card of a model that was trained on some clouds."""
+    return ModelCard(
+        name=name,
+        title=name,
+        task="segmentation",
+        domain=Domain(density=density, platforms=platforms, needs=needs),
+        recipe=("make weights",),
+        commit="0123456",
+        seed=1,
+        scenes=1,
+        epochs=1,
+        minutes=1.0,
+        parameters=1,
+        figures=(Figure(name="any", value=1.0, unit="m", inside=True),),
+        limits=("Everywhere.",),
+    )
+
+
+AIR, CAR = card("air", (8.0, 40.0), "airborne"), card("car", (50.0, 5000.0), "mobile", "tripod", needs=("intensity",))
+INTENSE = frozenset(["intensity"])
+
+
+@pytest.mark.parametrize(
+    ("density", "platform", "chosen", "doubtful"),
+    [
+        (18.0, "airborne", "air", False),
+        (60.0, "airborne", "air", False),
+        (300.0, "mobile", "car", False),
+        (2.0, "airborne", "air", True),
+        (300.0, "uav", "car", True),
+    ],
+)
+def test_the_nearest_model_is_chosen(density: float, platform: Any, chosen: str, doubtful: bool) -> None:
+    choice = nearest([AIR, CAR], CloudTraits(density, 3.0, platform, INTENSE))
+    assert choice.card.name == chosen
+    assert choice.doubtful == doubtful
+    assert chosen in choice.why()
+    assert ("unlike" in choice.why()) == doubtful
+
+
+def test_a_cloud_without_what_a_model_needs_is_not_for_it() -> None:
+    plain = CloudTraits(300.0, 30.0, "mobile", frozenset())
+    assert domain_distance(CAR, plain) == inf
+    assert nearest([AIR, CAR], plain).card.name == "air"
+    with pytest.raises(InputError, match="need intensity"):
+        nearest([CAR], plain)
+
+
+def test_traits_are_measured_on_the_cloud(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    even = np.column_stack([rng.uniform(0.0, 40.0, 16_000), rng.uniform(0.0, 20.0, 16_000), np.zeros(16_000)])
+    traits = cloud_traits(write(tmp_path / "even.laz", block_of(even, rng.uniform(0.1, 0.9, 16_000), np.zeros(16_000))))
+    assert traits.density == pytest.approx(20.0, abs=1.0)
+    assert traits.platform == "airborne"
+    assert traits.attributes == INTENSE
+    angle, away = rng.uniform(0.0, 2.0 * np.pi, 16_000), 2.0 + rng.exponential(6.0, 16_000)
+    swept = np.column_stack([away * np.cos(angle), away * np.sin(angle), np.zeros(16_000)])
+    traits = cloud_traits(write(tmp_path / "sweep.laz", block_of(swept, np.full(16_000, 0.5), np.zeros(16_000))))
+    assert traits.platform == "tripod"
+    assert traits.attributes == frozenset()
