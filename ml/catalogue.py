@@ -9,8 +9,10 @@ from synthroads_addon.base.catalogue import Entry, Kind, figures
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import read_yaml
 
+from .cards import model_names, read_card
 from .configuration import EXPERIMENTS, SHIPPED, Schedule, names_in, shipped_file
 from .data.classes import MAPPINGS, load_mapping
+from .data.yardsticks import YARDSTICKS, load_yardstick
 
 _YAML = (".yaml", ".yml", ".json")
 
@@ -39,10 +41,35 @@ def _experiment(name: str) -> Entry:
     return Entry(name, str(data.get("title", "")), file, told)
 
 
+def _model(name: str) -> Entry:
+    card = read_card(name)
+    low, high = card.domain.density
+    megabytes = round(card.weights.stat().st_size / 1e6, 2) if card.weights.is_file() else None
+    told = {
+        "task": card.task,
+        "density": f"{low:g} to {high:g}",
+        "platforms": list(card.domain.platforms),
+        "megabytes": megabytes,
+        "figures": [one.to_dict() for one in card.figures],
+        "limits": list(card.limits),
+    }
+    return Entry(name, card.title, card.weights.with_suffix(".json"), told, " ".join(card.limits))
+
+
 def _mapping(name: str) -> Entry:
     made = load_mapping(name)
     told = {"field": made.field, "classes": list(dict.fromkeys(made.classes.values()))}
     return Entry(name, made.title, shipped_file("mapping", MAPPINGS, name, [".json"]), told)
+
+
+def _yardstick(name: str) -> Entry:
+    made = load_yardstick(name)
+    told = {
+        "form": made.form,
+        "splits": list(made.splits),
+        "classes": list(dict.fromkeys(made.mapping.classes.values())),
+    }
+    return Entry(name, made.title, shipped_file("yardstick", YARDSTICKS, name, [".json"]), told, made.source)
 
 
 def _object(file: Path) -> Mapping[str, Any]:
@@ -80,6 +107,15 @@ KINDS = {
         ("what it is", "from", "variants"),
         figures("configuration", "variants", variants="; ".join),
     ),
+    "models": Kind(
+        "Trained models that come with the package",
+        "synthroads predict NAME CLOUD, synthroads centerline CLOUD --run NAME",
+        model_names,
+        _model,
+        (".json",),
+        ("what it is", "task", "points/m2", "platforms", "MB"),
+        figures("task", "density", "platforms", "megabytes"),
+    ),
     "mappings": Kind(
         "Mappings of the classes of others",
         "synthroads evaluate --mapping NAME",
@@ -88,6 +124,15 @@ KINDS = {
         (".json",),
         ("what it is", "attribute", "classes"),
         figures("field", "classes"),
+    ),
+    "yardsticks": Kind(
+        "Public data sets of others that are evaluated on",
+        "synthroads evaluate RUN FOLDER --yardstick NAME",
+        partial(names_in, YARDSTICKS),
+        _yardstick,
+        (".json",),
+        ("what it is", "files", "splits", "classes"),
+        figures("form", "splits", "classes"),
     ),
 }
 """Kinds of learning that can be listed, by name."""

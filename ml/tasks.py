@@ -20,12 +20,14 @@ class Evaluation:
         split: of the data sets.
         output: folder for tables and pictures.
         mapping: which of a cloud's own numbers are which class; None where clouds have ours. Of use to segmentation.
+        yardstick: public data set that each of the folders holds; None where they hold ours. Of use to segmentation.
     """
 
     data: Sequence[Path]
     split: str
     output: Path
     mapping: str | None = None
+    yardstick: str | None = None
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,7 @@ from .classes import IGNORED, LabelMapping, class_names, load_mapping, table_bet
 from .packed import PackReader
 from .points import voxel_sample
 from .tiles import CloudTile, eight_bits
+from .yardsticks import load_yardstick, numbered_blocks
 
 FULL = 65535.0
 """Largest 16-bit intensity."""
@@ -39,10 +40,15 @@ class Source(Part):
     path: str = Field(min_length=1, description="A packed file, a data set, a folder of tiles or clouds, or a cloud.")
     split: str | None = Field(None, description="Split of a data set, or sub-folder; all points if not given.")
     mapping: str | None = Field(None, description="Classes of clouds of others: a shipped mapping or a JSON file.")
+    yardstick: str | None = Field(
+        None, description="Public data set that the folder holds: a shipped yardstick or a JSON file."
+    )
     tile: float = quantity(60.0, ge=5, le=1000, unit="m", description="Edge of the tiles that clouds are cut into.")
 
     def label_mapping(self) -> LabelMapping | None:
         """Load the source's class mapping; None where its files name their classes themselves."""
+        if self.yardstick:
+            return load_yardstick(self.yardstick).mapping_in(Path(self.path))
         return load_mapping(self.mapping) if self.mapping else None
 
     def targets(self, scheme: ClassScheme) -> tuple[str, ...]:
@@ -64,9 +70,13 @@ def read_tiles(source: Source, scheme: ClassScheme, voxel: float | None) -> Iter
         InputError: a file is damaged or has no labels, or its classes don't fit the scheme.
     """
     path = Path(source.path)
+    if source.yardstick and source.mapping:
+        raise InputError("mapping", source.mapping, "a yardstick has its own mapping")
     if source.split and path.is_file():
         raise InputError("split", source.split, f"{path.name} is a file, which has no splits")
-    if path.is_file() and path.suffix.lower() == ".npz" and _is_pack(path):
+    if source.yardstick:
+        tiles = yardstick_tiles(path, scheme, source)
+    elif path.is_file() and path.suffix.lower() == ".npz" and _is_pack(path):
         tiles = _packed_tiles(path, scheme, voxel)
     elif path.is_file():
         tiles = cloud_tiles(path, scheme, source)
@@ -221,6 +231,35 @@ def cloud_tiles(path: Path, scheme: ClassScheme, source: Source, scene: str | No
             sorter.add(labelled_blocks(cloud, scheme, source))
             for part in sorter.tiles():
                 yield tile_of(part.points, scene or path.stem, part.corner, scale)
+
+
+def yardstick_tiles(folder: Path, scheme: ClassScheme, source: Source) -> Iterator[CloudTile]:
+    """Yield the labelled points of a public data set in a folder, file by file, as square tiles, in bounded memory.
+
+    Args:
+        folder: of the data set.
+        scheme: classes that are learned.
+        source: yardstick, split, and edge of the tiles; a sweep is one tile.
+
+    Raises:
+        MissingFileError, InputError: see `yardsticks.numbered_blocks`.
+    """
+    if not folder.is_dir():
+        raise MissingFileError(str(folder), None, "is no folder of a public data set")
+    yardstick, names = load_yardstick(str(source.yardstick)), class_names(scheme)
+    mapping = yardstick.mapping_in(folder)
+    edge = 1000.0 if yardstick.form == "sweeps" else source.tile
+    for path in yardstick.files(folder, source.split):
+        scene = path.relative_to(folder).with_suffix("").as_posix()
+        low = np.min([block.xyz.min(axis=0) for block, _ in numbered_blocks(path, yardstick) if len(block)], axis=0)
+        with tempfile.TemporaryDirectory() as scratch, TileSorter(edge, np.floor(low), Path(scratch)) as sorter:
+            for block, numbers in numbered_blocks(path, yardstick):
+                places = mapping.label(numbers, names)
+                if mapping.ignore_zero_intensity:
+                    places = np.where(block.intensity > 0, places, IGNORED).astype(np.int16)
+                sorter.add([_with_places(block, places)])
+            for part in sorter.tiles():
+                yield tile_of(part.points, scene, part.corner, FULL)
 
 
 def tile_of(points: PointBlock, scene: str, origin: Float, scale: float) -> CloudTile:

@@ -116,7 +116,8 @@ def _names(evaluation: Evaluation) -> list[str]:
 def _test_source(path: Path, evaluation: Evaluation) -> Source:
     """Return a test's source; a cloud of up to 5 million points is one tile, as tiles' edges see less around them."""
     if path.is_dir():
-        return Source(path=str(path), split=evaluation.split, mapping=evaluation.mapping)
+        told = {"mapping": evaluation.mapping, "yardstick": evaluation.yardstick}
+        return Source(path=str(path), split=evaluation.split, **told)
     tile = 60.0
     if path.suffix.lower() in ENDINGS and path.is_file():
         with suppress(InputError), open_cloud(path) as cloud:  # a packed file is no cloud

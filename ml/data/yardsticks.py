@@ -1,0 +1,198 @@
+"""Public labelled data sets as yardsticks: their files found in a user's folder, read, and mapped to classes.
+
+Nothing is downloaded, and nothing of these data sets comes with the package. A yardstick is a JSON file that says which
+files are which split, where they keep labels and intensities, and which of their numbers is which class.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Literal
+
+import laspy
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from synthroads_addon.base.arrays import AnyArray, Float
+from synthroads_addon.base.errors import InputError, MissingFileError
+from synthroads_addon.base.schema import read_json
+from synthroads_addon.cloud.formats.base import BLOCK
+from synthroads_addon.cloud.formats.ply import read_ply_header
+from synthroads_addon.cloud.formats.registry import open_cloud
+from synthroads_addon.cloud.points import PointBlock
+
+from ..configuration import SHIPPED, Part, names_in, shipped_file
+from .classes import LabelMapping
+
+YARDSTICKS = SHIPPED / "yardsticks"
+"""Folder of the shipped yardsticks."""
+Form = Literal["sweeps", "ply", "las", "any"]
+_SWEEP = np.dtype([("xyz", "<f4", 3), ("remission", "<f4")])
+_FULL = 65535.0
+
+
+class Yardstick(Part):
+    """A public data set: its files by split, and where they keep what."""
+
+    title: str = Field(min_length=1, description="What it is.")
+    source: str = Field(min_length=1, description="Where it is to be had, its licence, who made it.")
+    form: Form = Field(description="sweeps: SemanticKITTI's .bin and .label; ply, las; any: what a file's ending says.")
+    splits: dict[str, tuple[str, ...]] = Field(min_length=1, description="Split -> patterns of its files' paths.")
+    mapping: LabelMapping = Field(description="Attribute of the labels, and which of them is which class.")
+    intensity: str = Field(
+        "intensity", min_length=1, description="Attribute of the intensities; 0 where there is none."
+    )
+    names: str = Field("", description="JSON file in the folder, number -> name, where classes are mapped by name.")
+
+    def files(self, folder: Path, split: str | None) -> list[Path]:
+        """Return the files of a split, or of all, in a folder, sorted.
+
+        Raises:
+            InputError: there is no such split.
+            MissingFileError: the folder holds none of its files.
+        """
+        if split is not None and split not in self.splits:
+            raise InputError("split", split, f"must be one of {', '.join(self.splits)}")
+        patterns = [one for name, some in self.splits.items() if split in (None, name) for one in some]
+        readable = (".bin", ".ply", ".las", ".laz")
+        found = {path for one in patterns for path in folder.glob(one) if path.suffix.lower() in readable}
+        if not found:
+            raise MissingFileError(str(folder), None, f"holds no file like {' or '.join(patterns[:4])}")
+        return sorted(found)
+
+    def mapping_in(self, folder: Path) -> LabelMapping:
+        """Return the mapping of numbers, made from names by the file in the folder where classes have names.
+
+        Raises:
+            MissingFileError, InputError: that file is missing, or isn't numbers and names.
+        """
+        if not self.names:
+            return self.mapping
+        path = folder / self.names
+        if not path.is_file():
+            wanted = ", ".join(self.mapping.classes)
+            raise MissingFileError(
+                str(path), None, f'must say which number is which class: {{"1": "NAME", ...}}, of {wanted}'
+            )
+        told = read_json(path)
+        if not isinstance(told, dict) or not all(isinstance(name, str) for name in told.values()):
+            raise InputError(
+                str(path), None, 'must be an object of numbers as text and names, e.g. {"1": "RoadSurface"}'
+            )
+        classes = {number: self.mapping.classes[name] for number, name in told.items() if name in self.mapping.classes}
+        return self.mapping.model_copy(update={"classes": classes})
+
+
+def yardstick_names() -> list[str]:
+    """Return the names of the shipped yardsticks, sorted."""
+    return names_in(YARDSTICKS)
+
+
+def load_yardstick(name_or_file: str) -> Yardstick:
+    """Return a shipped yardstick or one from a JSON file.
+
+    Raises:
+        MissingFileError, InputError: there is no such file, or it is no yardstick.
+    """
+    path = shipped_file("yardstick", YARDSTICKS, name_or_file, [".json"])
+    return Yardstick.from_dict(read_json(path), str(name_or_file))
+
+
+def numbered_blocks(path: Path, yardstick: Yardstick) -> Iterator[tuple[PointBlock, NDArray[np.int64]]]:
+    """Yield a file's points in blocks, intensities as shares of what the file can hold, with their label numbers (N,).
+
+    Raises:
+        MissingFileError: there is no such file, or no labels beside a sweep.
+        InputError: it is damaged, or lacks the labels.
+    """
+    form = path.suffix.lower().removeprefix(".") if yardstick.form == "any" else yardstick.form
+    if form == "sweeps":
+        yield _sweep(path)
+    elif form == "ply":
+        yield from _ply(path, yardstick)
+    else:
+        yield from _las(path, yardstick.mapping.field)
+
+
+def _sweep(path: Path) -> tuple[PointBlock, NDArray[np.int64]]:
+    """Return a sweep of SemanticKITTI: float32 x, y, z, remission; labels as uint32, the class in the lower 16 bits."""
+    labels = path.parent.parent / "labels" / f"{path.stem}.label"
+    if not labels.is_file():
+        raise MissingFileError(str(labels), None, f"no such file; {path.name} has no labels")
+    if path.stat().st_size % _SWEEP.itemsize:
+        raise InputError(str(path), path.stat().st_size, f"must hold {_SWEEP.itemsize} bytes for each point")
+    points, numbers = np.fromfile(path, dtype=_SWEEP), np.fromfile(labels, dtype="<u4")
+    if len(points) != len(numbers):
+        raise InputError(str(labels), len(numbers), f"must hold a label for each of the {len(points)} points")
+    xyz = _finite(path, points["xyz"].astype(np.float64))
+    return _block(xyz, points["remission"].astype(np.float64), None), (numbers & 0xFFFF).astype(np.int64)
+
+
+def _ply(path: Path, yardstick: Yardstick) -> Iterator[tuple[PointBlock, NDArray[np.int64]]]:
+    """Yield the points of a PLY file, whatever its attributes are called."""
+    with path.open("rb") as file:
+        count, kind, _ = read_ply_header(path, file)
+        names = kind.names or ()
+        for name in ("x", "y", "z", yardstick.mapping.field):
+            if name not in names:
+                raise InputError(f"{path}: attribute", name, f"must be one of {', '.join(names)}")
+        full = _largest(kind, yardstick.intensity) if yardstick.intensity in names else 1.0
+        for done in range(0, count, BLOCK):
+            rows = min(BLOCK, count - done)
+            data = file.read(rows * kind.itemsize)
+            if len(data) != rows * kind.itemsize:
+                raise InputError(str(path), None, f"is truncated: {count} points are in its header")
+            record = np.frombuffer(data, dtype=kind)
+            xyz = _finite(path, np.stack([record[axis].astype(np.float64) for axis in "xyz"], axis=1))
+            given = record[yardstick.intensity].astype(np.float64) if yardstick.intensity in names else np.zeros(rows)
+            rgb = np.stack([record[name] for name in ("red", "green", "blue")], axis=1) if "red" in names else None
+            yield _block(xyz, given / full, rgb), np.rint(record[yardstick.mapping.field]).astype(np.int64)
+
+
+def _largest(kind: np.dtype[Any], name: str) -> float:
+    """Return what a full intensity is in an attribute: of integers what they can hold, of floats 16 bits."""
+    part = kind[name]
+    return float(np.iinfo(part).max) if part.kind in "iu" else _FULL
+
+
+def _las(path: Path, field: str) -> Iterator[tuple[PointBlock, NDArray[np.int64]]]:
+    """Yield the points of a LAS or LAZ file with the numbers of an attribute."""
+    with open_cloud(path) as cloud, laspy.open(path, read_evlrs=False) as file:
+        names = list(file.header.point_format.dimension_names)
+        if field not in names:
+            raise InputError(f"{path}: attribute", field, f"must be one of {', '.join(names)}")
+        scale = cloud.header.intensity_scale or 1.0
+        for block, record in zip(cloud.blocks(), file.chunk_iterator(BLOCK), strict=True):
+            yield (
+                _block(block.xyz, block.intensity * scale / _FULL, block.rgb),
+                np.asarray(record[field]).astype(np.int64),
+            )
+
+
+def _finite(path: Path, xyz: Float) -> Float:
+    if not np.isfinite(xyz).all():
+        raise InputError(str(path), None, "must hold finite coordinates")
+    return xyz
+
+
+def _block(xyz: Float, intensity: Float, rgb: AnyArray | None) -> PointBlock:
+    """Return a block of N points with intensities as shares and, if there are any, colours of 8 or 16 bits."""
+    count = len(xyz)
+    zeros = np.zeros(count)
+    wide = np.zeros((count, 3), dtype=np.uint16) if rgb is None else rgb.astype(np.uint16)
+    if rgb is not None and rgb.dtype.itemsize == 1:
+        wide = wide * np.uint16(257)
+    return PointBlock(
+        xyz=xyz,
+        intensity=np.clip(intensity, 0.0, 1.0),
+        rgb=wide,
+        class_id=np.zeros(count, dtype=np.uint8),
+        instance_id=np.zeros(count, dtype=np.uint32),
+        return_number=np.ones(count, dtype=np.uint8),
+        number_of_returns=np.ones(count, dtype=np.uint8),
+        gps_time=zeros,
+        scan_angle_deg=zeros.astype(np.float32),
+        strip=np.zeros(count, dtype=np.uint16),
+        range=zeros,
+        incidence_deg=zeros.astype(np.float32),
+    )
