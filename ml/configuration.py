@@ -69,6 +69,9 @@ class Configuration(Part):
         "float32", description="Of the training's steps; weights, gradients and geometry stay float32."
     )
     processes: int = quantity(1, ge=1, le=1024, unit="1", description="Processes that train, each on other batches.")
+    accumulation: int = quantity(
+        1, ge=1, le=1024, unit="1", description="Batches of a process whose gradients are averaged for one step."
+    )
     schedule: Schedule = Field(default=Schedule(), description="How the weights are learned.")
 
 

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeVar
 
 import torch
@@ -58,8 +58,9 @@ def fit(
     The result depends on the configuration alone: epoch ``e`` draws its batches from ``batches(e, ...)`` and its
     dropout from a stream keyed by seed and epoch, so that an interrupted training ends with the same weights.
 
-    Of N processes each takes every N-th batch; gradients are averaged, as if the N batches of a step were one. Batches
-    that don't make up a whole step are left out. The first process alone validates and saves.
+    Of N processes each takes every N-th batch, and of these as many as are accumulated make a step; gradients are
+    averaged, as if a step's batches were one. Batches that don't make up a whole step are left out, but for the
+    accumulation of one process, whose last step may have fewer. The first process alone validates and saves.
 
     Args:
         model: on the device it is trained on.
@@ -74,10 +75,11 @@ def fit(
         InputError: the loss is no longer finite, or an epoch has fewer batches than there are processes.
     """
     configuration, number, count = run.configuration, process_number(), process_count()
-    steps_per_epoch = batches_per_epoch // count
+    together = configuration.accumulation
+    steps_per_epoch = batches_per_epoch // (count * together) if count > 1 else -(-batches_per_epoch // together)
     if steps_per_epoch == 0 and count > 1:
         raise InputError("processes", count, f"must not exceed the batches of an epoch, {batches_per_epoch}")
-    share = slice(number, steps_per_epoch * count, count)
+    share = slice(number, min(steps_per_epoch * count * together, batches_per_epoch), count)
     schedule: Schedule = configuration.schedule
     optimizer = optimizer_of(model, schedule)
     state = run.last_checkpoint(next(model.parameters()).device)
@@ -91,9 +93,9 @@ def fit(
         torch.manual_seed(stream_seed(configuration.seed, "epoch", epoch, *([number] if number else [])))
         model.train()
         figures: list[Figures] = []
-        for step, batch in enumerate(batches(epoch, share), start=epoch * steps_per_epoch):
+        for step, several in enumerate(_groups(batches(epoch, share), together), start=epoch * steps_per_epoch):
             rate = learning_rate(schedule, step, schedule.epochs * steps_per_epoch)
-            figures.append(train_step(model, optimizer, rate, configuration, loss, batch))
+            figures.append(train_step(model, optimizer, rate, configuration, loss, *several))
             progress("training", step / (schedule.epochs * steps_per_epoch))
         summary = {"epoch": epoch + 1, **_means(figures), "learning_rate": optimizer.param_groups[0]["lr"]}
         average([buffer for buffer in model.buffers() if buffer.is_floating_point()])  # statistics of norms
@@ -133,9 +135,11 @@ def optimizer_of(model: nn.Module, schedule: Schedule) -> torch.optim.AdamW:
 
 
 def train_step(
-    model: M, optimizer: torch.optim.Optimizer, rate: float, configuration: Configuration, loss: Loss[M], batch: Any
+    model: M, optimizer: torch.optim.Optimizer, rate: float, configuration: Configuration, loss: Loss[M], *batches: Any
 ) -> Figures:
-    """Do one optimiser step, gradients averaged over processes; return mean loss and this process's other figures.
+    """Do one optimiser step, gradients averaged over batches and processes; return mean loss and mean other figures.
+
+    The loss is the mean over all processes, the other figures are this process's.
 
     Raises:
         InputError: the loss is no longer finite.
@@ -144,20 +148,37 @@ def train_step(
         group["lr"] = rate
     optimizer.zero_grad(set_to_none=True)
     half = configuration.precision == "bfloat16"
-    with torch.autocast(next(model.parameters()).device.type, torch.bfloat16, enabled=half):
-        value, figures = loss(model, move_to_device(model, batch))
-    mean = value.detach().clone()
+    values: list[Tensor] = []
+    parts: list[Figures] = []
+    for batch in batches:
+        with torch.autocast(next(model.parameters()).device.type, torch.bfloat16, enabled=half):
+            value, figures = loss(model, move_to_device(model, batch))
+        (value / len(batches)).backward()
+        values.append(value.detach())
+        parts.append(figures)
+    mean = torch.stack(values).mean()
     average([mean])  # not finite in one process, it is in none: all end
     if not torch.isfinite(mean):
         raise InputError("schedule.learning_rate", rate, f"the loss became {mean.item()}; a smaller rate may help")
-    value.backward()
     if process_count() > 1:
         for weight in model.parameters():
             weight.grad = torch.zeros_like(weight) if weight.grad is None else weight.grad
         average([weight.grad for weight in model.parameters() if weight.grad is not None])
     nn.utils.clip_grad_norm_(model.parameters(), configuration.schedule.clip)
     optimizer.step()
-    return {"loss": mean.item(), **figures}
+    return {"loss": mean.item(), **_means(parts)}
+
+
+def _groups(batches: Iterable[Any], size: int) -> Iterator[list[Any]]:
+    """Yield batches in lists of a size; the last one may be shorter."""
+    several: list[Any] = []
+    for batch in batches:
+        several.append(batch)
+        if len(several) == size:
+            yield several
+            several = []
+    if several:
+        yield several
 
 
 def _means(figures: list[Figures]) -> Figures:

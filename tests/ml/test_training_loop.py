@@ -199,3 +199,26 @@ def test_changes_reach_the_configuration(tmp_path: Path) -> None:
     assert (loaded.schedule.epochs, loaded.schedule.learning_rate, loaded.seed) == (4, 0.5, 8)
     with pytest.raises(InputError, match="one of"):
         load_configuration("no-such")
+
+
+def test_accumulated_batches_are_one_step_of_their_mean_gradient(tmp_path: Path) -> None:
+    """Two batches of 16 make the step of one batch of 32, and an odd number of them leaves none out."""
+
+    def without_dropout() -> nn.Module:
+        torch.manual_seed(0)
+        return nn.Sequential(nn.Linear(3, 8), nn.ReLU(), nn.Linear(8, 1))
+
+    def joined(epoch: int, share: slice = slice(None)) -> Iterator[Tensor]:
+        drawn = list(batches(epoch))
+        yield from [torch.cat(drawn[:2]), torch.cat(drawn[2:4]), drawn[4]][share]
+
+    models = []
+    for name, accumulation, source, count in (("two", 2, batches, STEPS), ("one", 1, joined, 3)):
+        model = without_dropout()
+        settings = configuration().model_copy(update={"accumulation": accumulation})
+        run = Run.start(tmp_path / name, settings)
+        fit(model, run, source, count, loss)
+        models.append(model)
+        assert len(run.history) == 6
+    for first, second in zip(models[0].parameters(), models[1].parameters(), strict=True):
+        assert torch.allclose(first, second, atol=1e-5)
