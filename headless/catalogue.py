@@ -4,10 +4,9 @@ Files of one's own are described in the same way.
 """
 
 from collections import Counter
-from pathlib import Path
 
 from synthroads_addon.base.catalogue import Entry, Kind, figure_text, figures, preset_file, range_text
-from synthroads_addon.base.classes import ClassSelector, Member, class_scheme, scheme_names
+from synthroads_addon.base.classes import ClassSelector, Member, class_scheme, scheme_file, scheme_names
 from synthroads_addon.base.files import PRESETS, preset_names
 from synthroads_addon.dataset.recipe import RECIPES, load_recipe, recipe_names
 from synthroads_addon.materials.table import material_table_path, read_material_table
@@ -64,9 +63,8 @@ def _recipe(name: str) -> Entry:
 
 def _classes(name: str) -> Entry:
     rows = class_scheme(name).rows
-    shipped = {"17": PRESETS / "classes.json", "5": PRESETS / "classes_5.json"}
     table = [{"id": row.id, "name": row.name, "las": row.las, "of": [_member(one) for one in row.of]} for row in rows]
-    return Entry(name, f"{len(rows)} classes", shipped.get(name, Path(name)), {"classes": table})
+    return Entry(name, f"{len(rows)} classes", scheme_file(name), {"classes": table})
 
 
 def _member(member: Member) -> str | int:

@@ -111,7 +111,7 @@ class ClassRow(Model):
 class ClassTable(Model):
     """A table of classes, or a scheme that merges, splits or adds to them, in JSON."""
 
-    extends: Literal["17", "5"] | None = Field(None, description="Built-in scheme whose classes these are added to.")
+    extends: Literal["17", "5", "19"] | None = Field(None, description="Built-in scheme whose classes these are added to.")
     classes: tuple[ClassRow, ...] = Field(min_length=1, max_length=256, description="The classes.")
 
     @model_validator(mode="after")
@@ -127,7 +127,7 @@ class ClassScheme:
     """A set of classes that clouds are written with.
 
     Attributes:
-        name: ``17``, ``5``, a file's stem, or ``asprs``.
+        name: ``17``, ``5``, ``19``, a file's stem, or ``asprs``.
         rows: the classes, ordered by id.
         ids: (256,) uint8, from the ``class_id`` of the points handed in to the scheme's.
         fine: classes that the full table doesn't have, by the ``class_id`` of the points handed in; as in the file.
@@ -194,7 +194,13 @@ def class_id(name: str) -> int:
 
 def scheme_names() -> list[str]:
     """Return the names of the built-in schemes."""
-    return ["17", "5"]
+    return ["17", "5", "19"]
+
+
+def scheme_file(name_or_file: str) -> Path:
+    """Return the path of a built-in scheme's table, or that of a file by its name."""
+    shipped = {"17": "classes.json"} | {name: f"classes_{name}.json" for name in scheme_names()[1:]}
+    return PRESETS / shipped[name_or_file] if name_or_file in shipped else Path(name_or_file)
 
 
 def class_scheme(name_or_file: str) -> ClassScheme:
@@ -208,12 +214,12 @@ def class_scheme(name_or_file: str) -> ClassScheme:
     """
     if name_or_file == "17":
         return ClassScheme("17", classes(), np.arange(256, dtype=np.uint8))
-    path = PRESETS / "classes_5.json" if name_or_file == "5" else Path(name_or_file)
+    path = scheme_file(name_or_file)
     if path.suffix.lower() != ".json":
         known = ", ".join(scheme_names())
         raise InputError("classes", name_or_file, f"must be one of {known}, or a .json file of classes")
     table = _read_table(path)
-    name = "5" if name_or_file == "5" else path.stem
+    name = name_or_file if name_or_file in scheme_names() else path.stem
     fine = _fine_classes(table.classes)
     return ClassScheme(name, _rows(table.classes), _merging_table(table.classes, fine, str(path)), fine)
 
@@ -266,8 +272,7 @@ def _read_table(path: Path) -> ClassTable:
             raise InputError(f"{path}: {row.name}.las", row.las, allowed)
     if table.extends is None:
         return table
-    shipped = PRESETS / ("classes.json" if table.extends == "17" else "classes_5.json")
-    extended = [row.to_dict() for row in _read_table(shipped).classes]
+    extended = [row.to_dict() for row in _read_table(scheme_file(table.extends)).classes]
     return ClassTable.from_dict({"classes": extended + [row.to_dict() for row in table.classes]}, str(path))
 
 

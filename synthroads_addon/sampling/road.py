@@ -16,6 +16,7 @@ from .conflicts import check_conflicts
 from .markings import place_markings
 from .placing.assets import sample_assets
 from .placing.furniture import place_furniture
+from .placing.roadside import place_roadside
 from .placing.site import PlacementSite
 from .section import SIDES, CarriagewaySampler
 from .surroundings import (
@@ -56,6 +57,7 @@ def sample_road(
     add(_structure(site))
     add(place_markings(site))
     add(place_furniture(site))
+    add(place_roadside(site, objects))
     add([("terrain", site.terrain)])
     add(sample_vegetation(site))
     add(sample_vehicles(site, objects))

@@ -27,7 +27,7 @@ class CloudScenario(ClosedModel):
         description="What is kept of each point beyond what every cloud holds.",
         json_schema_extra=notes(labels={name: layer.label for name, layer in LAYERS.items()}),
     )
-    classes: str = Field("17", min_length=1, description="17, 5, or a JSON file of classes of one's own.")
+    classes: str = Field("17", min_length=1, description="17, 5, 19, or a JSON file of classes of one's own.")
     point_spacing: float | None = quantity(
         None,
         "m",

@@ -109,12 +109,18 @@ class _FurnitureLimits(ClosedModel):
     """Signs, gantries and equipment."""
 
 
+class _RoadsideLimits(ClosedModel):
+    """Fences, hedges, buildings and the like beside the road, as far as its ground reaches."""
+
+
 if TYPE_CHECKING:
     BarrierLimits: TypeAlias = Any
     FurnitureLimits: TypeAlias = Any
+    RoadsideLimits: TypeAlias = Any
 else:
     BarrierLimits = limits_model("BarrierLimits", "barriers", _BarrierLimits)
     FurnitureLimits = limits_model("FurnitureLimits", "furniture", _FurnitureLimits)
+    RoadsideLimits = limits_model("RoadsideLimits", "roadside", _RoadsideLimits)
 
 
 class VehicleLimits(ClosedModel):
@@ -211,6 +217,7 @@ class RoadScenario(ClosedModel):
     markings: MarkingLimits = Field(MarkingLimits(), description="Line markings.")
     barriers: BarrierLimits = Field(BarrierLimits(), description="Guardrails and other barriers.")
     furniture: FurnitureLimits = Field(FurnitureLimits(), description="Signs, gantries, equipment.")
+    roadside: RoadsideLimits = Field(RoadsideLimits(), description="Fences, hedges, buildings, power lines.")
     vehicles: VehicleLimits = Field(VehicleLimits(), description="Traffic.")
     embankment_height: Interval = interval(
         -4.0, 5.0, "m", "Mean height of the road above the ground.", title="Embankment"

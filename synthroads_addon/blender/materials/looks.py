@@ -63,6 +63,11 @@ _NOISES: dict[str, tuple[_Noise, ...]] = {
     "noise_aluminium": (_Noise(0.08, 1.2, 3.0, (1.0, 1.0, 0.3)),),
     "noise_concrete": (_Noise(0.16, 0.02, 2.0), _Noise(0.14, 1.0, 4.0, (1.0, 1.0, 0.3))),
     "noise_wood": (_Noise(0.30, 0.12, 3.0, (1.0, 1.0, 0.06)), _Noise(0.18, 0.02, 2.0, (1.0, 1.0, 0.05))),
+    "plaster": (_Noise(0.04, 0.02, 2.0), _Noise(0.10, 0.9, 3.0, (1.0, 1.0, 0.25)), _Noise(0.16, 30.0, 0.0)),
+    "brick": (_Noise(0.22, 0.11, 1.0, (1.0, 1.0, 2.4)), _Noise(0.14, 0.7, 3.0)),
+    "roof_tiles": (_Noise(0.20, 0.14, 1.0), _Noise(0.16, 1.6, 3.0), _Noise(0.25, 40.0, 0.0)),
+    "wire_mesh": (_Noise(0.10, 0.2, 2.0),),
+    "conductor": (_Noise(0.06, 2.0, 2.0),),
     "gantry_steel": (_Noise(0.06, 0.1, 3.0), _Noise(0.06, 2.5, 2.0, (1.0, 1.0, 0.3))),
     "plastic_red": _WORN,
     "rubber": _WORN,
@@ -90,6 +95,8 @@ _DIRT: dict[str, _Dirt] = {
     "galvanised_steel": _Dirt(metallic=0.15),  # white rust
     "gantry_steel": _Dirt(metallic=0.3),  # paint over rust
     "board_back": _Dirt(metallic=0.3),
+    "wire_mesh": _Dirt(metallic=0.15),
+    "conductor": _Dirt(metallic=0.15),
     "car_paint": _Dirt(),
     "plastic_white": _Dirt(),
     "plastic_black": _Dirt(specular=0.03),
@@ -149,8 +156,8 @@ def _scars(shade: Shade) -> None:
     shade.scale_texture(shade.tree.node("ShaderNodeMapRange", scars, 0.25, 0.4, 1.12, 0.25).value)
 
 
-def _clear(shade: Shade) -> None:
-    shade.transparency = 0.8
+def _clear(shade: Shade, share: float = 0.8) -> None:
+    shade.transparency = share
 
 
 class _Texture(NamedTuple):
@@ -203,6 +210,7 @@ _AFTER_NOISES = {
     "barrier_concrete": _joints,
     "birch_bark": _scars,
     "acrylic_glass": _clear,
+    "wire_mesh": lambda shade: _clear(shade, 0.88),
 }
 
 

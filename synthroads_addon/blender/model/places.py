@@ -16,14 +16,18 @@ from ...road.section import Carriageway
 from ...road.surroundings import Vehicle
 from ...road.terrain import surface_elevation
 from ...road.things.asset import Asset
+from ...road.things.building import Building
 from ...road.things.gantry import Gantry
 from ...road.things.overpass import Overpass
+from ...road.things.power_line import PowerLine
 from ..things.meshes import on_plan
 from ..things.vehicle.vehicle import vehicle_place
 from .edits import turn_of, vertices_of
 
 Float = NDArray[np.float64]
 
+IN_A_FRAME = (Gantry, Overpass, Building, PowerLine)
+"""Things whose objects are placed and turned by their own matrices; other standing things are a vertex each."""
 PLACED = "synthroads_placed"
 """Custom property of what runs along the road: how far (x, y) its object's move is in its inputs already, m."""
 STILL = 2e-4
@@ -89,10 +93,10 @@ def _turned(axes: RoadAxes, item: PointObject, station: float, turn: float) -> f
     return round((rotation + 180.0) % 360.0 - 180.0, 9)
 
 
-def standing_update(axes: RoadAxes, item: Gantry | Overpass, place: Float) -> dict[str, Any]:
-    """Return the changed fields of a gantry or overpass by its object's place (4, 4); empty if unmoved."""
+def standing_update(axes: RoadAxes, item: PointObject, place: Float) -> dict[str, Any]:
+    """Return the changed fields of a thing of `IN_A_FRAME` by its object's place (4, 4); empty if unmoved."""
     expected = on_plan(axes.before, [item])[0]
-    rotation = item.rotation_deg if isinstance(item, Gantry) else 0.0
+    rotation = 0.0 if isinstance(item, Overpass) else item.rotation_deg
     heading = float(axes.before.alignment.heading(item.station)) - np.pi / 2.0 + np.deg2rad(rotation)
     turn = _wrapped(turn_of(place) - heading)
     if np.hypot(*(place[:3, 3] - expected)[:2]) < STILL and abs(turn) < _TURNED:
@@ -105,6 +109,8 @@ def standing_update(axes: RoadAxes, item: Gantry | Overpass, place: Float) -> di
         ends = ("left_offset", "right_offset")
         signs = [sign.model_copy(update={"offset": round(sign.offset + shift, 6)}) for sign in item.signs]
         update["signs"] = tuple(signs)
+    elif not isinstance(item, Overpass):
+        return update
     else:
         ends = ("left_abutment", "right_abutment")
         update["pier_offsets"] = tuple(round(pier + shift, 6) for pier in item.pier_offsets)

@@ -25,8 +25,6 @@ from ...road.parameters import RoadParameters
 from ...road.section import Arrow, Hatching
 from ...road.surroundings import Terrain, Vegetation, Vehicle
 from ...road.things.asset import Asset
-from ...road.things.gantry import Gantry
-from ...road.things.overpass import Overpass
 from ..things.model_builder import ROLE
 from .axis_edits import EditedAxis, edited_axis, moved_alignment
 from .edits import (
@@ -40,7 +38,16 @@ from .edits import (
     turn_of,
     vertices_of,
 )
-from .places import Lost, RoadAxes, asset_update, line_update, point_update, standing_update, vehicle_update
+from .places import (
+    IN_A_FRAME,
+    Lost,
+    RoadAxes,
+    asset_update,
+    line_update,
+    point_update,
+    standing_update,
+    vehicle_update,
+)
 from .read_back import edited_object, edited_parameters, read_inputs
 from .roads import BUILT_PARTS, ROAD, displacement, origin_of, parts_and_copies, root_above, world_matrix
 from .store import recall_parameters, road_named
@@ -367,7 +374,7 @@ def _update(
     """Return an object's changed fields by its part's place, and whether showing them needs a rebuild."""
     if isinstance(before, Asset):
         return asset_update(axes, before, place), False
-    if isinstance(before, Gantry | Overpass):
+    if isinstance(before, IN_A_FRAME):
         return standing_update(axes, before, place), True
     if isinstance(before, LineObject) and isinstance(item, LineObject):
         return line_update(axes, item, part, place), True
@@ -380,7 +387,7 @@ def _update(
 
 def _on_a_vertex(item: RoadObject | None) -> bool:
     """Return whether a thing is modelled as one vertex at its place, from which nodes make its shape."""
-    return isinstance(item, PointObject) and not isinstance(item, Asset | Gantry | Overpass | Arrow)
+    return isinstance(item, PointObject) and not isinstance(item, (Asset, Arrow, *IN_A_FRAME))
 
 
 def _on_axis(parameters: RoadParameters, axis: EditedAxis) -> RoadParameters:

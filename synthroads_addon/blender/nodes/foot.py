@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from . import operations as op
 from .axis import AxisInputs
-from .backbone import height_on, last_station, look_up, raise_place, station_ribbon
+from .backbone import first_station, height_on, last_station, look_up, raise_place, station_ribbon
 from .builder import Operand, Tree, Value, makes_group
 from .inputs import FAR, Inputs, backbone_socket, metres, socket
+from .solids import loft, row_of_points
 
 
 def foot_at(backbone: Value, surfaces: tuple[Value, Value], station: Value, offset: Operand) -> tuple[Value, Value]:
@@ -45,6 +46,45 @@ class Lengthwise(AxisInputs):
             end = self.end_station
             self.values["end_station"] = op.switch(end > 0.0, last_station(axis), end)
             return axis, (op.object_geometry(self.road), op.object_geometry(self.terrain))
+
+
+    def rows(self, step: Operand) -> Value:
+        """Add nodes for points at its stations, a `step` (m) apart, with ``station``, ``foot`` and ``left``.
+
+        Those beyond what it follows collapse at its ends.
+        """
+        axis, surfaces = self.geometry()
+        tree = self.tree
+        with tree.frame("Rows, at even distances"):
+            first, last = self.start_station, self.end_station
+            count = op.round_up(op.maximum(last - first, 0.01) / step - 1e-4) + 1
+            station = op.minimum(first + op.index(tree) * step, last)
+            within = op.minimum(op.maximum(station, first_station(axis)), last_station(axis))
+            line = op.store(row_of_points(tree, count), "station", within)
+            foot, left = foot_at(axis, surfaces, op.named_attribute(tree, "station"), self.offset)
+            return op.store(op.store(line, "foot", foot), "left", left)
+
+
+def sweep(line: Value, outline: list[tuple[float, float]], across: Operand, height: Operand, low: Operand) -> Value:
+    """Add nodes for a closed solid along the points of `Lengthwise.rows`.
+
+    Args:
+        line: the rows, with ``foot`` and ``left``.
+        outline: x and z of its corners, 0 to 1, clockwise as seen along the rows; x positive to the left.
+        across, height: what x and z are scaled with, m.
+        low: height of z = 0 above the feet, m.
+    """
+    tree = line.tree
+
+    def place(point: Value, row: Value) -> Value:
+        foot = op.sample_index(line, op.named_attribute(tree, "foot", "FLOAT_VECTOR"), row)
+        left = op.sample_index(line, op.named_attribute(tree, "left", "FLOAT_VECTOR"), row)
+        above = op.component(point, "Z") * height + low
+        return foot + left * (op.component(point, "X") * across) + op.vector(tree, 0.0, 0.0, above)
+
+    corners = [(x, 0.0, z) for x, z in outline]
+    body = loft(tree, lambda number: op.choose(number, corners), len(corners), op.point_count(line), place)
+    return op.delete_degenerate(body)
 
 
 class _Foot(Inputs):

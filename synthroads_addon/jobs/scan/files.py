@@ -1,6 +1,7 @@
 """A scan into files: the cloud and the previews while blocks of points are written to them."""
 
 import logging
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
@@ -151,11 +152,13 @@ class CloudFiles:
     def summary(self) -> dict[str, Any]:
         """Return the counts so far as JSON data, by class name and colour source."""
         names = self.scenario.cloud.scheme().sources().names()
-        by_class = {names.get(i, str(i)): int(n) for i, n in enumerate(self.counts.by_class) if n}
+        by_class: Counter[str] = Counter()  # a class of a scheme may have the name of one of the full table
+        for number in np.flatnonzero(self.counts.by_class).tolist():
+            by_class[names.get(number, str(number))] += int(self.counts.by_class[number])
         return {
             **{name: value for name, value in asdict(self.counts).items() if not name.startswith("by_")},
             "intensity_scale": self.intensity_scale,
-            "points_by_class": by_class,
+            "points_by_class": dict(by_class),
             "points_by_colour_source": shares_by_source(self.counts.by_source),
         }
 

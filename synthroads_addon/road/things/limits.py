@@ -41,6 +41,6 @@ class Limits(ClosedModel):
         allowed: interval -> the field of the thing whose limits it must keep to, or limits of its own.
     """
 
-    group: ClassVar[Literal["barriers", "furniture"]] = "furniture"
+    group: ClassVar[Literal["barriers", "furniture", "roadside"]] = "furniture"
     place: ClassVar[int] = 1000
     allowed: ClassVar[Mapping[str, str | tuple[float, float]]] = {}

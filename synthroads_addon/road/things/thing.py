@@ -92,12 +92,14 @@ class Thing(RoadObject):
         limits: what a scenario says of how it is sampled; None where that has no fields for it.
         obstacle: what its foot is called for people, where a barrier must stand before it; empty if none must.
         left_out: what of it isn't among its bodies, for people.
+        clearing: distance (m) around it within which no shrubs and trees grow; None where they may.
     """
 
     order: ClassVar[int] = 1000
     limits: ClassVar[type[Limits] | None] = None
     obstacle: ClassVar[str] = ""
     left_out: ClassVar[str] = ""
+    clearing: ClassVar[float | None] = None
 
     def footprint(self) -> Iterator[Block]:
         """Yield the boxes, in stations, offsets and heights, in which nothing else may stand."""

@@ -19,6 +19,7 @@ from ..geometry import RoadGeometry
 from ..instances import places_per_metre
 from ..surroundings import Terrain, Vegetation
 from ..terrain import known_elevation
+from ..things.thing import Thing
 
 STATION, OFFSET, CHANCE = 11, 12, 13
 """Added to a stand's seed: for a place's station within its metre, its offset, and whether a plant grows there."""
@@ -124,11 +125,23 @@ def plant_places(
     distance = np.maximum(offset - boundaries[:, 0], boundaries[:, -1] - offset)
     stands = (station <= geometry.length) & (distance > 0.0) & (clip_offset(offset, curvature) == offset)
     stands &= (distance >= plants.band_start) & (distance <= plants.band_end)
+    stands &= ~_in_clearings(geometry, station, offset)
     left = np.flatnonzero(stands)
     ground = (1.0 - curvature[left] * offset[left]) * _steepness(geometry, station[left], offset[left], curvature[left])
     needed = terrain.half_width * 2.0 * plants.density * ground
     stands[left] = random_share(seed + CHANCE, number[left]) * each <= needed
     return PlantPlaces(number, station, offset, stands)
+
+
+def _in_clearings(geometry: RoadGeometry, station: Float, offset: Float) -> Bool:
+    """Return whether places (N,) lie on or so near things that no shrubs and trees grow there."""
+    found = np.zeros(len(station), dtype=np.bool_)
+    for item in geometry.parameters.of_type(Thing).values():
+        for block in item.footprint() if item.clearing is not None else ():
+            near = item.clearing or 0.0
+            inside = (station > block.start - near) & (station < block.end + near)
+            found |= inside & (offset > block.low - near) & (offset < block.high + near)
+    return found
 
 
 def _steepness(geometry: RoadGeometry, station: Float, offset: Float, curvature: Float) -> Float:

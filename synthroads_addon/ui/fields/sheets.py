@@ -65,6 +65,7 @@ SHEETS = (
     ),
     PanelFields("barriers", "Barriers", "objects", 1, "road.barriers.*"),
     PanelFields("furniture", "Furniture", "objects", 2, "road.furniture.*"),
+    PanelFields("roadside", "Beside the Road", "objects", 3, "road.roadside.*"),
     PanelFields("vehicles", "Vehicles", "objects", 3, "road.vehicles.* scan.traffic_speed_factor"),
     PanelFields("vegetation", "Vegetation", "objects", 4, "vegetation_detail road.vegetation.*"),
     PanelFields("assets", "Assets of Your Own", "objects", 5, "road.assets"),

@@ -19,8 +19,9 @@ from tests.helpers.scenes.furnished_road import Float, FurnishedRoad
 from tests.helpers.solid_comparison import compare, triangles_of
 
 GROUND = ("Road", "Terrain", "Ground", "Backbone")
-NOT_BUILT = {"Asset"}
-COSTLY = {"Gantry", "Overpass", "NoiseBarrier"}
+NOT_BUILT = {"Asset", "Hedge", "ParkedVehicle"}
+"""Things whose shape isn't made of their bodies: `test_roadside` has hedges and parked vehicles."""
+COSTLY = {"Gantry", "Overpass", "NoiseBarrier", "PowerLine"}
 """Things whose shape is in files of their own."""
 _CROWN = 0.31
 """An embankment's crown begins so far (m) before the ends of a bridge's wing walls."""

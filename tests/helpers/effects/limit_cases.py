@@ -7,6 +7,7 @@ from tests.helpers.effects.road_cases import ELEVATIONS, TEXTURES
 
 Data = dict[str, Any]
 
+ENDS = ("minimum", "maximum")
 SEEDS = range(30)
 """Seeds that a limit may show itself with: what has a small share is drawn with few."""
 LIMITS: Data = {
@@ -27,12 +28,22 @@ LIMITS: Data = {
         "overpass": 1.0,
         "gantry_spacing": 400.0,
     },
+    "roadside": {"fences": 1.0, "power_line": 1.0, "hedges_per_km": {"minimum": 4.0, "maximum": 8.0}},
     "environment": {"wet": 1.0},
     "grass_density": 0.01,
 }
 """Limits of roads on which nearly everything is; as JSON data."""
 PLAIN: Data = {"length": 2500.0, "turnouts": {"exits": 0.0, "entries": 0.0, "emergency_bays": 0.0}}
 """Limits of roads on which there is room for long things."""
+YARDS: Data = PLAIN | {
+    "half_width": 100.0,
+    "roadside": {
+        "buildings_per_km": {"minimum": 4.0, "maximum": 8.0},
+        "walls": 1.0,
+        "parked_per_building": {"minimum": 1.0, "maximum": 3.0},
+    },
+}
+"""Limits of roads with buildings beside them."""
 ZONE = PLAIN | {"furniture": {"construction_zone": 1.0}}
 FREE = {"cross_section": {"lanes": [3.75, 3.75, 3.75], "hard_shoulder": 2.5}}
 
@@ -70,6 +81,13 @@ CASES: dict[str, LimitCase] = {
     "furniture.construction_length.maximum": LimitCase(given=ZONE),
     "elevation_model": LimitCase(value=str(ELEVATIONS), given={"length": 60.0, "half_width": 30.0}),
     "barriers.noise_barrier_length.maximum": LimitCase(given=PLAIN | {"barriers": {"noise_barrier": 1.0}}),
+    **{
+        f"roadside.{name}": LimitCase(given=YARDS)
+        for name in (
+            "walls",
+            *(f"{part}.{end}" for part in ("buildings_per_km", "wall_height", "parked_per_building") for end in ENDS),
+        )
+    },
     "epsg": LimitCase(value=25833),
     "textures": LimitCase(value=str(TEXTURES)),
     "assets": LimitCase(value=["roadside"]),

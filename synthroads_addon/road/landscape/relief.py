@@ -1,0 +1,90 @@
+"""The land's heights: at the terrain's edge those of the terrain, farther out hills."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from ...base.arrays import Float
+from ...base.random_streams import stream
+from ..geometry import RoadGeometry
+from ..terrain import known_elevation
+from .landscape import Landscape
+
+_WAVES, _OCTAVES = 16, 2.5
+_FLAT, _RISE = 1200.0, 1500.0  # m ahead of the road's ends: where hills begin on its prolongation, and over how far
+_NEAR = 500.0  # m beside the road over which the terrain turns into hills
+_EASE = 400.0  # m over which the road's grade eases beyond its ends
+
+
+class LandRelief:
+    """Heights of the land around a road, anywhere in local coordinates.
+
+    Args:
+        geometry: the road.
+        landscape: of its parameter set.
+
+    Attributes:
+        half_width: distance from the axis to which the terrain itself is built, m.
+    """
+
+    def __init__(self, geometry: RoadGeometry, landscape: Landscape) -> None:
+        terrain = geometry.parameters.terrain
+        edges = geometry.offsets([0.0, geometry.length])
+        self.geometry, self.landscape = geometry, landscape
+        self.half_width = max(terrain.half_width if terrain else 0.0, float(np.abs(edges).max()))
+
+    def elevation(self, plan: Float) -> Float:
+        """Return the local elevation (N,), m, at local points (N, 2), of the land or the road's prolongation."""
+        station, offset = self.geometry.alignment.project(plan)
+        return self.elevation_beside(plan, station, offset)
+
+    def elevation_beside(self, plan: Float, station: Float, offset: Float) -> Float:
+        """Return the local elevation (N,), m, at points (N, 2) with stations and offsets (N,) on the axis or beyond."""
+        length = self.geometry.length
+        on_road = np.clip(station, 0.0, length)
+        across = np.clip(offset, -self.half_width, self.half_width)
+        near = known_elevation(self.geometry, on_road, across) + self._climb(station)
+        ahead = np.maximum(np.maximum(-station, station - length), 0.0)
+        beside = np.maximum(np.abs(offset) - self.half_width, 0.0)
+        hills = np.maximum(1.0 - np.exp(-((beside / _NEAR) ** 2)), _smooth((ahead - _FLAT) / _RISE))
+        return near * (1.0 - hills) + (self._mean + self._hills(plan)) * hills
+
+    def _climb(self, station: Float) -> Float:
+        """Return the rise (N,), m, beyond the road's ends: at its grade there, which eases."""
+        length, profile = self.geometry.length, self.geometry.profile
+        first, last = profile.grade(np.array([0.0, length])).tolist()
+        before, after = np.maximum(-station, 0.0), np.maximum(station - length, 0.0)
+        return _EASE * (np.tanh(after / _EASE) * last - np.tanh(before / _EASE) * first)
+
+    @cached_property
+    def _mean(self) -> float:
+        station = np.linspace(0.0, self.geometry.length, 9)
+        return float(np.mean([known_elevation(self.geometry, station, np.full(9, side * self.half_width)) for side in (-1, 1)]))
+
+    def _hills(self, plan: Float) -> Float:
+        """Return the hills' heights (N,), m: seeded plane waves, the longer the higher."""
+        return plane_waves(plan, self.landscape.seed, "hills", self.landscape.hill_length) * self.landscape.hill_height
+
+
+def plane_waves(plan: Float, seed: int, purpose: str, shortest: float) -> Float:
+    """Return a seeded field (N,) of mean 0 and standard deviation 1 at points (N, 2).
+
+    Args:
+        plan: local points, m.
+        seed, purpose: of its random numbers.
+        shortest: wavelength, m; they spread over two and a half octaves above it.
+    """
+    rng = stream(seed, "landscape", purpose)
+    octave, direction = rng.uniform(0.0, _OCTAVES, _WAVES), rng.uniform(0.0, 2.0 * np.pi, _WAVES)
+    phase, weight = rng.uniform(0.0, 2.0 * np.pi, _WAVES), 2.0 ** (0.7 * octave)
+    number = 2.0 * np.pi / (shortest * 2.0**octave)
+    vectors = number * np.stack([np.cos(direction), np.sin(direction)])
+    waves: Float = np.sin(plan @ vectors + phase) @ (weight * np.sqrt(2.0 / np.sum(weight**2)))
+    return waves
+
+
+def _smooth(share: Float) -> Float:
+    inside = np.clip(share, 0.0, 1.0)
+    return inside * inside * (3.0 - 2.0 * inside)

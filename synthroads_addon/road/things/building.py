@@ -1,0 +1,128 @@
+"""Buildings beside the road: houses, barns and halls."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import ClassVar, Literal
+
+import numpy as np
+from pydantic import Field
+
+from ...base.arrays import Float
+from ...base.schema import quantity
+from .body import BURIED, Body, Place, box
+from .limits import Interval, Limits, interval
+from .thing import Block, StandingThing, TwinTypes
+
+OVERHANG, SLAB = 0.45, 0.22
+"""How far a roof stands out over the walls, and its thickness, m."""
+STOREY = 2.8
+"""Height of a storey, m."""
+WINDOW, DOOR = (1.1, 1.25), (1.1, 2.1)
+"""Width and height of a window and of a door, m."""
+GATE = (4.0, 3.6)
+"""Width and height of a barn's or hall's gate at most, m."""
+_PROUD = 0.04
+"""How far windows and doors stand out of the wall, m."""
+_BAY = 2.7
+"""Width of wall that a window has, m at least."""
+WALLS = {"house": "plaster", "brick_house": "brick", "barn": "noise_wood", "hall": "noise_aluminium"}
+"""Kind of building -> material of its walls."""
+ROOFS = {"house": "roof_tiles", "brick_house": "roof_tiles", "barn": "roof_tiles", "hall": "noise_aluminium"}
+"""Kind of building -> material of its roof."""
+
+
+class BuildingLimits(Limits):
+    """Limits of buildings."""
+
+    group: ClassVar = "roadside"
+    place: ClassVar = 30
+    allowed: ClassVar = {"buildings_per_km": (0.0, 100.0)}
+
+    buildings_per_km: Interval = interval(
+        0.0, 5.0, "1/km", "Buildings per km, 40 m or more from the pavement.", title="Buildings (per km)"
+    )
+
+
+class Building(StandingThing):
+    """A building with a gable roof, its ridge along its width; a roof that rises by nothing is flat."""
+
+    points_class: ClassVar = "roadside"
+    order: ClassVar = 170
+    limits: ClassVar = BuildingLimits
+    clearing: ClassVar = 1.5
+    type: Literal["Building"] = "Building"
+    kind: Literal["house", "brick_house", "barn", "hall"] = Field("house", description="What it is.")
+    width: float = quantity(11.0, ge=2, le=80, unit="m", description="Width, seen from the road that it faces.")
+    depth: float = quantity(9.0, ge=2, le=60, unit="m", description="Depth.")
+    height: float = quantity(5.6, ge=2, le=30, unit="m", description="Eaves above the highest ground at its walls.")
+    roof_height: float = quantity(4.0, ge=0, le=20, unit="m", description="Ridge above the eaves.")
+
+    def twin(self) -> TwinTypes:
+        """Return its types in the twin formats: a building."""
+        return TwinTypes("IfcBuildingElementProxy.ELEMENT", f"building.{self.kind}", "Building", kind=self.kind)
+
+    def bodies(self, place: Place) -> list[Body]:
+        """Return the closed solids of walls, roof and chimney in its frame; windows and doors are details."""
+        x, y = (np.array([-0.5, 0.5, 0.5, -0.5, 0.0]) * self.width, np.array([-0.5, -0.5, 0.5, 0.5, 0.0]) * self.depth)
+        ground = place.ground(x, y)
+        floor, low = float(np.max(ground)), float(np.min(ground)) - BURIED
+        eaves = floor + self.height
+        walls = Body(self._walls(low, eaves), WALLS[self.kind])
+        return [walls, *self._roof(eaves), *self._openings(floor)]
+
+    def _walls(self, low: float, eaves: float) -> Float:
+        """Return the sections of walls and gables: an outline across the ridge, extruded along it."""
+        half = self.depth / 2.0
+        outline = [(-half, low), (half, low), (half, eaves), (-half, eaves)]
+        if self.roof_height > 0.0:
+            outline.insert(3, (0.0, eaves + self.roof_height))
+        return self._along(outline, self.width / 2.0)
+
+    def _roof(self, eaves: float) -> Iterator[Body]:
+        """Yield the slabs of the roof and a house's chimney."""
+        end, half = self.width / 2.0 + OVERHANG, self.depth / 2.0 + OVERHANG
+        ridge, material = eaves + self.roof_height, ROOFS[self.kind]
+        drop = OVERHANG * self.roof_height / (self.depth / 2.0)
+        for side in (-1.0, 1.0):
+            slope = [(0.0, ridge), (side * half, eaves - drop), (side * half, eaves - drop + SLAB), (0.0, ridge + SLAB)]
+            yield Body(self._along(slope if side > 0.0 else slope[::-1], end), material)
+        if self.kind in ("house", "brick_house"):
+            top = ridge + 0.7
+            size = (0.5, 0.5, top - eaves)
+            yield Body(box(size, (self.width * 0.2, self.depth * 0.08, (top + eaves) / 2.0)), "brick")
+
+    @staticmethod
+    def _along(outline: list[tuple[float, float]], end: float) -> Float:
+        flat = np.array(outline)
+        return np.stack([np.column_stack([np.full(len(flat), x), flat]) for x in (-end, end)])
+
+    def _openings(self, floor: float) -> Iterator[Body]:
+        """Yield windows, doors and gates, which stand out of the walls by a little."""
+        if self.kind in ("barn", "hall"):
+            wide, tall = min(GATE[0], 0.5 * self.width), min(GATE[1], self.height - 0.3)
+            for side in (-1.0, 1.0):
+                yield self._opening((0.0, side, floor), (wide, tall), "gantry_steel")
+            return
+        bays = max(1, int(self.width / _BAY))
+        pitch = self.width / bays
+        for storey in range(max(1, int(self.height / STOREY))):
+            sill = floor + storey * STOREY + 0.9
+            for side in (-1.0, 1.0):
+                for bay in range(bays):
+                    x = (bay - (bays - 1) / 2.0) * pitch
+                    if storey == 0 and side < 0.0 and bay == bays // 2:
+                        yield self._opening((x, side, floor), DOOR, "noise_wood")
+                    else:
+                        yield self._opening((x, side, sill), WINDOW, "glass")
+
+    def _opening(self, at: tuple[float, float, float], size: tuple[float, float], material: str) -> Body:
+        x, side, low = at
+        middle = (x, side * self.depth / 2.0, low + size[1] / 2.0)
+        return Body(box((size[0], 2.0 * _PROUD, size[1]), middle), material, "openings", detail=_PROUD)
+
+    def footprint(self) -> Iterator[Block]:
+        """Yield the box that holds it, however it is turned; nothing else may stand there."""
+        half = math.hypot(self.width, self.depth) / 2.0 + OVERHANG
+        yield self.upright(half, self.height + self.roof_height + 1.0)
