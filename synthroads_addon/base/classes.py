@@ -111,7 +111,9 @@ class ClassRow(Model):
 class ClassTable(Model):
     """A table of classes, or a scheme that merges, splits or adds to them, in JSON."""
 
-    extends: Literal["17", "5", "19"] | None = Field(None, description="Built-in scheme whose classes these are added to.")
+    extends: Literal["17", "5", "19"] | None = Field(
+        None, description="Built-in scheme whose classes these are added to."
+    )
     classes: tuple[ClassRow, ...] = Field(min_length=1, max_length=256, description="The classes.")
 
     @model_validator(mode="after")

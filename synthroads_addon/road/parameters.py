@@ -17,6 +17,7 @@ from pydantic import Field, model_validator
 
 from ..base.errors import InputError
 from ..base.schema import Model, quantity, read_json, when
+from .landscape.landscape import Landscape
 from .objects import ObjectT, RoadObject, StrictFinite
 from .section import Arrow, Carriageway, Hatching, LineMarking, Median, Turnout
 from .surroundings import Environment, MaterialVariation, Terrain, Vegetation, Vehicle
@@ -117,7 +118,7 @@ if TYPE_CHECKING:
     AnyObject = RoadObject
 else:
     _PARTS = (AlignmentObject, Carriageway, Median, Turnout, LineMarking, Hatching, Arrow)
-    _AROUND = (Terrain, Vegetation, Vehicle)
+    _AROUND = (Terrain, Vegetation, Vehicle, Landscape)
     AnyObject = Annotated[Union[(*_PARTS, *THINGS.values(), *_AROUND)], Field(discriminator="type")]
 
 

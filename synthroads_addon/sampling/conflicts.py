@@ -24,6 +24,7 @@ from ..road.guidelines import (
     TURNOUT_LANE_WIDTH,
     TURNOUT_TAPER,
 )
+from ..road.landscape.landscape import Landscape
 from ..road.section import Marking, Pothole, Ramp, Rut, Turnout
 from ..road.surroundings import Environment, MaterialVariation, Terrain, Vegetation, Vehicle
 from ..road.things.limits import Interval
@@ -59,6 +60,7 @@ _FIELDS: dict[str, tuple[type[Model], str]] = {
     "undulation": (Terrain, "undulation"),
     "wavelength": (Terrain, "wavelength"),
     "batter_slope": (Terrain, "batter_slope"),
+    **{f"landscape.{name}": (Landscape, name) for name in ("hill_height", "hill_length", "parcel_size")},
     "vegetation.tree_height": (Vegetation, "height_min"),
     "vegetation.shrub_height": (Vegetation, "height_min"),
     "vegetation.grass_height": (Vegetation, "height_min"),
@@ -75,6 +77,10 @@ _PLAIN = {
     "pavement.potholes_per_km": (0.0, 1e4),
     "materials.patch_density": (0.0, 20.0),
     "materials.crack_density": (0.0, 1.0),
+    "landscape.forest_share": (0.0, 1.0),
+    "landscape.meadow_share": (0.0, 1.0),
+    "landscape.villages": (0.0, 50.0),
+    "landscape.turbines": (0.0, 200.0),
     "vehicles.per_km": (0.0, 1e3),
     "vehicles.trucks": (0.0, 1.0),
 }
@@ -105,7 +111,14 @@ def check_conflicts(scenario: RoadScenario, with_axis: bool = False) -> None:
 @lru_cache(maxsize=16)
 def conflicts(scenario: RoadScenario, with_axis: bool = False) -> tuple[str, ...]:
     """Return a sentence for each limit of a scenario that can't be kept; cached."""
-    kinds: list[Callable[[RoadScenario], Iterator[str]]] = [_ranges, _cross_section, _lane_changes, _turnouts, _lengths]
+    kinds: list[Callable[[RoadScenario], Iterator[str]]] = [
+        _ranges,
+        _cross_section,
+        _lane_changes,
+        _turnouts,
+        _lengths,
+        _land_use,
+    ]
     if not with_axis:
         kinds.insert(1, _alignment)
     return tuple(f"road.{sentence}" for kind in kinds for sentence in kind(scenario))
@@ -119,6 +132,12 @@ def _ranges(scenario: RoadScenario) -> Iterator[str]:
             yield f"{path}.minimum is {limits.minimum:g}, {low:g} is the least"
         if limits.maximum > high:
             yield f"{path}.maximum is {limits.maximum:g}, {high:g} is the most"
+
+
+def _land_use(scenario: RoadScenario) -> Iterator[str]:
+    shares = scenario.landscape.forest_share.maximum, scenario.landscape.meadow_share.maximum
+    if sum(shares) > 1.0:
+        yield f"landscape.forest_share.maximum and meadow_share.maximum are {sum(shares):g} together, 1 is the most"
 
 
 def _alignment(scenario: RoadScenario) -> Iterator[str]:

@@ -13,6 +13,7 @@ from ..road.section import Carriageway, Median, Turnout
 from ..scenario.road import RoadScenario
 from .alignment import HorizontalSampler, sample_profile
 from .conflicts import check_conflicts
+from .landscape import sample_landscape
 from .markings import place_markings
 from .placing.assets import sample_assets
 from .placing.furniture import place_furniture
@@ -62,6 +63,7 @@ def sample_road(
     add(sample_vegetation(site))
     add(sample_vehicles(site, objects))
     add(sample_assets(site))
+    add([("landscape", sample_landscape(site))])
     origin = origin_on_ground(scenario, site.alignment, site.terrain)
     section = scenario.cross_section.lower() if isinstance(scenario.cross_section, str) else "free"
     return RoadParameters(

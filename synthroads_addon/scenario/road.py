@@ -142,6 +142,19 @@ class VegetationLimits(ClosedModel):
     grass_height: Interval = interval(0.08, 0.5, "m", "Height of grass.")
 
 
+class LandscapeLimits(ClosedModel):
+    """The land beyond the terrain, which pictures show and no scan meets."""
+
+    reach: float = quantity(3000.0, "m", "Distance to which there is land.", (300, 20_000))
+    hill_height: Interval = interval(6.0, 26.0, "m", "Standard deviation of the hills.")
+    hill_length: Interval = interval(800.0, 1500.0, "m", "Shortest wavelength of the hills.")
+    parcel_size: Interval = interval(110.0, 200.0, "m", "Usual width of fields near the road.", title="Width of Fields")
+    forest_share: Interval = interval(0.12, 0.4, "1", "Share of the land under forest.", title="Forest")
+    meadow_share: Interval = interval(0.12, 0.35, "1", "Share of the land under meadow.", title="Meadow")
+    villages: Interval = interval(0.0, 2.0, "1", "Number of villages.")
+    turbines: Interval = interval(0.0, 5.0, "1", "Number of wind turbines.", title="Wind Turbines")
+
+
 class EnvironmentLimits(ClosedModel):
     """Light and weather."""
 
@@ -241,6 +254,7 @@ class RoadScenario(ClosedModel):
     shrubs_per_hectare: float = quantity(60.0, "1/ha", "Shrubs per hectare.", (0, 5000), title="Shrubs (per ha)")
     trees_per_hectare: float = quantity(40.0, "1/ha", "Trees per hectare.", (0, 2000), title="Trees (per ha)")
     vegetation: VegetationLimits = Field(VegetationLimits(), description="Species and sizes of plants.")
+    landscape: LandscapeLimits = Field(LandscapeLimits(), description="Land beyond the terrain, for pictures.")
     environment: EnvironmentLimits = Field(EnvironmentLimits(), description="Light and weather.")
     materials: MaterialLimits = Field(MaterialLimits(), description="Variation of materials.")
     textures: str | None = Field(

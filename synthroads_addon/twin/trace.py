@@ -28,7 +28,7 @@ LEVEL = f"true shapes, without fittings that stand out by less than {FITTINGS:g}
 _NOWHERE = dict.fromkeys(
     ("dash", "strip", "LineMarking", "Hatching", "Arrow", "Turnout", "LengthwiseThing"),
     "nothing of it is on the road, or it has no area",
-)
+) | {"Landscape": "it lies beyond the ground that the road stands on"}
 """Why any file may have no entity for something."""
 
 

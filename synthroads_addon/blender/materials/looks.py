@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -13,6 +14,10 @@ from .shading import Shade
 
 COLOR = "vehicle_color"
 """Attribute of vehicles that the paint's base colour is read from."""
+ROWS = "rows"
+"""Attribute of fields: the unit vector across the rows of their crop."""
+_DRILL, _TRAM = 3.0, 21.0
+"""Widths that machines drill a field in and tend it in, m."""
 ELEMENT = 6.0
 """Length of a concrete barrier between two joints, m."""
 _JOINT = 0.02  # m
@@ -53,6 +58,9 @@ _NOISES: dict[str, tuple[_Noise, ...]] = {
     "grass_ground": _TURF,
     "soil": (_Noise(0.35, 0.05, 3.0), _Noise(0.20, 3.0, 2.0)),
     **dict.fromkeys(("grass", "meadow", "ryegrass", "reed"), _GRASS),
+    **dict.fromkeys(
+        ("wheat", "crop", "rapeseed"), (_Noise(0.16, 0.5, 2.0), _Noise(0.14, 9.0, 2.0), _Noise(0.12, 70.0, 2.0))
+    ),
     **dict.fromkeys(("leaves", *(f"{species}_leaves" for species in _SPECIES)), _LEAVES),
     **dict.fromkeys(("bark", *(f"{species}_bark" for species in _SPECIES)), _BARK),
     "birch_bark": (_Noise(0.15, 0.2, 2.0),),
@@ -138,6 +146,16 @@ def _joints(shade: Shade) -> None:
     shade.scale((1.0 - joint * 0.8) / (1.0 - 0.8 * _JOINT / ELEMENT))
 
 
+def _rows(shade: Shade) -> None:
+    """Rows of a crop, and the tracks of the machines that tend it, across the vector attribute ``rows``."""
+    across = op.dot(shade.place, _attribute(shade, ROWS))
+    drills = op.unary("SINE", across * (2.0 * math.pi / _DRILL))
+    shade.scale_texture(1.0 + drills * 0.07)
+    wheels = op.unary("ABSOLUTE", op.unary("ABSOLUTE", across % _TRAM - _TRAM / 2.0) - _TRAM / 2.0 + 1.0)
+    track = shade.tree.node("ShaderNodeMath", wheels, 0.25, operation="LESS_THAN").value
+    shade.scale_texture((1.0 - track * 0.4) / (1.0 - 0.4 * 1.0 / _TRAM))
+
+
 def _film(shade: Shade, wear: Wear) -> None:
     """Film of a marking: worn where traffic crosses it, in spots as large as tyres' prints; with beads in it."""
     look, _ = pavement_look(shade, "paint", wear)
@@ -207,6 +225,7 @@ _BEFORE_NOISES: dict[str, Callable[[Shade], None]] = {
     "tarpaulin": lambda shade: _paint(shade, _COVER_TINT),
 }
 _AFTER_NOISES = {
+    **dict.fromkeys(("wheat", "crop", "rapeseed"), _rows),
     "barrier_concrete": _joints,
     "birch_bark": _scars,
     "acrylic_glass": _clear,

@@ -47,7 +47,6 @@ class Lengthwise(AxisInputs):
             self.values["end_station"] = op.switch(end > 0.0, last_station(axis), end)
             return axis, (op.object_geometry(self.road), op.object_geometry(self.terrain))
 
-
     def rows(self, step: Operand) -> Value:
         """Add nodes for points at its stations, a `step` (m) apart, with ``station``, ``foot`` and ``left``.
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 
 from ...base.classes import class_id
-from ...road.things import hedge as sizes
 from ...road.things.hedge import Hedge
 from ..nodes import operations as op
 from ..nodes.backbone import first_station, last_station
 from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.foot import Lengthwise, foot_at
-from ..nodes.inputs import integer, instance_number, material_of, metres, share
+from ..nodes.inputs import instance_number, integer, material_of, metres, share
 from .model_builder import ModelBuilder
 from .registry import model_part
 
@@ -61,7 +60,9 @@ def hedge_group(tree: Tree) -> None:
         points = op.delete_points(op.set_position(points, place), beyond)
     with tree.frame("Leaves"):
         face = tree.node("GeometryNodeMeshCircle", vertices=3, fill_type="NGON").value
-        leaf = op.set_position(face, op.choose(op.index(tree), [(x * _SIZE[0], y * _SIZE[1], 0.0) for x, y, _ in _LEAF]))
+        leaf = op.set_position(
+            face, op.choose(op.index(tree), [(x * _SIZE[0], y * _SIZE[1], 0.0) for x, y, _ in _LEAF])
+        )
         leaves = tree.node(
             "GeometryNodeInstanceOnPoints",
             points,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import bpy
 import numpy as np
 
@@ -42,19 +44,19 @@ def solid_group(tree: Tree) -> None:
 def add_solid(builder: ModelBuilder, name: str, item: StandingThing) -> None:
     """Add a thing that stands at one place to the model, its mesh made from its bodies."""
     frame = standing_frames(builder.geometry, [item])[0]
-    mesh = bodies_mesh(builder, item.bodies(frame.place()))
+    mesh = bodies_mesh(item.bodies(frame.place()), builder.materials.material)
     builder.add_thing(name, item, solid_group(), mesh, class_=class_id(item.semantic_class))
     builder.stand(name, item, item.rotation_deg)
 
 
-def bodies_mesh(builder: ModelBuilder, bodies: list[Body]) -> bpy.types.Mesh:
-    """Create a mesh of closed solids, each face with its body's material."""
+def bodies_mesh(bodies: Sequence[Body], material: Callable[[str], bpy.types.Material]) -> bpy.types.Mesh:
+    """Create a mesh of closed solids, each face with its body's material by name."""
     mesh, names = bpy.data.meshes.new("SR Solid"), list(dict.fromkeys(body.material for body in bodies))
     faces = [loft(body.sections) for body in bodies]
     corners = np.concatenate([part.points[part.corners] for part in faces])
     fill_polygons(mesh, corners, np.concatenate([part.sizes for part in faces]).tolist())
     for name in names:
-        mesh.materials.append(builder.materials.material(name))
+        mesh.materials.append(material(name))
     slots = [np.full(len(part), names.index(body.material)) for part, body in zip(faces, bodies, strict=True)]
     mesh.polygons.foreach_set("material_index", np.concatenate(slots).astype(np.int32))
     return mesh

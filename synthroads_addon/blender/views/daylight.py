@@ -1,4 +1,4 @@
-"""Sun, sky, haze and cameras of a road, kept in the file: for the user's own pictures, never for a scan."""
+"""Sun, sky, haze, landscape and cameras of a road, kept in the file: for the user's own pictures, never for a scan."""
 
 import math
 from collections.abc import Iterator
@@ -14,6 +14,7 @@ from ..cameras.light import sky_radiance
 from ..sky import SUN_COLOR, fill_sky, new_sun
 from ..things.model_builder import SUPPORT
 from .haze import haze_body, haze_light, light_below
+from .landscape import add_landscape, remove_landscape
 from .viewpoints import Viewpoint, aerial_view, driver_view
 
 VIEW = "synthroads_view"
@@ -28,7 +29,7 @@ _LOWEST_SKY = 0.02
 
 
 def add_views(scene: bpy.types.Scene, parameters: RoadParameters, matrix: Matrix) -> None:
-    """Add a road's sun, sky, haze and cameras to a scene, replacing those of an earlier call.
+    """Add a road's sun, sky, haze, landscape and cameras to a scene, replacing those of an earlier call.
 
     Other lights and cameras stay. The driver's camera becomes the scene's if it has none, or one of ours.
 
@@ -45,6 +46,7 @@ def add_views(scene: bpy.types.Scene, parameters: RoadParameters, matrix: Matrix
     if environment.visibility < _HAZE_BELOW:
         middle = matrix @ Vector(driver_view(parameters).place.tolist())
         _add_haze(scene, environment, sun, middle)
+    add_landscape(scene, parameters, matrix)
     for name, view in _VIEWS.items():
         camera = _mark(name, _camera(_NAMES[name], view(parameters), matrix), scene)
         if name == current:
@@ -52,7 +54,8 @@ def add_views(scene: bpy.types.Scene, parameters: RoadParameters, matrix: Matrix
 
 
 def remove_views(scene: bpy.types.Scene) -> None:
-    """Remove the sun, haze and cameras of `add_views` from a scene, with their data; the world stays."""
+    """Remove the sun, haze, landscape and cameras of `add_views` from a scene, with their data; the world stays."""
+    remove_landscape(scene)
     items = list(views_of(scene).values())
     data = [item.data for item in items if item.data is not None]
     bpy.data.batch_remove(items)

@@ -10,7 +10,7 @@ from typing import Any
 
 import bpy
 import numpy as np
-from mathutils import Vector
+from mathutils import Matrix, Vector
 
 from ...base.files import PRESETS
 from ...base.schema import read_json
@@ -28,6 +28,7 @@ from ..materials.surface_layers import PROPERTY
 from ..model.build import build_road
 from ..scene.evaluated import scene_mesh
 from . import pictures
+from .landscape import add_landscape
 from .viewpoints import Viewpoint, aerial_view, driver_view
 
 PRESET = PRESETS / "gallery.json"
@@ -37,7 +38,7 @@ _NEAR = 5.0
 _PITCH = 1.6
 """Distance of the materials' cubes from middle to middle, m."""
 _DAYLIGHT = Environment(sun_azimuth_deg=215.0, sun_elevation_deg=42.0)
-_NOT_SHOWN = ("Alignment", "Carriageway", "Median", "Terrain", "LineMarking")
+_NOT_SHOWN = ("Alignment", "Carriageway", "Median", "Terrain", "LineMarking", "Landscape")
 
 
 @dataclass(frozen=True)
@@ -102,15 +103,8 @@ def _build_scene(scene: dict[str, Any]) -> RoadParameters:
     parameters = sample_road(RoadScenario.from_dict(scene["road"]), scene["seed"])
     build_road(parameters, _TOLERANCE)
     pictures.light(_DAYLIGHT)
-    _far_ground()
+    add_landscape(bpy.context.scene, parameters, Matrix.Identity(4))
     return parameters
-
-
-def _far_ground() -> None:
-    """Add a ground plane up to the horizon, 1.5 m below the lowest point of ground and road, to the scene."""
-    corners = [corner for name in ("Ground", "Backbone") for corner in bpy.data.objects[name].bound_box]
-    bpy.ops.mesh.primitive_plane_add(size=20_000.0, location=(0.0, 0.0, min(z for _, _, z in corners) - 1.5))
-    bpy.context.object.data.materials.append(material("grass_ground"))
 
 
 def _aim_camera(view: Viewpoint) -> None:

@@ -61,7 +61,9 @@ class LandRelief:
     @cached_property
     def _mean(self) -> float:
         station = np.linspace(0.0, self.geometry.length, 9)
-        return float(np.mean([known_elevation(self.geometry, station, np.full(9, side * self.half_width)) for side in (-1, 1)]))
+        return float(
+            np.mean([known_elevation(self.geometry, station, np.full(9, side * self.half_width)) for side in (-1, 1)])
+        )
 
     def _hills(self, plan: Float) -> Float:
         """Return the hills' heights (N,), m: seeded plane waves, the longer the higher."""

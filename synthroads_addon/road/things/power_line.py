@@ -66,50 +66,47 @@ class PowerLine(StandingThing):
     def bodies(self, place: Place) -> list[Body]:
         """Return the closed solids of pylons and conductors in its frame."""
         x = np.array(self.pylons())
-        feet = place.ground(x, np.zeros(2))
-        made = [Body(shape, "galvanised_steel") for at, z in zip(x, feet, strict=True) for shape in self._pylon(at, z)]
-        return made + [Body(wire, "conductor") for wire in self._conductors(x, feet)]
+        feet = np.column_stack([x, np.zeros(2), place.ground(x, np.zeros(2))])
+        return [*self.pylon(feet[0]), *self.pylon(feet[1]), *self.conductors(feet[0], feet[1])]
 
-    def _pylon(self, x: float, z: float) -> Iterator[Float]:
-        """Yield the bars of a pylon with its foot at (x, 0, z)."""
-        foot = np.array([x, 0.0, z])
-        levels = np.append(np.linspace(0.0, WAIST[0], PANELS + 1), [0.8, 1.0]) * self.height
-        half = np.interp(levels, np.array([0.0, WAIST[0], 1.0]) * self.height, np.array([FOOT, WAIST[1], TOP]) * self.height)
-        corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+    def pylon(self, foot: Float) -> list[Body]:
+        """Return the bars of a pylon on a foot (3,), in its frame."""
+        levels = np.append(np.linspace(0.0, WAIST[0], PANELS + 1), [0.8, 1.0])
+        half = np.interp(levels, [0.0, WAIST[0], 1.0], [FOOT, WAIST[1], TOP]) * self.height
+        corners = np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)])
 
         def corner(level: int, number: int) -> Float:
-            cx, cy = corners[number % 4]
-            return foot + (cx * half[level], cy * half[level], levels[level])
+            return foot + np.append(corners[number % 4] * half[level], levels[level] * self.height)
 
+        bars = []
         for number in range(4):
-            yield bar(corner(0, number) - (0.0, 0.0, BURIED), corner(PANELS, number), LEG)
-            yield bar(corner(PANELS, number), corner(len(levels) - 1, number), LEG)
+            bars.append(bar(corner(0, number) - (0.0, 0.0, BURIED), corner(PANELS, number), LEG))
+            bars.append(bar(corner(PANELS, number), corner(len(levels) - 1, number), LEG))
             for level in range(len(levels) - 1):
-                yield bar(corner(level, number), corner(level + 1, number + 1), BRACE)
-                yield bar(corner(level + 1, number), corner(level, number + 1), BRACE)
-        yield from self._arms(foot)
+                bars.append(bar(corner(level, number), corner(level + 1, number + 1), BRACE))
+                bars.append(bar(corner(level + 1, number), corner(level, number + 1), BRACE))
+        return [Body(shape, "galvanised_steel") for shape in (*bars, *self._arms(foot))]
 
     def _arms(self, foot: Float) -> Iterator[Float]:
-        for share_, reach in ARMS:
-            level, wide = share_ * self.height, reach * HALF_ARM * self.height
+        for level, reach in ARMS:
+            middle = foot + (0.0, 0.0, level * self.height)
             for side in (-1.0, 1.0):
-                tip = foot + (0.0, side * wide, level)
+                tip = middle + (0.0, side * reach * HALF_ARM * self.height, 0.0)
                 for beside in (-1.0, 1.0):
-                    yield bar(foot + (beside * TOP * self.height, 0.0, level), tip, BRACE)
-                yield bar(foot + (0.0, 0.0, level + 0.05 * self.height), tip, BRACE)
+                    yield bar(middle + (beside * TOP * self.height, 0.0, 0.0), tip, BRACE)
+                yield bar(middle + (0.0, 0.0, 0.05 * self.height), tip, BRACE)
                 yield bar(tip, tip - (0.0, 0.0, INSULATOR), BRACE)
 
-    def _conductors(self, x: Float, z: Float) -> Iterator[Float]:
-        """Yield the sections of the conductors, which hang as parabolas, and of the earth wire over them."""
-        share_ = np.linspace(0.0, 1.0, _ROWS + 1)
-        ends = [(side * reach * HALF_ARM * self.height, level * self.height - INSULATOR, self.sag)
-                for level, reach in ARMS for side in (-1.0, 1.0)]  # fmt: skip
+    def conductors(self, start: Float, end: Float) -> Iterator[Body]:
+        """Yield the conductors between two pylons' feet (3,), which hang as parabolas, and the earth wire over them."""
+        along = np.linspace(0.0, 1.0, _ROWS + 1)
+        hung = [(side * reach * HALF_ARM, level, INSULATOR, 1.0) for level, reach in ARMS for side in (-1.0, 1.0)]
         turn = 2.0 * np.pi * np.arange(3) / 3.0
         ring = np.column_stack([np.zeros(3), np.cos(turn), np.sin(turn)]) * DIAMETER / 2.0
-        for y, level, sag in [*ends, (0.0, self.height, 0.8 * self.sag)]:
-            height = z[0] + (z[1] - z[0]) * share_ + level - 4.0 * sag * share_ * (1.0 - share_)
-            line = np.column_stack([x[0] + (x[1] - x[0]) * share_, np.full(len(share_), y), height])
-            yield line[:, None] + ring
+        for across, level, below, share_ in [*hung, (0.0, 1.0, 0.0, 0.8)]:
+            line = start + (end - start) * along[:, None] + (0.0, across * self.height, level * self.height - below)
+            line[:, 2] -= 4.0 * share_ * self.sag * along * (1.0 - along)
+            yield Body(line[:, None] + ring, "conductor")
 
     def footprint(self) -> Iterator[Block]:
         """Yield the boxes of its pylons, in which nothing else may stand."""

@@ -46,7 +46,12 @@ _BUILDINGS: dict[str, tuple[tuple[float, float], tuple[float, float], tuple[floa
     "hall": ((16.0, 30.0), (9.0, 12.0), (5.0, 7.5), (0.6, 1.2)),
 }
 """Kind of building -> limits of its width, depth, height and roof's height, m."""
-_MODELS = {"house": ("car", "estate"), "brick_house": ("car", "estate"), "barn": ("van", "estate"), "hall": ("car", "van", "truck")}
+_MODELS = {
+    "house": ("car", "estate"),
+    "brick_house": ("car", "estate"),
+    "barn": ("van", "estate"),
+    "hall": ("car", "van", "truck"),
+}
 _PYLON_DISTANCES = (90.0, 190.0)  # m from the axis
 
 

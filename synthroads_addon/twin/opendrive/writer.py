@@ -12,6 +12,7 @@ from pathlib import Path
 from ...base.crs import wkt
 from ...road.geometry import RoadGeometry
 from ...road.instances import InstanceNumbers
+from ...road.landscape.landscape import Landscape
 from ...road.parameters import AlignmentObject, RoadParameters
 from ...road.section import Carriageway, LineMarking, Median, Turnout
 from ...road.surroundings import Terrain, Vegetation, Vehicle
@@ -157,7 +158,7 @@ def geo_reference(epsg: int) -> str:
 def _list_unwritten(root: Element, parameters: RoadParameters) -> None:
     """Add user data to the root for objects without an element: centreline, owners of lanes, ground, traffic."""
     numbers = InstanceNumbers(parameters)
-    kinds = (AlignmentObject, Carriageway, Median, Turnout, LineMarking, Terrain, Vegetation, Vehicle)
+    kinds = (AlignmentObject, Carriageway, Median, Turnout, LineMarking, Terrain, Vegetation, Vehicle, Landscape)
     for name, item in parameters.objects.items():
         if isinstance(item, kinds):
             entry = element(root, "userData", {"code": "instance", "value": item.instance})

@@ -78,6 +78,7 @@ SHEETS = (
         2,
         "road.embankment_height road.batter_slope road.undulation road.wavelength road.half_width road.elevation_model",
     ),
+    PanelFields("landscape", "Landscape", "environment", 3, "road.landscape.*"),
     PanelFields(
         "scanner",
         "Scanner",

@@ -88,6 +88,8 @@ CASES: dict[str, LimitCase] = {
             *(f"{part}.{end}" for part in ("buildings_per_km", "wall_height", "parked_per_building") for end in ENDS),
         )
     },
+    "landscape.forest_share.maximum": LimitCase(value=0.3),
+    "landscape.meadow_share.maximum": LimitCase(value=0.3),
     "epsg": LimitCase(value=25833),
     "textures": LimitCase(value=str(TEXTURES)),
     "assets": LimitCase(value=["roadside"]),

@@ -5,9 +5,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import bpy
 import laspy
 import numpy as np
+from mathutils import Matrix
 
+from synthroads_addon.blender.model.edits import attribute_of, vertices_of
+from synthroads_addon.blender.views.landscape import add_landscape, remove_landscape
 from synthroads_addon.jobs.generate import Job, generate
 from synthroads_addon.jobs.open_scene import RoadScene
 from synthroads_addon.road.geometry import RoadGeometry
@@ -27,7 +31,21 @@ def look_at(scenario: Scenario, parameters: RoadParameters) -> Look:
     """Build a road as a scenario asks for it, scan it, and return what is seen; for the main thread."""
     scene = RoadScene(scenario, RoadGeometry(parameters))
     scene.build()
-    return look_at_model(scene.read()) | {f"points.{name}": value for name, value in look_at_scan(scene).items()}
+    seen = look_at_model(scene.read()) | {f"points.{name}": value for name, value in look_at_scan(scene).items()}
+    return seen | look_at_landscape(parameters)
+
+
+def look_at_landscape(parameters: RoadParameters) -> Look:
+    """Return what pictures show of a road's landscape; nothing where it has none."""
+    made = add_landscape(bpy.context.scene, parameters, Matrix.Identity(4))
+    seen: Look = {}
+    for kind, item in made.items():
+        arrays: dict[str, Any] = {"corners": vertices_of(item.data)}
+        arrays["material"] = [polygon.material_index for polygon in item.data.polygons]
+        arrays |= {name: attribute_of(item.data, name) for name in ("turn", "crown", "station")}
+        seen |= {f"landscape.{kind}.{name}": value for name, value in _digests(arrays).items()}
+    remove_landscape(bpy.context.scene)
+    return seen
 
 
 def look_at_model(scene: ScannedScene) -> Look:

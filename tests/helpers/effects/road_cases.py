@@ -29,7 +29,14 @@ LEFT_ENTRY = TURNOUTS["entry"] | {"carriageway": "left"}
 STRAIGHT = {"start_station": 8.0, "end_station": 50.0}
 LINE = {"carriageway": "right", "width": 0.15, "dash_length": 0.0, "gap_length": 0.0, **STRAIGHT}
 TYPES = {"ifc": "IfcFurniture.USERDEFINED", "cityjson": "CityFurniture", "opendrive": "barrier.fence"}
+LAND: Data = {
+    "seed": 1,
+    "reach": 600.0,
+    "villages": [{"x": 200.0, "y": 300.0, "houses": 2}],
+    "turbines": [{"x": -200.0, "y": 300.0}],
+}
 OWN: dict[str, dict[str, Data]] = {
+    "Landscape": {"land": LAND},
     "Turnout": TURNOUTS,
     "LineMarking": {
         "dashes": LINE | {"kind": "lane", "boundary": 1, "dash_length": 6.0, "gap_length": 6.0},

@@ -1,0 +1,68 @@
+"""The landscape in pictures: objects that renders show and scans leave out; none is built unless something sees it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import bpy
+from mathutils import Matrix
+
+from ....road.geometry import RoadGeometry
+from ....road.landscape.landscape import Landscape
+from ....road.landscape.parcels import parcels_of
+from ....road.landscape.relief import LandRelief
+from ....road.landscape.trees import land_trees
+from ....road.parameters import RoadParameters
+from ...materials import RoadMaterials
+from ...things.model_builder import SUPPORT
+from .far_road import far_road_mesh
+from .ground import ground_mesh
+from .structures import structures_mesh
+from .woods import trees_mesh, woods_group
+
+LANDSCAPE = "synthroads_landscape"
+"""Custom property of a landscape's objects: what it is."""
+
+
+def add_landscape(scene: bpy.types.Scene, parameters: RoadParameters, matrix: Matrix) -> dict[str, bpy.types.Object]:
+    """Add the landscape of a parameter set to a scene, replacing an earlier one; return its objects by what they are.
+
+    Args:
+        scene: that shows the road.
+        parameters: the road; where they have no landscape, nothing is added.
+        matrix: from the road's local coordinates to the scene's.
+    """
+    remove_landscape(scene)
+    landscape = next(iter(parameters.of_type(Landscape).values()), None)
+    if landscape is None:
+        return {}
+    geometry = RoadGeometry(parameters)
+    relief, parcels = LandRelief(geometry, landscape), parcels_of(geometry, landscape)
+    material = RoadMaterials.of(parameters).material
+    meshes: dict[str, Callable[[], bpy.types.Mesh]] = {
+        "ground": lambda: ground_mesh(geometry, relief, parcels, material),
+        "road": lambda: far_road_mesh(geometry, relief, material),
+        "woods": lambda: trees_mesh(land_trees(geometry, landscape, parcels, relief)),
+        "structures": lambda: structures_mesh(geometry, landscape, relief, material),
+    }
+    made = {kind: _add(scene, kind, make(), matrix) for kind, make in meshes.items()}
+    woods = made["woods"].modifiers.new("SynthRoads", "NODES")
+    woods.node_group = woods_group(material)
+    return made
+
+
+def _add(scene: bpy.types.Scene, kind: str, mesh: bpy.types.Mesh, matrix: Matrix) -> bpy.types.Object:
+    item = bpy.data.objects.new(f"SR Landscape {kind.title()}", mesh)
+    item[LANDSCAPE] = kind
+    item[SUPPORT] = True  # scans leave it out: nothing of it is within the terrain's reach
+    item.matrix_world = matrix
+    scene.collection.objects.link(item)
+    return item
+
+
+def remove_landscape(scene: bpy.types.Scene) -> None:
+    """Remove the landscape's objects from a scene, with their meshes."""
+    items = [item for item in scene.objects if LANDSCAPE in item]
+    meshes = [item.data for item in items]
+    bpy.data.batch_remove(items)
+    bpy.data.batch_remove([mesh for mesh in meshes if not mesh.users])
