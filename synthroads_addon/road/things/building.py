@@ -61,7 +61,8 @@ class Building(StandingThing):
 
     def twin(self) -> TwinTypes:
         """Return its types in the twin formats: a building."""
-        return TwinTypes("IfcBuildingElementProxy.ELEMENT", f"building.{self.kind}", "Building", kind=self.kind)
+        whole, element = "Building", "BuildingConstructiveElement"
+        return TwinTypes("IfcElementAssembly.USERDEFINED.SITE", f"building.{self.kind}", whole, element, kind=self.kind)
 
     def bodies(self, place: Place) -> list[Body]:
         """Return the closed solids of walls, roof and chimney in its frame; windows and doors are details."""
@@ -69,7 +70,7 @@ class Building(StandingThing):
         ground = place.ground(x, y)
         floor, low = float(np.max(ground)), float(np.min(ground)) - BURIED
         eaves = floor + self.height
-        walls = Body(self._walls(low, eaves), WALLS[self.kind])
+        walls = Body(self._walls(low, eaves), WALLS[self.kind], "walls", "IfcWall.SOLIDWALL")
         return [walls, *self._roof(eaves), *self._openings(floor)]
 
     def _walls(self, low: float, eaves: float) -> Float:
@@ -87,11 +88,13 @@ class Building(StandingThing):
         drop = OVERHANG * self.roof_height / (self.depth / 2.0)
         for side in (-1.0, 1.0):
             slope = [(0.0, ridge), (side * half, eaves - drop), (side * half, eaves - drop + SLAB), (0.0, ridge + SLAB)]
-            yield Body(self._along(slope if side > 0.0 else slope[::-1], end), material)
+            shape = self._along(slope if side > 0.0 else slope[::-1], end)
+            yield Body(shape, material, "roof", "IfcRoof.GABLE_ROOF")
         if self.kind in ("house", "brick_house"):
             top = ridge + 0.7
             size = (0.5, 0.5, top - eaves)
-            yield Body(box(size, (self.width * 0.2, self.depth * 0.08, (top + eaves) / 2.0)), "brick")
+            shape = box(size, (self.width * 0.2, self.depth * 0.08, (top + eaves) / 2.0))
+            yield Body(shape, "brick", "chimney", "IfcChimney.NOTDEFINED")
 
     @staticmethod
     def _along(outline: list[tuple[float, float]], end: float) -> Float:

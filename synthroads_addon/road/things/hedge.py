@@ -49,7 +49,7 @@ class Hedge(LengthwiseThing):
 
     def twin(self) -> TwinTypes:
         """Return its types in the twin formats: vegetation."""
-        return TwinTypes("IfcGeographicElement.VEGETATION", "vegetation.hedge")
+        return TwinTypes("IfcGeographicElement.VEGETATION", "vegetation.hedge", "PlantCover")
 
     def reach(self) -> tuple[float, float]:
         """Return how far it reaches to the right and to the left of its axis, m: half its width."""

@@ -57,7 +57,7 @@ class PowerLine(StandingThing):
 
     def twin(self) -> TwinTypes:
         """Return its types in the twin formats: pylons with a line between them."""
-        return TwinTypes("IfcElementAssembly.USERDEFINED", "pole.powerLine", "OtherConstruction")
+        return TwinTypes("IfcElementAssembly.USERDEFINED.SITE", "pole.powerLine", "OtherConstruction")
 
     def pylons(self) -> tuple[float, float]:
         """Return x (m) of its pylons in its frame, the left one first."""
