@@ -91,7 +91,7 @@ class Vehicle(RoadObject):
 
 
 class Environment(Model):
-    """Light and weather."""
+    """Light, weather and season."""
 
     sun_azimuth_deg: float = quantity(
         180.0, ge=0, le=360, unit="deg", description="Direction of the sun, clockwise from north."
@@ -105,6 +105,9 @@ class Environment(Model):
         90.0, ge=0, le=360, unit="deg", description="Where the shadows drift to, clockwise from north."
     )
     wetness: float = quantity(0.0, ge=0, le=1, unit="1", description="0 dry, 1 wet.")
+    season: Literal["summer", "winter"] = Field(
+        "summer", description="In winter broadleaved trees, shrubs and hedges are bare."
+    )
     weather: Literal["clear", "haze", "fog", "rain", "snow", "dust"] = Field(
         "clear", description="Weather, for the attenuation of the beam."
     )

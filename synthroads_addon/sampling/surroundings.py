@@ -73,7 +73,9 @@ def sample_environment(scenario: RoadScenario, seed: int) -> Environment:
         light["visibility"], light["sun_strength"] = WEATHER[weather]
     else:
         weather = "clear"
-    return Environment(wetness=wetness if wet or weather == "rain" else 0.0, weather=weather, **light)
+    season: Literal["summer", "winter"] = "winter" if rng.random() < limits.winter else "summer"
+    wetness = wetness if wet or weather == "rain" else 0.0
+    return Environment(wetness=wetness, weather=weather, season=season, **light)
 
 
 def sample_materials(scenario: RoadScenario, seed: int) -> MaterialVariation:

@@ -5,6 +5,7 @@ own pulses: where their rays leave the scene's heights, the corridor beside the 
 meets the same surfaces whatever the sections are.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,7 +16,9 @@ from ..base.arrays import Float
 from ..road.geometry import RoadGeometry
 from ..road.surroundings import Vegetation
 from ..road.terrain import surface_elevation
+from ..road.things.building import Building
 from ..road.things.overpass import Overpass
+from ..road.things.power_line import HALF_ARM, PowerLine
 from .blocks import Block, Blocks
 from .devices.shots import shots
 from .platforms.path import Strip
@@ -75,7 +78,7 @@ def sections(cut: Blocks, geometry: RoadGeometry, length: float, shadows: float 
         station = _block_stations(cut, geometry, strip)
         for block, owner in enumerate(np.clip(station // length, 0, count - 1).astype(int)):
             owned[owner].append((strip, block))
-    beyond = BORDER + shadows + _overpass_reach(geometry)
+    beyond = BORDER + shadows + _crossing_reach(geometry)
     for number, blocks in enumerate(owned):
         if blocks:
             low, high = reached_stations(cut, geometry, blocks)
@@ -188,10 +191,15 @@ def _stations_of_rays(cut: Blocks, geometry: RoadGeometry, origin: Float, direct
     return float(every.min()) - footprint, float(every.max()) + footprint
 
 
-def _overpass_reach(geometry: RoadGeometry) -> float:
-    """Return how far, m, along the road an overpass reaches at most from where it crosses."""
-    bridges = geometry.parameters.of_type(Overpass).values()
+def _crossing_reach(geometry: RoadGeometry) -> float:
+    """Return how far, m, along the road an overpass, a power line or a building reaches at most from its station."""
+    parameters = geometry.parameters
+    bridges, lines = parameters.of_type(Overpass).values(), parameters.of_type(PowerLine).values()
     lengths = [abs(np.sin(np.deg2rad(item.rotation_deg))) * _BRIDGE_SIDE + item.width for item in bridges]
+    for line in lines:
+        aside = abs(np.sin(np.deg2rad(line.rotation_deg))) * max(line.left_distance, line.right_distance)
+        lengths.append(aside + line.height * HALF_ARM)
+    lengths += [math.hypot(item.width, item.depth) for item in parameters.of_type(Building).values()]
     return float(max(lengths, default=0.0))
 
 
@@ -200,6 +208,7 @@ def _corridor(geometry: RoadGeometry) -> float:
     parameters = geometry.parameters
     edges = [float(section.road_edge([0.0, *section.kinks()]).max()) for section in geometry.sections.values()]
     reach = [*edges, parameters.terrain.half_width if parameters.terrain else 0.0]
+    reach += [max(item.left_distance, item.right_distance) for item in parameters.of_type(PowerLine).values()]
     return max(reach) + (_BRIDGE_SIDE if parameters.of_type(Overpass) else 0.0)
 
 

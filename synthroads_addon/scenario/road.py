@@ -164,6 +164,7 @@ class EnvironmentLimits(ClosedModel):
     wet: float = share(0.15, "Probability of a wet road.", title="Wet Road")
     wetness: Interval = interval(0.3, 1.0, "1", "Wetness of a wet road.")
     bad_weather: float = share(0.15, "Probability of haze, fog, rain, snow or dust.")
+    winter: float = share(0.2, "Probability that broadleaved plants are bare.")
 
 
 class MaterialLimits(ClosedModel):

@@ -11,7 +11,7 @@ from ..nodes.backbone import last_station
 from ..nodes.builder import Tree, Value, makes_group
 from ..nodes.foot import Lengthwise, sweep
 from ..nodes.inputs import boolean, instance_number, material_of, metres
-from ..nodes.solids import move_geometry, paint_faces, put_on_points, tube
+from ..nodes.solids import paint_faces, put_on_points, tube
 from .model_builder import ModelBuilder
 from .registry import model_part
 
@@ -42,11 +42,12 @@ def fence_group(tree: Tree) -> None:
         beyond = (wanted - station > 1e-3) | (station - wanted > 1e-3)
         passed = (station > end - 1e-3) & (fence.end_station > end + 1e-3) & (number < last)
         posts = op.delete_points(line, beyond | passed)
-        body = move_geometry(tube(tree, 1.0, 1.0, sizes.SIDES), (0.0, 0.0, 0.0))
+        body = tube(tree, 1.0, 1.0, sizes.SIDES)
         radius = fence.post_diameter * 0.5
         size = op.vector(tree, radius, radius, fence.height + BURIED)
         foot = op.named_attribute(tree, "foot", "FLOAT_VECTOR")
-        posts = op.realize(put_on_points(posts, body, foot + (0.0, 0.0, -BURIED), size))
+        upright = op.upright(op.named_attribute(tree, "left", "FLOAT_VECTOR"))
+        posts = op.realize(put_on_points(posts, body, foot + (0.0, 0.0, -BURIED), size, upright))
         posts = paint_faces(posts, fence.post_material)
     with tree.frame("Bands"):
         mesh = paint_faces(_bands(line, fence, "wildlife"), fence.mesh_material)

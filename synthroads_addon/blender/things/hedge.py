@@ -18,6 +18,8 @@ _LEAF = [(0.0, -0.5, 0.0), (0.5, 0.3, 0.0), (-0.42, 0.5, 0.0)]
 """A triangle that stands for a twig's leaves: across, along, up."""
 _SIZE = (0.20, 0.30)
 """Width and length of such a triangle, m."""
+_BARE = 0.3
+"""Width of the twigs that are left of it in winter, as a share of its own."""
 _HOLLOW = 0.5
 """Share of the way to its surface within which a hedge has no leaves."""
 
@@ -26,6 +28,7 @@ class _Hedge(Lengthwise):
     height = metres(1.8, (0.3, 8.0), "Top above the surface")
     width = metres(1.2, (0.3, 5.0), "Width where it is widest")
     leaves_per_metre = integer(200, (1, 100_000), "Leaves in each metre of its length, at full detail")
+    leaf_width = metres(_SIZE[0], (0.002, 0.5), "Width of a triangle that stands for a twig's leaves")
     zero = integer(0, (0, 2**20), "Whole metre of the road that the stations count from")
     seed = integer(0, (0, 2**31 - 1), "Seed of the leaves")
     detail = share(1.0, (0.0, 1.0), "Share of the leaves' triangles")
@@ -60,9 +63,8 @@ def hedge_group(tree: Tree) -> None:
         points = op.delete_points(op.set_position(points, place), beyond)
     with tree.frame("Leaves"):
         face = tree.node("GeometryNodeMeshCircle", vertices=3, fill_type="NGON").value
-        leaf = op.set_position(
-            face, op.choose(op.index(tree), [(x * _SIZE[0], y * _SIZE[1], 0.0) for x, y, _ in _LEAF])
-        )
+        size = op.vector(tree, hedge.leaf_width, _SIZE[1], 1.0)
+        leaf = op.set_position(face, op.choose(op.index(tree), _LEAF) * size)
         leaves = tree.node(
             "GeometryNodeInstanceOnPoints",
             points,
@@ -87,6 +89,8 @@ def build_hedges(builder: ModelBuilder) -> None:
     """Add one object per hedge to the model; none at detail 0."""
     if builder.detail == 0.0:
         return
+    bare = builder.parameters.environment.season == "winter"
+    looks = {"material": "bark" if bare else "leaves", "leaf_width": _SIZE[0] * (_BARE if bare else 1.0)}
     for name, hedge in builder.parameters.of_type(Hedge).items():
         builder.add_thing(
             name,
@@ -96,4 +100,5 @@ def build_hedges(builder: ModelBuilder) -> None:
             leaves_per_metre=hedge.leaves_per_metre(),
             zero=builder.zero,
             detail=builder.detail,
+            **looks,
         )

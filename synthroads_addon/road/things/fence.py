@@ -52,7 +52,7 @@ class FenceLimits(Limits):
 class Fence(LengthwiseThing):
     """A fence along the road. Its offset is that of its posts' axes."""
 
-    points_class: ClassVar = "barrier"
+    points_class: ClassVar = "utility"
     order: ClassVar = 150
     limits: ClassVar = FenceLimits
     clearing: ClassVar = 0.5
@@ -82,7 +82,7 @@ class Fence(LengthwiseThing):
         for band in KINDS[self.kind]:
             height = self.height * (band.low + (band.high - band.low) * level)
             made.append(Body(sweep(feet, left, side * band.thickness / 2.0, height), MATERIALS[self.kind]))
-        return made + [Body(self._post(foot), "noise_wood") for foot in feet]
+        return made + [Body(self._post(*place), "noise_wood") for place in zip(feet, left, strict=True)]
 
     def posts(self, end: float) -> Float:
         """Return the stations (N,), m, of its posts if it ends at a station (m)."""
@@ -90,11 +90,11 @@ class Fence(LengthwiseThing):
         station = np.minimum(self.start_station + np.arange(count) * self.post_spacing, self.end_station)
         return np.append(station[station < end - 1e-3], end)
 
-    def _post(self, foot: Float) -> Float:
-        outline = circle(self.post_diameter, SIDES)
-        sections = np.zeros((2, SIDES, 3))
-        sections[..., :2], sections[..., 2] = outline, np.array([[-BURIED], [self.height]])
-        return sections + foot
+    def _post(self, foot: Float, left: Float) -> Float:
+        """Return the sections of a post on a foot (3,), one of its corners to the left (unit vector (3,))."""
+        outline, ahead = circle(self.post_diameter, SIDES), np.array([-left[1], left[0], 0.0])
+        ring = foot + outline[:, :1] * left + outline[:, 1:] * ahead
+        return np.stack([ring - (0.0, 0.0, BURIED), ring + (0.0, 0.0, self.height)])
 
     def footprint(self) -> Iterator[Block]:
         """Yield the box around posts and bands, in which nothing else may stand."""

@@ -6,7 +6,6 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from ...base.schema import quantity
 from ..objects import Color
 from .body import Body, Place, box
 from .limits import Interval, Limits, interval
@@ -39,7 +38,6 @@ class ParkedVehicle(StandingThing):
         "car", description="Type of vehicle."
     )
     color: Color = (0.4, 0.4, 0.4)
-    elevation: float = quantity(0.0, ge=0, le=0, unit="m", description="It stands on the ground: 0.")
 
     def twin(self) -> TwinTypes:
         """Return its types in the twin formats: a vehicle."""
@@ -56,5 +54,5 @@ class ParkedVehicle(StandingThing):
         kind = VEHICLE_TYPES[self.model]
         sine, cosine = abs(math.sin(self.turn)), abs(math.cos(self.turn))
         along, across = cosine * kind.length + sine * kind.width, sine * kind.length + cosine * kind.width
-        s, d = self.station, self.offset
-        yield Block("foot", s - along / 2.0, s + along / 2.0, d - across / 2.0, d + across / 2.0, 0.0, kind.height)
+        s, d, z = self.station, self.offset, self.elevation
+        yield Block("foot", s - along / 2.0, s + along / 2.0, d - across / 2.0, d + across / 2.0, z, z + kind.height)

@@ -16,6 +16,8 @@ from .plants import BOTTOMS, KINDS
 
 NEEDLES = ("spruce", "pine")
 """Species of trees with needles."""
+BARE_TWIGS = {"leaf_length": 1.6, "leaf_width": 0.3}
+"""Factors on a leaf's triangle that make it the twigs that are left of it in winter."""
 TRUNK_FOOT = 0.02
 """Depth of a trunk's foot in the ground, for a tree of height 1."""
 TRUNK_TOP = 0.93
@@ -32,6 +34,11 @@ def species_shapes() -> dict[str, dict[str, dict[str, float]]]:
     """Return kind of plant -> species -> measures of a plant of height 1 (inputs of its node group), read once."""
     shapes: dict[str, dict[str, dict[str, float]]] = read_json(PRESETS / "plants.json")
     return shapes
+
+
+def is_bare(species: str, season: str) -> bool:
+    """Return whether plants of a species have lost their leaves in a season."""
+    return season == "winter" and species not in NEEDLES
 
 
 class PlantShape(NamedTuple):

@@ -115,7 +115,10 @@ CHECKERED = {"materials.textures": [CHECKS]}
 OTHER_ROAD = Case(value="left")
 OTHER_TURNOUT = Case(value="entry")
 BAY = TURNOUTS["bay"]
+PLANTED: Data = {"type": "Vegetation", "instance": 900, "kind": "shrub", "species": "hazel", "density": 0.05}
+PLANTED |= {"band_start": 1.0, "band_end": 6.0, "height_min": 1.0, "height_max": 2.0, "seed": 1}
 CASES: dict[str, Case] = {
+    "environment.season": Case(given={"objects.hazel": PLANTED}),
     "environment.visibility": Case(given={"environment.weather": "fog", "environment.visibility": 300.0}),
     "materials.textures": Case(value=[CHECKS]),
     "materials.textures[].material": Case(given=CHECKERED, value="concrete"),

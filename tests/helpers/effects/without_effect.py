@@ -38,5 +38,5 @@ SAYS: dict[str, Callable[[RoadParameters], Any]] = {
     "LineMarking.turnout": findings,
 }
 """Field of a parameter set -> where it is seen, and nowhere in the model or the points."""
-DERIVED = {"Alignment.horizontal[].kind", "ParkedVehicle.elevation"}
-"""Fields that have no other value: it follows from others beside them or from what the thing is; another is refused."""
+DERIVED = {"Alignment.horizontal[].kind"}
+"""Fields that have no other value: it follows from others beside them, and any other is refused."""

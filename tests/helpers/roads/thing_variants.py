@@ -39,6 +39,7 @@ FURTHER: dict[str, list[Data]] = {
     "Gantry": [{"kind": "cantilever", "post_side": "left", "beam": "truss", "beam_height": 1.4, "beam_depth": 1.0}],
     "Overpass": [{"rotation_deg": 25.0, "pier_offsets": [0.0, 18.5, -18.5], "width": 7.0}, {"parapet_height": 0.0}],
     "NoiseBarrier": [{"thickness": 0.3, "panel": "wood"}, {"thickness": 0.3, "panel": "glass"}],
+    "Building": [{"roof_height": 0.0}, {"kind": "hall", "roof_height": 0.8}],
     "Pole": [{"arm_length": 0.0}, {"kind": "surveillance", "arm_length": 0.0}],
 }
 """Variants that the choices alone don't show."""

@@ -12,7 +12,7 @@ from ....base.turns.stepper import run_aside
 from ....road.section import Median
 from ....road.surroundings import Terrain, Vegetation
 from ....road.vegetation.plants import ROADSIDE_SHARE, SEEDS, WILD_GRASSES, plant_places
-from ....road.vegetation.species import species_shapes
+from ....road.vegetation.species import BARE_TWIGS, is_bare, species_shapes
 from ..meshes import attribute, fill
 from ..model_builder import ModelBuilder
 from ..registry import model_part
@@ -41,8 +41,7 @@ def build_vegetation(builder: ModelBuilder) -> None:
             zero=builder.zero,
             seed=plants.seed % SEEDS,
             detail=builder.detail,
-            **species_shapes()[plants.kind][plants.species],
-            **_further_inputs(plants, builder),
+            **species_shapes()[plants.kind][plants.species] | _further_inputs(plants, builder),
         )
 
 
@@ -61,10 +60,18 @@ def _places_mesh(builder: ModelBuilder, plants: Vegetation, terrain: Terrain) ->
 
 
 def _further_inputs(plants: Vegetation, builder: ModelBuilder) -> dict[str, Any]:
-    """Return a stand's inputs that depend on its kind: for grass densities on verge and median, else materials."""
+    """Return a stand's inputs that depend on its kind: for grass densities on verge and median, else materials.
+
+    Bare plants have twigs of bark in the place of leaves.
+    """
     if plants.kind == "grass":
         roadside = plants.density * ROADSIDE_SHARE * (plants.species not in WILD_GRASSES)
         median = next((item.instance for item in builder.parameters.of_type(Median).values()), 0)
         reach = {"roadside_reach": builder.widest, "median_instance": median}
         return {"roadside_density": roadside, "material": plants.species, **reach}
-    return {"bark_material": f"{plants.species}_bark", "leaves_material": f"{plants.species}_leaves"}
+    bark, leaves = f"{plants.species}_bark", f"{plants.species}_leaves"
+    if not is_bare(plants.species, builder.parameters.environment.season):
+        return {"bark_material": bark, "leaves_material": leaves}
+    shape = species_shapes()[plants.kind][plants.species]
+    twigs = {name: shape[name] * factor for name, factor in BARE_TWIGS.items()}
+    return {"bark_material": bark, "leaves_material": bark, **twigs}

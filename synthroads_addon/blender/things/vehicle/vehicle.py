@@ -21,7 +21,7 @@ from .models import model_group
 
 _POINTS = (
     "One point per vehicle, below its middle, at any height, with heading (rad), grade of the road ahead (m/m), "
-    f"{COLOR} and instance"
+    f"elevation above it (m), {COLOR} and instance"
 )
 
 
@@ -73,7 +73,9 @@ def _on_wheels_group(tree: Tree) -> None:
         ahead, across_ahead = _axle(tree, road, front, inputs.half_track)
     with tree.frame("As the road is pitched and rolled"):
         # Place and turn are evaluated where the points still are.
-        points = op.store(inputs.points, "vehicle_place", behind - (ahead - behind) * (rear / (front - rear)))
+        raised = op.vector(tree, 0.0, 0.0, op.named_attribute(tree, "elevation"))
+        middle = behind - (ahead - behind) * (rear / (front - rear)) + raised
+        points = op.store(inputs.points, "vehicle_place", middle)
         rotation = tree.node(
             "FunctionNodeAxesToRotation",
             ahead - behind,

@@ -47,7 +47,7 @@ def add_landscape(scene: bpy.types.Scene, parameters: RoadParameters, matrix: Ma
     }
     made = {kind: _add(scene, kind, make(), matrix) for kind, make in meshes.items()}
     woods = made["woods"].modifiers.new("SynthRoads", "NODES")
-    woods.node_group = woods_group(material)
+    woods.node_group = woods_group(material, parameters.environment.season == "winter")
     return made
 
 

@@ -35,14 +35,19 @@ def trees_mesh(trees: LandTrees) -> bpy.types.Mesh:
     return mesh
 
 
-def woods_group(material: Callable[[str], bpy.types.Material]) -> bpy.types.NodeTree:
-    """Return the node group that shows a crown on each vertex of `trees_mesh`, with the materials of a road."""
+def woods_group(material: Callable[[str], bpy.types.Material], bare: bool) -> bpy.types.NodeTree:
+    """Return the node group that shows a crown on each vertex of `trees_mesh`, with the materials of a road.
+
+    Args:
+        material: returns the road's material of a name.
+        bare: whether broadleaved trees have lost their leaves.
+    """
     names = ("maple_leaves", "birch_leaves", "spruce_leaves", "maple_bark")
     made = {name: material(name).name for name in names}
-    return node_group("SR Landscape Woods", _build, tuple(sorted(made.items())), description="Trees on points")
+    return node_group("SR Landscape Woods", _build, tuple(sorted(made.items())), bare, description="Trees on points")
 
 
-def _build(tree: Tree, materials: tuple[tuple[str, str], ...]) -> None:
+def _build(tree: Tree, materials: tuple[tuple[str, str], ...], bare: bool) -> None:
     names = dict(materials)
     points = tree.input("Points", "Geometry", description="A point per tree: size (m), turn (rad), crown")
     crowns = []
@@ -50,7 +55,8 @@ def _build(tree: Tree, materials: tuple[tuple[str, str], ...]) -> None:
         with tree.frame(f"Crown {number}"):
             conifer = number >= _BROADLEAVES
             leaves = "spruce_leaves" if conifer else ("maple_leaves", "birch_leaves")[number % 2]
-            made = _crown(tree, "spruce_leaves" if conifer else "maple_leaves", number)
+            leaves = "maple_bark" if bare and not conifer else leaves
+            made = _crown(tree, "spruce_leaves" if conifer else "maple_leaves", number, bare and not conifer)
             made = paint_faces(made, _picked(tree, names[leaves]))
             crowns.append(tree.node("GeometryNodeGeometryToInstance", op.join(made, _trunk(tree, names))).value)
     with tree.frame("On the points"):
@@ -78,17 +84,18 @@ def _trunk(tree: Tree, names: dict[str, str]) -> Value:
     return paint_faces(trunk, _picked(tree, names["maple_bark"]))
 
 
-def _crown(tree: Tree, leaves: str, seed: int) -> Value:
-    """Add nodes for a crown of a tree 1 m high and 1 m broad: a lumpy core within twigs."""
+def _crown(tree: Tree, leaves: str, seed: int, bare: bool) -> Value:
+    """Add nodes for a crown of a tree 1 m high and 1 m broad: a lumpy core within twigs; in winter twigs alone."""
     radius, half, middle = _CORES[leaves]
     core = tree.node("GeometryNodeMeshIcoSphere", subdivisions=3, radius=1.0).value
     core = op.set_position(core, _shaped(tree, op.position(tree), leaves, seed, 0.9))
     cards = tree.node("GeometryNodePoints", count=_CARDS).value
     way = op.normalize(op.random(tree, (-1.0, -1.0, -1.0), (1.0, 1.0, 1.0), 10 * seed))
-    cards = op.set_position(cards, _shaped(tree, way, leaves, seed, 1.0))
+    inwards = op.random(tree, 0.4 if bare else 0.95, 1.0, 10 * seed + 3)
+    cards = op.set_position(cards, _shaped(tree, way, leaves, seed, 1.0) * inwards)
     disc = tree.node("GeometryNodeMeshCircle", vertices=3, radius=0.085, fill_type="NGON").value
     high = radius / half
-    disc = op.transform(disc, scale=(1.0, 1.0, 1.0 * high))
+    disc = op.transform(disc, scale=(0.12 if bare else 1.0, 1.8 if bare else 1.0, high))
     turn = op.random_turn(tree, (-math.pi, -math.pi, 0.0), (math.pi, math.pi, 2.0 * math.pi), 10 * seed + 1)
     twigs = tree.node(
         "GeometryNodeInstanceOnPoints",
@@ -97,7 +104,7 @@ def _crown(tree: Tree, leaves: str, seed: int) -> Value:
         rotation=turn,
         scale=op.random(tree, 0.6, 1.25, 10 * seed + 2),
     ).value
-    crown = op.join(core, op.realize(twigs))
+    crown = op.realize(twigs) if bare else op.join(core, op.realize(twigs))
     place = op.position(tree) * (radius, radius, half)
     return op.set_position(crown, place + (0.0, 0.0, middle))
 
