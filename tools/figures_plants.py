@@ -49,9 +49,11 @@ def row(species: str, season: str, seed: int) -> str:
     ground = points.class_id == class_id("ground")
     first = inside & (points.return_number == 1)
     last = inside & (points.return_number == points.number_of_returns)
-    pulses = float(first.sum())
     cells = [species, season, f"{points.number_of_returns[first].mean():.2f}"]
-    cells += [f"{100.0 * (last & ground).sum() / last.sum():.0f}", f"{100.0 * (inside & ground).sum() / inside.sum():.0f}"]
+    cells += [
+        f"{100.0 * (last & ground).sum() / last.sum():.0f}",
+        f"{100.0 * (inside & ground).sum() / inside.sum():.0f}",
+    ]
     return f"| {' | '.join(cells)} | {pulses:.0f} |"
 
 

@@ -3,14 +3,17 @@
 import numpy as np
 import pytest
 
+from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.materials.table import materials
+from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.surroundings import Terrain, Vegetation
 from synthroads_addon.road.things.building import Building
 from synthroads_addon.road.things.hedge import Hedge
 from synthroads_addon.road.vegetation.plants import plant_places
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.twin.things import placed_things
+from tests.helpers.roads.furnished_data import road_data
 from tests.helpers.roads.thing_variants import placed, straight_road
 from tests.helpers.scenes.furnished_road import Float, FurnishedRoad, corners
 
@@ -84,3 +87,24 @@ def test_no_tree_grows_in_a_building() -> None:
     assert near.sum() > 50
     assert not places.stands[near].any()
     assert places.stands[~near].any()
+
+
+def test_bare_plants_have_twigs_of_bark_where_leaves_were() -> None:
+    stand = {"type": "Vegetation", "kind": "tree", "density": 0.005, "band_start": 1.0, "band_end": 20.0}
+    stand |= {"height_min": 8.0, "height_max": 9.0, "seed": 3}
+    trees = {"maple": stand | {"species": "maple"}, "spruce": stand | {"species": "spruce"}, "hedge": HEDGE}
+    area: dict[tuple[str, str], float] = {}
+    for season in ("summer", "winter"):
+        parameters = RoadParameters.from_dict(
+            road_data(straight_road(trees), 300.0) | {"environment": {"season": season}}
+        )
+        model = build_road(parameters, 0.02, 0.3, {"road", "terrain", "vegetation", "hedges"}, (0.0, 60.0))
+        for name in trees:
+            mesh = scene_mesh(objects=[model.objects[name]])
+            names = [mesh.materials[number] for number in np.unique(mesh.material)]
+            leafy = name == "spruce" or season == "summer"
+            assert any("leaves" in material for material in names) == leafy, (name, season)
+            a, b, c = np.moveaxis(mesh.vertices[mesh.triangles].astype(np.float64), 1, 0)
+            area[name, season] = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    assert area["spruce", "winter"] == pytest.approx(area["spruce", "summer"])
+    assert all(0.2 < area[name, "winter"] / area[name, "summer"] < 0.6 for name in ("maple", "hedge"))
