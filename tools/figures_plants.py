@@ -49,12 +49,10 @@ def row(species: str, season: str, seed: int) -> str:
     ground = points.class_id == class_id("ground")
     first = inside & (points.return_number == 1)
     last = inside & (points.return_number == points.number_of_returns)
-    cells = [species, season, f"{points.number_of_returns[first].mean():.2f}"]
-    cells += [
-        f"{100.0 * (last & ground).sum() / last.sum():.0f}",
-        f"{100.0 * (inside & ground).sum() / inside.sum():.0f}",
-    ]
-    return f"| {' | '.join(cells)} | {pulses:.0f} |"
+    of_pulses = 100.0 * float((last & ground).sum()) / float(last.sum())
+    of_points = 100.0 * float((inside & ground).sum()) / float(inside.sum())
+    returns = float(points.number_of_returns[first].mean())
+    return f"| {species} | {season} | {returns:.2f} | {of_pulses:.0f} | {of_points:.0f} | {int(first.sum())} |"
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""The landscape: continuous at the terrain's edge, parcels without gaps, with the shares that are said, clear of the road."""
+"""The landscape: continuous at the terrain's edge, without gaps, with the shares that are said, clear of the road."""
 
 from __future__ import annotations
 
