@@ -64,6 +64,9 @@ class Vegetation(RoadObject):
     band_end: float = quantity(ge=-5, le=1000, unit="m", description="End of the band.")
     height_min: float = quantity(gt=0, le=60, unit="m", description="Height of the smallest plant.")
     height_max: float = quantity(gt=0, le=60, unit="m", description="Height of the tallest plant.")
+    mown_width: float = quantity(
+        0.0, ge=0, le=20, unit="m", description="Grass so near behind the verge is mown as the verge is."
+    )
     seed: int = quantity(ge=0, le=2**63 - 1, unit="1", description="Seed of places, sizes and turns.")
 
     @model_validator(mode="after")

@@ -64,6 +64,7 @@ _FIELDS: dict[str, tuple[type[Model], str]] = {
     "vegetation.tree_height": (Vegetation, "height_min"),
     "vegetation.shrub_height": (Vegetation, "height_min"),
     "vegetation.grass_height": (Vegetation, "height_min"),
+    "vegetation.mown_width": (Vegetation, "mown_width"),
     **{f"environment.{n}": (Environment, n) for n in EnvironmentLimits.model_fields if n in Environment.model_fields},
     **{
         f"materials.{n}": (MaterialVariation, n)

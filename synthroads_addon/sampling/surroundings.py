@@ -104,7 +104,9 @@ def sample_vegetation(site: PlacementSite) -> Iterator[tuple[str, Vegetation]]:
     """
     scenario, limits = site.scenario, site.scenario.vegetation
     room = _room_beside(site)
-    yield from _mix_species(site, "grass", limits.grasses, scenario.grass_density, limits.grass_height, 0.0)
+    mown = draw(site.stream("mown strip"), limits.mown_width)
+    for name, grass in _mix_species(site, "grass", limits.grasses, scenario.grass_density, limits.grass_height, 0.0):
+        yield name, grass.model_copy(update={"mown_width": mown})
     yield from _shrub_belts(site, room)
     first_tree = _first_tree(site)
     if first_tree < room:

@@ -140,6 +140,7 @@ class VegetationLimits(ClosedModel):
     tree_height: Interval = interval(4.0, 16.0, "m", "Height of trees.")
     shrub_height: Interval = interval(0.5, 3.0, "m", "Height of shrubs.")
     grass_height: Interval = interval(0.08, 0.5, "m", "Height of grass.")
+    mown_width: Interval = interval(1.0, 4.0, "m", "Width of the strip behind the verge that is mown.", "Mown Strip")
 
 
 class LandscapeLimits(ClosedModel):

@@ -56,7 +56,9 @@ OWN: dict[str, dict[str, Data]] = {
     "Asset": {"it": GIVEN["Asset"] | {"offset": -18.0, "twin_types": TYPES}},
     "Vegetation": {
         "it": {"kind": "shrub", "species": "hazel", "density": 0.05, "band_start": 1.0, "band_end": 6.0}
-        | {"height_min": 1.0, "height_max": 2.0, "seed": 1}
+        | {"height_min": 1.0, "height_max": 2.0, "seed": 1},
+        "grass": {"kind": "grass", "species": "meadow", "density": 1.0, "band_start": 0.0, "band_end": 4.0}
+        | {"height_min": 0.2, "height_max": 0.4, "mown_width": 1.0, "seed": 2},
     },
     "Vehicle": {"it": {"model": "car", "carriageway": "right", "lane": 0, "station": 25.0, "speed": 3.0}},
 }
@@ -145,6 +147,7 @@ CASES: dict[str, Case] = {
     "LineMarking.dash_length": Case(owner="dashes"),
     "LineMarking.offset": Case(owner="free"),
     "Hatching.turnout": OTHER_TURNOUT,
+    "Vegetation.mown_width": Case(owner="grass"),
     "Vegetation.kind": Case(value="tree", also={"objects.it.species": "birch"}),
     "TrafficSign.code": Case(given={"objects.it.code": "449"}, value="448"),
     "TrafficSign.text": Case(value=["Abfahrt"]),

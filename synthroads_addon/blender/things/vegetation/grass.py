@@ -22,6 +22,7 @@ class _Roadside(Inputs):
     roadside_density = number(1.0, (0.0, 50.0), "Tufts per area of verge and median (1/m2)")
     roadside_reach = metres(30.0, (1.0, 100.0), "Farthest verge from the axis")
     roadside_height = share(ROADSIDE_HEIGHT, (0.0, 1.0), "Height there, as a share of the height elsewhere")
+    mown_width = metres(0.0, (0.0, 20.0), "Width of the strip behind the verge where grass is as high as there")
     median_instance = integer(0, INSTANCES, "Instance number of the median's faces; 0 if it has none of its own")
     material = material_of("the blades", "meadow")
 
@@ -45,7 +46,10 @@ def grass_group(tree: Tree) -> None:
 
     with tree.frame("Places on the terrain"):
         points = points_in_band(tree, stand, stand.density * stand.detail)
-        points = op.store(op.store(points, "share", 1.0), "strip", _on_right(tree))
+        ground = op.object_geometry(stand.terrain)
+        distance = op.sample_surface(ground, op.named_attribute(tree, "distance"), op.position(tree))
+        share = op.switch(distance < roadside.mown_width, 1.0, roadside.roadside_height)
+        points = op.store(op.store(points, "share", share), "strip", _on_right(tree))
     with tree.frame("Places on verges and median"):
         beside = op.named_attribute(tree, "class_id", "INT").equals(class_id("roadside"))
         faces = op.separate(op.object_geometry(stand.road), beside, "FACE")
