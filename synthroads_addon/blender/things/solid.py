@@ -22,7 +22,7 @@ from .model_builder import ModelBuilder
 
 
 class _Solid(Inputs):
-    mesh = socket("Geometry", "The thing, its foot on z = 0")
+    body = socket("Geometry", "The thing, its foot on z = 0")
     road = socket("Object", "Surface that it stands on; else it stays at its object's height")
     terrain = socket("Object", "Surface beside the road")
     elevation = metres(0.0, (-20.0, 50.0), "Height of its foot above the surface")
@@ -37,8 +37,10 @@ def solid_group(tree: Tree) -> None:
     with tree.frame("On the surface"):
         surfaces = op.object_geometry(solid.road), op.object_geometry(solid.terrain)
         foot = height_on(*surfaces, op.vector(tree)) + solid.elevation
-        mesh = move_geometry(solid.mesh, op.vector(tree, 0.0, 0.0, foot))
-    tree.output("Mesh", op.label(mesh, solid.class_, solid.instance), description="The thing")
+        mesh = move_geometry(solid.body, op.vector(tree, 0.0, 0.0, foot))
+    with tree.frame("Labels"):
+        mesh = op.label(mesh, solid.class_, solid.instance)
+    tree.output("Mesh", mesh, description="The thing")
 
 
 def add_solid(builder: ModelBuilder, name: str, item: StandingThing) -> None:

@@ -14,7 +14,7 @@ from synthroads_addon.road.vegetation.plants import plant_places
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.twin.things import placed_things
 from tests.helpers.roads.furnished_data import road_data
-from tests.helpers.roads.thing_variants import placed, straight_road
+from tests.helpers.roads.thing_variants import straight_road
 from tests.helpers.scenes.furnished_road import Float, FurnishedRoad, corners
 
 KINDS = ["Hedge", "ParkedVehicle"]
@@ -24,7 +24,9 @@ HEDGE = {"type": "Hedge", "start_station": 20.0, "end_station": 50.0, "offset": 
 @pytest.fixture(scope="module")
 def built() -> tuple[FurnishedRoad, SceneMesh]:
     """Variants of hedges and parked vehicles on a straight road, and their mesh."""
-    road = FurnishedRoad(straight_road(placed(KINDS, most=2)), ["hedges", "parked_vehicles"], detail=1.0)
+    car = {"type": "ParkedVehicle", "station": 60.0, "offset": -30.0, "elevation": 0.1, "rotation_deg": 20.0}
+    things = {"hedge": HEDGE, "car": car, "van": car | {"model": "van", "station": 80.0}}
+    road = FurnishedRoad(straight_road(things), ["hedges", "parked_vehicles"], detail=1.0)
     shown = [item for role, item in road.model.objects.items() if role in road.geometry.parameters.objects]
     return road, scene_mesh(objects=[item for item in shown if item.name != "Terrain"])
 
