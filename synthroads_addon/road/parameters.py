@@ -17,10 +17,9 @@ from pydantic import Field, model_validator
 
 from ..base.errors import InputError
 from ..base.schema import Model, quantity, read_json, when
-from .landscape.landscape import Landscape
 from .objects import ObjectT, RoadObject, StrictFinite
 from .section import Arrow, Carriageway, Hatching, LineMarking, Median, Turnout
-from .surroundings import Environment, MaterialVariation, Terrain, Vegetation, Vehicle
+from .surroundings import Environment, Landscape, MaterialVariation, Terrain, Vegetation, Vehicle
 from .things.registry import THINGS
 
 SCHEMA_VERSION: Literal["1.0"] = "1.0"

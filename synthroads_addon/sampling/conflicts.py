@@ -24,9 +24,8 @@ from ..road.guidelines import (
     TURNOUT_LANE_WIDTH,
     TURNOUT_TAPER,
 )
-from ..road.landscape.landscape import Landscape
 from ..road.section import Marking, Pothole, Ramp, Rut, Turnout
-from ..road.surroundings import Environment, MaterialVariation, Terrain, Vegetation, Vehicle
+from ..road.surroundings import Environment, Landscape, MaterialVariation, Terrain, Vegetation, Vehicle
 from ..road.things.limits import Interval
 from ..road.things.registry import limits_of
 from ..scenario.road import EnvironmentLimits, MaterialLimits, RoadScenario

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..base.schema import round_value
 from ..road.geometry import alignment_of
-from ..road.landscape.landscape import Landscape, Village, WindTurbine
+from ..road.surroundings import Landscape, Village, WindTurbine
 from .placing.draw import draw, draw_between
 from .placing.site import PlacementSite
 

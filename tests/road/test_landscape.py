@@ -10,11 +10,11 @@ import pytest
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.road.geometry import RoadGeometry
-from synthroads_addon.road.landscape.landscape import Landscape
 from synthroads_addon.road.landscape.parcels import KINDS, Parcels, parcels_of
 from synthroads_addon.road.landscape.relief import LandRelief
 from synthroads_addon.road.landscape.trees import LandTrees, land_trees
 from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.surroundings import Landscape
 from synthroads_addon.road.terrain import surface_elevation
 from tests.helpers.roads.furnished_data import road_data
 

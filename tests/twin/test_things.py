@@ -128,7 +128,9 @@ def differences(name: str, parameters: RoadParameters, folder: Path) -> dict[str
 @pytest.mark.parametrize("most", [1, pytest.param(100, marks=pytest.mark.slow)])
 def test_bodies_read_back_are_the_things(name: str, most: int, tmp_path: Path) -> None:
     off = differences(name, road(most), tmp_path)
-    assert len(off) >= len(THINGS) - 5
+    shaped = [kind for kind in THINGS if kind != "Asset"]
+    standing = [kind for kind in shaped if issubclass(THINGS[kind], StandingThing)]
+    assert len(off) >= len(standing if name == "opendrive" else shaped)
     assert {thing: away for thing, away in off.items() if away > MILLIMETRE} == {}
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from ...base.arrays import Float, Int
 from ...base.random_streams import stream
 from ..geometry import RoadGeometry
-from .landscape import Landscape
+from ..surroundings import Landscape
 from .relief import plane_waves
 
 KINDS = ("forest", "meadow", "wheat", "crop", "rapeseed", "soil")

@@ -9,8 +9,8 @@ import numpy as np
 from ...base.arrays import Float
 from ...base.random_streams import stream
 from ..geometry import RoadGeometry
+from ..surroundings import Landscape
 from ..terrain import known_elevation
-from .landscape import Landscape
 
 _WAVES, _OCTAVES = 16, 2.5
 _FLAT, _RISE = 1200.0, 1500.0  # m ahead of the road's ends: where hills begin on its prolongation, and over how far

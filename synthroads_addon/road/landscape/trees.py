@@ -9,7 +9,7 @@ import numpy as np
 from ...base.arrays import Bool, Float
 from ...base.random_streams import stream
 from ..geometry import RoadGeometry
-from .landscape import Landscape
+from ..surroundings import Landscape
 from .parcels import Parcels
 from .relief import LandRelief
 

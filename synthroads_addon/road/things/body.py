@@ -131,7 +131,7 @@ def rotate_z(sections: Float, angle: float) -> Float:
     return sections @ np.array([(cosine, sine, 0.0), (-sine, cosine, 0.0), (0.0, 0.0, 1.0)])
 
 
-def bar(start: Sequence[float], end: Sequence[float], width: float) -> Float:
+def bar(start: Sequence[float] | Float, end: Sequence[float] | Float, width: float) -> Float:
     """Return the sections (2, 4, 3) of a bar of square section from one point to another, its sides ``width`` (m)."""
     first, last = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     along = (last - first) / np.linalg.norm(last - first)

@@ -41,7 +41,7 @@ class BuildingLimits(Limits):
     allowed: ClassVar = {"buildings_per_km": (0.0, 100.0)}
 
     buildings_per_km: Interval = interval(
-        0.0, 5.0, "1/km", "Buildings per km, 40 m or more from the pavement.", title="Buildings (per km)"
+        0.0, 2.5, "1/km", "Buildings per km of either side, 40 m from the pavement.", title="Buildings (per km)"
     )
 
 

@@ -39,13 +39,13 @@ MATERIALS = {"wildlife": "wire_mesh", "rails": "noise_wood"}
 
 
 class FenceLimits(Limits):
-    """Limits of wildlife fences."""
+    """Limits of fences."""
 
     group: ClassVar = "roadside"
     place: ClassVar = 10
     allowed: ClassVar = {"fence_height": "height"}
 
-    fences: float = share(0.5, "Probability that a wildlife fence runs along a side of the road.")
+    fences: float = share(0.5, "Probability that a fence runs along a side of the road.")
     fence_height: Interval = interval(1.6, 2.2, "m", "Height of fences.", title="Their Height")
 
 

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from ...base.schema import round_value
-from ...road.objects import RoadObject, Side
+from ...road.objects import RoadObject, Side, nominal_width
 from ...road.things.building import OVERHANG, Building
 from ...road.things.fence import Fence
 from ...road.things.hedge import Hedge
@@ -34,6 +34,8 @@ BUILDING_DISTANCE = 40.0
 """From the pavement to buildings, m at least: FStrG, section 9."""
 FARTHEST = 100.0
 """From the centreline to what stands at one place, m at most."""
+_TURNOUT = 35.0  # m along the road beyond a turnout: its verge comes back to its place over 30 m
+_SMALLEST = 5.0  # m, of a building's width and depth
 _GAP = 2.0  # m along the road between what stands in one zone
 _YARD = 5.0  # m before a building, for parked vehicles and a wall
 _LONGEST_FENCE = 1000.0  # m from one gate to the next
@@ -46,11 +48,13 @@ _BUILDINGS: dict[str, tuple[tuple[float, float], tuple[float, float], tuple[floa
     "hall": ((16.0, 30.0), (9.0, 12.0), (5.0, 7.5), (0.6, 1.2)),
 }
 """Kind of building -> limits of its width, depth, height and roof's height, m."""
+_FENCES: tuple[Literal["wildlife", "rails"], ...] = (*("wildlife",) * 6, "rails")
+"""Kinds of fences as often as they occur."""
 _MODELS = {
-    "house": ("car", "estate"),
+    "house": ("car", "estate", "car", "estate", "motorcycle"),
     "brick_house": ("car", "estate"),
-    "barn": ("van", "estate"),
-    "hall": ("car", "van", "truck"),
+    "barn": ("van", "estate", "truck"),
+    "hall": ("car", "van", "truck", "semitrailer", "bus"),
 }
 _PYLON_DISTANCES = (90.0, 190.0)  # m from the axis
 
@@ -74,12 +78,12 @@ def place_roadside(site: PlacementSite, objects: Mapping[str, RoadObject]) -> It
 
 
 class _Zones:
-    """The ground beside one carriageway, from the verge's edge to the terrain's end.
+    """The ground beside one carriageway, from the verge's edge to the terrain's end; none beside turnouts.
 
     Attributes:
         site, side: the road, and the carriageway's side.
         sign: of offsets there.
-        paved, edge: largest distance of the pavement and of the verge from the centreline, m.
+        paved, edge: largest distance of pavement and verge from the centreline where there is no turnout, m.
         reach: distance up to which something may stand, m.
     """
 
@@ -92,14 +96,16 @@ class _Zones:
         power_line: PowerLine | None,
     ) -> None:
         section = site.sections[side]
-        marks = np.unique([0.0, site.length, *section.kinks(), *np.arange(0.0, site.length, 5.0)])
+        marks = np.unique([0.0, site.length, *section.kinks()])
         self.site, self.side = site, side
         self.sign = section.carriageway.sign
-        self.paved, self.edge = float(section.paved_edge(marks).max()), float(section.road_edge(marks).max())
+        self.paved = float(section.main_edge(marks).max())
+        self.edge = self.paved + nominal_width(section.carriageway.verge_width)
         self.reach = min(site.terrain.half_width, FARTHEST) - 1.0
         standing = [*objects.values(), *([power_line] if power_line else [])]
         self._blocks = [block for item in standing if isinstance(item, Thing) for block in item.footprint()]
-        self._crossing = crossing
+        turnouts = (shape.range() for shape in section.turnouts)
+        self._crossing = Reservations([*crossing.stretches, *((a - _TURNOUT, b + _TURNOUT) for a, b in turnouts)])
 
     def free(self, near: float, far: float) -> list[Range]:
         """Return the stretches of road (m) on which nothing stands between two distances (m) from the centreline."""
@@ -169,12 +175,12 @@ def _hedges(zones: _Zones, rng: np.random.Generator) -> Iterator[tuple[str, Hedg
 
 
 def _fences(zones: _Zones, rng: np.random.Generator) -> Iterator[tuple[str, Fence]]:
-    """Yield the wildlife fence all along the side, with gaps where something is in its way."""
+    """Yield the fence all along the side, with gaps where something is in its way."""
     limits = zones.site.scenario.roadside
     height, distance = draw(rng, limits.fence_height), zones.edge + draw_between(rng, FENCE_ZONE)
     # Behind hedges, however wide they are.
     distance += limits.hedge_width.maximum if limits.hedges_per_km.maximum > 0.0 else 0.0
-    spacing, wanted = pick(rng, (4.0, 5.0, 6.0)), rng.random() < limits.fences
+    spacing, kind, wanted = pick(rng, (4.0, 5.0, 6.0)), pick(rng, _FENCES), rng.random() < limits.fences
     if not wanted or distance + 1.0 > zones.reach:
         return
     number = 0
@@ -189,6 +195,7 @@ def _fences(zones: _Zones, rng: np.random.Generator) -> Iterator[tuple[str, Fenc
                 start_station=round_value(piece),
                 end_station=round_value(last),
                 offset=round_value(zones.sign * distance),
+                kind=kind,
                 height=height,
                 post_spacing=spacing,
             )
@@ -200,17 +207,18 @@ def _yards(zones: _Zones, rng: np.random.Generator) -> Iterator[tuple[str, RoadO
     limits = zones.site.scenario.roadside
     first = max(zones.paved + BUILDING_DISTANCE, zones.edge + FENCE_ZONE[1] + limits.hedge_width.maximum + 2.0)
     taken, number = Reservations(), 0
-    for _ in range(zones.count(draw(rng, limits.buildings_per_km) / len(zones.site.sections), rng)):
+    for _ in range(zones.count(draw(rng, limits.buildings_per_km), rng)):
         kind = pick(rng, list(_BUILDINGS))
         width, depth, height, roof = (draw_between(rng, sizes) for sizes in _BUILDINGS[kind])
         turn = draw_between(rng, (-12.0, 12.0)) + pick(rng, (90.0, 0.0))
+        width, depth = _fit(width, depth, zones.reach - first - _YARD)
         half = math.hypot(width, depth) / 2.0 + OVERHANG
         parked, walled = draw(rng, limits.parked_per_building), rng.random() < limits.walls
         wall_height, wall_kind = draw(rng, limits.wall_height), pick(rng, ("plaster", "brick", "concrete"))
         near, far = first, first + _YARD + 2.0 * half
         ranges = [r for start, end in zones.free(near, far) for r in free_ranges(start, end, taken)]
         start = draw_start(rng, ranges, 2.0 * half)
-        if start is None or far > zones.reach:
+        if start is None or min(width, depth) < _SMALLEST:
             continue
         number += 1
         taken.add(start - 4.0 * _GAP, start + 2.0 * half + 4.0 * _GAP)
@@ -233,6 +241,12 @@ def _yards(zones: _Zones, rng: np.random.Generator) -> Iterator[tuple[str, RoadO
             yield f"wall-{zones.side}-{number}", _wall(span, zones.sign * (first + 0.5), fields)
         for place, vehicle in enumerate(_parked(rng, zones, (start, 2.0 * half), first + _YARD - 2.0, kind, parked), 1):
             yield f"parked-{zones.side}-{number}-{place}", vehicle
+
+
+def _fit(width: float, depth: float, room: float) -> tuple[float, float]:
+    """Return a building's width and depth (m), smaller where its plot, however it is turned, exceeds the room (m)."""
+    share = min(1.0, (room / 2.0 - OVERHANG - 0.1) / (math.hypot(width, depth) / 2.0))
+    return round_value(width * share), round_value(depth * share)
 
 
 def _wall(span: Range, offset: float, fields: Mapping[str, Any]) -> Wall:

@@ -12,10 +12,9 @@ from pathlib import Path
 from ...base.crs import wkt
 from ...road.geometry import RoadGeometry
 from ...road.instances import InstanceNumbers
-from ...road.landscape.landscape import Landscape
 from ...road.parameters import AlignmentObject, RoadParameters
 from ...road.section import Carriageway, LineMarking, Median, Turnout
-from ...road.surroundings import Terrain, Vegetation, Vehicle
+from ...road.surroundings import Landscape, Terrain, Vegetation, Vehicle
 from ..plants import PlacedPlant, placed_plants
 from ..things import placed_things, standing_things
 from ..trace import LEVEL, Trace

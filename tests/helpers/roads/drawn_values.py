@@ -115,6 +115,26 @@ def _cabinets_per_km(objects: Objects, parameters: RoadParameters) -> Iterator[f
         yield sum(item.kind == "utility" for item in objects["Cabinet"]) / parameters.alignment.length * 1000.0
 
 
+def _per_side(kind: str) -> Extractor:
+    """Return what gives how many things of a type there are in a km of each side of a very long road."""
+
+    def per_km(objects: Objects, parameters: RoadParameters) -> Iterator[float]:
+        if parameters.alignment.length > LONG:
+            for sign in (-1.0, 1.0):
+                yield sum(item.offset * sign > 0.0 for item in objects[kind]) / parameters.alignment.length * 1000.0
+
+    return per_km
+
+
+def _parked_per_building(objects: Objects, _: RoadParameters) -> Iterator[float]:
+    if objects["Building"]:
+        yield len(objects["ParkedVehicle"]) / len(objects["Building"])
+
+
+def _in_landscape(name: str) -> Extractor:
+    return lambda objects, _: (float(len(getattr(item, name))) for item in objects["Landscape"])
+
+
 def _pole_spacing(objects: Objects, _: RoadParameters) -> Iterator[float]:
     stations = sorted({item.station for item in objects["Pole"] if item.kind == "lighting"})
     if len(stations) >= 10:  # of which two follow each other, though some may be left out
@@ -195,6 +215,21 @@ EXTRACTORS: dict[str, Extractor] = {
     "furniture.overpass_clearance": _field("Overpass", "clearance"),
     "furniture.overpass_width": _field("Overpass", "width"),
     "furniture.construction_length": _construction_length,
+    "roadside.fence_height": _field("Fence", "height"),
+    "roadside.hedges_per_km": _per_side("Hedge"),
+    "roadside.hedge_length": lambda o, _: (i.end_station - i.start_station for i in o["Hedge"]),
+    "roadside.hedge_height": _field("Hedge", "height"),
+    "roadside.hedge_width": _field("Hedge", "width"),
+    "roadside.buildings_per_km": _per_side("Building"),
+    "roadside.wall_height": _field("Wall", "height"),
+    "roadside.parked_per_building": _parked_per_building,
+    "roadside.pylon_height": _field("PowerLine", "height"),
+    **{
+        f"landscape.{name}": _field("Landscape", name)
+        for name in ("hill_height", "hill_length", "parcel_size", "forest_share", "meadow_share")
+    },
+    "landscape.villages": _in_landscape("villages"),
+    "landscape.turbines": _in_landscape("turbines"),
     "vehicles.per_km": _vehicles_per_km,
     "vehicles.trucks": lambda objects, _: (share for share, _ in truck_shares(objects)),
     "vehicles.speed": _speeds,
@@ -205,6 +240,7 @@ EXTRACTORS: dict[str, Extractor] = {
     "vegetation.tree_height": _field("Vegetation", "height_min", "height_max", kind="tree"),
     "vegetation.shrub_height": _field("Vegetation", "height_min", "height_max", kind="shrub"),
     "vegetation.grass_height": _field("Vegetation", "height_min", "height_max", kind="grass"),
+    "vegetation.mown_width": _field("Vegetation", "mown_width", kind="grass"),
     "environment.sun_azimuth_deg": _of_scene("environment", "sun_azimuth_deg"),
     "environment.sun_elevation_deg": _of_scene("environment", "sun_elevation_deg"),
     "environment.cloud_cover": _of_scene("environment", "cloud_cover"),
@@ -220,6 +256,11 @@ EXTRACTORS: dict[str, Extractor] = {
 COUNTED = {
     "pavement.potholes_per_km",
     "furniture.cabinets_per_km",
+    "roadside.hedges_per_km",
+    "roadside.buildings_per_km",
+    "roadside.parked_per_building",
+    "landscape.villages",
+    "landscape.turbines",
     "vehicles.per_km",
     "vehicles.trucks",
     "materials.patch_density",

@@ -8,11 +8,11 @@ import bpy
 from mathutils import Matrix
 
 from ....road.geometry import RoadGeometry
-from ....road.landscape.landscape import Landscape
 from ....road.landscape.parcels import parcels_of
 from ....road.landscape.relief import LandRelief
 from ....road.landscape.trees import land_trees
 from ....road.parameters import RoadParameters
+from ....road.surroundings import Landscape
 from ...materials import RoadMaterials
 from ...things.model_builder import SUPPORT
 from .far_road import far_road_mesh

@@ -29,10 +29,11 @@ def far_road_mesh(
 ) -> bpy.types.Mesh:
     """Create the mesh of the road and the ground beside it beyond both ends, in local coordinates."""
     names: list[str] = []
-    vertices, faces, slots, places = [], [], [], []
+    vertices: list[Float] = []
+    faces, slots, places = [], [], []
     for end, way in ((0.0, -1.0), (geometry.length, 1.0)):
         for station, offset, name, raised in _strips(geometry, relief, end, way):
-            count = sum(map(len, vertices))
+            count = sum(len(part) for part in vertices)
             plan = place_beyond(geometry, station.ravel(), offset.ravel())
             z = relief.elevation_beside(plan, station.ravel(), offset.ravel()) + raised
             vertices.append(np.column_stack([plan, z]))

@@ -1,4 +1,4 @@
-"""What people built in the landscape: villages, wind turbines, and power lines that go on across the land."""
+"""Structures of the landscape: villages, wind turbines, and power lines that go on across the land."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 from ....base.arrays import Float
 from ....base.random_streams import stream
 from ....road.geometry import RoadGeometry
-from ....road.landscape.landscape import Landscape, Village, WindTurbine
 from ....road.landscape.relief import LandRelief
+from ....road.surroundings import Landscape, Village, WindTurbine
 from ....road.things.body import Body, Place, box, circle, prism, rotate_x, rotate_z
 from ....road.things.building import Building
 from ....road.things.power_line import PowerLine
@@ -45,12 +45,12 @@ def structures_mesh(
 
 def _village(village: Village, relief: LandRelief, rng: np.random.Generator) -> Iterator[Body]:
     """Yield the houses of a village, on a spiral around its church."""
-    kinds, weights = zip(*_HOUSES, strict=True)
+    limits = np.cumsum([weight for _, weight in _HOUSES])
     for number in range(1, village.houses + 1):
         turn = 2.399963 * number + rng.normal(0.0, 0.08)
         away = village.radius * math.sqrt((number + 0.6) / (village.houses + 1.0))
         place = np.array([village.x + away * math.cos(turn), village.y + away * math.sin(turn)])
-        kind = str(rng.choice(kinds, p=weights))
+        kind = _HOUSES[int(np.searchsorted(limits, rng.random() * limits[-1]))][0]
         size = (rng.uniform(9.0, 14.0), rng.uniform(8.0, 10.5), rng.uniform(3.4, 6.0), rng.uniform(3.0, 4.8))
         house = Building(instance=1, station=0.0, offset=0.0, kind=kind, **dict(zip(_CHURCH, size, strict=True)))
         yield from _stand(house, place, turn + rng.normal(0.0, 0.15) + math.pi / 2.0 * int(rng.integers(2)), relief)
