@@ -32,9 +32,9 @@ class RaycastNodesCaster:
         set_modifier_input(self._modifier, "Target", self._target)
 
     def cast(
-        self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float
+        self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float | NDArray[np.float32]
     ) -> NDArray[np.int32]:
-        """Return the index (N,) of the first face that each ray hits within the range (m), -1 for none."""
+        """Return the index (N,) of the first face that each ray hits within its range (m), -1 for none."""
         if not len(origins):
             return np.empty(0, np.int32)
         points = self._rays.data
@@ -42,7 +42,8 @@ class RaycastNodesCaster:
         points.vertices.add(len(origins))
         points.vertices.foreach_set("co", origins.ravel())
         _store(points, "direction", "FLOAT_VECTOR", "POINT", "vector", directions)
-        set_modifier_input(self._modifier, "Range", maximum_range)
+        limits = np.array(np.broadcast_to(maximum_range, len(origins)), np.float32)
+        _store(points, "reach", "FLOAT", "POINT", "value", limits)
         layer = self._scene.view_layers[0]
         layer.update()
         result = self._rays.evaluated_get(layer.depsgraph).data
@@ -52,9 +53,9 @@ class RaycastNodesCaster:
         return faces - 1
 
     def occluded(
-        self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float
+        self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float | NDArray[np.float32]
     ) -> NDArray[np.bool_]:
-        """Return a mask (N,) of the rays that hit anything within the range (m)."""
+        """Return a mask (N,) of the rays that hit anything within their range (m)."""
         return self.cast(origins, directions, maximum_range) >= 0
 
     def close(self) -> None:
@@ -102,7 +103,7 @@ def _cast_group() -> bpy.types.NodeTree:
     tree = Tree(group)
     points = tree.input("Geometry", "Geometry", description="Points where rays begin")
     target = tree.input("Target", "Object", description="What they are cast at")
-    reach = tree.number("Range", 100.0, (0.0, 1e6), unit="m", description="Length of the rays")
+    reach = tree.node("GeometryNodeInputNamedAttribute", data_type="FLOAT", name="reach")
     direction = tree.node("GeometryNodeInputNamedAttribute", data_type="FLOAT_VECTOR", name="direction")
     number = tree.node("GeometryNodeInputNamedAttribute", data_type="INT", name="number")
     cast = tree.node(
@@ -111,7 +112,7 @@ def _cast_group() -> bpy.types.NodeTree:
         target_geometry=tree.node("GeometryNodeObjectInfo", target)["Geometry"],
         attribute=number.value,
         ray_direction=direction.value,
-        ray_length=reach,
+        ray_length=reach.value,
     )
     store = {"data_type": "INT", "domain": "POINT", "name": "face", "value": cast["Attribute"]}
     tree.output("Geometry", tree.node("GeometryNodeStoreNamedAttribute", points, **store).value)

@@ -109,6 +109,18 @@ def beam_radii(divergence: Sequence[float]) -> tuple[float, float]:
     return math.tan(divergence[0] / 2.0), math.tan(divergence[1] / 2.0)
 
 
+def outer_radii(rings: tuple[int, ...], divergence: Sequence[float]) -> tuple[float, float]:
+    """Return the half axes of the ellipse that holds all rays of a pulse, m per metre of distance.
+
+    Args:
+        rings: rays on each ring.
+        divergence: two full angles at 1/e2, rad.
+    """
+    outermost = float(np.sqrt(np.square(beam_pattern(rings).across).sum(axis=1).max()))
+    radii = beam_radii(divergence)
+    return outermost * radii[0], outermost * radii[1]
+
+
 def conical_directions(
     direction: Float, in_plane: Float, across: Float, pattern: BeamPattern, divergence: Sequence[float]
 ) -> Float:

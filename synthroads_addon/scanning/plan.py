@@ -29,6 +29,7 @@ from .pavement_relief import PavementRelief
 from .platforms.path import Path, Strip
 from .receiving.response import laser_gains
 from .relief import MicroRelief
+from .scene.bare_ground import BareGround
 from .scene.caster import Caster
 from .scene.mesh import SceneMesh
 from .scene.target import Target
@@ -102,6 +103,7 @@ class ScanPlan:
         effects: effects that change the echoes of pulses, in the order in which they act.
         multipath: ghost echoes over surfaces that mirror; None without.
         air_class: ``class_id`` of the echoes that these add.
+        ground: where footprints that meet one plane alone are spared; None: every footprint is cast in full.
         beam: whether the rays of a pulse diverge from the aperture or run parallel.
         measured_layers: names of the optional per-point layers that the scan itself fills.
         records_seen_points: whether blocks tell where each point was seen (`BlockResult.seen`), for colours and relief.
@@ -139,6 +141,7 @@ class ScanPlan:
     effects: tuple[EchoEffect, ...] = ()
     multipath: Multipath | None = None
     air_class: int = UNLABELLED
+    ground: BareGround | None = None
     beam: Literal["conical", "cylindrical"] = "conical"
     measured_layers: frozenset[str] = frozenset()
     records_seen_points: bool = False
@@ -177,6 +180,12 @@ class ScanPlan:
     def rays_per_pulse(self) -> int:
         """Return the number of rays that sample one pulse."""
         return len(self.pattern.weights)
+
+    @property
+    def spares(self) -> bool:
+        """Return whether footprints that meet one plane alone are spared: none where echoes come from elsewhere too."""
+        from_surfaces = not self.effects and self.multipath is None
+        return self.ground is not None and from_surfaces and self.rays_per_pulse > 1
 
     @property
     def most_returns(self) -> int:

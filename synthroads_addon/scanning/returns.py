@@ -72,7 +72,7 @@ def group_returns(first: HitSignals, behind: HitSignals, pulse: Index, resolutio
     chosen = np.flatnonzero(mixed)
     if not len(chosen):
         return one
-    return _merge_echoes(one, _split_pulses(chosen, first, behind, pulse, resolution))
+    return merge_echoes(one, _split_pulses(chosen, first, behind, pulse, resolution))
 
 
 def _whole_pulses(pulse: Index, nearest: Float, first: HitSignals) -> Echoes:
@@ -142,8 +142,8 @@ def _strongest(energy: Float, group: Index, starts: Index) -> Index:
     return np.asarray(brightest[first])
 
 
-def _merge_echoes(one: Echoes, several: Echoes) -> Echoes:
-    """Return both sets of echoes joined, in the order of pulses; no pulse is in both."""
+def merge_echoes(one: Echoes, several: Echoes) -> Echoes:
+    """Return two sets of echoes joined, in the order of pulses; no pulse is in both."""
     echoes = Echoes.join([one, several])
     return echoes.select(np.argsort(echoes.pulse, kind="stable"))
 

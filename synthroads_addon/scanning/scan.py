@@ -23,7 +23,17 @@ from .receiving.detector import Readout, detect_echoes
 from .receiving.radiometry import received_intensity
 from .receiving.range_noise import range_sigma, range_walk, tail_factors
 from .receiving.waveform import merge_peaks
-from .returns import LEAST_REFLECTANCE, BothSignals, Echoes, HitSignals, group_returns, number_returns
+from .returns import (
+    LEAST_REFLECTANCE,
+    BothSignals,
+    Echoes,
+    HitSignals,
+    group_returns,
+    merge_echoes,
+    number_returns,
+)
+from .scene.target import FirstHits
+from .sparing import PartlyTraced, Sparing, Traced, count_footprints
 from .strip_errors import strip_gain, with_strip_errors
 from .trace import Hits, Rays, TracedRays, trace
 
@@ -45,6 +55,7 @@ class BlockResult:
         sources: (256,) points by the source of their colour, once they are finished.
         blocks: how many blocks these are.
         readout: what the receiver is still to make of the points; None once it is done.
+        footprints: (3, 256) pulses by class, see `sparing.count_footprints`; None where none could be spared.
     """
 
     points: PointBlock
@@ -56,11 +67,21 @@ class BlockResult:
     sources: Int | None = None
     blocks: int = 1
     readout: Readout | None = None
+    footprints: Int | None = None
+
+
+@dataclass(frozen=True)
+class _Tally:
+    """Rays of a block that were cast at what is first in their way, and its footprints, see `BlockResult`."""
+
+    rays: int
+    footprints: Int | None = None
 
 
 def join_results(results: list[BlockResult]) -> BlockResult:
     """Return the results of several blocks, none of them finished yet, joined into one in their order."""
     seen = [result.seen for result in results if result.seen is not None]
+    footprints = [result.footprints for result in results if result.footprints is not None]
     readouts = [result.readout for result in results if result.readout is not None]
 
     def total(name: str) -> int:
@@ -75,6 +96,7 @@ def join_results(results: list[BlockResult]) -> BlockResult:
         saturated=total("saturated"),
         blocks=total("blocks"),
         readout=Readout.join(readouts) if readouts else None,
+        footprints=np.sum(footprints, axis=0) if footprints else None,
     )
 
 
@@ -109,15 +131,7 @@ class BlockScan:
         if towards is not None:
             number = np.flatnonzero(towards)
             pulses = pulses.select(number)
-        rays = self.rays(pulses, poses.motions)
-        traced = trace(target, plan.surfaces, rays, poses.motions, setting.minimum_range, setting.maximum_range)
-        signals = self.signals(traced)
-        if plan.multipath is not None:
-            traced, signals = self.add_ghosts(plan.multipath, traced, signals, poses.motions)
-        for effect in plan.effects if self._in_air else ():
-            random = stream(plan.seed, f"effect {effect.name}", strip.index, key)
-            traced, signals = apply_effect(effect, random, setting, plan.attenuation, pulses, traced, signals)
-        echoes = group_returns(*signals, traced.pulse, setting.range_resolution)
+        traced, echoes, tally = self.traced_echoes(strip, pulses, poses.motions, key)
         if setting.receiver.echo_separation == "waveform":
             echoes = merge_peaks(echoes, setting.range_resolution)
         if plan.surfaces.varying:
@@ -132,10 +146,52 @@ class BlockScan:
         recorded = (return_number, returns, readout.speckle)
         points, seen = self._points(strip, pulses, traced, echoes, recorded, errors, number, poses.motions)
         if provisional:
-            return BlockResult(points, seen, count, traced.first.face.size, weak, 0, readout=readout)
+            return BlockResult(points, seen, count, tally.rays, weak, 0, readout=readout, footprints=tally.footprints)
         intensity, clipped = readout.read(points.intensity, points.range, setting, plan.gains)
         points = replace(points, intensity=intensity)
-        return BlockResult(points, seen, count, traced.first.face.size, weak, clipped)
+        return BlockResult(points, seen, count, tally.rays, weak, clipped, footprints=tally.footprints)
+
+    def traced_echoes(
+        self, strip: Strip, pulses: Pulses, motions: list[Track], key: int
+    ) -> tuple[Traced, Echoes, _Tally]:
+        """Return what the rays of pulses meet, the echoes that they give before any is lost, and the number of rays.
+
+        Args:
+            strip: of the pulses.
+            pulses: of a block.
+            motions: tracks of the target's moving parts.
+            key: of random streams.
+        """
+        plan, setting = self.plan, self.plan.setting
+        if not plan.spares:
+            traced = self._trace(pulses, motions)
+            signals = self.signals(traced)
+            if plan.multipath is not None:
+                traced, signals = self.add_ghosts(plan.multipath, traced, signals, motions)
+            for effect in plan.effects if self._in_air else ():
+                random = stream(plan.seed, f"effect {effect.name}", strip.index, key)
+                traced, signals = apply_effect(effect, random, setting, plan.attenuation, pulses, traced, signals)
+            echoes = group_returns(*signals, traced.pulse, setting.range_resolution)
+            return traced, echoes, _Tally(traced.first.face.size)
+        met = plan.target.cast(pulses.origin, pulses.direction, setting.maximum_range, pulses.time, motions)
+        sparing = Sparing(plan)
+        spared = sparing.find(pulses, met, motions)
+        others = np.ones(len(pulses.time), bool)
+        others[spared.pulse] = others[sparing.find_missing(pulses, met, motions)] = False
+        full = np.flatnonzero(others)
+        traced = self._trace(pulses.select(full), motions, met.take(full))
+        echoes = group_returns(*self.signals(traced), traced.pulse, setting.range_resolution)
+        echoes = replace(echoes, pulse=full[echoes.pulse])
+        echoes = merge_echoes(echoes, sparing.echoes(spared, traced.count))
+        rays = traced.first.face.size + len(met.face) - len(full)
+        tally = _Tally(rays, count_footprints(plan.target, met, spared))
+        return PartlyTraced(traced, spared, pulses), echoes, tally
+
+    def _trace(self, pulses: Pulses, motions: list[Track], axis: FirstHits | None = None) -> TracedRays:
+        """Return what all rays of pulses meet, without casting their axes again where ``axis`` says what these meet."""
+        plan, setting = self.plan, self.plan.setting
+        limits = (setting.minimum_range, setting.maximum_range)
+        return trace(plan.target, plan.surfaces, self.rays(pulses, motions, axis), motions, *limits, axis)
 
     @property
     def _in_air(self) -> bool:
@@ -222,8 +278,14 @@ class BlockScan:
             time, shot.scan_angle, channel, origin, direction, in_plane, across, measured_origin, measured_direction
         )
 
-    def rays(self, pulses: Pulses, motions: list[Track]) -> Rays:
-        """Return the K rays that sample each pulse's footprint; a cylindrical beam is cast once to find its range."""
+    def rays(self, pulses: Pulses, motions: list[Track], axis: FirstHits | None = None) -> Rays:
+        """Return the K rays that sample each pulse's footprint; a cylindrical beam is cast once to find its range.
+
+        Args:
+            pulses: P pulses.
+            motions: tracks of the target's moving parts.
+            axis: (P,) what the pulses' axes meet, if these were cast already.
+        """
         pattern, setting = self.plan.pattern, self.plan.setting
         origin, share = pulses.origin[:, None, :], pattern.weights[:, None]
         if len(pattern) == 1:
@@ -233,7 +295,9 @@ class BlockScan:
         across = (pulses.in_plane, pulses.across, pattern, setting.divergence)
         if self.plan.beam == "conical":
             return Rays(origin, conical_directions(pulses.direction, *across), share, pulses.time)
-        met = self.plan.target.cast(pulses.origin, pulses.direction, setting.maximum_range, pulses.time, motions)
+        met = axis or self.plan.target.cast(
+            pulses.origin, pulses.direction, setting.maximum_range, pulses.time, motions
+        )
         offsets = cylindrical_offsets(*across, met.distance)
         direction = np.repeat(pulses.direction[:, None, :], len(pattern), axis=1)
         return Rays(origin + offsets, direction, share, pulses.time)
@@ -262,7 +326,7 @@ class BlockScan:
         traced = replace(traced, behind=Hits.join([traced.behind, hits]), ray=np.concatenate([traced.ray, ray]))
         return traced, (first, HitSignals.join([behind, ghosts]))
 
-    def vary_brightness(self, traced: TracedRays, echoes: Echoes, motions: list[Track]) -> Echoes:
+    def vary_brightness(self, traced: Traced, echoes: Echoes, motions: list[Track]) -> Echoes:
         """Return the echoes with intensities scaled by how their materials' reflectance varies in space."""
         surfaces, target = self.plan.surfaces, self.plan.target
         material = traced.pick("material", echoes.hit)
@@ -272,10 +336,9 @@ class BlockScan:
         if not len(uneven):
             return echoes
         hit = echoes.hit[uneven]
-        ray, reach, face = traced.ray_of(hit), traced.pick("distance", hit), traced.pick("face", hit)
-        position, _ = _ray_ends(traced.rays, ray, reach)
+        position, _ = traced.ends(hit)
         if target.moving:
-            (position,) = target.at_time_zero(face, position, traced.rays.time[ray % len(traced.rays.time)], motions)
+            (position,) = target.at_time_zero(traced.pick("face", hit), position, traced.times(hit), motions)
         intensity = echoes.intensity.copy()
         place = position.T + self.plan.frame_origin
         intensity[uneven] *= spread_factors(surfaces, material[uneven], place, self.plan.seed)
@@ -285,7 +348,7 @@ class BlockScan:
         self,
         strip: Strip,
         pulses: Pulses,
-        traced: TracedRays,
+        traced: Traced,
         echoes: Echoes,
         recorded: tuple[UInt8, UInt8, Float | None],
         errors: Errors,
@@ -312,7 +375,7 @@ class BlockScan:
             normal = target.normals(face, along, pulses.time[pulse], motions)
             if self._off_surfaces:
                 air = np.flatnonzero(face < 0)
-                normal[:, air] = -np.take(traced.rays.direction.reshape(3, -1), traced.ray_of(hit[air]), axis=1)
+                normal[:, air] = -traced.directions(hit[air])
         class_id = target.face_values("class_id", face)
         if self._off_surfaces:
             class_id = np.where(face < 0, np.uint8(plan.air_class), class_id)
@@ -334,19 +397,16 @@ class BlockScan:
         )
         seen = None
         if plan.records_seen_points and normal is not None:
-            ray, reach = traced.ray_of(hit), traced.pick("distance", hit)
-            seen = self._seen_targets(traced.rays, ray, reach, face, normal, motions)
+            seen = self._seen_targets(traced, hit, face, normal, motions)
         return points, seen
 
-    def _seen_targets(
-        self, rays: Rays, ray: Index, reach: Float, face: Index, normal: Float, motions: list[Track]
-    ) -> SeenPoints:
+    def _seen_targets(self, traced: Traced, hit: Index, face: Index, normal: Float, motions: list[Track]) -> SeenPoints:
         """Return the surface points that gave the returns, in the scene at time 0, as it is rendered.
 
         That is on the surface that gave most of the return: the mean of all its hits may lie in the air between them.
         """
-        target, time = self.plan.target, rays.time[ray % len(rays.time)]
-        position, scanner = _ray_ends(rays, ray, reach)
+        target, time = self.plan.target, traced.times(hit)
+        position, scanner = traced.ends(hit)
         sunlit = None if self.plan.sun is None else self._sunlit(face, position, normal, time, motions)
         if target.moving:
             begin, offset, normal = target.at_time_zero(face, position, time, motions, (scanner - position, normal))
@@ -370,9 +430,3 @@ class BlockScan:
         begin = position[:, towards] + _OFF_SURFACE * normal[:, towards]
         result[towards] = self.plan.target.unobstructed(begin, sun, time[towards], motions)
         return result
-
-
-def _ray_ends(rays: Rays, ray: Index, reach: Float) -> tuple[Float, Float]:
-    """Return the ends of rays after ``reach`` (m) and their origins, (3, N) each, local, m."""
-    scanner = np.take(rays.origin.reshape(3, -1), ray if rays.origin.shape[1] > 1 else ray % len(rays.time), axis=1)
-    return scanner + reach * np.take(rays.direction.reshape(3, -1), ray, axis=1), scanner

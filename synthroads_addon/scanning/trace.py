@@ -7,7 +7,7 @@ import numpy as np
 from ..base.arrays import AnyArray, ArrayRows, Float, Index
 from ..materials.surfaces import Surfaces
 from .knots import Track
-from .scene.target import Target
+from .scene.target import FirstHits, Target
 
 LAYERS = 8
 """Surfaces that a ray passes at most."""
@@ -73,9 +73,33 @@ class TracedRays:
     ray: Index
 
     @property
+    def count(self) -> int:
+        """Return the number of hits, as `returns.Echoes` numbers them."""
+        return self.first.face.size + len(self.ray)
+
+    @property
     def pulse(self) -> Index:
         """Return the pulse (B,) of each hit behind a permeable surface."""
         return np.asarray(self.ray % self.first.face.shape[1])
+
+    def ends(self, hits: Index) -> tuple[Float, Float]:
+        """Return where chosen hits are and where their rays begin, (3, N) each, local, m; see `returns.Echoes`."""
+        begin = self.begins(hits)
+        return begin + self.pick("distance", hits) * self.directions(hits), begin
+
+    def begins(self, hits: Index) -> Float:
+        """Return where the rays of chosen hits begin, (3, N) local, m."""
+        ray, rays = self.ray_of(hits), self.rays
+        first = ray if rays.origin.shape[1] > 1 else ray % len(rays.time)
+        return np.take(rays.origin.reshape(3, -1), first, axis=1)
+
+    def directions(self, hits: Index) -> Float:
+        """Return the directions (3, N) of chosen hits' rays."""
+        return np.take(self.rays.direction.reshape(3, -1), self.ray_of(hits), axis=1)
+
+    def times(self, hits: Index) -> Float:
+        """Return when the rays of chosen hits (N,) were emitted, s."""
+        return np.take(self.rays.time, self.ray_of(hits) % len(self.rays.time))
 
     def ray_of(self, hits: Index) -> Index:
         """Return the ray k * P + p of each hit, by hit numbers as in `returns.Echoes`."""
@@ -96,13 +120,27 @@ class TracedRays:
 
 
 def trace(
-    target: Target, surfaces: Surfaces, rays: Rays, motions: list[Track], nearest: float, farthest: float
+    target: Target,
+    surfaces: Surfaces,
+    rays: Rays,
+    motions: list[Track],
+    nearest: float,
+    farthest: float,
+    axis: FirstHits | None = None,
 ) -> TracedRays:
     """Return what rays meet between two ranges (m), through permeable surfaces, and the light that each hit takes.
 
     The shares taken along one ray never add up to more than its own.
+
+    Args:
+        target: what is scanned.
+        surfaces: means of its materials.
+        rays: of pulses.
+        motions: tracks of the target's moving parts.
+        nearest, farthest: ranges, m.
+        axis: (P,) what the first ray of each pulse meets, where it has been cast already.
     """
-    met = target.cast(rays.origin, rays.direction, farthest, rays.time, motions)
+    met = _first_hits(target, rays, motions, farthest, axis)
     material = np.take(target.material, met.face, mode="clip").astype(np.intp)
     if not surfaces.permeable:
         first = Hits(met.face, material, _within(met.distance, nearest, np.inf), met.along, rays.share)
@@ -136,6 +174,15 @@ def trace(
         rays_on.append(on)
         left = left * through
     return _gather_hits(rays, first, layers, rays_on)
+
+
+def _first_hits(target: Target, rays: Rays, motions: list[Track], farthest: float, axis: FirstHits | None) -> FirstHits:
+    """Return what rays (K, P) meet first, without casting those again whose hits are known, see `trace`."""
+    if axis is None:
+        return target.cast(rays.origin, rays.direction, farthest, rays.time, motions)
+    origin = rays.origin[:, 1:] if rays.origin.shape[1] > 1 else rays.origin
+    others = target.cast(origin, rays.direction[:, 1:], farthest, rays.time, motions)
+    return FirstHits(*(np.concatenate([one[None], more]) for one, more in zip(axis, others, strict=True)))
 
 
 def _gather_hits(rays: Rays, first: Hits, layers: list[Hits], on: list[Index]) -> TracedRays:

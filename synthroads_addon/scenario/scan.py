@@ -14,6 +14,7 @@ from ..scanning.weather.registry import WeatherModel
 
 MOST_POSSIBLE = 10**15
 """Pulses that no scan can have more of: what `--allow-large` allows."""
+Footprints = Literal["full", "where_needed"]
 _RingRays = Annotated[int, Field(ge=3, le=60)]
 
 
@@ -65,6 +66,14 @@ class ScanScenario(DeviceChoice):
         max_length=6,
         description="Rays on each ring around the beam's axis, instead of rays_per_pulse.",
         json_schema_extra=notes(unset="By the rays"),
+    )
+    footprints: Footprints | None = Field(
+        None,
+        description="All rays of every pulse are cast, or only its axis where the footprint meets one plane of "
+        "pavement or bare ground and nothing else; the fidelity's if not given.",
+        json_schema_extra=notes(
+            inherits="fidelity.footprints", labels={"full": "Cast in Full", "where_needed": "Where Needed"}
+        ),
     )
     beam: Literal["conical", "cylindrical"] = Field(
         "conical", description="Rays diverge from the aperture, or run parallel over the footprint at the first hit."

@@ -22,7 +22,7 @@ from ..twin.formats import FORMATS, IfcSettings, TwinFormat
 from .cloud import CloudScenario
 from .colour import ColourScenario
 from .road import RoadScenario
-from .scan import ScanScenario, scanner_setting
+from .scan import Footprints, ScanScenario, scanner_setting
 from .tolerance import TIMES, Tolerance, with_unit
 
 SCENARIOS = PRESETS / "scenarios"
@@ -185,6 +185,7 @@ class Scenario(ClosedModel):
             "vegetation_detail": self.vegetation_detail,
             "rays_per_pulse": self.scan.rays_per_pulse,
             "relief_octaves": self.scan.relief_octaves,
+            "footprints": self.scan.footprints,
         }
         given = {name: value for name, value in values.items() if value is not None}
         return replace(FIDELITIES[self.fidelity], **given)
@@ -199,12 +200,14 @@ class Settings:
         vegetation_detail: share of the plants that are built, 0 to 1.
         rays_per_pulse: rays that sample a pulse's footprint.
         relief_octaves: octaves of the surfaces' micro-relief.
+        footprints: whether all rays of each footprint are cast, or only where more than one plane can be met.
     """
 
     tolerance: float
     vegetation_detail: float
     rays_per_pulse: int
     relief_octaves: int = 4
+    footprints: Footprints = "full"
 
 
 FIDELITIES = {

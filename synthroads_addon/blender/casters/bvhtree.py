@@ -20,19 +20,21 @@ class BVHTreeCaster:
         self._tree = BVHTree.FromPolygons(mesh.vertices, mesh.triangles, all_triangles=True)
 
     def cast(
-        self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float
+        self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float | NDArray[np.float32]
     ) -> NDArray[np.int32]:
-        """Return the index (N,) of the first face that each ray hits within the range (m), -1 for none."""
+        """Return the index (N,) of the first face that each ray hits within its range (m), -1 for none."""
         cast = self._tree.ray_cast
         faces = np.full(len(origins), -1, dtype=np.int32)
-        for i, (origin, direction) in enumerate(zip(origins.tolist(), directions.tolist(), strict=True)):
-            face = cast(Vector(origin), Vector(direction), maximum_range)[2]
+        limits = np.broadcast_to(maximum_range, len(origins)).tolist()
+        rays = zip(origins.tolist(), directions.tolist(), limits, strict=True)
+        for i, (origin, direction, limit) in enumerate(rays):
+            face = cast(Vector(origin), Vector(direction), limit)[2]
             if face is not None:
                 faces[i] = face
         return faces
 
     def occluded(
-        self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float
+        self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float | NDArray[np.float32]
     ) -> NDArray[np.bool_]:
-        """Return a mask (N,) of the rays that hit anything within the range (m)."""
+        """Return a mask (N,) of the rays that hit anything within their range (m)."""
         return self.cast(origins, directions, maximum_range) >= 0

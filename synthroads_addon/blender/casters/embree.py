@@ -52,10 +52,13 @@ class EmbreeCaster:
         return np.asarray(np.take(self._firsts, hits["geomID"]) + hits["primID"])
 
     def occluded(
-        self, origins: NDArray[np.float32], directions: NDArray[np.float32], maximum_range: float
+        self,
+        origins: NDArray[np.float32],
+        directions: NDArray[np.float32],
+        maximum_range: float | NDArray[np.float32],
     ) -> NDArray[np.bool_]:
-        """Return a mask (N,) of the rays that hit anything within the range (m); half the work of `cast`."""
+        """Return a mask (N,) of the rays that hit anything within their range (m); half the work of `cast`."""
         if not self._meshes or len(origins) == 0:
             return np.zeros(len(origins), bool)
-        limit = np.full(len(origins), maximum_range, dtype=np.float32)
+        limit = np.array(np.broadcast_to(maximum_range, len(origins)), np.float32)
         return np.asarray(self._scene.run(origins, directions, dists=limit, query="OCCLUDED") == 0)

@@ -88,7 +88,8 @@ class Trial:
     def scan_lines(self, rings: tuple[int, ...], lines: int = 0) -> list[BlockResult]:
         """Scan short stretches with a beam of so many rays per ring; return the result of each stretch."""
         path = scatter_stretches(self.plan.path, lines or self.lines, PULSES / self.plan.setting.shot_rate, self.phase)
-        plan = replace(self.plan, path=path, rings=rings)
+        ground = None if rings == RINGS[CONVERGED] else self.plan.ground
+        plan = replace(self.plan, path=path, rings=rings, ground=ground)
         results = iter(record_as_measured(plan))
         return [join_results([next(results) for _ in plan.cut.block_numbers(strip)]) for strip in path.strips]
 

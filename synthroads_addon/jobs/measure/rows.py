@@ -161,7 +161,7 @@ def _measure_stretches(site: Site, knob: Knob, plan: ScanPlan) -> tuple[dict[str
 def _true_plan(shown: RoadScene, part: ScanPlan, plants: float) -> ScanPlan | None:
     """Return the plan of the same stretches with 61 rays per pulse among all plants; None if it is that already.
 
-    The road is built anew, in place of the one scanned, if it lacks plants.
+    All of these rays are cast. The road is built anew, in place of the one scanned, if it lacks plants.
 
     Args:
         shown: that was scanned.
@@ -169,15 +169,15 @@ def _true_plan(shown: RoadScene, part: ScanPlan, plants: float) -> ScanPlan | No
         plants: share of the plants that the truth has.
     """
     detail = shown.scenario.settings().vegetation_detail
-    if detail == plants and part.rays_per_pulse == CONVERGED:
+    if detail == plants and part.rays_per_pulse == CONVERGED and not part.spares:
         return None
     if detail == plants and part.target.caster.name == "embree":
-        return replace(part, rings=RINGS[CONVERGED])
+        return replace(part, rings=RINGS[CONVERGED], ground=None)
     scan = shown.scenario.scan.model_copy(update={"caster": "auto"})
     true = RoadScene(shown.scenario.model_copy(update={"scan": scan, "vegetation_detail": plants}), shown.road)
     if detail != plants:
         true.build()
-    return replace(true.plan(), path=part.path, rings=RINGS[CONVERGED])
+    return replace(true.plan(), path=part.path, rings=RINGS[CONVERGED], ground=None)
 
 
 def _beam_errors(sample: StretchPoints, plan: ScanPlan | None) -> dict[str, float]:

@@ -36,7 +36,7 @@ _LONG = 300.0
 
 @dataclass
 class ScanCounts:
-    """Counts of pulses, rays and points of a scan, also by class and by colour source."""
+    """Counts of pulses, rays and points of a scan, also by class, by colour source, and of footprints by class."""
 
     pulses: int = 0
     rays: int = 0
@@ -46,6 +46,7 @@ class ScanCounts:
     intensity_clipped: int = 0
     by_class: np.ndarray = field(default_factory=lambda: np.zeros(256, dtype=np.int64))
     by_source: np.ndarray = field(default_factory=lambda: np.zeros(256, dtype=np.int64))
+    by_footprint: np.ndarray = field(default_factory=lambda: np.zeros((3, 256), dtype=np.int64))
 
     def add(self, result: BlockResult) -> None:
         """Add the counts of one block of a scan, in place."""
@@ -55,6 +56,8 @@ class ScanCounts:
         self.by_class += np.bincount(result.points.class_id, minlength=256)
         if result.sources is not None:
             self.by_source += result.sources
+        if result.footprints is not None:
+            self.by_footprint += result.footprints
 
 
 @dataclass
@@ -160,7 +163,20 @@ class CloudFiles:
             "intensity_scale": self.intensity_scale,
             "points_by_class": dict(by_class),
             "points_by_colour_source": shares_by_source(self.counts.by_source),
+        } | self._footprints(names)
+
+    def _footprints(self, names: Mapping[int, str]) -> dict[str, Any]:
+        """Return how many footprints were spared, by the class that the pulses' axes meet; empty where none could be.
+
+        ``pulses`` met the class; of ``one_ray`` of them only the axis was cast, and of ``checked`` the other rays were
+        only looked along for anything in their way.
+        """
+        counts = self.counts.by_footprint
+        rows = {
+            names.get(i, str(i)): dict(zip(("pulses", "one_ray", "checked"), counts[:, i].tolist(), strict=True))
+            for i in np.flatnonzero(counts[0]).tolist()
         }
+        return {"footprints": rows} if rows else {}
 
 
 def record_to_files(

@@ -14,11 +14,12 @@ from ...base.errors import InputError
 from ...base.progress import StageTimer
 from ...cloud.layers import optional_arrays
 from ...cloud.tools.previews import TopView
-from ...materials.surfaces import surfaces_of
+from ...materials.surfaces import Surfaces, surfaces_of
 from ...materials.table import Material, entry_of
 from ...materials.variation import vary_material, water_film
 from ...road.geometry import RoadGeometry
 from ...road.instances import InstanceNumbers
+from ...scanning.beam import outer_radii
 from ...scanning.blocks import Blocks
 from ...scanning.colour.colour import takes_nodes
 from ...scanning.colour.request import LayerRequest
@@ -29,7 +30,9 @@ from ...scanning.plan import ScanConditions, ScanPlan, SceneServices
 from ...scanning.platforms.guides import RoadGuide
 from ...scanning.platforms.path import Path as ScanPath
 from ...scanning.relief import micro_relief
+from ...scanning.scene.bare_ground import MOST_CELLS, BareGround
 from ...scanning.scene.classify import classify_scene
+from ...scanning.scene.mesh import SceneMesh
 from ...scanning.scene.motion import ScannedScene
 from ...scanning.scene.target import Target
 from ...scanning.sway import with_motion
@@ -39,6 +42,8 @@ from ...scenario.scan import scanner_setting
 from ...scenario.scenario import OF_POINTS, Scenario
 from .files import CloudFiles, record_to_files
 
+_CELLS_PER_PULSE, _FEWEST_CELLS = 4, 1 << 18
+"""Cells in which it is looked for what is near a footprint: many are dearer than what a small scan saves by them."""
 AIR_CLASS = "noise"
 """Class of what rain, snow and fog send back, in schemes that have it; without one it is unlabelled."""
 
@@ -85,7 +90,7 @@ def plan_scan(
     """
     conditions = conditions or ScanConditions()
     path = with_motion(path, scenario.scan.motion, scenario.seed)
-    scene = classify_scene(scene, scenario.cloud.scheme(), conditions.road)
+    usual, scene = scene.static, classify_scene(scene, scenario.cloud.scheme(), conditions.road)
     kept, coloured, rings = scenario.kept_layers, scenario.coloured_layers, scenario.beam_rings
     scan, settings, table = scenario.scan, scenario.settings(), scenario.own_materials()
     materials, shifts = scene.static.materials, scan.relief > 0.0
@@ -108,10 +113,16 @@ def plan_scan(
         for name, mean in zip(map(entry_of, materials), means, strict=True)
     ]
     by_layers = _intensity_from_layers(scenario, scanned, services, materials)
+    # The layers of each point have the variation of their own already.
+    surfaces = surfaces_of(scanned, scan.reflection, spread=not by_layers)
+    effects = weather.effects() if loss is None else ()
+    multipath = _multipath(scan.multipath, materials, scanned, conditions)
+    ground, all_from_surfaces = None, not effects and multipath is None
+    if settings.footprints == "where_needed" and (rings or scenario.chooses) and all_from_surfaces:
+        ground = _bare_ground(usual, surfaces, cut, outer_radii(rings, setting.divergence))
     return ScanPlan(
         target=target,
-        # The layers of each point have the variation of their own already.
-        surfaces=surfaces_of(scanned, scan.reflection, spread=not by_layers),
+        surfaces=surfaces,
         setting=setting,
         path=path,
         rings=rings,
@@ -119,9 +130,10 @@ def plan_scan(
         noise=scan.noise,
         strip_errors=scan.strip_errors,
         attenuation=weather.attenuation(setting.device.wavelength_nm) if loss is None else loss,
-        effects=weather.effects() if loss is None else (),
-        multipath=_multipath(scan.multipath, materials, scanned, conditions),
+        effects=effects,
+        multipath=multipath,
         air_class=scenario.cloud.scheme().source_ids().get(AIR_CLASS, UNLABELLED),
+        ground=ground,
         beam=scan.beam,
         measured_layers=(kept & optional_arrays("scan")) | ({"normal", "material"} if shifts else set()),
         records_seen_points=bool(coloured) or by_layers or shifts,
@@ -158,6 +170,13 @@ def _multipath(
         return None
     films = [water_film(entry_of(name), conditions.environment) for name in names]
     return Multipath(mirrors_of(rows, films), strength)
+
+
+def _bare_ground(mesh: SceneMesh, surfaces: Surfaces, cut: Blocks, radii: tuple[float, float]) -> BareGround:
+    """Return where footprints of half axes ``radii`` (m per metre of range) meet nothing but ground, for all pulses."""
+    pulses = sum(map(cut.pulse_count, cut.path.strips))
+    cells = min(max(_CELLS_PER_PULSE * pulses, _FEWEST_CELLS), MOST_CELLS)
+    return BareGround(mesh, surfaces.pervious, max(radii) * cut.path.typical_range, cells)
 
 
 def _intensity_from_layers(

@@ -30,8 +30,8 @@ class Caster(Protocol):
         """
         ...
 
-    def occluded(self, origins: Float32, directions: Float32, maximum_range: float) -> Bool:
-        """Return a mask (N,) of the rays that hit anything within ``maximum_range`` (m); arguments as of `cast`."""
+    def occluded(self, origins: Float32, directions: Float32, maximum_range: float | Float32) -> Bool:
+        """Return a mask (N,) of the rays that hit anything within ``maximum_range`` (m), that of all or each ray's."""
         ...
 
 

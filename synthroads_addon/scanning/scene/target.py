@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -55,6 +56,11 @@ class FirstHits(NamedTuple):
     face: Index
     distance: Float
     along: Float
+
+    def take(self, rays: Index) -> "FirstHits":
+        """Return the hits of some rays, by indices into the last axis."""
+        take = partial(np.take, indices=rays, axis=-1)
+        return FirstHits(take(self.face), take(self.distance), take(self.along))
 
 
 class Target:
@@ -188,6 +194,46 @@ class Target:
                 _clear_blocked(part, track, rays, reach, free)
         return free
 
+    def unblocked(self, origins: Float, directions: Float, reach: Float) -> Bool:
+        """Return a mask (K, N) of the rays that meet nothing of the static mesh within their reach.
+
+        Args:
+            origins: (3, 1 or K, N) local, m.
+            directions: (3, K, N) unit vectors.
+            reach: (K, N) m.
+        """
+        limit = np.array(reach.T, np.float32, order="C").ravel()
+        blocked = self.caster.occluded(*_as_rays(origins, directions), limit)
+        return ~blocked.reshape(reach.shape[::-1]).T
+
+    def near_moving(
+        self, origins: Float, directions: Float, reach: Float, times: Float, motions: list[Track], radius: float
+    ) -> Bool:
+        """Return a mask (N,) of the rays that pass through the box around a moving part, or by less than a radius (m).
+
+        Args:
+            origins: (3, N) local, m.
+            directions: (3, N) unit vectors.
+            reach: (N,) how far they go, m.
+            times: (N,) s.
+            motions: see `motions`.
+            radius: m.
+        """
+        near = np.zeros(len(times), bool)
+        if not self.moving or not len(times):
+            return near
+        rays = Bundles.gather(origins, directions, times, reach)
+        for part, track in zip(self._parts[1:], motions, strict=True):
+            if not track.present.any():
+                continue
+            some = rays.rays_near(track, part.centre, part.radius + radius)
+            rotation, place, present = track.at(times[some])
+            some, rotation, place = some[present], rotation[:, present], place[:, present]
+            begin = _unrotate(rotation, origins[:, some] - place) - part.centre[:, None]
+            towards = _unrotate(rotation, directions[:, some])
+            near[some[_crosses_box(begin, towards, reach[some], part.half + radius)]] = True
+        return near
+
     def at_time_zero(
         self, faces: Index, places: Float, times: Float, motions: list[Track], vectors: tuple[Float, ...] = ()
     ) -> tuple[Float, ...]:
@@ -212,6 +258,10 @@ class Target:
             for result, vector in zip(results[1:], vectors, strict=True):
                 result[:, mine] = begin_rotation[0] @ _unrotate(rotation, vector[:, mine])
         return results
+
+    def static_normals(self, faces: Index) -> Float:
+        """Return the local unit normals (3, H) of faces of the static mesh, on the side that these are seen from."""
+        return np.take(self._parts[0].planes.planes[:3], faces, axis=1)
 
     def normals(self, faces: Index, along: Float, times: Float, motions: list[Track]) -> Float:
         """Return the local unit normals (3, H) of faces at times (H,), turned towards the rays that met them."""
@@ -251,9 +301,8 @@ def _clear_scanner(track: Track, part: _TargetPart, scanner: Float) -> Track:
 def _cast(part: _TargetPart, origins: Float, directions: Float, maximum_range: float) -> FirstHits:
     """Return rays' first hits on one part, in its body frame; faces are numbered among those of all parts."""
     shape = directions.shape[1:]
-    begin, towards = (np.broadcast_to(_as_rows(array), (*shape, 3)).reshape(-1, 3) for array in (origins, directions))
-    found = part.caster.cast(begin, towards, maximum_range)
-    face = found.reshape(shape).astype(np.intp)
+    found = part.caster.cast(*_as_rays(origins, directions), maximum_range)
+    face = np.array(found.reshape(shape[::-1]).T, np.intp, order="C")
     if not part.count:
         return FirstHits(face, np.full(shape, np.inf), np.zeros(shape))
     # A miss is worked out with some face and then forgotten: that is less work than to sort them out before.
@@ -267,6 +316,21 @@ def _cast(part: _TargetPart, origins: Float, directions: Float, maximum_range: f
     if part.first or edge_on:
         face[missed] = -1
     return FirstHits(face, distance, along)
+
+
+def _as_rays(origins: Float, directions: Float) -> tuple[Float32, Float32]:
+    """Return rays (3, ...) as float32 rows, the last axis first: a caster meets a pulse's rays one after the other.
+
+    They are next to each other, so that what one has brought into the processor's cache serves the others.
+
+    Args:
+        origins: of the directions' shape, or one that spreads to it.
+        directions: (3, ...).
+    """
+    shape = (*directions.shape[:0:-1], 3)
+    rows = (_as_rows(np.moveaxis(vectors.T, -1, 0)) for vectors in (origins, directions))
+    begin, towards = (np.broadcast_to(array, shape).reshape(-1, 3) for array in rows)
+    return begin, towards
 
 
 def _as_rows(vectors: Float) -> Float32:
@@ -301,6 +365,16 @@ def _clear_blocked(part: _TargetPart, track: Track, rays: Bundles, reach: float,
     near, rotation, place = near[present], rotation[:, present], place[:, present]
     begin, towards = _unrotate(rotation, rays.origins[:, near] - place), _unrotate(rotation, rays.directions[:, near])
     free[near[part.caster.occluded(_as_rows(begin), _as_rows(towards), reach)]] = False
+
+
+def _crosses_box(begin: Float, towards: Float, reach: Float, half: Float) -> Bool:
+    """Return which rays (3, N) cross the box around the origin of half the size (3,), m, within their reach (N,), m."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        sides = np.stack([(-side * half[:, None] - begin) / towards for side in (1.0, -1.0)])
+    # A ray in the plane of a side, and no farther out than it, is between both: what isn't a number doesn't count.
+    first = np.fmax.reduce(np.fmin(*sides), axis=0)
+    last = np.fmin.reduce(np.fmax(*sides), axis=0)
+    return np.asarray((first <= last) & (last >= 0.0) & (first <= reach))
 
 
 def _unrotate(rotation: Float, vectors: Float) -> Float:

@@ -337,6 +337,9 @@ class ChoiceField(Field):
         """Select the menu item of a value; None selects Automatic."""
         setattr(owner, self.name, AUTOMATIC if value is None else str(value))
 
+    def _written(self, value: float | str | tuple[float, ...]) -> str:
+        return value_name(str(value), self.info)
+
     def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
         """Draw the menu, and beside Automatic, or below where it has no room, the greyed value that it stands for."""
         row, share = value_row(layout, self.label), value_share(self.label)

@@ -101,7 +101,7 @@ SHEETS = (
         2,
         "scan.platform.* scan.platform.roll_deg scan.platform.pitch_deg scan.platform.yaw_deg",
     ),
-    PanelFields("beam", "Beam", "scanner", 3, "scan.rays_per_pulse scan.beam_rings scan.beam scan.*"),
+    PanelFields("beam", "Beam", "scanner", 3, "scan.rays_per_pulse scan.beam_rings scan.footprints scan.beam scan.*"),
     PanelFields("air", "Air", "scanner", 4, "scan.weather scan.attenuation"),
     PanelFields("receiver", "Receiver", "scanner", 5, "scan.receiver.*"),
     PanelFields("noise", "Noise", "scanner", 5, "scan.noise.*"),

@@ -33,6 +33,7 @@ WRITTEN: dict[str, Written] = {
     # Where a ray passes the edge of two faces, casters may choose either.
     "scan.caster": Written("bvhtree", changes=CLOUD, same=0.999),
     "scan.threads": Written(2),
+    "scan.footprints": Written("where_needed"),
     "cloud.formats": Written(["laz", "npz"], adds=frozenset({"cloud.npz"})),
     "cloud.attributes": Written(["normal"], changes=CLOUD),
     "outputs": Written(["cloud", "previews", "parameters"], removes=frozenset({"centerline.geojson"})),
