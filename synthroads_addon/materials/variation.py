@@ -5,18 +5,15 @@ that what the camera sees and what the laser measures change alike. Facets and r
 paint has lost its beads with its film, and beads under water retro-reflect little.
 """
 
-import math
 from collections.abc import Mapping
 
 import numpy as np
 
+from ..road.pavement.age import asphalt_brightness
+from ..road.section import ASPHALTS, CONCRETES
 from ..road.surroundings import Environment, MaterialVariation
 from .table import Material, materials
 
-ASPHALT_OF_AGE = (0.38, 0.96, 1.06)
-"""Factor on asphalt under its binder's black film, on the bare aggregate below it, and on old asphalt."""
-_FILM_LASTS = 0.05
-"""Age at which traffic has left 1/e of the binder's film: about a year of twenty."""
 DRY_GRASS = (0.27, 0.22, 0.11)
 WET_BASE, WET_SPECULAR, WET_ROUGHNESS = 0.45, 0.5, 0.6
 """Share that water takes of a porous surface's base colour, of what it reflects at 905 nm, and of its roughness."""
@@ -25,7 +22,9 @@ WET_RETROREFLECTION = 0.8
 
 _PAINTS = ("paint_white", "paint_yellow")
 _GRASSES = ("verge", "median", "grass_ground", "grass", "meadow", "ryegrass", "reed")
-_POROUS = ("asphalt", "concrete", "soil", "verge", *_PAINTS)
+_POROUS = (*ASPHALTS, *CONCRETES, "soil", "verge", *_PAINTS)
+_DRAINED = 0.4
+"""Wetness that water leaves on porous asphalt, as a share of what it is on others: it drains through the pores."""
 _DEFAULT = MaterialVariation()
 
 
@@ -41,7 +40,8 @@ def vary_material(
     """
     result = _age_material(name, {**materials(), **(own or {})}, variation)
     if environment.wetness > 0.0 and name in _POROUS:
-        result = _wet_material(result, environment.wetness)
+        drained = _DRAINED if name == "porous_asphalt" else 1.0
+        result = _wet_material(result, environment.wetness * drained)
     return result
 
 
@@ -65,9 +65,10 @@ def _wet_material(dry: Material, wet: float) -> Material:
 
 def _age_material(name: str, table: Mapping[str, Material], variation: MaterialVariation) -> Material:
     mean = table[name]
-    if name == "asphalt":
-        return _scale_color(mean, variation.asphalt_brightness * _of_age(variation) / _of_age(_DEFAULT))
-    if name == "concrete":
+    if name in ASPHALTS:
+        aged = asphalt_brightness(variation.asphalt_age) / asphalt_brightness(_DEFAULT.asphalt_age)
+        return _scale_color(mean, variation.asphalt_brightness * aged)
+    if name in CONCRETES:
         return _scale_color(mean, variation.concrete_brightness)
     if name in _PAINTS:
         worn = (variation.paint_wear - _DEFAULT.paint_wear) / (1.0 - _DEFAULT.paint_wear)
@@ -76,12 +77,6 @@ def _age_material(name: str, table: Mapping[str, Material], variation: MaterialV
         dry = (variation.grass_dryness - _DEFAULT.grass_dryness) / (1.0 - _DEFAULT.grass_dryness)
         return _mix_materials(mean, mean.model_copy(update={"base_color": DRY_GRASS}), dry)
     return mean
-
-
-def _of_age(variation: MaterialVariation) -> float:
-    film, bare, old = ASPHALT_OF_AGE
-    age = variation.asphalt_age
-    return bare + (film - bare) * math.exp(-age / _FILM_LASTS) + (old - bare) * age
 
 
 def _scale_color(mean: Material, factor: float, specular: float | None = None) -> Material:

@@ -27,16 +27,18 @@ DAMAGES = (
     "sealed longitudinal crack",
     "sealed transverse crack",
     "sealed alligator cracks",
+    "removed marking",
 )
 """Kinds of damage by their number in the per-point layer ``damage``."""
 
 
 def damage_numbers(pavement: Pavement) -> list[int]:
-    """Return the index in `DAMAGES` of each of a pavement's ruts, potholes, patches and cracks, in this order."""
+    """Return the index in `DAMAGES` of each of a pavement's damages: ruts, potholes, patches, cracks, old markings."""
     numbers = [1] * len(pavement.ruts) + [2] * len(pavement.potholes) + [3] * len(pavement.patches)
     first = DAMAGES.index("longitudinal crack")
     kinds = ("longitudinal", "transverse", "alligator")
-    return numbers + [first + kinds.index(crack.kind) + len(kinds) * crack.sealed for crack in pavement.cracks]
+    numbers += [first + kinds.index(crack.kind) + len(kinds) * crack.sealed for crack in pavement.cracks]
+    return numbers + [DAMAGES.index("removed marking")] * len(pavement.removed_markings)
 
 
 def damage_depth(section: CarriagewaySection, station: Float, offset: Float) -> Float:

@@ -134,7 +134,7 @@ class InstanceNumbers:
             for part, kind in enumerate(damage_numbers(item.pavement))
         }
 
-    def patches_and_cracks(self) -> list[int]:
+    def laid_on(self) -> list[int]:
         """Return the instance numbers of the damages that have faces of their own on the pavement."""
         in_the_surface = {DAMAGES.index(name) for name in ("rut", "pothole")}
         return [number for number, kind in self.damages().items() if kind not in in_the_surface]
@@ -218,9 +218,9 @@ def _parts_of(item: RoadObject, parameters: RoadParameters, length: int) -> tupl
 
 
 def damage_kinds(pavement: Pavement) -> list[str]:
-    """Return "rut", "pothole", "patch" or "crack" for each of a pavement's damages, in the order of their numbers."""
-    names = ("rut", "pothole", "patch", "crack")
-    items = (pavement.ruts, pavement.potholes, pavement.patches, pavement.cracks)
+    """Return "rut", "pothole", "patch", "crack" or "removed-marking" for each of a pavement's damages, in order."""
+    names = ("rut", "pothole", "patch", "crack", "removed-marking")
+    items = (pavement.ruts, pavement.potholes, pavement.patches, pavement.cracks, pavement.removed_markings)
     return [name for name, of_kind in zip(names, items, strict=True) for _ in of_kind]
 
 

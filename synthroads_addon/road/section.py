@@ -51,6 +51,18 @@ class Pothole(Model):
     depth: float = quantity(gt=0, le=0.3, unit="m", description="Depth at the centre.")
 
 
+SHORTEST_DASH = 0.05
+"""Shortest dash and gap, m: a road has a row of faces for each."""
+
+
+def check_dashes(dash_length: float, gap_length: float) -> None:
+    """Raise ValueError unless a line's dashes and gaps (m) are both 0 or both long enough."""
+    if (dash_length == 0) != (gap_length == 0):
+        raise ValueError("dash_length and gap_length must both be 0 (solid) or both be positive")
+    if 0 < min(dash_length, gap_length) < SHORTEST_DASH:
+        raise ValueError(f"dash_length and gap_length must be 0 (solid) or at least {SHORTEST_DASH:g} m")
+
+
 Corner = tuple[
     Annotated[float, Field(strict=True, ge=0, le=1e6)],
     Annotated[float, Field(strict=True, ge=-100, le=100)],
@@ -84,10 +96,49 @@ class Crack(Model):
     )
 
 
+class RemovedMarking(Model):
+    """A line marking that was ground off: its dashes are left as a brighter, shallow groove beside today's lines."""
+
+    offset: float = quantity(ge=-100, le=100, unit="m", description="Offset of the line's axis.")
+    width: float = quantity(ge=0.05, le=1.0, unit="m", description="Width that was ground.")
+    dash_length: float = quantity(ge=0, le=100, unit="m", description="Length of a dash; 0 for a solid line.")
+    gap_length: float = quantity(ge=0, le=100, unit="m", description="Length of a gap; 0 for a solid line.")
+    start_station: float = quantity(ge=0, unit="m", description="Beginning of the first dash.")
+    end_station: float = quantity(ge=0, unit="m", description="End of the line.")
+    depth: float = quantity(0.002, ge=0, le=0.02, unit="m", description="Depth below the pavement.")
+
+    @model_validator(mode="after")
+    def _dashes_fit(self) -> RemovedMarking:
+        check_dashes(self.dash_length, self.gap_length)
+        return self
+
+
+ASPHALTS = ("asphalt", "stone_mastic_asphalt", "porous_asphalt", "mastic_asphalt")
+CONCRETES = ("concrete", "exposed_aggregate_concrete")
+SurfaceCourse = Literal[
+    "asphalt",
+    "stone_mastic_asphalt",
+    "porous_asphalt",
+    "mastic_asphalt",
+    "concrete",
+    "exposed_aggregate_concrete",
+]
+"""Kinds of pavement, each a material of the table; ``asphalt`` is dense asphalt concrete."""
+_Age = Annotated[float, Field(strict=True, ge=0, le=1)]
+
+
 class Pavement(Model):
     """Pavement of a carriageway, and its damage, which is exact geometry."""
 
-    kind: Literal["asphalt", "concrete"] = Field("asphalt", description="Surface course.")
+    kind: SurfaceCourse = Field("asphalt", description="Surface course; asphalt is dense asphalt concrete.")
+    lane_ages: tuple[_Age, ...] = Field(
+        (),
+        max_length=8,
+        description="Ages of the lanes from outside, 0 new, 1 old; of a lane without one the road's asphalt_age.",
+    )
+    shoulder_age: float | None = quantity(
+        None, ge=0, le=1, unit="1", description="Age of the hard shoulder; the road's asphalt_age if not given."
+    )
     slab_length: float = quantity(5.0, ge=2, le=20, unit="m", description="Distance of a concrete pavement's joints.")
     joint_depth: float = quantity(0.002, ge=0, le=0.05, unit="m", description="Depth of joints below the pavement.")
     wheel_track_depth: float = quantity(
@@ -104,6 +155,12 @@ class Pavement(Model):
     potholes: tuple[Pothole, ...] = Field((), description="Spalling and potholes.")
     patches: tuple[Patch, ...] = Field((), description="Repaired places.")
     cracks: tuple[Crack, ...] = Field((), description="Cracks.")
+    removed_markings: tuple[RemovedMarking, ...] = Field((), description="Line markings that were ground off.")
+
+    @property
+    def is_concrete(self) -> bool:
+        """Return whether it is of concrete, in slabs, else of asphalt."""
+        return self.kind in CONCRETES
 
 
 class Carriageway(RoadObject):
@@ -223,10 +280,6 @@ class Marking(Model):
     )
 
 
-SHORTEST_DASH = 0.05
-"""Shortest dash and gap, m: a road has a row of faces for each."""
-
-
 class LineMarking(Marking, RoadObject):
     """A marking that follows a boundary. It lies on the pavement with the thickness of its film.
 
@@ -266,10 +319,7 @@ class LineMarking(Marking, RoadObject):
 
     @model_validator(mode="after")
     def _dashes_fit(self) -> LineMarking:
-        if (self.dash_length == 0) != (self.gap_length == 0):
-            raise ValueError("dash_length and gap_length must both be 0 (solid) or both be positive")
-        if 0 < min(self.dash_length, self.gap_length) < SHORTEST_DASH:
-            raise ValueError(f"dash_length and gap_length must be 0 (solid) or at least {SHORTEST_DASH:g} m")
+        check_dashes(self.dash_length, self.gap_length)
         if (self.turnout is not None) != (self.kind in ("turnout_edge", "gore_edge")):
             raise ValueError("turnout must be given for turnout_edge and gore_edge, and only there")
         return self

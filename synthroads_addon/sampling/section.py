@@ -36,6 +36,7 @@ from ..road.turnout_geometry import BLEND, NOSE_BEFORE_END, NOSE_WIDTH, STEP
 from ..scenario.road import FreeCrossSection, RoadScenario
 from .pavement_damage import PavementDamage
 from .placing.draw import draw, draw_between
+from .surface_course import SurfaceCourses
 
 FeatureKind = Literal["exit", "entry", "emergency_bay", "lane_change"]
 
@@ -288,7 +289,7 @@ class CarriagewaySampler:
         curvature = max(max(abs(e.curvature_start), abs(e.curvature_end)) for e in axis.horizontal)
         self.ramps = RampLimits(scenario, self.section, 1.0 / max(curvature, 1e-9))
         self.features = features_of(scenario, self.section, self.ramps)
-        self.concrete = stream(seed, "pavement").random() < scenario.pavement.concrete
+        self._courses = SurfaceCourses(scenario, seed, axis.length)
 
     def draw(self, side: Side) -> tuple[Carriageway, dict[str, Turnout]]:
         """Return a drawn carriageway and its turnouts by id, all with instance 1."""
@@ -334,12 +335,13 @@ class CarriagewaySampler:
             verge_width=section.verge,
             crossfall=crossfall_points(self.scenario.design_class, side, section.paved_width / 2.0, axis),
             pavement=Pavement(
-                kind="concrete" if self.concrete else "asphalt",
+                **self._courses.draw(side, len(lanes)),
                 **self._relief(side),
                 ruts=self._ruts(lanes, rng),
                 potholes=self._potholes(side, lanes, rng),
                 patches=damage.patches(),
                 cracks=damage.cracks(),
+                removed_markings=self._courses.removed_markings(side, self._lane_edges(lanes)),
             ),
         )
 

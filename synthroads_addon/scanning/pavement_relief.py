@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from ..base.arrays import Float
 from ..road.geometry import RoadGeometry
 from ..road.objects import Side
-from ..road.pavement.cover import LineFilms
-from ..road.pavement.outlines import CRACK_FILM, PATCH_FILM
+from ..road.pavement.cover import MarkingFilms
+from ..road.pavement.outlines import CRACK_FILM, PATCH_FILM, REMOVED_FILM
 from ..road.pavement.surface import PavementSurface, damage_height
 from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Turnout
 
@@ -22,7 +22,7 @@ class _Kind(NamedTuple):
     Attributes:
         side: of the carriageway.
         tracks, joints: whether there are wheel tracks, and joints as well.
-        lifted: whether its faces lie on the films of lines where these are.
+        lifted: whether its faces lie on the films of markings where these are.
     """
 
     side: Side
@@ -59,7 +59,7 @@ class PavementRelief:
 
     def __init__(self, geometry: RoadGeometry) -> None:
         self._surface = PavementSurface(geometry)
-        self._films = {side: LineFilms(geometry, side) for side in geometry.sections}
+        self._films = {side: MarkingFilms(geometry, side) for side in geometry.sections}
         blocks = sorted(_blocks(geometry))
         self._first = np.array([block.first for block in blocks], np.int64)
         self._end = np.array([block.end for block in blocks], np.int64)
@@ -125,4 +125,7 @@ def _damage_blocks(carriageway: Carriageway, first: int) -> Iterator[_Block]:
         number += 1
     for crack in pavement.cracks:
         yield _Block(number, number + 1, _Kind(side, True, False, True), damage_height(crack) - CRACK_FILM)
+        number += 1
+    for marking in pavement.removed_markings:
+        yield _Block(number, number + 1, _Kind(side, True, False), damage_height(marking) - REMOVED_FILM)
         number += 1

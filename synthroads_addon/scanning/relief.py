@@ -37,7 +37,11 @@ SMOOTH = Relief(0.0, 0.1)
 ASPHALT = Relief(0.0008, 0.1)
 RELIEF: dict[str, Relief] = {
     "asphalt": ASPHALT,
+    "stone_mastic_asphalt": Relief(0.00095, 0.1),
+    "porous_asphalt": Relief(0.0015, 0.1),
+    "mastic_asphalt": Relief(0.0005, 0.1),
     "concrete": Relief(0.0007, 0.1),
+    "exposed_aggregate_concrete": Relief(0.00085, 0.1),
     "paint_white": Relief(0.0003, 0.1),
     "paint_yellow": Relief(0.0003, 0.1),
     "barrier_concrete": Relief(0.0003, 0.1),
@@ -55,8 +59,9 @@ RELIEF: dict[str, Relief] = {
 }
 """Relief of the material table's surfaces; a name such as ``birch_bark`` has that of its last word.
 
-Pavements: so that profiles have the mean profile depth (ISO 13473-1) of their kind with 6 octaves: asphalt 0.85 mm,
-between asphalt concrete (0.4 to 0.8) and stone mastic asphalt (0.8 to 1.2), concrete with exposed aggregate 0.75 mm.
+Pavements: so that profiles have the mean profile depth (ISO 13473-1) of their kind with 6 octaves: asphalt concrete
+0.85 mm, which is coarse (0.4 to 0.8), stone mastic asphalt 1.0 (0.8 to 1.2), porous asphalt 1.6 (1.3 to 2.0), mastic
+asphalt with rolled-in chippings 0.55 (0.4 to 0.7), concrete 0.75, with exposed aggregate 0.9 (0.7 to 1.1).
 Paint fills the texture that it lies on, hence the same wavelength: it has the asphalt's relief, flattened. Ground:
 random roughness, the standard deviation of heights about the mean plane. `docs/roughness.md` has sources and limits.
 Grass blades, leaves and all that is rolled, cast, painted or glazed are smooth, or are shaped by their own geometry.

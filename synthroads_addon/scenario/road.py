@@ -8,7 +8,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from ..base.schema import ClosedModel, Finite, notes, quantity
 from ..road.guidelines import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS, USUAL_SECTION, design_class_of
-from ..road.section import SHORTEST_DASH
+from ..road.section import ASPHALTS, CONCRETES, SHORTEST_DASH
 from ..road.surroundings import GRASSES, SHRUBS, TREES
 from ..road.things.limits import Interval, interval, share
 from ..road.things.registry import limits_model
@@ -71,6 +71,17 @@ class PavementLimits(ClosedModel):
     """Pavement of the carriageways, and its damage."""
 
     concrete: float = share(0.2, "Probability of a concrete pavement.", title="Concrete Pavement")
+    asphalts: tuple[Literal[ASPHALTS], ...] = Field(  # type: ignore[valid-type]
+        ASPHALTS, min_length=1, description="Kinds of asphalt that a road may have; asphalt is asphalt concrete."
+    )
+    concretes: tuple[Literal[CONCRETES], ...] = Field(  # type: ignore[valid-type]
+        CONCRETES, min_length=1, description="Kinds of concrete that a road may have."
+    )
+    renewed: float = share(
+        0.3,
+        "Probability that a carriageway's outermost lane, all its lanes, or its hard shoulder are newer than the rest.",
+        title="Lanes Renewed",
+    )
     rutted: float = share(0.3, "Probability that a carriageway's outer lane is rutted.", title="Ruts in the Outer Lane")
     rut_depth: Interval = interval(0.004, 0.025, "m", "Depth of ruts.")
     rut_width: Interval = interval(0.6, 1.0, "m", "Width of a wheel track.")
@@ -96,6 +107,9 @@ class MarkingLimits(ClosedModel):
         None, "m", "Gap of lane lines; 12 m by the RMS.", (SHORTEST_DASH, 100), inherits="rms.lane_gap"
     )
     film_thickness: Interval = interval(0.0015, 0.004, "m", "Thickness of the film.")
+    removed: float = share(
+        0.2, "Probability that a carriageway shows where former lines were ground off.", title="Ground-Off Lines"
+    )
 
 
 class _BarrierLimits(ClosedModel):

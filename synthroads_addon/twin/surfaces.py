@@ -7,10 +7,19 @@ from numpy.typing import NDArray
 
 from ..road.alignment import left_vectors
 from ..road.geometry import RoadGeometry
-from ..road.objects import LineObject
-from ..road.paint import arrow_outlines, cut_outline, hatching_outlines
-from ..road.pavement.outlines import CRACK_FILM, PATCH_FILM, crack_outlines, patch_outline
-from ..road.section import Arrow, Crack, Hatching, LineMarking, Patch, Pothole
+from ..road.objects import LineObject, Side
+from ..road.paint import cut_outline
+from ..road.pavement.cover import MarkingFilms, painted_outlines
+from ..road.pavement.joints import Joint
+from ..road.pavement.outlines import (
+    CRACK_FILM,
+    PATCH_FILM,
+    REMOVED_FILM,
+    crack_outlines,
+    patch_outline,
+    removed_outlines,
+)
+from ..road.section import Arrow, Crack, Hatching, LineMarking, Patch, Pothole, RemovedMarking
 from ..road.terrain import known_elevation
 from ..road.tessellation import sample_stations
 from .faces import FLAT, Faces, Int, drop_unused_points, grid_corners, join_faces, quad_faces, quad_twist
@@ -74,27 +83,54 @@ def dash_surfaces(geometry: RoadGeometry, line: LineMarking, stations: Float) ->
 
 def painted_surface(geometry: RoadGeometry, item: Hatching | Arrow, stations: Float) -> Faces:
     """Return the polygons of a hatching or an arrow on the road's surface, cut at the sampling stations."""
-    outlines = hatching_outlines(geometry, item) if isinstance(item, Hatching) else arrow_outlines(item)
-    return _drape_outlines(geometry, outlines, stations, item.film_thickness)
+    return _drape_outlines(geometry, painted_outlines(geometry, item), stations, item.film_thickness)
 
 
-def damaged_surface(geometry: RoadGeometry, item: Patch | Crack, stations: Float) -> Faces:
-    """Return the polygons of a patch or crack on the road's surface, cut at the sampling stations."""
+def damaged_surface(
+    geometry: RoadGeometry, item: Patch | Crack | RemovedMarking, side: Side, stations: Float, films: MarkingFilms
+) -> Faces:
+    """Return the polygons of a patch, crack or removed marking on the road's surface, cut at the sampling stations.
+
+    Args:
+        geometry: the road.
+        item: the damage.
+        side: of its carriageway.
+        stations: those at which the road is sampled (`road_stations`).
+        films: of the carriageway's markings, on which cracks lie.
+    """
+    if isinstance(item, RemovedMarking):
+        pavement = geometry.sections[side].carriageway.pavement
+        return _drape_outlines(geometry, removed_outlines(item, pavement, geometry.length), stations, REMOVED_FILM)
     if isinstance(item, Patch):
         outline = patch_outline(item)
         return _drape_outlines(geometry, [outline] if len(outline) > 2 else [], stations, PATCH_FILM)
-    return _drape_outlines(geometry, crack_outlines(item), stations, CRACK_FILM)
+    legs = _cut_at(stations, crack_outlines(item))
+    return _drape([(piece, film + CRACK_FILM) for piece, film in films.cut(legs)], geometry)
+
+
+def joint_surface(geometry: RoadGeometry, joint: Joint, stations: Float) -> Faces:
+    """Return the polygons of a joint on the road's surface."""
+    return _drape_outlines(geometry, joint.outlines, stations, 0.0)
 
 
 def _drape_outlines(geometry: RoadGeometry, outlines: Iterable[Float], stations: Float, film: float) -> Faces:
     """Return convex outlines (K, 2: station, offset) as flat polygons a film thickness (m) above the road's surface."""
-    parts = [piece for outline in outlines for piece in cut_outline(outline, _inside(stations, outline))]
+    return _drape([(piece, film) for piece in _cut_at(stations, outlines)], geometry)
+
+
+def _cut_at(stations: Float, outlines: Iterable[Float]) -> list[Float]:
+    """Return the pieces of convex outlines (K, 2) between the sampling stations."""
+    return [piece for outline in outlines for piece in cut_outline(outline, _inside(stations, outline))]
+
+
+def _drape(parts: list[tuple[Float, float]], geometry: RoadGeometry) -> Faces:
+    """Return outlines (K, 2), each with its height (m) above the road's surface, as flat polygons."""
     if not parts:
         return join_faces([])
-    places = np.concatenate(parts)
+    places = np.concatenate([piece for piece, _ in parts])
+    sizes = np.array([len(piece) for piece, _ in parts], dtype=np.int64)
     points = surface_points(geometry, places[:, 0], places[:, 1])
-    points[:, 2] += film
-    sizes = np.array([len(piece) for piece in parts], dtype=np.int64)
+    points[:, 2] += np.repeat([height for _, height in parts], sizes)
     return triangulate_twisted(Faces(points, np.arange(len(points)), sizes))
 
 

@@ -18,7 +18,7 @@ from synthroads_addon.road.guidelines import (
     TURNOUT_LANE_LENGTH,
 )
 from synthroads_addon.road.parameters import RoadParameters
-from synthroads_addon.road.section import Carriageway, LineMarking, Median, Turnout
+from synthroads_addon.road.section import ASPHALTS, CONCRETES, Carriageway, LineMarking, Median, Turnout
 from synthroads_addon.sampling.conflicts import conflicts
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.sampling.section import cross_section_of
@@ -218,8 +218,8 @@ def test_damage_lies_on_the_pavement(roads, furnished) -> None:
     for road in roads + furnished:
         sections, length = RoadGeometry(road).sections, road.alignment.length
         pavements = {item.side: item.pavement for item in road.of_type(Carriageway).values()}
-        kinds.add(pavements["left"].kind)
-        assert pavements["left"].kind == pavements["right"].kind
+        kinds |= {pavement.kind for pavement in pavements.values()}
+        assert pavements["left"].is_concrete == pavements["right"].is_concrete
         for side, pavement in pavements.items():
             section = sections[side]
             for pothole in pavement.potholes:
@@ -233,7 +233,30 @@ def test_damage_lies_on_the_pavement(roads, furnished) -> None:
                 lane = section.carriageway.lanes[rut.lane].width
                 assert isinstance(lane, float)
                 assert rut.track + rut.width <= lane + 1e-9
-    assert kinds == {"asphalt", "concrete"}
+            inner, outer = section.distances(np.array([0.0, length])).T[[0, -2]]
+            for line in pavement.removed_markings:
+                distance = section.carriageway.sign * line.offset
+                assert inner.max() < distance - line.width / 2 < distance + line.width / 2 < outer.min()
+                assert 0.0 <= line.start_station < line.end_station <= length + 1e-6
+    assert kinds == {*ASPHALTS, *CONCRETES}
+
+
+def test_pavements_are_of_the_kinds_and_ages_that_are_allowed() -> None:
+    limits = {"asphalts": ["porous_asphalt"], "concretes": ["exposed_aggregate_concrete"], "concrete": 0.5}
+    some = scenario(length=300.0, pavement={**limits, "renewed": 1.0}, markings={"removed": 1.0})
+    none = scenario(length=300.0, pavement={**limits, "renewed": 0.0}, markings={"removed": 0.0})
+    kinds, aged = set(), set()
+    for seed in range(30):
+        for carriageway in sample_road(some, seed).of_type(Carriageway).values():
+            pavement = carriageway.pavement
+            kinds.add(pavement.kind)
+            aged.add((len(pavement.lane_ages), pavement.shoulder_age is None))
+            assert pavement.removed_markings
+        for carriageway in sample_road(none, seed).of_type(Carriageway).values():
+            pavement = carriageway.pavement
+            assert (pavement.lane_ages, pavement.shoulder_age, pavement.removed_markings) == ((), None, ())
+    assert kinds == {"porous_asphalt", "exposed_aggregate_concrete"}
+    assert aged == {(1, True), (2, True), (0, False)}
 
 
 def test_potholes_are_as_many_as_asked() -> None:

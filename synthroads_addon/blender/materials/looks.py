@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from ...road.pavement.field import Wear
+from ...road.section import CONCRETES
 from ..nodes import operations as op
 from ..nodes.builder import Value
 from .pavement import pavement_look
@@ -18,6 +19,14 @@ ROWS = "rows"
 """Attribute of fields: the unit vector across the rows of their crop."""
 _DRILL, _TRAM = 3.0, 21.0
 """Widths that machines drill a field in and tend it in, m."""
+VEHICLE_PLACE, VEHICLE_SEAMS = "vehicle_place_on_it", "vehicle_seams"
+"""Attributes of vehicles: where a point is on it (m), with a height that `VEHICLE_BASE` is added to, as it is 0 on what
+is no vehicle; where its doors' seams are along it (m), 0 for none."""
+VEHICLE_BASE = 10.0
+_SEAM_WIDTH, _SEAM_HEIGHTS, _SEAM_DARK = 0.010, (0.30, 1.02), 0.65
+"""Width of a door's seam, heights that it is between (m), and how much of the brightness it takes."""
+_DIRT_COLOR, _DIRTIEST, _DIRT_ENDS = (0.13, 0.115, 0.095), 0.85, 0.75
+"""Base colour of what wheels throw up, its largest share, and the height at which there is none of it any more, m."""
 ELEMENT = 6.0
 """Length of a concrete barrier between two joints, m."""
 _JOINT = 0.02  # m
@@ -138,6 +147,33 @@ def _paint(shade: Shade, share: float = 1.0) -> None:
     shade.scale(color.value if share == 1.0 else color.value * share + (1.0 - share,) * 3)
 
 
+def _below(shade: Shade, value: Value, limit: float) -> Value:
+    """Return 1 where a number is below a limit, else 0."""
+    return shade.tree.node("ShaderNodeMath", value, limit, operation="LESS_THAN").value
+
+
+def _vehicle_wear(shade: Shade) -> None:
+    """Seams of a vehicle's doors, and dirt on its lower part."""
+    place, seams = _attribute(shade, VEHICLE_PLACE), _attribute(shade, VEHICLE_SEAMS)
+    along, height = op.component(place, "Y"), op.component(place, "Z") - VEHICLE_BASE
+    on_it = 1.0 - _below(shade, height, -1.0)
+    low, high = _SEAM_HEIGHTS
+    between = _below(shade, height, high) - _below(shade, height, low)
+    for axis in "XYZ":
+        seam = op.component(seams, axis)
+        there = _below(shade, op.unary("ABSOLUTE", along - seam), _SEAM_WIDTH / 2.0)
+        there = there * (1.0 - _below(shade, op.unary("ABSOLUTE", seam), 1e-6))
+        shade.scale(1.0 - there * between * _SEAM_DARK)
+    spread = shade.noise(0.35, 3.0, (1.0, 1.0, 0.6)) * 0.5 + 0.75
+    lower = op.minimum(op.maximum((_DIRT_ENDS - height) / _DIRT_ENDS, 0.0), 1.0)
+    share = lower * lower * spread * _DIRTIEST * on_it
+    dirt = tuple(part / mean for part, mean in zip(_DIRT_COLOR, shade.mean.base_color, strict=True))
+    assert shade.factor is not None
+    shade.factor = shade.factor * (1.0 - share) + op.vector(shade.tree, *dirt) * share
+    assert shade.roughness is not None
+    shade.roughness = shade.roughness + share * 0.5
+
+
 def _joints(shade: Shade) -> None:
     """Dark joints at whole elements, by the attribute ``station``."""
     station = op.component(_attribute(shade, "station"), "X")
@@ -198,14 +234,20 @@ class _Texture(NamedTuple):
 
 _PAVEMENTS = {
     "asphalt": _Texture((0.25, 0.012), (0.12, 0.6), (0.10, 25.0), 0.12, 0.6, 0.001),
+    # Stones of 8 to 11 mm side by side, with mastic between them; the same without mastic, and so with pores.
+    "stone_mastic_asphalt": _Texture((0.30, 0.016), (0.10, 0.5), (0.10, 25.0), 0.12, 0.6, 0.0013),
+    "porous_asphalt": _Texture((0.38, 0.018), (0.08, 0.5), (0.08, 25.0), 0.10, 0.7, 0.0020),
+    # A smooth mastic with rolled-in chippings of 2 to 4 mm, which lie unevenly.
+    "mastic_asphalt": _Texture((0.20, 0.007), (0.20, 0.4), (0.10, 25.0), 0.16, 0.5, 0.0006),
     "concrete": _Texture((0.10, 0.01), (0.12, 1.5), (0.0, 25.0), 0.12, 0.5, 0.0005),
+    "exposed_aggregate_concrete": _Texture((0.26, 0.012), (0.08, 1.2), (0.0, 25.0), 0.12, 0.55, 0.0009),
 }
 
 
 def _pavement(shade: Shade, kind: str, wear: Wear) -> None:
     """Pavement: its field of station and offset, and its texture."""
     texture = _PAVEMENTS[kind]
-    look, height = pavement_look(shade, kind, wear)
+    look, height = pavement_look(shade, "concrete" if kind in CONCRETES else "asphalt", wear)
     grain, mottle = shade.noise(texture.grain[1], 1.0), shade.noise(texture.mottle[1], 4.0)
     shade.scale(look.brightness)
     shade.vary(texture.grain[0], grain)
@@ -230,6 +272,7 @@ _AFTER_NOISES = {
     "birch_bark": _scars,
     "acrylic_glass": _clear,
     "wire_mesh": lambda shade: _clear(shade, 0.88),
+    "car_paint": _vehicle_wear,
 }
 
 

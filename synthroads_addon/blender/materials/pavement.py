@@ -19,8 +19,9 @@ from ..nodes import operations as op
 from ..nodes.builder import Operand, Tree, Value, node_group
 from .shading import Shade
 
-ATTRIBUTE, SHAPE = "pavement", "pavement_shape"
-"""Attributes of a pavement's mesh: place; slabs' length, depths of joints and tracks. See SR Pavement Place."""
+ATTRIBUTE, SHAPE, AGE = "pavement", "pavement_shape", "pavement_age"
+"""Attributes of a pavement's mesh: place; slabs' length, depths of joints and tracks; how bright it is for its age. See
+SR Pavement Place."""
 
 
 class NodeCalculus:
@@ -86,8 +87,12 @@ def _build(tree: Tree, kind: str) -> None:
     # As a vector: a number taken from a colour is its luminance, whose weights don't add up to 1 exactly.
     about = "Length of slabs, depths of joints and wheel tracks (m)"
     shapes = tree.input("Shape", "Vector", description=about) if kind != "paint" else None
+    about = "By how much it is brighter for its age (x), as a share"
+    age = tree.input("Age", "Vector", description=about) if kind != "paint" else None
     with tree.frame("Field of station and offset"):
         parts = PavementPlace(*(op.component(place, axis) for axis in "XYZ"))
+        if age is not None:
+            parts = parts._replace(age=op.component(age, "X"))
         if shapes is None:
             look = paint_look(calculus, parts, wear)
         else:
@@ -118,7 +123,7 @@ def pavement_look(shade: Shade, kind: str, wear: Wear) -> tuple[Look, Value | No
     for name, value in zip(("Polish", "Seed"), wear, strict=True):
         if name in raw.inputs:
             raw.inputs[name].default_value = value
-    for name, entry in ((ATTRIBUTE, "Place"), (SHAPE, "Shape")):
+    for name, entry in ((ATTRIBUTE, "Place"), (SHAPE, "Shape"), (AGE, "Age")):
         if entry in raw.inputs:
             attribute = tree.node("ShaderNodeAttribute", attribute_name=name)["Vector"]
             tree.group.links.new(attribute.source(), raw.inputs[entry])

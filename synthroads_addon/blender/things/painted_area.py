@@ -1,4 +1,4 @@
-"""Areas on the pavement as outlines in stations and offsets: SR Painted Area; SR Damaged Area, patches and cracks."""
+"""Areas on the pavement as outlines in stations and offsets: SR Painted Area; SR Damaged Area."""
 
 from __future__ import annotations
 
@@ -11,20 +11,28 @@ from numpy.typing import NDArray
 
 from ...base.classes import class_id
 from ...base.turns.stepper import run_aside
-from ...road.paint import arrow_outlines, cut_outline, hatching_outlines
-from ...road.pavement.cover import LineFilms
+from ...road.paint import cut_outline
+from ...road.pavement.cover import MarkingFilms, painted_outlines
 from ...road.pavement.field import (
     OPEN_CRACK,
     PAINT_AREA,
     PAINT_IN_LANE,
     PATCH,
+    REMOVED_MARKING,
     SEALED_CRACK,
     damage_code,
     place_code,
 )
-from ...road.pavement.outlines import CRACK_FILM, PATCH_FILM, crack_outlines, patch_outline
+from ...road.pavement.outlines import (
+    CRACK_FILM,
+    PATCH_FILM,
+    REMOVED_FILM,
+    crack_outlines,
+    patch_outline,
+    removed_outlines,
+)
 from ...road.pavement.places import pavement_places
-from ...road.section import Arrow, Carriageway, Hatching
+from ...road.section import ASPHALTS, CONCRETES, Arrow, Carriageway, Crack, Hatching, Pavement
 from ..nodes import operations as op
 from ..nodes.backbone import height_on, look_up, station_ribbon
 from ..nodes.builder import Tree, Value, makes_group
@@ -65,23 +73,34 @@ def painted_area_group(tree: Tree) -> None:
     tree.output("Mesh", mesh, description="Paint whose faces look up")
 
 
+_COURSES = (*ASPHALTS, *CONCRETES)
+"""Pavements in the order of the attribute ``course``."""
+
+
 class _Damage(Inputs):
-    material = material_of("cracks in asphalt, and patches", "asphalt")
-    concrete_material = material_of("cracks in concrete", "concrete")
+    material = material_of("damage in asphalt concrete, and patches", "asphalt")
+    stone_mastic_asphalt_material = material_of("damage in stone mastic asphalt", "stone_mastic_asphalt")
+    porous_asphalt_material = material_of("damage in porous asphalt", "porous_asphalt")
+    mastic_asphalt_material = material_of("damage in mastic asphalt", "mastic_asphalt")
+    concrete_material = material_of("damage in concrete", "concrete")
+    exposed_aggregate_concrete_material = material_of("damage in washed concrete", "exposed_aggregate_concrete")
 
 
 @makes_group("SR Damaged Area")
 def damaged_area_group(tree: Tree) -> None:
-    """Patches and cracks given by stations and offsets, laid on the pavement, which is no thicker there.
+    """Patches, cracks and removed markings given by stations and offsets, laid on the pavement.
 
-    Their points carry ``film`` (m), ``instance``, ``concrete`` (0 or 1), and ``pavement`` and ``offset``, the place
-    that the materials read.
+    Their points carry ``film`` (m), ``instance``, ``course`` (number of the pavement's kind), and ``pavement`` and
+    ``offset``, the place that the materials read.
     """
     outlines, damage = _Outlines(tree), _Damage(tree)
     mesh = _lay(outlines)
     with tree.frame("Labels"):
         mesh = op.label(mesh, class_id("road"), op.named_attribute(tree, "instance", "INT"), damage.material)
-        mesh = paint_faces(mesh, damage.concrete_material, op.named_attribute(tree, "concrete") > 0.5)
+        course = op.named_attribute(tree, "course")
+        for number in range(1, len(_COURSES)):
+            of_kind = (course > number - 0.5) & (course < number + 0.5)
+            mesh = paint_faces(mesh, damage.values[f"{_COURSES[number]}_material"], of_kind)
     tree.output("Mesh", mesh, description="Pavement whose faces look up")
 
 
@@ -132,13 +151,13 @@ def _painted_places(
 
 @model_part("damaged_areas", 31, on_the_road=True)
 def build_damaged_areas(builder: ModelBuilder) -> None:
-    """Add all patches and cracks of the pavement to the model as one object; none if there are none."""
+    """Add patches, cracks and removed markings of the pavement to the model as one object; none if there are none."""
     areas = run_aside(lambda: list(_damaged(builder)))
     if not areas:
         return
     mesh, sizes = _polygons_mesh("SR Damaged Areas", [area.outline for area in areas], builder.zero)
     attribute(mesh, "film", np.repeat([area.film for area in areas], sizes))
-    attribute(mesh, "concrete", np.repeat([float(area.concrete) for area in areas], sizes))
+    attribute(mesh, "course", np.repeat([float(area.course) for area in areas], sizes))
     attribute(mesh, "instance", np.repeat(signed_instance([area.instance for area in areas]), sizes))
     station = np.concatenate([area.outline[:, 0] for area in areas])
     code = np.repeat([area.code for area in areas], sizes)
@@ -147,34 +166,47 @@ def build_damaged_areas(builder: ModelBuilder) -> None:
 
 
 class _Area(NamedTuple):
-    """A face of a patch or crack: outline (K, 2) in station and offset, film (m), instance, damage code, concrete."""
+    """A face of damage: outline (K, 2) in station and offset, film (m), instance, damage code, number of the course."""
 
     outline: NDArray[np.float64]
     film: float
     instance: int
     code: float
-    concrete: bool
+    course: int
 
 
 def _damaged(builder: ModelBuilder) -> Iterator[_Area]:
-    numbers = builder.geometry.numbers
+    geometry = builder.geometry
     # Of the whole road, as an area may reach over the end of the stretch.
-    for name, carriageway in builder.geometry.parameters.of_type(Carriageway).items():
+    for name, carriageway in geometry.parameters.of_type(Carriageway).items():
         pavement = carriageway.pavement
-        part = len(pavement.ruts) + len(pavement.potholes)
+        part, own = len(pavement.ruts) + len(pavement.potholes), _COURSES.index(pavement.kind)
         for patch in pavement.patches:
-            instance, code = numbers.part(name, part)[1], damage_code(PATCH, patch.age)
+            instance, code = geometry.numbers.part(name, part)[1], damage_code(PATCH, patch.age)
             for piece in _pieces(patch_outline(patch), *builder.stretch):
-                yield _Area(piece, PATCH_FILM, instance, code, False)
+                yield _Area(piece, PATCH_FILM, instance, code, 0)
             part += 1
-        films = LineFilms(builder.geometry, carriageway.side)
+        films = MarkingFilms(geometry, carriageway.side)
         for crack in pavement.cracks:
-            instance, code = numbers.part(name, part)[1], damage_code(SEALED_CRACK if crack.sealed else OPEN_CRACK)
+            instance, code = (
+                geometry.numbers.part(name, part)[1],
+                damage_code(SEALED_CRACK if crack.sealed else OPEN_CRACK),
+            )
             legs = [piece for outline in crack_outlines(crack) for piece in _pieces(outline, *builder.stretch)]
             for piece, film in films.cut(legs):
-                concrete = pavement.kind == "concrete" and not crack.sealed
-                yield _Area(piece, film + CRACK_FILM, instance, code, concrete)
+                yield _Area(piece, film + CRACK_FILM, instance, code, _crack_course(crack, pavement))
             part += 1
+        for marking in pavement.removed_markings:
+            instance, code = geometry.numbers.part(name, part)[1], damage_code(REMOVED_MARKING)
+            for outline in removed_outlines(marking, pavement, geometry.length):
+                for piece in _pieces(outline, *builder.stretch):
+                    yield _Area(piece, REMOVED_FILM, instance, code, own)
+            part += 1
+
+
+def _crack_course(crack: Crack, pavement: Pavement) -> int:
+    """Return the number of what a crack is of: asphalt's binder where it seals concrete, else the pavement."""
+    return 0 if crack.sealed and pavement.is_concrete else _COURSES.index(pavement.kind)
 
 
 def _polygons_mesh(name: str, polygons: list[NDArray[np.float64]], zero: float) -> tuple[bpy.types.Mesh, list[int]]:
@@ -192,12 +224,10 @@ def _polygons_mesh(name: str, polygons: list[NDArray[np.float64]], zero: float) 
 def _outlines(builder: ModelBuilder) -> Iterator[tuple[NDArray[np.float64], Hatching | Arrow]]:
     # Of the whole road, as an area may reach over the end of the stretch.
     road = builder.geometry.parameters
-    for hatching in road.of_type(Hatching).values():
-        for outline in hatching_outlines(builder.geometry, hatching):
-            yield from ((piece, hatching) for piece in _pieces(outline, *builder.stretch))
-    for arrow in road.of_type(Arrow).values():
-        for outline in arrow_outlines(arrow):
-            yield from ((piece, arrow) for piece in _pieces(outline, *builder.stretch))
+    items: list[Hatching | Arrow] = [*road.of_type(Hatching).values(), *road.of_type(Arrow).values()]
+    for item in items:
+        for outline in painted_outlines(builder.geometry, item):
+            yield from ((piece, item) for piece in _pieces(outline, *builder.stretch))
 
 
 def _pieces(outline: NDArray[np.float64], start: float, end: float) -> Iterator[NDArray[np.float64]]:

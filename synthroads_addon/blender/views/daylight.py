@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from ...road.parameters import RoadParameters
 from ...road.surroundings import Environment
-from ..cameras.light import sky_radiance
-from ..sky import SUN_COLOR, fill_sky, new_sun
+from ..sky import fill_sky, new_sun
 from ..things.model_builder import SUPPORT
+from .clouds import add_clouds
+from .exposure import level_irradiance, stops_for, sun_and_sky
 from .haze import haze_body, haze_light, light_below
 from .landscape import add_landscape, remove_landscape
 from .viewpoints import Viewpoint, aerial_view, driver_view
@@ -29,9 +30,10 @@ _LOWEST_SKY = 0.02
 
 
 def add_views(scene: bpy.types.Scene, parameters: RoadParameters, matrix: Matrix) -> None:
-    """Add a road's sun, sky, haze, landscape and cameras to a scene, replacing those of an earlier call.
+    """Add a road's sun, sky with clouds, haze, landscape and cameras to a scene, replacing those of an earlier call.
 
-    Other lights and cameras stay. The driver's camera becomes the scene's if it has none, or one of ours.
+    Other lights and cameras stay. The driver's camera becomes the scene's if it has none, or one of ours. The scene's
+    exposure becomes that of the light.
 
     Args:
         scene: that shows the road.
@@ -46,6 +48,9 @@ def add_views(scene: bpy.types.Scene, parameters: RoadParameters, matrix: Matrix
     if environment.visibility < _HAZE_BELOW:
         middle = matrix @ Vector(driver_view(parameters).place.tolist())
         _add_haze(scene, environment, sun, middle)
+    else:
+        scene.view_settings.exposure = stops_for(level_irradiance(environment))
+    add_clouds(scene.world, environment)
     add_landscape(scene, parameters, matrix)
     for name, view in _VIEWS.items():
         camera = _mark(name, _camera(_NAMES[name], view(parameters), matrix), scene)
@@ -110,10 +115,11 @@ def _go_on_below_horizon(world: bpy.types.World) -> None:
 
 def _add_haze(scene: bpy.types.Scene, environment: Environment, sun: bpy.types.Object, middle: Vector) -> None:
     """Add the environment's haze around a place, and dim the scene's sun and sky by it."""
-    across = np.array(SUN_COLOR) * sun.data.energy
     elevation = math.radians(environment.sun_elevation_deg)
-    level = math.pi * np.array(sky_radiance(environment))
+    across, level = sun_and_sky(environment)
     light = haze_light(environment.visibility, elevation, across, level)
+    below = across * light.sun * max(math.sin(elevation), 0.0) + level * light.sky + math.pi * light.diffuse
+    scene.view_settings.exposure = stops_for(below)
     sun.data.energy *= light.sun
     light_below(scene.world, light)
     item = _mark(HAZE, haze_body(_NAMES[HAZE], environment.visibility, light.air, middle), scene)

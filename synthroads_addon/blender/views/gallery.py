@@ -37,7 +37,7 @@ _NEAR = 5.0
 """Distance from an object's middle within which its parts are shown close up, m."""
 _PITCH = 1.6
 """Distance of the materials' cubes from middle to middle, m."""
-_DAYLIGHT = Environment(sun_azimuth_deg=215.0, sun_elevation_deg=42.0)
+_DAYLIGHT = Environment(sun_azimuth_deg=215.0, sun_elevation_deg=42.0, cloud_cover=0.35, cloud_size=250.0)
 _NOT_SHOWN = ("Alignment", "Carriageway", "Median", "Terrain", "LineMarking", "Landscape")
 
 

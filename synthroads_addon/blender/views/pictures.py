@@ -11,18 +11,22 @@ from numpy.typing import ArrayLike
 
 from ...road.surroundings import Environment
 from ..sky import fill_sky, new_sun
+from .clouds import add_clouds
+from .exposure import level_irradiance, stops_for
 
 SUN = "SR Sun"
 CAMERA = "SR Camera"
 
 
 def light(environment: Environment) -> None:
-    """Add a sun and a sky to the current scene, replacing those of an earlier call."""
+    """Add a sun and a sky with clouds to the current scene, replacing those of an earlier call; expose for them."""
     scene = bpy.context.scene
     remove(SUN)
     scene.collection.objects.link(new_sun(SUN, environment))
     scene.world = bpy.data.worlds.get("SR Sky") or bpy.data.worlds.new("SR Sky")
     fill_sky(scene.world, environment.sun_elevation_deg, environment.sun_azimuth_deg, environment.sun_strength)
+    add_clouds(scene.world, environment)
+    scene.view_settings.exposure = stops_for(level_irradiance(environment))
 
 
 def camera(place: ArrayLike, target: ArrayLike, lens: float = 35.0) -> bpy.types.Object:

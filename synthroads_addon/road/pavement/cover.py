@@ -1,4 +1,7 @@
-"""Line markings as films over the pavement: cracks go through them, as the film breaks with what it lies on."""
+"""Markings as films over the pavement: cracks go through them, as the film breaks with what it lies on.
+
+A patch takes the place of pavement and film together: arrows and hatched areas have no film on it.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +12,22 @@ import numpy as np
 from ...base.arrays import Bool, Float
 from ..geometry import RoadGeometry
 from ..objects import Side
-from ..paint import cut_outline
-from ..section import LineMarking
+from ..paint import arrow_outlines, cut_outline, hatching_outlines
+from ..section import Arrow, Hatching, LineMarking
+from .clipping import covers, edges_of, meet, split_outline, subtract
+from .outlines import patch_outline
 
 
-class LineFilms:
-    """Films of a carriageway's line markings.
+def painted_outlines(geometry: RoadGeometry, item: Hatching | Arrow) -> list[Float]:
+    """Return the convex parts (K, 2) of a hatched area or an arrow as it is: without what patches took away."""
+    parts = hatching_outlines(geometry, item) if isinstance(item, Hatching) else arrow_outlines(item)
+    patches = [patch_outline(patch) for patch in geometry.parameters.carriageway_of(item).pavement.patches]
+    areas = [patch for patch in patches if len(patch) > 2]
+    return [piece for part in parts for piece in subtract(part, areas)]
+
+
+class MarkingFilms:
+    """Films of a carriageway's markings: lines, arrows, hatched areas.
 
     Args:
         geometry: the road's.
@@ -22,10 +35,18 @@ class LineFilms:
     """
 
     def __init__(self, geometry: RoadGeometry, side: Side) -> None:
-        lines = geometry.parameters.of_type(LineMarking).values()
+        road = geometry.parameters
+        lines = road.of_type(LineMarking).values()
         self._geometry = geometry
-        self._lines = [line for line in lines if geometry.parameters.carriageway_of(line).side == side]
+        self._lines = [line for line in lines if road.carriageway_of(line).side == side]
         self._dashes = [geometry.dashes(line) for line in self._lines]
+        painted: list[Hatching | Arrow] = [*road.of_type(Hatching).values(), *road.of_type(Arrow).values()]
+        self._areas = [
+            (outline, edges_of(outline), item.film_thickness)
+            for item in painted
+            if road.carriageway_of(item).side == side
+            for outline in painted_outlines(geometry, item)
+        ]
 
     def thickness(self, station: Float, offset: Float) -> Float:
         """Return the thickness (N,) of the thickest film at places (N,), m; 0 where there is none."""
@@ -34,10 +55,37 @@ class LineFilms:
             left, right = self._geometry.marking_edges(line, station)
             covered = _is_painted(dashes, station) & (offset <= left) & (offset >= right)
             result = np.where(covered, np.maximum(result, line.film_thickness), result)
+        for outline, edges, film in self._areas:
+            (low, _), (high, _) = outline.min(axis=0), outline.max(axis=0)
+            near = np.flatnonzero((station >= low) & (station <= high))
+            inside = near[covers(edges, station[near], offset[near])]
+            result[inside] = np.maximum(result[inside], film)
         return result
 
     def cut(self, outlines: Sequence[Float]) -> Iterator[tuple[Float, float]]:
         """Yield the pieces of short convex outlines (K, 2) on and beside films, with the film's thickness, m."""
+        for outline, film in self._cut_by_lines(outlines):
+            if film:
+                yield outline, film
+            else:
+                yield from self._cut_by_areas(outline)
+
+    def _cut_by_areas(self, outline: Float) -> Iterator[tuple[Float, float]]:
+        left = [outline]
+        for area, _, film in self._areas:
+            if not meet(outline, area):
+                continue
+            parts, left = left, []
+            for part in parts:
+                inside, outside = split_outline(part, area)
+                if inside is not None:
+                    yield inside, film
+                    left += outside
+                else:
+                    left.append(part)
+        yield from ((part, 0.0) for part in left)
+
+    def _cut_by_lines(self, outlines: Sequence[Float]) -> Iterator[tuple[Float, float]]:
         if not outlines:
             return
         low, high = (np.array([pick(outline, axis=0) for outline in outlines]) for pick in (np.min, np.max))
@@ -57,8 +105,16 @@ class LineFilms:
             for part in _cut(outline, ends):
                 for piece in _cut(part[::-1, ::-1], across):
                     centre = piece[:, ::-1].mean(axis=0)
-                    film = float(self.thickness(centre[:1], centre[1:])[0])
-                    yield piece[::-1, ::-1], film
+                    yield piece[::-1, ::-1], self._line_film(centre[:1], centre[1:])
+
+    def _line_film(self, station: Float, offset: Float) -> float:
+        """Return the thickness of the thickest line's film at one place, m."""
+        thickest = 0.0
+        for line, dashes in zip(self._lines, self._dashes, strict=True):
+            left, right = self._geometry.marking_edges(line, station)
+            if bool(_is_painted(dashes, station)[0]) and right[0] <= offset[0] <= left[0]:
+                thickest = max(thickest, line.film_thickness)
+        return thickest
 
 
 def _is_painted(dashes: Float, station: Float) -> Bool:

@@ -14,7 +14,9 @@ What is in it, and where its figures come from:
 - **Slabs** of concrete: joints every slab length and between lanes, sealed (ZTV Beton-StB: 8 to 10 mm wide); each slab
   is of its own pour.
 - **Markings** lose their film where tyres cross them: lines between lanes, arrows in the wheel tracks.
-- **Patches** are new and black, or older; open cracks are dark; sealed ones are a smooth band of bitumen.
+- **Patches** are new and black, or older; open cracks are dark; sealed ones are a smooth band of bitumen. Where a
+  marking was ground off the aggregate is bare: brighter and rougher.
+- **Ages**: what was paved earlier or later than the rest is brighter or darker than it, see `materials.variation`.
 - **Heights**: wheel tracks are as deep as they are worn, with the mean of a lane at 0; joints lie lower. Patches and
   cracks have heights of their own, and waves are `unevenness`.
 
@@ -39,7 +41,7 @@ of which nothing is known: it has its material's mean."""
 PAINT_CROSSED, PAINT_BESIDE, PAINT_AREA, PAINT_IN_LANE = 16, 17, 18, 19
 """Kinds of markings by the traffic that wears them: lines that lane changes cross, lines beside the lanes, hatched
 areas, and what lies in a lane, of which `PavementPlace.across` counts from the lane's middle."""
-PATCH, OPEN_CRACK, SEALED_CRACK = 24, 25, 26
+PATCH, OPEN_CRACK, SEALED_CRACK, REMOVED_MARKING = 24, 25, 26, 27
 """Kinds of repaired and damaged places; above the strips' and the markings'."""
 
 _TRACK, _TRACK_WIDTH, _OIL_WIDTH = 1.8, 0.3, 0.35
@@ -48,7 +50,7 @@ _TRACKS_MEAN, _OIL_MEAN = 0.40, 0.23
 """Means of tracks and oil strip over a lane of 3.75 m: a lane as a whole keeps its material's mean."""
 _LESS_INWARDS = 0.6
 """By how much the wear of a lane falls behind with each lane outside of it."""
-_DAY = 650.0
+DAY = 650.0
 """Length that is paved in a day, m."""
 _SLOW, _CHANGES = 30.0, 7.0
 """Distances of the knots of the slow variation along a lane, and of where lane changes cross a line, m: at a speed of
@@ -56,10 +58,12 @@ _SLOW, _CHANGES = 30.0, 7.0
 _CROSSED, _BESIDE, _AREA, _IN_LANE = 1.0, 0.2, 0.4, 0.6
 """Wear of lines that lane changes cross, of lines beside the lanes, of hatched areas, of arrows between the wheel
 tracks; in a wheel track it is 1."""
-_SEAM, _SEAM_INWARDS, _RAMP = 0.02, 0.13, 0.004
+SEAM, SEAM_INWARDS, _RAMP = 0.02, 0.13, 0.004
 """Width of a paver's joint, its distance from the lane's boundary, and over which its edge fades, m."""
-_SLAB_JOINT = 0.010
+SLAB_JOINT = 0.010
 """Width of a sealed joint between slabs, m."""
+_GROUND = 1.22
+"""Brightness of where a marking was ground off."""
 _KNOTS = 64.0
 """Between numbers of two places along the road in a hash's key: more than there are strips."""
 
@@ -108,11 +112,13 @@ class PavementPlace(NamedTuple):
         station: m.
         across: distance from its lane's middle, m, positive outwards.
         code: what it belongs to, see `place_code`.
+        age: by how much it is brighter for its age than its material's mean, as a share.
     """
 
     station: Any
     across: Any
     code: Any
+    age: Any = 0.0
 
 
 class Shape(NamedTuple):
@@ -193,9 +199,9 @@ def _slow(m: Calculus, place: PavementPlace, owner: Any, seed: Any, spacing: flo
 
 def _asphalt_joint(m: Calculus, place: PavementPlace, strip: _Strip) -> Any:
     """Return 1 on the paver's joints: beside each lane's outer boundary, and between two days' work."""
-    within = place.station % _DAY
-    day = _line(m, m.smaller(within, _DAY - within), _SEAM)
-    seam = m.below(strip.kind, SHOULDER - 0.5) * _line(m, m.absolute(place.across + _SEAM_INWARDS - strip.half), _SEAM)
+    within = place.station % DAY
+    day = _line(m, m.smaller(within, DAY - within), SEAM)
+    seam = m.below(strip.kind, SHOULDER - 0.5) * _line(m, m.absolute(place.across + SEAM_INWARDS - strip.half), SEAM)
     return m.larger(seam, day)
 
 
@@ -204,7 +210,7 @@ def _slab_joint(m: Calculus, place: PavementPlace, strip: _Strip, slab_length: A
     within = place.station % slab_length  # exact in float32 as well, which a difference of large quotients isn't
     across = m.smaller(within, slab_length - within)
     along = m.absolute(m.absolute(place.across) - strip.half) + (1.0 - m.below(strip.kind, SHOULDER - 0.5))
-    return _line(m, m.smaller(across, along), _SLAB_JOINT)
+    return _line(m, m.smaller(across, along), SLAB_JOINT)
 
 
 def _height(m: Calculus, strip: _Strip, joint: Any, shape: Shape) -> Any:
@@ -228,9 +234,12 @@ def concrete_height(m: Calculus, place: PavementPlace, shape: Shape, slab_length
 def _repaired(m: Calculus, strip: _Strip, look: Look) -> Look:
     """Return the look where patches and cracks have theirs in place of the pavement's."""
     age = strip.half * (1.0 / HALF_UNIT)
-    sealed, cracked = 1.0 - m.below(strip.kind, SEALED_CRACK - 0.5), 1.0 - m.below(strip.kind, OPEN_CRACK - 0.5)
-    brightness = (0.72 + 0.36 * age) * (1.0 - cracked) + cracked * 0.45 - sealed * 0.05
-    roughness = (0.06 - 0.1 * age) * (1.0 - cracked) + cracked * 0.05 - sealed * 0.4
+    removed = 1.0 - m.below(strip.kind, REMOVED_MARKING - 0.5)
+    sealed = 1.0 - m.below(strip.kind, SEALED_CRACK - 0.5) - removed
+    cracked = 1.0 - m.below(strip.kind, OPEN_CRACK - 0.5) - removed
+    intact = 1.0 - cracked - removed
+    brightness = (0.72 + 0.36 * age) * intact + cracked * 0.45 - sealed * 0.05 + removed * _GROUND
+    roughness = (0.06 - 0.1 * age) * intact + cracked * 0.05 - sealed * 0.4 + removed * 0.08
     share, known = strip.strip, 1.0 - m.below(strip.owner, 0.5)
     together = look.brightness * share + brightness * (1.0 - share)
     return Look(
@@ -248,12 +257,12 @@ def asphalt_look(m: Calculus, place: PavementPlace, wear: Wear) -> Look:
         wear: parameters.
     """
     strip = _decode(m, place)
-    own = _signed_hash(m, strip.owner, m.floor(place.station / _DAY), wear.seed)
+    own = _signed_hash(m, strip.owner, m.floor(place.station / DAY), wear.seed)
     slow = _slow(m, place, strip.owner, wear.seed)
     polished = strip.wear * strip.track * wear.polish
     joint = _asphalt_joint(m, place, strip)
     used = 1.0 + 0.55 * polished - 0.14 * strip.wear * strip.oil
-    brightness = (1.0 + 0.09 * own + 0.04 * slow) * used * (1.0 - 0.35 * joint)
+    brightness = (1.0 + 0.09 * own + 0.04 * slow) * used * (1.0 - 0.35 * joint) * (1.0 + place.age)
     roughness = 0.05 * own + 0.02 * slow - 0.3 * polished - 0.1 * joint
     return _repaired(m, strip, Look(brightness, roughness))
 
@@ -274,7 +283,7 @@ def concrete_look(m: Calculus, place: PavementPlace, wear: Wear, slab_length: An
     slow = _slow(m, place, strip.owner, wear.seed)
     polished = strip.wear * strip.track * wear.polish
     used = 1.0 - 0.4 * polished - 0.1 * strip.wear * strip.oil
-    brightness = (1.0 + 0.06 * own + 0.03 * slow) * used * (1.0 - 0.6 * joint)
+    brightness = (1.0 + 0.06 * own + 0.03 * slow) * used * (1.0 - 0.6 * joint) * (1.0 + place.age)
     roughness = 0.05 * own + 0.02 * slow - 0.25 * polished - 0.25 * joint
     return _repaired(m, strip, Look(brightness, roughness))
 

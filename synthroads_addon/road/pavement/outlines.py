@@ -5,11 +5,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...base.arrays import Float
-from ..section import Corner, Crack, Patch
+from ..section import Corner, Crack, Patch, Pavement, RemovedMarking
+from .clipping import subtract
 
-CRACK_FILM, PATCH_FILM = 0.0004, 0.0008
-"""Height of the faces of cracks and patches above the pavement, m, patches over cracks. On a line cracks lie as far
-above its film, see `cover`; patches lie below any."""
+REMOVED_FILM, CRACK_FILM, PATCH_FILM = 0.0002, 0.0004, 0.0008
+"""Height of the faces of removed markings, cracks and patches above the pavement, m, each over those before it. On a
+marking cracks lie as far above its film, see `cover`; the others lie below any."""
 _SHARPEST = 0.5
 """Cosine of half the turn beyond which a line's corner is not mitred any further."""
 
@@ -60,3 +61,26 @@ def crack_outlines(crack: Crack) -> Iterator[Float]:
         one, other = corners + middle * reach[:, None], corners - middle * reach[:, None]
         for number in range(len(legs)):
             yield np.array([other[number], other[number + 1], one[number + 1], one[number]])
+
+
+def removed_outlines(marking: RemovedMarking, pavement: Pavement, length: float) -> Iterator[Float]:
+    """Yield the convex parts (K, 2) of a removed marking's dashes that no patch covers, counter-clockwise from above.
+
+    Args:
+        marking: the marking.
+        pavement: that it was on.
+        length: of the road, m.
+    """
+    patches = [outline for patch in pavement.patches if len(outline := patch_outline(patch)) > 2]
+    for dash in _removed_dashes(marking, length):
+        yield from subtract(dash, patches)
+
+
+def _removed_dashes(marking: RemovedMarking, length: float) -> Iterator[Float]:
+    low, high = marking.offset - marking.width / 2.0, marking.offset + marking.width / 2.0
+    end, period = min(marking.end_station, length), marking.dash_length + marking.gap_length
+    starts = np.arange(marking.start_station, end, period) if period else np.array([marking.start_station])
+    for start in starts.tolist():
+        last = min(start + marking.dash_length, end) if period else end
+        if last > start:
+            yield np.array([(start, low), (last, low), (last, high), (start, high)])

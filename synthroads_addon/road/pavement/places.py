@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ...base.arrays import Float
@@ -30,8 +32,16 @@ def strip_lanes(kinds: tuple[str, ...], lanes: int) -> list[tuple[int, int]]:
     return result
 
 
-def pavement_places(section: CarriagewaySection, station: Float, offset: Float) -> PavementPlace:
-    """Return the places (N,) of stations and offsets (N,) on a carriageway."""
+def pavement_places(
+    section: CarriagewaySection, station: Float, offset: Float, contrasts: Sequence[float] = ()
+) -> PavementPlace:
+    """Return the places (N,) of stations and offsets (N,) on a carriageway.
+
+    Args:
+        section: the carriageway's.
+        station, offset: m.
+        contrasts: of its strips, see `age.strip_contrasts`; none where nothing but heights is asked.
+    """
     distances = section.distances(station)
     distance = section.carriageway.sign * offset
     strip = np.clip((distances[:, 1:] <= distance[:, None]).sum(axis=1), 0, len(section.kinds) - 1)
@@ -39,4 +49,5 @@ def pavement_places(section: CarriagewaySection, station: Float, offset: Float) 
     rows = np.arange(len(distance))
     inner, outer = distances[rows, source], distances[rows, source + 1]
     code = place_code(kind, int(section.carriageway.side == "left"), (outer - inner) / 2.0)
-    return PavementPlace(np.asarray(station, np.float64), distance - (inner + outer) / 2.0, code)
+    age = np.array(contrasts)[strip] if len(contrasts) else np.zeros(len(distance))
+    return PavementPlace(np.asarray(station, np.float64), distance - (inner + outer) / 2.0, code, age)

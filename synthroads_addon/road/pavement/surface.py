@@ -13,9 +13,10 @@ from ...base.arrays import Bool, Float, Index
 from ...base.random_streams import stream
 from ..geometry import RoadGeometry
 from ..objects import Side
-from ..section import Crack, Patch, Pavement
+from ..section import Crack, Patch, Pavement, RemovedMarking
+from .clipping import covers, edges_of
 from .field import ArrayCalculus, Shape, asphalt_height, concrete_height
-from .outlines import crack_outlines, patch_outline
+from .outlines import crack_outlines, patch_outline, removed_outlines
 from .places import pavement_places
 from .unevenness import unevenness
 
@@ -25,7 +26,7 @@ _CELL = 10.0
 
 @dataclass(frozen=True)
 class _DamageArea:
-    """A convex face of a patch or crack.
+    """A convex face of a patch, crack or removed marking.
 
     Attributes:
         edges: (K, 3) normal and distance of each edge in stations and offsets, inside where all are below 0.
@@ -42,9 +43,7 @@ class _DamageArea:
 
     def covers(self, station: Float, offset: Float) -> Bool:
         """Return which places (N,) lie within."""
-        normal, distance = self.edges[:, :2], self.edges[:, 2]
-        across = np.column_stack([station, offset]) @ normal.T - distance
-        return np.asarray((across <= 0.0).all(axis=1))
+        return covers(self.edges, station, offset)
 
 
 class PavementSurface:
@@ -59,7 +58,7 @@ class PavementSurface:
         self._seed = int(stream(geometry.parameters.metadata.seed, "pavement unevenness").integers(1 << 31))
 
     def height(self, station: ArrayLike, offset: ArrayLike) -> Float:
-        """Return the heights (N,) of places, m: of patches and cracks where these are; 0 beside the pavement."""
+        """Return the heights (N,) of places, m: of damage where there is any; 0 beside the pavement."""
         station, offset = (np.asarray(value, np.float64).ravel() for value in np.broadcast_arrays(station, offset))
         result = np.zeros(len(station))
         for side, section in self.geometry.sections.items():
@@ -93,7 +92,7 @@ class PavementSurface:
         pavement, place = section.carriageway.pavement, pavement_places(section, station, offset)
         shape = Shape(pavement.wheel_track_depth, pavement.joint_depth if joints else 0.0)
         calculus = ArrayCalculus()
-        if pavement.kind == "concrete":
+        if pavement.is_concrete:
             return np.asarray(concrete_height(calculus, place, shape, pavement.slab_length))
         return np.asarray(asphalt_height(calculus, place, shape))
 
@@ -104,7 +103,7 @@ class PavementSurface:
         return unevenness(place, pavement.unevenness, self._seed)
 
     def _lay_damage(self, side: Side, station: Float, offset: Float, rows: Index, result: Float) -> None:
-        """Give the rows on cracks and patches their heights: patches lie over cracks, later ones over earlier ones."""
+        """Give the rows on damage its heights: later ones lie over earlier ones, patches over cracks and markings."""
         cell = np.floor(station[rows] / _CELL).astype(np.int64)
         for number in np.unique(cell).tolist():
             mine = rows[cell == number]
@@ -117,18 +116,21 @@ class PavementSurface:
 
     @cached_property
     def _areas(self) -> dict[Side, dict[int, list[_DamageArea]]]:
-        """The faces of cracks, then of patches, of each side by the stretch that they lie on."""
+        """The faces of removed markings, of cracks, then of patches, of each side by the stretch that they lie on."""
         result: dict[Side, dict[int, list[_DamageArea]]] = {}
         for side, section in self.geometry.sections.items():
             cells: dict[int, list[_DamageArea]] = {}
-            for area in _faces(section.carriageway.pavement):
+            for area in _faces(section.carriageway.pavement, self.geometry.length):
                 for cell in range(int(area.low // _CELL), int(area.high // _CELL) + 1):
                     cells.setdefault(cell, []).append(area)
             result[side] = cells
         return result
 
 
-def _faces(pavement: Pavement) -> Iterator[_DamageArea]:
+def _faces(pavement: Pavement, length: float) -> Iterator[_DamageArea]:
+    for marking in pavement.removed_markings:
+        for outline in removed_outlines(marking, pavement, length):
+            yield _area(outline, damage_height(marking), levels=False)
     for crack in pavement.cracks:
         for outline in crack_outlines(crack):
             yield _area(outline, damage_height(crack), levels=False)
@@ -138,15 +140,12 @@ def _faces(pavement: Pavement) -> Iterator[_DamageArea]:
             yield _area(outline, damage_height(patch), levels=True)
 
 
-def damage_height(item: Patch | Crack) -> float:
-    """Return the height (m) above the pavement around of a patch, or of a crack: minus its depth."""
+def damage_height(item: Patch | Crack | RemovedMarking) -> float:
+    """Return the height (m) above the pavement around of a patch; of a crack or old marking minus its depth."""
     return item.height if isinstance(item, Patch) else -item.depth
 
 
 def _area(outline: Float, height: float, levels: bool) -> _DamageArea:
     """Return the face of a convex outline (K, 2) that goes against the clock."""
-    edges = np.roll(outline, -1, axis=0) - outline
-    normal = np.column_stack([edges[:, 1], -edges[:, 0]])
-    distance = np.einsum("ij,ij->i", normal, outline)
     low, high = outline[:, 0].min(), outline[:, 0].max()
-    return _DamageArea(np.column_stack([normal, distance]), float(low), float(high), height, levels)
+    return _DamageArea(edges_of(outline), float(low), float(high), height, levels)

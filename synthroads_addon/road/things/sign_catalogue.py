@@ -27,6 +27,7 @@ Pictogram = Literal[
     "bars_1",
     "bars_2",
     "bars_3",
+    "down_arrow",
 ]
 
 

@@ -38,7 +38,14 @@ def plan_random_signs(layout: Layout, rng: np.random.Generator) -> None:
     for roadside in layout.sides.values():
         for _ in range(_count(SIGNS_PER_KM, layout, rng)):
             station = layout.length * rng.random()
-            place_sign(roadside, pick(rng, codes), station, layout.length, destination_values(rng), pick(rng, SHIFTS))
+            place_sign(
+                roadside,
+                pick(rng, codes),
+                station,
+                layout.length,
+                destination_values(rng, layout.site),
+                pick(rng, SHIFTS),
+            )
 
 
 def plan_random_equipment(layout: Layout, rng: np.random.Generator) -> None:

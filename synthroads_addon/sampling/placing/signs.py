@@ -16,6 +16,7 @@ from ...road.turnout_geometry import STEP, TurnoutShape
 from .edge import island_begin, ramp_station
 from .layout import MEDIAN_BARRIER_HALF, MEDIAN_OBSTACLE, Layout, PlacementRequest, Roadside
 from .ranges import Range, nearest_free
+from .site import PlacementSite
 
 CURVE_SIGNS = (400.0, 200.0)
 """Distances before a tight curve at which its danger sign stands, m."""
@@ -60,6 +61,7 @@ def plan_exit_signs(layout: Layout, rng: np.random.Generator) -> None:
         for turnout in layout.site.turnouts_of_kind(side, "exit"):
             number, names = str(rng.integers(1, 100)), _names(rng, 3)
             values = {"number": number, "exit": names[0], "near": names[1], "middle": names[1], "far": names[2]}
+            values["motorway"] = motorway_number(layout.site)
             for distance, code in EXIT_SEQUENCE.items():
                 station = roadside.ahead(layout.site.begin(turnout), -distance)
                 place_sign(roadside, code, station, EXIT_SIGN_ROOM, values)
@@ -137,12 +139,18 @@ def place_sign_on_both_sides(layout: Layout, roadside: Roadside, code: str, stat
     median.signs.append(TrafficSign(instance=1, **fields))
 
 
-def destination_values(rng: np.random.Generator) -> dict[str, str]:
+def motorway_number(site: PlacementSite) -> str:
+    """Return the number of a road, such as "A 44", the same on all of its signs."""
+    return f"A {int(site.stream('motorway number').integers(1, 100))}"
+
+
+def destination_values(rng: np.random.Generator, site: PlacementSite) -> dict[str, str]:
     """Return drawn values for the texts of boards: a number, a name, and names with growing distances."""
     names = _names(rng, 4)
     distances = np.cumsum(rng.integers(3, 60, 3)).tolist()
     near, middle, far = (f"{name} {distance} km" for name, distance in zip(names[1:], distances, strict=True))
-    return {"number": str(rng.integers(1, 100)), "exit": names[0], "near": near, "middle": middle, "far": far}
+    values = {"number": str(rng.integers(1, 100)), "exit": names[0], "near": near, "middle": middle, "far": far}
+    return values | {"motorway": motorway_number(site)}
 
 
 def median_signs(layout: Layout) -> Iterator[tuple[str, TrafficSign]]:
@@ -165,7 +173,8 @@ def _behind_entry(
     end = roadside.ahead(layout.site.begin(turnout), turnout.length)
     if limit:
         place_sign(roadside, limit, roadside.ahead(end, LIMIT_BEHIND_ENTRY), _ROOM)
-    place_sign(roadside, "453", roadside.ahead(end, TABLE_BEHIND_ENTRY), _ROOM, destination_values(rng))
+    values = destination_values(rng, layout.site)
+    place_sign(roadside, "453", roadside.ahead(end, TABLE_BEHIND_ENTRY), _ROOM, values)
 
 
 def _announce_construction(layout: Layout, roadside: Roadside, zone: Range) -> None:

@@ -15,6 +15,7 @@ from ...road.things.sign_catalogue import sign_catalogue
 from .draw import draw, pick
 from .layout import SMALL_ZONE, Layout, Roadside
 from .ranges import Reservations, draw_start, free_ranges
+from .signs import motorway_number
 
 Kind = Literal["one_sided", "two_sided", "cantilever"]
 BEAMS: tuple[tuple[Literal["box", "truss", "tube"], float, float], ...] = (
@@ -175,7 +176,9 @@ def _signs(
             width=round_value(width),
             height=DISPLAY_SIZE if displays else pick(rng, DESTINATION_HEIGHTS),
             kind="display" if displays else "destination",
-            text=(pick(rng, DISPLAY_TEXTS),) if displays else (pick(rng, names), pick(rng, names)),
+            text=(pick(rng, DISPLAY_TEXTS),)
+            if displays
+            else (motorway_number(layout.site), pick(rng, names), pick(rng, names)),
         )
 
 

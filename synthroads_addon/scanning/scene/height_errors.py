@@ -28,7 +28,7 @@ def mesh_height_errors(
         names: classes of the faces that belong to the analytic surface.
     """
     rng = stream(0, "mesh height errors")
-    laid_on = geometry.numbers.patches_and_cracks()
+    laid_on = geometry.numbers.laid_on()
     of_surface = np.isin(mesh.class_id, [class_id(name) for name in names]) & ~np.isin(mesh.instance_id, laid_on)
     faces = np.flatnonzero(of_surface)
     area = mesh.areas()[faces]

@@ -8,11 +8,13 @@ from numpy.typing import NDArray
 
 from ...road.geometry import RoadGeometry
 from ...road.objects import RoadObject
-from ...road.section import Arrow, Carriageway, Crack, Hatching, LineMarking, Median, Patch, Turnout
+from ...road.pavement.cover import MarkingFilms
+from ...road.pavement.joints import joint_width, joints_of
+from ...road.section import Arrow, Carriageway, Crack, Hatching, LineMarking, Median, Patch, RemovedMarking, Turnout
 from ..attributes import attributes_of
 from ..faces import Faces, Int, join_faces
 from ..strips import StripSurface, strip_surfaces
-from ..surfaces import damaged_surface, dash_surfaces, painted_surface, pothole_surface
+from ..surfaces import damaged_surface, dash_surfaces, joint_surface, painted_surface, pothole_surface
 from .model import CityGeometry, CityObject, line_faces
 
 Float = NDArray[np.float64]
@@ -38,6 +40,7 @@ _FUNCTIONS = {
 """Kind of strip -> what it is for."""
 _LANES = {"exit": "deceleration lane", "entry": "acceleration lane"}
 _DRIVEN = ("lane", "turnout_lane")
+_DAMAGE_FUNCTIONS = {Patch: "patch", Crack: "crack", RemovedMarking: "removed marking"}
 
 
 def road_objects(geometry: RoadGeometry, stations: Float, tolerance: float) -> Iterator[CityObject]:
@@ -100,14 +103,24 @@ def _surfaces(geometry: RoadGeometry, stations: Float, tolerance: float) -> dict
             about |= pothole.model_dump()
             surfaces.append((about, pothole_surface(geometry, pothole, tolerance)))
         pavement = carriageway.pavement
-        first = len(pavement.ruts) + len(pavement.potholes)
-        laid: list[Patch | Crack] = [*pavement.patches, *pavement.cracks]
+        first, films = len(pavement.ruts) + len(pavement.potholes), MarkingFilms(geometry, carriageway.side)
+        laid: list[Patch | Crack | RemovedMarking] = [*pavement.patches, *pavement.cracks, *pavement.removed_markings]
         for number, damage in enumerate(laid, first):
             part, instance = geometry.numbers.part(name, number)
-            about = {"type": "+PavementDamage", "function": type(damage).__name__.lower(), "id": part}
+            about = {"type": "+PavementDamage", "function": _DAMAGE_FUNCTIONS[type(damage)], "id": part}
             about |= {"instance": instance} | damage.model_dump(exclude={"outline", "lines"})
-            surfaces.append((about, damaged_surface(geometry, damage, stations)))
+            surfaces.append((about, damaged_surface(geometry, damage, carriageway.side, stations, films)))
+        surfaces += _joints(geometry, name, carriageway, stations)
     return {instance: [pair for pair in pairs if len(pair[1])] for instance, pairs in by_road.items()}
+
+
+def _joints(geometry: RoadGeometry, name: str, carriageway: Carriageway, stations: Float) -> Iterator[Surface]:
+    """Yield the semantic surfaces of a carriageway's joints, one each."""
+    section, pavement = geometry.sections[carriageway.side], carriageway.pavement
+    same = {"instance": carriageway.instance, "width": joint_width(section), "depth": pavement.joint_depth}
+    for number, joint in enumerate(joints_of(section, stations)):
+        about = {"type": "+PavementJoint", "function": f"{joint.kind} joint", "id": f"{name}/joint-{number}"}
+        yield about | same | {"sealed": pavement.is_concrete}, joint_surface(geometry, joint, stations)
 
 
 def _strip_semantics(geometry: RoadGeometry, surface: StripSurface) -> dict[str, Any]:

@@ -18,11 +18,25 @@ from ...road.geometry import SurfaceStrip
 from ...road.guidelines import LIMITS
 from ...road.objects import AnyWidth
 from ...road.parameters import RoadParameters
-from ...road.section import Arrow, Carriageway, Crack, Hatching, LineMarking, Median, Patch, Pothole, Rut, Turnout
+from ...road.pavement.cover import MarkingFilms
+from ...road.pavement.joints import joint_width, joints_of
+from ...road.section import (
+    Arrow,
+    Carriageway,
+    Crack,
+    Hatching,
+    LineMarking,
+    Median,
+    Patch,
+    Pothole,
+    RemovedMarking,
+    Rut,
+    Turnout,
+)
 from ...road.section_geometry import CarriagewaySection
 from ...road.turnout_geometry import TURNOUT_STRIPS, TurnoutShape
-from ..faces import Faces
-from ..surfaces import damaged_surface, dash_surfaces, painted_surface
+from ..faces import Faces, join_faces
+from ..surfaces import damaged_surface, dash_surfaces, joint_surface, painted_surface
 from .entities import Entity, Float, IfcFile, rounded
 from .scene import Scene, grid_triangles
 
@@ -43,7 +57,6 @@ _PART_TYPES = {
 }
 """Kind of strip -> type of its road part; the others, edge strips, have none in IFC."""
 _TURNOUT_TYPES = {"emergency_bay": "LAYBY", "exit": "ROADSEGMENT", "entry": "ROADSEGMENT"}
-_PAVEMENTS = {"asphalt": "FLEXIBLE", "concrete": "RIGID"}
 
 
 def write_road(ifc: IfcFile, parameters: RoadParameters, site: Entity) -> Entity:
@@ -130,7 +143,7 @@ class _CarriagewayWriter:
         scene.parts[f"carriageway-{carriageway.side}"] = self.part
         scene.add_parameters(self.part, carriageway)
         pieces = list(self._pieces())
-        kind = _PAVEMENTS[carriageway.pavement.kind]
+        kind = "RIGID" if carriageway.pavement.is_concrete else "FLEXIBLE"
         self.pavement = self.ifc.add_product("IfcPavement", self.name, kind, Name=f"{self.name}/pavement")
         self.ifc.note_relation("IfcRelContainedInSpatialStructure", self.part, [self.pavement])
         self.ifc.add_labels(self.pavement, carriageway.instance, carriageway.points_class, carriageway.pavement)
@@ -138,6 +151,7 @@ class _CarriagewayWriter:
         for piece in pieces:
             self._write_piece(piece)
         self._write_damage()
+        self._write_joints()
 
     def _pieces(self) -> Iterator[_Piece]:
         strips = [strip for strip in self.scene.geometry.strips if strip.side == self.carriageway.side]
@@ -269,21 +283,48 @@ class _CarriagewayWriter:
             defect = ifc.add_product("IfcSurfaceFeature", name, "DEFECT", kind, placement)
             ifc.add_labels(defect, instance, self.carriageway.points_class, damage)
             ifc.note_relation("IfcRelAdheresToElement", self.pavement, [defect])
-        laid: list[Patch | Crack] = [*pavement.patches, *pavement.cracks]
+        laid: list[Patch | Crack | RemovedMarking] = [*pavement.patches, *pavement.cracks, *pavement.removed_markings]
+        films = MarkingFilms(self.scene.geometry, self.carriageway.side)
         for number, item in enumerate(laid, len(damages)):
             name, instance = self.scene.geometry.numbers.part(self.name, number)
-            mesh = _triangles(damaged_surface(self.scene.geometry, item, self.scene.stations))
+            faces = damaged_surface(self.scene.geometry, item, self.carriageway.side, self.scene.stations, films)
+            mesh = _triangles(faces)
             shape = ifc.shape([ifc.mesh(*mesh, False)], "Tessellation") if mesh else None
-            kind = "patch" if isinstance(item, Patch) else f"{item.kind} crack"
+            kind = _damage_kind(item)
             defect = ifc.add_product("IfcSurfaceFeature", name, "DEFECT", kind, Representation=shape)
             ifc.add_labels(defect, instance, self.carriageway.points_class)
             ifc.note_relation("IfcRelAdheresToElement", self.pavement, [defect])
+
+    def _write_joints(self) -> None:
+        """Add the pavement's joints, those along the road as one feature and those across it as another."""
+        ifc, pavement, scene = self.ifc, self.carriageway.pavement, self.scene
+        joints = list(joints_of(self.section, scene.stations))
+        for kind in ("longitudinal", "transverse"):
+            faces = [joint_surface(scene.geometry, joint, scene.stations) for joint in joints if joint.kind == kind]
+            mesh = _triangles(join_faces(faces))
+            if not mesh:
+                continue
+            name, shape = f"{self.name}/{kind}-joints", ifc.shape([ifc.mesh(*mesh, False)], "Tessellation")
+            feature = ifc.add_product("IfcSurfaceFeature", name, "USERDEFINED", f"{kind} joint", Representation=shape)
+            values = {"class": ifc.value(self.carriageway.points_class)}
+            values |= {
+                "width": ifc.value(joint_width(self.section), "m"),
+                "depth": ifc.value(pavement.joint_depth, "m"),
+            }
+            ifc.add_properties(feature, "SynthRoads", values | {"sealed": ifc.value(pavement.is_concrete)})
+            ifc.note_relation("IfcRelAdheresToElement", self.pavement, [feature])
 
     def _rut_offset(self, rut: Rut) -> float:
         """Return the offset of the middle of a rut's lane at the rut's start, m."""
         lane = min(rut.lane, len(self.carriageway.lanes) - 1)
         boundaries = self.section.lane_boundaries(rut.start_station)[0]
         return self.carriageway.sign * float(boundaries[lane] + boundaries[lane + 1]) / 2.0
+
+
+def _damage_kind(item: Patch | Crack | RemovedMarking) -> str:
+    if isinstance(item, Crack):
+        return f"{item.kind} crack"
+    return "patch" if isinstance(item, Patch) else "removed marking"
 
 
 def _range(shape: TurnoutShape, length: float) -> tuple[float, float]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...base.arrays import Float
 from ...road.objects import RoadObject
-from ...road.paint import arrow_outlines, hatching_outlines
+from ...road.pavement.cover import painted_outlines
 from ...road.section import Arrow, Hatching, LineMarking
 from ...road.things.body import Body
 from ...road.things.thing import LengthwiseThing, StandingThing, Thing
@@ -143,7 +143,7 @@ class Objects:
     def painted(self, name: str, item: Hatching | Arrow) -> None:
         """Add a hatched area or an arrow as a `roadMark` object, its parts as outlines in road coordinates."""
         geometry = self.ground.geometry
-        parts = hatching_outlines(geometry, item) if isinstance(item, Hatching) else arrow_outlines(item)
+        parts = painted_outlines(geometry, item)
         if not parts:
             return
         corners = np.concatenate(parts)

@@ -12,12 +12,13 @@ from synthroads_addon.base.arrays import Float
 from synthroads_addon.blender.cameras.calculator import calculator
 from synthroads_addon.blender.casters.embree import EmbreeCaster
 from synthroads_addon.blender.materials import RoadMaterials, material
-from synthroads_addon.blender.materials.pavement import ATTRIBUTE, SHAPE, look_group
+from synthroads_addon.blender.materials.pavement import AGE, ATTRIBUTE, SHAPE, look_group
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.road.damage import DAMAGES
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.pavement.age import strip_contrasts
 from synthroads_addon.road.pavement.field import (
     CODES,
     PAINT_BESIDE,
@@ -50,17 +51,21 @@ PLACES = 100_000
 @pytest.mark.parametrize("kind", ["asphalt", "concrete", "paint"])
 def test_nodes_and_arrays_give_the_same_field(kind: str) -> None:
     rng, wear, slab = np.random.default_rng(7), Wear(0.5, 4711.0), 4.5
-    code = place_code(rng.integers(0, 27, PLACES), rng.integers(0, 2, PLACES), 1.75)
+    code = place_code(rng.integers(0, 28, PLACES), rng.integers(0, 2, PLACES), 1.75)
     across = rng.uniform(-2.5, 2.5, PLACES)
     values = np.zeros((PLACES, 4), np.float32)
     values[:, :3] = np.column_stack([rng.uniform(-20.0, 3000.0, PLACES), across, code])
     shape = Shape(0.5, 0.25)
     shapes = np.tile(np.array([slab, shape.joints, shape.tracks, 0.0], np.float32), (PLACES, 1))
-    feed = {SurfaceInput("attribute", ATTRIBUTE): values, SurfaceInput("attribute", SHAPE): shapes}
+    ages = np.zeros((PLACES, 4), np.float32)
+    ages[:, 0] = rng.uniform(-0.6, 0.5, PLACES)
+    feed = {
+        SurfaceInput("attribute", name): given for name, given in ((ATTRIBUTE, values), (SHAPE, shapes), (AGE, ages))
+    }
     outputs = {"roughness": "Brightness", "specular": "Roughness"} | ({"metallic": "Height"} if kind != "paint" else {})
     with calculator({0: _probe(kind, wear, outputs)}, tuple(outputs)) as work:
         found = work.calculate(np.zeros(PLACES, np.intp), {what: feed[what] for what in work.inputs_of(0)})
-    calculus, place = ArrayCalculus(), PavementPlace(*values[:, :3].T.astype(np.float64))
+    calculus, place = ArrayCalculus(), PavementPlace(*values[:, :3].T.astype(np.float64), ages[:, 0].astype(np.float64))
     if kind == "paint":
         look, height = paint_look(calculus, place, wear), None
     elif kind == "asphalt":
@@ -89,7 +94,7 @@ def _probe(kind: str, wear: Wear, outputs: dict[str, str]) -> bpy.types.Material
     for name, value in zip(("Polish", "Seed"), wear, strict=True):
         if name in group.inputs:
             group.inputs[name].default_value = value
-    for name, entry in ((ATTRIBUTE, "Place"), (SHAPE, "Shape")):
+    for name, entry in ((ATTRIBUTE, "Place"), (SHAPE, "Shape"), (AGE, "Age")):
         if entry not in group.inputs:
             continue
         attribute = nodes.new("ShaderNodeAttribute")
@@ -108,8 +113,9 @@ def test_the_mesh_says_where_on_the_pavement_its_points_are() -> None:
     geometry = RoadGeometry(parameters)
     road = build_road(parameters, 0.005, 1.0, {"road"}).objects["Road"]
     mesh = road.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-    offset, place, shape = (np.empty((len(mesh.vertices), parts), np.float32) for parts in (1, 3, 3))
-    mesh.attributes["offset"].data.foreach_get("value", offset.ravel())
+    offset, place, shape, age = (np.empty((len(mesh.vertices), parts), np.float32) for parts in (1, 3, 3, 1))
+    for name, values in (("offset", offset), (AGE, age)):
+        mesh.attributes[name].data.foreach_get("value", values.ravel())
     for name, values in ((ATTRIBUTE, place), (SHAPE, shape)):
         mesh.attributes[name].data.foreach_get("vector", values.ravel())
     offset = offset[:, 0]
@@ -120,11 +126,17 @@ def test_the_mesh_says_where_on_the_pavement_its_points_are() -> None:
         rows = paved[sign * offset[paved] > 0.0]
         section = geometry.sections[side]
         # Points on a boundary belong to the strips on both of its sides: a hair to either one is one of them.
+        contrasts = strip_contrasts(section, parameters.materials.asphalt_age)
         found = [
-            pavement_places(section, station[rows], offset[rows].astype(np.float64) + nudge) for nudge in (-1e-4, 1e-4)
+            pavement_places(section, station[rows], offset[rows].astype(np.float64) + nudge, contrasts)
+            for nudge in (-1e-4, 1e-4)
         ]
-        off = [np.abs(one.across - across[rows]) + np.abs(one.code - code[rows]) for one in found]
+        off = [
+            np.abs(one.across - across[rows]) + np.abs(one.code - code[rows]) + np.abs(one.age - age[rows, 0])
+            for one in found
+        ]
         assert np.minimum(*off).max() < 1e-3, side
+        assert (np.ptp(age[rows]) > 0.02) == (side == "right")
         pavement = section.carriageway.pavement
         values = (pavement.slab_length, pavement.joint_depth, pavement.wheel_track_depth)
         assert shape[rows] == pytest.approx(np.tile(values, (len(rows), 1)))

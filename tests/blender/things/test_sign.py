@@ -53,6 +53,7 @@ THIN = 1e-9  # m2
 def catalogue_sign(code: str, station: float, offset: float, **more: Any) -> Data:
     sign = sign_catalogue().signs[code]
     values = {"exit": "Eschweiler", "number": "5", "near": "Kerpen", "middle": "Bergheim", "far": "Aachen"}
+    values["motorway"] = "A 4"
     fields = sign.fields() | {"code": code, "text": [line.format(**values) for line in sign.text]}
     return {"type": "TrafficSign", "station": station, "offset": offset, **fields, **more}
 
@@ -210,7 +211,7 @@ class TestWriting:
             else:
                 lines.append([low, high])
         tops = [high for _, high in lines]
-        assert len(lines) == 3
+        assert len(lines) == 4
         assert all(after - before == pytest.approx(tops[1] - tops[0], abs=0.03) for before, after in pairwise(tops))
         assert np.ptp(own[..., 0]) < 0.9 * sign_of(road, "453").width
 

@@ -113,6 +113,7 @@ class Case:
 
 
 CHECKS = {"material": "asphalt", "folder": str(TEXTURES / "asphalt" / "checks")}
+NODES = {"colour.source": "nodes"}
 CHECKERED = {"materials.textures": [CHECKS]}
 OTHER_ROAD = Case(value="left")
 OTHER_TURNOUT = Case(value="entry")
@@ -172,6 +173,10 @@ CASES: dict[str, Case] = {
     "Carriageway.pavement.cracks[].kind": Case(
         owner="right", scan={"cloud.attributes": ["range", "incidence", "damage"]}
     ),
+    "Carriageway.pavement.lane_ages": Case(owner="right", value=[0.02], scan=NODES),
+    "Carriageway.pavement.shoulder_age": Case(owner="right", value=0.02, scan=NODES),
+    "Carriageway.pavement.removed_markings": Case(owner="right", value=[]),
+    "Carriageway.pavement.removed_markings[].dash_length": Case(owner="right", value=8.0),
     "LineMarking.instance": Case(owner="free"),
 }
 """Path of a field -> how it is looked at; see `Case`. A field that isn't here is looked at on the usual objects."""
@@ -215,6 +220,10 @@ DAMAGE = {
     "ruts": [{"lane": 0, "start_station": 10.0, "end_station": 50.0, "depth": 0.03}],
     "potholes": [{"station": 20.0, "offset": -5.0, "length": 1.0, "width": 0.8, "depth": 0.05}],
     "patches": [{"outline": [[5.0, -5.0], [15.0, -5.0], [15.0, -3.0], [5.0, -3.0]], "age": 0.1}],
+    "lane_ages": [0.8],
+    "removed_markings": [
+        {"offset": -4.4, "width": 0.6, "dash_length": 6.0, "gap_length": 6.0, "start_station": 9.0, "end_station": 50.0}
+    ],
     "cracks": [{"kind": "longitudinal", "width": 0.15, "lines": [[[8.0, -6.0], [30.0, -6.2], [55.0, -6.0]]]}],
 }
 

@@ -90,7 +90,7 @@ def exact_triangles(geometry: RoadGeometry, low: float, high: float, scan: ScanP
 
 def is_laid_on(geometry: RoadGeometry, instance: Any) -> Any:
     """Return which of some instances are patches or cracks: a patch fills the ruts below it."""
-    return np.isin(instance, geometry.numbers.patches_and_cracks())
+    return np.isin(instance, geometry.numbers.laid_on())
 
 
 MESH: dict[int, Any] = {}

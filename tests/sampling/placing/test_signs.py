@@ -1,5 +1,6 @@
 """Traffic signs: their catalogue, and where they stand."""
 
+import re
 from typing import Any
 
 import pytest
@@ -130,9 +131,10 @@ def test_distance_tables_stand_behind_entries() -> None:
     furniture = place(make_site(straight(1500.0), turnouts=[entry_at(300.0)], **SIGNS))
     (table,) = coded(furniture, "453")
     assert table.station == pytest.approx(700.0 + 250.0)
-    distances = [int(line.split()[-2]) for line in table.text]
+    assert re.fullmatch(r"A \d{1,2}", table.text[0])
+    distances = [int(line.split()[-2]) for line in table.text[1:]]
     assert distances == sorted(distances)
-    assert all(line.endswith(" km") for line in table.text)
+    assert all(line.endswith(" km") for line in table.text[1:])
     assert not coded(place(make_site(straight(1500.0), turnouts=[bay_at(300.0)], **SIGNS)), "453")
 
 

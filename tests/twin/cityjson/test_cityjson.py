@@ -16,7 +16,7 @@ import pytest
 
 from synthroads_addon.base.classes import classes
 from synthroads_addon.road.geometry import RoadGeometry
-from synthroads_addon.road.instances import InstanceNumbers
+from synthroads_addon.road.instances import InstanceNumbers, damage_kinds
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.section import Carriageway, LineMarking
 from synthroads_addon.road.surroundings import Vegetation
@@ -263,7 +263,7 @@ def test_ids_and_instances_are_those_of_the_set_and_the_cloud(
         *(
             name
             for name, item in road.of_type(Carriageway).items()
-            if item.pavement.potholes or item.pavement.patches or item.pavement.cracks
+            if damage_kinds(item.pavement).count("rut") < len(damage_kinds(item.pavement))
         ),
     }
     wanted = {

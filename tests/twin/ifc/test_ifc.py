@@ -503,7 +503,7 @@ def test_the_structure_of_the_road(road) -> None:
         assert len(lanes) == len(carriageway.lanes)
         inside = [item for rel in part.ContainsElements for item in rel.RelatedElements]
         (pavement,) = [item for item in inside if item.is_a("IfcPavement")]
-        assert pavement.PredefinedType == {"asphalt": "FLEXIBLE", "concrete": "RIGID"}[carriageway.pavement.kind]
+        assert pavement.PredefinedType == ("RIGID" if carriageway.pavement.is_concrete else "FLEXIBLE")
         assert all(course.is_a("IfcCourse") for course in parts(pavement))
     for name, turnout in parameters.of_type(Turnout).items():
         part = named(file, name, "IfcRoadPart")

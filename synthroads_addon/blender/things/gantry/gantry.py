@@ -240,7 +240,9 @@ def _add_face(builder: ModelBuilder, name: str, gantry: Gantry, place: int, sign
 
 
 def _board_inputs(sign: GantrySign) -> dict[str, Any]:
-    return face_inputs(FaceStyle("blue", "white", "white"), "rectangle", sign.width, sign.height, sign.text)
+    return face_inputs(
+        FaceStyle("blue", "white", "white", "down_arrow"), "rectangle", sign.width, sign.height, sign.text
+    )
 
 
 def _display_inputs(sign: GantrySign) -> dict[str, Any]:

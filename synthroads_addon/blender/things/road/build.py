@@ -10,12 +10,23 @@ from ....base.turns.stepper import run_aside
 from ....road.geometry import RoadGeometry, sections_of
 from ....road.objects import nominal_width
 from ....road.parameters import RoadParameters
+from ....road.pavement.age import age_contrast, lane_contrasts
 from ....road.section import Carriageway, LineMarking, Median
 from ...nodes.inputs import input_name
 from ..meshes import attribute, fill, signed_instance
 from ..model_builder import ModelBuilder
 from ..registry import model_part
-from .layout import detail_points, names_in_words, road_layout, side_of, strip_widths, varying_widths, width_field
+from .layout import (
+    aged_strips,
+    brightness_field,
+    detail_points,
+    names_in_words,
+    road_layout,
+    side_of,
+    strip_widths,
+    varying_widths,
+    width_field,
+)
 from .markings import LINE_FIELDS
 from .road import road_group
 
@@ -73,6 +84,7 @@ def _road_inputs(
             joint_depth=carriageway.pavement.joint_depth,
             wheel_track_depth=carriageway.pavement.wheel_track_depth,
         )
+        give(side, **_age_inputs(carriageway, parameters.materials.asphalt_age))
     for median in parameters.of_type(Median).values():
         if len(parameters.of_type(Carriageway)) == 2:
             give("Median", instance=median.instance)
@@ -91,6 +103,14 @@ def _road_inputs(
         if line.kind == "free":
             give(place, distance=nominal_width(line.offset))
     return inputs
+
+
+def _age_inputs(carriageway: Carriageway, road_age: float) -> dict[str, float]:
+    """Return how much brighter a carriageway's lanes and shoulder are for their age, by input field."""
+    pavement, lanes = carriageway.pavement, len(carriageway.lanes)
+    contrasts = lane_contrasts(pavement, lanes, road_age)
+    contrasts = [*contrasts[::-1], age_contrast(pavement, pavement.shoulder_age, road_age)]
+    return {brightness_field(strip): value for strip, value in zip(aged_strips(lanes), contrasts, strict=True)}
 
 
 def _first_dash(name: str, line: LineMarking, geometry: RoadGeometry) -> int:

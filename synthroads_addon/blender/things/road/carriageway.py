@@ -26,12 +26,13 @@ from ...nodes.inputs import (
     socket,
 )
 from ...nodes.strip import StripFaces, strip_group
-from .layout import TURNOUT_NAMES, detail_field, strips_of, width_field
+from .layout import TURNOUT_NAMES, aged_strips, brightness_field, detail_field, strips_of, width_field
 
 _FAR = (0.0, 1000.0)
 _UNPAVED = ("Verge", "Island")
 _WIDTHS = {"Inner Edge Strip": 0.5, "Outer Edge Strip": 0.5, "Hard Shoulder": 2.5, "Verge": 1.5}
 _LANE = 3.5
+_CONTRAST = (-1.0, 4.0)
 _CROSSFALL = "Fall of the pavement to the right (m/m), which may be a field"
 
 
@@ -101,6 +102,7 @@ class _PavementPlace(Inputs):
     slab_length = metres(5.0, (2.0, 20.0), "Distance of a concrete pavement's joints")
     joint_depth = metres(0.002, (0.0, 0.05), "Depth of joints below the pavement")
     wheel_track_depth = metres(0.003, (0.0, 0.02), "Depth of the outermost lane's wheel tracks")
+    brightness = number(0.0, _CONTRAST, "By how much it is brighter for its age than its material, as a share")
 
 
 @makes_group("SR Pavement Place")
@@ -108,7 +110,8 @@ def pavement_place_group(tree: Tree) -> None:
     """A strip of pavement whose points know where they lie on it, for the materials.
 
     The attribute ``pavement`` is the station, the distance from the lane's middle, a code of strip and lane's width;
-    ``pavement_shape`` the slabs' length, the depths of joints and of wheel tracks.
+    ``pavement_shape`` the slabs' length, the depths of joints and of wheel tracks; ``pavement_age`` by how much it is
+    brighter for its age.
     """
     lane = _PavementPlace(tree)
     with tree.frame("Middle and half width of the lane at each row"):
@@ -123,6 +126,7 @@ def pavement_place_group(tree: Tree) -> None:
         mesh = op.store(lane.strip, "pavement", op.vector(tree, station, across, code))
         shape = op.vector(tree, lane.slab_length, lane.joint_depth, lane.wheel_track_depth)
         mesh = op.store(mesh, "pavement_shape", shape)
+        mesh = op.store(mesh, "pavement_age", lane.brightness)
     tree.output("Mesh", mesh, description="The strip")
 
 
@@ -159,6 +163,12 @@ class SideInputs(Inputs):
     wheel_track_depth = metres(0.003, (0.0, 0.02), "Depth of the outermost lane's wheel tracks")
 
 
+def age_fields(lanes: int) -> dict[str, Input]:
+    """Return the input fields of how bright a carriageway's lanes and shoulder are for their age, by field name."""
+    about = "By how much it is brighter for its age than its material, as a share"
+    return {brightness_field(strip): number(0.0, _CONTRAST, about) for strip in aged_strips(lanes)}
+
+
 class _Place(Inputs):
     backbone = backbone_socket()
     left_side = boolean(False, "On the left of the axis, else on its right")
@@ -175,6 +185,7 @@ def _build(tree: Tree, lanes: int, turnouts: bool) -> None:
     place = _Place(tree)
     widths = inputs_class("Widths", width_fields(lanes, turnouts))(tree)
     side = SideInputs(tree)
+    ages = inputs_class("Ages", age_fields(lanes))(tree).values
     verge = tree.material("Verge Material", "verge", description="Material of the verge")
     more = _Turnouts(tree) if turnouts else None
     strips = strips_of(lanes, turnouts)
@@ -217,6 +228,7 @@ def _build(tree: Tree, lanes: int, turnouts: bool) -> None:
                     slab_length=side.slab_length,
                     joint_depth=side.joint_depth,
                     wheel_track_depth=side.wheel_track_depth,
+                    brightness=ages.get(brightness_field(strips[lane]), 0.0),
                 ).value
             parts.append(mesh)
         at_row = op.sample_index(backbone, distances[-1], op.named_attribute(tree, "row", "INT"))

@@ -40,6 +40,16 @@ def detail_field(strip: str) -> str:
     return f"{strip.lower().replace(' ', '_')}_detail"
 
 
+def aged_strips(lanes: int) -> list[str]:
+    """Return the names of a carriageway's strips that may be of another age than the road: lanes, hard shoulder."""
+    return [*(f"Lane {number}" for number in range(lanes, 0, -1)), "Hard Shoulder"]
+
+
+def brightness_field(strip: str) -> str:
+    """Return the input field name of how bright a strip is for its age: "Lane 1" -> "lane_1_brightness"."""
+    return f"{strip.lower().replace(' ', '_')}_brightness"
+
+
 @dataclass(frozen=True)
 class MarkingLayout:
     """Properties of a line marking that the road's node group is built by.

@@ -16,7 +16,7 @@ from ...nodes.builder import Node, Tree, Value, node_group, offer_group
 from ...nodes.inputs import Input, Inputs, input_name, inputs_class, instance_number, material_of, metres, socket
 from ...nodes.solids import row_of_points
 from ...nodes.strip import strip_group
-from .carriageway import SideInputs, carriageway_group, width_fields
+from .carriageway import SideInputs, age_fields, carriageway_group, width_fields
 from .layout import TURNOUT_NAMES, MarkingLayout, SideLayout, attribute_name, detail_field, strips_of, width_field
 from .markings import declare_line, markings_group
 
@@ -31,6 +31,7 @@ class _Side:
     layout: SideLayout
     widths: Inputs
     inputs: SideInputs
+    ages: Inputs
     details: Inputs
     lines: list[dict[str, Value]]
     surface: Node | None = None
@@ -113,6 +114,7 @@ def _declare_side(tree: Tree, layout: SideLayout) -> _Side:
             layout,
             inputs_class("Widths", width_fields(layout.lanes, varying=layout.varying))(tree, words),
             SideInputs(tree, words),
+            inputs_class("Ages", age_fields(layout.lanes))(tree, words),
             inputs_class("Further", further)(tree, words),
             [],
         )
@@ -148,6 +150,7 @@ def _surface(tree: Tree, side: _Side, backbone: Value, verge: Value) -> Node:
         crossfall=op.named_attribute(tree, f"crossfall_{layout.side.lower()}"),
         **values,
         **side.inputs.values,
+        **side.ages.values,
         verge_material=verge,
     )
 

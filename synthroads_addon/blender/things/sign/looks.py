@@ -64,6 +64,7 @@ _DRAWING: dict[str, Box] = {
 }
 # Pictograms that share a rectangular board with writing: the writing's box, and the pictogram's.
 _SHARED: dict[str, tuple[Box, Box]] = {
+    "down_arrow": ((0.06, 0.94, 0.36, 0.96), (0.38, 0.62, 0.05, 0.34)),
     "exit_arrow": ((0.06, 0.68, 0.06, 0.94), (0.72, 0.95, 0.1, 0.9)),
     **dict.fromkeys(("bars_1", "bars_2", "bars_3"), ((0.08, 0.92, 0.68, 0.97), (0.12, 0.88, 0.05, 0.66))),
 }

@@ -120,6 +120,7 @@ PICTOGRAMS: dict[str, list[Polygon]] = {
     "bars_1": _bars(1),
     "bars_2": _bars(2),
     "bars_3": _bars(3),
+    "down_arrow": [_arrow([(0.0, 0.5), (0.0, -0.5)], 0.2, 2.6)],
 }
 """Polygons of each pictogram."""
 NAMES = ("none", *PICTOGRAMS)

@@ -47,6 +47,13 @@ def _models() -> dict[str, list[dict[str, Any]]]:
     return models
 
 
+def plates_of(model: str) -> list[tuple[tuple[float, float, float], tuple[float, float, float]]]:
+    """Return the middle and size of each of a model's number plates, m."""
+    parts = [part for frame in _models()[model] for part in frame["parts"] if part["part"] == "boxes"]
+    items = [item for part in parts for item in part["items"] if item[0] == "plate"]
+    return [(_as_tuples(middle), _as_tuples(size)) for _, middle, size in items]
+
+
 def _settings(part: dict[str, Any]) -> dict[str, Any]:
     """Return a preset part's arguments without its "part", lists as tuples as nodes take vectors."""
     return {name: _as_tuples(value) for name, value in part.items() if name != "part"}

@@ -18,6 +18,7 @@ from ..model_builder import ModelBuilder
 from ..registry import model_part
 from .details import VehicleMaterials
 from .models import model_group
+from .surface import mark_places, registration, write_plates
 
 _POINTS = (
     "One point per vehicle, below its middle, at any height, with heading (rad), grade of the road ahead (m/m), "
@@ -33,6 +34,7 @@ def vehicle_group(model: str) -> bpy.types.NodeTree:
 
 class _Vehicles(Inputs):
     points = socket("Geometry", _POINTS)
+    registration = socket("String", "What is written on the number plates; empty for nothing")
     road = socket("Object", "Surface that they drive on")
 
 
@@ -40,6 +42,8 @@ def _build(tree: Tree, model: str) -> None:
     traffic, materials = _Vehicles(tree), VehicleMaterials(tree)
     with tree.frame("Vehicle"):
         body = tree.call(model_group(model), **materials.values).value
+        body = op.join(body, write_plates(tree, model, traffic.registration, materials.black_material))
+        body = mark_places(body, model)
     with tree.frame("On the road"):
         chassis = CHASSIS[model]
         vehicles = tree.call(
@@ -128,7 +132,8 @@ def build_vehicles(builder: ModelBuilder) -> None:
         grade = lines[lane].carriageway.traffic * builder.geometry.profile.grade(np.array([vehicle.station]))
         place = vehicle_place(lines[lane], vehicle)
         mesh = builder.points("Vehicle", [place], {COLOR: np.array([vehicle.color]), "grade": grade})
-        builder.add(name, mesh, vehicle_group(vehicle.model))
+        inputs = {"Registration": registration(builder.parameters.metadata.seed, vehicle.instance)}
+        builder.add(name, mesh, vehicle_group(vehicle.model), inputs)
 
 
 def vehicle_place(line: LaneLine, vehicle: Vehicle) -> PointObject:

@@ -1,0 +1,66 @@
+"""How bright a pavement is at an age: asphalt bleaches as its binder wears off, concrete darkens by rubber and dirt.
+
+Both as measured on pavements in use (National Center for Asphalt Technology & National Concrete Pavement Technology
+Center 2019, Quantifying Pavement Albedo; asphalt's first years: Sen & Roesler 2016, Journal of Cleaner Production 117).
+"""
+
+import math
+
+from ..section import Pavement
+from ..section_geometry import CarriagewaySection
+from .places import strip_lanes
+
+ASPHALT_OF_AGE = (0.38, 0.96, 1.06)
+"""Factor on asphalt under its binder's black film, on the bare aggregate below it, and on old asphalt."""
+_FILM_LASTS = 0.05
+"""Age at which traffic has left 1/e of the binder's film: about a year of twenty."""
+_CONCRETE_OF_AGE = (1.08, 0.88)
+"""Factor on new and on old concrete."""
+
+
+def asphalt_brightness(age: float) -> float:
+    """Return a factor on asphalt's base colour and specular at an age, 0 new, 1 old."""
+    film, bare, old = ASPHALT_OF_AGE
+    return bare + (film - bare) * math.exp(-age / _FILM_LASTS) + (old - bare) * age
+
+
+def concrete_brightness(age: float) -> float:
+    """Return a factor on concrete's base colour and specular at an age, 0 new, 1 old."""
+    new, old = _CONCRETE_OF_AGE
+    return new + (old - new) * age
+
+
+def age_contrast(pavement: Pavement, age: float | None, road_age: float) -> float:
+    """Return by how much a strip of a pavement is brighter than one of the road's age, as a share.
+
+    Args:
+        pavement: the carriageway's.
+        age: the strip's; None for the road's.
+        road_age: 0 new, 1 old.
+    """
+    if age is None:
+        return 0.0
+    brightness = concrete_brightness if pavement.is_concrete else asphalt_brightness
+    return brightness(age) / brightness(road_age) - 1.0
+
+
+def lane_contrasts(pavement: Pavement, lanes: int, road_age: float) -> list[float]:
+    """Return `age_contrast` of each of a carriageway's lanes, from outside."""
+    ages = [*pavement.lane_ages, *[None] * lanes][:lanes]
+    return [age_contrast(pavement, age, road_age) for age in ages]
+
+
+def strip_contrasts(section: CarriagewaySection, road_age: float) -> list[float]:
+    """Return `age_contrast` of each strip of a carriageway, innermost first; edge strips have their lane's."""
+    carriageway = section.carriageway
+    pavement, lanes = carriageway.pavement, len(carriageway.lanes)
+    of_lanes = lane_contrasts(pavement, lanes, road_age)
+    shoulder = age_contrast(pavement, pavement.shoulder_age, road_age)
+    first = section.kinds.index("lane")
+    result = []
+    for number, (_, lane) in enumerate(strip_lanes(section.kinds, lanes)):
+        if section.kinds[lane] == "lane":
+            result.append(of_lanes[lanes - 1 - (lane - first)])
+        else:
+            result.append(shoulder if section.kinds[number] == "hard_shoulder" else 0.0)
+    return result
