@@ -1,8 +1,8 @@
 """How far apart the points of patches lie: the density-aware Chamfer distance.
 
-Of two sets of points S and T it is the mean of
+Of two sets of points S and T it is the mean, over x in S, of
 
-    1/|S| sum over x in S of 1 - exp(-a |x - y|) / n(y),   y being the nearest of T, n(y) how many have y as theirs,
+    1 - exp(-a d(x, y)) / n(y),   y being the nearest of T, d(x, y) its distance, n(y) how many have y as theirs,
 
 and the same the other way round (Wu et al. 2021, Density-aware Chamfer distance as a comprehensive metric for point
 cloud completion, NeurIPS). It is 0 for equal sets and at most 1, whatever single points do, and unlike the Chamfer

@@ -318,7 +318,7 @@ class ChainFit:
 
     @cached_property
     def linear(self) -> tuple[Float, Float]:
-        """Return R (F, F) and b (F,): but for a constant |R d + b|^2 is the sum of squares after a step d (F,)."""
+        """Return R (F, F) and b (F,): but for a constant the square of R d + b is the sum of squares after a step d (F,)."""
         return triangular(self.data.jacobian(self.chain, self.stations), self.residuals)
 
 

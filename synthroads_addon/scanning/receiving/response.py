@@ -4,12 +4,10 @@ Power S is in the unit of an ideal white target struck at a right angle at 1 m; 
 power that saturates the receiver, r the measured range. A number is a share of the full scale, 0 to 1, in steps of
 1 / (2^bits - 1); `power` alone is as it arrives, and isn't rounded.
 
-| response | number |
-|---|---|
-| linear | S / M |
-| range_compensated | S r^2 / full-scale reflectance, as heads for vehicles give |
-| logarithmic | 10 lg(S / T) over 10 lg(M / T) |
-| over_threshold | (S - T) / (M - T) |
+- ``linear``: S / M
+- ``range_compensated``: S r^2 / full-scale reflectance, as heads for vehicles give
+- ``logarithmic``: 10 lg(S / T) over 10 lg(M / T)
+- ``over_threshold``: (S - T) / (M - T)
 
 The logarithmic one is the amplitude above the detection limit in dB (Pfennigbauer and Ullrich 2010, Improving quality
 of laser scanning data acquisition through calibrated amplitude and pulse deviation measurement, Proc. SPIE 7684).

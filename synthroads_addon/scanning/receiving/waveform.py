@@ -1,7 +1,7 @@
 """Echoes that a pulse can't part: the sum of two Gaussian pulses has two peaks or one.
 
 Two echoes of the powers a and b, a distance d apart along the beam, of pulses with the rms length p, have one peak
-together if |ln(a / b)| is at least
+together if the absolute value of ln(a / b) is at least
 
     2 D sqrt(D^2 - 1) - 2 ln(D + sqrt(D^2 - 1)),   D = d / (2 p),
 
