@@ -318,7 +318,7 @@ class ChainFit:
 
     @cached_property
     def linear(self) -> tuple[Float, Float]:
-        """Return R (F, F) and b (F,): but for a constant the square of R d + b is the sum of squares after a step d (F,)."""
+        """Return R (F, F), b (F,): a step d (F,) gives the sum of squares (R d + b)^2, but for a constant."""
         return triangular(self.data.jacobian(self.chain, self.stations), self.residuals)
 
 
