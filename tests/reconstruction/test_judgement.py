@@ -126,6 +126,22 @@ def test_where_the_median_is_paved_the_lines_beside_it_must_do() -> None:
     assert reasons(judged(ground, line(-2.5), line(2.5, 0.0))) == {"neither the median'"}
 
 
+def test_ground_that_is_too_rough_is_no_pavement() -> None:
+    for sigma, doubts in ((0.02, set()), (0.06, {"the ground on its l"})):
+        ground = profiles([(-3.5, 3.5)])
+        ground.height[:] += np.random.default_rng(2).normal(0.0, sigma, ground.height.shape)
+        assert reasons(judged(ground, line(0.0))) == doubts
+
+
+def test_where_views_disagree_the_axis_is_open_and_what_lies_between_is_not_trusted() -> None:
+    ground, rivals = profiles([(-3.5, 3.5)]), np.zeros(ROWS // 5, dtype=bool)
+    rivals[[*range(8, 14), *range(19, 26)]] = True
+    bands = (Band(-4.0, 4.0, [line(0.0)], (line(-4.0, 0.0), line(4.0, 0.0))),)
+    (doubt,) = judge(ground, RoadLayout("single", bands, ground.count, ()), [0.0], rivals).doubts
+    assert (doubt.start, doubt.end) == (30.0, 140.0)
+    assert doubt.reasons == ("views of it disagree by more than 1 m",)
+
+
 # --- thrown clouds ---------------------------------------------------------------------------------------------------
 
 
