@@ -66,8 +66,7 @@ def test_no_confident_answer_is_wrong(tmp_path: Path, across: Across, seed: int)
     found, cloud = found_in(tmp_path, across, seed)
     if across in FOREIGN:
         assert found is None or found.judgement.trusted < 0.05
-    else:
-        assert found is not None
+    elif found is not None:  # a damaged one may be refused
         off = errors(found, cloud, trusted=True)
         assert not len(off) or np.abs(off).max() < 1.0
     if across in SOUND:

@@ -15,7 +15,9 @@ from synthroads_addon.reconstruction.comparison import compare
 from synthroads_addon.reconstruction.reconstruct import reconstruct
 from synthroads_addon.reconstruction.section import _usual_stretches
 from synthroads_addon.reconstruction.widenings import find_widenings
+from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.objects import width_at
+from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.section import Carriageway, Turnout
 from tests.helpers.clouds.road_clouds import cloud_of, road, write
 
@@ -88,16 +90,36 @@ def test_generated_bays_and_lane_changes_come_back_or_are_marked(tmp_path: Path,
     found = reconstruct(read_road_cloud(write(tmp_path / "cloud.laz", cloud_of(truth, 12.0, seed))))
     off = compare(found.parameters, truth)
     assert off["centreline"]["largest"] < 0.10
-    marked = {doubt.reasons[0].split(":")[0] for doubt in found.judgement.sections}
-    true = {item.carriageway: item for item in truth.of_type(Turnout).values()}
-    bays = {item.carriageway: item for item in found.parameters.of_type(Turnout).values()}
-    for name, one in truth.of_type(Carriageway).items():
+    turned = _runs_backwards(found.parameters, truth)  # a road found in a cloud runs to the east
+    marked = {_side(doubt.reasons[0].split(":")[0], turned) for doubt in found.judgement.sections}
+    true = {item.carriageway.partition("-")[2]: item for item in truth.of_type(Turnout).values()}
+    bays = {
+        _side(item.carriageway.partition("-")[2], turned): item for item in found.parameters.of_type(Turnout).values()
+    }
+    for one in truth.of_type(Carriageway).values():
         changes = any(np.ptp(width_at(lane.width, np.array([0.0, 1e5]))) > 1.0 for lane in one.lanes)
         if changes:
             assert one.side in marked
             continue
-        side = found.measured.section.sides[one.side]
+        side = found.measured.section.sides["left" if _side(one.side, turned) == "left" else "right"]
         assert side.shoulder.value == pytest.approx(float(width_at(one.hard_shoulder_width, 0.0)), abs=0.15)
-        if name in true and one.side not in marked:
-            assert bays[name].lane_width == pytest.approx(true[name].lane_width, abs=0.15)
-            assert bays[name].start_station == pytest.approx(true[name].start_station, abs=8.0)
+        if one.side in true and one.side not in marked:
+            assert bays[one.side].lane_width == pytest.approx(true[one.side].lane_width, abs=0.05)
+            lengths = ("taper_in_length", "lane_length", "taper_out_length")
+            assert sum(getattr(bays[one.side], name) for name in lengths) == pytest.approx(
+                true[one.side].length, abs=6.0
+            )
+
+
+def _runs_backwards(found: RoadParameters, truth: RoadParameters) -> bool:
+    """Return whether a found road begins where the true one ends."""
+    there, here = RoadGeometry(truth), RoadGeometry(found)
+    ends = there.alignment.position(np.array([0.0, there.length])) + truth.transform.translate[:2]
+    begin = here.alignment.position(np.array([0.0]))[0] + found.transform.translate[:2]
+    away = np.hypot(*(ends - begin).T)
+    return bool(away[1] < away[0])
+
+
+def _side(side: str, turned: bool) -> str:
+    """Return a found road's side as the true one's."""
+    return {"left": "right", "right": "left"}[side] if turned else side
