@@ -32,6 +32,7 @@ _THERE = 1e-6
 _LEVEL = "lines and places, without bodies"
 _LOST = {
     "Terrain": "there are no surfaces here but the median's",
+    "Landscape": "it lies beyond the ground that the road stands on",
     "strip": "there are no surfaces here but the median's",
     "rut": "there is no damage here",
     "pothole": "there is no damage here",

@@ -25,10 +25,12 @@ FITTINGS = 0.1
 LEVEL = f"true shapes, without fittings that stand out by less than {FITTINGS:g} m"
 
 
+NO_LAND = "its parameters alone: it lies beyond the ground that the road stands on"
+"""What formats with objects for all there is have of the landscape."""
 _NOWHERE = dict.fromkeys(
     ("dash", "strip", "LineMarking", "Hatching", "Arrow", "Turnout", "LengthwiseThing"),
     "nothing of it is on the road, or it has no area",
-) | {"Landscape": "it lies beyond the ground that the road stands on"}
+)
 """Why any file may have no entity for something."""
 
 

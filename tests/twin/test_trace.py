@@ -17,8 +17,8 @@ from tests.helpers.roads.twin_roads import one_of_many
 LOST = {
     "cityjson": set(),
     "ifc": set(),
-    "opendrive": {"Terrain", "Vehicle", "strip", "rut", "pothole", "patch", "crack"},
-    "geojson": {"Terrain", "strip", "rut", "pothole", "patch", "crack"},
+    "opendrive": {"Terrain", "Landscape", "Vehicle", "strip", "rut", "pothole", "patch", "crack"},
+    "geojson": {"Terrain", "Landscape", "strip", "rut", "pothole", "patch", "crack"},
     "opencrg": {*OBJECTS, "dash", "strip", "tree", "shrub"} - {"Alignment", "Carriageway", "Turnout"},
 }
 """Kinds of objects and parts that a format has nothing of."""

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from ...road.geometry import RoadGeometry
-from ...road.surroundings import Terrain, Vegetation
+from ...road.surroundings import Landscape, Terrain, Vegetation
 from ...road.vegetation.species import PlantShape
 from ..attributes import attributes_of
 from ..faces import Faces, Float, loft
 from ..ground import GroundMesh, triangulate_ground
 from ..plants import PlacedPlant, grass_strips, placed_plants
+from ..trace import NO_LAND
 from ..vehicles import placed_vehicles
 from .model import CityGeometry, CityModel, CityObject, solid_geometry
 
@@ -23,7 +24,7 @@ _GROUND, _PLANTS, _BOXES = "2", "2", "1"
 
 
 def add_surroundings(model: CityModel, geometry: RoadGeometry, stations: Float, tolerance: float) -> None:
-    """Add terrain, plants and vehicles to the city model; plants need a terrain.
+    """Add terrain, plants, vehicles and the landscape's parameters to the city model; plants need a terrain.
 
     Args:
         model: the objects of the file.
@@ -35,6 +36,9 @@ def add_surroundings(model: CityModel, geometry: RoadGeometry, stations: Float, 
         ground = triangulate_ground(geometry, terrain, stations, tolerance)
         model.add(_terrain(name, terrain, ground))
         _add_plants(model, geometry, ground)
+    for name, landscape in geometry.parameters.of_type(Landscape).items():
+        model.trace.record_loss(name, NO_LAND)
+        model.add(CityObject(name, "GenericCityObject", attributes_of(landscape)))
     for item in _vehicles(geometry, model):
         model.add(item)
 

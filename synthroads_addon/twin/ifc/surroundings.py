@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from ...road.surroundings import Terrain, Vegetation
+from ...road.surroundings import Landscape, Terrain, Vegetation
 from ...road.vegetation.species import PlantShape
 from ..faces import Faces, loft, triangulate
 from ..ground import GroundMesh, triangulate_ground
 from ..plants import GrassStrip, PlacedPlant, grass_strips, placed_plants
+from ..trace import NO_LAND
 from ..vehicles import PlacedVehicle, placed_vehicles
 from .entities import Entity
 from .scene import Scene
@@ -17,11 +18,14 @@ _MEASURES = ("height", "crownDiameter", "crownBottom", "trunkDiameter", "average
 
 
 def write_surroundings(scene: Scene) -> None:
-    """Add the terrain, its vegetation and the vehicles at time 0 to the IFC file."""
+    """Add the terrain, its vegetation, the landscape's parameters and the vehicles at time 0 to the IFC file."""
     for name, item in scene.geometry.parameters.of_type(Terrain).items():
         ground = triangulate_ground(scene.geometry, item, scene.stations, scene.tolerance)
         _write_ground(scene, name, item, ground)
         _write_plants(scene, ground)
+    for name, landscape in scene.geometry.parameters.of_type(Landscape).items():
+        scene.ifc.trace.record_loss(name, NO_LAND)
+        scene.add_parameters(_geographic(scene, name, "USERDEFINED", None, "Landscape"), landscape)
     vehicles = list(placed_vehicles(scene.geometry))
     scene.cache_surface((placed.vehicle.station, placed.offset) for placed in vehicles)
     for placed in vehicles:

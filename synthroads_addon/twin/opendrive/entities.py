@@ -7,6 +7,7 @@ from .xml import Element
 
 LOST = {
     "Terrain": "OpenDRIVE has no ground beside its lanes",
+    "Landscape": "OpenDRIVE has no ground beside its lanes",
     "strip": "OpenDRIVE has no areas of grass",
     "Vehicle": "OpenDRIVE has no traffic: scenarios are for that (OpenSCENARIO)",
     "rut": "OpenDRIVE has no damage in its surface: OpenCRG is for that",
