@@ -26,7 +26,7 @@ LEVEL = f"true shapes, without fittings that stand out by less than {FITTINGS:g}
 
 
 NO_LAND = "its parameters alone: it lies beyond the ground that the road stands on"
-"""What formats with objects for all there is have of the landscape."""
+"""Reason that formats give for what they leave out of the landscape."""
 _NOWHERE = dict.fromkeys(
     ("dash", "strip", "LineMarking", "Hatching", "Arrow", "Turnout", "LengthwiseThing"),
     "nothing of it is on the road, or it has no area",
