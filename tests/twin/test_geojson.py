@@ -12,7 +12,7 @@ import pytest
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.section import Carriageway, LineMarking, Turnout
-from synthroads_addon.road.surroundings import Terrain, Vegetation
+from synthroads_addon.road.surroundings import Landscape, Terrain, Vegetation
 from synthroads_addon.road.things.gantry import Gantry
 from synthroads_addon.twin.geojson import write_geojson
 from synthroads_addon.twin.plants import placed_plants
@@ -48,7 +48,7 @@ def lines_of(feature: dict[str, Any]) -> list[np.ndarray]:
 def test_every_object_is_there_with_its_instance(index: int, features: Features) -> None:
     road = ROADS[index]()
     found = {(f["properties"]["id"], f["properties"]["instance"]) for f in features[index]}
-    bare = (Terrain, Vegetation)
+    bare = (Terrain, Vegetation, Landscape)
     wanted = {(name, item.instance) for name, item in road.objects.items() if not isinstance(item, bare)}
     assert found == wanted | {(plant.name, plant.instance) for plant in placed_plants(RoadGeometry(road))}
 

@@ -38,7 +38,7 @@ def add_surroundings(model: CityModel, geometry: RoadGeometry, stations: Float, 
         _add_plants(model, geometry, ground)
     for name, landscape in geometry.parameters.of_type(Landscape).items():
         model.trace.record_loss(name, NO_LAND)
-        model.add(CityObject(name, "GenericCityObject", attributes_of(landscape)))
+        model.add(CityObject(name, "GenericCityObject", attributes_of(landscape) | {"class": "ground"}))
     for item in _vehicles(geometry, model):
         model.add(item)
 
