@@ -81,11 +81,26 @@ class SwayingPath:
         # what a Gaussian process hardly ever exceeds.
         reach = np.array([1.0] * 3 + [KNOT_RANGE] * 3)
         sway = 4.0 * float(np.linalg.norm(self.motion.sigma * reach)) * (2.0 * np.pi / self.motion.shortest_period) ** 2
+        sway *= _calmness(self.motion)
         return float((self.planned.knot_spacing**-2 + knot_spacing_for(sway) ** -2) ** -0.5)
 
     def pose(self, strip: Strip, time: Float) -> tuple[Float, Float]:
         """Return the planned path's positions (K, 3), m, and rotations (K, 3, 3), with sway, at times (K,), s."""
         return measured_pose(*self.planned.pose(strip, time), sway_offsets(self.motion, self.seed, strip.index, time))
+
+
+def _calmness(motion: Motion) -> float:
+    """Return the rms acceleration of sway as a share of that with sines that are all alike, 0 to 1."""
+    low, high, exponent = motion.shortest_period, motion.longest_period, motion.period_exponent
+
+    def mean_power(power: float) -> float:
+        """Return the mean power of periods that are even on a logarithmic scale, times their span."""
+        return (high**power - low**power) / power if power else math.log(high / low)
+
+    if exponent == 0.0 or low == high:
+        return 1.0
+    own = mean_power(2.0 * exponent - 4.0) / mean_power(2.0 * exponent)
+    return min(1.0, math.sqrt(own * mean_power(0.0) / mean_power(-4.0)))
 
 
 def sway_offsets(motion: Motion, seed: int, strip: int, time: Float) -> tuple[Float, Float]:

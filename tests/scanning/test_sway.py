@@ -72,8 +72,9 @@ def test_each_strip_and_seed_sways_by_itself() -> None:
     np.testing.assert_array_equal(off_path(1, time[700:701]), first[700:701])
 
 
-def test_between_knots_the_swaying_is_followed() -> None:
-    path = with_motion(Level(), MOTION, 1)
+@pytest.mark.parametrize("exponent", [0.0, 0.5, 1.0])
+def test_between_knots_the_swaying_is_followed(exponent: float) -> None:
+    path = with_motion(Level(), MOTION.model_copy(update={"period_exponent": exponent, "shortest_period": 0.1}), 1)
     assert isinstance(path, SwayingPath)
     assert path.knot_spacing < Level.knot_spacing
 
