@@ -155,7 +155,7 @@ def test_missing_and_unknown_recipes_are_refused(tmp_path: Path) -> None:
 # --- drawn values ----------------------------------------------------------------------------------------------------
 
 FIXED = {"centerline-airborne-even", "centerline-small"}
-"""Recipes that draw nothing: of a sensor without errors, for pairs with another one; and what models have learned from."""
+"""Recipes that draw nothing: of a sensor without errors, for pairs; and one that models have learned from."""
 ONLY_WITH = {
     "scan.receiver.range_walk": "scan.noise.speckle",
     "scan.receiver.faint_range_sigma": "scan.noise.range_sigma",
