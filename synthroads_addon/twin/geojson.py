@@ -38,6 +38,7 @@ _LOST = {
     "pothole": "there is no damage here",
     "patch": "there is no damage here",
     "crack": "there is no damage here",
+    "removed": "there are no traces of markings that were ground off",
 }
 """Type of object, or kind of part -> why the file has none."""
 

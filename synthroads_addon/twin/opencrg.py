@@ -33,7 +33,7 @@ _LOST = dict.fromkeys(
     "the file is a grid of the pavement's heights",
 )
 """Type of object, or kind of part -> why the file has none."""
-_WITHIN = ("rut", "pothole", "patch", "crack")
+_WITHIN = ("rut", "pothole", "patch", "crack", "removed")
 
 
 def write_opencrg(parameters: RoadParameters, path: Path, tolerance: float) -> Trace:

@@ -11,14 +11,15 @@ from synthroads_addon.road.parameters import AlignmentObject, RoadParameters
 from synthroads_addon.road.surroundings import Vegetation
 from synthroads_addon.twin.formats import TWIN_FORMATS, write_twin
 from tests.helpers.files.twin_reports import TwinReport, numbers_in, numbers_of, read_report
+from tests.helpers.roads.damage_outlines import damaged_road
 from tests.helpers.roads.parameter_sets import OBJECTS
 from tests.helpers.roads.twin_roads import one_of_many
 
 LOST = {
     "cityjson": set(),
     "ifc": set(),
-    "opendrive": {"Terrain", "Landscape", "Vehicle", "strip", "rut", "pothole", "patch", "crack"},
-    "geojson": {"Terrain", "Landscape", "strip", "rut", "pothole", "patch", "crack"},
+    "opendrive": {"Terrain", "Landscape", "Vehicle", "strip", "rut", "pothole", "patch", "crack", "removed"},
+    "geojson": {"Terrain", "Landscape", "strip", "rut", "pothole", "patch", "crack", "removed"},
     "opencrg": {*OBJECTS, "dash", "strip", "tree", "shrub"} - {"Alignment", "Carriageway", "Turnout"},
 }
 """Kinds of objects and parts that a format has nothing of."""
@@ -109,3 +110,10 @@ def test_roads_with_everything_are_told(number: int, tmp_path: Path) -> None:
             for entity in entities:
                 if entity.get("element") != "planView":
                     look(entity)
+
+
+def test_damage_of_every_kind_is_told(tmp_path: Path) -> None:
+    road = damaged_road()
+    write_twin(road, tmp_path, TWIN_FORMATS)
+    for name in TWIN_FORMATS:
+        assert faults(road, read_report(tmp_path, name)) == []

@@ -14,6 +14,7 @@ LOST = {
     "pothole": "OpenDRIVE has no damage in its surface: OpenCRG is for that",
     "patch": "OpenDRIVE has no damage on its surface",
     "crack": "OpenDRIVE has no damage on its surface",
+    "removed": "OpenDRIVE has no traces of markings that were ground off",
 }
 """Type of object, or kind of part -> why the file has none."""
 
