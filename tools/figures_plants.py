@@ -1,4 +1,4 @@
-"""Print the table of docs/landscape.md: what an airborne scan sees of a closed stand of trees, in leaf and bare.
+"""Print a table: what an airborne scan sees of a closed stand of trees, in leaf and bare.
 
 python tools/figures_plants.py --species maple spruce
 """

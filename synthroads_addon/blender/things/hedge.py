@@ -18,7 +18,7 @@ _LEAF = [(0.0, -0.5, 0.0), (0.5, 0.3, 0.0), (-0.42, 0.5, 0.0)]
 """A triangle that stands for a twig's leaves: across, along, up."""
 _SIZE = (0.20, 0.30)
 """Width and length of such a triangle, m."""
-_BARE = 0.3
+_BARE = 0.1
 """Width of the twigs that are left of it in winter, as a share of its own."""
 _HOLLOW = 0.5
 """Share of the way to its surface within which a hedge has no leaves."""

@@ -16,7 +16,7 @@ from .plants import BOTTOMS, KINDS
 
 NEEDLES = ("spruce", "pine")
 """Species of trees with needles."""
-BARE_TWIGS = {"leaf_length": 1.6, "leaf_width": 0.3}
+BARE_TWIGS = {"leaf_length": 1.6, "leaf_width": 0.06}
 """Factors on a leaf's triangle that make it the twigs that are left of it in winter."""
 TRUNK_FOOT = 0.02
 """Depth of a trunk's foot in the ground, for a tree of height 1."""
