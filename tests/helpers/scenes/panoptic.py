@@ -22,7 +22,7 @@ from synthroads_addon.jobs.open_scene import RoadScene
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import AlignmentObject, read_parameters
 from synthroads_addon.road.section import LineMarking
-from synthroads_addon.road.surroundings import Vegetation, Vehicle
+from synthroads_addon.road.surroundings import Landscape, Vegetation, Vehicle
 from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scanning.scan import BlockScan
 from synthroads_addon.scanning.scene.caster import FacePlanes
@@ -68,7 +68,7 @@ class PanopticSet:
         """Return the numbers that any twin has an entity of, and that faces can be of."""
         objects = self.road.parameters.objects
         found: set[int] = set().union(*(report.entities for report in self.reports.values()))
-        whole = (AlignmentObject, Vegetation)
+        whole = (AlignmentObject, Landscape, Vegetation)
         bare = {item.instance for item in objects.values() if isinstance(item, whole)}
         lines = self.road.parameters.of_type(LineMarking).values()
         return found - bare - {line.instance for line in lines if line.dash_length}
