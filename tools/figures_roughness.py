@@ -22,7 +22,7 @@ sys.path.insert(0, str(ROOT))
 from synthroads_addon.base.noise import noise_field  # noqa: E402
 from synthroads_addon.base.random_streams import stream  # noqa: E402
 from synthroads_addon.cloud.points import PointBlock  # noqa: E402
-from synthroads_addon.scanning.relief import OCTAVES, RELIEF, MicroRelief, shift_along_normals  # noqa: E402
+from synthroads_addon.scanning.relief.micro_relief import OCTAVES, RELIEF, MicroRelief, shift_along_normals  # noqa: E402
 from tools.surface_variation import plane_residuals, surface_variation  # noqa: E402
 
 Float = NDArray[np.float64]

@@ -96,9 +96,18 @@ class Crack(Model):
     )
 
 
+_DASHES_FIT = when(
+    {"dash_length": {"const": 0}},
+    {"gap_length": {"const": 0}},
+    otherwise={"dash_length": {"minimum": SHORTEST_DASH}, "gap_length": {"minimum": SHORTEST_DASH}},
+)
+"""JSON Schema of `check_dashes`."""
+
+
 class RemovedMarking(Model):
     """A line marking that was ground off: its dashes are left as a brighter, shallow groove beside today's lines."""
 
+    conditions = (_DASHES_FIT,)
     offset: float = quantity(ge=-100, le=100, unit="m", description="Offset of the line's axis.")
     width: float = quantity(ge=0.05, le=1.0, unit="m", description="Width that was ground.")
     dash_length: float = quantity(ge=0, le=100, unit="m", description="Length of a dash; 0 for a solid line.")
@@ -289,11 +298,7 @@ class LineMarking(Marking, RoadObject):
     """
 
     conditions = (
-        when(
-            {"dash_length": {"const": 0}},
-            {"gap_length": {"const": 0}},
-            otherwise={"dash_length": {"minimum": SHORTEST_DASH}, "gap_length": {"minimum": SHORTEST_DASH}},
-        ),
+        _DASHES_FIT,
         when(
             {"kind": {"enum": ["turnout_edge", "gore_edge"]}},
             {"turnout": {"type": "string"}},

@@ -96,8 +96,8 @@ class Vehicle(RoadObject):
 class Village(Model):
     """A village of simple houses around a church."""
 
-    x: float = quantity(ge=-2e4, le=2e4, unit="m", description="Local x of its church.")
-    y: float = quantity(ge=-2e4, le=2e4, unit="m", description="Local y of its church.")
+    x: float = quantity(ge=-1e6, le=1e6, unit="m", description="Local x of its church.")
+    y: float = quantity(ge=-1e6, le=1e6, unit="m", description="Local y of its church.")
     houses: int = quantity(30, ge=1, le=500, unit="1", description="Number of houses.")
     radius: float = quantity(140.0, ge=20, le=2000, unit="m", description="Radius within which they stand.")
 
@@ -105,8 +105,8 @@ class Village(Model):
 class WindTurbine(Model):
     """A wind turbine with three blades."""
 
-    x: float = quantity(ge=-2e4, le=2e4, unit="m", description="Local x of its tower.")
-    y: float = quantity(ge=-2e4, le=2e4, unit="m", description="Local y of its tower.")
+    x: float = quantity(ge=-1e6, le=1e6, unit="m", description="Local x of its tower.")
+    y: float = quantity(ge=-1e6, le=1e6, unit="m", description="Local y of its tower.")
     hub_height: float = quantity(120.0, ge=20, le=200, unit="m", description="Height of its hub.")
     rotor_diameter: float = quantity(110.0, ge=10, le=220, unit="m", description="Diameter of its rotor.")
     azimuth_deg: float = quantity(

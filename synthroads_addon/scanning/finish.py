@@ -15,7 +15,7 @@ from .plan import ScanPlan
 from .receiving.detector import Readout
 from .receiving.radiometry import DARKEST_DB, decibels
 from .receiving.response import range_corrected
-from .relief import shift_along_normals
+from .relief.micro_relief import shift_along_normals
 from .returns import number_returns
 from .scan import BlockResult
 

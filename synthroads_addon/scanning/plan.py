@@ -25,10 +25,10 @@ from .effects import EchoEffect
 from .forecast import ScanForecast, forecast_scan
 from .multipath import Multipath
 from .noise import Noise
-from .pavement_relief import PavementRelief
 from .platforms.path import Path, Strip
 from .receiving.response import laser_gains
-from .relief import MicroRelief
+from .relief.micro_relief import MicroRelief
+from .relief.pavement import PavementRelief
 from .scene.bare_ground import BareGround
 from .scene.caster import Caster
 from .scene.mesh import SceneMesh

@@ -77,7 +77,7 @@ def test_the_table_of_the_page_merges_five_classes_into_two(tmp_path: Path) -> N
 
 
 def test_unknown_scheme() -> None:
-    with pytest.raises(InputError, match=r"must be one of 17, 5, or a \.json file"):
+    with pytest.raises(InputError, match=r"must be one of 17, 5, 19, or a \.json file"):
         class_scheme("six")
     with pytest.raises(InputError, match="no such file"):
         class_scheme("six.json")

@@ -237,6 +237,9 @@ BROKEN = {
     "a gantry's left end lies left of its right end": _object(
         "", type="Gantry", kind="one_sided", left_offset=-5.0, right_offset=5.0, **PLACE
     ),
+    "forest and meadow are at most all of the land": _object(
+        "", type="Landscape", seed=1, forest_share=0.6, meadow_share=0.5
+    ),
 }
 """Condition -> objects that break it and nothing else."""
 TEXTURE = {"material": "asphalt", "folder": "asphalt"}
@@ -294,7 +297,7 @@ def test_faults_are_told_by_their_place(place: str, value: Any, said: str) -> No
 
 
 def test_the_nearest_type_is_suggested() -> None:
-    assert fault(changed("objects.rail.type", "Gardrail")).endswith("Vehicle (did you mean 'Guardrail'?)")
+    assert fault(changed("objects.rail.type", "Gardrail")).endswith("Landscape (did you mean 'Guardrail'?)")
 
 
 @pytest.mark.parametrize(

@@ -44,7 +44,7 @@ CASES = {
     "dataset re": {"reference", "recipe.yaml"},
     "train centerline-s": {"centerline-sequence", "centerline-single"},
     "cloud ": {"info", "subsample", "map-intensity", "convert", "preview", "merge", "crop", "tile"},
-    "cloud convert mine --classes 1": {"17"},
+    "cloud convert mine --classes 1": {"17", "19"},
     "tradeoff --knobs fid": {"fidelity"},
     "twin mine.json --twin opend": {"opendrive"},
     "parameters --cross-section RQ4": {"RQ43.5"},

@@ -12,7 +12,7 @@ from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import load_scenario
 
-CHECKSUM = "2ebfc839cd3eac303cf3896705f1965acc9c9b8042f5b5fffefab0fe6389f0fc"
+CHECKSUM = "99163db4044c56ad0c22046ff411cca888ccd4c4657098d4b09e4c3032bd36f4"
 EVERYTHING = ["exits=1", "entries=1", "emergency_bays=1"]
 
 

@@ -15,7 +15,7 @@ from synthroads_addon.scanning.colour.colour import MaterialLayers, surface_cons
 from synthroads_addon.scanning.effects import EchoChanges, PulseHits
 from synthroads_addon.scanning.finish import Finish
 from synthroads_addon.scanning.plan import ScanPlan
-from synthroads_addon.scanning.relief import micro_relief
+from synthroads_addon.scanning.relief.micro_relief import micro_relief
 from synthroads_addon.scanning.scan import BlockResult
 from synthroads_addon.scanning.scene.mesh import SceneMesh, empty_scene_mesh
 from tests.helpers.scenes.scan_scenes import ORIGIN, Standing, mesh_of, plane, scan_block, scan_of, scan_pulses

@@ -34,7 +34,7 @@ from ...scanning.colour.colour import (
 from ...scanning.colour.difference import colour_difference, known_rows, squared_error
 from ...scanning.colour.request import LayerRequest
 from ...scanning.plan import ScanPlan
-from ...scanning.relief import shift_along_normals
+from ...scanning.relief.micro_relief import shift_along_normals
 from ...scanning.scan import BlockResult
 
 Errors = dict[str, tuple[float, float]]

@@ -22,7 +22,7 @@ from ...scanning.colour.request import LayerRequest
 from ...scanning.plan import ScanPlan
 from ...scanning.platforms.stretches import spread_stretches
 from ...scanning.record import RETURNS_AT_ONCE, record_as_measured, scan_blocks
-from ...scanning.relief import micro_relief
+from ...scanning.relief.micro_relief import micro_relief
 from ...scanning.scan import BlockResult, join_results
 from ...scanning.scene.height_errors import mesh_height_errors
 from ...scenario.scenario import load_scenario

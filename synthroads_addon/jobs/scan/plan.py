@@ -29,7 +29,7 @@ from ...scanning.multipath import Multipath, mirrors_of
 from ...scanning.plan import ScanConditions, ScanPlan, SceneServices
 from ...scanning.platforms.guides import RoadGuide
 from ...scanning.platforms.path import Path as ScanPath
-from ...scanning.relief import micro_relief
+from ...scanning.relief.micro_relief import micro_relief
 from ...scanning.scene.bare_ground import MOST_CELLS, BareGround
 from ...scanning.scene.classify import classify_scene
 from ...scanning.scene.mesh import SceneMesh

@@ -39,7 +39,7 @@ from synthroads_addon.road.pavement.outlines import CRACK_FILM, crack_outlines, 
 from synthroads_addon.road.pavement.places import pavement_places
 from synthroads_addon.road.section import Patch
 from synthroads_addon.road.surroundings import Environment, MaterialVariation
-from synthroads_addon.scanning.pavement_relief import PavementRelief
+from synthroads_addon.scanning.relief.pavement import PavementRelief
 from synthroads_addon.scanning.scene.motion import ScannedScene
 from synthroads_addon.scanning.scene.surface_values import SurfaceInput
 from synthroads_addon.scanning.scene.target import Target

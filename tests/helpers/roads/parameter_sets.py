@@ -138,11 +138,21 @@ def _axis(data: dict[str, Any]) -> dict[str, Any]:
     return {"horizontal": [{**element, "length": element["length"] * share} for element in data["horizontal"]]}
 
 
+def _dashes(data: dict[str, Any]) -> dict[str, Any]:
+    lengths = {name: data.get(name, 0.0) for name in ("dash_length", "gap_length")}
+    if 0 in lengths.values():
+        return dict.fromkeys(lengths, 0.0)
+    return {name: max(value, 0.05) for name, value in lengths.items()}
+
+
 def _line(data: dict[str, Any]) -> dict[str, Any]:
-    solid = data["dash_length"] == 0 or data["gap_length"] == 0
     turnout = data["kind"] in ("turnout_edge", "gore_edge")
-    longer = {name: max(data[name], 0.05) for name in ("dash_length", "gap_length")}
-    return ({"dash_length": 0.0, "gap_length": 0.0} if solid else longer) | {"turnout": "exit" if turnout else None}
+    return _dashes(data) | {"turnout": "exit" if turnout else None}
+
+
+def _shares(data: dict[str, Any]) -> dict[str, Any]:
+    together = sum(data.get(name, 0.5) for name in ("forest_share", "meadow_share"))
+    return {"forest_share": 0.5, "meadow_share": 0.25} if together > 1.0 else {}
 
 
 def _turnout(data: dict[str, Any]) -> dict[str, Any]:
@@ -177,6 +187,8 @@ _RULES = {
     "AlignmentObject": _axis,
     "HorizontalElement": _element,
     "LineMarking": _line,
+    "RemovedMarking": _dashes,
+    "Landscape": _shares,
     "Turnout": _turnout,
     "Vegetation": _plants,
     "Gantry": _gantry,
@@ -264,5 +276,6 @@ LIBRARY_ONLY = {
     "a vegetation's band and heights end after they begin": "must not be less than band_start and height_min",
     "a gantry's left end lies left of its right end": "left_offset must be greater than right_offset",
     "a material has one set of textures at most": "textures has '.*' twice",
+    "forest and meadow are at most all of the land": "forest_share and meadow_share must not be more than 1",
 }
 """Conditions that JSON Schema can't express -> what the library says. docs/parameters.md lists them."""

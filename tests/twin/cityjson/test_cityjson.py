@@ -170,6 +170,8 @@ def test_vertices_lie_on_the_analytic_road_within_a_millimetre(
     city, geometry = full_city if index is None else cities(index), RoadGeometry(road)
     films, rings = [], []
     for _, about, found in city.surfaces():
+        if about.get("function") in ("crack", "removed marking"):  # as high as the films below, see the tests of damage
+            continue
         rings += found
         films.append(np.full(sum(map(len, found)), about.get("film_thickness", 0.0)))
     local, station, offset = on_road(road, rings)

@@ -7,13 +7,13 @@ from typing import NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import Float
-from ..road.geometry import RoadGeometry
-from ..road.objects import Side
-from ..road.pavement.cover import MarkingFilms
-from ..road.pavement.outlines import CRACK_FILM, PATCH_FILM, REMOVED_FILM
-from ..road.pavement.surface import PavementSurface, damage_height
-from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Turnout
+from ...base.arrays import Float
+from ...road.geometry import RoadGeometry
+from ...road.objects import Side
+from ...road.pavement.cover import MarkingFilms
+from ...road.pavement.outlines import CRACK_FILM, PATCH_FILM, REMOVED_FILM
+from ...road.pavement.surface import PavementSurface, damage_height
+from ...road.section import Arrow, Carriageway, Hatching, LineMarking, Turnout
 
 
 class _Kind(NamedTuple):

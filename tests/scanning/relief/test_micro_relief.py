@@ -13,7 +13,7 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.noise import mean_deviation, noise_field
 from synthroads_addon.cloud.points import PointBlock, concatenate
 from synthroads_addon.materials.table import Material, materials
-from synthroads_addon.scanning.relief import (
+from synthroads_addon.scanning.relief.micro_relief import (
     ASPHALT,
     MAX_STRENGTH,
     RELIEF,
@@ -25,7 +25,7 @@ from synthroads_addon.scanning.relief import (
 from tests.helpers.clouds.random_points import make_points
 from tools.surface_variation import plane_residuals, surface_variation
 
-REAL = sorted((Path(__file__).resolve().parents[2].parent / "shared" / "real").glob("als_*.laz"))
+REAL = sorted((Path(__file__).resolve().parents[3].parent / "shared" / "real").glob("als_*.laz"))
 ORIGIN = np.array([294_000.0, 5_628_000.0, 180.0])
 ROAD = ("asphalt", "paint_white", "verge", "grass_ground", "car_paint")
 

@@ -13,8 +13,8 @@ from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.pavement.outlines import CRACK_FILM, PATCH_FILM
 from synthroads_addon.road.pavement.surface import PavementSurface
-from synthroads_addon.scanning.pavement_relief import PavementRelief
-from synthroads_addon.scanning.relief import MicroRelief, shift_along_normals
+from synthroads_addon.scanning.relief.micro_relief import MicroRelief, shift_along_normals
+from synthroads_addon.scanning.relief.pavement import PavementRelief
 from tests.helpers.clouds.random_points import make_points
 from tests.helpers.effects.road_cases import base_road
 

@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..base.arrays import Float, Index
-from ..base.errors import InputError
-from ..base.noise import noise_field
-from ..cloud.points import PointBlock
-from ..materials.table import UNKNOWN, Material, entry_of, materials
+from ...base.arrays import Float, Index
+from ...base.errors import InputError
+from ...base.noise import noise_field
+from ...cloud.points import PointBlock
+from ...materials.table import UNKNOWN, Material, entry_of, materials
 
 MAX_STRENGTH = 100.0
 OCTAVES = {"draft": 2, "standard": 4, "high": 6}
