@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 
 from headless import dataset_run
 from headless.dataset_run import TASK, Outcome, WorkerAbsence, local_processes, run_task
+from headless.messages import logger
 from synthroads_addon.base.errors import InputError
 
 
@@ -72,7 +74,11 @@ def test_each_attempt_has_a_folder_of_its_own(monkeypatch: pytest.MonkeyPatch, t
     assert len({path for path in seen if path.parent == tmp_path}) == 3
 
 
-def test_absence_of_workers_is_said_after_a_minute_and_ended_in_the_end(caplog: pytest.LogCaptureFixture) -> None:
+def test_absence_of_workers_is_said_after_a_minute_and_ended_in_the_end(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(logger, "propagate", True)  # not so once a command has been run in this process
+    caplog.set_level(logging.INFO, logger.name)
     absence = WorkerAbsence("tcp://here:1", 600.0)
     for workers, now in ((1, 0.0), (0, 10.0), (0, 69.0)):
         absence.update(workers, now)
