@@ -12,6 +12,7 @@ if __name__ == "__main__":
 
 from headless.commands import Outcome, entry
 from headless.messages import progress_bar
+from headless.reconstruct import reservations
 from synthroads_addon.base.errors import InputError, OutputError
 from synthroads_addon.base.files import write_file
 from synthroads_addon.base.schema import canonical_json
@@ -105,13 +106,7 @@ def summary(result: dict[str, Any], output: Path) -> str:
         apart = "" if beside is None else f", {beside:.2f} m rms from it"
         lines.append(f"  {view['name']}: seen on {view['seen']:.0%}, agrees on {view['used']:.0%}{apart}")
     lines.append(f"  network: {result['network']['why']}")
-    lines += [f"  note: {note}" for note in result["notes"]]
-    for doubt in result["judgement"]["doubtful"]:
-        lines.append(f"  doubtful from {doubt['start']:.0f} to {doubt['end']:.0f} m: {'; '.join(doubt['why'])}")
-    if "comparison" in result:
-        off = result["comparison"]["centreline"]
-        apart = f"{off['mae']:.3f} m on average, {off['largest']:.3f} m at most" if off else "nothing in common"
-        lines.append(f"  from the truth: {apart}")
+    lines += reservations(result)
     return "\n".join([*lines, f"written to {output}"])
 
 

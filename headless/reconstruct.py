@@ -153,16 +153,22 @@ def summary(result: dict[str, Any], output: Path) -> str:
     objects = result["objects"]
     bays = f", {len(result['emergency_bays'])} emergency bays" if result["emergency_bays"] else ""
     lines.append(f"  {len(objects['barriers'])} barriers, {len(objects['delineators'])} delineators{bays}")
-    lines += [f"  note: {note}" for note in result["notes"]]
-    for doubt in result["judgement"]["doubtful"]:
-        lines.append(f"  doubtful from {doubt['start']:.0f} to {doubt['end']:.0f} m: {'; '.join(doubt['why'])}")
-    for doubt in result["judgement"]["other_sections"]:
-        lines.append(f"  another section from {doubt['start']:.0f} to {doubt['end']:.0f} m: {'; '.join(doubt['why'])}")
+    lines += reservations(result)
+    return "\n".join([*lines, f"written to {output}"])
+
+
+def reservations(result: dict[str, Any]) -> list[str]:
+    """Return the lines of a report that tell its notes, doubtful stretches, and the comparison with the truth."""
+    lines = [f"  note: {note}" for note in result["notes"]]
+    for kind, what in (("doubtful", "doubtful"), ("other_sections", "another section")):
+        for doubt in result["judgement"].get(kind, ()):
+            place = f"{what} from {doubt['start']:.0f} to {doubt['end']:.0f} m"
+            lines.append(f"  {place}: {'; '.join(doubt['why'])}")
     if "comparison" in result:
         off = result["comparison"]["centreline"]
         apart = f"{off['mae']:.3f} m on average, {off['largest']:.3f} m at most" if off else "nothing in common"
         lines.append(f"  from the truth: centreline {apart}")
-    return "\n".join([*lines, f"written to {output}"])
+    return lines
 
 
 if __name__ == "__main__":
