@@ -73,7 +73,8 @@ class CarriagewaySection:
         Only behind a ramp's end is it not the pavement's edge.
         """
         station = np.atleast_1d(np.asarray(station, dtype=np.float64))
-        extra = sum((shape.widths(station).verge_extra for shape in self.turnouts), np.zeros(station.shape))
+        near = [shape for shape in self.turnouts if shape.reaches(station)]
+        extra = sum((shape.widths(station).verge_extra for shape in near), np.zeros(station.shape))
         return self.paved_edge(station) + extra
 
     def lane_boundaries(self, station: ArrayLike) -> Float:
@@ -114,7 +115,7 @@ class CarriagewaySection:
         return sum((shape.bend(station) for shape in self.turnouts), np.zeros(station.shape))
 
     def _distances(self, station: Float) -> Float:
-        shapes = [shape.widths(station) for shape in self.turnouts]
+        shapes = [shape.widths(station) for shape in self.turnouts if shape.reaches(station)]
         columns = [width_at(self.carriageway.inner_offset, station)]
         for kind, width in self._widths:
             if kind in TURNOUT_STRIPS:

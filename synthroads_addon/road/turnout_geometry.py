@@ -68,6 +68,7 @@ class TurnoutShape:
             full = float(width_at(carriageway.hard_shoulder_width, self.station(self._tip)))
             cubed = 6.0 * turnout.ramp.clothoid_parameter**2 * (full + NOSE_WIDTH)
             self.nose = max(min(cubed ** (1.0 / 3.0), turnout.ramp.length - NOSE_BEFORE_END), STEP)
+        self._range = self.range()
 
     def station(self, w: float) -> float:
         """Return the station at a distance w along the turnout (both m), for an entry backwards from its end."""
@@ -91,6 +92,11 @@ class TurnoutShape:
         """Return the lowest and the highest station, m, at which the turnout changes any width."""
         marks = self.kinks()
         return min(marks), max(marks)
+
+    def reaches(self, station: Float) -> bool:
+        """Say whether any station (N,) may lie where the turnout changes a width."""
+        low, high = self._range
+        return not np.all((station > high) | (station < low))
 
     def gore_tip(self) -> float:
         """Return the station of the gore's tip, m; only exits and entries have one."""

@@ -15,6 +15,8 @@ from synthroads_addon.materials.table import materials, write_material_table
 from synthroads_addon.scenario.scenario import Scenario
 from tools.check_calibration import check_table
 
+pytestmark = pytest.mark.any_blender
+
 OWN = {
     "asphalt": {"specular": 0.21, "spread_below": 0.29, "spread_above": 0.2, "spread_wavelength": 0.25},
     "paint_white": {"specular": 0.02, "retroreflection": 0.65, "spread_below": 0.15, "spread_above": 0.15},

@@ -48,6 +48,7 @@ def test_layers_are_rendered_where_a_material_varies_and_else_its_own(tmp_path: 
     assert np.mean(np.asarray(cloud["roughness"])[road]) == pytest.approx(row.roughness, abs=0.05)
 
 
+@pytest.mark.any_blender
 def test_what_is_wanted_is_rendered_and_nothing_else(tmp_path: Path) -> None:
     counts, _ = made(tmp_path / "a", "colour.rgb=false", "colour.intensity_from_layers=true")
     assert counts["rendered"]["layers"] == ["base_color", "metallic", "specular"]
@@ -65,6 +66,7 @@ def test_what_is_wanted_is_rendered_and_nothing_else(tmp_path: Path) -> None:
     assert np.median(np.asarray(cloud.green)[paint]) > 1.3 * np.median(np.asarray(cloud.green)[road])
 
 
+@pytest.mark.any_blender
 def test_intensities_from_layers_are_the_materials_where_these_are_constant(tmp_path: Path) -> None:
     same = ("colour.rgb=false", "scan.relief=0")
     before, constant, patterned = (
@@ -83,6 +85,7 @@ def test_intensities_from_layers_are_the_materials_where_these_are_constant(tmp_
     assert rendered.mean() == pytest.approx(plain[road].mean(), rel=0.05)
 
 
+@pytest.mark.any_blender
 def test_relief_moves_points_along_the_normal_and_none_is_none(tmp_path: Path) -> None:
     plain = made(tmp_path / "a", "colour.rgb=false", "scan.relief=0")[1]
     rough = made(tmp_path / "b", "colour.rgb=false", "scan.relief=3")[1]

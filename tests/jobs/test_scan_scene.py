@@ -375,6 +375,7 @@ def test_a_scan_leaves_the_open_scene_as_it_was(caster: str, tmp_path: Path, map
     assert digest() == before
 
 
+@pytest.mark.any_blender
 def test_a_scan_leaves_a_road_of_ours_as_it_was(road_scene: tuple[Path, RoadGeometry], tmp_path: Path) -> None:
     before = digest()
     thin = {"lines_per_second": 20.0, "platform": {"height": 30.0, "speed": 30.0}}

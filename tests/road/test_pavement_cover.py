@@ -13,8 +13,10 @@ from synthroads_addon.road.pavement.clipping import split_outline, subtract
 from synthroads_addon.road.pavement.cover import MarkingFilms, painted_outlines
 from synthroads_addon.road.pavement.outlines import crack_outlines
 from synthroads_addon.road.section import Arrow, Hatching
+from synthroads_addon.sampling.road import sample_road
 from tests.helpers.effects.road_cases import TURNOUTS, base_road
 from tests.helpers.roads.damage_outlines import damaged_road
+from tests.helpers.roads.sampled_parts import scenario
 
 
 def area(outlines: list[np.ndarray]) -> float:
@@ -66,3 +68,24 @@ def test_a_crack_goes_through_an_arrow_and_a_hatched_area_on_their_films() -> No
     assert beside.intersection(box(10.0, -7.0, 12.0, -5.0)).area < 0.04
     middle = np.array([12.0, 20.0])
     assert films.thickness(middle, np.array([-6.005, -3.2])).tolist() == [0.003, 0.0]
+
+
+def test_pieces_of_cracks_have_the_film_that_lies_at_their_middle() -> None:
+    limits = scenario(cross_section="RQ31", length=1000.0, turnouts={"exits": 1, "entries": 1, "emergency_bays": 0})
+    road = sample_road(limits, 11)
+    films = MarkingFilms(RoadGeometry(road), "right")
+    pieces = list(films.cut([leg for crack in road.carriageway("right").pavement.cracks for leg in crack_outlines(crack)]))
+    middles = np.array([piece.mean(axis=0) for piece, _ in pieces])
+    found = [film for _, film in pieces]
+    assert found == films.thickness(middles[:, 0], middles[:, 1]).tolist()
+    assert sum(film > 0.0 for film in found) > 10
+
+
+def test_widths_at_one_station_are_those_among_many() -> None:
+    geometry = RoadGeometry(RoadParameters.from_dict(base_road({"exit": {"type": "Turnout"} | TURNOUTS["exit"]})))
+    stations = np.linspace(0.0, geometry.length, 301)
+    for section in geometry.sections.values():
+        alone = np.concatenate([section.distances(station) for station in stations])
+        assert np.array_equal(alone, section.distances(stations))
+        assert np.array_equal([section.plane_edge(s)[0] for s in stations], section.plane_edge(stations))
+        assert np.isnan(section.distances([np.nan, stations[0]])[0, -1]) or not section.turnouts

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ...base.arrays import Bool, Float
+from ...base.arrays import Bool, Float, Int
 from ..geometry import RoadGeometry
 from ..objects import Side
 from ..paint import arrow_outlines, cut_outline, hatching_outlines
@@ -92,7 +92,10 @@ class MarkingFilms:
         middle = (low[:, 0] + high[:, 0]) / 2.0
         near = np.zeros((len(self._lines), len(outlines)), bool)
         edges = np.zeros((*near.shape, 2))
-        for number, line in enumerate(self._lines):
+        for number, (line, dashes) in enumerate(zip(self._lines, self._dashes, strict=True)):
+            # Edges cost far more than to see that a line ends before all this or begins behind it.
+            if not len(dashes) or dashes[0, 0] > high[:, 0].max() or dashes[-1, 1] < low[:, 0].min():
+                continue
             edges[number] = np.stack(self._geometry.marking_edges(line, middle), axis=1)
             near[number] = (edges[number, :, 1] < high[:, 1]) & (edges[number, :, 0] > low[:, 1])
         for number, outline in enumerate(outlines):
@@ -105,14 +108,17 @@ class MarkingFilms:
             for part in _cut(outline, ends):
                 for piece in _cut(part[::-1, ::-1], across):
                     centre = piece[:, ::-1].mean(axis=0)
-                    yield piece[::-1, ::-1], self._line_film(centre[:1], centre[1:])
+                    yield piece[::-1, ::-1], self._line_film(met, centre[:1], centre[1:])
 
-    def _line_film(self, station: Float, offset: Float) -> float:
-        """Return the thickness of the thickest line's film at one place, m."""
+    def _line_film(self, lines: Int, station: Float, offset: Float) -> float:
+        """Return the thickness of the thickest film of some lines, by number (L,), at one place, m."""
         thickest = 0.0
-        for line, dashes in zip(self._lines, self._dashes, strict=True):
+        for number in lines:
+            line = self._lines[number]
+            if not _is_painted(self._dashes[number], station)[0]:
+                continue
             left, right = self._geometry.marking_edges(line, station)
-            if bool(_is_painted(dashes, station)[0]) and right[0] <= offset[0] <= left[0]:
+            if right[0] <= offset[0] <= left[0]:
                 thickest = max(thickest, line.film_thickness)
         return thickest
 

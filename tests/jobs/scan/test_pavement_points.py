@@ -55,6 +55,7 @@ def scan(parameters: RoadParameters, relief: float) -> PointBlock:
     return concatenate([block.points for block in blocks.results])
 
 
+@pytest.mark.any_blender
 def test_points_on_cracks_joints_and_patches_are_as_deep_and_as_dark_as_said() -> None:
     parameters = damaged_road()
     geometry = RoadGeometry(parameters)

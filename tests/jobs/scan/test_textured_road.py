@@ -71,6 +71,7 @@ def base_color(points: PointBlock) -> Float:
     return np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
 
 
+@pytest.mark.any_blender
 def test_points_have_the_images_values_at_their_station_and_offset(tmp_path: Path) -> None:
     """Wear and rain stay on top, on a patch as beside it; the image gives the rest."""
     parameters = textured_road(tmp_path)

@@ -101,6 +101,7 @@ def test_it_stays_in_place_when_another_road_is_built(shown: Any, tmp_path: Path
     assert view.offset(bpy.context.scene).tolist() == [-1_000.0] * 3
 
 
+@pytest.mark.any_blender
 def test_nothing_of_the_file_is_touched(shown: Any, tmp_path: Path) -> None:
     build()
     bpy.ops.mesh.primitive_cube_add()

@@ -93,6 +93,7 @@ def steps_until_cancelled(number: int, begin: Callable[[], Generator[Any, None, 
     return True
 
 
+@pytest.mark.any_blender
 @pytest.mark.parametrize("before", ["nothing", "a road and the user's own"])
 def test_cancelling_at_any_step_leaves_the_file_as_it_was(
     before: str,

@@ -92,6 +92,7 @@ def test_what_is_rendered_is_the_librarys(cheap: Any, tmp_path: Path) -> None:  
     assert {"scene copy", "images", "scan"} <= written["stages"].keys()
 
 
+@pytest.mark.any_blender
 def test_nothing_is_rendered_where_no_colour_is_wanted(road: Any, started: list[Any]) -> None:  # noqa: F811
     choose(road, **{"colour.source": "images", "colour.rgb": False, "outputs": {"cloud"}})
     assert bpy.ops.synthroads.scan() == {"FINISHED"}

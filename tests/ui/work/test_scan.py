@@ -141,6 +141,7 @@ def test_what_is_wrong_is_said_and_nothing_written(road: Any, tmp_path: Path, na
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
+@pytest.mark.any_blender
 def test_replacing_files_is_the_users_choice(road: Any, tmp_path: Path) -> None:  # noqa: F811
     (tmp_path / "cloud.laz").write_text("old")
     (tmp_path / "notes.txt").write_text("mine")
@@ -192,6 +193,7 @@ def test_the_thread_touches_no_data_of_blender(road: Any, tmp_path: Path, monkey
     assert (tmp_path / "out" / "cloud.laz").read_bytes() == (tmp_path / "again" / "cloud.laz").read_bytes()
 
 
+@pytest.mark.any_blender
 def test_a_cancelled_scan_leaves_nothing(road: Any, tmp_path: Path) -> None:  # noqa: F811
     before, counts = digest(), block_counts()
     for ticks in (0, 2, 8, 40):
@@ -208,6 +210,7 @@ def test_a_cancelled_scan_leaves_nothing(road: Any, tmp_path: Path) -> None:  # 
         assert digest() == before, ticks
 
 
+@pytest.mark.any_blender
 def test_a_change_while_the_scene_is_read_is_in_the_scan_or_not_but_never_half(road: Any, tmp_path: Path) -> None:  # noqa: F811
     """The user moves an object, whose mesh stays the same, between two steps: reading begins again."""
     axis = bpy.data.objects["Backbone"].data.vertices
