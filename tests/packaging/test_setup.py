@@ -189,6 +189,7 @@ def test_one():
 """
 
 
+@pytest.mark.first_python
 def test_skips_are_counted_by_reason(tmp_path: Path) -> None:
     (tmp_path / "conftest.py").write_text((ROOT / "tests" / "conftest.py").read_text(encoding="utf-8"))
     (tmp_path / "test_one.py").write_text(TESTS_THAT_SKIP)

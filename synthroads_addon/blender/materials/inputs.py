@@ -96,6 +96,7 @@ class InputSearch:
     sites: list[InputSite] = field(default_factory=list)
     obstacles: list[str] = field(default_factory=list)
     _seen: set[tuple[object, ...]] = field(default_factory=set)
+    _sources: dict[int, dict[int, list[bpy.types.NodeSocket]]] = field(default_factory=dict)
 
     def visit(self, socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...] = ()) -> None:
         """Look at an output socket, and at all that it depends on.
@@ -127,8 +128,14 @@ class InputSearch:
             self._refuse(node, socket)
 
     def _follow(self, entry: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...]) -> None:
-        for link in entry.links:
-            self.visit(link.from_socket, path)
+        tree = entry.id_data
+        # A socket looks for its links among all those of its tree each time, which made this the dearest of a scene.
+        if (sources := self._sources.get(tree.as_pointer())) is None:
+            sources = self._sources[tree.as_pointer()] = {}
+            for link in tree.links:
+                sources.setdefault(link.to_socket.as_pointer(), []).append(link.from_socket)
+        for source in sources.get(entry.as_pointer(), ()):
+            self.visit(source, path)
 
     def _enter(self, node: bpy.types.Node, socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...]) -> None:
         if node.node_tree is None:

@@ -326,7 +326,6 @@ class TestFurniture:
             assert (along < -0.8).all()
 
 
-@pytest.mark.any_blender
 class TestLabels:
     def test_every_face_is_labelled_and_every_object_has_faces(self) -> None:
         parameters = demo_parameters(length=300.0)

@@ -28,7 +28,7 @@ def parameters() -> RoadParameters:
 
 @pytest.fixture(scope="module")
 def mesh(parameters: RoadParameters) -> SceneMesh:
-    build_road(parameters, 0.02, 0.1)
+    build_road(parameters, 0.1, 0.1)
     return scene_mesh()
 
 

@@ -94,7 +94,6 @@ def cases() -> Iterator[Any]:
         yield pytest.param(*case.values, marks=[*case.marks, *([pytest.mark.any_blender] if number % 4 else [])])
 
 
-@pytest.mark.any_blender
 @pytest.mark.parametrize(("design_class", "cross_section"), cases())
 def test_every_cross_section_follows_the_analytic_surface(design_class: str, cross_section: str) -> None:
     road = built(sample_road(everything(design_class, cross_section), 4))
@@ -131,7 +130,6 @@ def test_every_fidelity_keeps_its_tolerance_with_turnouts_and_damage(fidelity: s
     assert np.abs(error).max() < TOLERANCES[fidelity]
 
 
-@pytest.mark.any_blender
 def test_there_are_no_cracks_where_widths_change() -> None:
     road = built(sample_road(everything("EKA1A", "RQ36", 800.0), 5), parts=("road", "terrain"))
     mesh = road.mesh("Road", "Terrain")

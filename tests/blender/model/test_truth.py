@@ -81,7 +81,6 @@ def assert_shows(edited: EditedRoad, names: tuple[str, ...] = ()) -> None:
             assert np.allclose(here[number], there[number], rtol=0.0, atol=EXACT), (name, here[number], there[number])
 
 
-@pytest.mark.any_blender
 class TestPlaces:
     def test_nothing_is_read_where_nothing_was_edited(self, model: RoadModel) -> None:
         edited = truth(model)

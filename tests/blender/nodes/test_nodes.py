@@ -208,7 +208,6 @@ class TestKeptGroups:
 
 
 class TestGroups:
-    @pytest.mark.any_blender
     def test_inputs_are_described_and_limited(self) -> None:
         for group in all_groups():
             assert group.description, group.name

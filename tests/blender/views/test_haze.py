@@ -96,7 +96,6 @@ def seen(visibility: float, file: Path) -> dict[str, np.ndarray]:
     return found
 
 
-@pytest.mark.any_blender
 def test_fog_is_bright_and_hides_what_is_beyond_its_visibility(tmp_path: Path) -> None:
     clear = seen(23_000.0, tmp_path / "clear.exr")
     for item in list(bpy.data.objects):

@@ -34,7 +34,7 @@ pytestmark = pytest.mark.any_blender
 NEAR, BUDGET = 0.25, 30.0
 """Share of the expected time that a job may take more or less; time that it may take where that is what is asked, s."""
 SMALL = (
-    "road.length=100",
+    "road.length=60",
     "road.half_width=25",
     "scan.platform.lateral_offsets=[5]",
     "scan.platform.speed=80",

@@ -66,7 +66,7 @@ def triangles_within(parameters: RoadParameters, low: float, high: float) -> dic
 
 @pytest.mark.any_blender
 def test_a_stretch_has_the_whole_road_s_triangles() -> None:
-    parameters, low, high = barriers(), 110.3, 190.9
+    parameters, low, high = barriers(), 110.3, 160.9
     build_road(parameters, 0.02, 0.1)
     whole = triangles_within(parameters, low, high)
     build_road(parameters, 0.02, 0.1, stretch=(low - CUT, high + CUT))
