@@ -74,7 +74,9 @@ def test_pieces_of_cracks_have_the_film_that_lies_at_their_middle() -> None:
     limits = scenario(cross_section="RQ31", length=1000.0, turnouts={"exits": 1, "entries": 1, "emergency_bays": 0})
     road = sample_road(limits, 11)
     films = MarkingFilms(RoadGeometry(road), "right")
-    pieces = list(films.cut([leg for crack in road.carriageway("right").pavement.cracks for leg in crack_outlines(crack)]))
+    pieces = list(
+        films.cut([leg for crack in road.carriageway("right").pavement.cracks for leg in crack_outlines(crack)])
+    )
     middles = np.array([piece.mean(axis=0) for piece, _ in pieces])
     found = [film for _, film in pieces]
     assert found == films.thickness(middles[:, 0], middles[:, 1]).tolist()

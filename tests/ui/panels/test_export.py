@@ -89,8 +89,6 @@ def test_without_a_source_it_is_the_last_scans(settings: Any, tmp_path: Path) ->
         ("bad.laz", "b.ply", "is not a LAS file"),
     ],
 )
-
-pytestmark = pytest.mark.any_blender
 def test_what_cannot_be_exported_is_a_message(tmp_path: Path, source: str, output: str, message: str) -> None:
     write(tmp_path / "a.laz", make_points(100))
     (tmp_path / "bad.laz").write_bytes(b"nothing" * 100)
