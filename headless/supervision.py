@@ -19,9 +19,12 @@ from typing import NoReturn
 from headless import ENDS
 from synthroads_addon.base.scratch.folders import record_folders_in, remove_recorded_folders
 
-LOSSES = ("bad_alloc", "alloc returns null", "annot allocate memory", "emory allocation", "Thread creation failed")
+LOSSES = (
+    *("bad_alloc", "alloc returns null", "annot allocate memory", "emory allocation"),
+    *("Thread creation failed", "pthread_create has failed"),
+)
 """Parts of what libraries write on standard error where memory is short."""
-_BEGINNINGS = ("terminate called", "Fatal Python error", *LOSSES)
+_BEGINNINGS = ("terminate called", "Fatal Python error", "ERROR CAUGHT IN EMBREE", *LOSSES)
 """Parts of the first line of what they write before they end the process."""
 _DEATH_SIGNAL = 1
 """Linux's PR_SET_PDEATHSIG."""

@@ -33,6 +33,7 @@ def work(arguments):
 
 leave(lambda: run(work, argparse.Namespace(json=False, quiet=False)))
 """
+EMBREE = "os.write(2, b'ERROR CAUGHT IN EMBREE\\nERROR: Unknown error\\nMESSAGE: pthread_create has failed\\n'); "
 SPEAK = "os.write(2, b'Warning: a\\nterminate called after throwing an instance of bad_alloc\\n what()\\n'); "
 
 
@@ -57,6 +58,7 @@ def nothing_is_left(folder: Path) -> bool:
     [
         ("os.kill(os.getpid(), signal.SIGKILL)", 2, "error: too little memory (the work was ended by SIGKILL); "),
         (SPEAK + "os.abort()", 2, "Warning: a\nerror: too little memory (the work was ended by SIGABRT); "),
+        (EMBREE + "ctypes.string_at(0)", 2, "error: too little memory (the work was ended by SIGSEGV); "),
         ("ctypes.string_at(0)", 1, "error: a defect of a library ended the work (SIGSEGV); "),
     ],
 )

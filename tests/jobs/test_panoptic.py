@@ -27,14 +27,19 @@ ALL = (
     "road.vehicles.per_km.maximum=30",
 )
 WORKS = ("road.furniture.construction_zone=1",)
-ASSETS = ('road.assets=["roadside"]', "road.half_width=60")
+ASSETS = ('road.assets=["roadside"]', "road.half_width=110")
+VILLAGE = (
+    *(f"road.roadside.buildings_per_km.{end}=12" for end in ("minimum", "maximum")),
+    *(f"road.roadside.parked_per_building.{end}=2" for end in ("minimum", "maximum")),
+    "road.roadside.walls=1",
+)
 BRIDGE = ("road.furniture.overpass=1", "road.barriers.concrete_median=1")
 TURNOUTS = ("road.turnouts.exits=1", "road.turnouts.emergency_bays=1")
 SETS = {
     "RQ43.5": ("EKA1A", 400, BRIDGE),
     "RQ36": ("EKA1A", 700, WORKS),
     "RQ31": ("EKA1B", 400, BRIDGE),
-    "RQ28": ("EKA2", 300, ASSETS),
+    "RQ28": ("EKA2", 300, (*ASSETS, *VILLAGE)),
     "RQ38.5": ("EKA3", 700, TURNOUTS),
     "RQ31.5": ("EKA3", 200, ()),
     "RQ25": ("EKA3", 200, ()),

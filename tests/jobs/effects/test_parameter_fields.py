@@ -112,7 +112,8 @@ def test_every_field_changes_the_model_or_the_points(looks: dict[str, Look], pat
 def test_an_instance_number_changes_nothing_but_numbers(looks: dict[str, Look], path: str) -> None:
     changed, _, _ = seen(looks, path, {})
     assert all(name.endswith(LABEL) for name in changed)
-    assert changed or path == "Alignment.instance"  # which has no faces
+    # An axis has no faces, and a stand none of its own: each plant has a number that follows from those of all.
+    assert changed or path in ("Alignment.instance", "Vegetation.instance")
 
 
 @pytest.mark.slow

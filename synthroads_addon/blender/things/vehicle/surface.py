@@ -23,9 +23,9 @@ _DOORS = {"car": (-0.62, 0.42), "estate": (-0.62, 0.42), "van": (-0.75, 0.0)}
 """Model with doors -> the front door's front edge against the front axle, the rear one's rear edge against the rear."""
 
 
-def registration(seed: int, instance: int) -> str:
-    """Return a made-up registration number of a vehicle of a road."""
-    rng = stream(seed, "registration", instance)
+def registration(seed: int, name: str) -> str:
+    """Return a made-up registration number of a vehicle of a road, by the vehicle's name."""
+    rng = stream(seed, "registration", name)
     letters = "".join(_LETTERS[i] for i in rng.integers(len(_LETTERS), size=int(rng.integers(1, 3))))
     return f"{_DISTRICTS[int(rng.integers(len(_DISTRICTS)))]} {letters} {int(rng.integers(10, 9999))}"
 
