@@ -25,7 +25,8 @@ from tests.helpers.effects.road_cases import TURNOUTS, base_road, objects_of
 from tests.helpers.scenes.tree_text import tree_from_text, tree_text
 
 ON_A_ROAD = ("Hatching", "Arrow", "Gantry", "TrafficSign", "Vegetation", "Vehicle", "NoiseBarrier")
-PLANTS = (("shrub", "hazel"), ("tree", "birch"), ("grass", "meadow"))
+PLANTS = (("shrub", "hazel", 0.02), ("tree", "birch", 0.005), ("grass", "meadow", 0.5))
+"""Kind, species, plants per m2."""
 GEOMETRY = Path(__file__).parent / "snapshots" / "geometry.json"
 RELEASE = f"{bpy.app.version[0]}.{bpy.app.version[1]}"
 
@@ -92,7 +93,8 @@ def numbers_of(group: bpy.types.NodeTree) -> dict[str, Any] | None:
 def small_road() -> RoadModel:
     """Build a road of 60 m that has what groups can't make of their defaults: ground, plants, paint, writing."""
     objects = {kind.lower(): item for kind in ON_A_ROAD for item in objects_of(kind).values() if item["type"] == kind}
-    objects |= {f"{species}-1": {**objects["vegetation"], "kind": kind, "species": species} for kind, species in PLANTS}
+    for kind, species, density in PLANTS:
+        objects[f"{species}-1"] = objects["vegetation"] | {"kind": kind, "species": species, "density": density}
     data = base_road({"exit": {"type": "Turnout", **TURNOUTS["exit"]}} | objects)
     for number, item in enumerate(data["objects"].values(), 1):
         item["instance"] = number
