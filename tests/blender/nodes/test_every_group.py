@@ -25,7 +25,7 @@ from tests.helpers.effects.road_cases import TURNOUTS, base_road, objects_of
 from tests.helpers.scenes.tree_text import tree_from_text, tree_text
 
 ON_A_ROAD = ("Hatching", "Arrow", "Gantry", "TrafficSign", "Vegetation", "Vehicle", "NoiseBarrier")
-PLANTS = (("shrub", "hazel", 0.02), ("tree", "birch", 0.005), ("grass", "meadow", 0.5))
+PLANTS = (("shrub", "hazel", 0.02), ("tree", "birch", 0.02), ("grass", "meadow", 0.5))
 """Kind, species, plants per m2."""
 GEOMETRY = Path(__file__).parent / "snapshots" / "geometry.json"
 RELEASE = f"{bpy.app.version[0]}.{bpy.app.version[1]}"
