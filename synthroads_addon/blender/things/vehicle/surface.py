@@ -17,17 +17,24 @@ _DISTRICTS = ("AC", "BN", "D", "DO", "E", "HH", "K", "KS", "M", "MS", "OL", "S",
 _LETTERS = "ABCDEFGHJKLMNPRSTUVWXYZ"
 _RAISED = 0.001
 """Height of the letters above a plate, m."""
+_NARROW = 0.3
+"""Width of a plate, m, below which there is room for a short registration alone."""
 _BORDER = 0.1
 """Part of a plate on either side that its writing leaves free."""
 _DOORS = {"car": (-0.62, 0.42), "estate": (-0.62, 0.42), "van": (-0.75, 0.0)}
 """Model with doors -> the front door's front edge against the front axle, the rear one's rear edge against the rear."""
 
 
-def registration(seed: int, name: str) -> str:
-    """Return a made-up registration number of a vehicle of a road, by the vehicle's name."""
+def registration(seed: int, name: str, model: str) -> str:
+    """Return a made-up registration number of a vehicle of a road, by its name; a short one where its plate is narrow.
+
+    On a motorcycle's plate longer ones would be too small to be read, and aren't written at all.
+    """
     rng = stream(seed, "registration", name)
-    letters = "".join(_LETTERS[i] for i in rng.integers(len(_LETTERS), size=int(rng.integers(1, 3))))
-    return f"{_DISTRICTS[int(rng.integers(len(_DISTRICTS)))]} {letters} {int(rng.integers(10, 9999))}"
+    narrow = any(width < _NARROW for _, (width, _, _) in plates_of(model))
+    letters = "".join(_LETTERS[i] for i in rng.integers(len(_LETTERS), size=1 if narrow else int(rng.integers(1, 3))))
+    number = int(rng.integers(10, 100 if narrow else 10_000))
+    return f"{_DISTRICTS[int(rng.integers(len(_DISTRICTS)))]} {letters} {number}"
 
 
 def write_plates(tree: Tree, model: str, text: Value, material: Value) -> Value:

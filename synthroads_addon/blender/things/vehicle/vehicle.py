@@ -132,7 +132,7 @@ def build_vehicles(builder: ModelBuilder) -> None:
         grade = lines[lane].carriageway.traffic * builder.geometry.profile.grade(np.array([vehicle.station]))
         place = vehicle_place(lines[lane], vehicle)
         mesh = builder.points("Vehicle", [place], {COLOR: np.array([vehicle.color]), "grade": grade})
-        inputs = {"Registration": registration(builder.parameters.metadata.seed, name)}
+        inputs = {"Registration": registration(builder.parameters.metadata.seed, name, vehicle.model)}
         builder.add(name, mesh, vehicle_group(vehicle.model), inputs)
 
 
