@@ -43,6 +43,7 @@ def prepared_materials(names: Sequence[str], layers: Sequence[str], numbers: boo
             if item.node_tree:
                 added.append(LayerNodes(item.node_tree))
                 add_layer_outputs(item, layers, added[-1])
+                added[-1].hide_transparency()
                 if numbers:
                     added[-1].new_output(NUMBER).inputs["Value"].default_value = index + 1
         yield

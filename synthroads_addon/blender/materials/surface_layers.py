@@ -197,6 +197,43 @@ class LayerNodes:
         node.aov_name = name
         return node
 
+    def hide_transparency(self) -> None:
+        """Have a camera's rays end on what else lets them straight through; light still comes through.
+
+        Else a renderer adds up the layers of all surfaces along a ray, and says whichever of them it likes.
+        """
+        seen: set[bpy.types.NodeTree] = set()
+        waiting = [self.tree]
+        while waiting:
+            tree = waiting.pop()
+            if tree in seen:
+                continue
+            seen.add(tree)
+            for node in list(tree.nodes):
+                if node.type == "MIX_SHADER":
+                    for entry, factor in zip(node.inputs[1:3], (1.0, 0.0), strict=True):
+                        if entry.is_linked and entry.links[0].from_node.type == "BSDF_TRANSPARENT":
+                            self._give_camera(tree, node.inputs[0], factor)
+                elif node.type == "BSDF_PRINCIPLED":
+                    alpha = node.inputs["Alpha"]
+                    if alpha.is_linked or alpha.default_value < 1.0:
+                        self._give_camera(tree, alpha, 1.0)
+                elif node.type == "GROUP" and node.node_tree is not None:
+                    waiting.append(node.node_tree)
+
+    def _give_camera(self, tree: bpy.types.NodeTree, entry: bpy.types.NodeSocket, value: float) -> None:
+        """Have an input be a value for a camera's rays, and what it was for others."""
+        source, usual = (entry.links[0].from_socket if entry.is_linked else None), entry.default_value
+        if source is not None:
+            self._undo.append(lambda: tree.links.new(source, entry))
+        path, mix = self._new(tree, "ShaderNodeLightPath"), self._new(tree, "ShaderNodeMix")
+        factor, first, second = mix.inputs["Factor"], mix.inputs["A"], mix.inputs["B"]
+        first.default_value, second.default_value = usual, value
+        tree.links.new(path.outputs["Is Camera Ray"], factor)
+        if source is not None:
+            tree.links.new(source, first)
+        tree.links.new(mix.outputs["Result"], entry)
+
     def socket(self, expression: Expression) -> bpy.types.NodeSocket:
         """Return a socket of the material's own tree that gives an expression."""
         if isinstance(expression, Linked):

@@ -12,6 +12,8 @@ from synthroads_addon.blender.cameras.images import aim
 from synthroads_addon.blender.cameras.light import daylight
 from synthroads_addon.blender.cameras.stage import Passes, stage
 from synthroads_addon.blender.materials import material as table_material
+from synthroads_addon.blender.scene.evaluated import scene_mesh
+from synthroads_addon.materials.table import materials
 from synthroads_addon.scanning.colour.colour import (
     FROM_MATERIAL,
     FROM_RETURN,
@@ -119,6 +121,27 @@ def test_places_lie_in_their_pixels() -> None:
             row, column = np.nonzero(there)
             assert np.abs(np.hypot(x - column - 0.5, y - row - 0.5)).max() < 0.1, "far less than half a pixel"
             np.testing.assert_allclose(rendered.depth[there], depth, rtol=1e-5)
+
+
+def test_what_light_comes_through_hides_the_ground_behind_it_from_the_camera() -> None:
+    """Else Cycles adds up the layers of both."""
+    low, high = (-SIDE, -SIDE, 1.0), (SIDE, SIDE, 1.0)
+    corners = [low, (SIDE, -SIDE, 1.0), high, (-SIDE, SIDE, 1.0)]
+    quad("Fence", corners, table_material("wire_mesh"))
+    quad("Ground", [(x, y, 0.0) for x, y, _ in corners], table_material("soil"))
+    mesh, before = scene_mesh(), _state()
+    (view, *_) = views_along(OverPath(), scene_sample(mesh), ColourSettings(7.0, 0.06, 1), np.deg2rad(70.0), 256)
+    with stage(bpy.context.scene, mesh.materials, Passes(("roughness", "metallic"), lit=False), (), None) as set_up:
+        aim(set_up.camera, view)
+        rendered = set_up.render(*view.size)
+    assert _state() == before
+    fence = rendered.material == mesh.materials.index("wire_mesh") + 1
+    assert fence[rendered.material > 0.5].mean() > 0.999
+    row = materials()["wire_mesh"]
+    for name, mean in (("roughness", row.roughness), ("metallic", row.metallic)):
+        assert np.abs(rendered.layers[name][fence].mean() - mean) < 0.1, name
+        assert rendered.layers[name][fence].max() < 1.5 * mean + 0.1, name
+    assert rendered.layers["roughness"][fence].std() > 0.005
 
 
 class Low(OverPath):
