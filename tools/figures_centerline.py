@@ -43,6 +43,7 @@ from ml.scores.baselines import SkeletonSettings, centers_on, skeletons  # noqa:
 from ml.scores.distances import over_roads  # noqa: E402
 from ml.scores.evaluation import (  # noqa: E402
     HALF_WIDTH,
+    STRETCHES,
     Case,
     Cropping,
     Predictor,
@@ -74,7 +75,7 @@ PAINTED = "als_rural2lane_t211-278"
 """The real road that has a painted line beside nearly all of its axis."""
 CROPPINGS: dict[str, Cropping | None] = {
     "real-slices": Cropping(),
-    "real-stretches": Cropping(length=50.0),
+    "real-stretches": STRETCHES,
     "real-whole": None,
 }
 """Tables of the real roads, and how their slices are cropped."""
@@ -210,8 +211,8 @@ def load_models(runs: Sequence[str]) -> dict[str, list[Model]]:
 
 
 def kind_of(run: Run[Any]) -> TruthKind:
-    """Return the kind of truth, road or carriageway, that a run learned."""
-    return _part(run, SliceSettings).truth
+    """Return the kind of truth, road or carriageway, that a run learned; road if it learned both."""
+    return "carriageway" if _part(run, SliceSettings).truth == "carriageway" else "road"
 
 
 def learned_by(run: Run[Any]) -> frozenset[str]:

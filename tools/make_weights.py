@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import argparse
 import json
+import resource
+import shlex
 import subprocess
 import sys
-import time
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -18,11 +19,14 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from ml.cards import WEIGHTS, Domain, Figure, ModelCard  # noqa: E402
-from ml.runs import Run  # noqa: E402
+from ml.runs import METRICS, Run  # noqa: E402
 from ml.shipped import ship  # noqa: E402
 from synthroads_addon.base.files import write_file  # noqa: E402
 from synthroads_addon.base.schema import canonical_json, read_json  # noqa: E402
+from synthroads_addon.dataset.manifest import MANIFEST, read_manifest  # noqa: E402
 
+REAL = "a real scan"
+"""What figures on clouds of others are called."""
 RULES = ("views", "skeleton", "middle of", "between the", "centroid")
 """Beginnings of the names of what learns nothing in `synthroads evaluate`'s tables."""
 
@@ -33,48 +37,61 @@ class Plan:
 
     Attributes:
         title, task: of its card.
-        recipe: of the data set that it learns from.
         configuration, changes: of the training.
         domain: what it is good for.
         limits: where it fails.
+        inside, outside: splits of the recipe's roads that it is measured on, by how the figures call them: roads of the
+            kinds that it has learned, and others.
         mapping: real cloud's name in the folder of real ones -> mapping of its classes; of centrelines axes lie beside.
     """
 
     title: str
     task: Any
-    recipe: str
     configuration: str
     changes: tuple[str, ...]
     domain: Domain
     limits: tuple[str, ...]
+    inside: dict[str, str]
+    outside: dict[str, str]
     mapping: dict[str, str | None] = field(default_factory=dict)
 
 
+RECIPE = "package-models"
+"""Data set that all of them learn from."""
 PLANS = {
     "centerline-airborne": Plan(
-        "Centreline of whole roads in airborne surveys, ten slices at a time",
+        "Centreline of roads with one or two carriageways, seen from the air, ten slices at a time",
         "centerline",
-        "centerline-small",
         "centerline-transformer",
-        ("schedule.epochs=10", "threads=1"),
-        Domain(density=(8.0, 45.0), platforms=("airborne",), needs=("intensity",)),
+        ("schedule.epochs=12", "slices.truth=either", "data.calibration_split=held_out", "threads=1"),
+        Domain(density=(8.0, 60.0), platforms=("airborne", "uav"), needs=("intensity",)),
         (
-            "It has seen twenty synthetic roads; roads in towns, with islands, tracks or cycle paths it doesn't know.",
+            "Roads in towns, with islands, tracks or cycle paths beside, it hasn't seen.",
             "Strips cut off within the pavement, and roads without markings, it knows from augmentation alone.",
+            "Only ground is looked at: plants and vehicles must be told from it before.",
         ),
-        {"als_rural2lane_t211-278.laz": None, "als_dual4lane_t338-369.laz": None},
+        {"test": "its own test roads"},
+        {"held_out": "synthetic roads of another world"},
+        {
+            "als_rural2lane_t211-278.laz": None,
+            "als_rural2lane_t000-075.laz": None,
+            "als_dual4lane_t338-369.laz": None,
+            "als_dual6lane_t370-473.laz": None,
+        },
     ),
-    "segmentation-uav": Plan(
-        "Five classes on and beside motorways in dense clouds seen from above",
+    "segmentation-overhead": Plan(
+        "Five classes on and beside roads, from the air, from UAVs and in single sweeps of a car's head",
         "segmentation",
-        "small-roads",
-        "segmentation-small",
-        ("threads=1",),
-        Domain(density=(60.0, 1500.0), platforms=("uav",)),
+        "segmentation-any-scanner",
+        ("schedule.epochs=12", "network.width=16", "crop_points=6000", "crops_per_tile=1", "threads=1"),
+        Domain(density=(3.0, 1500.0), platforms=("airborne", "uav", "tripod")),
         (
-            "It has seen six motorways of 120 m by one scanner; buildings, rails and water are none of its classes.",
-            "Scans from the road, and sparse ones from aircraft, are unlike what it was trained on.",
+            "Buildings, rails, water and street furniture of towns are none of its classes: they become one of the five.",
+            "Vegetation beside synthetic roads is of few kinds; hedges along a pavement may be taken for road furniture.",
+            "Markings are found where the intensity tells them, which in sweeps of cars' heads it hardly does.",
         ),
+        {"test": "its own test roads", "test_sweeps": "a sweep of its own"},
+        {"held_out": "synthetic roads of another world"},
         {"ign_lidarhd_street.laz": "ign", "semkitti_seq00_000000.laz": "semantickitti"},
     ),
 }
@@ -89,22 +106,24 @@ def main() -> None:
     parser.add_argument("--real", type=Path, help="folder of real scans to measure on; without it those figures stay")
     parser.add_argument("--jobs", type=int, default=2, help="scenes at a time")
     arguments = parser.parse_args()
+    if unknown := [name for name in arguments.names if name not in PLANS]:
+        parser.error(f"NAME is {unknown[0]}: must be one of {', '.join(PLANS)}")
     for name in arguments.names or PLANS:
         make(name, PLANS[name], arguments)
 
 
 def make(name: str, plan: Plan, arguments: argparse.Namespace) -> None:
     """Make one model: its data set, training, figures, weights and card."""
-    data, folder = arguments.work / plan.recipe, arguments.work / name
-    run_command("dataset", plan.recipe, "--output", str(data), "--jobs", str(arguments.jobs))
-    changes = [*plan.changes, *data_changes(plan, data)]
-    options = [word for change in changes for word in ("--set", change)]
-    begin = time.perf_counter()
-    run_command("train", plan.configuration, "--output", str(folder), "--resume", *options)
-    minutes = (time.perf_counter() - begin) / 60.0
+    data, folder = arguments.work / RECIPE, arguments.work / name
+    run_command("dataset", RECIPE, "--output", str(data), "--jobs", str(arguments.jobs), *resumption(data))
+    options = [word for change in (*plan.changes, *data_changes(plan, data)) for word in ("--set", change)]
+    minutes = train(plan, folder, options)
     run: Run[Any] = Run.open(folder)
-    spent = sum(epoch.get("seconds", 0.0) for epoch in run.history) / 60.0 or minutes
-    figures = [*measured(plan, name, folder, data, arguments), *foreign(plan, name, folder, arguments)]
+    figures = [
+        *(figure for split, where in plan.inside.items() for figure in measured(plan, name, split, where, arguments)),
+        *(figure for split, where in plan.outside.items() for figure in measured(plan, name, split, where, arguments)),
+        *foreign(plan, name, folder, arguments),
+    ]
     arguments.weights.mkdir(parents=True, exist_ok=True)
     ship(run, arguments.weights / f"{name}.safetensors", overwrite=True)
     card = ModelCard(
@@ -113,14 +132,14 @@ def make(name: str, plan: Plan, arguments: argparse.Namespace) -> None:
         task=plan.task,
         domain=plan.domain,
         recipe=(
-            f"synthroads dataset {plan.recipe} --output {data}",
-            f"synthroads train {plan.configuration} --output {folder} {' '.join(options)}",
+            f"synthroads dataset {RECIPE} --output {data}",
+            f"synthroads train {plan.configuration} --output {folder} {shlex.join(options)}",
         ),
         commit=commit(),
         seed=run.configuration.seed,
-        scenes=sum(1 for _ in (data / "scenes").iterdir()),
+        scenes=training_roads(plan, data),
         epochs=run.configuration.schedule.epochs,
-        minutes=round(spent, 1),
+        minutes=round(minutes, 1),
         parameters=int(read_json(folder / "metrics.json")["parameters"]),
         figures=tuple(figures),
         limits=plan.limits,
@@ -129,20 +148,42 @@ def make(name: str, plan: Plan, arguments: argparse.Namespace) -> None:
     write_file(arguments.weights / f"{name}.md", card_text(card).encode(), overwrite=True)
 
 
+def resumption(data: Path) -> list[str]:
+    """Return the option by which a data set that was begun is gone on with."""
+    return ["--resume"] if (data / MANIFEST).is_file() else []
+
+
+def train(plan: Plan, folder: Path, options: list[str]) -> float:
+    """Train a model to its end unless it is; return the minutes of processor time of all that it took so far."""
+    kept = folder / "minutes.json"
+    before = float(read_json(kept)["minutes"]) if kept.is_file() else 0.0
+    begin = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    if not (folder / METRICS).is_file():
+        run_command("train", plan.configuration, "--output", str(folder), "--resume", *options)
+        before += (resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - begin) / 60.0
+        write_file(kept, canonical_json({"minutes": before}).encode(), overwrite=True)
+    return before
+
+
+def training_roads(plan: Plan, data: Path) -> int:
+    """Return the number of a data set's roads that a model learns from."""
+    splits = {"train"} if plan.task == "centerline" else {"train", "train_sweeps"}
+    return sum(1 for scene in read_manifest(data).scenes if scene.status == "done" and scene.split in splits)
+
+
 def data_changes(plan: Plan, data: Path) -> list[str]:
     """Return the changes of a configuration that have it learn from a data set's folder."""
     if plan.task == "centerline":
         return [f"data.data_sets={json.dumps([str(data)])}"]
-    return [
-        f"data.synthetic={json.dumps([{'path': str(data), 'split': 'train'}])}",
-        f"data.tests={json.dumps({'unseen road': [{'path': str(data), 'split': 'test'}]})}",
-    ]
+    sources = [{"path": str(data), "split": split} for split in ("train", "train_sweeps")]
+    return [f"data.synthetic={json.dumps(sources)}"]
 
 
-def measured(plan: Plan, name: str, folder: Path, data: Path, arguments: argparse.Namespace) -> list[Figure]:
-    """Return the figures on the data set's own test roads."""
-    scores = evaluate(folder, [str(data), "--split", "test"], arguments.work / f"{name}-scores" / "inside")
-    return figures_of(plan, scores, "its own test roads", inside=True)
+def measured(plan: Plan, name: str, split: str, where: str, arguments: argparse.Namespace) -> list[Figure]:
+    """Return the figures on a split of the data set's roads."""
+    words = [str(arguments.work / RECIPE), "--split", split]
+    scores = evaluate(arguments.work / name, words, arguments.work / f"{name}-scores" / split)
+    return figures_of(plan, scores, where, inside=split in plan.inside)
 
 
 def foreign(plan: Plan, name: str, folder: Path, arguments: argparse.Namespace) -> list[Figure]:
@@ -150,44 +191,53 @@ def foreign(plan: Plan, name: str, folder: Path, arguments: argparse.Namespace) 
     before = arguments.weights / f"{name}.json"
     if arguments.real is None:
         told = ModelCard.from_dict(read_json(before)).figures if before.is_file() else ()
-        return [figure for figure in told if not figure.inside]
+        return [figure for figure in told if REAL in figure.name]
     found = []
     for cloud, mapping in plan.mapping.items():
         words = [str(arguments.real / cloud), *(["--mapping", mapping] if mapping else [])]
         scores = evaluate(folder, words, arguments.work / f"{name}-scores" / Path(cloud).stem)
-        found += figures_of(plan, scores, f"a real scan, {Path(cloud).stem}", inside=False)
+        found += figures_of(plan, scores, f"{REAL}, {Path(cloud).stem}", inside=False)
     return found
 
 
 def figures_of(plan: Plan, scores: dict[str, Any], where: str, *, inside: bool) -> list[Figure]:
     """Return an evaluation's figures for a card, of centrelines beside the best of the rules that learn nothing."""
     if plan.task == "segmentation":
-        ((_, told),) = scores["tests"].items()
-        return [Figure(name=f"mean IoU on {where}", value=round(100.0 * told["mean_iou"], 1), unit="%", inside=inside)]
-    errors = {name: rows["all"]["mae"]["mean"] for name, rows in scores["tables"].items()}
-    rules = {name: error for name, error in errors.items() if error is not None and name.startswith(RULES)}
-    own = next(error for name, error in errors.items() if not name.startswith((*RULES, "the displaced")))
-    alone = {name: error for name, error in rules.items() if not name.startswith("views with")}
-    together = next(error for name, error in errors.items() if name.startswith("views with"))
-    best = round(min(alone.values()), 3)
+        return segmentation_figures(scores, where, inside=inside)
+    means = {name: rows["all"] for name, rows in scores["tables"].items()}
+    errors = {name: row["mae"]["mean"] for name, row in means.items()}
+    own = next(name for name in errors if not name.startswith((*RULES, "the displaced")))
+    together = next(name for name in errors if name.startswith("views with"))
+    alone = [error for name, error in errors.items() if name.startswith(RULES) and name != together]
+    best = round(min(error for error in alone if error is not None), 3)
+
+    def figure(text: str, value: float, unit: str, rule: float | None = None) -> Figure:
+        return Figure(name=f"{text}, {where}", value=round(value, 3), rule=rule, unit=unit, inside=inside)
+
+    covered = [(share, means[together][f"coverage_{share}"]["mean"]) for share in (68, 95)]
     return [
-        Figure(
-            name=f"mean error, the network by itself, {where}", value=round(own, 3), rule=best, unit="m", inside=inside
-        ),
-        Figure(
-            name=f"mean error, fused with the views, {where}",
-            value=round(together, 3),
-            rule=best,
-            unit="m",
-            inside=inside,
-        ),
+        figure("mean error, the network by itself", errors[own], "m", best),
+        figure("mean error, fused with the views", errors[together], "m", best),
+        *(figure(f"in the {share} % interval, fused", round(100.0 * value, 1), "%") for share, value in covered),
+    ]
+
+
+def segmentation_figures(scores: dict[str, Any], where: str, *, inside: bool) -> list[Figure]:
+    """Return mean IoU and that of each class which the truth has."""
+    ((_, told),) = scores["tests"].items()
+    by_class = {name: row["iou"] for name, row in told["classes"].items() if row["support"]}
+    named = {"mean IoU": told["mean_iou"], **{f"IoU of {name}": value for name, value in by_class.items()}}
+    return [
+        Figure(name=f"{name}, {where}", value=round(100.0 * value, 1), unit="%", inside=inside)
+        for name, value in named.items()
+        if value is not None
     ]
 
 
 def evaluate(folder: Path, words: list[str], output: Path) -> dict[str, Any]:
-    """Return the scores of `synthroads evaluate` as JSON data, measured once."""
+    """Return the scores of `synthroads evaluate` as JSON data, measured once for each training."""
     kept = output / "scores.json"
-    if not kept.is_file():
+    if not kept.is_file() or kept.stat().st_mtime < (folder / METRICS).stat().st_mtime:
         told = run_command("evaluate", str(folder), *words, "--output", str(output), "--json")
         write_file(kept, told.encode(), overwrite=True)
     return dict(read_json(kept))

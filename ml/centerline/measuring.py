@@ -15,14 +15,14 @@ from synthroads_addon.base.progress import Progress, silent
 from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.dataset.manifest import MANIFEST
 
-from ..data.corridor import TruthKind
+from ..data.corridor import Learned
 from ..data.roads import LearningRoad, read_measured, read_scene, scene_folders
 from ..networks.centerline.models import TARGETS
 from ..scores.baselines import SkeletonSettings
 from ..scores.distances import TARGET_METRICS, TargetErrors
 from ..scores.evaluation import (
+    STRETCHES,
     Case,
-    Cropping,
     Predictor,
     make_case,
     measure,
@@ -57,7 +57,7 @@ def measure_run(
     """Measure a trained model on data sets and on real clouds with an axis beside them; write tables and pictures.
 
     Synthetic roads are looked at along a path that strays from the axis, and whole. Real ones, whose strips were cut
-    around the axis, have both sides of each slice cropped at random, and the path is found in what is left.
+    around the axis, have both sides cropped at random, anew every 50 m, and the path is found in what is left.
 
     Returns:
         the model's mean figures; ``tables`` has those of all predictors and roads, ``corridor`` its errors by target,
@@ -105,7 +105,7 @@ def read_cases(
                     shown.append(make_case(road, seed, cropping=None, estimated=False, settings=settings))
         else:
             road = _read_measured_case(path, settings.truth)
-            shown.append(make_case(road, seed, cropping=Cropping(), estimated=True, settings=settings))
+            shown.append(make_case(road, seed, cropping=STRETCHES, estimated=True, settings=settings))
     if not shown:
         names = ", ".join(str(path) for path in evaluation.data)
         raise InputError("data", names, f"holds no road with a {settings.truth} of the kind that was learned")
@@ -130,7 +130,7 @@ def corridor_figures(predictor: CenterlinePredictor, shown: Sequence[Case]) -> d
     return rows
 
 
-def _read_measured_case(cloud: Path, truth: TruthKind) -> LearningRoad:
+def _read_measured_case(cloud: Path, truth: Learned) -> LearningRoad:
     found = [cloud.with_name(cloud.stem + ending) for ending in AXIS_ENDINGS]
     there = [path for path in found if path.is_file()]
     if not cloud.exists():

@@ -20,6 +20,7 @@ from ..configuration import Configuration
 from ..data.batches import Batches, BatchOptions, DataOptions, Roads, crop_only_effects, fixed_batches, read_roads
 from ..data.effects import SequenceEffects
 from ..data.frames import read_path
+from ..data.roads import cut_strip
 from ..data.slices import Batch, SliceSettings
 from ..networks.centerline.losses import LossOptions, centerline_loss
 from ..networks.centerline.models import TARGETS, CenterlineModel, ModelOptions, all_targets
@@ -28,7 +29,7 @@ from ..processes import helper_processes
 from ..registry import network_union
 from ..runs import CALIBRATION, Run, stream_seed, to_json_data
 from ..scores.calibration import DEVIATIONS, IntervalCalibration
-from ..scores.evaluation import Cropping, make_case
+from ..scores.evaluation import STRETCHES, make_case
 from ..tasks import Evaluation, Prediction
 from ..training_loop import chosen_device, fit, move_to_device
 from .find_road import centerline_geojson, corridor_json, find_road
@@ -210,17 +211,24 @@ def _validation(configuration: CenterlineConfiguration, roads: Roads) -> Any:
 
 
 def calibrate(run: Run[CenterlineConfiguration], model: CenterlineModel, roads: Roads) -> dict[str, Any]:
-    """Calibrate the model's deviations on the validation roads, write them to the run; return the validation's metrics.
+    """Calibrate the model's deviations, write them to the run; return the metrics on the roads that they are of.
 
-    These are gone along from end to end, as in use: joined lines are better than those of single sequences.
+    Roads are gone along from end to end, as in use: joined lines are better than those of single sequences. They are the
+    validation's, or those held out, which are shown whole and once more as strips cut unevenly around them, as scans of
+    road networks are.
     """
     configuration = run.configuration
     seed, settings = configuration.seed, configuration.slices
     ready = CenterlinePredictor(model, settings, configuration.use)
-    shown = [make_case(road, seed, cropping=None, estimated=False, settings=settings) for road in roads.validation]
+    whole = roads.held_out or roads.validation
+    shown = [make_case(road, seed, cropping=None, estimated=False, settings=settings) for road in whole]
+    shown += [
+        make_case(cut_strip(road, seed), seed, cropping=STRETCHES, estimated=False, settings=settings)
+        for road in roads.held_out
+    ]
     # Strips that were cut around their axis beforehand: the middle of the strip must not be the answer.
     shown += [
-        make_case(road, seed, cropping=Cropping(), estimated=True, settings=settings)
+        make_case(road, seed, cropping=STRETCHES, estimated=True, settings=settings)
         for road in roads.measured_validation
     ]
     calibrated, error = ready.calibrate((one.road, one.frames) for one in shown)

@@ -1,7 +1,7 @@
 """The roads that a configuration names, and the batches of an epoch."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Self
 
@@ -16,7 +16,7 @@ from synthroads_addon.base.schema import quantity
 
 from ..configuration import Part
 from .axis import MeasuredAxis
-from .corridor import Truth, TruthKind
+from .corridor import Learned, Truth
 from .effects import SequenceEffects
 from .effects.slices import SequenceCrop
 from .roads import LearningRoad, read_measured, read_scene, scene_folders
@@ -44,6 +44,11 @@ class DataOptions(Part):
     data_sets: tuple[str, ...] = Field((), description="Folders that `synthroads dataset` made.")
     train_split: str = Field("train", description="Split of the data sets that weights are learned from.")
     validation_split: str = Field("validation", description="Split that curves and calibration are made with.")
+    calibration_split: str = Field(
+        "",
+        description="Split whose roads, cut at random and whole, calibrate the deviations instead of the validation's: "
+        "roads unlike those learned from make them right elsewhere.",
+    )
     measured: tuple[MeasuredRoad, ...] = Field((), description="Real roads to learn from.")
     measured_validation: tuple[MeasuredRoad, ...] = Field((), description="Real roads to validate with.")
     measured_share: float = quantity(
@@ -79,15 +84,16 @@ class BatchOptions(Part):
 
 @dataclass(frozen=True)
 class Roads:
-    """Synthetic and measured roads to train on (`train`, `measured`), and to validate with."""
+    """Synthetic and measured roads to train on (`train`, `measured`), to validate with, and held out to calibrate."""
 
     train: list[LearningRoad]
     measured: list[LearningRoad]
     validation: list[LearningRoad]
     measured_validation: list[LearningRoad]
+    held_out: list[LearningRoad] = field(default_factory=list)
 
 
-def read_roads(data: DataOptions, truth: TruthKind, progress: Progress = silent) -> Roads:
+def read_roads(data: DataOptions, truth: Learned, progress: Progress = silent) -> Roads:
     """Read the synthetic and the measured roads that a configuration trains on and validates with.
 
     Raises:
@@ -102,7 +108,9 @@ def read_roads(data: DataOptions, truth: TruthKind, progress: Progress = silent)
         raise InputError("data", list(data.data_sets), f"holds no road with a {truth} to learn from")
     if not validation and not measured_validation:
         raise InputError("data", list(data.data_sets), f"holds no road with a {truth} to validate with")
-    return Roads(train, measured, validation, measured_validation)
+    apart = data.calibration_split
+    held_out = _read_scenes(data.data_sets, apart, truth, cache, progress) if apart else []
+    return Roads(train, measured, validation, measured_validation, held_out)
 
 
 class Batches:
@@ -180,7 +188,7 @@ def crop_only_effects(crop: SequenceCrop) -> SequenceEffects:
 
 
 def _read_scenes(
-    data_sets: Sequence[str], split: str, truth: TruthKind, cache: Path | None, progress: Progress
+    data_sets: Sequence[str], split: str, truth: Learned, cache: Path | None, progress: Progress
 ) -> list[LearningRoad]:
     folders = [folder for data_set in data_sets for folder in scene_folders(Path(data_set), split)]
     roads: list[LearningRoad] = []
@@ -190,7 +198,7 @@ def _read_scenes(
     return roads
 
 
-def _read_measured_road(road: MeasuredRoad, truth: TruthKind) -> LearningRoad:
+def _read_measured_road(road: MeasuredRoad, truth: Learned) -> LearningRoad:
     """Read a measured road, its true axis clipped to the stations `first` to `last`."""
     whole = read_measured(Path(road.cloud), Path(road.axis), truth)
     assert whole.truth is not None
@@ -199,4 +207,4 @@ def _read_measured_road(road: MeasuredRoad, truth: TruthKind) -> LearningRoad:
     if np.count_nonzero(inside) < 2:
         raise InputError(f"{road.axis}: first", road.first, f"leaves nothing of an axis of {axis.length:.0f} m")
     part = MeasuredAxis(axis.points[inside], axis.joined[inside[:-1] & inside[1:]])
-    return replace(whole, truth=Truth.of_axis(part, truth))
+    return replace(whole, truth=Truth.of_axis(part, whole.truth.kind))

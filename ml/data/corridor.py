@@ -20,6 +20,9 @@ from .frames import Frames
 
 TruthKind = Literal["road", "carriageway"]
 TRUTH_KINDS: tuple[TruthKind, ...] = ("road", "carriageway")
+Learned = Literal["road", "carriageway", "either"]
+"""What a model learns: truths of one kind, or the middle of whole roads and of carriageways without shoulders as well."""
+LEARNED_KINDS: tuple[Learned, ...] = (*TRUTH_KINDS, "either")
 
 CORRIDOR = ("left_edge", "right_edge", "lanes", "lane_width", "heading", "height")
 """Columns of a corridor: y of the pavement's outer edges in the frame (m, left positive), number of lanes over both
@@ -30,6 +33,8 @@ STEP = 0.5
 _FULL_LANE = 2.5
 """A lane of less than this width (m) is just beginning or ending."""
 _NO_LANE = 0.01
+NO_SHOULDER = 1.2
+"""Pavement beyond an edge line that is no shoulder yet, m."""
 
 
 @dataclass(frozen=True)
@@ -106,6 +111,18 @@ class Truth:
         lines, room = (as_seen(*(self._along(side, station) for side in both.T)) for both in (self.lines, self.room))
         return Crossings(center, station, corridor, lines, room)
 
+    @property
+    def without_shoulders(self) -> bool:
+        """Return whether it is a carriageway whose pavement nowhere reaches `NO_SHOULDER` beyond its edge lines."""
+        if self.kind != "carriageway" or self.left is None or self.right is None:
+            return False
+        station = self.axis.station
+        frames = Frames(self.axis.position(station), self.axis.direction(station), station)
+        seen = self.at(frames)
+        sides = np.column_stack([seen.corridor[:, 0] - seen.center, seen.center - seen.corridor[:, 1]]) - seen.lines
+        known = sides[np.isfinite(sides)]
+        return bool(len(known)) and float(known.max()) <= NO_SHOULDER
+
     def _along(self, values: Float, station: Float) -> Float:
         """Return values (M,) interpolated at stations, NaN at NaN; the vertex before counts where one is infinite."""
         known = np.nan_to_num(station)
@@ -136,19 +153,23 @@ class Crossings:
     room: Float
 
 
-def truths(parameters: RoadParameters, kind: TruthKind, origin: ArrayLike = (0.0, 0.0, 0.0)) -> list[Truth]:
+def truths(parameters: RoadParameters, kind: Learned, origin: ArrayLike = (0.0, 0.0, 0.0)) -> list[Truth]:
     """Return the truths of a road: one of kind ``road``, one of kind ``carriageway`` for each with two lanes anywhere.
 
     Args:
         parameters: the road.
-        kind: which centreline.
+        kind: which centreline; ``either``: the road's, then that of each carriageway without shoulders, which by itself
+            is like a road of two lanes.
         origin: (3,) map coordinates that were subtracted from the cloud's points.
 
     Raises:
         InputError: the kind isn't known.
     """
-    if kind not in TRUTH_KINDS:
-        raise InputError("truth", kind, f"must be one of {', '.join(TRUTH_KINDS)}")
+    if kind not in LEARNED_KINDS:
+        raise InputError("truth", kind, f"must be one of {', '.join(LEARNED_KINDS)}")
+    if kind == "either":
+        alone = [truth for truth in truths(parameters, "carriageway", origin) if truth.without_shoulders]
+        return [*truths(parameters, "road", origin), *alone]
     geometry = RoadGeometry(parameters)
     by: Float = np.array(parameters.transform.translate) - np.asarray(origin, dtype=np.float64)
     if kind == "road":

@@ -22,13 +22,15 @@ from synthroads_addon.dataset.manifest import checksum, read_manifest
 from synthroads_addon.road.parameters import read_parameters
 
 from .axis import MeasuredAxis
-from .corridor import Truth, TruthKind, truths
+from .corridor import Learned, Truth, truths
 from .frames import Frames
 from .points import GROUND_CLASSES, Points, read_ground, read_points
 
 REACH = 45.0
 """Points farther from the line that they are sorted along aren't kept, m."""
 CLOUD, PARAMETERS = "cloud.laz", "parameters.json"
+STRIP = (6.0, 20.0)
+"""Least and largest half width of strips that scans of road networks are cut into, m."""
 _MARGIN = 2.0
 """Stretch of stations before and behind a slice that may hold points of it, beyond what its corners say, m."""
 _CACHED = {
@@ -163,13 +165,14 @@ def scene_folders(data_set: Path, split: str | None) -> list[Path]:
     return found
 
 
-def read_scene(folder: Path, kind: TruthKind, cache: Path | None = None) -> list[LearningRoad]:
+def read_scene(folder: Path, kind: Learned, cache: Path | None = None) -> list[LearningRoad]:
     """Read a data set's scene as roads: its ground points, with the truth of each road or carriageway of `kind`.
 
     Args:
         folder: with ``cloud.laz`` and ``parameters.json``.
         kind: of the truth. A road with carriageways of two lanes gives a `LearningRoad` for each of them with the kind
-            ``carriageway``, perhaps none; names of several end with their number.
+            ``carriageway``, perhaps none; with ``either`` the whole road, and each of them that has no shoulders. Names
+            of several end with their number.
         cache: folder in which the sorted points are kept, to be mapped into memory the next time; None: nowhere.
 
     Raises:
@@ -191,13 +194,13 @@ def read_scene(folder: Path, kind: TruthKind, cache: Path | None = None) -> list
     return [replace(whole, name=name, truth=truth) for name, truth in zip(names, found, strict=True)]
 
 
-def read_measured(cloud: Path, axis: Path, kind: TruthKind, gap: float | None = None) -> LearningRoad:
+def read_measured(cloud: Path, axis: Path, kind: Learned, gap: float | None = None) -> LearningRoad:
     """Read a real cloud's ground points as a road whose truth is a measured axis in the same map coordinates.
 
     Args:
         cloud: the cloud.
         axis: CSV with columns x, y, z (``s`` and others aren't used) or GeoJSON.
-        kind: what the axis is the middle of.
+        kind: what the axis is the middle of; ``either`` is a whole road's.
         gap: see `MeasuredAxis.read`.
 
     Raises:
@@ -205,7 +208,7 @@ def read_measured(cloud: Path, axis: Path, kind: TruthKind, gap: float | None = 
     """
     points = read_ground(cloud)
     line = MeasuredAxis.read(axis, gap).translate(-points.origin)
-    return LearningRoad.of_points(cloud.stem, points, line, Truth.of_axis(line, kind))
+    return LearningRoad.of_points(cloud.stem, points, line, Truth.of_axis(line, "carriageway" if kind == "carriageway" else "road"))
 
 
 def crop_road(road: LearningRoad, share: float, seed: int, length: float = 1.0) -> LearningRoad:
@@ -236,6 +239,19 @@ def crop_road(road: LearningRoad, share: float, seed: int, length: float = 1.0) 
         np.maximum.at(reach, number, sign * offset)
         keep &= sign * offset <= (reach * (1.0 - shares[:, side]))[number]
     return road.select(keep)
+
+
+def cut_strip(road: LearningRoad, seed: int) -> LearningRoad:
+    """Return a road's points within a distance of its true axis that is drawn from the seed and the road's name.
+
+    The distance lies in `STRIP`, all ratios as likely. A road without a known truth stays as it is.
+    """
+    if road.truth is None:
+        return road
+    low, high = np.log(STRIP)
+    reach = float(np.exp(stream(seed, "strip", road.name).uniform(low, high)))
+    _, offset = road.truth.axis.project(road.xyz)
+    return road.select(np.abs(offset) <= reach)
 
 
 def cut_beside_median(road: LearningRoad, error: float, rng: np.random.Generator) -> LearningRoad:

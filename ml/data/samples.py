@@ -8,12 +8,10 @@ from numpy.typing import NDArray
 
 from synthroads_addon.base.arrays import AnyArray, Bool, Float, Index
 
-from .corridor import CORRIDOR
+from .corridor import CORRIDOR, NO_SHOULDER
 from .frames import Frames
 
 LEFT, RIGHT, HEADING, HEIGHT = (CORRIDOR.index(name) for name in ("left_edge", "right_edge", "heading", "height"))
-_NO_SHOULDER = 1.2
-"""Pavement beyond an edge line that is no shoulder yet, m."""
 
 
 @dataclass
@@ -95,4 +93,4 @@ class Stretch(Sample):
         """Return whether it is a carriageway whose pavement ends within 1.2 m of its edge lines, in all slices."""
         beyond = self.paved_sides() - self.lines
         beyond = beyond[np.isfinite(beyond)]
-        return self.carriageway and bool(len(beyond)) and float(beyond.max()) <= _NO_SHOULDER
+        return self.carriageway and bool(len(beyond)) and float(beyond.max()) <= NO_SHOULDER

@@ -29,7 +29,7 @@ from synthroads_addon.base.schema import quantity
 from ..configuration import Part
 from ..registry import apply_effects
 from . import intensity
-from .corridor import CORRIDOR, TruthKind
+from .corridor import CORRIDOR, Learned
 from .effects import SequenceEffects
 from .frames import SPACING, Frames, displace_frames, sequences
 from .points import ROAD_CLASSES
@@ -48,7 +48,11 @@ MISSING_NOISE = 0.01
 class SliceSettings(Part):
     """Options for cutting sequences of slices, and for how their path strays in training."""
 
-    truth: TruthKind = Field("road", description="road: the middle of all; carriageway: between its two lanes.")
+    truth: Learned = Field(
+        "road",
+        description="road: the middle of all; carriageway: between its two lanes; either: the middle of whole roads, and "
+        "of carriageways without shoulders as of roads by themselves.",
+    )
     slices: int = quantity(10, ge=1, le=1000, unit="1", description="Slices of a sequence.")
     spacing: float = quantity(1.0, gt=0, le=100, unit="m", description="Of a sequence's slices along the path.")
     thickness: float = quantity(1.0, gt=0, le=100, unit="m", description="Of a slice, along the path.")
@@ -208,7 +212,7 @@ def cut_stretch(road: LearningRoad, frames: Frames, settings: SliceSettings) -> 
         corridor=corridor,
         lines=lines,
         room=room,
-        carriageway=settings.truth == "carriageway",
+        carriageway=road.truth is not None and road.truth.kind == "carriageway",
     )
     if np.isfinite(room).any():
         y = cut.coord[:, 1] - center[cut.number]

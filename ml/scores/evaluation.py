@@ -59,6 +59,10 @@ class Cropping:
     length: float = 1.0
 
 
+STRETCHES = Cropping(length=50.0)
+"""Cuts that stay the same for 50 m: no model that sees less of the road can average them out."""
+
+
 @dataclass(frozen=True)
 class Case:
     """A road to evaluate on: its points, perhaps cropped, and the frames of a randomly displaced path."""

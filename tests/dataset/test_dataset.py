@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -154,8 +155,8 @@ def test_missing_and_unknown_recipes_are_refused(tmp_path: Path) -> None:
 
 # --- drawn values ----------------------------------------------------------------------------------------------------
 
-FIXED = {"centerline-airborne-even", "centerline-small"}
-"""Recipes that draw nothing: of a sensor without errors, for pairs; and one that models have learned from."""
+FIXED = {"centerline-airborne-even"}
+"""Recipes that draw nothing: of a sensor without errors, for pairs."""
 ONLY_WITH = {
     "scan.receiver.range_walk": "scan.noise.speckle",
     "scan.receiver.faint_range_sigma": "scan.noise.range_sigma",
@@ -170,17 +171,22 @@ def value_at(scenario: Any, path: str) -> Any:
     return scenario
 
 
-def drawn_fields(data: Recipe) -> dict[str, DrawnValue]:
-    return {path: value for part in (data, *data.groups) for path, value in part.draw.items()}
+def drawn_fields(data: Recipe) -> Iterator[tuple[str, DrawnValue, list[SceneJob]]]:
+    """Yield each field that a recipe or a group draws, with its values and the scenes that they are for."""
+    jobs = scene_jobs(data)
+    yield from ((path, value, jobs) for path, value in data.draw.items())
+    for group in data.groups:
+        own = [job for job in jobs if job.name.rpartition("-")[0] == group.name]
+        yield from ((path, value, own) for path, value in group.draw.items())
 
 
 @pytest.mark.parametrize("name", sorted(set(recipe_names()) - FIXED))
 def test_built_in_recipes_draw_the_sensor_and_every_drawn_value_is_used(name: str) -> None:
     """Each lies in its range, differs from scene to scene, and has what it needs to matter."""
-    drawn, jobs = drawn_fields(load_recipe(name)), scene_jobs(load_recipe(name))
+    drawn = list(drawn_fields(load_recipe(name)))
     for part in ("scan.noise.", "scan.receiver.", "scan.platform.", "scan.relief"):
-        assert any(path.startswith(part) for path in drawn), part
-    for path, value in drawn.items():
+        assert any(path.startswith(part) for path, _, _ in drawn), part
+    for path, value, jobs in drawn:
         if value.one_of:
             continue
         found = [value_at(job.scenario, path) for job in jobs if path.split(".")[1] != "platform" or has(job, path)]

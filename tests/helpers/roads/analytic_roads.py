@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from ml.data.corridor import TruthKind, truths
+from ml.data.corridor import Learned, truths
 from ml.data.points import Points
 from ml.data.roads import LearningRoad
 from synthroads_addon.base.classes import class_scheme
@@ -78,14 +78,14 @@ def points(section: str = "RQ31", design_class: str = "EKA1A", seed: int = SEED,
 
 
 def roads(
-    kind: TruthKind = "road", section: str = "RQ31", design_class: str = "EKA1A", seed: int = SEED
+    kind: Learned = "road", section: str = "RQ31", design_class: str = "EKA1A", seed: int = SEED
 ) -> list[LearningRoad]:
     """Return a road for each truth of a kind; tests share their arrays, which can't be written to."""
     return list(_roads(kind, section, design_class, seed))
 
 
 @cache
-def _roads(kind: TruthKind, section: str, design_class: str, seed: int) -> tuple[LearningRoad, ...]:
+def _roads(kind: Learned, section: str, design_class: str, seed: int) -> tuple[LearningRoad, ...]:
     known = parameters(section, design_class, seed)
     whole = _sorted(section, design_class, seed)
     return tuple(replace(whole, truth=truth) for truth in truths(known, kind, whole.origin))

@@ -13,9 +13,11 @@ import pytest
 import torch
 
 from ml.centerline import task
+from ml.centerline.predictor import CenterlinePredictor
 from ml.configuration import from_data, load_configuration
 from ml.data.batches import Batches, BatchOptions, MeasuredRoad, Roads, read_roads
 from ml.data.effects import SequenceEffects
+from ml.data.roads import LearningRoad
 from ml.data.slices import mirror_batch
 from ml.runs import CALIBRATION, METRICS, Run
 from ml.tasks import Evaluation, Prediction
@@ -204,6 +206,39 @@ def test_batches_hang_on_seed_and_epoch_alone():
     mirror = torch.cat([mirror_batch(batch)["center"] for batch in one[2:]])
     assert torch.equal(drawn_once.sort(0).values, mirror.sort(0).values)
     assert not torch.equal(drawn_once, mirror)
+
+
+def test_roads_held_out_calibrate_in_the_place_of_the_validations(
+    trained: Trained, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Each whole and as a strip cut unevenly; the calibration is that of their errors."""
+    known, held = analytic_roads.roads(), analytic_roads.roads(seed=6)
+    shown: list[list[LearningRoad]] = []
+    whole = CenterlinePredictor.calibrate
+
+    def calibrate(self: CenterlinePredictor, cases: Any) -> Any:
+        shown.append([road for road, _ in (cases := list(cases))])
+        return whole(self, cases)
+
+    monkeypatch.setattr(CenterlinePredictor, "calibrate", calibrate)
+    model = task.load_predictor(trained()).model
+    factors = []
+    for number, roads in enumerate((Roads([], [], known, []), Roads([], [], known, [], held))):
+        run = Run.start(tmp_path / str(number), configuration(data))
+        factors.append(task.calibrate(run, model, roads)["calibration_factor"])
+    assert [road.truth for road in shown[0]] == [road.truth for road in known]
+    assert [road.truth for road in shown[1]] == [road.truth for road in held] * 2
+    assert len(shown[1][1]) < 0.9 * len(held[0])
+    assert factors[0] != factors[1]
+
+
+def test_a_split_to_calibrate_on_is_read(data: Path):
+    options = configuration(data).data
+    assert not read_roads(options, "road").held_out
+    apart = options.model_copy(update={"calibration_split": "validation"})
+    assert [road.name for road in read_roads(apart, "road").held_out] == [
+        road.name for road in read_roads(options, "road").validation
+    ]
 
 
 def test_synthetic_and_measured_roads_are_mixed():

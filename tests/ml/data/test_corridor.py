@@ -184,3 +184,18 @@ def test_a_gap_in_the_axis_leaves_everything_unknown() -> None:
 def test_unknown_kinds_are_refused() -> None:
     with pytest.raises(InputError, match="must be one of road, carriageway"):
         truths(parameters(), "street")  # type: ignore[arg-type]
+
+
+NARROW = {"lanes": [3.5, 3.5], "hard_shoulder": 0.0, "outer_edge_strip": 0.5, "inner_edge_strip": 0.5, "median": 2.5}
+
+
+def test_carriageways_without_shoulders_are_roads_by_themselves() -> None:
+    """Such are like rural roads; a motorway's, with its shoulder, isn't."""
+    scenario = {"design_class": "EKA3", "length": 160.0, "turnouts": {"exits": 0.0, "entries": 0.0}}
+    scenario["turnouts"] |= {"emergency_bays": 0.0}  # type: ignore[operator]
+    limits = RoadScenario.from_dict(scenario | {"cross_section": NARROW, "lane_changes": {"share": 0.0}})
+    found = truths(sample_road(limits, 3), "either")
+    assert [truth.kind for truth in found] == ["road", "carriageway", "carriageway"]
+    assert [truth.without_shoulders for truth in found] == [False, True, True]
+    assert [truth.kind for truth in truths(parameters(), "either")] == ["road"]
+    assert not any(truth.without_shoulders for truth in truths(parameters(), "carriageway"))

@@ -12,7 +12,7 @@ import torch
 
 from ml.data.effects import SequenceEffects
 from ml.data.points import Points
-from ml.data.roads import crop_road, read_measured, read_scene, scene_folders
+from ml.data.roads import STRIP, crop_road, cut_strip, read_measured, read_scene, scene_folders
 from ml.data.slices import SliceDataset, SliceSettings, collate
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError
@@ -75,6 +75,19 @@ def write_scene(folder: Path) -> Points:
     with open_writer(folder / "cloud.laz", 25832, cloud.origin, 65535.0, (), scheme) as writer:
         writer.write(block)
     return cloud
+
+
+def test_a_strip_is_as_wide_as_seed_and_name_say() -> None:
+    road = roads()[0]
+    truth = road.known_truth
+    reaches = []
+    for seed in range(8):
+        strip = cut_strip(road, seed)
+        assert len(cut_strip(road, seed)) == len(strip) < len(road)
+        assert strip.truth is truth
+        reaches.append(np.abs(truth.axis.project(strip.xyz)[1]).max())
+    assert STRIP[0] - 0.1 < min(reaches) < 0.6 * max(reaches)
+    assert max(reaches) <= STRIP[1] + 1e-6
 
 
 def test_reading_a_scene_with_and_without_cache(tmp_path: Path) -> None:
