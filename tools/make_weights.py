@@ -86,8 +86,8 @@ PLANS = {
         ("schedule.epochs=12", "network.width=16", "crop_points=6000", "crops_per_tile=1", "threads=1"),
         Domain(density=(3.0, 1500.0), platforms=("airborne", "uav", "tripod")),
         (
-            "Buildings, rails, water and street furniture of towns are none of its classes: they become one of the five.",
-            "Vegetation beside synthetic roads is of few kinds; hedges along a pavement may be taken for road furniture.",
+            "Buildings, rails, water and furniture of streets are none of its classes: they become one of the five.",
+            "Plants beside synthetic roads are of few kinds; hedges along a pavement may be taken for road furniture.",
             "Markings are found where the intensity tells them, which in sweeps of cars' heads it hardly does.",
         ),
         {"test": "its own test roads", "test_sweeps": "a sweep of its own"},

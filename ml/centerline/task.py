@@ -213,9 +213,9 @@ def _validation(configuration: CenterlineConfiguration, roads: Roads) -> Any:
 def calibrate(run: Run[CenterlineConfiguration], model: CenterlineModel, roads: Roads) -> dict[str, Any]:
     """Calibrate the model's deviations, write them to the run; return the metrics on the roads that they are of.
 
-    Roads are gone along from end to end, as in use: joined lines are better than those of single sequences. They are the
-    validation's, or those held out, which are shown whole and once more as strips cut unevenly around them, as scans of
-    road networks are.
+    Roads are gone along from end to end, as in use: joined lines are better than those of single sequences. They are
+    the validation's, or those held out, which are shown whole and once more as strips cut unevenly around them, as
+    scans of road networks are.
     """
     configuration = run.configuration
     seed, settings = configuration.seed, configuration.slices

@@ -21,7 +21,7 @@ from .frames import Frames
 TruthKind = Literal["road", "carriageway"]
 TRUTH_KINDS: tuple[TruthKind, ...] = ("road", "carriageway")
 Learned = Literal["road", "carriageway", "either"]
-"""What a model learns: truths of one kind, or the middle of whole roads and of carriageways without shoulders as well."""
+"""Truths that a model learns: of one kind, or of whole roads and of carriageways without shoulders as well."""
 LEARNED_KINDS: tuple[Learned, ...] = (*TRUTH_KINDS, "either")
 
 CORRIDOR = ("left_edge", "right_edge", "lanes", "lane_width", "heading", "height")

@@ -208,7 +208,8 @@ def read_measured(cloud: Path, axis: Path, kind: Learned, gap: float | None = No
     """
     points = read_ground(cloud)
     line = MeasuredAxis.read(axis, gap).translate(-points.origin)
-    return LearningRoad.of_points(cloud.stem, points, line, Truth.of_axis(line, "carriageway" if kind == "carriageway" else "road"))
+    truth = Truth.of_axis(line, "carriageway" if kind == "carriageway" else "road")
+    return LearningRoad.of_points(cloud.stem, points, line, truth)
 
 
 def crop_road(road: LearningRoad, share: float, seed: int, length: float = 1.0) -> LearningRoad:

@@ -50,8 +50,8 @@ class SliceSettings(Part):
 
     truth: Learned = Field(
         "road",
-        description="road: the middle of all; carriageway: between its two lanes; either: the middle of whole roads, and "
-        "of carriageways without shoulders as of roads by themselves.",
+        description="road: the middle of all; carriageway: between its two lanes; either: the middle of whole roads, "
+        "and of carriageways without shoulders as of roads by themselves.",
     )
     slices: int = quantity(10, ge=1, le=1000, unit="1", description="Slices of a sequence.")
     spacing: float = quantity(1.0, gt=0, le=100, unit="m", description="Of a sequence's slices along the path.")

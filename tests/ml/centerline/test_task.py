@@ -217,8 +217,9 @@ def test_roads_held_out_calibrate_in_the_place_of_the_validations(
     whole = CenterlinePredictor.calibrate
 
     def calibrate(self: CenterlinePredictor, cases: Any) -> Any:
-        shown.append([road for road, _ in (cases := list(cases))])
-        return whole(self, cases)
+        kept = list(cases)
+        shown.append([road for road, _ in kept])
+        return whole(self, kept)
 
     monkeypatch.setattr(CenterlinePredictor, "calibrate", calibrate)
     model = task.load_predictor(trained()).model
