@@ -212,6 +212,7 @@ def test_roads_held_out_calibrate_in_the_place_of_the_validations(
     trained: Trained, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     """Each whole and as a strip cut unevenly; the calibration is that of their errors."""
+    model = task.load_predictor(trained()).model
     known, held = analytic_roads.roads(), analytic_roads.roads(seed=6)
     shown: list[list[LearningRoad]] = []
     whole = CenterlinePredictor.calibrate
@@ -222,7 +223,6 @@ def test_roads_held_out_calibrate_in_the_place_of_the_validations(
         return whole(self, kept)
 
     monkeypatch.setattr(CenterlinePredictor, "calibrate", calibrate)
-    model = task.load_predictor(trained()).model
     factors = []
     for number, roads in enumerate((Roads([], [], known, []), Roads([], [], known, [], held))):
         run = Run.start(tmp_path / str(number), configuration(data))
