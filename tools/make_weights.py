@@ -26,7 +26,7 @@ from synthroads_addon.base.schema import canonical_json, read_json  # noqa: E402
 from synthroads_addon.dataset.manifest import MANIFEST, read_manifest  # noqa: E402
 
 REAL = "a real scan"
-"""What figures on clouds of others are called."""
+"""How the names of figures on clouds of others call them."""
 RULES = ("views", "skeleton", "middle of", "between the", "centroid")
 """Beginnings of the names of what learns nothing in `synthroads evaluate`'s tables."""
 
