@@ -23,6 +23,7 @@ COMMANDS = {
     "train": "train a segmentation or centreline model",
     "evaluate": "measure a trained model",
     "predict": "label a cloud, or find its road, with a trained model",
+    "export": "write a trained network as ONNX",
     "experiment": "train variants of a segmentation with several seeds, and compare their scores",
     "pack": "pack a data set's labelled points into one small file, to train from elsewhere",
     "forecast": "forecast how long a training of a segmentation takes on this machine",

@@ -50,7 +50,7 @@ class Prediction:
 
 
 class Task(Protocol):
-    """Protocol of the modules of `TASKS`: train, evaluate, predict; results are JSON data, tables are text."""
+    """Protocol of the modules of `TASKS`: train, evaluate, predict, export; results are JSON data, tables are text."""
 
     CONFIGURATION: type[Configuration]
 
@@ -62,6 +62,9 @@ class Task(Protocol):
 
     def predict(self, run: Any, prediction: Prediction, progress: Progress = silent) -> dict[str, Any]:
         """Apply a trained `Run` to a cloud, write the prediction's files; return a summary as JSON data."""
+
+    def exportable(self, run: Any) -> Any:
+        """Return the network of a trained `Run` as `onnx_export.Exportable`."""
 
 
 def task(name: str) -> Task:

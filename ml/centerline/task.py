@@ -25,6 +25,7 @@ from ..data.slices import Batch, SliceSettings
 from ..networks.centerline.losses import LossOptions, centerline_loss
 from ..networks.centerline.models import TARGETS, CenterlineModel, ModelOptions, all_targets
 from ..networks.centerline.transformer import TransformerOptions
+from ..onnx_export import Exportable
 from ..processes import helper_processes
 from ..registry import network_union
 from ..runs import CALIBRATION, Run, stream_seed, to_json_data
@@ -32,6 +33,7 @@ from ..scores.calibration import DEVIATIONS, IntervalCalibration
 from ..scores.evaluation import STRETCHES, make_case
 from ..tasks import Evaluation, Prediction
 from ..training_loop import chosen_device, fit, move_to_device
+from .exporting import exportable_network
 from .find_road import centerline_geojson, corridor_json, find_road
 from .measuring import measure_run
 from .predictor import CenterlinePredictor, UseOptions
@@ -145,6 +147,15 @@ def predict(run: Run[CenterlineConfiguration], prediction: Prediction, progress:
         "mean_std": float(found.std[there, 0].mean()) if there.any() else None,
         "files": [str(lines), str(corridor)],
     }
+
+
+def exportable(run: Run[CenterlineConfiguration]) -> Exportable:
+    """Return a trained run's network, to be written as ONNX.
+
+    Raises:
+        InputError: the training isn't finished.
+    """
+    return exportable_network(load_predictor(run), run.configuration.seed)
 
 
 def load_predictor(run: Run[CenterlineConfiguration]) -> CenterlinePredictor:

@@ -20,12 +20,14 @@ from ..data.classes import IGNORED, class_names
 from ..data.crops import Item
 from ..data.sources import Source
 from ..data.tiles import CloudTile, scalings
+from ..onnx_export import Exportable
 from ..processes import helper_processes
 from ..runs import PRETRAINING, Run
 from ..scores.confusion import Confusion, score_table
 from ..scores.pictures import comparison
 from ..tasks import Evaluation, Prediction
 from ..training_loop import Figures, chosen_device, fit
+from .exporting import exportable_network
 from .loading import CropBatches, read_domains, report_lost_workers, thin_tiles
 from .network import build, scores_of
 from .prediction import Labelling, predict_file
@@ -93,6 +95,15 @@ def evaluate(run: SegmentationRun, evaluation: Evaluation, progress: Progress = 
     means = {f"{name}_mean_iou": result["mean_iou"] for name, result in results.items()}
     text = "\n".join(f"{name}:\n{table}" for name, table in tables.items())
     return {**means, "tests": results, "files": files}, text.rstrip("\n")
+
+
+def exportable(run: SegmentationRun) -> Exportable:
+    """Return a trained run's network, to be written as ONNX.
+
+    Raises:
+        InputError: the checkpoint is damaged, or the network isn't one that ONNX takes.
+    """
+    return exportable_network(trained_model(run), run.configuration)
 
 
 def _names(evaluation: Evaluation) -> list[str]:

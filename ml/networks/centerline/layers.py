@@ -116,7 +116,7 @@ class FixedKernelPoints(nn.Module):
         sums = cell_sums(coord, mask, features, self.reach, self.number)
         tokens = self.norm(self.kernel(cell_features(sums).transpose(1, 2)).transpose(1, 2))
         height, weight = sums[..., -2:].unfold(1, 2 * self.cells, self.cells).sum(-1).unbind(-1)
-        return Tokens(tokens, self.places.expand(len(coord), -1), height / (weight + _FEW))
+        return Tokens(tokens, self.places.expand(coord.shape[0], -1), height / (weight + _FEW))
 
 
 class DeformableKernelPoints(nn.Module):

@@ -105,12 +105,30 @@ def parabola(frame: Tensor, center: Tensor, weight: Tensor, stiffness: Tensor) -
     powers = torch.stack([torch.ones_like(along), along, along * along], dim=-1)
     weighted = powers * weight[..., None]
     normal = weighted.transpose(1, 2) @ powers + torch.diag(stiffness)
-    factors = torch.linalg.solve(normal, (weighted * (points[..., 1] - middle)[..., None]).sum(1))
+    factors = _solve(normal, (weighted * (points[..., 1] - middle)[..., None]).sum(1))
     value = (powers @ factors[..., None])[..., 0] + middle
     slope = (factors[:, 1:2] + 2.0 * factors[:, 2:] * along) / _PARABOLA_UNIT
     # One step of Newton's method along the orthogonal: the parabola is nearly straight from here to there.
     away = (points[..., 1] - value) / (left[..., 1] - slope * left[..., 0])
     return center - away, torch.atan(slope) - turn
+
+
+def _solve(matrix: Tensor, right: Tensor) -> Tensor:
+    """Return x (B, 3) of symmetric positive definite systems matrix (B, 3, 3) x = right (B, 3), by elimination.
+
+    Written out, as neither ONNX nor batches of small systems on a GPU have a fast solver.
+    """
+    (first, b, c), (second, e), third = matrix[:, 0].unbind(-1), matrix[:, 1, 1:].unbind(-1), matrix[:, 2, 2]
+    y0, y1, y2 = right.unbind(-1)
+    to_second, to_third = b / first, c / first
+    second, e = second - to_second * b, e - to_second * c
+    further = e / second
+    third = third - to_third * c - further * e
+    y1 = y1 - to_second * y0
+    y2 = y2 - to_third * y0 - further * y1
+    z2 = y2 / third
+    z1 = y1 / second - further * z2
+    return torch.stack([y0 / first - to_second * z1 - to_third * z2, z1, z2], dim=-1)
 
 
 def _in_the_middle(frame: Tensor, dtype: torch.dtype) -> tuple[Tensor, Tensor]:

@@ -126,6 +126,8 @@ def gather_max(values: Tensor, index: Tensor) -> Tensor:
 
     The gradient goes to the first of equal ones. Of the size M x K x C only a chunk is held at a time.
     """
+    if torch.compiler.is_exporting():  # a graph without chunks and gradients
+        return values.index_select(0, index.reshape(-1)).unflatten(0, index.shape).amax(dim=1)
     result: Tensor = _GatherMax.apply(values, index)
     return result
 
@@ -291,6 +293,11 @@ def pairs_max(
     Returns:
         Maxima (M, C2), the sum of ``y`` over all pairs (C1,), and the sum of its products ``y y^T`` (C1, C1).
     """
+    if torch.compiler.is_exporting():
+        pairs = support.index_select(0, index.reshape(-1)).unflatten(0, index.shape)
+        few = weight.shape[1]
+        after = torch.relu(pairs + offset[:, None]) @ weight.T
+        return after.amax(dim=1), offset.new_zeros(few), offset.new_zeros(few, few)
     result: tuple[Tensor, Tensor, Tensor] = _PairsMax.apply(support, offset, index, weight, moments)
     return result
 
@@ -303,4 +310,7 @@ def _pairs(support: Tensor, offset: Tensor, index: Tensor) -> Tensor:
 @full_precision
 def interpolate(values: Tensor, nearest: Tensor, weight: Tensor) -> Tensor:
     """Return weighted sums (N, C) of the rows of `values` (M, C) that `nearest` (N, 3) names."""
+    if torch.compiler.is_exporting():
+        chosen = values.index_select(0, nearest.reshape(-1)).unflatten(0, nearest.shape)
+        return (chosen * weight.to(values.dtype)[..., None]).sum(dim=1)
     return F.embedding_bag(nearest, values, mode="sum", per_sample_weights=weight.to(values.dtype))

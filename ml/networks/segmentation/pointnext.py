@@ -106,7 +106,7 @@ class PointNeXt(nn.Module):
         Raises:
             InputError: features and neighbours don't fit each other or the network.
         """
-        shape = (len(neighbours["positions0"]), self.stem.in_features)
+        shape = (neighbours["positions0"].shape[0], self.stem.in_features)
         if tuple(feat.shape) != shape:
             raise InputError("feat", tuple(feat.shape), f"must have the shape {shape}")
         levels = [self.stem(feat)]

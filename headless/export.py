@@ -1,0 +1,49 @@
+"""Write a trained network as an ONNX file, for programs without PyTorch, and compare it with PyTorch's own outputs."""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from headless.commands import Outcome, entry
+from synthroads_addon.base.errors import InputError
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `synthroads export` to its parser."""
+    parser.add_argument("run", type=Path, metavar="RUN", help="folder of a trained run, or name of a shipped model")
+    text = "ONNX file to write (RUN.onnx in the folder that the command runs in)"
+    parser.add_argument("--output", type=Path, metavar="FILE", help=text)
+    parser.add_argument("--overwrite", action="store_true", help="replace a file that is already there")
+
+
+def run(arguments: argparse.Namespace) -> Outcome:
+    """Run `synthroads export`; return exit code, inputs and outputs as JSON data and printed text."""
+    target = arguments.output or Path(f"{arguments.run.name}.onnx")
+    if target.suffix.lower() != ".onnx":
+        raise InputError("--output", str(target), "must end in .onnx")
+    from ml.onnx_export import write_onnx
+    from ml.shipped import open_run
+    from ml.tasks import task
+
+    trained = open_run(arguments.run)
+    network = task(trained.configuration.task).exportable(trained)
+    told = write_onnx(network, target, overwrite=arguments.overwrite)
+    return 0, told, summary(told, target)
+
+
+def summary(told: dict[str, Any], target: Path) -> str:
+    """Return what was written as text: inputs with their shapes, outputs, size, difference from PyTorch."""
+    lines = [f"  {name}: {' x '.join(map(str, shape))}" for name, shape in told["inputs"].items()]
+    beside = "not compared: onnxruntime isn't installed"
+    if told["difference"] is not None:
+        beside = f"within {told['difference']:.1e} of PyTorch"
+    size = f"{told['bytes'] / 1e6:.2f} MB"
+    return "\n".join([f"written {target}: {size}, {beside}", *lines, f"outputs: {', '.join(told['outputs'])}"])
+
+
+if __name__ == "__main__":
+    entry("export")

@@ -1,0 +1,131 @@
+"""Trained networks as ONNX files, for programs without PyTorch: written, and compared with what PyTorch says."""
+
+from __future__ import annotations
+
+import json
+import logging
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from synthroads_addon.base.errors import InputError, OutputError
+from synthroads_addon.base.files import write_file
+
+OPSET = 18
+"""Version of ONNX' operators."""
+TOLERANCE = 1e-4
+"""Largest difference of the outputs of ONNX Runtime and of PyTorch, in the outputs' units."""
+
+
+@dataclass(frozen=True)
+class Exportable:
+    """A network with all that it takes to write it as ONNX.
+
+    Attributes:
+        model: its `forward(*tensors)` takes the inputs in order, and returns a tuple of the outputs.
+        inputs: examples by name, on the CPU.
+        dynamic: by input's name the axes that may have any length, each with the length's name.
+        outputs: names.
+        metadata: texts that the file holds.
+    """
+
+    model: nn.Module
+    inputs: Mapping[str, Tensor]
+    dynamic: Mapping[str, Mapping[int, str]]
+    outputs: tuple[str, ...]
+    metadata: Mapping[str, str] = field(default_factory=dict)
+
+
+def write_onnx(network: Exportable, target: Path, *, overwrite: bool = False) -> dict[str, Any]:
+    """Write a network as an ONNX file in single precision; return its inputs, outputs, bytes and largest difference.
+
+    ``difference`` is the largest one between ONNX Runtime's outputs and PyTorch's on the example; None where ONNX
+    Runtime isn't installed.
+
+    Raises:
+        InputError: the package onnx or onnxscript isn't installed, or the difference is more than `TOLERANCE`.
+        OutputError: the file is there already or can't be written.
+    """
+    if target.exists() and not overwrite:
+        raise OutputError("--output", str(target), "is there already; --overwrite replaces it")
+    content = onnx_bytes(network)
+    difference = largest_difference(network, content)
+    if difference is not None and not difference <= TOLERANCE:
+        raise InputError("export", difference, f"ONNX Runtime's outputs must be within {TOLERANCE:g} of PyTorch's")
+    write_file(target, content, overwrite=overwrite)
+    return {
+        "inputs": {name: _shape(name, value, network) for name, value in network.inputs.items()},
+        "outputs": list(network.outputs),
+        "bytes": len(content),
+        "difference": difference,
+    }
+
+
+def onnx_bytes(network: Exportable) -> bytes:
+    """Return a network as the bytes of an ONNX file.
+
+    Raises:
+        InputError: the package onnx or onnxscript isn't installed.
+    """
+    axes = {name: torch.export.Dim(name) for of in network.dynamic.values() for name in of.values()}
+    shapes = tuple(
+        {axis: axes[length] for axis, length in network.dynamic.get(name, {}).items()} for name in network.inputs
+    )
+    logging.getLogger("onnxscript").setLevel(logging.ERROR)
+    try:
+        with warnings.catch_warnings(), torch.no_grad():
+            warnings.simplefilter("ignore")  # of PyTorch's own deprecations
+            program = torch.onnx.export(
+                network.model.eval(),
+                tuple(network.inputs.values()),
+                dynamo=True,
+                opset_version=OPSET,
+                input_names=list(network.inputs),
+                output_names=list(network.outputs),
+                dynamic_shapes=(shapes,),
+                external_data=False,
+                verbose=False,
+            )
+    except ModuleNotFoundError as error:
+        text = f"needs the package {error.name}: pip install 'synthroads[onnx]'"
+        raise InputError("export", None, text) from None
+    assert program is not None
+    proto = program.model_proto
+    del proto.metadata_props[:]
+    for name, value in sorted(network.metadata.items()):
+        entry = proto.metadata_props.add()
+        entry.key, entry.value = name, value
+    return bytes(proto.SerializeToString())
+
+
+def largest_difference(network: Exportable, content: bytes) -> float | None:
+    """Return the largest difference of ONNX Runtime's outputs from PyTorch's on the example; None if it isn't there."""
+    try:
+        import onnxruntime  # optional: 30 MB that only comparisons need
+    except ModuleNotFoundError:
+        return None
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1
+    session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
+    found = session.run(list(network.outputs), {name: value.numpy() for name, value in network.inputs.items()})
+    with torch.no_grad():
+        wanted = network.model(*network.inputs.values())
+    return max(float(np.abs(one - other.numpy()).max()) for one, other in zip(found, wanted, strict=True))
+
+
+def described(**told: Any) -> dict[str, str]:
+    """Return metadata as texts: JSON, but for what is text already."""
+    return {
+        name: value if isinstance(value, str) else json.dumps(value, sort_keys=True) for name, value in told.items()
+    }
+
+
+def _shape(name: str, value: Tensor, network: Exportable) -> list[int | str]:
+    dynamic = network.dynamic.get(name, {})
+    return [dynamic.get(axis, size) for axis, size in enumerate(value.shape)]
