@@ -93,7 +93,7 @@ def onnx_bytes(network: Exportable) -> bytes:
                 verbose=False,
             )
     except ModuleNotFoundError as error:
-        text = f"needs the package {error.name}: pip install 'synthroads[onnx]'"
+        text = f"needs the package {error.name}: pip install '.[onnx]' in the repository"
         raise InputError("export", None, text) from None
     assert program is not None
     proto = program.model_proto
