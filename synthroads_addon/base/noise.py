@@ -100,6 +100,16 @@ def mean_deviation(long: Float, short: Float) -> Float32:
     return np.asarray(((1.0 + scale * long**2) * (1.0 + scale * short**2)) ** -0.25, dtype=np.float32)
 
 
+def hash_cells(cells: NDArray[np.int64], key: int) -> NDArray[np.uint32]:
+    """Return random whole numbers (N,), uniform from 0 to 2^32 - 1, of cells (3, N) of a lattice; the key seeds them."""
+    first, second, third = (axis.astype(np.uint32) * prime for axis, prime in zip(cells, _AXES, strict=True))
+    node = _mix_bits(first + np.uint32(key))
+    node = _mix_bits(node + second)
+    node = _mix_bits(node + third)
+    node *= _FACTORS[1]
+    return node ^ (node >> _FIRST)
+
+
 def _turn_coordinates(point: list[Float]) -> list[Float]:
     """Return coordinates, three arrays (N,), rotated by `_TURN`."""
     x, y, z = point

@@ -40,6 +40,7 @@ class Surfaces:
         base_color: linear RGB.
         roughness, metallic, specular: 0 to 1.
         transmission: share of the light that goes on through, 0 to 1.
+        gap_size: of the leaves and gaps of what lets light through, m; 0: the light is weakened evenly.
         slope: of the facets, rad; 0 reflects as Lambert says.
         retro: effective reflectance of the retro-reflection at a right angle.
         lobe: angle at which it has fallen to 1/e, rad.
@@ -47,8 +48,8 @@ class Surfaces:
         spread_wavelength: longest wavelength of its variation, m.
 
     The rest follows from these: reflectivity R, Oren and Nayar's A and B, the lobe as 1/rad^2, which materials retro-
-    reflect (``shining``), let light through (``pervious``) or vary (``uneven``), the factor that makes
-    the mean of their variation 1 (``spread_scale``), and whether any does, or is rough.
+    reflect (``shining``), let light through (``pervious``), through gaps (``gappy``), or vary (``uneven``), the factor
+    that makes the mean of their variation 1 (``spread_scale``), and whether any does, or is rough.
     """
 
     base_color: Float
@@ -56,6 +57,7 @@ class Surfaces:
     metallic: Float
     specular: Float
     transmission: Float
+    gap_size: Float
     slope: Float
     retro: Float
     lobe: Float
@@ -68,6 +70,7 @@ class Surfaces:
         self.facet_a, self.facet_b = facet_terms(self.slope)
         self.inverse_lobe_squared: Float = 1.0 / np.maximum(self.lobe, 1e-3) ** 2
         self.shining, self.pervious = self.retro > 0.0, self.transmission > 0.0
+        self.gappy = self.pervious & (self.gap_size > 0.0)
         self.uneven = (self.spread_below > 0.0) | (self.spread_above > 0.0)
         self.spread_scale: Float = 1.0 / mean_over_median(self.spread_below, self.spread_above)
         self.permeable, self.retroreflective = bool(self.pervious.any()), bool(self.shining.any())
@@ -88,6 +91,7 @@ def surfaces_of(rows: Iterable[Material], reflection: Reflection = "lambert", sp
         metallic=column("metallic"),
         specular=column("specular"),
         transmission=column("transmission"),
+        gap_size=column("gap_size"),
         slope=slope,
         retro=column("retroreflection"),
         lobe=np.deg2rad(column("retro_lobe_deg")),

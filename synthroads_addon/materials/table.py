@@ -47,6 +47,13 @@ class Material(Model):
     transmission: float = quantity(
         0.0, "1", "Share of the laser's light that goes on through and comes back.", ge=0, lt=1
     )
+    gap_size: float = quantity(
+        0.0,
+        "m",
+        "Size of the leaves and gaps that a surface with transmission stands for: a beam that narrow meets the one or "
+        "passes through the other. 0: all of the beam is weakened alike, as by a pane.",
+        (0, 10),
+    )
     facet_slope: float | None = quantity(
         None, "rad", "Facets' slope (one sigma); the roughness's if not given.", (0, 1.5)
     )

@@ -23,6 +23,7 @@ from .colour.request import LayerRequest
 from .devices.device import ScannerSetting
 from .effects import EchoEffect
 from .forecast import ScanForecast, forecast_scan
+from .gaps import LeafGaps
 from .multipath import Multipath
 from .noise import Noise
 from .platforms.path import Path, Strip
@@ -175,6 +176,13 @@ class ScanPlan:
         if request is None or not request.lit or not (self.services is None or takes_nodes(request.settings)):
             return None
         return sun_direction(request.environment)
+
+    @cached_property
+    def gaps(self) -> LeafGaps | None:
+        """Return the leaves and gaps of the scene's materials, as the beam meets them; None where there are none."""
+        if not self.surfaces.gappy.any():
+            return None
+        return LeafGaps.of(self.setting, self.seed, self.frame_origin)
 
     @property
     def rays_per_pulse(self) -> int:

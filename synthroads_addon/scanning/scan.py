@@ -191,7 +191,7 @@ class BlockScan:
         """Return what all rays of pulses meet, without casting their axes again where ``axis`` says what these meet."""
         plan, setting = self.plan, self.plan.setting
         limits = (setting.minimum_range, setting.maximum_range)
-        return trace(plan.target, plan.surfaces, self.rays(pulses, motions, axis), motions, *limits, axis)
+        return trace(plan.target, plan.surfaces, self.rays(pulses, motions, axis), motions, *limits, axis, plan.gaps)
 
     @property
     def _in_air(self) -> bool:

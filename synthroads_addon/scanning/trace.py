@@ -6,11 +6,12 @@ import numpy as np
 
 from ..base.arrays import AnyArray, ArrayRows, Float, Index
 from ..materials.surfaces import Surfaces
+from .gaps import LeafGaps
 from .knots import Track
 from .scene.target import FirstHits, Target
 
-LAYERS = 8
-"""Surfaces that a ray passes at most."""
+LAYERS = 32
+"""Surfaces that a ray passes at most: a canopy's leaves are many, one behind the other."""
 FAINTEST = 1e-2
 """A ray ends where less than this of its own light is left."""
 _BEYOND = 1e-3
@@ -34,6 +35,12 @@ class Rays:
     direction: Float
     share: Float
     time: Float
+
+    def pick(self, ray: Index) -> tuple[Float, Float]:
+        """Return origins and directions (3, N) of chosen rays, as k * P + p for ray k of pulse p."""
+        first = ray if self.origin.shape[1] > 1 else ray % len(self.time)
+        origin = np.take(self.origin.reshape(3, -1), first, axis=1)
+        return origin, np.take(self.direction.reshape(3, -1), ray, axis=1)
 
 
 @dataclass(frozen=True)
@@ -84,14 +91,8 @@ class TracedRays:
 
     def ends(self, hits: Index) -> tuple[Float, Float]:
         """Return where chosen hits are and where their rays begin, (3, N) each, local, m; see `returns.Echoes`."""
-        begin = self.begins(hits)
-        return begin + self.pick("distance", hits) * self.directions(hits), begin
-
-    def begins(self, hits: Index) -> Float:
-        """Return where the rays of chosen hits begin, (3, N) local, m."""
-        ray, rays = self.ray_of(hits), self.rays
-        first = ray if rays.origin.shape[1] > 1 else ray % len(rays.time)
-        return np.take(rays.origin.reshape(3, -1), first, axis=1)
+        begin, direction = self.rays.pick(self.ray_of(hits))
+        return begin + self.pick("distance", hits) * direction, begin
 
     def directions(self, hits: Index) -> Float:
         """Return the directions (3, N) of chosen hits' rays."""
@@ -127,10 +128,11 @@ def trace(
     nearest: float,
     farthest: float,
     axis: FirstHits | None = None,
+    gaps: LeafGaps | None = None,
 ) -> TracedRays:
     """Return what rays meet between two ranges (m), through permeable surfaces, and the light that each hit takes.
 
-    The shares taken along one ray never add up to more than its own.
+    The shares taken along one ray never add up to more than its own. What takes nothing isn't met: it is at inf.
 
     Args:
         target: what is scanned.
@@ -139,6 +141,7 @@ def trace(
         motions: tracks of the target's moving parts.
         nearest, farthest: ranges, m.
         axis: (P,) what the first ray of each pulse meets, where it has been cast already.
+        gaps: leaves and gaps of materials that have a ``gap_size``; None: they weaken rays as others do, evenly.
     """
     met = _first_hits(target, rays, motions, farthest, axis)
     material = np.take(target.material, met.face, mode="clip").astype(np.intp)
@@ -147,12 +150,15 @@ def trace(
         return _gather_hits(rays, first, [], [])
     on = np.flatnonzero(np.take(surfaces.pervious, material, mode="clip"))
     on = on[np.take(met.distance, on) < farthest]
-    through = surfaces.transmission[np.take(material, on)]
     share = np.broadcast_to(rays.share, material.shape).copy()
-    left = np.take(share, on)
+    left, start = np.take(share, on), np.take(met.distance, on)
+    through = _transmitted(surfaces, gaps, rays, on, np.take(material, on), start)
     share.ravel()[on] = left * (1.0 - through)
-    start = np.take(met.distance, on)
-    first = Hits(met.face, material, _within(met.distance, nearest, np.inf), met.along, share)
+    distance = _within(met.distance, nearest, np.inf)
+    if gaps is not None and (through == 1.0).any():
+        distance = distance.copy()
+        distance.ravel()[on[through == 1.0]] = np.inf
+    first = Hits(met.face, material, distance, met.along, share)
     layers, rays_on = [], []
     left *= through
     for _ in range(LAYERS - 1):
@@ -160,20 +166,44 @@ def trace(
         if not len(bright):
             break
         on, left, start = on[bright], left[bright], start[bright] + _BEYOND
-        pulse = on % material.shape[1]
-        direction = np.take(rays.direction.reshape(3, -1), on, axis=1)
-        origin = np.take(rays.origin.reshape(3, -1), on if rays.origin.shape[1] > 1 else pulse, axis=1)
-        origin += start * direction
-        met = target.cast(origin, direction, farthest, rays.time[pulse], motions)
+        origin, direction = rays.pick(on)
+        met = target.cast(origin + start * direction, direction, farthest, rays.time[on % material.shape[1]], motions)
         hit = np.flatnonzero(met.face >= 0)
         on, left, start = on[hit], left[hit], start[hit] + met.distance[hit]
         face = met.face[hit]
         surface = np.take(target.material, face).astype(np.intp)
-        through = np.take(surfaces.transmission, surface)
-        layers.append(Hits(face, surface, _within(start, nearest, farthest), met.along[hit], left * (1.0 - through)))
+        through = _transmitted(surfaces, gaps, rays, on, surface, start)
+        taken = left * (1.0 - through)
+        reached = np.where(taken > 0.0, _within(start, nearest, farthest), np.inf)
+        layers.append(Hits(face, surface, reached, met.along[hit], taken))
         rays_on.append(on)
         left = left * through
     return _gather_hits(rays, first, layers, rays_on)
+
+
+def _transmitted(
+    surfaces: Surfaces, gaps: LeafGaps | None, rays: Rays, on: Index, material: Index, distance: Float
+) -> Float:
+    """Return the share (N,) of their light that rays keep behind what they meet.
+
+    Args:
+        surfaces: the materials.
+        gaps: leaves and gaps of some of them.
+        rays: of pulses.
+        on: (N,) rays as k * P + p for ray k of pulse p.
+        material: (N,) of what they meet.
+        distance: (N,) where they meet it, m.
+    """
+    result = np.take(surfaces.transmission, material)
+    leafy = np.flatnonzero(np.take(surfaces.gappy, material)) if gaps is not None else ()
+    if gaps is None or not len(leafy):
+        return result
+    ray, here = on[leafy], distance[leafy]
+    origin, direction = rays.pick(ray)
+    share = np.take(rays.share, ray // rays.direction.shape[2])
+    place = origin + here * direction
+    result[leafy] = gaps.transmitted(surfaces, material[leafy], place, here, share)
+    return result
 
 
 def _first_hits(target: Target, rays: Rays, motions: list[Track], farthest: float, axis: FirstHits | None) -> FirstHits:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from synthroads_addon.base import noise as noise_module
-from synthroads_addon.base.noise import MAX_OCTAVES, mean_deviation, noise_field
+from synthroads_addon.base.noise import MAX_OCTAVES, hash_cells, mean_deviation, noise_field
 from synthroads_addon.base.random_streams import stream
 
 TURN = np.array([[15, 6, -10], [6, 10, 15], [10, -15, 6]]) / 19.0
@@ -168,3 +168,17 @@ def test_no_points() -> None:
 def test_octaves_out_of_range(octaves: int) -> None:
     with pytest.raises(ValueError, match="octaves"):
         noise_field(np.zeros((1, 3)), 1.0, 1, octaves)
+
+
+def test_hashes_of_cells_are_uniform_and_unrelated_to_their_neighbours() -> None:
+    axis = np.arange(-15, 15)
+    cells = np.stack(np.meshgrid(axis, axis, axis, indexing="ij")).reshape(3, -1)
+    share = hash_cells(cells, 5) / 2.0**32
+    counts = np.histogram(share, 16, (0.0, 1.0))[0]
+    assert counts.sum() == len(share)
+    assert np.abs(counts / len(share) * 16.0 - 1.0).max() < 0.08
+    grid = share.reshape(30, 30, 30)
+    for turned in (grid[1:], grid[:, 1:], grid[:, :, 1:]):
+        there = grid[tuple(slice(0, size) for size in turned.shape)]
+        assert abs(np.corrcoef(there.ravel(), turned.ravel())[0, 1]) < 0.02
+    assert (hash_cells(cells, 6) != hash_cells(cells, 5)).mean() > 0.99

@@ -39,6 +39,7 @@ def test_what_lets_light_through() -> None:
     leaves = {name for name in materials() if name.endswith("leaves")}
     assert set(through) == {*leaves, "grass", "meadow", "ryegrass", "reed", "glass", "acrylic_glass", "wire_mesh"}
     assert all(0.1 <= through[name] <= 0.3 for name in leaves)
+    assert {name for name, row in materials().items() if row.gap_size > 0.0} == leaves
     # Twice 85 % of a window, twice 92 % of acrylic glass.
     assert through["glass"] == pytest.approx(0.85**2, abs=0.01)
     assert through["acrylic_glass"] == pytest.approx(0.92**2, abs=0.01)
@@ -141,7 +142,7 @@ def test_materials_of_earlier_files_have_no_optics() -> None:
 
 
 @pytest.mark.parametrize(
-    ("field", "value"), [("transmission", 1.0), ("facet_slope", -0.1), ("retroreflection", -1), ("retro_lobe_deg", 0)]
+    ("field", "value"), [("transmission", 1.0), ("gap_size", -0.1), ("facet_slope", -0.1), ("retroreflection", -1), ("retro_lobe_deg", 0)]
 )
 def test_impossible_values_are_refused(field, value) -> None:
     with pytest.raises(InputError, match=field):
