@@ -56,9 +56,9 @@ CONDITIONS: list[tuple[str, Weather, str]] = [
     ("fog, 400 m", Fog(), GREY),
     ("fog, 100 m", Fog(visibility=100), "#222222"),
 ]
-_SPECIES = ("maple", "birch", "poplar", "pine", "hawthorn", "hazel", "blackthorn")
+_SPECIES = ("birch", "poplar", "pine", "hawthorn", "hazel", "blackthorn")
 _ALIKE = {*(f"{species}_leaves" for species in _SPECIES), "meadow", "ryegrass", "reed"}
-"""Plants that the table leaves out: they are as leaves, needles or grass."""
+"""Plants that the table leaves out: they are as leaves of maple, of shrubs, as needles or grass."""
 ANGLES = np.linspace(0.0, 89.9, 400)
 
 

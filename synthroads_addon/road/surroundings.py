@@ -38,10 +38,20 @@ class Terrain(RoadObject):
     )
 
 
-class Vegetation(RoadObject):
-    """Plants of one species in a band on both sides of the road, measured from the outer edge of the verge."""
+LONGEST = 1e6
+"""Station, m, that no road reaches."""
 
-    conditions = tuple(when({"kind": {"const": k}}, {"species": {"enum": list(s)}}) for k, s in SPECIES.items())
+
+class Vegetation(RoadObject):
+    """Plants of one species in a band beside the road, measured from the outer edge of the verge."""
+
+    conditions = (
+        *(when({"kind": {"const": k}}, {"species": {"enum": list(s)}}) for k, s in SPECIES.items()),
+        when(
+            {"kind": {"const": "grass"}},
+            {"side": {"const": "both"}, "start_station": {"const": 0}, "end_station": {"const": LONGEST}},
+        ),
+    )
 
     points_class: ClassVar = "vegetation"
     type: Literal["Vegetation"] = "Vegetation"
@@ -62,6 +72,15 @@ class Vegetation(RoadObject):
     density: float = quantity(ge=0, le=50, unit="1/m2", description="Plants (tufts of grass, trees) per area.")
     band_start: float = quantity(ge=-5, le=1000, unit="m", description="Beginning of the band.")
     band_end: float = quantity(ge=-5, le=1000, unit="m", description="End of the band.")
+    side: Literal["both", "left", "right"] = Field(
+        "both", description="Sides of the road, looking with the stations, that shrubs and trees grow on."
+    )
+    start_station: float = quantity(
+        0.0, ge=0, le=LONGEST, unit="m", description="Station from which on shrubs and trees grow."
+    )
+    end_station: float = quantity(
+        LONGEST, ge=0, le=LONGEST, unit="m", description="Station up to which shrubs and trees grow."
+    )
     height_min: float = quantity(gt=0, le=60, unit="m", description="Height of the smallest plant.")
     height_max: float = quantity(gt=0, le=60, unit="m", description="Height of the tallest plant.")
     mown_width: float = quantity(
@@ -73,6 +92,10 @@ class Vegetation(RoadObject):
     def _fits(self) -> Vegetation:
         if self.band_end < self.band_start or self.height_max < self.height_min:
             raise ValueError("band_end and height_max must not be less than band_start and height_min")
+        if self.end_station < self.start_station:
+            raise ValueError("end_station must not be less than start_station")
+        if self.kind == "grass" and (self.side, self.start_station, self.end_station) != ("both", 0.0, LONGEST):
+            raise ValueError("side, start_station and end_station are for shrubs and trees: grass grows all along")
         if self.species not in SPECIES[self.kind]:
             raise ValueError(f"species '{self.species}' is no {self.kind}: {', '.join(SPECIES[self.kind])} are")
         return self

@@ -64,6 +64,7 @@ _FIELDS: dict[str, tuple[type[Model], str]] = {
     "vegetation.shrub_height": (Vegetation, "height_min"),
     "vegetation.grass_height": (Vegetation, "height_min"),
     "vegetation.mown_width": (Vegetation, "mown_width"),
+    "vegetation.forest_height": (Vegetation, "height_min"),
     **{f"environment.{n}": (Environment, n) for n in EnvironmentLimits.model_fields if n in Environment.model_fields},
     **{
         f"materials.{n}": (MaterialVariation, n)
@@ -81,6 +82,9 @@ _PLAIN = {
     "landscape.meadow_share": (0.0, 1.0),
     "landscape.villages": (0.0, 50.0),
     "landscape.turbines": (0.0, 200.0),
+    "vegetation.forest_edges_per_km": (0.0, 20.0),
+    "vegetation.forest_edge_length": (5.0, 1e4),
+    "vegetation.forest_depth": (5.0, 500.0),
     "vehicles.per_km": (0.0, 1e3),
     "vehicles.trucks": (0.0, 1.0),
 }

@@ -22,6 +22,7 @@ from ..road.things.limits import Interval
 from ..road.things.temporary_barrier import TemporaryBarrier
 from ..road.things.vehicles import COLORS, HEAVY_SPEED, VEHICLE_GAP, VEHICLE_LANE_WIDTH, VEHICLE_ROOM, VEHICLE_TYPES
 from ..scenario.road import RoadScenario
+from .forest import sample_forest_edges
 from .pavement_damage import draw_materials
 from .placing.draw import draw
 from .placing.site import PlacementSite
@@ -100,7 +101,7 @@ def sample_vegetation(site: PlacementSite) -> Iterator[tuple[str, Vegetation]]:
     """Yield (id, stand of plants), species by species; their instance numbers are 1.
 
     Grass grows everywhere beside the road. Shrubs follow behind the verge, one species after the other. Trees mix, and
-    grow where they are no obstacle that needed a barrier (RPS).
+    grow where they are no obstacle that needed a barrier (RPS). Forest edges stand along parts of the road.
     """
     scenario, limits = site.scenario, site.scenario.vegetation
     room = _room_beside(site)
@@ -112,6 +113,7 @@ def sample_vegetation(site: PlacementSite) -> Iterator[tuple[str, Vegetation]]:
     if first_tree < room:
         density = scenario.trees_per_hectare / 10_000.0
         yield from _mix_species(site, "tree", limits.trees, density, limits.tree_height, first_tree)
+    yield from sample_forest_edges(site, room, first_tree)
 
 
 def _room_beside(site: PlacementSite) -> float:

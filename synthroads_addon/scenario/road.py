@@ -155,6 +155,12 @@ class VegetationLimits(ClosedModel):
     shrub_height: Interval = interval(0.5, 3.0, "m", "Height of shrubs.")
     grass_height: Interval = interval(0.08, 0.5, "m", "Height of grass.")
     mown_width: Interval = interval(1.0, 4.0, "m", "Width of the strip behind the verge that is mown.", "Mown Strip")
+    forest_edges_per_km: Interval = interval(
+        0.0, 0.0, "1/km", "Forest edges per km of either side.", title="Forest Edges (per km)"
+    )
+    forest_edge_length: Interval = interval(60.0, 200.0, "m", "Length of forest edges.", title="Their Length")
+    forest_depth: Interval = interval(12.0, 25.0, "m", "Depth of what is built of a forest.", title="Their Depth")
+    forest_height: Interval = interval(12.0, 22.0, "m", "Height of a forest's trees.", title="Their Trees")
 
 
 class LandscapeLimits(ClosedModel):

@@ -9,11 +9,12 @@ from collections.abc import Iterable
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 import pytest
 
+from synthroads_addon.base.errors import InputError
 from synthroads_addon.materials.variation import vary_material
 from synthroads_addon.road.guidelines import OBSTACLE_DISTANCE
 from synthroads_addon.road.objects import width_at
@@ -32,6 +33,7 @@ from synthroads_addon.road.things.beacon import ConstructionBeacon
 from synthroads_addon.road.things.limits import Interval
 from synthroads_addon.road.things.temporary_barrier import TemporaryBarrier
 from synthroads_addon.road.things.vehicles import COLORS, VEHICLE_TYPES
+from synthroads_addon.sampling.forest import NEAREST
 from synthroads_addon.sampling.placing.site import PlacementSite
 from synthroads_addon.sampling.surroundings import (
     WEATHER,
@@ -239,6 +241,44 @@ def test_one_kind_does_not_change_another() -> None:
     plants = dict(sample_vegetation(site(RoadScenario(), 1)))
     others = dict(sample_vegetation(site(RoadScenario(shrubs_per_hectare=0.0), 1)))
     assert others == {name: item for name, item in plants.items() if item.kind != "shrub"}
+
+
+@cache
+def forests() -> list[dict[str, Vegetation]]:
+    limits = {"forest_edges_per_km": {"minimum": 6.0, "maximum": 10.0}}
+    scenario = RoadScenario.from_dict({"length": 600.0, "vegetation": limits})
+    return [
+        {name: item for name, item in sample_vegetation(site(scenario, seed)) if name.startswith("forest")}
+        for seed in range(20)
+    ]
+
+
+def test_a_forest_edge_is_a_mantle_of_shrubs_before_a_stand_of_trees() -> None:
+    assert sum(map(len, forests())) > 20
+    for plants in forests():
+        stands = list(plants.values())
+        for shrubs, trees in zip(stands[::2], stands[1::2], strict=True):
+            assert (shrubs.kind, trees.kind) == ("shrub", "tree")
+            assert (shrubs.side, shrubs.start_station) == (trees.side, trees.start_station)
+            assert NEAREST <= shrubs.band_start < trees.band_start < shrubs.band_end < trees.band_end <= 78.0
+            assert 0.0 <= shrubs.start_station < shrubs.end_station <= 600.0
+
+
+def test_forest_edges_of_a_side_are_apart_and_all_else_stays() -> None:
+    for seed, plants in enumerate(forests()):
+        for side in ("left", "right"):
+            trees = [item for item in of_kind(plants, "tree") if item.side == side]
+            spans = sorted((item.start_station, item.end_station) for item in trees)
+            assert all(before[1] < after[0] for before, after in pairwise(spans))
+        without = dict(sample_vegetation(site(RoadScenario(length=600.0), seed)))
+        assert not any(name.startswith("forest") for name in without)
+
+
+@pytest.mark.parametrize("field", [{"side": "left"}, {"start_station": 5.0}, {"end_station": 50.0}])
+def test_grass_grows_all_along(field: dict[str, Any]) -> None:
+    grass = of_kind(gardens()[0], "grass")[0].to_dict()
+    with pytest.raises(InputError, match="grass grows all along"):
+        Vegetation.from_dict(grass | field)
 
 
 # --- traffic -------------------------------------------------------------------------------------------------------

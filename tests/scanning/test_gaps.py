@@ -19,12 +19,14 @@ def leaf_surfaces(size: float = SIZE, transmission: float = OPEN) -> Surfaces:
     return surfaces_of([materials()["asphalt"], leaves])
 
 
-def canopy(rays: int = 1, **changes) -> ScanPlan:
-    """Return a scan of one layer of leaves, 10 m above asphalt and in the midst of cells, from 60 m up."""
-    corners = [(x, y, z) for z in (0.0, 10.03) for x, y in ((-90, -90), (90, -90), (90, 90), (-90, 90))]
-    mesh = mesh_of(corners, [(0, 1, 2), (0, 2, 3), (4, 5, 6), (4, 6, 7)])
-    mesh = replace(mesh, material=np.array([0, 0, 1, 1], np.uint16), materials=("asphalt", "leaves"))
-    scan = scan_of(mesh, rays, Standing(60.0, speed=20.0), **changes)
+def canopy(rays: int = 1, heights: tuple[float, ...] = (10.03,), **changes) -> ScanPlan:
+    """Return a scan of layers of leaves above asphalt, each in the midst of cells, from 60 m up."""
+    corners = [(x, y, z) for z in (0.0, *heights) for x, y in ((-90, -90), (90, -90), (90, 90), (-90, 90))]
+    firsts = range(0, len(corners), 4)
+    mesh = mesh_of(corners, [(n + a, n + b, n + c) for n in firsts for a, b, c in ((0, 1, 2), (0, 2, 3))])
+    material = np.array([0, 0] + [1, 1] * len(heights), np.uint16)
+    mesh = replace(mesh, material=material, materials=("asphalt", "leaves"))
+    scan = scan_of(mesh, rays, Standing(60.0, 20.0), **changes)
     return replace(scan, surfaces=leaf_surfaces())
 
 
@@ -43,10 +45,19 @@ def places(count: int = 8_000) -> np.ndarray:
 
 
 def test_a_narrow_beam_meets_a_leaf_or_passes() -> None:
-    points = scanned(canopy(divergence=(1e-6, 1e-6)))
+    points = scanned(canopy(divergence=(1e-9, 1e-9)))
     assert set(points.number_of_returns) == {1}
     height = points.xyz[:, 2] - points.xyz[:, 2].min()
     assert float((height < 5.0).mean()) == pytest.approx(OPEN, abs=0.03)
+
+
+def test_each_of_several_layers_has_its_own_gaps() -> None:
+    points = scanned(canopy(heights=(10.03, 14.03, 18.03), divergence=(1e-9, 1e-9)))
+    assert set(points.number_of_returns) == {1}
+    assert points.intensity.min() > 0.0
+    height = points.xyz[:, 2] - points.xyz[:, 2].min()
+    shares = [float((height > level).mean()) for level in (16.0, 12.0, 8.0)]
+    assert shares == pytest.approx([1.0 - OPEN, 1.0 - OPEN**2, 1.0 - OPEN**3], abs=0.03)
 
 
 def test_a_wide_beam_meets_both_and_keeps_the_mean() -> None:
@@ -79,7 +90,7 @@ def test_what_is_met_is_of_place_and_seed_alone() -> None:
 
 
 def test_leaves_are_where_they_were_when_a_place_is_scanned_again() -> None:
-    scan = canopy(divergence=(1e-6, 1e-6))
+    scan = canopy(divergence=(1e-9, 1e-9))
     np.testing.assert_array_equal(scanned(scan).xyz, scanned(scan).xyz)
     other = scanned(replace(scan, seed=scan.seed + 1))
     assert not np.array_equal(other.xyz[:, 2] > 185.0, scanned(scan).xyz[:, 2] > 185.0)

@@ -137,7 +137,8 @@ def leaf_scan(transmission: float, layers: int = 1, rays: int = 7, **changes) ->
     mesh = mesh_of(corners, faces)
     mesh = replace(mesh, material=np.repeat([0, 1], [2, 2 * layers]).astype(np.uint16), materials=("asphalt", "leaves"))
     scan = scan_of(mesh, rays, **changes)
-    rows = [materials()["asphalt"], materials()["leaves"].model_copy(update={"transmission": transmission})]
+    even = materials()["leaves"].model_copy(update={"transmission": transmission, "gap_size": 0.0})
+    rows = [materials()["asphalt"], even]
     return replace(scan, surfaces=surfaces_of(rows))
 
 

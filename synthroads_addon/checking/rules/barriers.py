@@ -145,10 +145,11 @@ def _tree_distance(road: Road) -> Iterator[Finding]:
             continue
         for edges in road.sides.values():
             distance = edges.verge + plants.band_start
-            if distance < 0.0 or not below(distance, least):
+            if plants.side not in ("both", edges.carriageway.side) or distance < 0.0 or not below(distance, least):
                 continue
             near = road.protecting[edges.name].outer & (road.barriers.clearance < distance)
-            for start, _ in islice(_gaps(road, edges, near, 0.0, road.length), 1):
+            stretch = plants.start_station, min(plants.end_station, road.length)
+            for start, _ in islice(_gaps(road, edges, near, *stretch), 1):
                 text = (
                     f"Trees stand {distance:.2f} m from the {edges.carriageway.side} paved edge with no barrier in "
                     f"front; {least} m are needed (RPS)."

@@ -125,6 +125,9 @@ def plant_places(
     distance = np.maximum(offset - boundaries[:, 0], boundaries[:, -1] - offset)
     stands = (station <= geometry.length) & (distance > 0.0) & (clip_offset(offset, curvature) == offset)
     stands &= (distance >= plants.band_start) & (distance <= plants.band_end)
+    stands &= (station >= plants.start_station) & (station <= plants.end_station)
+    if plants.side != "both":
+        stands &= offset > 0.0 if plants.side == "left" else offset < 0.0
     stands &= ~_in_clearings(geometry, station, offset)
     left = np.flatnonzero(stands)
     ground = (1.0 - curvature[left] * offset[left]) * _steepness(geometry, station[left], offset[left], curvature[left])

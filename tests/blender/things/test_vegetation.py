@@ -277,3 +277,21 @@ def test_less_detail_is_fewer_triangles_and_none_is_none() -> None:
         counts.append(sum(len(road.mesh(name).triangles) for name in few))
     assert 0.25 < counts[1] / counts[0] < 0.45
     assert not set(few) & set(FurnishedRoad(few, ("vegetation",), detail=0.0, length=LENGTH).model.objects)
+
+
+@pytest.mark.parametrize("stretch", [None, (30.0, 70.0)])
+def test_a_stand_may_grow_on_one_side_and_along_a_part_of_the_road(stretch: tuple[float, float] | None) -> None:
+    part = {"side": "left", "start_station": 40.0, "end_station": 80.0, "density": 0.05}
+    road = FurnishedRoad({"hazel": STANDS["hazel"] | part}, ("vegetation",), stretch, 1.0, length=LENGTH)
+    last = 80.0 if stretch is None else 70.0
+    known = [plant.instance for plant in placed_plants(road.geometry) if plant.station < last]
+    assert len(known) > 5
+    assert np.unique(road.mesh("hazel").instance_id).tolist() == known
+    # The nodes keep to it by themselves as well.
+    for mesh in (road.mesh("hazel"), road.edit("hazel", "Band End", 17.9)):
+        faces = [mesh.triangles[mesh.instance_id == number] for number in np.unique(mesh.instance_id)]
+        station, offset = road.located(np.array([mesh.vertices[face].mean(axis=(0, 1)) for face in faces]))
+        assert 38.0 < station.min() < station.max() < last + 2.0
+        assert offset.min() > 0.0
+    shorter = road.edit("hazel", "End Station", 55.0)
+    assert 0 < len(np.unique(shorter.instance_id)) < len(known)

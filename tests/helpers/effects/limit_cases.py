@@ -44,6 +44,12 @@ YARDS: Data = PLAIN | {
     },
 }
 """Limits of roads with buildings beside them."""
+FORESTS: Data = PLAIN | {
+    "length": 1300.0,
+    "vegetation": {"forest_edges_per_km": {"minimum": 2.0, "maximum": 4.0}},
+    "grass_density": 0.01,
+}
+"""Limits of roads with forest edges beside them."""
 ZONE = PLAIN | {"furniture": {"construction_zone": 1.0}}
 FREE = {"cross_section": {"lanes": [3.75, 3.75, 3.75], "hard_shoulder": 2.5}}
 
@@ -87,6 +93,11 @@ CASES: dict[str, LimitCase] = {
             "walls",
             *(f"{part}.{end}" for part in ("buildings_per_km", "wall_height", "parked_per_building") for end in ENDS),
         )
+    },
+    **{
+        f"vegetation.forest_{part}.{end}": LimitCase(given=FORESTS)
+        for part in ("edges_per_km", "edge_length", "depth", "height")
+        for end in ENDS
     },
     "landscape.forest_share.maximum": LimitCase(value=0.3),
     "landscape.meadow_share.maximum": LimitCase(value=0.3),

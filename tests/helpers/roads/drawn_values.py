@@ -16,6 +16,7 @@ from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.surroundings import MaterialVariation
 from synthroads_addon.road.things.limits import Interval
 from synthroads_addon.road.things.vehicles import VEHICLE_TYPES
+from synthroads_addon.sampling.forest import MANTLE
 from synthroads_addon.sampling.pavement_damage import CRACKS_PER_KM
 from synthroads_addon.scenario.road import RoadScenario
 
@@ -124,6 +125,29 @@ def _per_side(kind: str) -> Extractor:
                 yield sum(item.offset * sign > 0.0 for item in objects[kind]) / parameters.alignment.length * 1000.0
 
     return per_km
+
+
+def _heights(kind: str) -> Extractor:
+    """Return what gives the heights of stands of a kind that aren't of a forest edge."""
+
+    def extract(objects: Objects, _: RoadParameters) -> Iterator[float]:
+        for item in objects["Vegetation"]:
+            if item.kind == kind and item.side == "both":
+                yield from (item.height_min, item.height_max)
+
+    return extract
+
+
+def forests(objects: Objects) -> list[Any]:
+    """Return the stands of trees of forest edges."""
+    return [item for item in objects["Vegetation"] if item.kind == "tree" and item.side != "both"]
+
+
+def _forest_edges_per_km(objects: Objects, parameters: RoadParameters) -> Iterator[float]:
+    if parameters.alignment.length > LONG:
+        for side in ("left", "right"):
+            number = sum(item.side == side for item in forests(objects))
+            yield number / parameters.alignment.length * 1000.0
 
 
 def _parked_per_building(objects: Objects, _: RoadParameters) -> Iterator[float]:
@@ -237,10 +261,20 @@ EXTRACTORS: dict[str, Extractor] = {
     "undulation": _field("Terrain", "undulation"),
     "wavelength": _field("Terrain", "wavelength"),
     "batter_slope": _field("Terrain", "batter_slope"),
-    "vegetation.tree_height": _field("Vegetation", "height_min", "height_max", kind="tree"),
-    "vegetation.shrub_height": _field("Vegetation", "height_min", "height_max", kind="shrub"),
+    "vegetation.tree_height": _heights("tree"),
+    "vegetation.shrub_height": _heights("shrub"),
     "vegetation.grass_height": _field("Vegetation", "height_min", "height_max", kind="grass"),
     "vegetation.mown_width": _field("Vegetation", "mown_width", kind="grass"),
+    "vegetation.forest_edges_per_km": _forest_edges_per_km,
+    "vegetation.forest_edge_length": lambda objects, _: (
+        item.end_station - item.start_station for item in forests(objects)
+    ),
+    "vegetation.forest_depth": lambda objects, _: (
+        item.band_end - item.band_start + MANTLE / 2.0 for item in forests(objects)
+    ),
+    "vegetation.forest_height": lambda objects, _: (
+        height for item in forests(objects) for height in (item.height_min, item.height_max)
+    ),
     "environment.sun_azimuth_deg": _of_scene("environment", "sun_azimuth_deg"),
     "environment.sun_elevation_deg": _of_scene("environment", "sun_elevation_deg"),
     "environment.cloud_cover": _of_scene("environment", "cloud_cover"),
@@ -259,6 +293,7 @@ COUNTED = {
     "roadside.hedges_per_km",
     "roadside.buildings_per_km",
     "roadside.parked_per_building",
+    "vegetation.forest_edges_per_km",
     "landscape.villages",
     "landscape.turbines",
     "vehicles.per_km",

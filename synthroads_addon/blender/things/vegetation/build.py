@@ -20,6 +20,7 @@ from .grass import grass_group
 from .shrub import shrub_group
 from .tree import tree_group
 
+_SIDES = {"both": 0, "left": 1, "right": -1}
 _GROUPS = {"grass": grass_group, "shrub": shrub_group, "tree": tree_group}
 
 
@@ -53,9 +54,10 @@ def _places_mesh(builder: ModelBuilder, plants: Vegetation, terrain: Terrain) ->
     attribute(mesh, "id", places.number)
     attribute(mesh, "stands", places.stands.astype(np.int64))
     attribute(mesh, "seed", np.full(len(places.number), plants.seed % SEEDS))
-    inputs = {"density": plants.density, "band_start": plants.band_start, "band_end": plants.band_end}
-    for name, value in {**inputs, "reach": terrain.half_width}.items():
-        attribute(mesh, name, np.full(len(places.number), value))
+    inputs = {name: getattr(plants, name) for name in ("density", "band_start", "band_end")}
+    stretch = {name: builder.along(getattr(plants, name)) for name in ("start_station", "end_station")}
+    for name, value in {**inputs, **stretch, "reach": terrain.half_width, "on_side": _SIDES[plants.side]}.items():
+        attribute(mesh, name, np.full(len(places.number), float(value)))
     return mesh
 
 
@@ -70,8 +72,9 @@ def _further_inputs(plants: Vegetation, builder: ModelBuilder) -> dict[str, Any]
         reach = {"roadside_reach": builder.widest, "median_instance": median}
         return {"roadside_density": roadside, "material": plants.species, **reach}
     bark, leaves = f"{plants.species}_bark", f"{plants.species}_leaves"
+    side = {"on_side": _SIDES[plants.side]}
     if not is_bare(plants.species, builder.parameters.environment.season):
-        return {"bark_material": bark, "leaves_material": leaves}
+        return {"bark_material": bark, "leaves_material": leaves, **side}
     shape = species_shapes()[plants.kind][plants.species]
     twigs = {name: shape[name] * factor for name, factor in BARE_TWIGS.items()}
-    return {"bark_material": bark, "leaves_material": bark, **twigs}
+    return {"bark_material": bark, "leaves_material": bark, **twigs, **side}

@@ -42,7 +42,15 @@ class Stand(Inputs):
     instance = integer(0, INSTANCES, "Instance number of the first; the others have those after it")
 
 
-DECIDED = ("density", "band_start", "band_end", "reach")
+class PlantStand(Stand):
+    """Inputs of a stand of shrubs or trees, which may grow on one side and along a part of the road alone."""
+
+    start_station = metres(0.0, (-1e6, 1e6), "Station from which on they grow")
+    end_station = metres(1e6, (-1e6, 1e6), "Station up to which they grow")
+    on_side = integer(0, (-1, 1), "1: on the left of the axis, -1: on its right, 0: on both sides")
+
+
+DECIDED = ("density", "band_start", "band_end", "reach", "start_station", "end_station", "on_side")
 """Inputs of a stand that the places of `decided_places` were decided for: their points carry them, and the seed."""
 
 
@@ -111,6 +119,9 @@ def points_on(
     if band is not None:
         gone = gone | (ray["Attribute"] < band[0]) | (ray["Attribute"] > band[1])
         if places is not None:
+            assert isinstance(stand, PlantStand)
+            gone = gone | (station < stand.start_station) | (station > stand.end_station)
+            gone = gone | (offset * stand.on_side < 0.0)
             aside = (ray["Attribute"] < band[0] - _ASIDE) | (ray["Attribute"] > band[1] + _ASIDE)
             decided, stands = _decisions(stand, places, identity)
             gone = op.switch(decided, gone, ~ray["Is Hit"] | ~stands | aside)

@@ -8,7 +8,7 @@ from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import metres
 from .crown import Crown, Plant, PlantMaterials, bend_stems, crown_group
-from .plants import Stand, decided_places, own_numbers, plant_points, points_in_band, sizes
+from .plants import PlantStand, decided_places, own_numbers, plant_points, points_in_band, sizes
 
 # Kinds of one species: seed, and a factor on the crown's radius.
 _KINDS = tuple(zip((5, 17, 29), KINDS["shrub"], strict=True))
@@ -36,7 +36,7 @@ class _ShrubInputs(Crown):
 @makes_group("SR Shrub")
 def shrub_group(tree: Tree) -> None:
     """Shrubs of one species in a band beside the road, of three kinds, with gaps between their leaves."""
-    places, stand = decided_places(tree), Stand(tree, defaults=_STAND)
+    places, stand = decided_places(tree), PlantStand(tree, defaults=_STAND)
     with tree.panel("Shape at height 1"):
         shape = _ShrubInputs(tree, defaults=_DEFAULTS)
     with tree.panel("Materials"):

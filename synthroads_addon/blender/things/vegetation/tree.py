@@ -10,7 +10,7 @@ from ...nodes.builder import Tree, Value, makes_group
 from ...nodes.inputs import metres
 from ...nodes.solids import paint_faces
 from .crown import Crown, Plant, PlantMaterials, bend_stems, crown_group
-from .plants import Stand, decided_places, own_numbers, plant_points, points_in_band, sizes
+from .plants import PlantStand, decided_places, own_numbers, plant_points, points_in_band, sizes
 
 # Kinds of one species: seed, and factors on the crown's bottom and radius.
 _KINDS = tuple(zip((11, 23, 37), BOTTOMS["tree"], KINDS["tree"], strict=True))
@@ -28,7 +28,7 @@ class _TreeInputs(Crown):
 @makes_group("SR Tree")
 def tree_group(tree: Tree) -> None:
     """Trees of one species in a band beside the road, of three kinds, with gaps between their leaves."""
-    places, stand = decided_places(tree), Stand(tree, defaults=_STAND)
+    places, stand = decided_places(tree), PlantStand(tree, defaults=_STAND)
     with tree.panel("Shape at height 1"):
         shape = _TreeInputs(tree)
     with tree.panel("Materials"):
