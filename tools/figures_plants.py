@@ -68,7 +68,7 @@ def main() -> None:
     parser.add_argument("--species", nargs="+", default=["maple", "birch", "spruce"], choices=list(_TREES))
     parser.add_argument("--seed", type=int, default=5)
     given = parser.parse_args()
-    print("| species | season | pulses to the ground (%) | returns per pulse into trees | of 1, 2, 3, more (%) | pulses |")
+    print("| species | season | pulses to the ground (%) | returns per pulse into trees | 1, 2, 3, more (%) | pulses |")
     print("|---|---|---|---|---|---|")
     for species in given.species:
         for season in ("summer", "winter"):

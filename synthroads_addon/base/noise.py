@@ -101,7 +101,7 @@ def mean_deviation(long: Float, short: Float) -> Float32:
 
 
 def hash_cells(cells: NDArray[np.int64], key: int) -> NDArray[np.uint32]:
-    """Return random whole numbers (N,), uniform from 0 to 2^32 - 1, of cells (3, N) of a lattice; the key seeds them."""
+    """Return random whole numbers (N,), uniform from 0 to 2^32 - 1, of cells (3, N) of a lattice, by a key."""
     first, second, third = (axis.astype(np.uint32) * prime for axis, prime in zip(cells, _AXES, strict=True))
     node = _mix_bits(first + np.uint32(key))
     node = _mix_bits(node + second)

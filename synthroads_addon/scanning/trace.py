@@ -94,6 +94,10 @@ class TracedRays:
         begin, direction = self.rays.pick(self.ray_of(hits))
         return begin + self.pick("distance", hits) * direction, begin
 
+    def begins(self, hits: Index) -> Float:
+        """Return where the rays of chosen hits begin, (3, N) local, m."""
+        return self.rays.pick(self.ray_of(hits))[0]
+
     def directions(self, hits: Index) -> Float:
         """Return the directions (3, N) of chosen hits' rays."""
         return np.take(self.rays.direction.reshape(3, -1), self.ray_of(hits), axis=1)

@@ -142,7 +142,8 @@ def test_materials_of_earlier_files_have_no_optics() -> None:
 
 
 @pytest.mark.parametrize(
-    ("field", "value"), [("transmission", 1.0), ("gap_size", -0.1), ("facet_slope", -0.1), ("retroreflection", -1), ("retro_lobe_deg", 0)]
+    ("field", "value"),
+    [("transmission", 1.0), ("gap_size", -0.1), ("facet_slope", -0.1), ("retroreflection", -1), ("retro_lobe_deg", 0)],
 )
 def test_impossible_values_are_refused(field, value) -> None:
     with pytest.raises(InputError, match=field):
