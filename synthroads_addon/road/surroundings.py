@@ -90,10 +90,12 @@ class Vegetation(RoadObject):
 
     @model_validator(mode="after")
     def _fits(self) -> Vegetation:
-        if self.band_end < self.band_start or self.height_max < self.height_min:
-            raise ValueError("band_end and height_max must not be less than band_start and height_min")
-        if self.end_station < self.start_station:
-            raise ValueError("end_station must not be less than start_station")
+        ends = (self.band_end, self.height_max, self.end_station)
+        begins = (self.band_start, self.height_min, self.start_station)
+        if any(end < begin for begin, end in zip(begins, ends, strict=True)):
+            raise ValueError(
+                "band_end, height_max and end_station must not be less than band_start, height_min and start_station"
+            )
         if self.kind == "grass" and (self.side, self.start_station, self.end_station) != ("both", 0.0, LONGEST):
             raise ValueError("side, start_station and end_station are for shrubs and trees: grass grows all along")
         if self.species not in SPECIES[self.kind]:

@@ -160,7 +160,7 @@ class VegetationLimits(ClosedModel):
     )
     forest_edge_length: Interval = interval(60.0, 200.0, "m", "Length of forest edges.", title="Their Length")
     forest_depth: Interval = interval(12.0, 25.0, "m", "Depth of what is built of a forest.", title="Their Depth")
-    forest_height: Interval = interval(12.0, 22.0, "m", "Height of a forest's trees.", title="Their Trees")
+    forest_height: Interval = interval(12.0, 22.0, "m", "Height of a forest's trees.", title="Their Height")
 
 
 class LandscapeLimits(ClosedModel):

@@ -233,7 +233,7 @@ BROKEN = {
         "alignment": SMALL_ROAD["objects"]["alignment"]
         | {"horizontal": [{"kind": "arc", "length": 1.0, "curvature_start": 0.0, "curvature_end": 0.0}]}
     },
-    "a vegetation's band and heights end after they begin": _object("", **PLANTS | {"band_end": 4.0}),
+    "a vegetation's band, heights and stretch end after they begin": _object("", **PLANTS | {"band_end": 4.0}),
     "a gantry's left end lies left of its right end": _object(
         "", type="Gantry", kind="one_sided", left_offset=-5.0, right_offset=5.0, **PLACE
     ),

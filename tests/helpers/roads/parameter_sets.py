@@ -15,7 +15,7 @@ from pydantic.fields import FieldInfo
 from synthroads_addon.base.schema import Model
 from synthroads_addon.road.objects import WidthPoint
 from synthroads_addon.road.parameters import AnyObject, Metadata, Transform
-from synthroads_addon.road.surroundings import SPECIES, Environment, MaterialVariation
+from synthroads_addon.road.surroundings import LONGEST, SPECIES, Environment, MaterialVariation
 
 OBJECTS = {kind.model_fields["type"].default: kind for kind in get_args(get_args(AnyObject)[0])}
 """Type of object -> its class."""
@@ -166,8 +166,13 @@ def _turnout(data: dict[str, Any]) -> dict[str, Any]:
 
 def _plants(data: dict[str, Any]) -> dict[str, Any]:
     species = SPECIES[data["kind"]]
+    start, end = sorted((data["start_station"], data["end_station"]))
+    grass = data["kind"] == "grass"
     return {
         "species": data["species"] if data["species"] in species else species[0],
+        "side": "both" if grass else data["side"],
+        "start_station": 0.0 if grass else start,
+        "end_station": LONGEST if grass else end,
         "band_end": max(data["band_start"], data["band_end"]),
         "height_max": max(data["height_min"], data["height_max"]),
     }
@@ -273,7 +278,7 @@ LIBRARY_ONLY = {
     "stations of a width's points increase": "must be greater than the one before",
     "the alignment is at most 1000 km long": "must be at most 1e\\+06 m long together",
     "an arc's curvatures are equal, a clothoid's differ": "kind '(arc|clothoid)' contradicts",
-    "a vegetation's band and heights end after they begin": "must not be less than band_start and height_min",
+    "a vegetation's band, heights and stretch end after they begin": "must not be less than band_start, height_min",
     "a gantry's left end lies left of its right end": "left_offset must be greater than right_offset",
     "a material has one set of textures at most": "textures has '.*' twice",
     "forest and meadow are at most all of the land": "forest_share and meadow_share must not be more than 1",
