@@ -166,11 +166,11 @@ def _turnout(data: dict[str, Any]) -> dict[str, Any]:
 
 def _plants(data: dict[str, Any]) -> dict[str, Any]:
     species = SPECIES[data["kind"]]
-    start, end = sorted((data["start_station"], data["end_station"]))
+    start, end = sorted((data.get("start_station", 0.0), data.get("end_station", LONGEST)))
     grass = data["kind"] == "grass"
     return {
         "species": data["species"] if data["species"] in species else species[0],
-        "side": "both" if grass else data["side"],
+        "side": "both" if grass else data.get("side", "both"),
         "start_station": 0.0 if grass else start,
         "end_station": LONGEST if grass else end,
         "band_end": max(data["band_start"], data["band_end"]),
