@@ -23,7 +23,6 @@ from .colour.request import LayerRequest
 from .devices.device import ScannerSetting
 from .effects import EchoEffect
 from .forecast import ScanForecast, forecast_scan
-from .gaps import LeafGaps
 from .multipath import Multipath
 from .noise import Noise
 from .platforms.path import Path, Strip
@@ -32,6 +31,7 @@ from .relief.micro_relief import MicroRelief
 from .relief.pavement import PavementRelief
 from .scene.bare_ground import BareGround
 from .scene.caster import Caster
+from .scene.gaps import LeafGaps
 from .scene.mesh import SceneMesh
 from .scene.target import Target
 from .strip_errors import StripErrors, strip_error_report

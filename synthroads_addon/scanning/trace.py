@@ -6,8 +6,8 @@ import numpy as np
 
 from ..base.arrays import AnyArray, ArrayRows, Float, Index
 from ..materials.surfaces import Surfaces
-from .gaps import LeafGaps
 from .knots import Track
+from .scene.gaps import LeafGaps
 from .scene.target import FirstHits, Target
 
 LAYERS = 32

@@ -7,8 +7,8 @@ import pytest
 
 from synthroads_addon.materials.surfaces import Surfaces, surfaces_of
 from synthroads_addon.materials.table import materials
-from synthroads_addon.scanning.gaps import LeafGaps
 from synthroads_addon.scanning.plan import ScanPlan
+from synthroads_addon.scanning.scene.gaps import LeafGaps
 from tests.helpers.scenes.scan_scenes import Standing, mesh_of, scan_of, scan_pulses
 
 OPEN, SIZE = 0.4, 0.1

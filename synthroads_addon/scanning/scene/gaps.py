@@ -16,12 +16,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..base.arrays import Float, Index
-from ..base.noise import hash_cells
-from ..base.random_streams import stream
-from ..materials.surfaces import Surfaces
-from .beam import beam_radii
-from .devices.device import ScannerSetting
+from ...base.arrays import Float, Index
+from ...base.noise import hash_cells
+from ...base.random_streams import stream
+from ...materials.surfaces import Surfaces
+from ..beam import beam_radii
+from ..devices.device import ScannerSetting
 
 _CORNERS = np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)]) / math.sqrt(3.0)
 """Corners of a regular tetrahedron around the origin, with a radius of 1."""
