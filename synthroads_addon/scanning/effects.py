@@ -1,6 +1,7 @@
 """Effects between tracing and returns, such as drops in the air, that change a pulse's echoes; and how they act."""
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -25,25 +26,43 @@ class PulseHits:
         origin: (3, P) where each pulse leaves the scanner, local, m.
         direction: (3, P) unit vectors of the beam's axis.
         share: (K,) of the pulse's energy that each ray stands for; they add up to 1.
-        distance: (K, P) range of what each ray meets first, m; inf where there is nothing within reach.
-        brightness: (K, P) of that; 0 where there is nothing.
         behind_pulse, behind_ray: (B,) pulse and ray of what lies behind leaves and the like, and of echoes that
             effects before this one have added.
-        behind_distance, behind_brightness: (B,) of these.
         setting: the scanner's.
+        attenuation: of the beam, 1/m of range.
+        signals: received of what each ray meets first, and of what lies behind.
     """
 
     time: Float
     origin: Float
     direction: Float
     share: Float
-    distance: Float
-    brightness: Float
     behind_pulse: Index
     behind_ray: Index
-    behind_distance: Float
-    behind_brightness: Float
     setting: ScannerSetting
+    attenuation: float
+    signals: BothSignals
+
+    @property
+    def distance(self) -> Float:
+        """Return the range (K, P) of what each ray meets first, m; inf where there is nothing within reach."""
+        return self.signals[0].distance
+
+    @property
+    def behind_distance(self) -> Float:
+        """Return the range (B,) of what lies behind, m."""
+        return self.signals[1].distance
+
+    # Few effects ask how bright things are.
+    @cached_property
+    def brightness(self) -> Float:
+        """Return the brightness (K, P) of what each ray meets first; 0 where there is nothing."""
+        return _brightness(self.signals[0], self.attenuation)
+
+    @cached_property
+    def behind_brightness(self) -> Float:
+        """Return the brightness (B,) of what lies behind."""
+        return _brightness(self.signals[1], self.attenuation)
 
 
 @dataclass(frozen=True)
@@ -122,20 +141,17 @@ def apply_effect(
 def _pulse_hits(
     setting: ScannerSetting, attenuation: float, pulses: Pulses, traced: TracedRays, signals: BothSignals
 ) -> PulseHits:
-    first, behind = signals
     ray, pulse = np.divmod(traced.ray, len(pulses.time))
     return PulseHits(
         time=pulses.time,
         origin=pulses.origin,
         direction=pulses.direction,
         share=traced.rays.share[:, 0],
-        distance=first.distance,
-        brightness=_brightness(first, attenuation),
         behind_pulse=pulse,
         behind_ray=ray,
-        behind_distance=behind.distance,
-        behind_brightness=_brightness(behind, attenuation),
         setting=setting,
+        attenuation=attenuation,
+        signals=signals,
     )
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import product
 from typing import Any, Self
 
 import numpy as np
@@ -13,6 +14,10 @@ _AT_ONCE = 256
 """Knots whose poses are worked out at once: for so many it takes hardly longer than for a few."""
 _KEPT = 16
 """So many times `_AT_ONCE` knots are kept, for the blocks that are being scanned and those that follow."""
+NODES = 6
+"""Poses from which those between the middle two are worked out, by the polynomial through them."""
+NODE_ERROR = 225.0 / 46_080.0
+"""Largest error of that polynomial over the sixth derivative times the sixth power of the nodes' spacing."""
 
 
 @dataclass(frozen=True)
@@ -37,12 +42,32 @@ class Track:
     present: Bool
 
     @classmethod
-    def between(cls, pose: Callable[[Float], Any], begin: float, end: float, spacing: float) -> Self:
+    def between(
+        cls, pose: Callable[[Float], Any], begin: float, end: float, spacing: float, every: int = 1
+    ) -> Self:
         """Sample ``pose(time (K,)) -> (rotation (K, 3, 3), position (K, 3), present (K,))`` at knots, begin to end, s.
 
         Knots are whole multiples of the spacing, so that no result depends on where a block begins.
+
+        Args:
+            every: only so many knots apart the pose is worked out, between these by polynomials through `NODES` of
+                them: for poses that bend fast and smoothly.
         """
-        return cls._at_knots(pose, *_knot_numbers(begin, end, spacing), spacing)
+        first, last = _knot_numbers(begin, end, spacing)
+        if every == 1:
+            return cls._at_knots(pose, first, last, spacing)
+        low, cells = first // every, last // every - first // every + 1
+        before = NODES // 2 - 1
+        nodes = cls._at_knots(pose, low - before, low + cells + before, spacing * every)
+        wanted = slice(first - low * every, last + 1 - low * every)
+        present = np.repeat(nodes.present[before : before + cells] & nodes.present[before + 1 :][:cells], every)
+        return cls(
+            first * spacing,
+            spacing,
+            _refine(nodes.rotation, every)[:, wanted],
+            _refine(nodes.position, every)[:, wanted],
+            present[wanted],
+        )
 
     @classmethod
     def _at_knots(cls, pose: Callable[[Float], Any], first: int, last: int, spacing: float) -> Self:
@@ -136,8 +161,34 @@ def _locate(track: Track, times: Float) -> tuple[Index, Float]:
 
 def _interpolate(values: Float, index: Index, share: Float) -> Float:
     """Return values (C, N), interpolated linearly at shares (N,) of the way from knot ``index`` to the next."""
-    step = np.diff(values, axis=1)
-    result = np.take(step, index, axis=1)
-    result *= share
-    result += np.take(values, index, axis=1)
+    result, begin = np.empty((len(values), len(index))), np.empty(len(index))
+    # Row by row, which is thrice as fast as all at once.
+    for row, step, interpolated in zip(values, np.diff(values, axis=1), result, strict=True):
+        np.take(step, index, out=interpolated, mode="clip")
+        interpolated *= share
+        interpolated += np.take(row, index, out=begin, mode="clip")
     return result
+
+
+@lru_cache(maxsize=64)
+def _node_weights(every: int) -> Float:
+    """Return the weights (every, NODES) of evenly spaced nodes at each knot between the middle two, by Lagrange."""
+    share, place = np.arange(every) / every, np.arange(NODES) - (NODES // 2 - 1)
+    weights = np.ones((every, NODES))
+    for node, other in product(range(NODES), repeat=2):
+        if node != other:
+            weights[:, node] *= (share - place[other]) / (place[node] - place[other])
+    return weights
+
+
+def _refine(values: Float, every: int) -> Float:
+    """Return values (C, N) at nodes as values (C, (N + 1 - NODES) * every) at the knots from the third node on."""
+    weights, cells = _node_weights(every), values.shape[1] + 1 - NODES
+    result = np.empty((len(values), cells, every))
+    total, part = np.empty((2, every, cells))
+    for row, refined in zip(values, result, strict=True):
+        total[:] = 0.0
+        for node in range(NODES):
+            total += np.multiply(weights[:, node, None], row[node : node + cells], out=part)
+        refined[:] = total.T
+    return result.reshape(len(values), -1)

@@ -13,6 +13,8 @@ exp(-32) of its influence, so a block is computed from its own and the previous 
 be asked for in any order, at the same cost.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
 from ..base.arrays import Float, Float32
@@ -86,17 +88,21 @@ def trajectory_errors(noise: Noise, seed: int, strip: Strip, time: Float) -> tup
     values = np.empty((len(time), _AXES))
     for block in np.unique(number):
         here = np.flatnonzero(number == block)
-        at, knots = within[here], _process_block(seed, strip, int(block))
+        at, knots = within[here], _process_block(seed, strip.index, int(block))
         values[here] = before[here, None] * knots[at] + after[here, None] * knots[at + 1]
     values *= sigma
     return values[:, :3], values[:, 3:]
 
 
-def _process_block(seed: int, strip: Strip, number: int) -> Float:
-    """Return the unit-variance process (`BLOCK` + 1, 6) at a block's knots and the first of the next one."""
+@lru_cache(maxsize=16)
+def _process_block(seed: int, strip: int, number: int) -> Float:
+    """Return the unit-variance process (`BLOCK` + 1, 6) at a block's knots and the first of the next one.
+
+    It is kept, as many blocks of pulses share it.
+    """
     parts = [(number - 1, BLOCK)] if number > 0 else []
     parts += [(number, BLOCK), (number + 1, 1)]
-    streams = ((stream(seed, "trajectory noise", strip.index, part), count) for part, count in parts)
+    streams = ((stream(seed, "trajectory noise", strip, part), count) for part, count in parts)
     innovations = np.concatenate([random.standard_normal((count, _AXES)) for random, count in streams])
     return _autoregression(innovations)[-BLOCK - 1 :]
 

@@ -10,6 +10,7 @@ import numpy as np
 from ..base.arrays import Bool, Float, Float32, Index, UInt8
 from .devices.device import ScannerSetting
 from .knots import Track
+from .receiver import values_of_echoes
 from .scene.target import Target
 
 
@@ -18,45 +19,35 @@ class Errors:
     """Random errors of a block's P pulses in range, angle and intensity, and which returns are lost, whatever is met.
 
     Attributes:
-        range: (2, P) float32 of the block, or as many as a pulse can have returns if these are more, in units of one
-            sigma; None without. See `range_errors`.
+        range: (2, P) or more, in units of one sigma; None without. Of this and of all others but `angle` echoes have
+            what `receiver.values_of_echoes` says.
         angle: (2, P) rad; None without.
-        lost: (P, returns) bool; None without.
-        speckle: (P, returns) factors on the intensities, 1 on average; None without.
-        receiver: (2, P) noise of the receiver, in units of one sigma, see `receiver.values_of_echoes`; None without.
+        lost: as `range`: shares, 0 to 1, that say who is lost; None without.
+        speckle: as `range`: factors on the intensities, 1 on average; None without.
+        receiver: as `range`: noise of the receiver, in units of one sigma; None without.
         tails: as `range`: factors on these; None without.
-        number: (2, P) shares, 0 to 1, that say whose number is lost, see `receiver.values_of_echoes`; None without.
+        number: as `range`: shares, 0 to 1, that say whose number is lost; None without.
     """
 
     range: Float32 | None
-    angle: Float | None
-    lost: Bool | None
+    angle: Float32 | None
+    lost: Float32 | None
     speckle: Float32 | None = None
     receiver: Float32 | None = None
     tails: Float32 | None = None
     number: Float32 | None = None
 
-    def range_errors(self, pulse: Index, number: UInt8, most: int) -> Float32:
+    def range_errors(self, pulse: Index, number: UInt8) -> Float:
         """Return (N,) range errors of returns, in units of one sigma.
-
-        First returns have a number each. Later ones, which are few, take theirs from a second row, the third and
-        fourth of a pulse a good part of the block away from the second: no two returns of one pulse share one.
 
         Args:
             pulse: (N,) within the block.
             number: (N,) from 1.
-            most: largest number that there can be.
         """
         assert self.range is not None
-        count = self.range.shape[1]
-        later = np.flatnonzero(number > 1)
-        place = (pulse[later] + (number[later].astype(np.intp) - 2) * max(1, count // most)) % count
-        result = np.take(self.range[0], pulse)
-        result[later] = self.range[1][place]
+        result = values_of_echoes(self.range, pulse, number)
         if self.tails is not None:
-            factor = np.take(self.tails[0], pulse)
-            factor[later] = self.tails[1][place]
-            result *= factor
+            result *= values_of_echoes(self.tails, pulse, number)
         return result
 
 

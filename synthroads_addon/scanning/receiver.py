@@ -20,10 +20,10 @@ from typing import Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from ..base.arrays import Float, Float32, Index
+from ..base.arrays import Float, Float32, Index, UInt8
 from ..base.schema import ClosedModel, notes, quantity
 
-_LATER = 32
+MOST_ECHOES = 32
 """Echoes of one pulse of which no two share a random number."""
 
 FEWEST_FREEDOM = 3.0
@@ -175,21 +175,21 @@ class Receiver(ClosedModel):
         return threshold / self.threshold_to_noise if self.threshold_to_noise else 0.0
 
 
-def values_of_echoes(values: Float32, pulse: Index, number: Index) -> Float:
+def values_of_echoes(values: Float32, pulse: Index, number: Index | UInt8) -> Float:
     """Return the random numbers of echoes (N,), out of two rows for a block's pulses.
 
     First echoes have a number each. Later ones, which are few, take theirs from the second row, the third and fourth of
     a pulse a good part of the block away from the second.
 
     Args:
-        values: (2, P), P being at least the number of pulses.
+        values: (2, P), P being at least the number of pulses, and `MOST_ECHOES`.
         pulse: (N,) within the block.
         number: (N,) of each echo in its pulse, from 1.
     """
     count = values.shape[1]
     result = np.take(values[0], pulse).astype(np.float64)
     later = np.flatnonzero(number > 1)
-    place = pulse[later] + (number[later] - 2) * max(1, count // _LATER)
+    place = pulse[later] + (number[later].astype(np.intp) - 2) * max(1, count // MOST_ECHOES)
     result[later] = values[1][place % count]
     return result
 
@@ -198,5 +198,7 @@ def number_echoes(pulse: Index) -> Index:
     """Return the numbers (N,) of echoes in their pulses, from 1; pulses (N,) are non-decreasing."""
     begins = np.ones(len(pulse), dtype=bool)
     begins[1:] = pulse[1:] != pulse[:-1]
+    if begins.all():
+        return np.ones(len(pulse), dtype=np.intp)
     starts = np.flatnonzero(begins)
     return np.asarray(np.arange(len(pulse)) - starts[np.cumsum(begins) - 1] + 1)

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.arrays import Bool, Float, Index, Int, UInt8
+from ..base.arrays import Bool, Float, Float32, Index, Int, UInt8
 from ..base.random_streams import stream
 from ..cloud.points import PointBlock, concatenate, make_block
 from ..materials.surfaces import brightness_of, spread_factors
@@ -19,6 +19,7 @@ from .plan import ScanPlan
 from .platforms.path import Strip
 from .point_layers import MeasuredPoints, fill_layers, place_points
 from .pulses import Errors, Poses, Pulses, may_hit_scene, turn_vectors
+from .receiver import MOST_ECHOES
 from .receiving.detector import Readout, detect_echoes
 from .receiving.radiometry import received_intensity
 from .receiving.range_noise import range_sigma, range_walk, tail_factors
@@ -35,6 +36,7 @@ from .returns import (
 from .scene.target import FirstHits
 from .sparing import PartlyTraced, Sparing, Traced, count_footprints
 from .strip_errors import strip_gain, with_strip_errors
+from .sway import SwayingPath
 from .trace import Hits, Rays, TracedRays, trace
 
 _MOTION_KNOTS = 0.01
@@ -139,7 +141,9 @@ class BlockScan:
         if (gain := strip_gain(plan.strip_errors, plan.seed, strip.index)) != 1.0:
             echoes = replace(echoes, intensity=echoes.intensity * gain)
         provisional = plan.detects_after_layers
-        echoes, readout, weak = detect_echoes(echoes, errors, number, pulses.channel, setting, provisional=provisional)
+        echoes, readout, weak = detect_echoes(
+            echoes, errors, number, pulses.channel, setting, dropout=plan.noise.dropout, provisional=provisional
+        )
         keep, return_number, returns = number_returns(echoes.pulse, plan.most_returns)
         if not keep.all():
             echoes, readout = echoes.select(keep), readout.select(keep)
@@ -210,42 +214,60 @@ class BlockScan:
         def source(purpose: str) -> np.random.Generator:
             return stream(plan.seed, purpose, strip.index, key)
 
-        shape, receiver = (count, plan.most_returns), plan.setting.receiver
-        angle, dropout, ranges = plan.noise.angle_sigma_mrad * 1e-3, plan.noise.dropout, plan.setting.range_sigma
+        shape, receiver, noise = (2, max(count, MOST_ECHOES)), plan.setting.receiver, plan.noise
+        angle, ranges = np.float32(noise.angle_sigma_mrad * 1e-3), plan.setting.range_sigma
+
+        def normal(purpose: str) -> Float32:
+            return source(purpose).standard_normal(shape, dtype=np.float32)
+
+        def share(purpose: str) -> Float32:
+            return source(purpose).random(shape, dtype=np.float32)
+
         return Errors(
-            source("range noise").standard_normal((2, max(shape)), dtype=np.float32) if ranges else None,
-            source("angle noise").normal(scale=angle, size=(2, count)) if angle else None,
-            source("dropouts").random(shape, dtype=np.float32) < dropout if dropout else None,
-            speckle_factors(source("speckle"), plan.noise.speckle, shape) if plan.noise.speckle else None,
-            source("receiver noise").standard_normal((2, max(shape)), dtype=np.float32)
-            if receiver.noise_sigma(plan.setting.threshold)
-            else None,
-            tail_factors(source("range tails"), receiver.range_tails, (2, max(shape)))
+            normal("range noise") if ranges else None,
+            angle * normal("angle noise")[:, :count] if angle else None,
+            share("dropouts") if noise.dropout else None,
+            speckle_factors(source("speckle"), noise.speckle, shape) if noise.speckle else None,
+            normal("receiver noise") if receiver.noise_sigma(plan.setting.threshold) else None,
+            tail_factors(source("range tails"), receiver.range_tails, shape)
             if ranges and receiver.range_tails
             else None,
-            source("lost numbers").random((2, max(shape)), dtype=np.float32) if receiver.lost_numbers else None,
+            share("lost numbers") if receiver.lost_numbers else None,
         )
 
     def poses_between(self, strip: Strip, begin: float, end: float) -> Poses:
         """Return the tracks of the scanner and of the target's moving parts between two times, s."""
         path, noise, spacing = self.plan.path, self.plan.noise, self.plan.path.knot_spacing
         strip_errors, seed = self.plan.strip_errors, self.plan.seed
+        every = path.knots_per_node if isinstance(path, SwayingPath) else 1
+        noisy = bool(noise.position_sigma or noise.attitude_sigma_deg or noise.heading_sigma_deg)
+        known: dict[tuple[float, float], tuple[Float, Float]] = {}
+
+        def planned(time: Float) -> tuple[Float, Float]:
+            """Return the poses at evenly spaced times, which are worked out once for both tracks."""
+            key = (float(time[0]), float(time[-1]))
+            if key not in known:
+                known[key] = path.pose(strip, time)
+            return known[key]
 
         def true(time: Float) -> tuple[Float, Float, Float]:
-            position, rotation = path.pose(strip, time)
+            position, rotation = planned(time)
             return rotation, position, np.ones(len(time))
 
         def measured(time: Float) -> tuple[Float, Float, Float]:
-            pose = measured_pose(*path.pose(strip, time), trajectory_errors(noise, seed, strip, time))
+            pose = planned(time)
+            if noisy:
+                pose = measured_pose(*pose, trajectory_errors(noise, seed, strip, time))
             position, rotation = with_strip_errors(strip_errors, seed, strip, time, pose)
             return rotation, position, np.ones(len(time))
 
-        track = Track.between(true, begin, end, spacing)
-        noisy = noise.position_sigma or noise.attitude_sigma_deg or noise.heading_sigma_deg or strip_errors.moves_points
+        track = Track.between(true, begin, end, spacing, every)
+        # Between knots errors would lose some of their spread if they changed much meanwhile.
+        closest = min(spacing, noise.correlation_time / 50.0)
+        every = max(1, min(every, int(noise.correlation_time / 50.0 / closest)))
         return Poses(
             track,
-            # Linear between knots, errors would lose some of their spread if they changed much meanwhile.
-            Track.between(measured, begin, end, min(spacing, noise.correlation_time / 50.0)) if noisy else track,
+            Track.between(measured, begin, end, closest, every) if noisy or strip_errors.moves_points else track,
             self.plan.target.motions(begin, end, min(spacing, _MOTION_KNOTS), track if self.plan.on_vehicle else None),
         )
 
@@ -366,7 +388,7 @@ class BlockScan:
         face, along = traced.pick("face", hit), traced.pick("along", hit)
         distance = echoes.range + plan.noise.range_bias
         if errors.range is not None:
-            range_errors = errors.range_errors(number_in_block[pulse], number, plan.most_returns)
+            range_errors = errors.range_errors(number_in_block[pulse], number)
             distance = distance + range_sigma(setting, echoes.range, along, echoes.intensity) * range_errors
             if speckle is not None and setting.receiver.range_walk:
                 distance = distance + range_walk(setting, speckle, plan.noise.speckle)

@@ -14,11 +14,14 @@ from pydantic import model_validator
 from ..base.arrays import Float
 from ..base.random_streams import stream
 from ..base.schema import ClosedModel, quantity
+from .knots import NODE_ERROR, NODES
 from .noise import measured_pose
-from .platforms.path import KNOT_RANGE, Path, Strip, knot_spacing_for
+from .platforms.path import KNOT_ERROR, KNOT_RANGE, Path, Strip, knot_spacing_for
 
 _SINES = 24
 _AXES = 6
+_CREST = 4.0
+"""Standard deviations that a Gaussian process hardly ever exceeds."""
 
 
 class Motion(ClosedModel):
@@ -77,20 +80,29 @@ class SwayingPath:
     @property
     def knot_spacing(self) -> float:
         """Return the largest time between two knots, s, by the bends of path and sway together."""
-        # Acceleration of a place at KNOT_RANGE where all sines are at their crests would be sqrt(2 N) sigma; 4 sigma is
-        # what a Gaussian process hardly ever exceeds.
+        return float((self.planned.knot_spacing**-2 + knot_spacing_for(self._bend(2)) ** -2) ** -0.5)
+
+    @property
+    def knots_per_node(self) -> int:
+        """Return of how many knots one is worked out; those between follow within a quarter of `KNOT_ERROR`."""
+        smooth = (KNOT_ERROR / 4.0 / (NODE_ERROR * self._bend(NODES))) ** (1.0 / NODES)
+        # Where the planned path bends at once, polynomials err about as much as straight lines do.
+        return max(1, int(min(smooth, self.planned.knot_spacing / 2.0) / self.knot_spacing))
+
+    def _bend(self, order: int) -> float:
+        """Return a derivative by time of a place at `KNOT_RANGE`, m/s^order, that its sway hardly ever exceeds."""
+        # Where all sines are at their crests it would be sqrt(2 N) sigma.
         reach = np.array([1.0] * 3 + [KNOT_RANGE] * 3)
-        sway = 4.0 * float(np.linalg.norm(self.motion.sigma * reach)) * (2.0 * np.pi / self.motion.shortest_period) ** 2
-        sway *= _calmness(self.motion)
-        return float((self.planned.knot_spacing**-2 + knot_spacing_for(sway) ** -2) ** -0.5)
+        size = _CREST * float(np.linalg.norm(self.motion.sigma * reach))
+        return size * (2.0 * np.pi / self.motion.shortest_period) ** order * _calmness(self.motion, order)
 
     def pose(self, strip: Strip, time: Float) -> tuple[Float, Float]:
         """Return the planned path's positions (K, 3), m, and rotations (K, 3, 3), with sway, at times (K,), s."""
         return measured_pose(*self.planned.pose(strip, time), sway_offsets(self.motion, self.seed, strip.index, time))
 
 
-def _calmness(motion: Motion) -> float:
-    """Return the rms acceleration of sway as a share of that with sines that are all alike, 0 to 1."""
+def _calmness(motion: Motion, order: int) -> float:
+    """Return the rms of a derivative of sway as a share of that with sines that are all alike, 0 to 1."""
     low, high, exponent = motion.shortest_period, motion.longest_period, motion.period_exponent
 
     def mean_power(power: float) -> float:
@@ -99,8 +111,8 @@ def _calmness(motion: Motion) -> float:
 
     if exponent == 0.0 or low == high:
         return 1.0
-    own = mean_power(2.0 * exponent - 4.0) / mean_power(2.0 * exponent)
-    return min(1.0, math.sqrt(own * mean_power(0.0) / mean_power(-4.0)))
+    own = mean_power(2.0 * (exponent - order)) / mean_power(2.0 * exponent)
+    return min(1.0, math.sqrt(own * mean_power(0.0) / mean_power(-2.0 * order)))
 
 
 def sway_offsets(motion: Motion, seed: int, strip: int, time: Float) -> tuple[Float, Float]:
@@ -115,8 +127,11 @@ def sway_offsets(motion: Motion, seed: int, strip: int, time: Float) -> tuple[Fl
     phases = random.uniform(0.0, 2.0 * np.pi, (_AXES, _SINES))
     weights = (periods / motion.longest_period) ** motion.period_exponent
     weights /= np.sqrt(np.mean(weights**2, axis=1, keepdims=True))
-    angle = np.asarray(time, dtype=np.float64)[:, None, None] * (2.0 * np.pi / periods) + phases
-    values = (weights * np.sin(angle)).sum(axis=2) * (np.sqrt(2.0 / _SINES) * motion.sigma)
+    angle = np.asarray(time, dtype=np.float64)[:, None, None] * (2.0 * np.pi / periods)
+    angle += phases
+    np.sin(angle, out=angle)
+    angle *= weights
+    values = angle.sum(axis=2) * (np.sqrt(2.0 / _SINES) * motion.sigma)
     return values[:, :3], values[:, 3:]
 
 

@@ -8,8 +8,12 @@ from scipy import stats
 
 from synthroads_addon.cloud.points import PointBlock, concatenate
 from synthroads_addon.scanning.devices.device import Device
+from synthroads_addon.scanning.noise import Noise
 from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scanning.receiver import Receiver, number_echoes, values_of_echoes
+from synthroads_addon.scanning.receiving.detector import detect_echoes
+from synthroads_addon.scanning.returns import Echoes
+from synthroads_addon.scanning.scan import BlockScan
 from tests.helpers.scenes.scan_scenes import Standing, plane, scan_block, scan_of
 from tests.helpers.scenes.scanners import device
 
@@ -58,7 +62,7 @@ def test_noise_of_detected_echoes_is_a_normal_distribution_cut_off_at_the_thresh
     mean = calm.intensity[np.isin(calm.gps_time, noisy.gps_time)]
     assert noisy.intensity.min() >= threshold
     share = stats.truncnorm.cdf(noisy.intensity, (threshold - mean) / sigma, np.inf, mean, sigma)
-    assert stats.kstest(share, "uniform").pvalue > 0.001
+    assert stats.chisquare(np.bincount((share * 20).astype(int), minlength=20)).pvalue > 0.001
 
 
 def test_a_hard_threshold_stays_and_noise_moves_no_point() -> None:
@@ -87,6 +91,35 @@ def test_each_echo_of_a_pulse_has_a_number_of_its_own() -> None:
     np.testing.assert_array_equal(
         values_of_echoes(values, pulse[kept], number_echoes(pulse[kept])), dealt.ravel()[kept]
     )
+
+
+def test_every_echo_of_a_pulse_follows_the_laws() -> None:
+    """Chi-square tests of speckle, noise, detection and lost echoes by their number in the pulse."""
+    pulses, echoes, dropout, sigma = 3000, 4, 0.1, 0.3
+    plan = scan_of(plane(), 1)
+    setting = replace(plan.setting, threshold=1.0, receiver=NOISY)
+    plan = replace(plan, setting=setting, noise=Noise(speckle=sigma, dropout=dropout))
+    errors = BlockScan(plan).draw_errors(plan.path.strips[0], pulses, 0)
+    pulse = np.repeat(np.arange(pulses), echoes)
+    power = np.full(len(pulse), 1.1)
+    sent = Echoes(pulse, np.arange(len(pulse)), np.arange(len(pulse)) * 1.0, power, power)
+    number, channel = np.arange(pulses), np.zeros(pulses, dtype=np.uint8)
+    certain = replace(errors, lost=None, receiver=None), replace(setting, threshold=0.0)
+    seen, readout, weak = detect_echoes(sent, certain[0], number, channel, certain[1], provisional=False)
+    assert (len(seen.pulse), weak) == (len(pulse), 0)
+    assert readout.speckle is not None
+    factor, nth = readout.speckle.reshape(-1, echoes), np.arange(len(pulse)) % echoes
+    share = stats.gamma.cdf(factor, sigma**-2.0, scale=sigma**2)
+    for column in share.T:
+        assert stats.chisquare(np.bincount((column * 20).astype(int), minlength=20)).pvalue > 0.001
+    assert np.abs(np.corrcoef(factor.T)[~np.eye(echoes, dtype=bool)]).max() < 5.0 / np.sqrt(pulses)
+    found, _, weak = detect_echoes(sent, errors, number, channel, setting, dropout=dropout, provisional=False)
+    chance = stats.norm.cdf(RATIO * (1.1 * factor.ravel() - 1.0))
+    detected = np.isin(sent.hit, found.hit)
+    kept = chance * (1.0 - dropout)
+    excess, spread = (np.bincount(nth, values) for values in (detected - kept, kept * (1.0 - kept)))
+    assert stats.chi2.sf(np.sum(excess**2 / spread), echoes) > 0.001
+    assert weak == pytest.approx(np.sum(1.0 - chance), abs=5.0 * np.sqrt(np.sum(chance * (1.0 - chance))))
 
 
 def test_a_scenario_changes_what_it_names_and_a_device_says_the_rest() -> None:

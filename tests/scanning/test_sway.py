@@ -72,8 +72,9 @@ def test_each_strip_and_seed_sways_by_itself() -> None:
     np.testing.assert_array_equal(off_path(1, time[700:701]), first[700:701])
 
 
+@pytest.mark.parametrize("all_worked_out", [True, False])
 @pytest.mark.parametrize("exponent", [0.0, 0.5, 1.0])
-def test_between_knots_the_swaying_is_followed(exponent: float) -> None:
+def test_between_knots_the_swaying_is_followed(exponent: float, all_worked_out: bool) -> None:
     path = with_motion(Level(), MOTION.model_copy(update={"period_exponent": exponent, "shortest_period": 0.1}), 1)
     assert isinstance(path, SwayingPath)
     assert path.knot_spacing < Level.knot_spacing
@@ -83,12 +84,33 @@ def test_between_knots_the_swaying_is_followed(exponent: float) -> None:
         return rotation, position, np.ones(len(time))
 
     time = np.linspace(100.0, 110.0, 5003)
-    rotation, origin, _ = Track.between(pose, 100.0, 110.0, path.knot_spacing).at(time)
+    assert path.knots_per_node > 5
+    every = 1 if all_worked_out else path.knots_per_node
+    track = Track.between(pose, 100.0, 110.0, path.knot_spacing, every)
+    rotation, origin, _ = track.at(time)
     exact_position, exact_rotation = path.pose(STRIP, time)
     beam = np.array([0.3, 0.4, -np.sqrt(0.75)]) * KNOT_RANGE
     place = origin.T + np.einsum("ijk,j->ki", rotation.reshape(3, 3, -1).transpose(0, 1, 2), beam)
     exact = exact_position + exact_rotation @ beam
     assert np.linalg.norm(place - exact, axis=1).max() < 2.0 * KNOT_ERROR
+
+
+def test_no_knot_depends_on_where_a_block_begins() -> None:
+    path = SwayingPath(Level(), MOTION, 1)
+
+    def pose(time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        position, rotation = path.pose(STRIP, time)
+        return rotation, position, np.ones(len(time))
+
+    spacing, every = path.knot_spacing, path.knots_per_node
+    whole = Track.between(pose, 100.0, 101.0, spacing, every)
+    for begin in (100.13, 100.5, 100.5 + 3.0 * spacing):
+        part = Track.between(pose, begin, begin + 0.1, spacing, every)
+        first = round((part.begin - whole.begin) / spacing)
+        knots = slice(first, first + len(part.present))
+        np.testing.assert_array_equal(part.position, whole.position[:, knots])
+        np.testing.assert_array_equal(part.rotation, whole.rotation[:, knots])
+        assert part.begin <= begin < begin + 0.1 <= part.begin + (len(part.present) - 1) * spacing + 1e-9
 
 
 def test_a_platform_that_does_not_sway_keeps_its_path() -> None:

@@ -4,11 +4,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...base.arrays import ArrayRows, Bool, Float, Float32, Index, UInt8
+from ...base.arrays import ArrayRows, Bool, Float, Index, UInt8
 from ..devices.device import ScannerSetting
 from ..pulses import Errors
 from ..receiver import number_echoes, values_of_echoes
-from ..returns import Echoes, number_returns
+from ..returns import Echoes
 from .response import overlap_share, read_power
 
 PROVISIONAL_THRESHOLD = 0.25
@@ -51,7 +51,14 @@ class Readout(ArrayRows):
 
 
 def detect_echoes(
-    echoes: Echoes, errors: Errors, number: Index, channel: UInt8, setting: ScannerSetting, *, provisional: bool
+    echoes: Echoes,
+    errors: Errors,
+    number: Index,
+    channel: UInt8,
+    setting: ScannerSetting,
+    *,
+    dropout: float = 0.0,
+    provisional: bool,
 ) -> tuple[Echoes, Readout, int]:
     """Return the echoes that are detected and not lost at random, what is still to be read of them, and the weak ones.
 
@@ -61,47 +68,41 @@ def detect_echoes(
         number: (P,) of the echoes' pulses in the block.
         channel: (P,) lasers of these.
         setting: the scanner's.
+        dropout: share of the echoes that is lost at random.
         provisional: whether intensities are still to change: then all are kept that may be detected in the end.
     """
     if (share := overlap_share(setting, echoes.range)) is not None:
         echoes = replace(echoes, intensity=echoes.intensity * share)
-    noise = speckle = None
-    if errors.speckle is not None:
-        speckle = _speckle_of_echoes(echoes, errors.speckle[number])
+    speckle, noise, shares, lost = _values_of_errors(echoes, errors, number)
+    if speckle is not None:
         echoes = replace(echoes, intensity=echoes.intensity * speckle)
-    if errors.receiver is not None:
-        noise = values_of_echoes(errors.receiver, number[echoes.pulse], number_echoes(echoes.pulse))
+    if noise is not None:
         noise *= setting.receiver.noise_sigma(setting.threshold)
-    unread = None
-    if errors.number is not None:
-        shares = values_of_echoes(errors.number, number[echoes.pulse], number_echoes(echoes.pulse))
-        unread = shares < (setting.receiver.lost_numbers or 0.0)
+    unread = None if shares is None else shares < (setting.receiver.lost_numbers or 0.0)
     readout = Readout(noise, channel[echoes.pulse] if setting.receiver.gain_sigma_db else None, speckle, unread)
     brightest = echoes.intensity / PROVISIONAL_THRESHOLD if provisional else echoes.intensity
-    strong = np.flatnonzero(readout.detected(brightest, setting.threshold))
-    weak = len(echoes.pulse) - len(strong)
-    if weak:
-        echoes, readout = echoes.select(strong), readout.select(strong)
-    if errors.lost is not None:
-        kept = _kept_echoes(echoes, errors.lost[number])
+    seen = readout.detected(brightest, setting.threshold)
+    weak = len(echoes.pulse) - int(np.count_nonzero(seen))
+    if lost is not None:
+        seen &= lost >= dropout
+    if not seen.all():
+        kept = np.flatnonzero(seen)
         echoes, readout = echoes.select(kept), readout.select(kept)
     return echoes, readout, weak
 
 
-def _speckle_of_echoes(echoes: Echoes, factors: Float32) -> Float:
-    """Return the factors (N,) by which speckle changes echoes, from those of pulses (P, returns), by their numbers.
+def _values_of_errors(echoes: Echoes, errors: Errors, number: Index) -> tuple[Float | None, ...]:
+    """Return the echoes' (N,) factors by speckle, noise, and shares that say whose number and who is lost.
 
-    They are 1 beyond the last number that is recorded.
+    Each is None where there is no such error.
+
+    Args:
+        echoes: of a block.
+        errors: of the block.
+        number: (P,) of the echoes' pulses in the block.
     """
-    keep, number, _ = number_returns(echoes.pulse, factors.shape[1])
-    chosen = np.flatnonzero(keep)
-    result = np.ones(len(echoes.pulse))
-    result[chosen] = factors[echoes.pulse[chosen], number - 1]
-    return result
-
-
-def _kept_echoes(echoes: Echoes, lost: Bool) -> Index:
-    """Return the echoes that are not lost at random, by their number within the pulse."""
-    keep, number, _ = number_returns(echoes.pulse, lost.shape[1])
-    chosen = np.flatnonzero(keep)
-    return np.asarray(chosen[~lost[echoes.pulse[chosen], number - 1]])
+    drawn = (errors.speckle, errors.receiver, errors.number, errors.lost)
+    if all(values is None for values in drawn):
+        return None, None, None, None
+    pulse, nth = number[echoes.pulse], number_echoes(echoes.pulse)
+    return tuple(None if values is None else values_of_echoes(values, pulse, nth) for values in drawn)

@@ -108,8 +108,11 @@ def _saturated(power: Float, setting: ScannerSetting) -> tuple[Float, int]:
     softness, limit = setting.receiver.soft_saturation, setting.saturation
     if not softness:
         return saturate(power, limit)
-    share = np.maximum(power, 0.0) / limit
-    soft = np.asarray(power / (1.0 + share ** (2.0 * softness)) ** (0.5 / softness))
+    share = power / limit
+    # Of what is fainter the share's power is lost beside 1.
+    bright = np.flatnonzero(share > (np.finfo(np.float64).eps / 4.0) ** (0.5 / softness))
+    soft = np.array(power)
+    soft[bright] /= (1.0 + share[bright] ** (2.0 * softness)) ** (0.5 / softness)
     return soft, int(np.count_nonzero(power > limit))
 
 

@@ -19,6 +19,8 @@ from ..returns import Echoes
 FULL_WIDTH = 2.0 * np.sqrt(2.0 * np.log(2.0))
 """Full width at half height of a Gaussian over its rms width."""
 _STEPS = 60
+_NEAR_PEAK = 1e-6
+"""Step of the fixed point that is its last, in rms lengths of the pulse."""
 _MOST_MERGED = 8
 """Echoes that one return is made of, at most."""
 
@@ -71,12 +73,16 @@ def _merged(echoes: Echoes, first: Index, length: float) -> Echoes:
     near, far = echoes.select(first), echoes.select(first + 1)
     shift, power = peak_of(near.intensity, far.intensity, far.range - near.range, length)
     stronger = far.intensity > near.intensity
-    hit = np.where(stronger, far.hit, near.hit)
-    merged = Echoes(near.pulse, hit, near.range + shift, power, near.weight + far.weight)
     others = np.ones(len(echoes.pulse), dtype=bool)
-    others[first] = others[first + 1] = False
-    joined = Echoes.join([echoes.select(others), merged])
-    return joined.select(np.argsort(np.concatenate([np.flatnonzero(others), first])))
+    others[first + 1] = False
+    result = echoes.select(others)
+    # Where what was behind them is gone, each lies farther ahead by the number of pairs before it.
+    place = first - np.arange(len(first))
+    result.hit[place] = np.where(stronger, far.hit, near.hit)
+    result.range[place] = near.range + shift
+    result.intensity[place] = power
+    result.weight[place] = near.weight + far.weight
+    return result
 
 
 def peak_of(near: Float, far: Float, separation: Float, length: float) -> tuple[Float, Float]:
@@ -88,8 +94,19 @@ def peak_of(near: Float, far: Float, separation: Float, length: float) -> tuple[
         length: rms length of a pulse, m.
     """
     scale = 0.5 / length**2
-    place = np.where(far > near, separation, 0.0)
+
+    def weights(place: Float, pair: Index | slice) -> tuple[Float, Float]:
+        behind = place - separation[pair]
+        return near[pair] * np.exp(-scale * place**2), far[pair] * np.exp(-scale * behind**2)
+
+    place, climbing = np.where(far > near, separation, 0.0), np.arange(len(near))
     for _ in range(_STEPS):
-        one, other = near * np.exp(-scale * place**2), far * np.exp(-scale * (place - separation) ** 2)
-        place = separation * other / np.maximum(one + other, 1e-300)
-    return place, near * np.exp(-scale * place**2) + far * np.exp(-scale * (place - separation) ** 2)
+        if not len(climbing):
+            break
+        before = place[climbing]
+        one, other = weights(before, climbing)
+        after = separation[climbing] * other / np.maximum(one + other, 1e-300)
+        place[climbing] = after
+        climbing = climbing[np.abs(after - before) > _NEAR_PEAK * length]
+    one, other = weights(place, slice(None))
+    return place, one + other

@@ -12,6 +12,7 @@ to the metre without attenuation, and diameters beyond D(r) are exponential.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -81,17 +82,27 @@ def particle_echoes(spectrum: ParticleSpectrum, hits: PulseHits, random: np.rand
     """
     setting = hits.setting
     faintest = PROVISIONAL_THRESHOLD * setting.threshold
-    begin, end = max(setting.minimum_range, _NEAREST), setting.maximum_range
-    grid = np.geomspace(begin, end, _STEPS)
-    density = echoes_per_metre(spectrum, setting, grid, faintest)
-    number = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(grid))])
-    before = np.interp(np.minimum(hits.distance.min(axis=0), end), grid, number)
-    pulse = np.repeat(np.arange(len(before)), random.poisson(before))
-    distance = np.interp(random.random(len(pulse)) * before[pulse], number, grid)
+    grid, number = _echoes_before(spectrum, setting, faintest)
+    free = hits.distance.min(axis=0)
+    # A Poisson process of all pulses as far as the freest one goes, thinned to those that lie before what is met: its
+    # cost grows with the echoes, not with the pulses.
+    most = np.interp(free.max(initial=0.0), grid, number)
+    count = random.poisson(most * len(free))
+    pulse, distance = random.integers(max(len(free), 1), size=count), np.interp(most * random.random(count), number, grid)
     diameter = smallest_seen(spectrum, setting, distance, faintest)
-    diameter += random.exponential(1.0 / spectrum.slope, len(pulse))
+    diameter += random.exponential(1.0 / spectrum.slope, count)
     taken = np.minimum(diameter / np.maximum(_beam_width(setting, distance), 1e-9), 1.0) ** 2
-    return EchoChanges(pulse, np.zeros(len(pulse), dtype=np.intp), distance, spectrum.reflectance * taken)
+    kept = np.flatnonzero(distance < free[pulse])
+    none = np.zeros(len(kept), dtype=np.intp)
+    return EchoChanges(pulse[kept], none, distance[kept], spectrum.reflectance * taken[kept])
+
+
+@lru_cache(maxsize=8)
+def _echoes_before(spectrum: ParticleSpectrum, setting: ScannerSetting, faintest: float) -> tuple[Float, Float]:
+    """Return ranges (N,), m, and how many echoes a pulse has before each of them that are at least as intense."""
+    grid = np.geomspace(max(setting.minimum_range, _NEAREST), setting.maximum_range, _STEPS)
+    density = echoes_per_metre(spectrum, setting, grid, faintest)
+    return grid, np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]) * np.diff(grid))])
 
 
 def _beam_width(setting: ScannerSetting, distance: Float) -> Float:

@@ -12,6 +12,7 @@ the meteorological optical range MOR = ln 20 / a. The peak lies near the scanner
 """
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -47,6 +48,7 @@ def soft_power(setting: ScannerSetting, extinction: float, distance: Float) -> F
     return np.asarray(np.pi * backscatter(extinction) * (back * shape).sum(axis=1) * 2.0 * width / _PULSE_STEPS)
 
 
+@lru_cache(maxsize=8)
 def soft_peak(setting: ScannerSetting, extinction: float) -> tuple[float, float]:
     """Return the range (m) at which the light of a fog peaks, and its power there."""
     grid = np.geomspace(max(setting.minimum_range, 1e-2), max(_FARTHEST, 2.0 * setting.minimum_range), _STEPS)
