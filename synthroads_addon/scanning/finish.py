@@ -15,7 +15,7 @@ from .plan import ScanPlan
 from .receiving.detector import Readout
 from .receiving.radiometry import DARKEST_DB, decibels
 from .receiving.response import range_corrected
-from .relief.micro_relief import shift_along_normals
+from .relief.micro_relief import shift_by_relief
 from .returns import number_returns
 from .scan import BlockResult
 
@@ -45,9 +45,11 @@ class Finish:
         points = result.points
         if result.seen is not None and plan.relief is not None:
             pavement, seen = plan.pavement, result.seen.position
-            points = shift_along_normals(
+            # What moves is smooth: for all that has a relief the beam is the one that the scene at time 0 was seen by.
+            points = shift_by_relief(
                 points,
                 seen + plan.frame_origin,
+                result.seen.towards_scanner,
                 plan.relief,
                 plan.relief_strength,
                 plan.seed,

@@ -107,14 +107,24 @@ def _process_block(seed: int, strip: int, number: int) -> Float:
     return _autoregression(innovations)[-BLOCK - 1 :]
 
 
-def speckle_factors(random: np.random.Generator, sigma: float, shape: tuple[int, ...]) -> Float32:
-    """Draw speckle factors on intensities: gamma distributed with mean 1 and standard deviation sigma.
+def standard_normal(random: np.random.Generator, count: int) -> Float32:
+    """Draw numbers (N,) of the standard normal distribution."""
+    return random.standard_normal(count, dtype=np.float32)
+
+
+def shares(random: np.random.Generator, count: int) -> Float32:
+    """Draw shares (N,), evenly from 0 to 1."""
+    return random.random(count, dtype=np.float32)
+
+
+def speckle_factors(random: np.random.Generator, count: int, sigma: float) -> Float32:
+    """Draw speckle factors (N,) on intensities: gamma distributed with mean 1 and standard deviation sigma.
 
     The light of a rough surface within one pulse is the sum of m = 1 / sigma^2 independent speckles (Goodman 2007,
     Speckle Phenomena in Optics, chapter 4).
     """
     looks = 1.0 / (sigma * sigma)
-    return np.asarray(random.standard_gamma(looks, shape, dtype=np.float32) / np.float32(looks))
+    return np.asarray(random.standard_gamma(looks, count, dtype=np.float32) / np.float32(looks))
 
 
 def measured_pose(position: Float, rotation: Float, errors: tuple[Float, Float]) -> tuple[Float, Float]:

@@ -10,7 +10,7 @@ import numpy as np
 from ..base.arrays import Bool, Float, Float32, Index, UInt8
 from .devices.device import ScannerSetting
 from .knots import Track
-from .receiver import values_of_echoes
+from .receiver import EchoValues, values_of_echoes
 from .scene.target import Target
 
 
@@ -19,8 +19,8 @@ class Errors:
     """Random errors of a block's P pulses in range, angle and intensity, and which returns are lost, whatever is met.
 
     Attributes:
-        range: (2, P) or more, in units of one sigma; None without. Of this and of all others but `angle` echoes have
-            what `receiver.values_of_echoes` says.
+        range: in units of one sigma; None without. Of this and of all others but `angle` echoes have what
+            `receiver.values_of_echoes` says.
         angle: (2, P) rad; None without.
         lost: as `range`: shares, 0 to 1, that say who is lost; None without.
         speckle: as `range`: factors on the intensities, 1 on average; None without.
@@ -29,13 +29,13 @@ class Errors:
         number: as `range`: shares, 0 to 1, that say whose number is lost; None without.
     """
 
-    range: Float32 | None
+    range: EchoValues | None
     angle: Float32 | None
-    lost: Float32 | None
-    speckle: Float32 | None = None
-    receiver: Float32 | None = None
-    tails: Float32 | None = None
-    number: Float32 | None = None
+    lost: EchoValues | None
+    speckle: EchoValues | None = None
+    receiver: EchoValues | None = None
+    tails: EchoValues | None = None
+    number: EchoValues | None = None
 
     def range_errors(self, pulse: Index, number: UInt8) -> Float:
         """Return (N,) range errors of returns, in units of one sigma.
@@ -111,6 +111,23 @@ def turn_vectors(rotation: Float, vectors: Float) -> Float:
         np.multiply(rotation[3 * i], vectors[0], out=result[i])
         for j in (1, 2):
             result[i] += np.multiply(rotation[3 * i + j], vectors[j], out=product)
+    return result
+
+
+def tilt_vectors(vectors: Float, first: Float, second: Float, angle: Float32) -> Float:
+    """Return unit vectors (3, N) tilted towards two axes (3, N) at right angles to them and each other.
+
+    Args:
+        angle: (2, N) tangents of the tilts.
+    """
+    scale = 1.0 / np.sqrt(1.0 + angle[0].astype(np.float64) ** 2 + angle[1].astype(np.float64) ** 2)
+    result = np.empty_like(vectors)
+    product = np.empty(vectors.shape[1])
+    for i in range(3):
+        np.multiply(angle[0], first[i], out=result[i])
+        result[i] += np.multiply(angle[1], second[i], out=product)
+        result[i] += vectors[i]
+        result[i] *= scale
     return result
 
 

@@ -15,6 +15,7 @@ one half at the threshold, the more abrupt the larger the threshold-to-noise rat
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Literal, Self
 
 import numpy as np
@@ -175,22 +176,37 @@ class Receiver(ClosedModel):
         return threshold / self.threshold_to_noise if self.threshold_to_noise else 0.0
 
 
-def values_of_echoes(values: Float32, pulse: Index, number: Index | UInt8) -> Float:
-    """Return the random numbers of echoes (N,), out of two rows for a block's pulses.
+EchoValues = tuple[Float32, Float32]
+"""Random numbers of a block's echoes: of the first of each pulse (P,), and of all later ones (L,)."""
 
-    First echoes have a number each. Later ones, which are few, take theirs from the second row, the third and fourth of
-    a pulse a good part of the block away from the second.
+
+def draw_values(draw: Callable[[int], Float32], pulses: int) -> EchoValues:
+    """Return random numbers of a block's echoes.
 
     Args:
-        values: (2, P), P being at least the number of pulses, and `MOST_ECHOES`.
+        draw: returns so many numbers.
+        pulses: of the block.
+    """
+    values = draw(pulses + max(MOST_ECHOES, pulses))
+    return values[:pulses], values[pulses:]
+
+
+def values_of_echoes(values: EchoValues, pulse: Index, number: Index | UInt8) -> Float:
+    """Return the random numbers of echoes (N,) out of a block's.
+
+    First echoes have a number each. Later ones take theirs by their pulse, the third and fourth of a pulse a good part
+    of the block away from the second: no two of one pulse share one, nor do neighbours.
+
+    Args:
+        values: the block's.
         pulse: (N,) within the block.
         number: (N,) of each echo in its pulse, from 1.
     """
-    count = values.shape[1]
-    result = np.take(values[0], pulse).astype(np.float64)
+    first, others = values
+    result = np.take(first, pulse).astype(np.float64)
     later = np.flatnonzero(number > 1)
-    place = pulse[later] + (number[later].astype(np.intp) - 2) * max(1, count // MOST_ECHOES)
-    result[later] = values[1][place % count]
+    place = pulse[later] + (number[later].astype(np.intp) - 2) * (len(others) // MOST_ECHOES)
+    result[later] = others[place % len(others)]
     return result
 
 

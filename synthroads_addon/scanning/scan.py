@@ -1,6 +1,9 @@
 """One block of pulses, from the path to the points. Pure arrays: the casters are all that knows the scene."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -14,12 +17,12 @@ from .devices.shots import shots
 from .effects import apply_effect
 from .knots import Track
 from .multipath import Multipath
-from .noise import measured_pose, speckle_factors, trajectory_errors
+from .noise import measured_pose, shares, speckle_factors, standard_normal, trajectory_errors
 from .plan import ScanPlan
 from .platforms.path import Strip
 from .point_layers import MeasuredPoints, fill_layers, place_points
-from .pulses import Errors, Poses, Pulses, may_hit_scene, turn_vectors
-from .receiver import MOST_ECHOES
+from .pulses import Errors, Poses, Pulses, may_hit_scene, tilt_vectors, turn_vectors
+from .receiver import draw_values
 from .receiving.detector import Readout, detect_echoes
 from .receiving.radiometry import received_intensity
 from .receiving.range_noise import range_sigma, range_walk, tail_factors
@@ -214,25 +217,23 @@ class BlockScan:
         def source(purpose: str) -> np.random.Generator:
             return stream(plan.seed, purpose, strip.index, key)
 
-        shape, receiver, noise = (2, max(count, MOST_ECHOES)), plan.setting.receiver, plan.noise
-        angle, ranges = np.float32(noise.angle_sigma_mrad * 1e-3), plan.setting.range_sigma
+        receiver, noise, ranges = plan.setting.receiver, plan.noise, plan.setting.range_sigma
 
-        def normal(purpose: str) -> Float32:
-            return source(purpose).standard_normal(shape, dtype=np.float32)
+        def values(purpose: str, wanted: object, draw: Callable[[np.random.Generator, int], Float32]) -> Any:
+            return draw_values(partial(draw, source(purpose)), count) if wanted else None
 
-        def share(purpose: str) -> Float32:
-            return source(purpose).random(shape, dtype=np.float32)
+        def angles() -> Float32:
+            sigma = np.float32(noise.angle_sigma_mrad * 1e-3)
+            return np.asarray(sigma * source("angle noise").standard_normal((2, count), dtype=np.float32))
 
         return Errors(
-            normal("range noise") if ranges else None,
-            angle * normal("angle noise")[:, :count] if angle else None,
-            share("dropouts") if noise.dropout else None,
-            speckle_factors(source("speckle"), noise.speckle, shape) if noise.speckle else None,
-            normal("receiver noise") if receiver.noise_sigma(plan.setting.threshold) else None,
-            tail_factors(source("range tails"), receiver.range_tails, shape)
-            if ranges and receiver.range_tails
-            else None,
-            share("lost numbers") if receiver.lost_numbers else None,
+            values("range noise", ranges, standard_normal),
+            angles() if noise.angle_sigma_mrad else None,
+            values("dropouts", noise.dropout, shares),
+            values("speckle", noise.speckle, partial(speckle_factors, sigma=noise.speckle)),
+            values("receiver noise", receiver.noise_sigma(plan.setting.threshold), standard_normal),
+            values("range tails", ranges and receiver.range_tails, partial(tail_factors, freedom=receiver.range_tails)),
+            values("lost numbers", receiver.lost_numbers, shares),
         )
 
     def poses_between(self, strip: Strip, begin: float, end: float) -> Poses:
@@ -290,8 +291,7 @@ class BlockScan:
             if angle is not None:
                 assert frame[0] is not None
                 assert frame[1] is not None
-                believed = believed + angle[0] * frame[0] + angle[1] * frame[1]
-                believed /= np.sqrt(np.einsum("ij,ij->j", believed, believed))
+                believed = tilt_vectors(believed, frame[0], frame[1], angle)
             rotation, measured_origin, _ = poses.measured.at(time)
             measured_direction = turn_vectors(rotation, believed)
         assert shot.beam is not None

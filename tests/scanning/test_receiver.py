@@ -10,7 +10,7 @@ from synthroads_addon.cloud.points import PointBlock, concatenate
 from synthroads_addon.scanning.devices.device import Device
 from synthroads_addon.scanning.noise import Noise
 from synthroads_addon.scanning.plan import ScanPlan
-from synthroads_addon.scanning.receiver import Receiver, number_echoes, values_of_echoes
+from synthroads_addon.scanning.receiver import Receiver, draw_values, number_echoes, values_of_echoes
 from synthroads_addon.scanning.receiving.detector import detect_echoes
 from synthroads_addon.scanning.returns import Echoes
 from synthroads_addon.scanning.scan import BlockScan
@@ -79,7 +79,7 @@ def test_a_hard_threshold_stays_and_noise_moves_no_point() -> None:
 
 
 def test_each_echo_of_a_pulse_has_a_number_of_its_own() -> None:
-    values = np.random.default_rng(1).standard_normal((2, 500), dtype=np.float32)
+    values = draw_values(lambda count: np.random.default_rng(1).standard_normal(count, dtype=np.float32), 500)
     pulse = np.repeat(np.arange(500), 6)
     number = number_echoes(pulse)
     np.testing.assert_array_equal(number.reshape(500, 6), np.tile(np.arange(1, 7), (500, 1)))

@@ -34,7 +34,7 @@ from ...scanning.colour.colour import (
 from ...scanning.colour.difference import colour_difference, known_rows, squared_error
 from ...scanning.colour.request import LayerRequest
 from ...scanning.plan import ScanPlan
-from ...scanning.relief.micro_relief import shift_along_normals
+from ...scanning.relief.micro_relief import shift_by_relief
 from ...scanning.scan import BlockResult
 
 Errors = dict[str, tuple[float, float]]
@@ -72,10 +72,11 @@ def beam_errors(mine: Sequence[PointBlock], truth: Sequence[PointBlock]) -> Erro
 
 
 def shift_points(results: Sequence[BlockResult], plan: ScanPlan, octaves: int) -> list[Float]:
-    """Return the points (N, 3) of each part, moved along their normals by a plan's micro-relief, m."""
+    """Return the points (N, 3) of each part, moved along their beams by a plan's micro-relief, m."""
     assert plan.relief is not None
-    shift = partial(shift_along_normals, relief=plan.relief, strength=plan.relief_strength, seed=plan.seed)
-    return [shift(one.points, one.seen.position, octaves=octaves).xyz for one in results if one.seen is not None]
+    shift = partial(shift_by_relief, relief=plan.relief, strength=plan.relief_strength, seed=plan.seed)
+    seen = ((one.points, one.seen) for one in results if one.seen is not None)
+    return [shift(points, at.position, at.towards_scanner, octaves=octaves).xyz for points, at in seen]
 
 
 def relief_errors(mine: Sequence[Float], truth: Sequence[Float]) -> Errors:

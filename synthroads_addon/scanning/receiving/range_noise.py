@@ -75,7 +75,7 @@ def range_walk(setting: ScannerSetting, speckle: Float, sigma: float) -> Float:
     return np.asarray((setting.receiver.range_walk or 0.0) * _DECIBELS * (mean - np.log(np.maximum(speckle, 1e-12))))
 
 
-def tail_factors(random: np.random.Generator, freedom: float, shape: tuple[int, ...]) -> Float32:
-    """Return the factors that make normal errors Student's t of the same standard deviation, float32."""
-    squares = np.float32(2.0) * random.standard_gamma(freedom / 2.0, shape, dtype=np.float32)
+def tail_factors(random: np.random.Generator, count: int, freedom: float) -> Float32:
+    """Return factors (N,) that make normal errors Student's t of the same standard deviation, float32."""
+    squares = np.float32(2.0) * random.standard_gamma(freedom / 2.0, count, dtype=np.float32)
     return np.asarray(np.sqrt(np.float32(freedom - 2.0) / squares), dtype=np.float32)

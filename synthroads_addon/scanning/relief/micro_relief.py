@@ -1,4 +1,4 @@
-"""Roughness adjustment: points are shifted along the surface's normal by the material's micro-relief.
+"""Roughness adjustment: points are shifted along their beams to where these meet the material's micro-relief.
 
 The scene's surfaces are smooth; real ones have texture. Its heights are a random field in space (`base.noise`), one for
 each wavelength: the same place has the same height in every strip, and pulses near each other have similar ones. A
@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...base.arrays import Float, Index
+from ...base.arrays import AnyArray, Float, Index
 from ...base.errors import InputError
 from ...base.noise import noise_field
 from ...cloud.points import PointBlock
@@ -24,6 +24,8 @@ OCTAVES = {"draft": 2, "standard": 4, "high": 6}
 
 _LEAST_COSINE = 0.02
 """Of the incidence angle, below which footprints don't grow on."""
+_NEXT_PEAK = 0.5
+"""Share of the relief's wavelength, along the surface, within which a beam that grazes it meets some peak."""
 
 
 class Relief(NamedTuple):
@@ -113,9 +115,10 @@ def relief_of_roughness(row: Material) -> Relief:
     return ASPHALT._replace(amplitude=ASPHALT.amplitude * excess**2)
 
 
-def shift_along_normals(
+def shift_by_relief(
     points: PointBlock,
     position: Float,
+    towards: AnyArray,
     relief: MicroRelief,
     strength: float,
     seed: int,
@@ -123,22 +126,25 @@ def shift_along_normals(
     raised: Float | None = None,
     divergence: float = 0.0,
 ) -> PointBlock:
-    """Return the points with `xyz` shifted along the normal, and `range` to match; all else is kept.
+    """Return the points with `xyz` shifted along their beams, and `range` to match; all else is kept.
 
-    The range becomes the distance to the shifted point: less by the height times the cosine of the incidence angle.
-    `true_xyz` and `true_range` are without the relief; intensity, normal and incidence angle stay.
-    With strength 0, or if nothing has relief, the very same block is returned.
+    A scanner's points lie on its beams: a beam meets a surface that is higher by h nearer by h over the cosine of the
+    incidence angle, and one that grazes it meets some peak within half a wavelength along it. `true_xyz` and `true_range`
+    are without the relief; intensity, normal and incidence angle stay. With strength 0, or if nothing has relief, the
+    very same block is returned.
 
     Args:
         points: needs `normal` and `material`.
         position: (N, 3) local coordinates of the points without noise, m. The measured ones will do, but then the
             heights of neighbours are less alike than they should be, by as much as noise moves the points.
+        towards: (N, 3) unit vectors from the points to the scanner.
         relief: of the scene's materials.
         strength: factor on every amplitude, 0 to `MAX_STRENGTH`.
         seed: the scene's.
         octaves: see `OCTAVES`.
-        raised: (N,) heights of the surface that are added whatever the strength, m; `true_xyz` and `true_range` have
-            these as well.
+        raised: (N,) heights of the surface by which points move along its normal, whatever the strength, m; the range
+            is then the distance to there, less by the height times the cosine of the incidence angle. `true_xyz` and
+            `true_range` have these as well.
         divergence: full angle of the beam at 1/e^2, rad, over whose footprint the relief is averaged; 0: points.
 
     Raises:
@@ -155,24 +161,30 @@ def shift_along_normals(
     rough = np.flatnonzero(np.take(np.append(relief.amplitude, 0.0), points.material, mode="clip"))
     material = points.material[rough]
     if raised is not None:
-        points = _shift(points, np.flatnonzero(raised), raised, ("true_xyz", "true_range"))
-    if len(rough) == 0 and raised is None:
+        for arrays in (("xyz", "range"), ("true_xyz", "true_range")):
+            points = _shift_along_normals(points, np.flatnonzero(raised), raised, arrays)
+    if not len(rough):
         return points
-    height = np.zeros(len(points)) if raised is None else raised.copy()
-    footprint = _footprint(points, rough, divergence) if divergence else None
-    texture = noise_field(position[rough], relief.wavelength[material], seed, octaves, footprint)
-    height[rough] += strength * relief.amplitude[material] * texture
-    return _shift(points, np.flatnonzero(height), height)
+    cosine = np.cos(np.radians(points.incidence_deg[rough].astype(np.float64)))
+    footprint = _footprint(points.range[rough], cosine, divergence) if divergence else None
+    wavelength = relief.wavelength[material]
+    height = noise_field(position[rough], wavelength, seed, octaves, footprint)
+    height *= strength * relief.amplitude[material]
+    sine = np.sqrt(1.0 - cosine**2)
+    nearer = height / np.maximum(cosine, np.abs(height) * sine / (_NEXT_PEAK * wavelength))
+    place, distance = points.xyz.copy(), points.range.copy()
+    place[rough] += nearer[:, None] * towards[rough]
+    distance[rough] -= nearer
+    return points.with_arrays({"xyz": place, "range": distance})
 
 
-def _footprint(points: PointBlock, rows: Index, divergence: float) -> tuple[Float, Float]:
-    """Return the standard deviations (K,) of some points' footprints on the surface along and across the slant, m."""
-    across = points.range[rows] * (divergence / 4.0)
-    cosine = np.cos(np.radians(points.incidence_deg[rows].astype(np.float64)))
+def _footprint(distance: Float, cosine: Float, divergence: float) -> tuple[Float, Float]:
+    """Return the standard deviations (K,) of footprints on the surface along and across the slant, m."""
+    across = distance * (divergence / 4.0)
     return across / np.maximum(cosine, _LEAST_COSINE), across
 
 
-def _shift(points: PointBlock, rows: Index, height: Float, arrays: tuple[str, str] = ("xyz", "range")) -> PointBlock:
+def _shift_along_normals(points: PointBlock, rows: Index, height: Float, arrays: tuple[str, str]) -> PointBlock:
     """Return the points of which some rows (K,) have arrays of places and ranges shifted by heights (N,), m."""
     place, distance = (points.array(name) for name in arrays)
     if place is None or distance is None or not len(rows):
