@@ -86,7 +86,7 @@ def test_intensities_from_layers_are_the_materials_where_these_are_constant(tmp_
 
 
 @pytest.mark.any_blender
-def test_relief_moves_points_along_the_normal_and_none_is_none(tmp_path: Path) -> None:
+def test_relief_moves_points_to_its_height_and_none_is_none(tmp_path: Path) -> None:
     plain = made(tmp_path / "a", "colour.rgb=false", "scan.relief=0")[1]
     rough = made(tmp_path / "b", "colour.rgb=false", "scan.relief=3")[1]
     height = np.asarray(rough.z) - np.asarray(plain.z)
