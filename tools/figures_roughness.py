@@ -22,7 +22,7 @@ sys.path.insert(0, str(ROOT))
 from synthroads_addon.base.noise import noise_field  # noqa: E402
 from synthroads_addon.base.random_streams import stream  # noqa: E402
 from synthroads_addon.cloud.points import PointBlock  # noqa: E402
-from synthroads_addon.scanning.relief.micro_relief import OCTAVES, RELIEF, MicroRelief, shift_by_relief  # noqa: E402
+from synthroads_addon.scanning.relief.micro_relief import OCTAVES, RELIEF, BeamEnds, MicroRelief, shift_by_relief  # noqa: E402
 from tools.surface_variation import plane_residuals, surface_variation  # noqa: E402
 
 Float = NDArray[np.float64]
@@ -272,7 +272,7 @@ def print_timing(count: int = 1_000_000) -> None:
         for _ in range(3):
             begin = time.process_time()
             for block in blocks:
-                shift_by_relief(block, block.xyz, towards, relief, 1.0, SEED, octaves)
+                shift_by_relief(block, BeamEnds(block.xyz, towards), relief, 1.0, SEED, octaves)
             best = min(best, (time.process_time() - begin) * 1e6 / (size * len(blocks)))
         print(f"{fidelity}: {octaves} octaves, {best:.3f} s of one core per million points, all on rough surfaces")
 

@@ -15,7 +15,7 @@ from .plan import ScanPlan
 from .receiving.detector import Readout
 from .receiving.radiometry import DARKEST_DB, decibels
 from .receiving.response import range_corrected
-from .relief.micro_relief import shift_by_relief
+from .relief.micro_relief import BeamEnds, shift_by_relief
 from .returns import number_returns
 from .scan import BlockResult
 
@@ -48,14 +48,12 @@ class Finish:
             # What moves is smooth: for all that has a relief the beam is the one that the scene at time 0 was seen by.
             points = shift_by_relief(
                 points,
-                seen + plan.frame_origin,
-                result.seen.towards_scanner,
+                BeamEnds(seen + plan.frame_origin, result.seen.towards_scanner, plan.setting.beam_angle),
                 plan.relief,
                 plan.relief_strength,
                 plan.seed,
                 plan.relief_octaves,
                 None if pavement is None else pavement.heights(points.instance_id, seen + plan.target.origin),
-                plan.setting.beam_angle,
             )
         changes: dict[str, AnyArray | None] = dict.fromkeys(points.attributes().keys() & OPTIONAL - plan.kept_layers)
         if plan.range_corrected:

@@ -42,9 +42,7 @@ class Track:
     present: Bool
 
     @classmethod
-    def between(
-        cls, pose: Callable[[Float], Any], begin: float, end: float, spacing: float, every: int = 1
-    ) -> Self:
+    def between(cls, pose: Callable[[Float], Any], begin: float, end: float, spacing: float, every: int = 1) -> Self:
         """Sample ``pose(time (K,)) -> (rotation (K, 3, 3), position (K, 3), present (K,))`` at knots, begin to end, s.
 
         Knots are whole multiples of the spacing, so that no result depends on where a block begins.
@@ -163,10 +161,10 @@ def _interpolate(values: Float, index: Index, share: Float) -> Float:
     """Return values (C, N), interpolated linearly at shares (N,) of the way from knot ``index`` to the next."""
     result, begin = np.empty((len(values), len(index))), np.empty(len(index))
     # Row by row, which is thrice as fast as all at once.
-    for row, step, interpolated in zip(values, np.diff(values, axis=1), result, strict=True):
-        np.take(step, index, out=interpolated, mode="clip")
-        interpolated *= share
-        interpolated += np.take(row, index, out=begin, mode="clip")
+    for number, (row, step) in enumerate(zip(values, np.diff(values, axis=1), strict=True)):
+        np.take(step, index, out=result[number], mode="clip")
+        result[number] *= share
+        result[number] += np.take(row, index, out=begin, mode="clip")
     return result
 
 

@@ -1,4 +1,4 @@
-"""A scan with every effect of the sensor at once: each of them acts, and neither workers nor their order change a byte."""
+"""A scan with every effect of the sensor at once: each acts, and neither workers nor their order change a byte."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ from ...scanning.colour.colour import (
 from ...scanning.colour.difference import colour_difference, known_rows, squared_error
 from ...scanning.colour.request import LayerRequest
 from ...scanning.plan import ScanPlan
-from ...scanning.relief.micro_relief import shift_by_relief
+from ...scanning.relief.micro_relief import BeamEnds, shift_by_relief
 from ...scanning.scan import BlockResult
 
 Errors = dict[str, tuple[float, float]]
@@ -81,7 +81,7 @@ def shift_points(results: Sequence[BlockResult], plan: ScanPlan, octaves: int) -
         for one in results
         if one.seen is not None
     )
-    return [shift(points, at.position, at.normal, octaves=octaves).xyz for points, at in seen]
+    return [shift(points, BeamEnds(at.position, at.normal), octaves=octaves).xyz for points, at in seen]
 
 
 def relief_errors(mine: Sequence[Float], truth: Sequence[Float]) -> Errors:

@@ -115,29 +115,40 @@ def relief_of_roughness(row: Material) -> Relief:
     return ASPHALT._replace(amplitude=ASPHALT.amplitude * excess**2)
 
 
+class BeamEnds(NamedTuple):
+    """Places where the beams of N points meet the surface.
+
+    Attributes:
+        position: (N, 3) local coordinates of the points without noise, m. The measured ones will do, but then the
+            heights of neighbours are less alike than they should be, by as much as noise moves the points.
+        towards: (N, 3) unit vectors to the scanner.
+        divergence: full angle of the beam at 1/e^2, rad, over whose footprint the relief is averaged; 0: points.
+    """
+
+    position: Float
+    towards: AnyArray
+    divergence: float = 0.0
+
+
 def shift_by_relief(
     points: PointBlock,
-    position: Float,
-    towards: AnyArray,
+    ends: BeamEnds,
     relief: MicroRelief,
     strength: float,
     seed: int,
     octaves: int = 4,
     raised: Float | None = None,
-    divergence: float = 0.0,
 ) -> PointBlock:
     """Return the points with `xyz` shifted along their beams, and `range` to match; all else is kept.
 
     A scanner's points lie on its beams: a beam meets a surface that is higher by h nearer by h over the cosine of the
-    incidence angle, and one that grazes it meets some peak within half a wavelength along it. `true_xyz` and `true_range`
-    are without the relief; intensity, normal and incidence angle stay. With strength 0, or if nothing has relief, the
-    very same block is returned.
+    incidence angle, and one that grazes it meets some peak within half a wavelength along it. `true_xyz` and
+    `true_range` are without the relief; intensity, normal and incidence angle stay. With strength 0, or if nothing has
+    relief, the very same block is returned.
 
     Args:
         points: needs `normal` and `material`.
-        position: (N, 3) local coordinates of the points without noise, m. The measured ones will do, but then the
-            heights of neighbours are less alike than they should be, by as much as noise moves the points.
-        towards: (N, 3) unit vectors from the points to the scanner.
+        ends: where their beams end.
         relief: of the scene's materials.
         strength: factor on every amplitude, 0 to `MAX_STRENGTH`.
         seed: the scene's.
@@ -145,7 +156,6 @@ def shift_by_relief(
         raised: (N,) heights of the surface by which points move along its normal, whatever the strength, m; the range
             is then the distance to there, less by the height times the cosine of the incidence angle. `true_xyz` and
             `true_range` have these as well.
-        divergence: full angle of the beam at 1/e^2, rad, over whose footprint the relief is averaged; 0: points.
 
     Raises:
         InputError: strength out of range.
@@ -166,14 +176,14 @@ def shift_by_relief(
     if not len(rough):
         return points
     cosine = np.cos(np.radians(points.incidence_deg[rough].astype(np.float64)))
-    footprint = _footprint(points.range[rough], cosine, divergence) if divergence else None
+    footprint = _footprint(points.range[rough], cosine, ends.divergence) if ends.divergence else None
     wavelength = relief.wavelength[material]
-    height = noise_field(position[rough], wavelength, seed, octaves, footprint)
+    height = noise_field(ends.position[rough], wavelength, seed, octaves, footprint)
     height *= strength * relief.amplitude[material]
     sine = np.sqrt(1.0 - cosine**2)
     nearer = height / np.maximum(cosine, np.abs(height) * sine / (_NEXT_PEAK * wavelength))
     place, distance = points.xyz.copy(), points.range.copy()
-    place[rough] += nearer[:, None] * towards[rough]
+    place[rough] += nearer[:, None] * ends.towards[rough]
     distance[rough] -= nearer
     return points.with_arrays({"xyz": place, "range": distance})
 

@@ -88,7 +88,8 @@ def particle_echoes(spectrum: ParticleSpectrum, hits: PulseHits, random: np.rand
     # cost grows with the echoes, not with the pulses.
     most = np.interp(free.max(initial=0.0), grid, number)
     count = random.poisson(most * len(free))
-    pulse, distance = random.integers(max(len(free), 1), size=count), np.interp(most * random.random(count), number, grid)
+    pulse = random.integers(max(len(free), 1), size=count)
+    distance = np.interp(most * random.random(count), number, grid)
     diameter = smallest_seen(spectrum, setting, distance, faintest)
     diameter += random.exponential(1.0 / spectrum.slope, count)
     taken = np.minimum(diameter / np.maximum(_beam_width(setting, distance), 1e-9), 1.0) ** 2

@@ -17,6 +17,7 @@ from synthroads_addon.scanning.relief.micro_relief import (
     ASPHALT,
     MAX_STRENGTH,
     RELIEF,
+    BeamEnds,
     MicroRelief,
     micro_relief,
     relief_of_roughness,
@@ -40,7 +41,7 @@ def patch(name: str, count: int, size: float, strength: float, noise: float = 0.
     position = np.column_stack([rng.uniform(0, size, (count, 2)), np.zeros(count)])
     points = scanned(position, np.zeros(count, np.uint16), np.array([0.0, 0.0, 1.0]), rng)
     points, above = replace(points, incidence_deg=np.zeros(count, np.float32)), np.tile([0.0, 0.0, 1.0], (count, 1))
-    result = shift_by_relief(points, position, above, relief_of(name), strength, 1, octaves).xyz - ORIGIN
+    result = shift_by_relief(points, BeamEnds(position, above), relief_of(name), strength, 1, octaves).xyz - ORIGIN
     result[:, 2] += rng.normal(0, noise, count)
     return result
 
@@ -83,19 +84,19 @@ def scene(count: int = 20_000, seed: int = 0) -> tuple[PointBlock, np.ndarray]:
 
 def test_strength_0_returns_the_very_same_points() -> None:
     points, position = scene()
-    assert shift_by_relief(points, position, beams(points), relief_of(*ROAD), 0.0, 1) is points
+    assert shift_by_relief(points, BeamEnds(position, beams(points)), relief_of(*ROAD), 0.0, 1) is points
 
 
 def test_smooth_materials_return_the_very_same_points() -> None:
     points, position = scene()
     smooth = replace(points, material=np.full(len(points), 4, np.uint16))
-    assert shift_by_relief(smooth, position, beams(smooth), relief_of(*ROAD), 1.0, 1) is smooth
-    assert shift_by_relief(points, position, beams(points), relief_of(*["car_paint"] * 5), 1.0, 1) is points
+    assert shift_by_relief(smooth, BeamEnds(position, beams(smooth)), relief_of(*ROAD), 1.0, 1) is smooth
+    assert shift_by_relief(points, BeamEnds(position, beams(points)), relief_of(*["car_paint"] * 5), 1.0, 1) is points
 
 
 def test_points_move_along_their_beams_to_the_height_and_nothing_else_changes() -> None:
     points, position = scene()
-    result = shift_by_relief(points, position, beams(points), relief_of(*ROAD), 2.0, 1)
+    result = shift_by_relief(points, BeamEnds(position, beams(points)), relief_of(*ROAD), 2.0, 1)
     shift, relief = result.xyz - points.xyz, relief_of(*ROAD)
     nearer = np.einsum("ij,ij->i", shift, beams(points))
     # Float64 has steps of 1e-9 at 5.6e6 m.
@@ -118,7 +119,7 @@ def test_points_move_along_their_beams_to_the_height_and_nothing_else_changes() 
 
 def test_range_is_the_distance_to_the_shifted_point() -> None:
     points, position = scene()
-    result = shift_by_relief(points, position, beams(points), relief_of(*ROAD), 5.0, 1)
+    result = shift_by_relief(points, BeamEnds(position, beams(points)), relief_of(*ROAD), 5.0, 1)
     assert np.abs(result.range - points.range).max() > 0.05
     assert result.range == pytest.approx(np.linalg.norm(result.xyz - points.scanner, axis=1), abs=1e-6)
     assert (result.range[points.material == 4] == points.range[points.material == 4]).all()
@@ -134,7 +135,7 @@ def test_one_laser_s_line_on_rough_ground_is_as_flat_as_on_smooth_ground() -> No
     distance = np.linalg.norm(beam, axis=1)
     incidence = np.degrees(np.arccos(1.73 / distance))
     points = replace(points, scanner=scanner + ORIGIN, range=distance, incidence_deg=incidence)
-    moved = shift_by_relief(points, position, beams(points), relief_of("asphalt"), 3.0, 1)
+    moved = shift_by_relief(points, BeamEnds(position, beams(points)), relief_of("asphalt"), 3.0, 1)
     slope = np.linalg.norm(moved.xyz[:, :2] - ORIGIN[:2], axis=1) / (1.73 - moved.xyz[:, 2] + ORIGIN[2])
     assert np.ptp(moved.xyz[:, 2]) > 2e-3
     assert slope == pytest.approx(10.0 / 1.73, abs=1e-6)
@@ -143,7 +144,7 @@ def test_one_laser_s_line_on_rough_ground_is_as_flat_as_on_smooth_ground() -> No
 def test_the_given_points_are_not_written_to() -> None:
     points, position = scene(2000)
     before = {name: array.copy() for name, array in points.attributes().items()}
-    shift_by_relief(points, position, beams(points), relief_of(*ROAD), 1.0, 1)
+    shift_by_relief(points, BeamEnds(position, beams(points)), relief_of(*ROAD), 1.0, 1)
     for name, array in points.attributes().items():
         np.testing.assert_array_equal(array, before[name])
 
@@ -152,10 +153,13 @@ def test_the_given_points_are_not_written_to() -> None:
 @given(cuts=st.lists(st.integers(0, 3000), max_size=4), seed=st.integers(0, 2**31), order=st.integers(0, 99))
 def test_blocks_and_order_do_not_matter(cuts: list[int], seed: int, order: int) -> None:
     points, position = scene(3000)
-    whole = shift_by_relief(points, position, beams(points), relief_of(*ROAD), 1.5, seed)
+    whole = shift_by_relief(points, BeamEnds(position, beams(points)), relief_of(*ROAD), 1.5, seed)
     shuffle = np.random.default_rng(order).permutation(3000)
     parts = [(rows, points.select(rows)) for rows in np.split(shuffle, sorted(cuts))]
-    blocks = [shift_by_relief(part, position[rows], beams(part), relief_of(*ROAD), 1.5, seed) for rows, part in parts]
+    blocks = [
+        shift_by_relief(part, BeamEnds(position[rows], beams(part)), relief_of(*ROAD), 1.5, seed)
+        for rows, part in parts
+    ]
     joined = concatenate(blocks)
     assert (joined.xyz == whole.xyz[shuffle]).all()
     assert (joined.range == whole.range[shuffle]).all()
@@ -167,7 +171,8 @@ def test_the_same_place_has_the_same_height_in_every_strip() -> None:
     there, back = (scanned(position, material, normal, np.random.default_rng(seed)) for seed in (1, 2))
     assert (there.range != back.range).all()
     heights = [
-        (shift_by_relief(points, position, beams(points), relief_of("asphalt"), 1.0, 3).xyz - points.xyz) @ normal
+        (shift_by_relief(points, BeamEnds(position, beams(points)), relief_of("asphalt"), 1.0, 3).xyz - points.xyz)
+        @ normal
         for points in (there, back)
     ]
     steep = np.minimum(*(np.cos(np.deg2rad(points.incidence_deg)) for points in (there, back))) > 0.1
@@ -272,20 +277,20 @@ def test_reaches_the_roughness_of_real_asphalt(file: Path) -> None:
 def test_strength_out_of_range(strength: float) -> None:
     points, position = scene(10)
     with pytest.raises(InputError, match="roughness strength"):
-        shift_by_relief(points, position, beams(points), relief_of(*ROAD), strength, 1)
+        shift_by_relief(points, BeamEnds(position, beams(points)), relief_of(*ROAD), strength, 1)
 
 
 @pytest.mark.parametrize("missing", ["normal", "material"])
 def test_normals_and_materials_are_needed(missing: str) -> None:
     points, position = scene(10)
     with pytest.raises(ValueError, match="normals and materials"):
-        shift_by_relief(replace(points, **{missing: None}), position, beams(points), relief_of(*ROAD), 1.0, 1)
+        shift_by_relief(replace(points, **{missing: None}), BeamEnds(position, beams(points)), relief_of(*ROAD), 1.0, 1)
 
 
 def test_no_points() -> None:
     points, position = scene(10)
     none = points.select(np.zeros(10, bool))
-    assert len(shift_by_relief(none, position[:0], beams(none), relief_of(*ROAD), 1.0, 1)) == 0
+    assert len(shift_by_relief(none, BeamEnds(position[:0], beams(none)), relief_of(*ROAD), 1.0, 1)) == 0
 
 
 def test_every_material_of_the_table_has_a_stated_relief() -> None:
@@ -317,7 +322,7 @@ def test_a_million_points_in_a_second() -> None:
     spent = []
     for _ in range(3):
         begin = time.process_time()
-        shift_by_relief(points, position, beams(points), relief_of("asphalt"), 1.0, 1)
+        shift_by_relief(points, BeamEnds(position, beams(points)), relief_of("asphalt"), 1.0, 1)
         spent.append(time.process_time() - begin)
     assert min(spent) < 0.1
 
@@ -330,7 +335,7 @@ def test_a_wide_beam_sees_a_flatter_relief() -> None:
     incidence = np.where(np.arange(20_000) % 2, 0.0, 80.0).astype(np.float32)
     points = replace(points, range=np.full(20_000, 10.0), incidence_deg=incidence)
     towards = np.stack([np.sin(np.deg2rad(incidence)), 0.0 * incidence, np.cos(np.deg2rad(incidence))], axis=1)
-    moved = shift_by_relief(points, position, towards, relief_of("asphalt"), 1.0, 1, 1, divergence=2e-3)
+    moved = shift_by_relief(points, BeamEnds(position, towards, 2e-3), relief_of("asphalt"), 1.0, 1, 1)
     height = moved.xyz[:, 2] - ORIGIN[2]
     for slant, angle in ((height[1::2], 0.0), (height[::2], 80.0)):
         across = 10.0 * 2e-3 / 4.0 / 0.05  # in cells of half the wavelength

@@ -13,7 +13,7 @@ from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.pavement.outlines import CRACK_FILM, PATCH_FILM
 from synthroads_addon.road.pavement.surface import PavementSurface
-from synthroads_addon.scanning.relief.micro_relief import MicroRelief, shift_by_relief
+from synthroads_addon.scanning.relief.micro_relief import BeamEnds, MicroRelief, shift_by_relief
 from synthroads_addon.scanning.relief.pavement import PavementRelief
 from tests.helpers.clouds.random_points import make_points
 from tests.helpers.effects.road_cases import base_road
@@ -81,8 +81,8 @@ def test_the_truth_has_the_pavement_s_height_and_not_the_relief(strength: float)
     )
     raised = np.where(np.arange(count) < 250, -0.004, 0.0)
     beam = np.tile([np.sqrt(0.75), 0.0, 0.5], (count, 1))
-    shifted = shift_by_relief(points, position, beam, FLAT, strength, 1, raised=raised)
-    bare = shift_by_relief(points, position, beam, FLAT, strength, 1)
+    shifted = shift_by_relief(points, BeamEnds(position, beam), FLAT, strength, 1, raised=raised)
+    bare = shift_by_relief(points, BeamEnds(position, beam), FLAT, strength, 1)
     assert shifted.true_xyz[:, 2] == pytest.approx(raised)
     assert shifted.true_range == pytest.approx(np.sqrt(30.0**2 - 30.0 * raised + raised**2))
     assert shifted.xyz[:, 2] == pytest.approx(bare.xyz[:, 2] + raised)
