@@ -112,6 +112,11 @@ def standard_normal(random: np.random.Generator, count: int) -> Float32:
     return random.standard_normal(count, dtype=np.float32)
 
 
+def standard_exponential(random: np.random.Generator, count: int) -> Float32:
+    """Draw numbers (N,) of the exponential distribution with the mean 1."""
+    return random.standard_exponential(count, dtype=np.float32)
+
+
 def shares(random: np.random.Generator, count: int) -> Float32:
     """Draw shares (N,), evenly from 0 to 1."""
     return random.random(count, dtype=np.float32)

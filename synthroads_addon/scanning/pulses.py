@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -27,6 +28,7 @@ class Errors:
         receiver: as `range`: noise of the receiver, in units of one sigma; None without.
         tails: as `range`: factors on these; None without.
         number: as `range`: shares, 0 to 1, that say whose number is lost; None without.
+        delay: as `range`: exponential with the mean 1; None without.
     """
 
     range: EchoValues | None
@@ -36,18 +38,23 @@ class Errors:
     receiver: EchoValues | None = None
     tails: EchoValues | None = None
     number: EchoValues | None = None
+    delay: EchoValues | None = None
 
-    def range_errors(self, pulse: Index, number: UInt8) -> Float:
+    def range_errors(self, pulse: Index, number: UInt8, delayed: float = 0.0) -> Float:
         """Return (N,) range errors of returns, in units of one sigma.
 
         Args:
             pulse: (N,) within the block.
             number: (N,) from 1.
+            delayed: share of sigma that comes of delays.
         """
         assert self.range is not None
         result = values_of_echoes(self.range, pulse, number)
         if self.tails is not None:
             result *= values_of_echoes(self.tails, pulse, number)
+        if self.delay is not None:
+            result *= math.sqrt(1.0 - delayed**2)
+            result += delayed * (values_of_echoes(self.delay, pulse, number) - 1.0)
         return result
 
 

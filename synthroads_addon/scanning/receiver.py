@@ -154,6 +154,15 @@ class Receiver(ClosedModel):
         inherits="device.range_tails",
         unset="Normal",
     )
+    range_delay: float | None = quantity(
+        None,
+        "1",
+        "Share of the range's standard deviation that comes of delays, which are exponential: the longer trailing edge "
+        "of real pulses. Points then lie rather too far than too near.",
+        (0, 0.95),
+        inherits="device.range_delay",
+        unset="None",
+    )
     echo_separation: EchoSeparation | None = Field(
         None,
         description="Echoes are parted by the range resolution alone, or where the sum of their pulses has two peaks.",

@@ -17,7 +17,7 @@ from .devices.shots import shots
 from .effects import apply_effect
 from .knots import Track
 from .multipath import Multipath
-from .noise import measured_pose, shares, speckle_factors, standard_normal, trajectory_errors
+from .noise import measured_pose, shares, speckle_factors, standard_exponential, standard_normal, trajectory_errors
 from .plan import ScanPlan
 from .platforms.path import Strip
 from .point_layers import MeasuredPoints, fill_layers, place_points
@@ -234,6 +234,7 @@ class BlockScan:
             values("receiver noise", receiver.noise_sigma(plan.setting.threshold), standard_normal),
             values("range tails", ranges and receiver.range_tails, partial(tail_factors, freedom=receiver.range_tails)),
             values("lost numbers", receiver.lost_numbers, shares),
+            values("range delays", ranges and receiver.range_delay, standard_exponential),
         )
 
     def poses_between(self, strip: Strip, begin: float, end: float) -> Poses:
@@ -388,7 +389,8 @@ class BlockScan:
         face, along = traced.pick("face", hit), traced.pick("along", hit)
         distance = echoes.range + plan.noise.range_bias
         if errors.range is not None:
-            range_errors = errors.range_errors(number_in_block[pulse], number)
+            delayed = setting.receiver.range_delay or 0.0
+            range_errors = errors.range_errors(number_in_block[pulse], number, delayed)
             distance = distance + range_sigma(setting, echoes.range, along, echoes.intensity) * range_errors
             if speckle is not None and setting.receiver.range_walk:
                 distance = distance + range_walk(setting, speckle, plan.noise.speckle)

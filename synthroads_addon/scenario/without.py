@@ -22,7 +22,7 @@ EFFECTS: dict[str, tuple[str, ...]] = {
     ),
     "range-noise": tuple(
         f"scan.receiver.{name}=0"
-        for name in ("faint_range_sigma", "incidence_range_noise", "range_walk", "range_tails")
+        for name in ("faint_range_sigma", "incidence_range_noise", "range_walk", "range_tails", "range_delay")
     ),
     "speckle": ("scan.noise.speckle=0",),
     "dropout": ("scan.noise.dropout=0",),

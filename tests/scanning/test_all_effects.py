@@ -40,6 +40,7 @@ RECEIVER = Receiver(
     incidence_range_noise=0.2,
     range_walk=0.003,
     range_tails=5.0,
+    range_delay=0.4,
     echo_separation="waveform",
 )
 MOTION = Motion(position_sigma=0.1, attitude_sigma_deg=0.5, heading_sigma_deg=0.5, shortest_period=0.2)

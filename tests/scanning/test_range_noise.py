@@ -35,12 +35,22 @@ def errors_and_sigma(**receiver):
 
 @pytest.mark.parametrize(
     "receiver",
-    [{}, {"faint_range_sigma": 0.2}, {"incidence_range_noise": 0.5}, {"faint_range_sigma": 0.1, "range_tails": 5.0}],
+    [
+        {},
+        {"faint_range_sigma": 0.2},
+        {"incidence_range_noise": 0.5},
+        {"faint_range_sigma": 0.1, "range_tails": 5.0},
+        {"faint_range_sigma": 0.1, "range_delay": 0.5},
+    ],
 )
 def test_errors_of_ranges_follow_their_law_in_every_ring(receiver) -> None:
     error, sigma, reach = errors_and_sigma(**receiver)
     freedom = receiver.get("range_tails", 0.0)
+    delayed = receiver.get("range_delay", 0.0)
     law = stats.t(freedom, scale=np.sqrt((freedom - 2) / freedom)) if freedom else stats.norm()
+    if delayed:
+        even = np.sqrt(1.0 - delayed**2)
+        law = stats.exponnorm(delayed / even, loc=-delayed, scale=even)
     share = law.cdf(error / sigma)
     for low, high in ((0.0, 4.0), (4.0, 10.0), (10.0, np.inf)):
         here = (reach >= low) & (reach < high)
@@ -50,7 +60,9 @@ def test_errors_of_ranges_follow_their_law_in_every_ring(receiver) -> None:
 
 
 def test_errors_have_no_mean() -> None:
-    error, sigma, _ = errors_and_sigma(faint_range_sigma=0.1, incidence_range_noise=0.3, range_tails=4.0)
+    error, sigma, _ = errors_and_sigma(
+        faint_range_sigma=0.1, incidence_range_noise=0.3, range_tails=4.0, range_delay=0.4
+    )
     assert abs(np.average(error, weights=sigma**-2.0)) < min(1e-3, 5.0 / np.sqrt(np.sum(sigma**-2.0)))
 
 

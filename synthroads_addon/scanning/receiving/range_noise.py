@@ -10,8 +10,10 @@ satellite laser altimeters, IEEE Trans. Geosci. Remote Sens. 30, has both terms)
 
 with sigma_0 that of a strong echo at a right angle and sigma_T what an echo at the threshold T has besides. Errors
 follow a normal distribution, or Student's t of the same standard deviation (Lange, Little and Taylor 1989, Robust
-statistical modeling using the t distribution, JASA 84). None of them has a mean: ranges stay unbiased. All of it is
-left out where sigma_0 is 0.
+statistical modeling using the t distribution, JASA 84). Pulses rise faster than they fall (Chauve et al. 2007,
+Processing full-waveform lidar data: modelling raw signals, ISPRS Archives 36), so that more echoes are ranged late than
+early: a share q of sigma may be an exponential delay less its mean, which gives the errors the skewness 2 q^3. None of
+them has a mean: ranges stay unbiased. All of it is left out where sigma_0 is 0.
 
 A bright echo passes a fixed threshold earlier than a faint one and is ranged nearer: range walk (Amann et al. 2001,
 Laser ranging: a critical review of usual techniques for distance measurement, Opt. Eng. 40). Scanners correct for it

@@ -142,6 +142,7 @@ CASES: dict[str, ScanCase] = {
     "scan.receiver.incidence_range_noise": ScanCase(value=1.0),
     "scan.receiver.range_walk": ScanCase(value=0.05, given={"scan.noise.speckle": 0.3}),
     "scan.receiver.range_tails": ScanCase(value=4.0),
+    "scan.receiver.range_delay": ScanCase(value=0.5),
     "scan.receiver.echo_separation": ScanCase(value="waveform", given=RAYS),
     "scan.motion.shortest_period": ScanCase(value=3.0, given=SWAYING),
     "scan.motion.longest_period": ScanCase(value=9.0, given=SWAYING),
