@@ -13,16 +13,16 @@ from synthroads_addon.scanning.receiver import Receiver
 from synthroads_addon.scanning.weather.base import Weather
 from synthroads_addon.scanning.weather.conditions import Fog, Rain, Snow
 from synthroads_addon.scanning.weather.soft_target import soft_peak
-from tests.helpers.scenes.scan_scenes import middle_pulses, plane, scan_block, scan_of
+from tests.helpers.scenes.scan_scenes import Standing, middle_pulses, plane, scan_block, scan_of
 
 RINGS = np.array([1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 9.0, 14.0])
 DIVERGENCE = 4e-3
 THRESHOLD = 2e-6
 
 
-def in_weather(weather: Weather, threshold: float = THRESHOLD, **changes) -> ScanPlan:
-    """Return a scan from 60 m over a plane, dimmed by nothing: the formulas are of the echoes."""
-    plan = scan_of(plane(), threshold=threshold, divergence=(DIVERGENCE, DIVERGENCE), minimum_range=1.0, **changes)
+def in_weather(weather: Weather, threshold: float = THRESHOLD, path: Standing | None = None, **changes) -> ScanPlan:
+    """Return a scan from above a plane, dimmed by nothing: the formulas are of the echoes."""
+    plan = scan_of(plane(), path=path, threshold=threshold, divergence=(DIVERGENCE, DIVERGENCE), minimum_range=1.0, **changes)
     return replace(plan, effects=weather.effects())
 
 
@@ -57,6 +57,21 @@ def test_drops_and_flakes_are_met_as_often_as_published_in_every_ring(weather: R
     assert many.sum() >= 2
     np.testing.assert_allclose(found[many], expected[many], rtol=0.05)
     assert found.sum() == pytest.approx(expected.sum(), rel=0.05)
+
+
+def test_what_is_met_hides_the_drops_behind_it() -> None:
+    """From 3 m above a plane pulses have as many echoes as there are drops above it, at every slant."""
+    weather = Rain(rate_mm_h=2.0, echoes=True)
+    plan = in_weather(weather, path=Standing(3.0), field_of_view=2.6, range_resolution=0.0)
+    result = scan_block(plan, plan.path.strips[0], 0)
+    points = result.points
+    air = points.class_id == UNLABELLED
+    reach = 3.0 / np.cos(np.deg2rad(points.scan_angle_deg.astype(np.float64)))
+    assert (points.range[air] < reach[air]).all()
+    ground = reach[~air]
+    expected = np.mean([published(weather, 1.0, near) for near in np.quantile(ground, (np.arange(40) + 0.5) / 40)])
+    assert air.sum() > 1000
+    assert air.sum() == pytest.approx(expected * result.pulses, rel=0.05)
 
 
 def test_fog_s_echo_is_the_peak_of_the_published_integral() -> None:
