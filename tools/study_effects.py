@@ -7,7 +7,9 @@ One scene of a recipe is built once and scanned with all effects, without each o
 without all of them, with the same rays and random numbers. Each cloud is compared with the real ones as `synthroads
 compare` does; a small network learns on it to tell markings from pavement by point, and is asked about the real clouds;
 the scan's processor time is measured. The table goes to `effects.md`, all figures to `effects.json`, a picture to
-`effects.png`.
+`effects.png`. Without real clouds only the time is measured, several times of which the least counts:
+
+    python tools/study_effects.py centerline-airborne --scene straight-08 --repeats 5 --output out/times
 """
 
 from __future__ import annotations
@@ -101,13 +103,14 @@ def variants(scenario: Scenario) -> Iterator[tuple[str, Scenario]]:
     yield EVERYTHING, scenario_without(scenario, found)
 
 
-def study(scenario: Scenario, real: Path, output: Path) -> Iterator[Outcome]:
+def study(scenario: Scenario, real: Path | None, output: Path, repeats: int = 1) -> Iterator[Outcome]:
     """Yield the outcome of a scenario and of it without each of its effects; builds its road once.
 
     Args:
         scenario: the job.
-        real: list of real clouds.
+        real: list of real clouds; None to measure the time alone.
         output: folder for the clouds.
+        repeats: scans of each, of whose times the least counts.
 
     Raises:
         InputError: a cloud or a list is wrong.
@@ -117,17 +120,19 @@ def study(scenario: Scenario, real: Path, output: Path) -> Iterator[Outcome]:
     scene = RoadScene(scenario, road)
     scene.build()
     scene.read()
-    known = [read_compared(path, row) for path, row in find_clouds(real)]
-    others = join_patches([make_patches(cloud.classes[ROAD], cloud.name) for cloud in known])
+    known = [] if real is None else [read_compared(path, row) for path, row in find_clouds(real)]
+    others = join_patches([make_patches(cloud.classes[ROAD], cloud.name) for cloud in known]) if known else None
     asked = [points_of(cloud) for cloud in known if MARKING in cloud.classes]
     # The first scan loads what later ones find loaded.
     scene.scan(new_folder(output / "warm-up"), timer)
     for effect, changed in variants(scenario):
-        folder = new_folder(output / effect.partition(":")[0])
-        begun = time.process_time()
-        scene.with_settings(changed, stands=True).scan(folder, timer)
-        seconds = time.process_time() - begun
-        yield outcome(effect, folder / "cloud.laz", others, asked, seconds)
+        spent = []
+        for number in range(repeats):
+            folder = new_folder(output / f"{effect.partition(':')[0]}{f' {number}' if number else ''}")
+            begun = time.process_time()
+            scene.with_settings(changed, stands=True).scan(folder, timer)
+            spent.append(time.process_time() - begun)
+        yield outcome(effect, folder / "cloud.laz", others, asked, min(spent))
 
 
 def new_folder(path: Path) -> Path:
@@ -136,9 +141,13 @@ def new_folder(path: Path) -> Path:
     return path
 
 
-def outcome(effect: str, cloud: Path, others: Patches, asked: Sequence[tuple[Float, Index]], seconds: float) -> Outcome:
-    """Return what a scan's cloud is like, against the patches and the points of real ones."""
+def outcome(
+    effect: str, cloud: Path, others: Patches | None, asked: Sequence[tuple[Float, Index]], seconds: float
+) -> Outcome:
+    """Return what a scan's cloud is like, against the patches and the points of real ones if there are any."""
     read = read_compared(cloud, UnlistedCloud(cloud=cloud.name))
+    if others is None:
+        return Outcome(effect, {}, None, len(read.classes[ROAD].intensity), round(seconds, 2))
     patches = make_patches(read.classes[ROAD], effect)
     auc = distinguish(patches, others, _SEED, effect).auc
     score = network_score(points_of(read), asked) if MARKING in read.classes and asked else None
@@ -178,13 +187,13 @@ def table(outcomes: Sequence[Outcome]) -> str:
     """Return outcomes as a Markdown table, each beside its difference to the scan with all effects."""
     groups = list(outcomes[0].auc)
     lines = [
-        f"| without | {' | '.join(f'AUC {group}' for group in groups)} | network's score | points | CPU s |",
+        " | ".join(["| without", *(f"AUC {group}" for group in groups), "network's score", "points", "CPU s |"]),
         "|---|" + "--:|" * (len(groups) + 3),
     ]
     for one in outcomes:
         score = "-" if one.score is None else f"{one.score:.3f}"
-        auc = " | ".join(f"{one.auc[group]:.2f}" for group in groups)
-        lines.append(f"| {one.effect} | {auc} | {score} | {one.points:,} | {one.seconds:.1f} |")
+        auc = (f"{one.auc[group]:.2f}" for group in groups)
+        lines.append(" | ".join([f"| {one.effect}", *auc, score, f"{one.points:,}", f"{one.seconds:.2f} |"]))
     return "\n".join(lines) + "\n"
 
 
@@ -257,13 +266,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("recipe", metavar="RECIPE")
     parser.add_argument("--scene", metavar="NAME", help="scene of the recipe (its last one)")
-    parser.add_argument("--real", type=Path, required=True, metavar="LIST", help="real clouds, see docs/compare.md")
+    parser.add_argument("--real", type=Path, metavar="LIST", help="real clouds, see docs/compare.md (time alone)")
+    parser.add_argument("--repeats", type=int, default=1, metavar="N", help="scans of each, the fastest counts (1)")
     parser.add_argument("--output", type=Path, required=True, metavar="DIR")
     parser.add_argument("--set", action="append", default=[], metavar="PATH=VALUE", help="change of the scenario")
     arguments = parser.parse_args()
     scenario = scenario_of(arguments.recipe, arguments.scene, arguments.set)
     outcomes = []
-    for one in study(scenario, arguments.real, arguments.output):
+    for one in study(scenario, arguments.real, arguments.output, arguments.repeats):
         outcomes.append(one)
         print(json.dumps(one.to_dict()), flush=True)
     (arguments.output / "effects.json").write_text(json.dumps([one.to_dict() for one in outcomes], indent=1))

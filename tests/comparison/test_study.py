@@ -67,6 +67,6 @@ def test_a_row_for_each_effect() -> None:
         Outcome("speckle", {"all": 1.0, "pattern": 0.7}, None, 5, 4.0),
     ]
     assert table(rows).splitlines()[2:] == [
-        "| none: all effects | 0.90 | 0.70 | 0.850 | 1,234 | 5.0 |",
-        "| speckle | 1.00 | 0.70 | - | 5 | 4.0 |",
+        "| none: all effects | 0.90 | 0.70 | 0.850 | 1,234 | 5.00 |",
+        "| speckle | 1.00 | 0.70 | - | 5 | 4.00 |",
     ]
