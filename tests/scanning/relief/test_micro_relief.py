@@ -126,7 +126,7 @@ def test_range_is_the_distance_to_the_shifted_point() -> None:
 
 
 def test_one_laser_s_line_on_rough_ground_is_as_flat_as_on_smooth_ground() -> None:
-    """What a head's one laser measures lies on the cone that it sweeps, however rough the road is."""
+    """Points of one laser of a head lie on the cone that it sweeps, however rough the road is."""
     azimuth = np.linspace(-0.02, 0.02, 200)
     position = 10.0 * np.column_stack([np.cos(azimuth), np.sin(azimuth), np.zeros(200)])
     points = scanned(position, np.zeros(200, np.uint16), np.array([0.0, 0.0, 1.0]), np.random.default_rng(1))

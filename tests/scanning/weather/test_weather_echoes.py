@@ -22,7 +22,9 @@ THRESHOLD = 2e-6
 
 def in_weather(weather: Weather, threshold: float = THRESHOLD, path: Standing | None = None, **changes) -> ScanPlan:
     """Return a scan from above a plane, dimmed by nothing: the formulas are of the echoes."""
-    plan = scan_of(plane(), path=path, threshold=threshold, divergence=(DIVERGENCE, DIVERGENCE), minimum_range=1.0, **changes)
+    plan = scan_of(
+        plane(), path=path, threshold=threshold, divergence=(DIVERGENCE, DIVERGENCE), minimum_range=1.0, **changes
+    )
     return replace(plan, effects=weather.effects())
 
 
