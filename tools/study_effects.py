@@ -126,13 +126,13 @@ def study(scenario: Scenario, real: Path | None, output: Path, repeats: int = 1)
     # The first scan loads what later ones find loaded.
     scene.scan(new_folder(output / "warm-up"), timer)
     for effect, changed in variants(scenario):
-        spent = []
+        spent, name = [], effect.partition(":")[0]
         for number in range(repeats):
-            folder = new_folder(output / f"{effect.partition(':')[0]}{f' {number}' if number else ''}")
+            folder = new_folder(output / (f"{name} {number}" if number else name))
             begun = time.process_time()
             scene.with_settings(changed, stands=True).scan(folder, timer)
             spent.append(time.process_time() - begun)
-        yield outcome(effect, folder / "cloud.laz", others, asked, min(spent))
+        yield outcome(effect, output / name / "cloud.laz", others, asked, min(spent))
 
 
 def new_folder(path: Path) -> Path:

@@ -232,7 +232,11 @@ class BlockScan:
             values("dropouts", noise.dropout, shares),
             values("speckle", noise.speckle, partial(speckle_factors, sigma=noise.speckle)),
             values("receiver noise", receiver.noise_sigma(plan.setting.threshold), standard_normal),
-            values("range tails", ranges and receiver.range_tails, partial(tail_factors, freedom=receiver.range_tails)),
+            values(
+                "range tails",
+                ranges and receiver.range_tails,
+                partial(tail_factors, freedom=receiver.range_tails or 0.0),
+            ),
             values("lost numbers", receiver.lost_numbers, shares),
             values("range delays", ranges and receiver.range_delay, standard_exponential),
         )
@@ -273,7 +277,7 @@ class BlockScan:
             self.plan.target.motions(begin, end, min(spacing, _MOTION_KNOTS), track if self.plan.on_vehicle else None),
         )
 
-    def emit(self, strip: Strip, poses: Poses, angle: Float | None, first: int, count: int) -> Pulses:
+    def emit(self, strip: Strip, poses: Poses, angle: Float32 | None, first: int, count: int) -> Pulses:
         """Return ``count`` pulses of a strip from ``first`` on, as they leave the scanner, in local coordinates.
 
         Args:
