@@ -16,12 +16,11 @@ import laspy
 import matplotlib as mpl
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from synthroads_addon.base.classes import UNLABELLED, classes  # noqa: E402
+from synthroads_addon.base.classes import classes  # noqa: E402
 from synthroads_addon.jobs.generate import Job, generate  # noqa: E402
 from synthroads_addon.road.geometry import RoadGeometry  # noqa: E402
 from synthroads_addon.sampling.road import sample_road  # noqa: E402
@@ -33,10 +32,6 @@ from matplotlib import pyplot  # noqa: E402
 
 REACH, ASIDE, PIXEL = 105.0, 42.0, 0.15
 """Half the length and width that a picture shows, and its pixel, m."""
-GHOSTS_LENGTH, MIXED_LENGTH = 12.0, 8.0
-"""Stretches of road of which ghosts and mixed points are shown, m."""
-MIXED_APART = 0.12
-"""Mixed points lie so far, m, from all points that one has where every pulse parts its surfaces."""
 SHORT = ["road.half_width=40"]
 PLATFORMS = {
     "UAV, rotating mirror": ("rq31-600m", ["road.length=200"]),
@@ -193,62 +188,11 @@ def _moments(distance: float, tilt: float, x: Any, y: Any, weights: Any) -> tupl
     return mean, float(np.sqrt((weights * (reach - mean) ** 2).sum()))
 
 
-def draw_false_points(output: Path) -> None:
-    """Write a picture of ghosts beside and below a wet road, and of points between edges and what is behind them."""
-    changes = ["road.length=120", "road.half_width=30", "road.vehicles.per_km=80", "scan.rays_per_pulse=19"]
-    changes += ["road.environment.wet=1", "scan.multipath=1", "scan.noise.range_sigma=0.005"]
-    figure, axes = pyplot.subplots(2, 1, figsize=(9, 7.5), layout="constrained")
-    with tempfile.TemporaryDirectory() as folder:
-        parted, mixed = (
-            _along_road("mobile-mapping-300m", [*changes, f"scan.receiver.echo_separation={name}"], Path(folder) / name)
-            for name in ("resolution", "waveform")
-        )
-    ghost = mixed[:, 3] == UNLABELLED
-    seen = _densest_window(mixed[ghost, 0], GHOSTS_LENGTH)
-    within = np.abs(mixed[:, 0] - seen) < GHOSTS_LENGTH / 2.0
-    _draw_section(axes[0], mixed[within & ~ghost], mixed[within & ghost], f"{GHOSTS_LENGTH:g} m of road: ghosts in red")
-    axes[0].set(xlim=(-25, 25), ylim=(-12, 8))
-    apart = cKDTree(parted[:, :3]).query(mixed[:, :3], distance_upper_bound=MIXED_APART)[0] > MIXED_APART
-    apart &= ~ghost & (mixed[:, 2] > 0.3) & (np.abs(mixed[:, 1]) < 16.0)
-    seen = _densest_window(mixed[apart, 0], MIXED_LENGTH)
-    within = np.abs(mixed[:, 0] - seen) < MIXED_LENGTH / 2.0
-    title = f"{MIXED_LENGTH:g} m of road: in red what lies between two surfaces that a pulse can't part"
-    _draw_section(axes[1], mixed[within & ~apart & ~ghost], mixed[within & apart], title)
-    axes[1].set(xlim=(-16, 16), ylim=(-0.5, 5), xlabel="offset (m)")
-    figure.savefig(output / "false-points.png", dpi=100, metadata={"Software": None})
-
-
-def _along_road(name: str, changes: list[str], folder: Path) -> NDArray[np.float64]:
-    """Return a scan's points (N, 4) by station, offset, height above the road's profile, m, and class."""
-    cloud, scenario = scan(name, changes, folder), load_scenario(name, changes)
-    geometry = RoadGeometry(sample_road(scenario.road, scenario.seed))
-    local = np.asarray(cloud.xyz) - geometry.parameters.transform.translate
-    station, offset = geometry.alignment.project(local[:, :2])
-    height = local[:, 2] - geometry.profile.elevation(np.clip(station, 0.0, geometry.length))
-    return np.column_stack([station, offset, height, np.asarray(cloud["class_id"])])
-
-
-def _densest_window(place: NDArray[np.float64], length: float) -> float:
-    """Return the middle of the stretch of this length (m) with the most of some places (N,)."""
-    count, edges = np.histogram(place, np.arange(5.0, 115.0, length / 4.0))
-    first = int(np.argmax(np.convolve(count, np.ones(4), "valid")))
-    return float(edges[first] + length / 2.0)
-
-
-def _draw_section(axis: Any, points: NDArray[np.float64], marked: NDArray[np.float64], title: str) -> None:
-    """Draw points of a stretch of road across it, some of them marked."""
-    axis.scatter(points[:, 1], points[:, 2], s=0.3, c="#555555", linewidths=0)
-    axis.scatter(marked[:, 1], marked[:, 2], s=2.5, c="#d62728", linewidths=0)
-    axis.set_title(title, fontsize=10, loc="left")
-    axis.set(aspect="equal", ylabel="height (m)")
-
-
 FIGURES: dict[str, Callable[[Path], None]] = {
     "platforms": draw_platforms,
     "intensity_histograms": intensity_histograms,
     "convergence": print_convergence,
     "clouds": draw_cloud_shadows,
-    "false_points": draw_false_points,
 }
 
 if __name__ == "__main__":
