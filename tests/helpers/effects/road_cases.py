@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.road.surroundings import LONGEST
 from tests.helpers.effects.field_paths import value_at, with_value
 from tests.helpers.roads.furnished_data import road_data
 from tests.helpers.roads.parameter_sets import OBJECTS
@@ -58,7 +59,8 @@ OWN: dict[str, dict[str, Data]] = {
         "it": {"kind": "shrub", "species": "hazel", "density": 0.05, "band_start": 1.0, "band_end": 6.0}
         | {"height_min": 1.0, "height_max": 2.0, "seed": 1},
         "grass": {"kind": "grass", "species": "meadow", "density": 1.0, "band_start": 0.0, "band_end": 4.0}
-        | {"height_min": 0.2, "height_max": 0.4, "mown_width": 1.0, "seed": 2},
+        | {"height_min": 0.2, "height_max": 0.4, "mown_width": 1.0, "seed": 2}
+        | {"start_station": 0.0, "end_station": LONGEST},
     },
     "Vehicle": {"it": {"model": "car", "carriageway": "right", "lane": 0, "station": 25.0, "speed": 3.0}},
 }
