@@ -12,7 +12,7 @@ from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import load_scenario
 
-CHECKSUM = "99163db4044c56ad0c22046ff411cca888ccd4c4657098d4b09e4c3032bd36f4"
+CHECKSUM = "6c1304df334af09224e3326042030147b3df7a5e50d98f0900dfeaab675c9f95"
 EVERYTHING = ["exits=1", "entries=1", "emergency_bays=1"]
 
 

@@ -17,7 +17,7 @@ from synthroads_addon.road.guidelines import SECTIONS_OF_CLASS
 from synthroads_addon.road.parameters import RoadParameters, parameters_schema
 from synthroads_addon.road.things.limits import Interval
 from synthroads_addon.sampling.road import sample_road
-from synthroads_addon.scenario.road import RoadScenario
+from synthroads_addon.scenario.road import RoadScenario, VegetationLimits
 from tests.helpers.files.mutations import cases
 from tests.helpers.roads.drawn_values import (
     COUNTED,
@@ -45,6 +45,10 @@ NOT_SAMPLED = {
     ("TrafficSign", "shape", "octagon"),
 }
 """Choices (class, field, value) that only sets made by hand have."""
+
+
+WOODED = VegetationLimits(forest_edges_per_km=Interval(minimum=0.5, maximum=1.0))
+"""Plants with forest edges among them, of which a road has none unless it is asked to."""
 
 
 def scenario_of(design_class: str, cross_section: str, length: float, **limits: Any) -> RoadScenario:
@@ -112,7 +116,7 @@ def narrowed(limits: ClosedModel) -> Any:
 
 @pytest.mark.parametrize(("design_class", "cross_section"), ROADS)
 def test_every_drawn_value_lies_within_its_interval(design_class: str, cross_section: str) -> None:
-    scenario = narrowed(scenario_of(design_class, cross_section, 8000.0))
+    scenario = narrowed(scenario_of(design_class, cross_section, 8000.0, vegetation=WOODED))
     parameters = sample_road(scenario, 1)
     objects, drawn = objects_by_type(parameters), set()
     for path, extract in EXTRACTORS.items():
