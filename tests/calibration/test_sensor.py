@@ -109,7 +109,7 @@ def test_an_airborne_sensor_is_found_again(
     gains = [10.0 * np.log10(strip_gain(plan.strip_errors, plan.seed, strip)) for strip in (0, 1)]
     # Brighter strips are ranged better: the mean of both strips' variances.
     brighter = np.sqrt(np.mean(10.0 ** (-2.0 * np.array(gains) / 10.0)))
-    # How the noise is divided between its two parts scatters, 0.67 to 1.06 of the second over eight seeds; the sum hardly.
+    # How the noise is divided between its two parts scatters, by 0.67 to 1.06 over eight seeds; the sum hardly does.
     faint = 0.08 / power * brighter
     assert found["faint_range_sigma"] == pytest.approx(faint, rel=0.35)
     assert np.hypot(found["range_sigma"], found["faint_range_sigma"]) == pytest.approx(np.hypot(0.02, faint), rel=0.08)
