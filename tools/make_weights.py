@@ -83,7 +83,7 @@ PLANS = {
         "Five classes on and beside roads, from the air, from UAVs and in single sweeps of a car's head",
         "segmentation",
         "segmentation-any-scanner",
-        ("schedule.epochs=12", "network.width=16", "crop_points=6000", "crops_per_tile=1", "threads=1"),
+        ("schedule.epochs=70", "network.width=16", "crop_points=6000", "crops_per_tile=1", "threads=1"),
         Domain(density=(3.0, 1500.0), platforms=("airborne", "uav", "tripod")),
         (
             "Buildings, rails, water and furniture of streets are none of its classes: they become one of the five.",
