@@ -18,7 +18,7 @@ from ml.segmentation.network import build
 from synthroads_addon.base.errors import InputError, OutputError
 
 for _package in ("onnx", "onnxscript", "onnxruntime"):
-    pytest.importorskip(_package)
+    pytest.importorskip(_package, reason="needs onnx, onnxscript and onnxruntime: pip install '.[onnx]'")
 pytestmark = pytest.mark.slow
 
 

@@ -5,11 +5,11 @@ A patch takes the place of pavement and film together: arrows and hatched areas 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from ...base.arrays import Bool, Float, Int
+from ...base.arrays import Bool, Float
 from ..geometry import RoadGeometry
 from ..objects import Side
 from ..paint import arrow_outlines, cut_outline, hatching_outlines
@@ -50,11 +50,7 @@ class MarkingFilms:
 
     def thickness(self, station: Float, offset: Float) -> Float:
         """Return the thickness (N,) of the thickest film at places (N,), m; 0 where there is none."""
-        result = np.zeros(len(station))
-        for line, dashes in zip(self._lines, self._dashes, strict=True):
-            left, right = self._geometry.marking_edges(line, station)
-            covered = _is_painted(dashes, station) & (offset <= left) & (offset >= right)
-            result = np.where(covered, np.maximum(result, line.film_thickness), result)
+        result = self._line_thickness(range(len(self._lines)), station, offset)
         for outline, edges, film in self._areas:
             (low, _), (high, _) = outline.min(axis=0), outline.max(axis=0)
             near = np.flatnonzero((station >= low) & (station <= high))
@@ -108,19 +104,19 @@ class MarkingFilms:
             for part in _cut(outline, ends):
                 for piece in _cut(part[::-1, ::-1], across):
                     centre = piece[:, ::-1].mean(axis=0)
-                    yield piece[::-1, ::-1], self._line_film(met, centre[:1], centre[1:])
+                    yield piece[::-1, ::-1], float(self._line_thickness(met, centre[:1], centre[1:])[0])
 
-    def _line_film(self, lines: Int, station: Float, offset: Float) -> float:
-        """Return the thickness of the thickest film of some lines, by number (L,), at one place, m."""
-        thickest = 0.0
+    def _line_thickness(self, lines: Iterable[int], station: Float, offset: Float) -> Float:
+        """Return the thickness (N,), m, of the thickest film of some lines, by number, at places (N,); 0 for none."""
+        result = np.zeros(len(station))
         for number in lines:
-            line = self._lines[number]
-            if not _is_painted(self._dashes[number], station)[0]:
+            painted = _is_painted(self._dashes[number], station)
+            if not painted.any():
                 continue
-            left, right = self._geometry.marking_edges(line, station)
-            if right[0] <= offset[0] <= left[0]:
-                thickest = max(thickest, line.film_thickness)
-        return thickest
+            left, right = self._geometry.marking_edges(self._lines[number], station)
+            film = self._lines[number].film_thickness
+            result = np.where(painted & (offset <= left) & (offset >= right), np.maximum(result, film), result)
+        return result
 
 
 def _is_painted(dashes: Float, station: Float) -> Bool:
