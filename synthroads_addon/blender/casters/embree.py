@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import logging
+import os
+from contextlib import suppress
+
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
@@ -11,6 +15,22 @@ from ...scanning.scene.mesh import SceneMesh
 
 _AT_ONCE = 20_000
 """Triangles that are handed over together: meanwhile no other thread runs, and Blender's window stands still."""
+
+
+class _NativeErrors(logging.Handler):
+    """Handler that writes to the system's standard error, where a command holds back what precedes a crash."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Write a record's message in a line."""
+        with suppress(OSError):  # there is no standard error
+            os.write(2, f"{record.getMessage()}\n".encode(errors="backslashreplace"))
+
+
+_log = logging.getLogger("embreex")
+if not _log.handlers:
+    # It tells of Embree's errors by a logger that, by itself, Python would write to `sys.stderr`.
+    _log.addHandler(_NativeErrors())
+    _log.propagate = False
 
 
 class EmbreeCaster:
