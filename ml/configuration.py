@@ -65,6 +65,7 @@ class Configuration(Part):
     seed: int = quantity(1, ge=0, le=_LARGEST_SEED, unit="1", description="Seed of everything random.")
     threads: int = quantity(0, ge=0, le=1024, unit="1", description="Threads of PyTorch; 0: one per core.")
     device: str = Field("auto", pattern=r"^(auto|cpu|cuda(:\d+)?)$", description="auto: CUDA where there is one.")
+    workers: int = quantity(0, ge=0, le=256, unit="1", description="Processes that prepare batches; 0: this one.")
     precision: Literal["float32", "bfloat16"] = Field(
         "float32", description="Of the training's steps; weights, gradients and geometry stay float32."
     )

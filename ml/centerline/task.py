@@ -22,6 +22,7 @@ from ..data.effects import SequenceEffects
 from ..data.frames import read_path
 from ..data.roads import cut_strip
 from ..data.slices import Batch, SliceSettings
+from ..data.workers import report_lost_workers
 from ..networks.centerline.losses import LossOptions, centerline_loss
 from ..networks.centerline.models import TARGETS, CenterlineModel, ModelOptions, all_targets
 from ..networks.centerline.transformer import TransformerOptions
@@ -94,16 +95,18 @@ def train_network(run: Run[CenterlineConfiguration], progress: Progress = silent
         configuration.batches,
         configuration.seed,
         configuration.data.measured_share,
+        configuration.workers,
     )
-    fit(
-        model,
-        run,
-        batches,
-        configuration.batches.steps,
-        centerline_loss(configuration.loss, configuration.slices.half_width),
-        validate=_validation(configuration, roads),
-        progress=progress,
-    )
+    with report_lost_workers(configuration.workers):
+        fit(
+            model,
+            run,
+            batches,
+            configuration.batches.steps,
+            centerline_loss(configuration.loss, configuration.slices.half_width),
+            validate=_validation(configuration, roads),
+            progress=progress,
+        )
     return model, roads
 
 

@@ -1,11 +1,12 @@
 """The roads that a configuration names, and the batches of an epoch."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
+import torch
 from pydantic import Field, model_validator
 
 from synthroads_addon.base.arrays import Index
@@ -21,6 +22,7 @@ from .effects import SequenceEffects
 from .effects.slices import SequenceCrop
 from .roads import LearningRoad, read_measured, read_scene, scene_folders
 from .slices import Batch, Sample, SliceDataset, SliceSettings, collate, mirror_batch
+from .workers import load_batches
 
 
 class MeasuredRoad(Part):
@@ -123,6 +125,7 @@ class Batches:
         options: how many.
         seed: of everything random.
         measured_share: of the samples from real roads, where there are both kinds.
+        workers: processes that draw samples; 0: this one. All give the same.
     """
 
     def __init__(
@@ -133,8 +136,10 @@ class Batches:
         options: BatchOptions,
         seed: int,
         measured_share: float,
+        workers: int = 0,
     ) -> None:
         self.options = options
+        self.workers = workers
         self.seed = seed
         self.drawn_per_epoch = options.size * options.steps // options.passes
         kinds = ((roads.train, 1.0 - measured_share), (roads.measured, measured_share))
@@ -152,16 +157,56 @@ class Batches:
 
     def __call__(self, epoch: int, share: slice = slice(None)) -> Iterator[Batch]:
         """Yield the batches of an epoch whose numbers, from 0, `share` selects; every second pass is mirrored."""
-        kept: dict[int, Sample] = {}
         kind = self.kinds(epoch)
-        size, each = self.options.size, self.options.steps // self.options.passes
-        for turn, place in (divmod(number, each) for number in range(self.options.steps)[share]):
-            order = stream(self.seed, "order", epoch, turn).permutation(self.drawn_per_epoch)
-            numbers = [int(n) for n in (order if turn else np.arange(len(order)))[place * size : (place + 1) * size]]
-            drawn = {n: kept.get(n) or self.datasets[kind[n]].draw_sample(epoch, n) for n in numbers}
-            kept |= drawn if self.options.passes > 1 else {}
-            batch = collate([drawn[n] for n in numbers])
+        plan = [self._planned(epoch, number) for number in range(self.options.steps)[share]]
+        new = _first_occurrences([numbers for _, numbers in plan])
+        kept: dict[int, Sample] = {}
+        draws = load_batches(_Draws(self.datasets, kind, epoch), new, _as_arrays, self.workers)
+        for (turn, numbers), wanted, drawn in zip(plan, new, draws, strict=True):
+            kept |= zip(wanted, map(_as_tensors, drawn), strict=True)
+            batch = collate([kept[n] for n in numbers])
+            if self.options.passes == 1:
+                kept.clear()
             yield mirror_batch(batch) if turn % 2 else batch
+
+    def _planned(self, epoch: int, number: int) -> tuple[int, list[int]]:
+        """Return which pass over an epoch's samples a batch belongs to, and the numbers of its samples."""
+        size, each = self.options.size, self.options.steps // self.options.passes
+        turn, place = divmod(number, each)
+        order = stream(self.seed, "order", epoch, turn).permutation(self.drawn_per_epoch)
+        numbers = order if turn else np.arange(len(order))
+        return turn, numbers[place * size : (place + 1) * size].tolist()
+
+
+def _first_occurrences(batches: Sequence[Sequence[int]]) -> list[list[int]]:
+    """Return of each batch the numbers that no batch before it has."""
+    seen: set[int] = set()
+    new = []
+    for batch in batches:
+        new.append([number for number in batch if number not in seen])
+        seen.update(batch)
+    return new
+
+
+@dataclass(frozen=True)
+class _Draws:
+    """An epoch's samples by their numbers, each from the data set of its kind of road."""
+
+    datasets: Sequence[SliceDataset]
+    kind: Index
+    epoch: int
+
+    def __getitem__(self, number: int) -> Sample:
+        return self.datasets[self.kind[number]].draw_sample(self.epoch, number)
+
+
+def _as_arrays(samples: list[Sample]) -> list[dict[str, Any]]:
+    """Return samples as arrays: each tensor from a worker would hold a file open, of which there are too few."""
+    return [{name: value.numpy() for name, value in sample.items()} for sample in samples]
+
+
+def _as_tensors(sample: Mapping[str, Any]) -> Sample:
+    return {name: torch.as_tensor(value) for name, value in sample.items()}
 
 
 def fixed_batches(

@@ -1,25 +1,20 @@
 """Batches for training and for the norms' statistics: tiles read, crops drawn, neighbours found in the workers."""
 
 import math
-import signal
-import sys
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from types import TracebackType
 
 import numpy as np
 import torch
-from torch.utils.data import DataLoader
 
-from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.random_streams import stream
 
 from ..data.classes import class_names
 from ..data.crops import CropDataset, Draw, Item, Seeds, collate
 from ..data.sources import Source, read_tiles
 from ..data.tiles import CloudTile, scalings
+from ..data.workers import load_batches
 from .network import overlay_clouds
 from .recipes import SegmentationConfiguration, mapped_intensities, plan
 
@@ -92,76 +87,17 @@ class CropBatches:
         yield from _load_crops(crops, given, epoch, given.adaptation.mix3d, share)
 
 
-@contextmanager
-def report_lost_workers(configuration: SegmentationConfiguration) -> Iterator[None]:
-    """Context that turns PyTorch's error about a killed data worker into an `InputError` of one line.
-
-    Raises:
-        InputError: a worker was lost.
-    """
-    try:
-        yield
-    except RuntimeError as error:
-        if not str(error).startswith("DataLoader worker (pid"):
-            raise
-        said = " ".join(str(error).partition(". ")[0].split())
-        allowed = f"one of these processes was lost ({said}): is memory short? --resume goes on, with fewer too"
-        raise InputError("workers", configuration.workers, allowed) from None
-
-
 def _load_crops(
     dataset: CropDataset, configuration: SegmentationConfiguration, epoch: int, mix3d: float, share: slice
 ) -> Iterator[Item]:
     numbers, size = range(len(dataset)), configuration.batch
-    loader: DataLoader[Item] = DataLoader(
+    return load_batches(
         dataset,
-        batch_sampler=[[*numbers[first : first + size]] for first in numbers[::size][share]],
-        num_workers=configuration.workers,
-        collate_fn=Collate(configuration, epoch, mix3d),
+        [numbers[first : first + size] for first in numbers[::size][share]],
+        Collate(configuration, epoch, mix3d),
+        configuration.workers,
         pin_memory=configuration.device != "cpu" and torch.cuda.is_available(),
-        worker_init_fn=silence_lost_pipes,
     )
-    batches: Iterator[Item] = iter(())
-    try:
-        with defer_interrupt():
-            batches = iter(loader)
-        yield from batches
-    finally:
-        # PyTorch calls it an error if a worker was ended by a signal, as all are that are interrupted: where only the
-        # garbage collector hears of it, that is a traceback on standard error.
-        with suppress(RuntimeError):
-            if end_workers := getattr(batches, "_shutdown_workers", None):  # there only where workers are
-                end_workers()
-
-
-def silence_lost_pipes(_worker: int) -> None:
-    """Initialise a data worker so that it prints no broken-pipe traceback after its trainer ended."""
-    said = sys.excepthook
-    if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})  # its end by PyTorch, put off by `defer_interrupt`
-
-    def hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-        if not issubclass(kind, (EOFError, ConnectionError)):
-            said(kind, error, trace)
-
-    sys.excepthook = hook
-
-
-@contextmanager
-def defer_interrupt() -> Iterator[None]:
-    """Context that blocks SIGINT, SIGTERM and SIGHUP while processes are forked, which would lose them.
-
-    The processes go on putting off Ctrl-C and a lost connection, until the one that started them ends; PyTorch has them
-    end at once where they are told to by SIGTERM.
-    """
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGHUP})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @dataclass(frozen=True)

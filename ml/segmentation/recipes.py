@@ -64,7 +64,6 @@ class SegmentationConfiguration(Configuration):
     crop_points: int = quantity(24_000, ge=64, le=2_000_000, unit="1", description="Points of a crop.")
     crops_per_tile: int = quantity(30, ge=1, le=100_000, unit="1", description="Crops of each tile and epoch.")
     batch: int = quantity(16, ge=1, le=1024, unit="1", description="Crops of a batch.")
-    workers: int = quantity(0, ge=0, le=256, unit="1", description="Processes that prepare batches; 0: this one.")
     set_up: SetUp = Field("synthetic", description="Which data are trained on, and how.")
     synthetic_share: float | None = quantity(
         None,

@@ -22,10 +22,11 @@ from ..data.crops import CropSettings, Item, crop_of, make_item
 from ..data.points import voxel_sample
 from ..data.sources import Source, read_tiles
 from ..data.tiles import CloudTile, Scaling, scalings
+from ..data.workers import report_lost_workers
 from ..runs import Run
 from ..scores.confusion import Confusion
 from ..training_loop import chosen_device, move_to_device
-from .loading import adaptation_batches, report_lost_workers, thin_tiles
+from .loading import adaptation_batches, thin_tiles
 from .network import adapt_network, build, scores_of
 from .recipes import SegmentationConfiguration
 
@@ -200,7 +201,7 @@ def score(
     confusion = Confusion(_targets(sources, scheme))
     if configuration.adaptation.adabn:
         tiles = list(thin_tiles(sources, configuration, "test"))
-        with report_lost_workers(configuration):
+        with report_lost_workers(configuration.workers):
             model = adapt_network(model, adaptation_batches(tiles, configuration))
     scores = classifier(model, configuration)
     shown = None

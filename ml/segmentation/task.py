@@ -20,6 +20,7 @@ from ..data.classes import IGNORED, class_names
 from ..data.crops import Item
 from ..data.sources import Source
 from ..data.tiles import CloudTile, scalings
+from ..data.workers import report_lost_workers
 from ..onnx_export import Exportable
 from ..processes import helper_processes
 from ..runs import PRETRAINING, Run
@@ -28,7 +29,7 @@ from ..scores.pictures import comparison
 from ..tasks import Evaluation, Prediction
 from ..training_loop import Figures, chosen_device, fit
 from .exporting import exportable_network
-from .loading import CropBatches, read_domains, report_lost_workers, thin_tiles
+from .loading import CropBatches, read_domains, thin_tiles
 from .network import build, scores_of
 from .prediction import Labelling, predict_file
 from .recipes import SegmentationConfiguration, class_shares, class_weights
@@ -198,7 +199,7 @@ def _fit(
     batches, device = CropBatches(configuration, domains.values()), next(model.parameters()).device
     loss = objective(configuration, batches.tiles, device)
     validate = _validation(configuration, validation) if validation else None
-    with report_lost_workers(configuration):
+    with report_lost_workers(configuration.workers):
         fit(model, run, batches, len(batches), loss, validate=validate, progress=progress)
 
 

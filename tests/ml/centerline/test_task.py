@@ -192,12 +192,12 @@ def test_batches_hang_on_seed_and_epoch_alone():
     roads = Roads(analytic_roads.roads(), [], analytic_roads.roads(), [])
     options = BatchOptions(size=3, steps=4, passes=2, validation=1)
 
-    def drawn(seed: int, epoch: int) -> list[Any]:
-        return list(Batches(roads, SETTINGS, SequenceEffects(), options, seed, 0.5)(epoch))
+    def drawn(seed: int, epoch: int, workers: int = 0) -> list[Any]:
+        return list(Batches(roads, SETTINGS, SequenceEffects(), options, seed, 0.5, workers)(epoch))
 
-    one, again, later, other = drawn(1, 4), drawn(1, 4), drawn(1, 5), drawn(2, 4)
+    one, again, apart, later, other = drawn(1, 4), drawn(1, 4), drawn(1, 4, 2), drawn(1, 5), drawn(2, 4)
     assert len(one) == 4
-    for first, second in zip(one, again, strict=True):
+    for first, second in (*zip(one, again, strict=True), *zip(one, apart, strict=True)):
         assert all(torch.equal(first[name].nan_to_num(), second[name].nan_to_num()) for name in first)
     assert not torch.equal(one[0]["center"], later[0]["center"])
     assert not torch.equal(one[0]["center"], other[0]["center"])

@@ -7,13 +7,12 @@ import subprocess
 import sys
 import time
 from multiprocessing.process import BaseProcess
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
 import torch
 
-from ml.segmentation import loading
+from ml.data.workers import load_batches
 
 
 class SlowCrops:
@@ -30,12 +29,9 @@ class SlowCrops:
 
 def test_workers_that_a_signal_ends_with_the_training_leave_no_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
     """The signal to all processes of a terminal or job; of the workers' end PyTorch hears while it waits for them."""
-    monkeypatch.setattr(loading, "Collate", lambda *_: torch.stack)
     ignored: list[Any] = []
     monkeypatch.setattr(sys, "unraisablehook", ignored.append)
-    settings: Any = SimpleNamespace(batch=1, workers=2, device="cpu")
-    crops: Any = SlowCrops()
-    batches = loading._load_crops(crops, settings, 0, 0.0, slice(None))
+    batches = load_batches(SlowCrops(), [[number] for number in range(4)], torch.stack, 2)
     assert next(batches).shape == (1, 1)
 
     workers, join = multiprocessing.active_children(), BaseProcess.join

@@ -1,0 +1,111 @@
+"""Data workers: processes that prepare batches, ended cleanly whatever ends the training."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from types import TracebackType
+from typing import Any, Protocol, TypeVar
+
+from torch.utils.data import DataLoader
+
+from synthroads_addon.base.errors import InputError
+
+B = TypeVar("B")
+
+
+class Indexed(Protocol):
+    """Data that give an item for each number, the same in every process."""
+
+    def __getitem__(self, number: int, /) -> Any:
+        """Return the item of a number."""
+
+
+def load_batches(
+    items: Indexed,
+    numbers: Sequence[Sequence[int]],
+    collate: Callable[[list[Any]], B],
+    workers: int,
+    *,
+    pin_memory: bool = False,
+) -> Iterator[B]:
+    """Yield what `collate` makes of each batch's items, in order, prepared by so many processes (0: by this one).
+
+    Args:
+        items: what the batches are of.
+        numbers: of each batch's items.
+        collate: called in the worker with a batch's items.
+        workers: processes.
+        pin_memory: whether tensors come in memory from which a GPU copies faster.
+    """
+    loader: DataLoader[Any] = DataLoader(
+        items,  # type: ignore[arg-type]
+        batch_sampler=[[*batch] for batch in numbers],
+        num_workers=workers,
+        collate_fn=collate,
+        pin_memory=pin_memory,
+        worker_init_fn=silence_lost_pipes,
+    )
+    batches: Iterator[B] = iter(())
+    try:
+        with defer_interrupt():
+            batches = iter(loader)
+        yield from batches
+    finally:
+        # PyTorch calls it an error if a worker was ended by a signal, as all are that are interrupted: where only the
+        # garbage collector hears of it, that is a traceback on standard error.
+        with suppress(RuntimeError):
+            if end_workers := getattr(batches, "_shutdown_workers", None):  # there only where workers are
+                end_workers()
+
+
+@contextmanager
+def report_lost_workers(workers: int) -> Iterator[None]:
+    """Context that turns PyTorch's error about a killed data worker into an `InputError` of one line.
+
+    Args:
+        workers: how many there are.
+
+    Raises:
+        InputError: a worker was lost.
+    """
+    try:
+        yield
+    except RuntimeError as error:
+        if not str(error).startswith("DataLoader worker (pid"):
+            raise
+        said = " ".join(str(error).partition(". ")[0].split())
+        allowed = f"one of these processes was lost ({said}): is memory short? --resume goes on, with fewer too"
+        raise InputError("workers", workers, allowed) from None
+
+
+def silence_lost_pipes(_worker: int) -> None:
+    """Initialise a data worker so that it prints no broken-pipe traceback after its trainer ended."""
+    said = sys.excepthook
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})  # its end by PyTorch, put off by `defer_interrupt`
+
+    def hook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+        if not issubclass(kind, (EOFError, ConnectionError)):
+            said(kind, error, trace)
+
+    sys.excepthook = hook
+
+
+@contextmanager
+def defer_interrupt() -> Iterator[None]:
+    """Context that blocks SIGINT, SIGTERM and SIGHUP while processes are forked, which would lose them.
+
+    The processes go on putting off Ctrl-C and a lost connection, until the one that started them ends; PyTorch has them
+    end at once where they are told to by SIGTERM.
+    """
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM, signal.SIGHUP})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
