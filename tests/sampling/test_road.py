@@ -185,7 +185,7 @@ def census() -> Census:
     for number, road in enumerate(ROADS):
         for length, count in ((600.0, 400), (3000.0, 360), (8000.0, 12)):
             for seed in range(count):
-                found.add(scenario_of(*road, length), 10_000 * number + seed)
+                found.add(scenario_of(*road, length, vegetation=WOODED), 10_000 * number + seed)
     return found
 
 

@@ -15,7 +15,7 @@ from .thing import Block, StandingThing, TwinTypes
 
 _IFC = r"^Ifc[A-Za-z]+\.[A-Z_]+$"
 _OBJECTS = "none|obstacle|pole|tree|vegetation|barrier|building|patch|trafficIsland|streetLamp|gantry|soundBarrier"
-_OPENDRIVE = rf"^({_OBJECTS})(\.\w+)?$"
+_OPENDRIVE = rf"^({_OBJECTS})(\.[A-Za-z0-9_]+)?$"
 
 
 class AssetTypes(Model):

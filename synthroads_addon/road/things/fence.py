@@ -86,8 +86,9 @@ class Fence(LengthwiseThing):
 
     def posts(self, end: float) -> Float:
         """Return the stations (N,), m, of its posts if it ends at a station (m)."""
-        count = int(np.ceil((self.end_station - self.start_station) / self.post_spacing - 1e-4)) + 1
-        station = np.minimum(self.start_station + np.arange(count) * self.post_spacing, self.end_station)
+        last = min(self.end_station, end)  # the fence may say that it goes on far beyond the road's end
+        count = int(np.ceil((last - self.start_station) / self.post_spacing - 1e-4)) + 1
+        station = np.minimum(self.start_station + np.arange(count) * self.post_spacing, last)
         return np.append(station[station < end - 1e-3], end)
 
     def _post(self, foot: Float, left: Float) -> Float:
