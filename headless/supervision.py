@@ -24,7 +24,11 @@ LOSSES = (
     *("Thread creation failed", "pthread_create has failed"),
 )
 """Parts of what libraries write on standard error where memory is short."""
-_BEGINNINGS = ("terminate called", "Fatal Python error", "ERROR CAUGHT IN EMBREE", *LOSSES)
+_BEGINNINGS = (
+    *("terminate called", "Fatal Python error", "ERROR CAUGHT IN EMBREE", *LOSSES),
+    # Written by Python itself where it is too short of memory to find `sys.stderr`.
+    *("lost sys.stderr", "Traceback (most recent call last)", "MemoryError"),
+)
 """Parts of the first line of what they write before they end the process."""
 _DEATH_SIGNAL = 1
 """Linux's PR_SET_PDEATHSIG."""
