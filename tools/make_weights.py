@@ -11,9 +11,12 @@ import resource
 import shlex
 import subprocess
 import sys
+import time
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+import torch
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
@@ -38,6 +41,7 @@ class Plan:
     Attributes:
         title, task: of its card.
         configuration, changes: of the training.
+        splits: of the data set, that it learns from.
         domain: what it is good for.
         limits: where it fails.
         inside, outside: splits of the recipe's roads that it is measured on, by how the figures call them: roads of the
@@ -49,6 +53,7 @@ class Plan:
     task: Any
     configuration: str
     changes: tuple[str, ...]
+    splits: tuple[str, ...]
     domain: Domain
     limits: tuple[str, ...]
     inside: dict[str, str]
@@ -64,6 +69,7 @@ PLANS = {
         "centerline",
         "centerline-transformer",
         ("schedule.epochs=12", "slices.truth=either", "data.calibration_split=held_out", "threads=1"),
+        ("train",),
         Domain(density=(8.0, 60.0), platforms=("airborne", "uav"), needs=("intensity",)),
         (
             "Roads in towns, with islands, tracks or cycle paths beside, it hasn't seen.",
@@ -84,6 +90,7 @@ PLANS = {
         "segmentation",
         "segmentation-any-scanner",
         ("schedule.epochs=70", "network.width=16", "crop_points=6000", "crops_per_tile=1", "threads=1"),
+        ("train", "train_sweeps"),
         Domain(density=(3.0, 1500.0), platforms=("airborne", "uav", "tripod")),
         (
             "Buildings, rails, water and furniture of streets are none of its classes: they become one of the five.",
@@ -117,7 +124,7 @@ def make(name: str, plan: Plan, arguments: argparse.Namespace) -> None:
     data, folder = arguments.work / RECIPE, arguments.work / name
     run_command("dataset", RECIPE, "--output", str(data), "--jobs", str(arguments.jobs), *resumption(data))
     options = [word for change in (*plan.changes, *data_changes(plan, data)) for word in ("--set", change)]
-    minutes = train(plan, folder, options)
+    minutes, machine = train(plan, folder, options)
     run: Run[Any] = Run.open(folder)
     figures = [
         *(figure for split, where in plan.inside.items() for figure in measured(plan, name, split, where, arguments)),
@@ -140,6 +147,7 @@ def make(name: str, plan: Plan, arguments: argparse.Namespace) -> None:
         scenes=training_roads(plan, data),
         epochs=run.configuration.schedule.epochs,
         minutes=round(minutes, 1),
+        machine=machine,
         parameters=int(read_json(folder / "metrics.json")["parameters"]),
         figures=tuple(figures),
         limits=plan.limits,
@@ -153,29 +161,34 @@ def resumption(data: Path) -> list[str]:
     return ["--resume"] if (data / MANIFEST).is_file() else []
 
 
-def train(plan: Plan, folder: Path, options: list[str]) -> float:
-    """Train a model to its end unless it is; return the minutes of processor time of all that it took so far."""
+def train(plan: Plan, folder: Path, options: list[str]) -> tuple[float, str]:
+    """Train a model to its end unless it is; return the minutes that all of it took so far, and on what.
+
+    On a GPU that is time by the clock, else processor time.
+    """
     kept = folder / "minutes.json"
-    before = float(read_json(kept)["minutes"]) if kept.is_file() else 0.0
-    begin = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    before = read_json(kept) if kept.is_file() else {"minutes": 0.0, "machine": "one core"}
     if not (folder / METRICS).is_file():
+        graphics = torch.cuda.get_device_name() if torch.cuda.is_available() else None
+        begin = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime, time.perf_counter()
         run_command("train", plan.configuration, "--output", str(folder), "--resume", *options)
-        before += (resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - begin) / 60.0
-        write_file(kept, canonical_json({"minutes": before}).encode(), overwrite=True)
-    return before
+        end = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime, time.perf_counter()
+        spent = (end[1] - begin[1] if graphics else end[0] - begin[0]) / 60.0
+        before = {"minutes": before["minutes"] + spent, "machine": graphics or "one core"}
+        write_file(kept, canonical_json(before).encode(), overwrite=True)
+    return float(before["minutes"]), str(before["machine"])
 
 
 def training_roads(plan: Plan, data: Path) -> int:
     """Return the number of a data set's roads that a model learns from."""
-    splits = {"train"} if plan.task == "centerline" else {"train", "train_sweeps"}
-    return sum(1 for scene in read_manifest(data).scenes if scene.status == "done" and scene.split in splits)
+    return sum(1 for scene in read_manifest(data).scenes if scene.status == "done" and scene.split in plan.splits)
 
 
 def data_changes(plan: Plan, data: Path) -> list[str]:
     """Return the changes of a configuration that have it learn from a data set's folder."""
     if plan.task == "centerline":
         return [f"data.data_sets={json.dumps([str(data)])}"]
-    sources = [{"path": str(data), "split": split} for split in ("train", "train_sweeps")]
+    sources = [{"path": str(data), "split": split} for split in plan.splits]
     return [f"data.synthetic={json.dumps(sources)}"]
 
 
@@ -267,7 +280,7 @@ def card_text(card: ModelCard) -> str:
         for one in card.figures
     ]
     made = f"{card.title}. {card.parameters:,} weights in half precision, seed {card.seed}, {card.epochs} epochs of "
-    made += f"{card.minutes:g} minutes in all on one core, {card.scenes} synthetic roads, source {card.commit}."
+    made += f"{card.minutes:g} minutes in all on {card.machine}, {card.scenes} synthetic roads, source {card.commit}."
     needed = f", with {' and '.join(card.domain.needs)}" if card.domain.needs else ""
     use = f"For clouds of {low:g} to {high:g} points/m2, {' or '.join(card.domain.platforms)}{needed}."
     lines = [
