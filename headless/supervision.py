@@ -13,7 +13,9 @@ import resource
 import signal
 import sys
 import threading
+import traceback
 from contextlib import suppress
+from functools import partial
 from typing import NoReturn
 
 from headless import ENDS
@@ -81,8 +83,8 @@ def _wait_and_exit(child: int, spoken: _ErrorPipe, journal: int) -> NoReturn:
     listening.join(1.0)  # a process that the work has begun may still hold the other end
     code = os.waitstatus_to_exitcode(status)
     short = code < 0 and _memory_is_short(-code, spoken.held)
+    remove_recorded_folders(journal)  # those that are still there
     if code < 0:
-        remove_recorded_folders(journal)
         _say(_line(-code, short))
         code = 2 if short else 1
     elif code != 2:  # else a line says it all
@@ -121,13 +123,20 @@ class _ErrorPipe:
         self._hear, self._say = os.pipe()
 
     def redirect(self) -> None:
-        """In the child, redirect file descriptor 2 into the pipe; Python's ``sys.stderr`` keeps the terminal."""
+        """In the child, redirect file descriptor 2 into the pipe, and what Python code prints of exceptions that it caught.
+
+        Python's ``sys.stderr`` keeps the terminal.
+        """
         os.close(self._hear)
         with suppress(OSError):  # there is no standard error
             sys.stderr.flush()
             terminal = os.dup(2)
             os.dup2(self._say, 2)
-            sys.stderr = os.fdopen(terminal, "w", buffering=1, encoding=sys.stderr.encoding, errors="backslashreplace")
+            encoding = sys.stderr.encoding
+            sys.stderr = os.fdopen(terminal, "w", buffering=1, encoding=encoding, errors="backslashreplace")
+            # Blender's scripts print what fails while they are loaded, and may have no memory left to print it whole.
+            native = os.fdopen(os.dup(2), "w", buffering=1, encoding=encoding, errors="backslashreplace")
+            traceback.print_exc = partial(traceback.print_exc, file=native)
         os.close(self._say)
 
     def pass_on(self) -> None:
