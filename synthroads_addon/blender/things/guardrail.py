@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from ...base.classes import class_id
 from ...road.things import guardrail as sizes
 from ...road.things.guardrail import Guardrail
@@ -10,13 +12,20 @@ from ..nodes.backbone import first_station, height_on, last_station, look_up, ra
 from ..nodes.builder import Operand, Tree, Value, makes_group
 from ..nodes.foot import Lengthwise
 from ..nodes.inputs import boolean, instance_number, material_of, metres
-from ..nodes.solids import row_of_points
+from ..nodes.solids import flip_faces, move_geometry, paint_faces, put_on_points, row_of_points
 from .model_builder import ModelBuilder
 from .registry import model_part
 
 BEAM_PROFILE = [(x, 0.0, z) for x, z in sizes.BEAM]
 BEAM_PROFILE += [(x - sizes.SHEET, 0.0, z) for x, z in reversed(sizes.BEAM)]
 BEAM_PROFILE.append(BEAM_PROFILE[0])
+
+_LAP_PROFILE = [(x + sizes.LAP_SHEET, 0.0, z) for x, z in sizes.BEAM]
+_LAP_PROFILE = [BEAM_PROFILE[0], *_LAP_PROFILE, (sizes.BEAM[-1][0], 0.0, sizes.BEAM[-1][1])]
+"""Front of a splice's upper sheet; its edges close the gap to the beam below."""
+_BOLT_SIDES = 6
+_COARSE = 0.01
+"""Tolerance (m) from which splices have no bolts."""
 
 # Across the road, along it; open at its back.
 _HALF, _SIDE = sizes.POST[0] / 2, sizes.POST[1] / 2
@@ -35,9 +44,13 @@ class _Rail(Lengthwise):
     height = metres(0.75, (0.3, 1.5), "Top of the beam above the surface")
     post_spacing = metres(4.0, (0.5, 10.0), "Distance between posts")
     terminal_length = metres(12.0, (0.0, 50.0), "Length of the ramp at each end")
+    beam_length = metres(4.0, (1.0, 20.0), "Distance between the splices of the beam's sheets")
+    bolts = boolean(True, "Bolts on the splices")
+    reflector_spacing = metres(50.0, (0.0, 1000.0), "Distance between the reflectors in the beam; 0 for none")
     beam_step = metres(2.0, (0.1, 8.0), "Largest length of a straight piece of beam")
     instance = instance_number()
     material = material_of("beams and posts", "galvanised_steel")
+    reflector_material = material_of("the reflectors", "reflector")
 
     def beams(self) -> tuple[tuple[float, Value], ...]:
         """Return (side, whether it has a beam) for the left, +1, and the right side, -1."""
@@ -63,37 +76,53 @@ class _Rail(Lengthwise):
 
 @makes_group("SR Guardrail", catalogue="Barriers")
 def guardrail_group(tree: Tree) -> None:
-    """A steel guardrail along the road: W-beams, posts and spacers, with ramped terminals."""
+    """A steel guardrail along the road: W-beams with splices and reflectors, posts and spacers, ramped terminals."""
     rail = _Rail(tree)
     axis, surfaces = rail.geometry()
     ribbon = station_ribbon(axis)
     with tree.frame("Rows of the beams: terminal, middle, terminal"):
         ramp = rail.ramp()
         begin, end = first_station(axis), last_station(axis)
-        line = _rows(tree, rail, ramp)
-        # What lies beyond the backbone's ends collapses there.
-        within = op.minimum(op.maximum(op.named_attribute(tree, "station"), begin), end)
-        line = op.store(line, "station", within)
-    with tree.frame("Line of the beams' top edge"):
         station = op.named_attribute(tree, "station")
-        foot, left = rail.foot_at(station, ribbon, surfaces)
-        line = op.store(op.store(line, "left", left), "top", raise_place(foot, rail.top_at(station, ramp)))
-    parts = []
+
+        def on_backbone(line: Value) -> Value:
+            """Add nodes for the rows' top edge; what lies beyond the backbone's ends collapses there."""
+            line = op.store(line, "station", op.clip(station, begin, end))
+            foot, left = rail.foot_at(station, ribbon, surfaces)
+            return op.store(op.store(line, "left", left), "top", raise_place(foot, rail.top_at(station, ramp)))
+
+        def standing(points: Value) -> Value:
+            """Add nodes that put points with a station below the beam, with its height ``tall``."""
+            points = op.store(points, "tall", rail.top_at(station, ramp))
+            # One on the end of a backbone beyond which the rail goes on is the next stretch's.
+            beyond = (station > end) | ((station > end - 1e-3) & (rail.end_station > end + 1e-3))
+            points = op.delete_points(points, beyond | (station < begin))
+            foot, left = rail.foot_at(station, ribbon, surfaces)
+            return op.set_position(op.store(points, "left", left), foot)
+
+        line = on_backbone(_rows(tree, rail, ramp))
+    with tree.frame("Splices: two rows each, the faces between them away"):
+        laps = on_backbone(_splice_rows(tree, rail, (-sizes.LAP / 2.0, sizes.LAP / 2.0)))
+    with tree.frame("Bolts of the splices, and reflectors"):
+        bolts = op.only_if(rail.bolts, standing(_splice_rows(tree, rail, sizes.BOLT_ROWS)))
+        reflectors = standing(_reflector_rows(tree, rail, ramp))
+    parts, signals = [], []
     for side, present in rail.beams():
         with tree.frame(f"{'Left' if side > 0 else 'Right'} beam"):
-            parts.append(op.only_if(present, _beam(tree, line, side, rail.spacer)))
+            beam = _beam(tree, line, side, rail.spacer)
+            lap = _lap(tree, laps, side, rail.spacer)
+            heads = _in_beam(bolts, _bolts(tree, side), rail.spacer, side)
+            parts.append(op.only_if(present, op.join(beam, lap, heads)))
+            signals.append(op.only_if(present, _in_beam(reflectors, _reflector(tree, side), rail.spacer, side)))
     with tree.frame("Posts from the start on, where the beam is high enough"):
-        posts = op.store(_post_rows(tree, rail), "tall", rail.top_at(station, ramp))
-        # A post on the end of a backbone beyond which the rail goes on is the next stretch's.
-        beyond = (station > end) | ((station > end - 1e-3) & (rail.end_station > end + 1e-3))
-        posts = op.delete_points(posts, beyond | (station < begin))
-        foot, left = rail.foot_at(station, ribbon, surfaces)
-        posts = op.set_position(op.store(posts, "left", left), foot)
+        posts = standing(_post_rows(tree, rail))
         posts = op.delete_points(posts, op.named_attribute(tree, "tall") < sizes.LOWEST_POST)
         parts += _instances(tree, posts, rail)
     with tree.frame("Labels"):
-        mesh = op.label(op.realize(op.join(*parts)), class_id(Guardrail.points_class), rail.instance, rail.material)
-    tree.output("Mesh", mesh, description="Beams, posts and spacers")
+        plates = paint_faces(op.realize(op.join(*signals)), rail.reflector_material)
+        mesh = op.join(paint_faces(op.realize(op.join(*parts)), rail.material), plates)
+        mesh = op.label(mesh, class_id(Guardrail.points_class), rail.instance)
+    tree.output("Mesh", mesh, description="Beams, posts, spacers and reflectors")
 
 
 def _post_rows(tree: Tree, rail: _Rail) -> Value:
@@ -102,6 +131,25 @@ def _post_rows(tree: Tree, rail: _Rail) -> Value:
     count = tree.node("FunctionNodeFloatToInt", number, rounding_mode="FLOOR").value + 1
     posts = row_of_points(tree, count)
     return op.store(posts, "station", rail.start_station + op.index(tree) * rail.post_spacing)
+
+
+def _splice_rows(tree: Tree, rail: _Rail, rows: tuple[float, float]) -> Value:
+    """Add nodes for two points per splice with their ``station``, so far (m) from the splice's middle."""
+    count = op.maximum(op.round_up((rail.end_station - rail.start_station) / rail.beam_length - 1e-4) - 1, 0)
+    count = tree.node("FunctionNodeFloatToInt", count, rounding_mode="ROUND").value
+    points, number = row_of_points(tree, count * 2), op.index(tree)
+    before, after = rows
+    station = rail.start_station + (number // 2 + 1) * rail.beam_length + (number % 2) * (after - before) + before
+    return op.store(points, "station", op.clip(station, rail.start_station, rail.end_station))
+
+
+def _reflector_rows(tree: Tree, rail: _Rail, ramp: Value) -> Value:
+    """Add nodes for one point per reflector with its ``station``, from the first terminal's end to the last one's."""
+    spacing = op.maximum(rail.reflector_spacing, sizes.SHORTEST_REFLECTOR_SPACING)
+    number = (rail.end_station - rail.start_station - ramp * 2.0) / spacing + 1e-4
+    count = tree.node("FunctionNodeFloatToInt", number, rounding_mode="FLOOR").value + 1
+    points = row_of_points(tree, op.switch(rail.reflector_spacing > 0.0, 0, count))
+    return op.store(points, "station", rail.start_station + ramp + op.index(tree) * spacing)
 
 
 def _rows(tree: Tree, rail: _Rail, ramp: Value) -> Value:
@@ -128,15 +176,62 @@ def _rows(tree: Tree, rail: _Rail, ramp: Value) -> Value:
 
 def _beam(tree: Tree, line: Value, side: float, spacer: Value) -> Value:
     """Add nodes that sweep the beam's profile along the line of its top edge; return the mesh."""
-    mesh, column, number = op.grid(tree, len(BEAM_PROFILE), op.point_count(line))
-    profile = op.choose(column, BEAM_PROFILE)
+    return op.delete_degenerate(_sweep(tree, line, BEAM_PROFILE, side, spacer))
+
+
+def _lap(tree: Tree, laps: Value, side: float, spacer: Value) -> Value:
+    """Add nodes for the upper sheet of every splice, whose rows are two points each; return the mesh."""
+    mesh = _sweep(tree, laps, _LAP_PROFILE, side, spacer)
+    # Faces of a grid run column by column, one less than the rows of them each.
+    between = (op.index(tree) % op.maximum(op.point_count(laps) - 1, 1)) % 2
+    return op.delete_degenerate(op.delete_faces(mesh, op.maximum(between, 0).equals(1)))
+
+
+def _sweep(tree: Tree, line: Value, outline: list[tuple[float, float, float]], side: float, spacer: Value) -> Value:
+    """Add nodes that sweep an outline (depth in front of the posts, height under the top edge) along a beam's rows."""
+    mesh, column, number = op.grid(tree, len(outline), op.point_count(line))
+    profile = op.choose(column, outline)
     top = op.sample_index(line, op.named_attribute(tree, "top", "FLOAT_VECTOR"), number)
     left = op.sample_index(line, op.named_attribute(tree, "left", "FLOAT_VECTOR"), number)
     depth = (op.component(profile, "X") + spacer + POST_DEPTH) * side
     place = top + left * depth + op.vector(tree, 0.0, 0.0, op.component(profile, "Z"))
-    mesh = op.delete_degenerate(op.set_position(mesh, place))
+    mesh = op.set_position(mesh, place)
     # Seen along the rows the profile runs round clockwise on the right side: there its faces look outwards.
-    return tree.node("GeometryNodeFlipFaces", mesh).value if side > 0 else mesh
+    return flip_faces(mesh) if side > 0 else mesh
+
+
+def _in_beam(points: Value, body: Value, spacer: Value, side: float) -> Value:
+    """Add nodes for an instance of a body on every point, its origin on the beam's rear plane at its top edge."""
+    tree = points.tree
+    left = op.named_attribute(tree, "left", "FLOAT_VECTOR")
+    away = left * ((spacer + POST_DEPTH) * side) + op.vector(tree, 0.0, 0.0, op.named_attribute(tree, "tall"))
+    return put_on_points(points, body, op.position(tree) + away, rotation=op.upright(left))
+
+
+def _bolts(tree: Tree, side: float) -> Value:
+    """Add nodes for the heads of a row of bolts; x is across the road, z = 0 the beam's top edge."""
+    radius, high = sizes.BOLT_HEAD
+    disc = tree.node("GeometryNodeMeshCircle", vertices=_BOLT_SIDES, radius=radius, fill_type="NGON").value
+    head = tree.node("GeometryNodeExtrudeMesh", disc, offset_scale=high, individual=False).value
+    heads = []
+    for depth, height, turn in sizes.BOLTS:
+        # From facing up to facing the road, and then along with the flank's slope.
+        tilt = (0.0, side * (math.pi / 2.0 - turn), 0.0)
+        flank = op.transform(head, rotation=tilt)
+        outwards = math.cos(turn) * sizes.LAP_SHEET, math.sin(turn) * sizes.LAP_SHEET
+        heads.append(move_geometry(flank, (side * (depth + outwards[0]), 0.0, height + outwards[1])))
+    return op.join(*heads)
+
+
+def _reflector(tree: Tree, side: float) -> Value:
+    """Add nodes for a reflector's plate; x is across the road, z = 0 the beam's top edge."""
+    (inner, low), (outer, high) = sizes.REFLECTOR
+    plate = tree.node("GeometryNodeMeshCube", size=1.0).value
+    share = op.component(op.position(tree), "X") * side + 0.5
+    tall = op.component(op.position(tree), "Z") * (share * (high - low) + low)
+    x = (share * (outer - inner) + inner) * side
+    y = op.component(op.position(tree), "Y") * sizes.REFLECTOR_PLATE
+    return op.set_position(plate, op.vector(tree, x, y, tall + sizes.REFLECTOR_MIDDLE))
 
 
 def _instances(tree: Tree, posts: Value, rail: _Rail) -> list[Value]:
@@ -184,4 +279,5 @@ def build_guardrails(builder: ModelBuilder) -> None:
             right_beam=rail.faces in ("right", "both"),
             spacer=sizes.SPACER[rail.faces],
             beam_step=builder.step,
+            bolts=builder.tolerance < _COARSE,
         )

@@ -1,13 +1,16 @@
 """Steel guardrails."""
 
+from __future__ import annotations
+
+import math
 from collections.abc import Iterator
 from typing import ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from ...base.arrays import Float
-from ...base.schema import quantity
+from ...base.schema import quantity, when
 from .body import Body, Course, boxes, sweep
 from .limits import Interval, Limits, interval
 from .thing import Block, LengthwiseThing, TwinTypes
@@ -35,6 +38,23 @@ SHEET = 0.003
 BLOCK = (0.96, 0.10, 0.22, 0.155)
 """A spacer: its share of the gap, as faces that coincide have no first hit; length and height; how far its middle is
 below the beam's top (m)."""
+LAP, LAP_SHEET = 0.32, SHEET
+"""A splice: length over which two sheets of the beam lie over each other, and how far the upper one is proud, m."""
+BOLT_ROWS = (-0.1, 0.1)
+"""Where the bolts of a splice are along the beam, from its middle, m: three one below the other in each row."""
+BOLTS = ((0.043, -0.102, -0.9535), (0.003, -0.155, 0.0), (0.043, -0.208, 0.9535))
+"""Bolts of a row: depth and height under the beam's top edge of their middles (m), and by how much they are turned
+upwards (rad), as the flanks are that they sit on."""
+BOLT_HEAD = (0.017, 0.009)
+"""Radius and height of a bolt's head, m."""
+REFLECTOR = ((0.008, 0.034), (0.1, 0.09))
+"""A reflector's inner and outer edge, upright across the beam's trough: depth and height of each, m."""
+REFLECTOR_MIDDLE, REFLECTOR_PLATE = -0.155, 0.008
+"""Height of a reflector's middle under the beam's top edge, and its thickness along the road, m."""
+SHORTEST_REFLECTOR_SPACING = 1.0
+"""Shortest distance of reflectors, m."""
+_STEEPEST = 0.1
+"""Slope of a usual terminal, m/m."""
 _FACE, _REAR = 0.2, 0.05
 """From the axis to the face of the beam, and to the rear of the posts, m."""
 
@@ -50,8 +70,18 @@ class GuardrailLimits(Limits):
 
 
 class Guardrail(LengthwiseThing):
-    """A steel guardrail: W-beam on posts, ramped down at its terminals. Its offset is that of the posts' axis."""
+    """A steel guardrail: W-beam on posts, ramped down at its terminals. Its offset is that of the posts' axis.
 
+    The beam is of sheets that are bolted to each other with an overlap of `LAP`, the first splice ``beam_length`` after
+    its start. Reflectors stand in its trough from the end of the first terminal on.
+    """
+
+    conditions = (
+        when(
+            {"reflector_spacing": {"exclusiveMinimum": 0}},
+            {"reflector_spacing": {"minimum": SHORTEST_REFLECTOR_SPACING}},
+        ),
+    )
     points_class: ClassVar = "guardrail"
     order: ClassVar = 10
     limits: ClassVar = GuardrailLimits
@@ -62,6 +92,18 @@ class Guardrail(LengthwiseThing):
     terminal_length: float = quantity(
         12.0, ge=0, le=50, unit="m", description="Length over which either end is ramped into the ground."
     )
+    beam_length: float = quantity(
+        4.0, ge=1, le=20, unit="m", description="Distance between the splices of the beam's sheets."
+    )
+    reflector_spacing: float = quantity(
+        50.0, ge=0, le=1000, unit="m", description="Distance between the reflectors in the beam; 0 for none."
+    )
+
+    @model_validator(mode="after")
+    def _reflectors_fit(self) -> Guardrail:
+        if 0 < self.reflector_spacing < SHORTEST_REFLECTOR_SPACING:
+            raise ValueError(f"reflector_spacing must be 0 (none) or at least {SHORTEST_REFLECTOR_SPACING:g} m")
+        return self
 
     def twin(self) -> TwinTypes:
         """Return its types in the twin formats: a guardrail."""
@@ -74,13 +116,18 @@ class Guardrail(LengthwiseThing):
         return rear if self.faces == "left" else face, rear if self.faces == "right" else face
 
     def bodies(self, course: Course) -> list[Body]:
-        """Return the closed solids of beams, posts and spacers in local coordinates; none off the road."""
+        """Return the closed solids of beams, posts, spacers and reflectors in local coordinates; none off the road.
+
+        Details are the splices with their bolts.
+        """
         end = self.end_on(course.length)
         if end is None:
             return []
         sides = {"left": (1.0,), "right": (-1.0,), "both": (1.0, -1.0)}[self.faces]
         shapes = [*self._beams(course, end, sides), *self._posts(course, end, sides)]
-        return [Body(shape, "galvanised_steel") for shape in shapes]
+        bodies = [Body(shape, "galvanised_steel") for shape in shapes]
+        bodies += [Body(shape, "galvanised_steel", detail=LAP) for shape in self._splices(course, end, sides)]
+        return bodies + [Body(shape, "reflector") for shape in self._reflectors(course, end, sides)]
 
     def _beams(self, course: Course, end: float, sides: tuple[float, ...]) -> Iterator[Float]:
         ramp = self.ramp_length(end)
@@ -105,6 +152,44 @@ class Guardrail(LengthwiseThing):
             beside = side * (POST[0] + spacer) / 2.0
             shapes += boxes(feet, left, (spacer * share, long, high), top - below - high / 2.0, beside)
         return shapes
+
+    def splice_stations(self, end: float) -> Float:
+        """Return the stations (N,), m, of the splices' middles if it ends at ``end`` (m)."""
+        count = max(math.ceil((end - self.start_station) / self.beam_length - 1e-4) - 1, 0)
+        return self.start_station + (1.0 + np.arange(count)) * self.beam_length
+
+    def reflector_stations(self, end: float) -> Float:
+        """Return the stations (N,), m, of the reflectors if it ends at ``end`` (m); none on its terminals."""
+        if not self.reflector_spacing:
+            return np.empty(0)
+        ramp = self.ramp_length(end)
+        count = int((end - self.start_station - 2.0 * ramp) / self.reflector_spacing + 1e-4) + 1
+        return self.start_station + ramp + np.arange(count) * self.reflector_spacing
+
+    def _splices(self, course: Course, end: float, sides: tuple[float, ...]) -> Iterator[Float]:
+        """Yield the sections of what a splice adds in front of a beam: the upper sheet, and the bolts' heads on it."""
+        # A head stands upright on its flank, so in depth it reaches farther; on a terminal it stays level.
+        flattest = min(math.cos(turn) for _, _, turn in BOLTS)
+        proud = (LAP_SHEET + BOLT_HEAD[1] + BOLT_HEAD[0] * _STEEPEST) / flattest
+        profile = np.array([*((x + proud, z) for x, z in BEAM), *reversed(BEAM)])
+        across = profile[:, 0] + POST[0] / 2.0 + SPACER[self.faces]
+        middle = self.splice_stations(end)
+        station = np.add.outer(middle, (-LAP / 2.0, LAP / 2.0)).ravel().clip(self.start_station, end)
+        feet, left = course.feet(station, self.offset_at(station)), course.left(station)
+        height = self._top(end, station)[:, None] + profile[:, 1]
+        for side in sides:
+            yield from sweep(feet, left, side * across, height).reshape(len(middle), 2, len(profile), 3)
+
+    def _reflectors(self, course: Course, end: float, sides: tuple[float, ...]) -> Iterator[Float]:
+        """Yield the sections of the reflectors' plates, one behind and one before each station."""
+        station = self.reflector_stations(end)
+        feet, left = course.feet(station, self.offset_at(station)), course.left(station)
+        ahead = np.stack([left[:, 1], -left[:, 0], left[:, 2]], axis=1) * (REFLECTOR_PLATE / 2.0)
+        corners = np.array([(x, sign * high / 2.0) for sign, edge in ((-1, 1), (1, -1)) for x, high in REFLECTOR[::edge]])
+        across = corners[:, 0] + POST[0] / 2.0 + SPACER[self.faces]
+        height = (self._top(end, station) + REFLECTOR_MIDDLE)[:, None] + corners[:, 1]
+        for side in sides:
+            yield from np.stack([sweep(feet + by * ahead, left, side * across, height) for by in (-1.0, 1.0)], axis=1)
 
     def _top(self, end: float, station: Float) -> Float:
         """Return the height (N,) of the beam's top above the surface, m."""

@@ -23,7 +23,7 @@ from tests.helpers.scenes.furnished_road import (
 
 pytestmark = pytest.mark.any_blender
 
-PARTS = ("concrete_barriers", "noise_barriers", "temporary_barriers")
+PARTS = ("concrete_barriers", "guardrails", "noise_barriers", "temporary_barriers")
 PANELS = {"aluminium": 0.12, "concrete": 0.2, "wood": 0.14, "glass": 0.06}
 PANEL_MATERIALS = {"aluminium": "noise_aluminium", "concrete": "noise_concrete", "wood": "noise_wood"}
 PANEL_MATERIALS |= {"glass": "acrylic_glass"}
@@ -49,6 +49,8 @@ OBJECTS: dict[str, Data] = {
         )
         for i, (kind, thickness) in enumerate(PANELS.items())
     },
+    "rail": line("Guardrail", 82.0, 190.0, 14.9, faces="right", reflector_spacing=30.0),
+    "bare-rail": line("Guardrail", 210.0, 230.0, 0.0, faces="both", reflector_spacing=0.0, beam_length=6.0),
     "left-wall": line("NoiseBarrier", 100.0, 148.0, 19.0, post_spacing=5.0),
     "steel": line("TemporaryBarrier", 100.0, 181.0, -5.0, end_offset=-8.0),
     "plastic": line(
@@ -127,6 +129,46 @@ class TestConcrete:
         _, offset = road.located(mesh.vertices)
         foot = np.abs(offset - OBJECTS[name]["offset"]) > 0.26
         assert above(road, mesh.vertices[foot]).min() < -0.05
+
+
+@pytest.mark.keep_scene
+class TestGuardrail:
+    def parts(self, road: FurnishedRoad, name: str, low: float, high: float) -> tuple[Float, list[Float]]:
+        """Return the stations (N,) of the pieces whose length along the road lies between two lengths, and they."""
+        found = [p for p in pieces(road.mesh(name)) if low < np.ptp(road.located(p.reshape(-1, 3))[0]) < high]
+        middles = [road.located(p.reshape(-1, 3))[0] for p in found]
+        return np.array([(s.min() + s.max()) / 2.0 for s in middles]), found
+
+    @pytest.mark.parametrize("name", ["rail", "bare-rail"])
+    def test_sheets_are_spliced_at_their_length(self, road: FurnishedRoad, name: str) -> None:
+        item = OBJECTS[name]
+        start, length, sides = item["start_station"], item.get("beam_length", 4.0), 2 if item["faces"] == "both" else 1
+        expected = np.repeat(np.arange(start + length, item["end_station"] - 1e-6, length), sides)
+        station, laps = self.parts(road, name, 0.3, 0.4)
+        assert np.sort(station) == pytest.approx(expected, abs=MEASURE)
+        deepest = [np.abs(road.located(points)[1] - item["offset"]).max() for points in (
+            np.concatenate(laps).reshape(-1, 3), np.concatenate(self.parts(road, name, 10.0, 200.0)[1]).reshape(-1, 3)
+        )]  # fmt: skip
+        # A sheet of 3 mm lies over the beam.
+        assert deepest[0] - deepest[1] == pytest.approx(0.003, abs=1e-3)
+        bolts, heads = self.parts(road, name, 0.02, 0.05)
+        assert len(bolts) == 6 * len(expected)
+        assert np.sort(bolts) == pytest.approx(np.sort(np.repeat([expected - 0.1, expected + 0.1], 3)), abs=MEASURE)
+        # The disc below is on the sheet; the head is upright on the flank.
+        assert all(np.linalg.norm(np.ptp(head.reshape(-1, 3), axis=0)) < 0.06 for head in heads)
+
+    def test_reflectors_stand_across_the_trough(self, road: FurnishedRoad) -> None:
+        mesh = road.mesh("rail")
+        plates = pieces(mesh, of_material(mesh, "reflector"))
+        station = [road.located(plate.mean(axis=(0, 1))[None])[0][0] for plate in plates]
+        assert sorted(station) == pytest.approx([94.0, 124.0, 154.0], abs=MEASURE)
+        for plate in plates:
+            assert open_edges(plate) == 0
+            station, offset = road.located(plate.reshape(-1, 3))
+            over = plate[..., 2] - road.point(station.mean(), 14.9)[2]
+            assert (over.min(), over.max()) == (pytest.approx(0.55, abs=MEASURE), pytest.approx(0.64, abs=MEASURE))
+            assert 14.9 - offset.min() == pytest.approx(0.05 + 0.07 + 0.1, abs=MEASURE)
+        assert "reflector" not in {road.mesh("bare-rail").materials[i] for i in road.mesh("bare-rail").material}
 
 
 @pytest.mark.keep_scene
@@ -261,7 +303,7 @@ class TestTemporary:
 class TestAll:
     def test_faces_carry_class_instance_and_material(self, road: FurnishedRoad) -> None:
         classes = {"ConcreteBarrier": "barrier", "NoiseBarrier": "noise_barrier"}
-        classes["TemporaryBarrier"] = "construction_barrier"
+        classes |= {"TemporaryBarrier": "construction_barrier", "Guardrail": "guardrail"}
         for name, item in OBJECTS.items():
             mesh = road.mesh(name)
             assert set(mesh.class_id) == {class_id(classes[item["type"]])}
@@ -274,7 +316,7 @@ class TestAll:
             assert np.linalg.norm(np.cross(b - a, c - a), axis=1).min() / 2 > 1e-7, name
 
     def test_triangles_are_few(self, road: FurnishedRoad) -> None:
-        most = {"ConcreteBarrier": 20, "NoiseBarrier": 130, "TemporaryBarrier": 60}
+        most = {"ConcreteBarrier": 20, "Guardrail": 120, "NoiseBarrier": 130, "TemporaryBarrier": 60}
         for name, item in OBJECTS.items():
             per_metre = len(road.mesh(name).triangles) / (item["end_station"] - item["start_station"])
             scale = 4.0 / item.get("segment_length", 4.0)
@@ -297,7 +339,7 @@ def test_a_changed_input_changes_the_mesh() -> None:
 
 
 def test_stretches_of_a_road_have_the_same_barriers_together() -> None:
-    names = ("step", "wood", "steel")
+    names = ("step", "rail", "wood", "steel")
     whole = FurnishedRoad({name: OBJECTS[name] for name in names}, PARTS)
     wanted = {name: _solids(whole, name) for name in names}
     found: dict[str, int] = dict.fromkeys(names, 0)
@@ -311,11 +353,13 @@ def test_stretches_of_a_road_have_the_same_barriers_together() -> None:
         ends += [station.min(), station.max()]
     assert ends == pytest.approx([50.0, 150.0, 150.0, 201.3], abs=MEASURE)
     # An element that the border cuts is one in either stretch.
-    assert found == {"step": 2, "wood": wanted["wood"], "steel": wanted["steel"] + 1}
+    assert found == {"step": 2, "rail": wanted["rail"], "wood": wanted["wood"], "steel": wanted["steel"] + 1}
 
 
 def _solids(road: FurnishedRoad, name: str) -> int:
     mesh = road.mesh(name)
+    if name == "rail":
+        return sum(np.ptp(road.located(piece.reshape(-1, 3))[0]) < 0.05 for piece in pieces(mesh))
     chosen = {"wood": of_material(mesh, "galvanised_steel"), "steel": ~of_material(mesh, "reflector")}
     return len(pieces(mesh, chosen.get(name, slice(None))))
 
