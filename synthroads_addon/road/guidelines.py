@@ -126,6 +126,11 @@ INTERCHANGE_SPACING = {"EKA1A": 8000.0, "EKA1B": 5000.0, "EKA2": 5000.0, "EKA3":
 LANE_TAPER_LENGTH = {"EKA1A": 120.0, "EKA1B": 120.0, "EKA2": 100.0, "EKA3": 80.0}
 """Shortest stretch over which a lane begins or ends, m."""
 
+# --- earthworks and drainage (RAA, RAS-Ew; unconfirmed) ---------------------------------------------------------------
+
+SWALE_DEPTH_SHARE = 0.2
+"""Depth of a swale as a share of its width."""
+
 # --- barriers (RPS) -----------------------------------------------------------------------------------------------
 
 EMBANKMENT_HEIGHT, EMBANKMENT_RUN = 3.0, 3.0

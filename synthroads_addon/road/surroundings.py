@@ -32,6 +32,18 @@ class Terrain(RoadObject):
     batter_slope: float = quantity(
         1.5, ge=0.5, le=10, unit="m/m", description="Horizontal run of the batter per metre of height."
     )
+    crest_length: float = quantity(
+        0.0, ge=0, le=5, unit="m", description="Tangent length of the rounded crest of embankments."
+    )
+    rounding_length: float = quantity(
+        0.0, ge=0, le=10, unit="m", description="Tangent length of the rounding of batter and ground; on low ones less."
+    )
+    swale_width: float = quantity(
+        0.0, ge=0, le=5, unit="m", description="Width of the swale between verge and batter of a cutting; 0 for none."
+    )
+    swale_depth: float = quantity(
+        0.0, ge=0, le=1, unit="m", description="Depth of that swale's middle below the verge's edge."
+    )
     seed: int = quantity(ge=0, le=2**63 - 1, unit="1", description="Seed of the undulation.")
     elevation_model: str | None = Field(
         None, description="File of a digital elevation model that takes the undulation's place."

@@ -10,6 +10,7 @@ from ..base.arrays import Float
 from ..base.files import change_stamp
 from ..base.random_streams import stream
 from ..base.schema import round_value
+from .batter import batter_height, is_shaped
 from .elevation_model import Corridor, ElevationModel, read_elevation_model
 from .geometry import RoadGeometry, alignment_of, profile_of
 from .parameters import AlignmentObject
@@ -111,8 +112,8 @@ def fit_to_ground(
 def surface_elevation(geometry: RoadGeometry, station: Float, offset: Float) -> Float:
     """Return the local elevation (N,), m, of road, batter or ground at stations and offsets (N,); no plants.
 
-    Beside the road the batter rises or falls from the verge's edge until it meets the ground; without a terrain the
-    road's edge goes on level.
+    Beside the road the batter rises or falls from the verge's edge until it meets the ground, with swale and roundings
+    as in `batter`; without a terrain the road's edge goes on level.
     """
     edges = geometry.offsets(station)
     within = np.clip(offset, edges[:, -1], edges[:, 0])
@@ -120,9 +121,12 @@ def surface_elevation(geometry: RoadGeometry, station: Float, offset: Float) -> 
     terrain = geometry.parameters.terrain
     beside = np.flatnonzero(within != offset)
     if terrain is not None and len(beside):
-        reach = np.abs(offset - within)[beside] / terrain.batter_slope
-        ground = ground_elevation(geometry, terrain, station[beside], offset[beside])
-        height[beside] = np.clip(ground, height[beside] - reach, height[beside] + reach)
+        distance, edge = np.abs(offset - within)[beside], height[beside]
+        above = ground_elevation(geometry, terrain, station[beside], offset[beside]) - edge
+        at_edge = above
+        if is_shaped(terrain):
+            at_edge = ground_elevation(geometry, terrain, station[beside], within[beside]) - edge
+        height[beside] = edge + batter_height(terrain, distance, above, at_edge)
     return height
 
 

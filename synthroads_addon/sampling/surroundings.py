@@ -11,7 +11,7 @@ from ..base.arrays import Bool, Float, Index
 from ..base.random_streams import stream
 from ..base.schema import round_value
 from ..materials.textures import texture_sets
-from ..road.guidelines import OBSTACLE_DISTANCE
+from ..road.guidelines import OBSTACLE_DISTANCE, SWALE_DEPTH_SHARE
 from ..road.objects import AnyWidth, RoadObject, Side, least_width, nominal_width, width_at, width_kinks
 from ..road.parameters import AlignmentObject
 from ..road.section_geometry import CarriagewaySection
@@ -60,7 +60,10 @@ def sample_terrain(scenario: RoadScenario, seed: int) -> Terrain:
     names = ("embankment_height", "undulation", "wavelength", "batter_slope")
     drawn = {name: draw(rng, getattr(scenario, name)) for name in names}
     given = {"half_width": scenario.half_width, "elevation_model": scenario.elevation_model}
-    return Terrain(instance=1, seed=_seed(rng), **drawn, **given)
+    foot = stream(seed, "terrain", "foot")
+    shape = {name: draw(foot, getattr(scenario, name)) for name in ("crest_length", "rounding_length", "swale_width")}
+    shape["swale_depth"] = round_value(shape["swale_width"] * SWALE_DEPTH_SHARE)
+    return Terrain(instance=1, seed=_seed(rng), **drawn, **shape, **given)
 
 
 def sample_environment(scenario: RoadScenario, seed: int) -> Environment:

@@ -260,6 +260,11 @@ class RoadScenario(ClosedModel):
     undulation: Interval = interval(0.05, 0.8, "m", "Standard deviation of the ground.")
     wavelength: Interval = interval(30.0, 60.0, "m", "Shortest wavelength of the ground's undulation.")
     batter_slope: Interval = interval(1.5, 2.5, "m/m", "Run of the batter per height.")
+    crest_length: Interval = interval(0.5, 1.0, "m", "Tangent length of embankments' rounded crest.", title="Crest")
+    rounding_length: Interval = interval(2.0, 3.0, "m", "Tangent length of toes' rounding.", title="Rounded Toe")
+    swale_width: Interval = interval(
+        1.0, 2.5, "m", "Width of swales in cuttings, whose depth is a fifth of it; 0 for none.", title="Swale"
+    )
     half_width: float = quantity(78.0, "m", "Reach built to either side.", (5, 1000), title="Reach Each Side")
     elevation_model: str | None = Field(
         None,

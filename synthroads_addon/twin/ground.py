@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..road.alignment import clip_offset
+from ..road.batter import batter_begin, is_shaped, rounding_height, shaped_width, swale_share
 from ..road.geometry import RoadGeometry
 from ..road.surroundings import Terrain
 from ..road.terrain import ground_elevation
@@ -23,6 +24,10 @@ _LOOKED_AT = 5_000
 """Triangles at whose middles and edges the distance is measured."""
 _FIRST_LOOK = 1.0  # m, between places at which a batter's toe is looked for
 _HALVINGS = 30
+_NEAR, _TOE = 8, 8
+"""Pieces of the ground's cross-section over crest or swale, and over the rounding of the toe."""
+_LEAST = 0.3
+"""Width of the crest's or swale's columns at least, m."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +39,9 @@ class GroundSide:
         sign: 1 on the left, -1 on the right.
         station: (R,) of the rows, m.
         edge: (R,) offsets of the road's edge, m.
-        distance: (R, K) of the columns from there, m: the edge, the batter's toe, and evenly beyond it.
+        distance: (R, K) of the columns from there, m: the edge; where batters are rounded crest or swale; the toe; and
+            evenly beyond it.
+        swale: (R,) share of its full depth that the swale has; 0 where there is none.
     """
 
     geometry: RoadGeometry
@@ -42,6 +49,7 @@ class GroundSide:
     station: Float
     edge: Float
     distance: Float
+    swale: Float
 
     def points(self, distance: Float) -> Float:
         """Return the ground's local points (R * K, 3) at distances (R, K) outwards from the road's edge, m."""
@@ -67,6 +75,15 @@ class GroundSide:
         corners = np.concatenate([first, beyond[:, ::-1]] if self.sign > 0.0 else [first[:, ::-1], beyond])
         points = np.concatenate([grid, seam])
         return upward_triangles(points, corners)
+
+    def swale_faces(self, width: float) -> Faces:
+        """Return the polygons of the swale, so wide (m), beside the road; none where the road is in no cutting."""
+        rows = np.flatnonzero((self.swale[:-1] > 0.0) | (self.swale[1:] > 0.0))
+        across = np.linspace(0.0, width, _NEAR + 1)
+        points = self.points(np.broadcast_to(across, (len(self.station), len(across))))
+        corners = grid_corners(len(self.station), len(across)).reshape(len(self.station) - 1, -1, 4)[rows].reshape(-1, 4)
+        triangles = split_quads(corners)
+        return upward_triangles(points, triangles[:, ::-1] if self.sign > 0.0 else triangles)
 
     def clip_to_band(self, start: float, end: float) -> Float:
         """Return the column distances (R, K) clipped to a band between two distances from the road's edge, m."""
@@ -109,34 +126,63 @@ def triangulate_ground(geometry: RoadGeometry, terrain: Terrain, road: Float, to
     return made
 
 
+def swales(name: str, terrain: Terrain, ground: GroundMesh) -> Iterator[tuple[str, Faces]]:
+    """Yield (name, polygons) of the swales on either side, those that are anywhere; the terrain's name begins them."""
+    for side, part in zip(("left", "right"), ground.sides, strict=True):
+        if part.swale.any() and len(faces := part.swale_faces(terrain.swale_width)):
+            yield f"{name}/swale-{side}", faces
+
+
 def _side(geometry: RoadGeometry, terrain: Terrain, sign: float, spacing: float) -> GroundSide:
     even = np.linspace(0.0, geometry.length, max(2, int(np.ceil(geometry.length / spacing)) + 1))
     kinks = [s for section in geometry.sections.values() for s in section.kinks() if 0.0 < s < geometry.length]
     station = np.unique(np.concatenate([even, kinks]))
     edge = geometry.offsets(station)[:, 0 if sign > 0.0 else -1]
     reach = np.maximum(terrain.half_width - sign * edge, 0.0)
-    toe = _toe_distance(geometry, terrain, station, edge, reach * sign)
+    at_edge = ground_elevation(geometry, terrain, station, edge) - geometry.elevation(station, edge)
+    toe = _toe_distance(geometry, terrain, station, edge, reach * sign, at_edge)
+    columns = _columns_to_toe(terrain, toe, at_edge)
     further = np.arange(1, int(np.ceil(reach.max() / spacing)) + 1) * spacing
-    beyond = np.clip(further[None, :], toe[:, None], reach[:, None])
-    return GroundSide(geometry, sign, station, edge, np.column_stack([np.zeros(len(station)), toe, beyond]))
+    beyond = np.clip(further[None, :], columns[:, -1:], reach[:, None])
+    swale = swale_share(np.nan_to_num(at_edge)) * (terrain.swale_width > 0.0)
+    distance = np.minimum(np.column_stack([np.zeros(len(station)), columns, beyond]), reach[:, None])
+    return GroundSide(geometry, sign, station, edge, distance, swale)
 
 
-def _toe_distance(geometry: RoadGeometry, terrain: Terrain, station: Float, edge: Float, reach: Float) -> Float:
+def _columns_to_toe(terrain: Terrain, toe: Float, at_edge: Float) -> Float:
+    """Return the distances (R, C) from the road's edge, m, of the columns up to where the batter has met the ground."""
+    if not is_shaped(terrain):
+        return toe[:, None]
+    at_edge = np.nan_to_num(at_edge)
+    # Not at the edge itself, where the road's points are.
+    shaped = np.maximum(shaped_width(terrain, at_edge), _LEAST)
+    tangent = rounding_height(terrain, at_edge) * terrain.batter_slope
+    begin = np.maximum(toe - tangent, shaped)
+    end = np.maximum(toe + tangent, begin)
+    near = shaped[:, None] * (np.arange(1, _NEAR + 1) / _NEAR)
+    return np.column_stack([near, begin[:, None] + (end - begin)[:, None] * np.linspace(0.0, 1.0, _TOE + 1)])
+
+
+def _toe_distance(
+    geometry: RoadGeometry, terrain: Terrain, station: Float, edge: Float, reach: Float, at_edge: Float
+) -> Float:
     """Return the distance (R,) from the road's edge at which its batter meets the ground, m; the reach if nowhere.
 
     Args:
         geometry, terrain: the road and its ground.
         station, edge: (R,) stations, and offsets of the road's edge.
         reach: (R,) largest distance, negative on the right.
+        at_edge: (R,) height of the ground above the edge there, m.
     """
     level, far = geometry.elevation(station, edge), np.abs(reach)
+    begin = batter_begin(terrain, at_edge)[:, None]
 
     def excess_height(distance: Float) -> Float:
         """Return by how much the ground's height over the edge exceeds the batter's (R, D), m; -1 where unknown."""
         every = np.repeat(station, distance.shape[1])
         offset = (edge[:, None] + np.sign(reach)[:, None] * distance).ravel()
         ground = ground_elevation(geometry, terrain, every, offset).reshape(distance.shape)
-        apart = np.abs(ground - level[:, None]) - distance / terrain.batter_slope
+        apart = np.abs(ground - level[:, None]) - np.maximum(distance - begin, 0.0) / terrain.batter_slope
         return np.where(np.isnan(apart), -1.0, apart)
 
     steps = np.linspace(0.0, 1.0, max(2, int(np.ceil(far.max() / _FIRST_LOOK)) + 1))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import bpy
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +11,7 @@ from numpy.typing import NDArray
 from ...base.classes import class_id
 from ...base.turns.stepper import run_aside
 from ...road.alignment import clip_offset
+from ...road.batter import SWALE_FROM, SWALE_FULL
 from ...road.geometry import RoadGeometry
 from ...road.surroundings import Terrain
 from ...road.terrain import GROUND_MARGIN, ground_elevation
@@ -34,6 +37,18 @@ Float = NDArray[np.float64]
 
 _FINE = 0.12
 """Share of even spacing among the columns; the rest grows away from the road."""
+_NEAR, _TOE = 10, 8
+"""Pieces of the ground's cross-section from the road's edge to where the batter is a plane, and of its rounded toe."""
+
+
+class _Shape(Inputs):
+    """Inputs of the batter's shape, as `road.batter` has them."""
+
+    batter_slope = number(1.5, (0.5, 10.0), "Run of the batter per metre of height (m/m)")
+    crest_length = metres(0.0, (0.0, 5.0), "Tangent length of the rounded crest of embankments")
+    rounding_length = metres(0.0, (0.0, 10.0), "Tangent length of the rounding of batter and ground; on low ones less")
+    swale_width = metres(0.0, (0.0, 5.0), "Width of the swale between verge and batter of a cutting; 0 for none")
+    swale_depth = metres(0.0, (0.0, 1.0), "Depth of that swale's middle below the verge's edge")
 
 
 class _Terrain(Inputs):
@@ -41,16 +56,21 @@ class _Terrain(Inputs):
     road = socket("Object", "The road, whose outermost edges the terrain begins at")
     ground = socket("Object", "Surface of the ground before the road was built")
     half_width = metres(60.0, (5.0, 1000.0), "Reach to either side of the axis")
-    batter_slope = number(1.5, (0.5, 10.0), "Run of the batter per metre of height (m/m)")
-    columns = integer(40, (3, 500), "Points across each side, closer near the road")
+
+
+class _Columns(Inputs):
+    columns = integer(40, (3, 500), "Points across each side beyond the batter, closer near the road")
+
+
+class _Labels(Inputs):
     instance = instance_number()
     material = material_of("the ground", "grass_ground")
 
 
 @makes_group("SR Terrain")
 def terrain_group(tree: Tree) -> None:
-    """Ground on both sides of the road, joined to it by batters of a given slope."""
-    terrain = _Terrain(tree)
+    """Ground on both sides of the road, joined to it by batters with swales in cuttings and rounded edges."""
+    terrain, shape, columns, labels = _Terrain(tree), _Shape(tree), _Columns(tree).columns, _Labels(tree)
 
     with tree.frame("Geometry"):
         axis, surface = op.object_geometry(terrain.backbone), op.object_geometry(terrain.ground)
@@ -67,11 +87,11 @@ def terrain_group(tree: Tree) -> None:
                 ground=surface,
                 side=sign,
                 half_width=terrain.half_width,
-                batter_slope=terrain.batter_slope,
-                columns=terrain.columns,
+                **shape.values,
+                columns=columns,
             ).value)  # fmt: skip
     with tree.frame("Labels"):
-        mesh = op.label(op.join(*sides), class_id("ground"), terrain.instance, terrain.material)
+        mesh = op.label(op.join(*sides), class_id("ground"), labels.instance, labels.material)
     tree.output("Mesh", mesh, description="Terrain; its points carry their distance from the road")
 
 
@@ -81,21 +101,20 @@ class _TerrainInputs(Inputs):
     ground = socket("Geometry", "Surface of the ground before the road was built")
     side = number(1.0, (-1.0, 1.0), "+1 for the left, -1 for the right side")
     half_width = metres(60.0, (5.0, 1000.0), "Reach from the axis")
-    batter_slope = number(1.5, (0.5, 10.0), "Run of the batter per metre of height (m/m)")
-    columns = integer(40, (3, 500), "Points from the edge outwards")
 
 
 @makes_group("SR Terrain Side")
 def _side_group(tree: Tree) -> None:
-    """Terrain on one side: from the road's edge outwards, between the batter's two planes."""
-    inputs = _TerrainInputs(tree)
-    backbone, side, columns = inputs.backbone, inputs.side, inputs.columns
+    """Terrain on one side: from the road's edge outwards over swale or crest, batter and rounded toe to the ground."""
+    inputs, shape, columns = _TerrainInputs(tree), _Shape(tree), _Columns(tree).columns
+    backbone, side = inputs.backbone, inputs.side
 
     with tree.frame("Columns from left to right, rows as the backbone's"):
-        # One more than those that are spread: the first two are the edge and the batter's toe.
-        mesh, column, number = op.grid(tree, columns + 1, op.point_count(backbone))
-        rank = op.switch(side > 0.0, column, columns - column)
-        outwards = op.maximum(rank - 1, 0) / (columns - 1.0)
+        # Those beyond the toe's last one are spread.
+        last = columns + (_NEAR + _TOE)
+        mesh, column, number = op.grid(tree, last + 1, op.point_count(backbone))
+        rank = op.switch(side > 0.0, column, last - column)
+        outwards = op.maximum(rank - (_NEAR + _TOE), 0) / op.maximum(columns - 1.0, 1.0)
         spread = outwards * _FINE + op.power(outwards, 2.2) * (1.0 - _FINE)
     with tree.frame("Offset, cut where it would fold"):
         axis, left, curvature = row(backbone, number)
@@ -104,28 +123,78 @@ def _side_group(tree: Tree) -> None:
         width = op.maximum(inputs.half_width - start_offset * side, 0.0)
         farthest = (limit_offset(start_offset + width * side, curvature) - start_offset) * side
         spread_out = (limit_offset(start_offset + width * spread * side, curvature) - start_offset) * side
-    with tree.frame("None but the edge lies within the batter, whose toe is a column"):
-        edge = op.store(inputs.edge, "toe", _toe(tree, inputs))
-        toe = op.minimum(op.sample_index(edge, op.named_attribute(tree, "toe"), number), farthest)
-        distance = op.switch(rank > 0, 0.0, op.maximum(spread_out, toe))
-        beyond = distance * side
+    with tree.frame("On the edge's points: the ground's height, the batter's toe"):
+        above = _ground_above(tree, inputs.ground, op.position(tree))
+        edge = op.store(op.store(inputs.edge, "above", above), "toe", _toe(tree, inputs, shape, above))
+        at_edge = op.sample_index(edge, op.named_attribute(tree, "above"), number)
+        toe = op.sample_index(edge, op.named_attribute(tree, "toe"), number)
+    with tree.frame("Columns: crest or swale, the toe's rounding, the ground"):
+        room = op.minimum(shape.rounding_length / shape.batter_slope, op.unary("ABSOLUTE", at_edge))
+        shaped = op.switch(at_edge > 0.0, shape.crest_length * 2.0, shape.swale_width)
+        near = shaped * op.minimum(rank * (1.0 / _NEAR), 1.0)
+        tangent = room * shape.batter_slope
+        begin = op.maximum(toe - tangent, shaped)
+        end = op.maximum(toe + tangent, begin)
+        rounded = begin + (end - begin) * op.clip((rank - (_NEAR + 1)) * (1.0 / (_TOE - 1)), 0.0, 1.0)
+        distance = op.switch(rank > _NEAR, near, op.maximum(spread_out, rounded))
+        distance = op.minimum(distance, farthest)
     with tree.frame("Height: the ground, as far as the batter reaches to it"):
-        place = start + left * beyond
+        place = start + left * (distance * side)
         rise = _ground_above(tree, inputs.ground, place)
-        steepest = distance / inputs.batter_slope
-        height = op.maximum(op.minimum(rise, steepest), -steepest)
+        height = tree.call(_batter_group(), **shape.values, distance=distance, ground=rise, at_edge=at_edge).value
     with tree.frame("Mesh"):
         mesh = op.store(mesh, "distance", distance)
         mesh = op.set_position(mesh, place + op.vector(tree, 0.0, 0.0, height))
         tree.output("Mesh", op.delete_degenerate(mesh))
 
 
-def _toe(tree: Tree, inputs: _TerrainInputs) -> Value:
+class _Beside(Inputs):
+    distance = metres(0.0, (0.0, 1000.0), "Distance from the road's edge")
+    ground = metres(0.0, FAR, "Height of the ground there above the edge")
+    at_edge = metres(0.0, FAR, "Height of the ground at the edge above it")
+
+
+@makes_group("SR Batter Height")
+def _batter_group(tree: Tree) -> None:
+    """Height above the road's edge of what lies beside it: crest, swale, batter, rounded toe, ground."""
+    shape, beside = _Shape(tree), _Beside(tree)
+    distance, ground, at_edge = beside.distance, beside.ground, beside.at_edge
+    with tree.frame("Swale: deeper as the cutting begins"):
+        wide = shape.swale_width
+        share = op.clip((at_edge - SWALE_FROM) * (1.0 / (SWALE_FULL - SWALE_FROM)), 0.0, 1.0)
+        deep = op.switch(wide > 0.0, 0.0, share * shape.swale_depth)
+        turn = op.minimum(distance / op.maximum(wide, 1e-6), 1.0) * math.pi
+        hollow = deep * op.power(op.unary("SINE", turn), 2.0)
+    with tree.frame("Planes of the batter, rounded where they begin"):
+        upper = _rise(distance - wide * 0.5, wide * 0.25) / shape.batter_slope - hollow
+        lower = -(_rise(distance, shape.crest_length) / shape.batter_slope)
+    with tree.frame("Where they meet the ground"):
+        room = op.minimum(shape.rounding_length / shape.batter_slope, op.unary("ABSOLUTE", at_edge))
+        cutting = op.maximum(-_smooth_maximum(-ground, -upper, room), lower - deep * 2.0)
+        embankment = op.minimum(_smooth_maximum(ground, lower, room), upper)
+    tree.output("Height", op.switch(at_edge > 0.0, embankment, cutting), description="Above the road's edge (m)")
+
+
+def _rise(distance: Value, tangent: Value) -> Value:
+    """Add nodes for how far a plane of slope 1 has risen, rounded from level over two tangents (m)."""
+    beyond = op.maximum(distance, 0.0)
+    curve = op.power(beyond, 2.0) / op.maximum(tangent * 4.0, 1e-6)
+    return op.switch(beyond < tangent * 2.0, beyond - tangent, curve)
+
+
+def _smooth_maximum(first: Value, second: Value, room: Value) -> Value:
+    """Add nodes for the larger of two heights, rounded by a parabola where they differ by less than `room`, m."""
+    near = op.maximum(room - op.unary("ABSOLUTE", first - second), 0.0)
+    return op.maximum(first, second) + op.power(near, 2.0) / op.maximum(room * 4.0, 1e-6)
+
+
+def _toe(tree: Tree, inputs: _TerrainInputs, shape: _Shape, above: Value) -> Value:
     """Add nodes for the distance (m) from the edge at which the batter meets the ground; a field on its points."""
-    start = op.position(tree)
     _, left, _ = row(inputs.backbone, op.index(tree))
+    begin = op.switch(above > 0.0, shape.crest_length, shape.swale_width * 0.75)
+    start = op.position(tree) + left * (begin * inputs.side)
     rises = op.switch(_ground_above(tree, inputs.ground, start) > 0.0, -1.0, 1.0)
-    along = left * (inputs.side * inputs.batter_slope) + op.vector(tree, 0.0, 0.0, rises)
+    along = left * (inputs.side * shape.batter_slope) + op.vector(tree, 0.0, 0.0, rises)
     ray = tree.node(
         "GeometryNodeRaycast",
         target_geometry=inputs.ground,
@@ -133,7 +202,8 @@ def _toe(tree: Tree, inputs: _TerrainInputs) -> Value:
         ray_direction=along,
         ray_length=2000.0,
     )
-    return op.switch(ray["Is Hit"], FAR[1], ray["Hit Distance"] * (inputs.batter_slope / op.length(along)))
+    reach = ray["Hit Distance"] * (shape.batter_slope / op.length(along))
+    return op.switch(ray["Is Hit"], FAR[1], begin + reach)
 
 
 def _ground_above(tree: Tree, ground: Value, place: Value) -> Value:

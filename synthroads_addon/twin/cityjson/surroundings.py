@@ -13,7 +13,7 @@ from ...road.surroundings import Landscape, Terrain, Vegetation
 from ...road.vegetation.species import PlantShape
 from ..attributes import attributes_of
 from ..faces import Faces, Float, loft
-from ..ground import GroundMesh, triangulate_ground
+from ..ground import GroundMesh, swales, triangulate_ground
 from ..plants import PlacedPlant, grass_strips, placed_plants
 from ..trace import NO_LAND
 from ..vehicles import placed_vehicles
@@ -35,6 +35,8 @@ def add_surroundings(model: CityModel, geometry: RoadGeometry, stations: Float, 
     for name, terrain in geometry.parameters.of_type(Terrain).items():
         ground = triangulate_ground(geometry, terrain, stations, tolerance)
         model.add(_terrain(name, terrain, ground))
+        for swale, faces in swales(name, terrain, ground):
+            model.add(_swale(swale, terrain, faces))
         _add_plants(model, geometry, ground)
     for name, landscape in geometry.parameters.of_type(Landscape).items():
         model.trace.record_loss(name, NO_LAND)
@@ -47,6 +49,15 @@ def _terrain(name: str, terrain: Terrain, ground: GroundMesh) -> CityObject:
     attributes = attributes_of(terrain) | {"class": terrain.points_class, "deviation": round(ground.deviation, 4)}
     shapes = (CityGeometry("CompositeSurface", _GROUND, (faces,)) for faces in ground.faces if len(faces))
     return CityObject(name, "TINRelief", attributes, tuple(shapes))
+
+
+def _swale(name: str, terrain: Terrain, faces: Faces) -> CityObject:
+    """Return the swales beside one side's verge as a Road: a ditch, whose surface is the terrain's too."""
+    about = {"instance": terrain.instance, "function": "ditch"}
+    measures = {"width": terrain.swale_width, "depth": terrain.swale_depth}
+    semantics = {"type": "AuxiliaryTrafficArea", "surfaceMaterial": ["grass"], "strip": "swale"} | about | measures
+    shape = CityGeometry("MultiSurface", _GROUND, (faces,), (semantics,), np.zeros(len(faces), np.int64))
+    return CityObject(name, "Road", about | {"class": terrain.points_class} | measures, (shape,))
 
 
 def _add_plants(model: CityModel, geometry: RoadGeometry, ground: GroundMesh) -> None:

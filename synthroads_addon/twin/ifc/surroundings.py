@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...road.surroundings import Landscape, Terrain, Vegetation
 from ...road.vegetation.species import PlantShape
 from ..faces import Faces, loft, triangulate
-from ..ground import GroundMesh, triangulate_ground
+from ..ground import GroundMesh, swales, triangulate_ground
 from ..plants import GrassStrip, PlacedPlant, grass_strips, placed_plants
 from ..trace import NO_LAND
 from ..vehicles import PlacedVehicle, placed_vehicles
@@ -49,6 +49,20 @@ def _write_ground(scene: Scene, name: str, item: Terrain, ground: GroundMesh) ->
     made = _geographic(scene, name, "TERRAIN", scene.ifc.shape(meshes, "Tessellation"))
     scene.ifc.assign_material(made, "grass_ground")
     scene.add_parameters(made, item)
+    for swale, faces in swales(name, item, ground):
+        _write_swale(scene, swale, item, faces)
+
+
+def _write_swale(scene: Scene, name: str, item: Terrain, faces: Faces) -> None:
+    """Add the swales of one side to its roadside, as a surface that is the terrain's too."""
+    ifc = scene.ifc
+    shape = ifc.shape([_add_open_mesh(scene, faces)], "Tessellation")
+    made = ifc.add_product("IfcGeographicElement", name, "USERDEFINED", "Swale", Representation=shape)
+    scene.contain(made, scene.parts[f"roadside-{name.rpartition('-')[2]}"])
+    ifc.assign_material(made, "grass_ground")
+    values = {"instance": ifc.value(item.instance), "class": ifc.value(item.points_class)}
+    values |= {name: ifc.value(getattr(item, f"swale_{name}"), "m") for name in ("width", "depth")}
+    ifc.add_properties(made, "SynthRoads", values)
 
 
 # --- plants ---------------------------------------------------------------------------------------------------------

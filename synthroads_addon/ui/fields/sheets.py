@@ -76,7 +76,8 @@ SHEETS = (
         "Terrain",
         "environment",
         2,
-        "road.embankment_height road.batter_slope road.undulation road.wavelength road.half_width road.elevation_model",
+        "road.embankment_height road.batter_slope road.crest_length road.rounding_length road.swale_width "
+        "road.undulation road.wavelength road.half_width road.elevation_model",
     ),
     PanelFields("landscape", "Landscape", "environment", 3, "road.landscape.*"),
     PanelFields(

@@ -24,7 +24,7 @@ from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import AlignmentObject, RoadParameters
 from synthroads_addon.road.section import Carriageway, LineMarking
 from synthroads_addon.road.surroundings import Landscape, Vegetation
-from synthroads_addon.road.terrain import ground_elevation
+from synthroads_addon.road.terrain import ground_elevation, surface_elevation
 from synthroads_addon.road.tessellation import sample_stations
 from synthroads_addon.road.things.delineator import Delineator
 from synthroads_addon.road.things.guardrail import Guardrail
@@ -241,21 +241,18 @@ class TestMarkings:
 
 @pytest.mark.keep_scene
 class TestTerrain:
-    def test_it_is_the_ground_between_the_batters_planes(self, demo: Built) -> None:
+    def test_it_is_the_analytic_ground(self, demo: Built) -> None:
         terrain = demo.parameters.terrain
         mesh = demo.mesh("Terrain")
         station, offset = demo.located(mesh.vertices)
         inside = (station > 0.0) & (station < demo.geometry.length)
         station, offset, z = station[inside], offset[inside], mesh.vertices[inside, 2]
-        edge_offset = np.clip(offset, *demo.geometry.offsets(0.0)[0, [-1, 0]])
-        edge = demo.surface(station, edge_offset)
-        ground = ground_elevation(demo.geometry, terrain, station, offset)
-        reach = np.abs(offset - edge_offset) / terrain.batter_slope
-        error = z - np.clip(ground, edge - reach, edge + reach)
+        error = z - surface_elevation(demo.geometry, station, offset)
         print(f"terrain: {np.abs(error).max() * 1000:.1f} mm off the ground at most")
         assert np.abs(error).max() < 0.015
-        assert (reach > 1.0).any()
-        assert np.abs(z - ground)[np.abs(offset) > 40.0].max() < 0.015
+        far = np.abs(offset) > 40.0
+        ground = ground_elevation(demo.geometry, terrain, station[far], offset[far])
+        assert np.abs(z[far] - ground).max() < 0.015
 
 
 @pytest.mark.keep_scene

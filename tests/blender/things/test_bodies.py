@@ -89,18 +89,32 @@ class TestBodies:
         assert [found.name for found in standing if not built.misfits(_changed(found, "height"))] == []
 
 
-@pytest.mark.parametrize("undulation", [0.0, 0.5])
-def test_the_ground_has_an_edge_at_the_batters_toe(undulation: float) -> None:
+SHAPE = {"crest_length": 0.8, "rounding_length": 3.0, "swale_width": 2.0, "swale_depth": 0.4}
+
+
+@pytest.mark.parametrize(
+    ("ground", "chord"),
+    [
+        ({"undulation": 0.0}, 1e-3),
+        # The ground itself has chords: 5 mm along, and as much across; roundings and swales have theirs.
+        ({"undulation": 0.5, "embankment_height": -0.4} | SHAPE, 2e-2),
+    ],
+)
+def test_the_ground_beside_the_road_is_the_analytic_one(ground: Data, chord: float) -> None:
     data = straight_road({})
-    data["terrain"]["undulation"] = undulation
+    data["terrain"] |= ground
     road = FurnishedRoad(data, [])
     rng = np.random.default_rng(1)
-    station, offset = rng.uniform(2.0, LENGTH - 2.0, 400), rng.uniform(15.6, 24.0, 400)
+    station, offset = rng.uniform(2.0, LENGTH - 2.0, 800), rng.uniform(15.6, 24.0, 800)
     plan = road.geometry.alignment.place(station, offset)
     known = surface_elevation(road.geometry, station, offset)
     found = road.surface(plan - road.origin[:2]) + road.origin[2]
-    # The ground itself has chords: 5 mm along, and as much across.
-    assert np.abs(found - known).max() < (1e-3 if undulation == 0.0 else 1e-2)
+    assert np.abs(found - known).max() < chord
+    vertices = road.mesh("Terrain").vertices
+    station, offset = road.located(vertices)
+    inside = (station > 0.5) & (station < LENGTH - 0.5)
+    known = surface_elevation(road.geometry, station[inside], offset[inside]) - road.origin[2]
+    assert np.abs(vertices[inside, 2] - known).max() < 2e-3
 
 
 @pytest.mark.slow
