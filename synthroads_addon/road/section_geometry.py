@@ -124,6 +124,7 @@ class CarriagewaySection:
             column = width_at(width, station)
             if kind == "hard_shoulder":
                 column = np.minimum.reduce([column, *(shape.hard_shoulder for shape in shapes)])
+                column = sum((shape.shoulder_extra for shape in shapes), column)
             elif kind == "verge":
                 column = sum((shape.verge_extra for shape in shapes), column)
             columns.append(column)

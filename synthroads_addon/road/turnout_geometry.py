@@ -14,6 +14,11 @@ STEP = 0.05
 Long enough that coordinates of 32 bits don't turn the faces over: they lie skew, some metres to one side."""
 NOSE_WIDTH = 1.0
 """Unpaved ground between hard shoulder and ramp at the nose, m."""
+_NOSE_TURN = np.arange(6) * (np.pi / 10.0)
+NOSE_ROUND = STEP / (1.0 - np.cos(_NOSE_TURN[1])) * (1.0 - np.cos(_NOSE_TURN))
+NOSE_SHARE = np.sin(_NOSE_TURN)
+"""Corners of the island's rounded nose, half an ellipse: distances behind the nose (m), and the shares of its width that
+it has there. The first piece is the step in which the pavement changes."""
 NOSE_BEFORE_END = 10.0
 """The nose lies at least this far before the ramp's end, m."""
 BLEND = 30.0
@@ -38,11 +43,13 @@ class TurnoutWidths:
     Attributes:
         strips: by kind, of `TURNOUT_STRIPS`.
         hard_shoulder: what is left of the main road's.
+        shoulder_extra: pavement between it and the rounded nose of the island.
         verge_extra: what the verge has in addition behind a ramp's end.
     """
 
     strips: dict[str, Float]
     hard_shoulder: Float
+    shoulder_extra: Float
     verge_extra: Float
 
 
@@ -78,6 +85,8 @@ class TurnoutShape:
         """Return the stations (m, unsorted) at which a width's rate of change, or a width, jumps."""
         last = self.turnout.length + STEP + BLEND if self.turnout.ramp else self.turnout.length
         marks = [self.station(w) for w in (0.0, self._taper, self._tip, last)]
+        if self.turnout.ramp:
+            marks += [self.nose_station(behind) for behind in NOSE_ROUND[2:].tolist()]
         return [*marks, *(station for step in self.steps() for station in step)]
 
     def steps(self) -> list[tuple[float, float]]:
@@ -102,9 +111,9 @@ class TurnoutShape:
         """Return the station of the gore's tip, m; only exits and entries have one."""
         return self.station(self._tip)
 
-    def nose_station(self) -> float:
-        """Return the station of the nose, m; only exits and entries have one."""
-        return self.station(self._tip + self.nose)
+    def nose_station(self, behind: float = 0.0) -> float:
+        """Return the station of the nose, or of a place ``behind`` it, m; only exits and entries have one."""
+        return self.station(self._tip + self.nose + behind)
 
     def bend(self, station: Float) -> Float:
         """Return the second derivative (N,) of the ramp's offset by station, 1/m; 0 without a ramp."""
@@ -122,7 +131,7 @@ class TurnoutShape:
         if turnout.ramp is None:
             opened = np.minimum(w / turnout.taper_in_length, (turnout.length - w) / turnout.taper_out_length)
             strips["bay"] = turnout.lane_width * np.clip(opened, 0.0, 1.0)
-            return TurnoutWidths(strips, full, np.zeros(station.shape))
+            return TurnoutWidths(strips, full, np.zeros(station.shape), np.zeros(station.shape))
         return self._with_ramp(turnout.ramp, w, full, strips)
 
     def _with_ramp(self, ramp: Ramp, w: Float, full: Float, strips: dict[str, Float]) -> TurnoutWidths:
@@ -137,8 +146,13 @@ class TurnoutShape:
             return there * (opened * lane * (1.0 - to_ramp) + of_ramp * to_ramp)
 
         shoulder = np.minimum(full, wedge)
-        strips["island"] = there * behind_nose * (wedge - shoulder)
-        strips["gore"] = there * (1.0 - behind_nose) * wedge
+        whole = wedge - shoulder
+        island = whole * np.interp(x - self.nose, NOSE_ROUND, NOSE_SHARE)
+        # Half of what the rounded nose leaves lies on either side; over the step it grows evenly.
+        beside = behind_nose * (whole - np.maximum(island, NOSE_SHARE[1] * whole)) / 2.0
+        strips["island"] = there * island
+        stepping = wedge - island - behind_nose * shoulder - beside
+        strips["gore"] = there * np.where(behind_nose < 1.0, stepping, beside)
         strips["ramp_inner_strip"] = between(0.0, ramp.edge_strip_width)
         strips["turnout_lane"] = between(turnout.lane_width, ramp.lane_width)
         strips["turnout_edge_strip"] = between(turnout.edge_strip_width, ramp.edge_strip_width)
@@ -147,7 +161,7 @@ class TurnoutShape:
         hard_shoulder = there * (before + behind_nose * shoulder) + (1.0 - there) * full
         blend = np.clip(1.0 - (x - ramp.length - STEP) / BLEND, 0.0, 1.0)
         at_end = wedge - shoulder + ramp.lane_width + 2.0 * ramp.edge_strip_width
-        return TurnoutWidths(strips, hard_shoulder, (1.0 - there) * blend * at_end)
+        return TurnoutWidths(strips, hard_shoulder, there * beside, (1.0 - there) * blend * at_end)
 
     def _w(self, station: Float) -> Float:
         return station - self.turnout.start_station if self._forward else self.turnout.end_station - station

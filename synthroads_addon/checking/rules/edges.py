@@ -19,6 +19,10 @@ Offset = TypeVar("Offset", Float, float)
 
 #: At the nose the unpaved ground between hard shoulder and ramp is this wide (m), and the ramp goes on this far (m).
 NOSE_WIDTH, NOSE_BEFORE_END = 1.0, 10.0
+#: Where the nose is rounded, m behind it, and the share of the ground's width there: half an ellipse with ten sides, whose
+#: first two take 5 cm along the road.
+_TURN = np.deg2rad([0.0, 18.0, 36.0, 54.0, 72.0, 90.0])
+ROUNDING, ROUNDED = 0.05 * (1.0 - np.cos(_TURN)) / (1.0 - np.cos(_TURN[1])), np.sin(_TURN)
 #: Stations that are looked at between two that matter, where a ramp bends away.
 BETWEEN = 3
 
@@ -128,6 +132,7 @@ class TurnoutEdges:
         if self.turnout.ramp:
             parts = ((self.tip, self.nose), (self.nose, self.end))
             w += [a + (b - a) * i / (BETWEEN + 1) for a, b in parts for i in range(1, BETWEEN + 1)]
+            w += list(self.nose + ROUNDING[1:])
         return np.array([self.station(at) for at in w])
 
     def widen(self, station: Float, edges: _WidthSums) -> None:
@@ -146,7 +151,10 @@ class TurnoutEdges:
         wedge = x * x * x / self._apart
         edges.left[inside] = np.minimum(edges.left[inside], left)
         edges.wedge[inside] += wedge
-        edges.bare[inside] += np.where(w >= self.nose, np.maximum(wedge - full, 0.0), 0.0)
+        between = np.where(w >= self.nose, np.maximum(wedge - full, 0.0), 0.0)
+        bare = between * np.interp(w - self.nose, ROUNDING, ROUNDED)
+        edges.bare[inside] += bare
+        edges.beside[inside] += (between - bare) / 2.0
 
 
 class _WidthSums(NamedTuple):
@@ -158,6 +166,7 @@ class _WidthSums(NamedTuple):
         wedge: between the main road and a ramp, hard shoulder included.
         added: outside both.
         bare: of the unpaved ground within the wedge.
+        beside: of the pavement between that ground and the ramp, where the nose is rounded.
     """
 
     full: Float
@@ -165,6 +174,7 @@ class _WidthSums(NamedTuple):
     wedge: Float
     added: Float
     bare: Float
+    beside: Float
 
 
 class Edges:
@@ -206,12 +216,12 @@ class Edges:
         if not self.turnouts:
             main = base + full
             return EdgeDistances(inner, lanes, main, main, main, main)
-        sums = _WidthSums(full, full.copy(), np.zeros(count), np.zeros(count), np.zeros(count))
+        sums = _WidthSums(full, full.copy(), *np.zeros((4, count)))
         for turnout in self.turnouts:
             turnout.widen(station, sums)
         high = base + sums.left + sums.wedge
-        outer, gap = high + sums.added, sums.bare > 0.0
-        gap_low, gap_high = np.where(gap, high - sums.bare, outer), np.where(gap, high, outer)
+        outer, gap, ramp = high + sums.added, sums.bare > 0.0, high - sums.beside
+        gap_low, gap_high = np.where(gap, ramp - sums.bare, outer), np.where(gap, ramp, outer)
         return EdgeDistances(inner, lanes, base + full, outer, gap_low, gap_high)
 
     def inner(self, station: Float) -> Float:

@@ -12,7 +12,7 @@ from ...road.objects import Side
 from ...road.section import Turnout
 from ...road.things.sign import TrafficSign
 from ...road.things.sign_catalogue import sign_catalogue
-from ...road.turnout_geometry import STEP, TurnoutShape
+from ...road.turnout_geometry import NOSE_ROUND, STEP, TurnoutShape
 from .edge import island_begin, ramp_station
 from .layout import MEDIAN_BARRIER_HALF, MEDIAN_OBSTACLE, Layout, PlacementRequest, Roadside
 from .ranges import Range, nearest_free
@@ -164,7 +164,7 @@ def _gore_station(shape: TurnoutShape, width: float) -> float:
     ramp = shape.turnout.ramp
     assert ramp is not None
     wide_enough = island_begin(shape, ramp, width + 2.0 * (SIGN_DISTANCE + _GORE_MARGIN))
-    return ramp_station(shape, min(max(wide_enough, shape.nose + 2.0 * STEP), ramp.length - STEP))
+    return ramp_station(shape, min(max(wide_enough, shape.nose + NOSE_ROUND[-1]), ramp.length - STEP))
 
 
 def _behind_entry(
