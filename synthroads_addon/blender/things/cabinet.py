@@ -1,4 +1,4 @@
-"""Utility cabinets with doors, on a plinth, under a lid (SR Cabinet), and the objects of emergency phones."""
+"""Utility cabinets with doors, on a plinth, maybe on a pad, under a lid (SR Cabinet), and the objects of emergency phones."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ _WIDE = 0.7
 class _Cabinet(Standing):
     width = metres(0.8, (0.1, 5.0), "Width of its front")
     depth = metres(0.35, (0.1, 5.0), "Depth (m)")
-    height = metres(1.1, (0.3, 5.0), "Top above the surface")
+    height = metres(1.1, (0.3, 5.0), "Top above the surface, or above its pad")
+    pad_margin = metres(0.0, (0.0, 2.0), "Reach of the levelled pad around it; 0 for none")
     body_material = material_of("body parts", "cabinet_grey")
     plinth_material = material_of("plinth parts", "concrete")
     fitting_material = material_of("fitting parts", "plastic_black")
@@ -71,30 +72,38 @@ def cabinet_group(tree: Tree) -> None:
         places, high, low = _on_highest_ground(tree, cabinet)
         tall = op.vector(tree, 1.0, 1.0, high - low + (sizes.PLINTH + BURIED))
         standing = put_on(_raised(places, high), op.join(*parts))
-        mesh = op.join(put_on(_raised(places, low - BURIED), plinth, tall), standing)
+        standing = op.join(put_on(_raised(places, low - BURIED), plinth, tall), standing)
+        pad = paint_faces(_block(tree, cabinet, -cabinet.pad_margin, 0.0, 1.0), cabinet.plinth_material)
+        pad = put_on(_raised(places, low - BURIED), pad, op.vector(tree, 1.0, 1.0, high - low + BURIED))
+        mesh = op.join(op.only_if(cabinet.pad_margin > 0.0, pad), standing)
         mesh = cabinet.label(mesh, class_id(Cabinet.points_class))
     tree.output("Mesh", mesh, description="Cabinet")
 
 
-def _block(tree: Tree, cabinet: _Cabinet, inset: float, low: Value | float, high: Value | float) -> Value:
+def _block(tree: Tree, cabinet: _Cabinet, inset: Value | float, low: Value | float, high: Value | float) -> Value:
     """Add nodes for a box of the cabinet's plan, smaller by `inset` (m) all around, between two heights (m)."""
-    size = op.vector(tree, cabinet.width - 2.0 * inset, cabinet.depth - 2.0 * inset, high - low)
+    size = op.vector(tree, cabinet.width - inset * 2.0, cabinet.depth - inset * 2.0, high - low)
     return box(tree, size, op.vector(tree, 0.0, 0.0, (high + low) * 0.5))
 
 
 def _on_highest_ground(tree: Tree, cabinet: _Cabinet) -> tuple[Value, Value, Value]:
-    """Add nodes for the points on the surface, and the ground's highest and lowest z below a cabinet, relative, m."""
+    """Add nodes for the points on the surface, and the highest and lowest z below a cabinet or its pad, relative, m.
+
+    The highest one is the pad's top, where there is one.
+    """
     places = cabinet.places()
     surfaces = op.object_geometry(cabinet.road), op.object_geometry(cabinet.terrain)
     heading = op.named_attribute(tree, "heading")
     cosine, sine = op.unary("COSINE", heading), op.unary("SINE", heading)
     here, elevation = op.position(tree), op.component(op.position(tree), "Z")
     high = low = elevation * 0.0
+    pad = cabinet.pad_margin
     for beside, ahead in sizes.CORNERS:
-        x, y = cabinet.width * beside, cabinet.depth * ahead
+        x, y = (cabinet.width + pad * 2.0) * beside, (cabinet.depth + pad * 2.0) * ahead
         corner = here + op.vector(tree, x * cosine - y * sine, x * sine + y * cosine)
         ground = height_on(*surfaces, corner) - elevation
         high, low = op.maximum(high, ground), op.minimum(low, ground)
+    high = high + op.switch(pad > 0.0, 0.0, sizes.PAD_RISE)
     for name, value in (("high", high), ("low", low)):
         places = op.store(places, name, value)
     return places, op.named_attribute(tree, "high"), op.named_attribute(tree, "low")

@@ -15,8 +15,10 @@ from .thing import Block, StandingThing, TwinTypes
 PLINTH, LID = 0.12, 0.03
 """Height of a cabinet's plinth above the highest ground below it, and of its lid, m."""
 CORNERS = ((-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5))
-"""Corners of a cabinet as shares of its width and depth: its level plinth reaches from the highest ground below them
-to `BURIED` below the lowest."""
+"""Corners of a cabinet, or of the pad around it, as shares of its width and depth: its level plinth reaches from the
+highest ground below them to `BURIED` below the lowest."""
+PAD_RISE = 0.03
+"""Height of a levelled pad above the highest ground below it, m."""
 STEEPEST = 1.5
 """Run of a usual batter per metre of height: by so much a cabinet stands higher than the ground at its middle."""
 OVERHANG, DOOR = 0.02, 0.012
@@ -60,7 +62,10 @@ class Cabinet(StandingThing):
     width: float = quantity(0.3, ge=0.1, le=3, unit="m", description="Width, seen by the traffic beside it.")
     depth: float = quantity(0.3, ge=0.1, le=3, unit="m", description="Depth.")
     height: float = quantity(
-        1.6, ge=0.4, le=3, unit="m", description="Top above the surface, on a slope above its highest ground."
+        1.6, ge=0.4, le=3, unit="m", description="Top above the surface, on a slope above its highest ground or its pad."
+    )
+    pad_margin: float = quantity(
+        0.0, ge=0, le=2, unit="m", description="Reach of the levelled, paved pad around a utility cabinet; 0 for none."
     )
 
     def twin(self) -> TwinTypes:
@@ -70,19 +75,22 @@ class Cabinet(StandingThing):
         return TwinTypes(entity, f"obstacle.{self.kind}", kind=self.kind)
 
     def bodies(self, place: Place) -> list[Body]:
-        """Return the closed solids of body, plinth and lid or band in its frame; doors and panel are details."""
+        """Return the closed solids of pad, body, plinth and lid or band in its frame; doors and panel are details."""
         return self._phone() if self.kind == "emergency_phone" else self._cabinet(place)
 
     def _cabinet(self, place: Place) -> list[Body]:
-        beside, ahead = np.array(CORNERS).T * [[self.width], [self.depth]]
+        pad = self.pad_margin
+        beside, ahead = np.array(CORNERS).T * [[self.width + 2.0 * pad], [self.depth + 2.0 * pad]]
         ground = np.append(place.ground(beside, ahead), 0.0)
-        foot, low = float(ground.max()), float(ground.min()) - BURIED
+        foot, low = float(ground.max()) + (PAD_RISE if pad else 0.0), float(ground.min()) - BURIED
         top, body = foot + self.height, foot + self.height - LID
         walls = self._block(OVERHANG, foot + PLINTH, body)
         lid, plinth = self._block(0.0, body, top), self._block(2.0 * OVERHANG, low, foot + PLINTH)
         tall = body - foot
         doors = box((self.width, OVERHANG, tall), (0.0, (OVERHANG - self.depth) / 2.0, foot + tall / 2.0))
+        pads = [Body(self._block(-pad, low, foot), "concrete", "pad", "IfcSlab.PAVING")] if pad else []
         return [
+            *pads,
             Body(walls, "cabinet_grey"),
             Body(lid, "cabinet_grey"),
             Body(plinth, "concrete"),
@@ -111,6 +119,6 @@ class Cabinet(StandingThing):
 
     def footprint(self) -> Iterator[Block]:
         """Yield the box that holds it, however it is turned, on a batter too; nothing else may stand there."""
-        half = max(self.width, self.depth) / 2.0
+        half = max(self.width, self.depth) / 2.0 + (self.pad_margin if self.kind == "utility" else 0.0)
         on_slope = half / STEEPEST if self.kind == "utility" else 0.0
         yield self.upright(half, self.height + on_slope)

@@ -15,6 +15,8 @@ from .registry import small_thing
 
 UTILITY_SIZES = ((0.8, 0.35, 1.1), (1.2, 0.4, 1.3), (0.6, 0.3, 0.9))
 """Width, depth and height of utility cabinets, m."""
+PAD_MARGIN = 0.3
+"""Reach of the levelled pad around a utility cabinet, m."""
 LARGEST_KILOMETRE = 800
 """Kilometre of the road's first board at most."""
 BESIDE_BOARD = 10.0
@@ -129,8 +131,9 @@ def plan_cabinets(layout: Layout, rng: np.random.Generator) -> None:
         width, depth, height = pick(rng, UTILITY_SIZES)
         start = draw_start(rng, free_ranges(0.0, layout.length, roadside.near), 2.0 * _CABINET_HALF)
         if start is not None:
-            fields = {"kind": "utility", "width": width, "depth": depth, "height": height}
-            roadside.put(PlacementRequest("cabinet", Cabinet, start + _CABINET_HALF, _CABINET_HALF, width, fields))
+            fields = {"kind": "utility", "width": width, "depth": depth, "height": height, "pad_margin": PAD_MARGIN}
+            room = width + 2.0 * PAD_MARGIN
+            roadside.put(PlacementRequest("cabinet", Cabinet, start + _CABINET_HALF, _CABINET_HALF, room, fields))
 
 
 def _put_pole(roadside: Roadside, kind: str, station: float, height: float, diameter: float, arm: float) -> None:

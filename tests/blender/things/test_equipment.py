@@ -10,7 +10,7 @@ from synthroads_addon.base.classes import class_id
 from synthroads_addon.road.objects import ObjectT
 from synthroads_addon.road.things import kilometre_board as sizes
 from synthroads_addon.road.things.body import BURIED
-from synthroads_addon.road.things.cabinet import CORNERS, PLINTH, Cabinet
+from synthroads_addon.road.things.cabinet import CORNERS, PAD_RISE, PLINTH, Cabinet
 from synthroads_addon.road.things.delineator import REFLECTOR, Delineator
 from synthroads_addon.road.things.kilometre_board import KilometreBoard
 from synthroads_addon.road.things.pole import Pole
@@ -59,6 +59,7 @@ KINDS: dict[str, Data] = {
     "cabinet": utility(0.8, 0.35, 1.1),
     "cabinet-small": utility(0.6, 0.3, 0.9, elevation=0.2),
     "cabinet-turned": utility(1.2, 0.4, 1.3, rotation_deg=30.0),
+    "cabinet-pad": utility(0.8, 0.35, 1.1, rotation_deg=90.0, pad_margin=0.3),
 }
 DELINEATORS: dict[str, Data] = {
     "post": {},
@@ -92,19 +93,21 @@ def of_type(road: FurnishedRoad, name: str, kind: type[ObjectT]) -> ObjectT:
 
 
 def ground_below(road: FurnishedRoad, name: str) -> Float:
-    """Return the heights of the built ground at a utility cabinet's corners, m above its foot; none of other things."""
+    """Return the built ground's heights at the corners of a utility cabinet or its pad, m above its foot; else none."""
     item = road.parameters.objects[name]
     if not isinstance(item, Cabinet) or item.kind != "utility":
         return np.empty(0)
     foot = road.point(item.station, item.offset)
     right, along, _ = axes(road, name)
-    plan = [foot[:2] + x * item.width * right[:2] + y * item.depth * along[:2] for x, y in CORNERS]
+    wide, deep = item.width + 2.0 * item.pad_margin, item.depth + 2.0 * item.pad_margin
+    plan = [foot[:2] + x * wide * right[:2] + y * deep * along[:2] for x, y in CORNERS]
     return road.surface(np.array(plan)) - foot[2] - item.elevation
 
 
 def highest_below(road: FurnishedRoad, name: str) -> float:
     """Return by how much the ground below a utility cabinet is higher than its foot, m; 0 of other things."""
-    return float(ground_below(road, name).max(initial=0.0))
+    pad = getattr(road.parameters.objects[name], "pad_margin", 0.0)
+    return float(ground_below(road, name).max(initial=0.0)) + (PAD_RISE if pad else 0.0)
 
 
 @pytest.mark.keep_scene
@@ -242,11 +245,20 @@ class TestCabinet:
         assert high[1] == pytest.approx(cabinet.depth / 2, abs=MEASURE)
         assert low[1] == pytest.approx(-cabinet.depth / 2, abs=MEASURE)
 
-    @pytest.mark.parametrize("name", ["cabinet", "cabinet-small", "cabinet-turned"])
+    def test_a_pad_is_level_around_it(self, road: FurnishedRoad) -> None:
+        cabinet = of_type(road, "cabinet-pad", Cabinet)
+        pad = own(road, "cabinet-pad", "concrete").reshape(-1, 3)
+        assert np.ptp(pad[:, :2], axis=0) == pytest.approx([cabinet.width + 0.6, cabinet.depth + 0.6], abs=MEASURE)
+        outer = pad[np.abs(pad[:, 0]) > cabinet.width / 2.0 + 0.29]
+        assert np.unique(outer[:, 2].round(3)).tolist() == pytest.approx(
+            [ground_below(road, "cabinet-pad").min() - BURIED, highest_below(road, "cabinet-pad")], abs=MEASURE
+        )
+
+    @pytest.mark.parametrize("name", ["cabinet", "cabinet-small", "cabinet-turned", "cabinet-pad"])
     def test_it_stands_level_above_all_ground_below_it(self, road: FurnishedRoad, name: str) -> None:
         body, plinth = (own(road, name, material)[..., 2] for material in ("cabinet_grey", "concrete"))
         ground = ground_below(road, name)
-        assert body.min() == pytest.approx(max(ground.max(), 0.0) + PLINTH, abs=MEASURE)
+        assert body.min() == pytest.approx(highest_below(road, name) + PLINTH, abs=MEASURE)
         assert plinth.max() == pytest.approx(body.min(), abs=MEASURE)
         assert plinth.min() == pytest.approx(min(ground.min(), 0.0) - BURIED, abs=MEASURE)
 

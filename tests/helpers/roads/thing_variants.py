@@ -40,6 +40,7 @@ FURTHER: dict[str, list[Data]] = {
     "Overpass": [{"rotation_deg": 25.0, "pier_offsets": [0.0, 18.5, -18.5], "width": 7.0}, {"parapet_height": 0.0}],
     "NoiseBarrier": [{"thickness": 0.3, "panel": "wood"}, {"thickness": 0.3, "panel": "glass"}],
     "Building": [{"roof_height": 0.0}, {"kind": "hall", "roof_height": 0.8}],
+    "Cabinet": [{"kind": "utility", "pad_margin": 0.3}],
     "Pole": [{"arm_length": 0.0}, {"kind": "surveillance", "arm_length": 0.0}],
 }
 """Variants that the choices alone don't show."""
