@@ -13,7 +13,7 @@ from ..base.arrays import Float
 from .surroundings import Terrain
 
 SWALE_FROM, SWALE_FULL = 0.2, 0.8
-"""A swale begins where the ground at the road's edge is so much higher than it, and has its full depth from there, m."""
+"""Height of the ground at the road's edge above it from which there is a swale, and from which it is full, m."""
 
 
 def is_shaped(terrain: Terrain) -> bool:

@@ -17,8 +17,8 @@ NOSE_WIDTH = 1.0
 _NOSE_TURN = np.arange(6) * (np.pi / 10.0)
 NOSE_ROUND = STEP / (1.0 - np.cos(_NOSE_TURN[1])) * (1.0 - np.cos(_NOSE_TURN))
 NOSE_SHARE = np.sin(_NOSE_TURN)
-"""Corners of the island's rounded nose, half an ellipse: distances behind the nose (m), and the shares of its width that
-it has there. The first piece is the step in which the pavement changes."""
+"""Corners of the island's rounded nose, half an ellipse: distances behind the nose (m), and the shares of its width
+that it has there. The first piece is the step in which the pavement changes."""
 NOSE_BEFORE_END = 10.0
 """The nose lies at least this far before the ramp's end, m."""
 BLEND = 30.0

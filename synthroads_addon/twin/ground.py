@@ -81,8 +81,8 @@ class GroundSide:
         rows = np.flatnonzero((self.swale[:-1] > 0.0) | (self.swale[1:] > 0.0))
         across = np.linspace(0.0, width, _NEAR + 1)
         points = self.points(np.broadcast_to(across, (len(self.station), len(across))))
-        corners = grid_corners(len(self.station), len(across)).reshape(len(self.station) - 1, -1, 4)[rows].reshape(-1, 4)
-        triangles = split_quads(corners)
+        corners = grid_corners(len(self.station), len(across)).reshape(len(self.station) - 1, -1, 4)
+        triangles = split_quads(corners[rows].reshape(-1, 4))
         return upward_triangles(points, triangles[:, ::-1] if self.sign > 0.0 else triangles)
 
     def clip_to_band(self, start: float, end: float) -> Float:

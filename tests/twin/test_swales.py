@@ -6,6 +6,7 @@ from pathlib import Path
 
 import ifcopenshell
 import numpy as np
+import pytest
 
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
@@ -28,7 +29,9 @@ def test_swales_are_surfaces_beside_the_verge(tmp_path: Path) -> None:
     ifc = ifcopenshell.open(str(tmp_path / "twin.ifc"))
     origin = np.array(road.transform.translate)
     for side, sign in (("left", 1.0), ("right", -1.0)):
-        (about,) = [about for name, about, _ in city.surfaces("AuxiliaryTrafficArea") if name == f"terrain/swale-{side}"]
+        (about,) = [
+            about for name, about, _ in city.surfaces("AuxiliaryTrafficArea") if name == f"terrain/swale-{side}"
+        ]
         assert (about["function"], about["width"], about["depth"]) == ("ditch", 2.0, 0.4)
         assert about["instance"] == road.terrain.instance  # type: ignore[union-attr]
         points = np.concatenate(city.rings({"object": f"terrain/swale-{side}"})) - origin
@@ -36,7 +39,7 @@ def test_swales_are_surfaces_beside_the_verge(tmp_path: Path) -> None:
         station = np.clip(station, 0.0, geometry.length)
         edge = geometry.offsets(station)[:, 0 if sign > 0.0 else -1]
         beyond = (offset - edge) * sign
-        assert (beyond.min() > -1e-3) and (beyond.max() < 2.001) and np.ptp(beyond) > 1.998
+        assert (beyond.min(), beyond.max()) == (pytest.approx(0.0, abs=1e-3), pytest.approx(2.0, abs=1e-3))
         assert np.abs(points[:, 2] - surface_elevation(geometry, station, edge + sign * beyond)).max() < 2e-3
         middle = np.abs(beyond - 1.0) < 1e-3
         deepest = geometry.elevation(station[middle], edge[middle]) - points[middle, 2]

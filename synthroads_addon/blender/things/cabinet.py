@@ -1,4 +1,4 @@
-"""Utility cabinets with doors, on a plinth, maybe on a pad, under a lid (SR Cabinet), and the objects of emergency phones."""
+"""Utility cabinets with doors, on plinth and pad, under a lid (SR Cabinet), and the objects of emergency phones."""
 
 from __future__ import annotations
 

@@ -19,8 +19,8 @@ Offset = TypeVar("Offset", Float, float)
 
 #: At the nose the unpaved ground between hard shoulder and ramp is this wide (m), and the ramp goes on this far (m).
 NOSE_WIDTH, NOSE_BEFORE_END = 1.0, 10.0
-#: Where the nose is rounded, m behind it, and the share of the ground's width there: half an ellipse with ten sides, whose
-#: first two take 5 cm along the road.
+#: Where the nose is rounded, m behind it, and the share of the ground's width there: half an ellipse with ten sides,
+#: whose first two take 5 cm along the road.
 _TURN = np.deg2rad([0.0, 18.0, 36.0, 54.0, 72.0, 90.0])
 ROUNDING, ROUNDED = 0.05 * (1.0 - np.cos(_TURN)) / (1.0 - np.cos(_TURN[1])), np.sin(_TURN)
 #: Stations that are looked at between two that matter, where a ramp bends away.

@@ -185,7 +185,9 @@ class Guardrail(LengthwiseThing):
         station = self.reflector_stations(end)
         feet, left = course.feet(station, self.offset_at(station)), course.left(station)
         ahead = np.stack([left[:, 1], -left[:, 0], left[:, 2]], axis=1) * (REFLECTOR_PLATE / 2.0)
-        corners = np.array([(x, sign * high / 2.0) for sign, edge in ((-1, 1), (1, -1)) for x, high in REFLECTOR[::edge]])
+        corners = np.array(
+            [(x, sign * high / 2.0) for sign, edge in ((-1, 1), (1, -1)) for x, high in REFLECTOR[::edge]]
+        )
         across = corners[:, 0] + POST[0] / 2.0 + SPACER[self.faces]
         height = (self._top(end, station) + REFLECTOR_MIDDLE)[:, None] + corners[:, 1]
         for side in sides:

@@ -53,7 +53,7 @@ def _terrain(name: str, terrain: Terrain, ground: GroundMesh) -> CityObject:
 
 def _swale(name: str, terrain: Terrain, faces: Faces) -> CityObject:
     """Return the swales beside one side's verge as a Road: a ditch, whose surface is the terrain's too."""
-    about = {"instance": terrain.instance, "function": "ditch"}
+    about = {"instance": terrain.instance, "function": "ditch", "side": name.rpartition("-")[2]}
     measures = {"width": terrain.swale_width, "depth": terrain.swale_depth}
     semantics = {"type": "AuxiliaryTrafficArea", "surfaceMaterial": ["grass"], "strip": "swale"} | about | measures
     shape = CityGeometry("MultiSurface", _GROUND, (faces,), (semantics,), np.zeros(len(faces), np.int64))

@@ -120,6 +120,11 @@ CHECKERED = {"materials.textures": [CHECKS]}
 OTHER_ROAD = Case(value="left")
 OTHER_TURNOUT = Case(value="entry")
 BAY = TURNOUTS["bay"]
+CUTTING = {
+    "objects.terrain.embankment_height": -3.0,
+    "objects.terrain.swale_width": 2.0,
+    "objects.terrain.swale_depth": 0.4,
+}
 PLANTED: Data = {"type": "Vegetation", "instance": 900, "kind": "shrub", "species": "hazel", "density": 0.05}
 PLANTED |= {"band_start": 1.0, "band_end": 6.0, "height_min": 1.0, "height_max": 2.0, "seed": 1}
 CASES: dict[str, Case] = {
@@ -166,6 +171,9 @@ CASES: dict[str, Case] = {
     "Asset.name": Case(value="grit_bin"),
     "Asset.class_name": Case(value="barrier"),
     "Asset.library": Case(value=str(OTHER_LIBRARY)),
+    "Guardrail.reflector_spacing": Case(value=6.0),
+    "Terrain.swale_width": Case(given=CUTTING),
+    "Terrain.swale_depth": Case(given=CUTTING),
     "Terrain.elevation_model": Case(value=str(ELEVATIONS)),
     "Carriageway.pavement.ruts": Case(owner="right"),
     "Carriageway.pavement.potholes": Case(owner="right"),

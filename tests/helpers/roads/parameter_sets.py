@@ -188,11 +188,17 @@ def _materials(data: dict[str, Any]) -> dict[str, Any]:
     return {"textures": list(textures.values())}
 
 
+def _reflectors(data: dict[str, Any]) -> dict[str, Any]:
+    spacing = data.get("reflector_spacing", 50.0)
+    return {"reflector_spacing": 1.0 if 0.0 < spacing < 1.0 else spacing}
+
+
 _RULES = {
     "AlignmentObject": _axis,
     "HorizontalElement": _element,
     "LineMarking": _line,
     "RemovedMarking": _dashes,
+    "Guardrail": _reflectors,
     "Landscape": _shares,
     "Turnout": _turnout,
     "Vegetation": _plants,
