@@ -30,14 +30,14 @@ def batter_height(terrain: Terrain, distance: Float, ground: Float, at_edge: Flo
         ground: (N,) height of the ground there before the road was built, above the edge, m.
         at_edge: (N,) height of that ground at the edge, above the edge, m.
     """
-    wide, room = terrain.swale_width, rounding_height(terrain, at_edge)
-    deep = swale_share(at_edge) * terrain.swale_depth if wide else np.zeros(distance.shape)
-    upper = _rise(distance - wide / 2.0, wide / 4.0) / terrain.batter_slope
+    width, rounding = terrain.swale_width, rounding_height(terrain, at_edge)
+    depth = swale_share(at_edge) * terrain.swale_depth if width else np.zeros(distance.shape)
+    upper = _rise(distance - width / 2.0, width / 4.0) / terrain.batter_slope
     lower = -_rise(distance, terrain.crest_length) / terrain.batter_slope
-    if wide:
-        upper = upper - deep * np.sin(np.pi * np.minimum(distance / wide, 1.0)) ** 2
-    cutting = np.maximum(-_smooth_maximum(-ground, -upper, room), lower - 2.0 * deep)
-    embankment = np.minimum(_smooth_maximum(ground, lower, room), upper)
+    if width:
+        upper = upper - depth * np.sin(np.pi * np.minimum(distance / width, 1.0)) ** 2
+    cutting = np.maximum(-_smooth_maximum(-ground, -upper, rounding), lower - 2.0 * depth)
+    embankment = np.minimum(_smooth_maximum(ground, lower, rounding), upper)
     return np.where(at_edge > 0.0, cutting, embankment)
 
 
@@ -72,7 +72,7 @@ def _rise(distance: Float, tangent: float) -> Float:
     return np.where(beyond < 2.0 * tangent, beyond**2 / (4.0 * tangent), beyond - tangent)
 
 
-def _smooth_maximum(first: Float, second: Float, room: Float) -> Float:
-    """Return the larger of two heights (N,), rounded by a parabola where they differ by less than ``room`` (N,), m."""
-    near = np.maximum(room - np.abs(first - second), 0.0)
-    return np.maximum(first, second) + near**2 / np.maximum(4.0 * room, 1e-12)
+def _smooth_maximum(first: Float, second: Float, rounding: Float) -> Float:
+    """Return the larger of two heights (N,), m, rounded by a parabola where they differ by less than ``rounding``."""
+    near = np.maximum(rounding - np.abs(first - second), 0.0)
+    return np.maximum(first, second) + near**2 / np.maximum(4.0 * rounding, 1e-12)

@@ -60,8 +60,8 @@ def sample_terrain(scenario: RoadScenario, seed: int) -> Terrain:
     names = ("embankment_height", "undulation", "wavelength", "batter_slope")
     drawn = {name: draw(rng, getattr(scenario, name)) for name in names}
     given = {"half_width": scenario.half_width, "elevation_model": scenario.elevation_model}
-    foot = stream(seed, "terrain", "foot")
-    shape = {name: draw(foot, getattr(scenario, name)) for name in ("crest_length", "rounding_length", "swale_width")}
+    batter = stream(seed, "terrain", "batter")
+    shape = {name: draw(batter, getattr(scenario, name)) for name in ("crest_length", "rounding_length", "swale_width")}
     shape["swale_depth"] = round_value(shape["swale_width"] * SWALE_DEPTH_SHARE)
     return Terrain(instance=1, seed=_seed(rng), **drawn, **shape, **given)
 

@@ -24,10 +24,10 @@ _LOOKED_AT = 5_000
 """Triangles at whose middles and edges the distance is measured."""
 _FIRST_LOOK = 1.0  # m, between places at which a batter's toe is looked for
 _HALVINGS = 30
-_NEAR, _TOE = 8, 8
+_SHAPE_PIECES, _TOE_PIECES = 8, 8
 """Pieces of the ground's cross-section over crest or swale, and over the rounding of the toe."""
-_LEAST = 0.3
-"""Width of the crest's or swale's columns at least, m."""
+_LEAST_WIDTH = 0.3
+"""Least width of crest or swale in the triangles, m."""
 
 
 @dataclass(frozen=True)
@@ -77,10 +77,10 @@ class GroundSide:
         return upward_triangles(points, corners)
 
     def swale_faces(self, width: float) -> Faces:
-        """Return the polygons of the swale, so wide (m), beside the road; none where the road is in no cutting."""
+        """Return the triangles of a swale of a width (m) within the ground's reach; none where there is no cutting."""
         rows = np.flatnonzero((self.swale[:-1] > 0.0) | (self.swale[1:] > 0.0))
-        across = np.linspace(0.0, width, _NEAR + 1)
-        points = self.points(np.broadcast_to(across, (len(self.station), len(across))))
+        across = np.linspace(0.0, width, _SHAPE_PIECES + 1)
+        points = self.points(np.minimum(across, self.distance[:, -1:]))
         corners = grid_corners(len(self.station), len(across)).reshape(len(self.station) - 1, -1, 4)
         triangles = split_quads(corners[rows].reshape(-1, 4))
         return upward_triangles(points, triangles[:, ::-1] if self.sign > 0.0 else triangles)
@@ -127,7 +127,7 @@ def triangulate_ground(geometry: RoadGeometry, terrain: Terrain, road: Float, to
 
 
 def swales(name: str, terrain: Terrain, ground: GroundMesh) -> Iterator[tuple[str, Faces]]:
-    """Yield (name, polygons) of the swales on either side, those that are anywhere; the terrain's name begins them."""
+    """Yield (name, triangles) of the swales on each side that has any; the terrain's name begins theirs."""
     for side, part in zip(("left", "right"), ground.sides, strict=True):
         if part.swale.any() and len(faces := part.swale_faces(terrain.swale_width)):
             yield f"{name}/swale-{side}", faces
@@ -155,12 +155,13 @@ def _columns_to_toe(terrain: Terrain, toe: Float, at_edge: Float) -> Float:
         return toe[:, None]
     at_edge = np.nan_to_num(at_edge)
     # Not at the edge itself, where the road's points are.
-    shaped = np.maximum(shaped_width(terrain, at_edge), _LEAST)
+    shaped = np.maximum(shaped_width(terrain, at_edge), _LEAST_WIDTH)
     tangent = rounding_height(terrain, at_edge) * terrain.batter_slope
     begin = np.maximum(toe - tangent, shaped)
     end = np.maximum(toe + tangent, begin)
-    near = shaped[:, None] * (np.arange(1, _NEAR + 1) / _NEAR)
-    return np.column_stack([near, begin[:, None] + (end - begin)[:, None] * np.linspace(0.0, 1.0, _TOE + 1)])
+    over_shape = shaped[:, None] * (np.arange(1, _SHAPE_PIECES + 1) / _SHAPE_PIECES)
+    over_toe = begin[:, None] + (end - begin)[:, None] * np.linspace(0.0, 1.0, _TOE_PIECES + 1)
+    return np.column_stack([over_shape, over_toe])
 
 
 def _toe_distance(

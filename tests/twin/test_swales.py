@@ -12,6 +12,7 @@ from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.terrain import surface_elevation
 from synthroads_addon.twin.formats import write_twin
+from synthroads_addon.twin.ground import swales, triangulate_ground
 from tests.helpers.files.cityjson_files import read_city
 from tests.helpers.files.ifc_reading import body, named
 from tests.helpers.roads.furnished_data import road_data
@@ -52,3 +53,18 @@ def test_swales_are_surfaces_beside_the_verge(tmp_path: Path) -> None:
     (tmp_path / "bank").mkdir()
     write_twin(RoadParameters.from_dict(data), tmp_path / "bank", ["cityjson"])
     assert not [name for name in read_city(tmp_path / "bank" / "twin.city.json").objects if "swale" in name]
+
+
+def test_swales_end_where_the_terrain_does() -> None:
+    data = road_data({}, length=40.0)
+    data["objects"]["terrain"] |= {"embankment_height": -3.0, "undulation": 0.0} | SHAPE
+    road = RoadGeometry(RoadParameters.from_dict(data))
+    edge = float(road.offsets(np.zeros(1))[0, 0])
+    data["objects"]["terrain"]["half_width"] = edge + 1.2
+    road = RoadGeometry(RoadParameters.from_dict(data))
+    terrain = road.parameters.terrain
+    assert terrain is not None
+    ground = triangulate_ground(road, terrain, np.array([0.0, 40.0]), 0.01)
+    faces = dict(swales("terrain", terrain, ground))["terrain/swale-left"]
+    _, offset = road.alignment.project(faces.points[:, :2])
+    assert offset.max() == pytest.approx(edge + 1.2, abs=1e-3)

@@ -24,8 +24,8 @@ _LAP_PROFILE = [(x + sizes.LAP_SHEET, 0.0, z) for x, z in sizes.BEAM]
 _LAP_PROFILE = [BEAM_PROFILE[0], *_LAP_PROFILE, (sizes.BEAM[-1][0], 0.0, sizes.BEAM[-1][1])]
 """Front of a splice's upper sheet; its edges close the gap to the beam below."""
 _BOLT_SIDES = 6
-_COARSE = 0.01
-"""Tolerance (m) from which splices have no bolts."""
+_NO_BOLTS = 0.01
+"""Tolerance (m) from which on splices have no bolts: it is that of their height."""
 
 # Across the road, along it; open at its back.
 _HALF, _SIDE = sizes.POST[0] / 2, sizes.POST[1] / 2
@@ -85,14 +85,14 @@ def guardrail_group(tree: Tree) -> None:
         begin, end = first_station(axis), last_station(axis)
         station = op.named_attribute(tree, "station")
 
-        def on_backbone(line: Value) -> Value:
-            """Add nodes for the rows' top edge; what lies beyond the backbone's ends collapses there."""
+        def place_rows(line: Value) -> Value:
+            """Add nodes that store the top edge at the rows; what lies beyond the backbone's ends collapses there."""
             line = op.store(line, "station", op.clip(station, begin, end))
             foot, left = rail.foot_at(station, ribbon, surfaces)
             return op.store(op.store(line, "left", left), "top", raise_place(foot, rail.top_at(station, ramp)))
 
-        def standing(points: Value) -> Value:
-            """Add nodes that put points with a station below the beam, with its height ``tall``."""
+        def place_on_ground(points: Value) -> Value:
+            """Add nodes that put points by their station on the ground, and store the height ``tall`` of the beam."""
             points = op.store(points, "tall", rail.top_at(station, ramp))
             # One on the end of a backbone beyond which the rail goes on is the next stretch's.
             beyond = (station > end) | ((station > end - 1e-3) & (rail.end_station > end + 1e-3))
@@ -100,12 +100,12 @@ def guardrail_group(tree: Tree) -> None:
             foot, left = rail.foot_at(station, ribbon, surfaces)
             return op.set_position(op.store(points, "left", left), foot)
 
-        line = on_backbone(_rows(tree, rail, ramp))
+        line = place_rows(_rows(tree, rail, ramp))
     with tree.frame("Splices: two rows each, the faces between them away"):
-        laps = on_backbone(_splice_rows(tree, rail, (-sizes.LAP / 2.0, sizes.LAP / 2.0)))
+        laps = place_rows(_splice_rows(tree, rail, (-sizes.LAP / 2.0, sizes.LAP / 2.0)))
     with tree.frame("Bolts of the splices, and reflectors"):
-        bolts = op.only_if(rail.bolts, standing(_splice_rows(tree, rail, sizes.BOLT_ROWS)))
-        reflectors = standing(_reflector_rows(tree, rail, ramp))
+        bolts = op.only_if(rail.bolts, place_on_ground(_splice_rows(tree, rail, sizes.BOLT_ROWS)))
+        reflectors = place_on_ground(_reflector_rows(tree, rail, ramp))
     parts, signals = [], []
     for side, present in rail.beams():
         with tree.frame(f"{'Left' if side > 0 else 'Right'} beam"):
@@ -115,7 +115,7 @@ def guardrail_group(tree: Tree) -> None:
             parts.append(op.only_if(present, op.join(beam, lap, heads)))
             signals.append(op.only_if(present, _in_beam(reflectors, _reflector(tree, side), rail.spacer, side)))
     with tree.frame("Posts from the start on, where the beam is high enough"):
-        posts = standing(_post_rows(tree, rail))
+        posts = place_on_ground(_post_rows(tree, rail))
         posts = op.delete_points(posts, op.named_attribute(tree, "tall") < sizes.LOWEST_POST)
         parts += _instances(tree, posts, rail)
     with tree.frame("Labels"):
@@ -279,5 +279,5 @@ def build_guardrails(builder: ModelBuilder) -> None:
             right_beam=rail.faces in ("right", "both"),
             spacer=sizes.SPACER[rail.faces],
             beam_step=builder.step,
-            bolts=builder.tolerance < _COARSE,
+            bolts=builder.tolerance < _NO_BOLTS,
         )

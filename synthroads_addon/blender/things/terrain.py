@@ -37,8 +37,8 @@ Float = NDArray[np.float64]
 
 _FINE = 0.12
 """Share of even spacing among the columns; the rest grows away from the road."""
-_NEAR, _TOE = 10, 8
-"""Pieces of the ground's cross-section from the road's edge to where the batter is a plane, and of its rounded toe."""
+_SHAPE_PIECES, _TOE_PIECES = 10, 8
+"""Pieces of the cross-section over crest or swale, up to where the batter is a plane, and over its rounded toe."""
 
 
 class _Shape(Inputs):
@@ -111,10 +111,10 @@ def _side_group(tree: Tree) -> None:
 
     with tree.frame("Columns from left to right, rows as the backbone's"):
         # Those beyond the toe's last one are spread.
-        last = columns + (_NEAR + _TOE)
+        last = columns + (_SHAPE_PIECES + _TOE_PIECES)
         mesh, column, number = op.grid(tree, last + 1, op.point_count(backbone))
         rank = op.switch(side > 0.0, column, last - column)
-        outwards = op.maximum(rank - (_NEAR + _TOE), 0) / op.maximum(columns - 1.0, 1.0)
+        outwards = op.maximum(rank - (_SHAPE_PIECES + _TOE_PIECES), 0) / op.maximum(columns - 1.0, 1.0)
         spread = outwards * _FINE + op.power(outwards, 2.2) * (1.0 - _FINE)
     with tree.frame("Offset, cut where it would fold"):
         axis, left, curvature = row(backbone, number)
@@ -129,14 +129,14 @@ def _side_group(tree: Tree) -> None:
         at_edge = op.sample_index(edge, op.named_attribute(tree, "above"), number)
         toe = op.sample_index(edge, op.named_attribute(tree, "toe"), number)
     with tree.frame("Columns: crest or swale, the toe's rounding, the ground"):
-        room = op.minimum(shape.rounding_length / shape.batter_slope, op.unary("ABSOLUTE", at_edge))
+        rounding = op.minimum(shape.rounding_length / shape.batter_slope, op.unary("ABSOLUTE", at_edge))
         shaped = op.switch(at_edge > 0.0, shape.crest_length * 2.0, shape.swale_width)
-        near = shaped * op.minimum(rank * (1.0 / _NEAR), 1.0)
-        tangent = room * shape.batter_slope
+        over_shape = shaped * op.minimum(rank * (1.0 / _SHAPE_PIECES), 1.0)
+        tangent = rounding * shape.batter_slope
         begin = op.maximum(toe - tangent, shaped)
         end = op.maximum(toe + tangent, begin)
-        rounded = begin + (end - begin) * op.clip((rank - (_NEAR + 1)) * (1.0 / (_TOE - 1)), 0.0, 1.0)
-        distance = op.switch(rank > _NEAR, near, op.maximum(spread_out, rounded))
+        rounded = begin + (end - begin) * op.clip((rank - (_SHAPE_PIECES + 1)) * (1.0 / (_TOE_PIECES - 1)), 0.0, 1.0)
+        distance = op.switch(rank > _SHAPE_PIECES, over_shape, op.maximum(spread_out, rounded))
         distance = op.minimum(distance, farthest)
     with tree.frame("Height: the ground, as far as the batter reaches to it"):
         place = start + left * (distance * side)
@@ -148,7 +148,7 @@ def _side_group(tree: Tree) -> None:
         tree.output("Mesh", op.delete_degenerate(mesh))
 
 
-class _Beside(Inputs):
+class _BatterInputs(Inputs):
     distance = metres(0.0, (0.0, 1000.0), "Distance from the road's edge")
     ground = metres(0.0, FAR, "Height of the ground there above the edge")
     at_edge = metres(0.0, FAR, "Height of the ground at the edge above it")
@@ -157,21 +157,21 @@ class _Beside(Inputs):
 @makes_group("SR Batter Height")
 def _batter_group(tree: Tree) -> None:
     """Height above the road's edge of what lies beside it: crest, swale, batter, rounded toe, ground."""
-    shape, beside = _Shape(tree), _Beside(tree)
-    distance, ground, at_edge = beside.distance, beside.ground, beside.at_edge
-    with tree.frame("Swale: deeper as the cutting begins"):
-        wide = shape.swale_width
+    shape, inputs = _Shape(tree), _BatterInputs(tree)
+    distance, ground, at_edge = inputs.distance, inputs.ground, inputs.at_edge
+    with tree.frame("Swale: the deeper the cutting, up to its full depth"):
+        width = shape.swale_width
         share = op.clip((at_edge - SWALE_FROM) * (1.0 / (SWALE_FULL - SWALE_FROM)), 0.0, 1.0)
-        deep = op.switch(wide > 0.0, 0.0, share * shape.swale_depth)
-        turn = op.minimum(distance / op.maximum(wide, 1e-6), 1.0) * math.pi
-        hollow = deep * op.power(op.unary("SINE", turn), 2.0)
+        depth = op.switch(width > 0.0, 0.0, share * shape.swale_depth)
+        turn = op.minimum(distance / op.maximum(width, 1e-6), 1.0) * math.pi
+        hollow = depth * op.power(op.unary("SINE", turn), 2.0)
     with tree.frame("Planes of the batter, rounded where they begin"):
-        upper = _rise(distance - wide * 0.5, wide * 0.25) / shape.batter_slope - hollow
+        upper = _rise(distance - width * 0.5, width * 0.25) / shape.batter_slope - hollow
         lower = -(_rise(distance, shape.crest_length) / shape.batter_slope)
     with tree.frame("Where they meet the ground"):
-        room = op.minimum(shape.rounding_length / shape.batter_slope, op.unary("ABSOLUTE", at_edge))
-        cutting = op.maximum(-_smooth_maximum(-ground, -upper, room), lower - deep * 2.0)
-        embankment = op.minimum(_smooth_maximum(ground, lower, room), upper)
+        rounding = op.minimum(shape.rounding_length / shape.batter_slope, op.unary("ABSOLUTE", at_edge))
+        cutting = op.maximum(-_smooth_maximum(-ground, -upper, rounding), lower - depth * 2.0)
+        embankment = op.minimum(_smooth_maximum(ground, lower, rounding), upper)
     tree.output("Height", op.switch(at_edge > 0.0, embankment, cutting), description="Above the road's edge (m)")
 
 
@@ -182,10 +182,10 @@ def _rise(distance: Value, tangent: Value) -> Value:
     return op.switch(beyond < tangent * 2.0, beyond - tangent, curve)
 
 
-def _smooth_maximum(first: Value, second: Value, room: Value) -> Value:
-    """Add nodes for the larger of two heights, rounded by a parabola where they differ by less than `room`, m."""
-    near = op.maximum(room - op.unary("ABSOLUTE", first - second), 0.0)
-    return op.maximum(first, second) + op.power(near, 2.0) / op.maximum(room * 4.0, 1e-6)
+def _smooth_maximum(first: Value, second: Value, rounding: Value) -> Value:
+    """Add nodes for the larger of two heights, rounded by a parabola where they differ by less than `rounding`, m."""
+    near = op.maximum(rounding - op.unary("ABSOLUTE", first - second), 0.0)
+    return op.maximum(first, second) + op.power(near, 2.0) / op.maximum(rounding * 4.0, 1e-6)
 
 
 def _toe(tree: Tree, inputs: _TerrainInputs, shape: _Shape, above: Value) -> Value:

@@ -62,7 +62,11 @@ class Cabinet(StandingThing):
     width: float = quantity(0.3, ge=0.1, le=3, unit="m", description="Width, seen by the traffic beside it.")
     depth: float = quantity(0.3, ge=0.1, le=3, unit="m", description="Depth.")
     height: float = quantity(
-        1.6, ge=0.4, le=3, unit="m", description="Top above the surface, or its pad, or its highest ground."
+        1.6,
+        ge=0.4,
+        le=3,
+        unit="m",
+        description="Top above the surface; a utility cabinet's above its pad, or else the highest ground below it.",
     )
     pad_margin: float = quantity(
         0.0, ge=0, le=2, unit="m", description="Reach of the levelled, paved pad around a utility cabinet; 0 for none."

@@ -250,6 +250,8 @@ class TestTerrain:
         error = z - surface_elevation(demo.geometry, station, offset)
         print(f"terrain: {np.abs(error).max() * 1000:.1f} mm off the ground at most")
         assert np.abs(error).max() < 0.015
+        edges = demo.geometry.offsets(station)[:, [-1, 0]]
+        assert (np.abs(z - demo.surface(station, np.clip(offset, *edges.T))) > 1.0).any(), "no batter"
         far = np.abs(offset) > 40.0
         ground = ground_elevation(demo.geometry, terrain, station[far], offset[far])
         assert np.abs(z[far] - ground).max() < 0.015

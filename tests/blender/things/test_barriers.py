@@ -134,7 +134,7 @@ class TestConcrete:
 @pytest.mark.keep_scene
 class TestGuardrail:
     def parts(self, road: FurnishedRoad, name: str, low: float, high: float) -> tuple[Float, list[Float]]:
-        """Return the stations (N,) of the pieces whose length along the road lies between two lengths, and they."""
+        """Return the stations (N,) of the middles of pieces between two lengths (m) along the road, and the pieces."""
         found = [p for p in pieces(road.mesh(name)) if low < np.ptp(road.located(p.reshape(-1, 3))[0]) < high]
         middles = [road.located(p.reshape(-1, 3))[0] for p in found]
         return np.array([(s.min() + s.max()) / 2.0 for s in middles]), found

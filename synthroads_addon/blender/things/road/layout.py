@@ -206,8 +206,8 @@ def _turnout_widths(side: str, section: CarriagewaySection, station: Float) -> d
     main = section.carriageway.hard_shoulder_width
     nominal = max(nominal_width(main), 1e-9)
     values[attribute_name(side, "Hard Shoulder Main")] = width_at(main, station) / nominal
-    left = np.minimum.reduce([shape.hard_shoulder for shape in shapes])
-    values[attribute_name(side, "Hard Shoulder")] = sum((shape.shoulder_extra for shape in shapes), left) / nominal
+    remaining = np.minimum.reduce([shape.hard_shoulder for shape in shapes])
+    values[attribute_name(side, "Hard Shoulder")] = sum((shape.shoulder_extra for shape in shapes), remaining) / nominal
     values[attribute_name(side, "Verge Extra")] = sum((shape.verge_extra for shape in shapes), 0.0 * station)
     return values
 
