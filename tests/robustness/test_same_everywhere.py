@@ -12,7 +12,7 @@ from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import load_scenario
 
-CHECKSUM = "6c1304df334af09224e3326042030147b3df7a5e50d98f0900dfeaab675c9f95"
+CHECKSUM = "e608b4477ecdf6cd87d2d1745d8af1b02e95200ed43ad5bfb704f22deb49516b"
 EVERYTHING = ["exits=1", "entries=1", "emergency_bays=1"]
 
 

@@ -15,8 +15,8 @@ from .registry import small_thing
 
 UTILITY_SIZES = ((0.8, 0.35, 1.1), (1.2, 0.4, 1.3), (0.6, 0.3, 0.9))
 """Width, depth and height of utility cabinets, m."""
-PAD_MARGIN = 0.3
-"""Reach of the levelled pad around a utility cabinet, m."""
+PAD_MARGIN = 0.25
+"""Reach of the levelled pad around a utility cabinet, m: the widest one fits before `FAR_ZONE`."""
 LARGEST_KILOMETRE = 800
 """Kilometre of the road's first board at most."""
 BESIDE_BOARD = 10.0
