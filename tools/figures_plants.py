@@ -9,10 +9,12 @@ python tools/figures_plants.py --species maple spruce
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 
 import numpy as np
 
 from synthroads_addon import load_scenario
+from synthroads_addon.base.arrays import Float
 from synthroads_addon.base.classes import class_id
 from synthroads_addon.cloud.points import concatenate
 from synthroads_addon.jobs.open_scene import RoadScene
@@ -39,8 +41,31 @@ _TREES = {"maple": 220, "birch": 450, "poplar": 1100, "spruce": 600, "pine": 400
 """Trees per hectare of a closed stand: their crowns, at random places, cover about nine tenths of the ground."""
 
 
-def row(species: str, season: str, seed: int) -> str:
-    """Return a line of the table, of a stand that is built in the open file and scanned."""
+@dataclass(frozen=True)
+class CanopyFigures:
+    """Returns of a closed stand of trees.
+
+    Attributes:
+        to_ground: share of the pulses whose last return is no tree's.
+        returns_per_pulse: mean of those whose first return is a tree's.
+        return_shares: (4,) share of those pulses with 1, 2, 3 and more returns.
+        pulses: number of pulses with a return within the stand.
+    """
+
+    to_ground: float
+    returns_per_pulse: float
+    return_shares: Float
+    pulses: int
+
+
+def measure_canopy(species: str, season: str, seed: int) -> CanopyFigures:
+    """Return the figures of a stand that is built in the open file and scanned.
+
+    Args:
+        species: of the trees, one of `_TREES`.
+        season: "summer" in leaf, "winter" bare.
+        seed: of road and scan.
+    """
     settings = [*_SETTINGS, f"road.trees_per_hectare={_TREES[species]}", f'road.vegetation.trees=["{species}"]']
     settings += [f"road.environment.winter={int(season == 'winter')}", f"seed={seed}"]
     scenario = load_scenario("airborne-1000m", settings)
@@ -55,11 +80,17 @@ def row(species: str, season: str, seed: int) -> str:
     tree = points.class_id == class_id("vegetation")
     first = inside & (points.return_number == 1)
     last = inside & (points.return_number == points.number_of_returns)
-    on_ground = 100.0 * float((last & ~tree).sum()) / float(last.sum())
     returns = points.number_of_returns[first & tree]
-    shares = 100.0 * np.bincount(np.minimum(returns, 4), minlength=5)[1:] / max(1, len(returns))
-    counted = " / ".join(f"{share:.0f}" for share in shares)
-    return f"| {species} | {season} | {on_ground:.0f} | {returns.mean():.2f} | {counted} | {int(first.sum())} |"
+    shares = np.bincount(np.minimum(returns, 4), minlength=5)[1:] / max(1, len(returns))
+    to_ground = float((last & ~tree).sum()) / float(last.sum())
+    return CanopyFigures(to_ground, float(returns.mean()), shares, int(first.sum()))
+
+
+def _row(species: str, season: str, seed: int) -> str:
+    figures = measure_canopy(species, season, seed)
+    shares = " / ".join(f"{100.0 * share:.0f}" for share in figures.return_shares)
+    cells = (f"{100.0 * figures.to_ground:.0f}", f"{figures.returns_per_pulse:.2f}", shares, str(figures.pulses))
+    return f"| {species} | {season} | {' | '.join(cells)} |"
 
 
 def main() -> None:
@@ -72,7 +103,7 @@ def main() -> None:
     print("|---|---|---|---|---|---|")
     for species in given.species:
         for season in ("summer", "winter"):
-            print(row(species, season, given.seed), flush=True)
+            print(_row(species, season, given.seed), flush=True)
 
 
 if __name__ == "__main__":
