@@ -8,10 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..road.alignment import clip_offset
-from ..road.batter import batter_begin, is_shaped, rounding_height, shaped_width, swale_share
 from ..road.geometry import RoadGeometry
 from ..road.surroundings import Terrain
-from ..road.terrain import ground_elevation
+from ..road.terrain import (
+    batter_begin,
+    ground_elevation,
+    is_shaped,
+    rounding_height,
+    shaped_width,
+    swale_share,
+)
 from .faces import Faces, Float, grid_corners, split_quads, upward_triangles
 from .strips import triangulate_rows
 from .surfaces import surface_points

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.arrays import Float
-from synthroads_addon.road.batter import batter_height, swale_share
 from synthroads_addon.road.surroundings import Terrain
+from synthroads_addon.road.terrain import batter_height, swale_share
 
 SLOPE, CREST, ROUNDING, WIDE, DEEP = 1.6, 0.8, 2.4, 2.0, 0.4
 

@@ -30,10 +30,10 @@ def test_swales_are_surfaces_beside_the_verge(tmp_path: Path) -> None:
     ifc = ifcopenshell.open(str(tmp_path / "twin.ifc"))
     origin = np.array(road.transform.translate)
     for side, sign in (("left", 1.0), ("right", -1.0)):
-        (about,) = [
-            about for name, about, _ in city.surfaces("AuxiliaryTrafficArea") if name == f"terrain/swale-{side}"
-        ]
-        assert (about["function"], about["width"], about["depth"]) == ("ditch", 2.0, 0.4)
+        swale = city.objects[f"terrain/swale-{side}"]
+        about = swale["attributes"]
+        assert (swale["type"], about["function"], about["side"]) == ("LandUse", "swale", side)
+        assert (about["width"], about["depth"]) == (2.0, 0.4)
         assert about["instance"] == road.terrain.instance  # type: ignore[union-attr]
         points = np.concatenate(city.rings({"object": f"terrain/swale-{side}"})) - origin
         station, offset = geometry.alignment.project(points[:, :2])

@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from ...base.classes import class_id
 from ...base.turns.stepper import run_aside
 from ...road.alignment import clip_offset
-from ...road.batter import SWALE_FROM, SWALE_FULL
 from ...road.geometry import RoadGeometry
 from ...road.surroundings import Terrain
-from ...road.terrain import GROUND_MARGIN, ground_elevation
+from ...road.terrain import GROUND_MARGIN, SWALE_FROM, SWALE_FULL, ground_elevation
 from ..nodes import operations as op
 from ..nodes.backbone import limit_offset, row
 from ..nodes.builder import Tree, Value, makes_group
@@ -42,7 +41,7 @@ _SHAPE_PIECES, _TOE_PIECES = 10, 8
 
 
 class _Shape(Inputs):
-    """Inputs of the batter's shape, as `road.batter` has them."""
+    """Inputs of the batter's shape, as `road.terrain.batter_height` has them."""
 
     batter_slope = number(1.5, (0.5, 10.0), "Run of the batter per metre of height (m/m)")
     crest_length = metres(0.0, (0.0, 5.0), "Tangent length of the rounded crest of embankments")

@@ -47,7 +47,7 @@ BOLTS = ((0.043, -0.102, -0.9535), (0.003, -0.155, 0.0), (0.043, -0.208, 0.9535)
 upwards (rad), as the flanks are that they sit on."""
 BOLT_HEAD = (0.017, 0.009)
 """Radius and height of a bolt's head, m."""
-REFLECTOR = ((0.008, 0.034), (0.1, 0.09))
+REFLECTOR = ((0.008, 0.034), (0.08, 0.09))
 """A reflector's inner and outer edge, upright across the beam's trough: depth and height of each, m."""
 REFLECTOR_MIDDLE, REFLECTOR_PLATE = -0.155, 0.008
 """Height of a reflector's middle under the beam's top edge, and its thickness along the road, m."""

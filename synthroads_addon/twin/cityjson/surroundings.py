@@ -52,12 +52,10 @@ def _terrain(name: str, terrain: Terrain, ground: GroundMesh) -> CityObject:
 
 
 def _swale(name: str, terrain: Terrain, faces: Faces) -> CityObject:
-    """Return the swales beside one side's verge as a Road: a ditch, whose surface is the terrain's too."""
-    about = {"instance": terrain.instance, "function": "ditch", "side": name.rpartition("-")[2]}
-    measures = {"width": terrain.swale_width, "depth": terrain.swale_depth}
-    semantics = {"type": "AuxiliaryTrafficArea", "surfaceMaterial": ["grass"], "strip": "swale"} | about | measures
-    shape = CityGeometry("MultiSurface", _GROUND, (faces,), (semantics,), np.zeros(len(faces), np.int64))
-    return CityObject(name, "Road", about | {"class": terrain.points_class} | measures, (shape,))
+    """Return the swales beside one side's verge as a LandUse, whose surface is the terrain's too."""
+    attributes = {"instance": terrain.instance, "class": terrain.points_class, "function": "swale"}
+    attributes |= {"side": name.rpartition("-")[2], "width": terrain.swale_width, "depth": terrain.swale_depth}
+    return CityObject(name, "LandUse", attributes, (CityGeometry("MultiSurface", _GROUND, (faces,)),))
 
 
 def _add_plants(model: CityModel, geometry: RoadGeometry, ground: GroundMesh) -> None:
