@@ -25,9 +25,9 @@ def paint_faces(geometry: Value, material: Value, selection: Value | bool = True
     return geometry.tree.node("GeometryNodeSetMaterial", geometry, selection, material=material).value
 
 
-def flip_faces(geometry: Value) -> Value:
-    """Add a node that flips the normals of all faces; return the geometry."""
-    return geometry.tree.node("GeometryNodeFlipFaces", geometry).value
+def flip_faces(geometry: Value, selection: Value | bool = True) -> Value:
+    """Add a node that flips the normals of all or the selected faces; return the geometry."""
+    return geometry.tree.node("GeometryNodeFlipFaces", geometry, selection).value
 
 
 def loft(

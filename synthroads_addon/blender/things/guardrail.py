@@ -8,10 +8,10 @@ from ...base.classes import class_id
 from ...road.things import guardrail as sizes
 from ...road.things.guardrail import Guardrail
 from ..nodes import operations as op
-from ..nodes.backbone import first_station, height_on, last_station, look_up, raise_place, station_ribbon
+from ..nodes.backbone import first_station, last_station, raise_place
 from ..nodes.builder import Operand, Tree, Value, makes_group
-from ..nodes.foot import Lengthwise
-from ..nodes.inputs import boolean, instance_number, material_of, metres
+from ..nodes.foot import Lengthwise, foot_at
+from ..nodes.inputs import Inputs, boolean, instance_number, material_of, metres, number, socket
 from ..nodes.solids import flip_faces, move_geometry, paint_faces, put_on_points, row_of_points
 from .model_builder import ModelBuilder
 from .registry import model_part
@@ -66,20 +66,12 @@ class _Rail(Lengthwise):
         share = op.switch(ramp > 1e-3, 1.0, op.minimum(inside, 1.0))
         return self.height * share + sizes.TIP * (1.0 - share)
 
-    def foot_at(self, station: Value, ribbon: Value, surfaces: tuple[Value, Value]) -> tuple[Value, Value]:
-        """Add nodes for the surface point under the posts' axis at a station (field), and the vector to the left."""
-        left = look_up(ribbon, "left", station)
-        place = look_up(ribbon, "axis", station) + left * self.offset
-        rise = height_on(*surfaces, place) - op.component(place, "Z")
-        return raise_place(place, rise), left
-
 
 @makes_group("SR Guardrail", catalogue="Barriers")
 def guardrail_group(tree: Tree) -> None:
     """A steel guardrail along the road: W-beams with splices and reflectors, posts and spacers, ramped terminals."""
     rail = _Rail(tree)
     axis, surfaces = rail.geometry()
-    ribbon = station_ribbon(axis)
     with tree.frame("Rows of the beams: terminal, middle, terminal"):
         ramp = rail.ramp()
         begin, end = first_station(axis), last_station(axis)
@@ -88,7 +80,7 @@ def guardrail_group(tree: Tree) -> None:
         def place_rows(line: Value) -> Value:
             """Add nodes that store the top edge at the rows; what lies beyond the backbone's ends collapses there."""
             line = op.store(line, "station", op.clip(station, begin, end))
-            foot, left = rail.foot_at(station, ribbon, surfaces)
+            foot, left = foot_at(axis, surfaces, station, rail.offset)
             return op.store(op.store(line, "left", left), "top", raise_place(foot, rail.top_at(station, ramp)))
 
         def place_on_ground(points: Value) -> Value:
@@ -97,7 +89,7 @@ def guardrail_group(tree: Tree) -> None:
             # One on the end of a backbone beyond which the rail goes on is the next stretch's.
             beyond = (station > end) | ((station > end - 1e-3) & (rail.end_station > end + 1e-3))
             points = op.delete_points(points, beyond | (station < begin))
-            foot, left = rail.foot_at(station, ribbon, surfaces)
+            foot, left = foot_at(axis, surfaces, station, rail.offset)
             return op.set_position(op.store(points, "left", left), foot)
 
         line = place_rows(_rows(tree, rail, ramp))
@@ -106,21 +98,21 @@ def guardrail_group(tree: Tree) -> None:
     with tree.frame("Bolts of the splices, and reflectors"):
         bolts = op.only_if(rail.bolts, place_on_ground(_splice_rows(tree, rail, sizes.BOLT_ROWS)))
         reflectors = place_on_ground(_reflector_rows(tree, rail, ramp))
-    parts, signals = [], []
+    parts, plates = [], []
     for side, present in rail.beams():
         with tree.frame(f"{'Left' if side > 0 else 'Right'} beam"):
-            beam = _beam(tree, line, side, rail.spacer)
-            lap = _lap(tree, laps, side, rail.spacer)
-            heads = _in_beam(bolts, _bolts(tree, side), rail.spacer, side)
-            parts.append(op.only_if(present, op.join(beam, lap, heads)))
-            signals.append(op.only_if(present, _in_beam(reflectors, _reflector(tree, side), rail.spacer, side)))
+            beam = tree.call(
+                _side_group(), line=line, laps=laps, bolts=bolts, reflectors=reflectors, side=side, spacer=rail.spacer
+            )
+            parts.append(op.only_if(present, beam["Beam"]))
+            plates.append(op.only_if(present, beam["Reflectors"]))
     with tree.frame("Posts from the start on, where the beam is high enough"):
         posts = place_on_ground(_post_rows(tree, rail))
         posts = op.delete_points(posts, op.named_attribute(tree, "tall") < sizes.LOWEST_POST)
         parts += _instances(tree, posts, rail)
     with tree.frame("Labels"):
-        plates = paint_faces(op.realize(op.join(*signals)), rail.reflector_material)
-        mesh = op.join(paint_faces(op.realize(op.join(*parts)), rail.material), plates)
+        plates_mesh = paint_faces(op.realize(op.join(*plates)), rail.reflector_material)
+        mesh = op.join(paint_faces(op.realize(op.join(*parts)), rail.material), plates_mesh)
         mesh = op.label(mesh, class_id(Guardrail.points_class), rail.instance)
     tree.output("Mesh", mesh, description="Beams, posts, spacers and reflectors")
 
@@ -137,9 +129,9 @@ def _splice_rows(tree: Tree, rail: _Rail, rows: tuple[float, float]) -> Value:
     """Add nodes for two points per splice with their ``station``, so far (m) from the splice's middle."""
     count = op.maximum(op.round_up((rail.end_station - rail.start_station) / rail.beam_length - 1e-4) - 1, 0)
     count = tree.node("FunctionNodeFloatToInt", count, rounding_mode="ROUND").value
-    points, number = row_of_points(tree, count * 2), op.index(tree)
+    points, place = row_of_points(tree, count * 2), op.index(tree)
     before, after = rows
-    station = rail.start_station + (number // 2 + 1) * rail.beam_length + (number % 2) * (after - before) + before
+    station = rail.start_station + (place // 2 + 1) * rail.beam_length + (place % 2) * (after - before) + before
     return op.store(points, "station", op.clip(station, rail.start_station, rail.end_station))
 
 
@@ -174,64 +166,82 @@ def _rows(tree: Tree, rail: _Rail, ramp: Value) -> Value:
     return op.store(line, "station", op.maximum(op.minimum(station, last), first))
 
 
-def _beam(tree: Tree, line: Value, side: float, spacer: Value) -> Value:
-    """Add nodes that sweep the beam's profile along the line of its top edge; return the mesh."""
-    return op.delete_degenerate(_sweep(tree, line, BEAM_PROFILE, side, spacer))
+class _Side(Inputs):
+    line = socket("Geometry", "Rows of the beam, with ``top`` and ``left``")
+    laps = socket("Geometry", "Rows of its splices, two each")
+    bolts = socket("Geometry", "Points of its rows of bolts, on the ground, with ``tall`` and ``left``")
+    reflectors = socket("Geometry", "Points of its reflectors, likewise")
+    side = number(1.0, (-1.0, 1.0), "+1 for the left, -1 for the right side")
+    spacer = metres(0.07, (0.0, 0.5), "Distance between posts and beam")
 
 
-def _lap(tree: Tree, laps: Value, side: float, spacer: Value) -> Value:
-    """Add nodes for the upper sheet of every splice, whose rows are two points each; return the mesh."""
-    mesh = _sweep(tree, laps, _LAP_PROFILE, side, spacer)
-    # Faces of a grid run column by column, one less than the rows of them each.
-    between = (op.index(tree) % op.maximum(op.point_count(laps) - 1, 1)) % 2
-    return op.delete_degenerate(op.delete_faces(mesh, op.maximum(between, 0).equals(1)))
+@makes_group("SR Guardrail Side")
+def _side_group(tree: Tree) -> None:
+    """The beam on one side of the posts, with its splices and bolts, and the reflectors in it."""
+    rail = _Side(tree)
+    with tree.frame("Beam"):
+        beam = op.delete_degenerate(_sweep(rail, rail.line, BEAM_PROFILE))
+    with tree.frame("Upper sheets of the splices"):
+        # Faces of a grid run column by column, one less than the rows of them each.
+        between = (op.index(tree) % op.maximum(op.point_count(rail.laps) - 1, 1)) % 2
+        laps = op.delete_faces(_sweep(rail, rail.laps, _LAP_PROFILE), op.maximum(between, 0).equals(1))
+    with tree.frame("Bolts"):
+        heads = _in_beam(rail, rail.bolts, _bolts(tree))
+    tree.output("Beam", op.join(beam, op.delete_degenerate(laps), heads), description="Beam with splices and bolts")
+    with tree.frame("Reflectors"):
+        plates = _in_beam(rail, rail.reflectors, _reflector(tree))
+    tree.output("Reflectors", plates, description="Reflectors, as instances")
 
 
-def _sweep(tree: Tree, line: Value, outline: list[tuple[float, float, float]], side: float, spacer: Value) -> Value:
+def _sweep(rail: _Side, line: Value, outline: list[tuple[float, float, float]]) -> Value:
     """Add nodes that sweep an outline (depth in front of the posts, height under the top edge) along a beam's rows."""
-    mesh, column, number = op.grid(tree, len(outline), op.point_count(line))
+    tree = rail.tree
+    mesh, column, row = op.grid(tree, len(outline), op.point_count(line))
     profile = op.choose(column, outline)
-    top = op.sample_index(line, op.named_attribute(tree, "top", "FLOAT_VECTOR"), number)
-    left = op.sample_index(line, op.named_attribute(tree, "left", "FLOAT_VECTOR"), number)
-    depth = (op.component(profile, "X") + spacer + POST_DEPTH) * side
+    top = op.sample_index(line, op.named_attribute(tree, "top", "FLOAT_VECTOR"), row)
+    left = op.sample_index(line, op.named_attribute(tree, "left", "FLOAT_VECTOR"), row)
+    depth = (op.component(profile, "X") + rail.spacer + POST_DEPTH) * rail.side
     place = top + left * depth + op.vector(tree, 0.0, 0.0, op.component(profile, "Z"))
-    mesh = op.set_position(mesh, place)
     # Seen along the rows the profile runs round clockwise on the right side: there its faces look outwards.
-    return flip_faces(mesh) if side > 0 else mesh
+    return flip_faces(op.set_position(mesh, place), rail.side > 0.0)
 
 
-def _in_beam(points: Value, body: Value, spacer: Value, side: float) -> Value:
-    """Add nodes for an instance of a body on every point, its origin on the beam's rear plane at its top edge."""
-    tree = points.tree
-    left = op.named_attribute(tree, "left", "FLOAT_VECTOR")
-    away = left * ((spacer + POST_DEPTH) * side) + op.vector(tree, 0.0, 0.0, op.named_attribute(tree, "tall"))
-    return put_on_points(points, body, op.position(tree) + away, rotation=op.upright(left))
+def _in_beam(rail: _Side, points: Value, body: Value) -> Value:
+    """Add nodes for an instance of a body on every point, its origin on the beam's rear plane at its top edge.
+
+    The body's x points away from the posts.
+    """
+    tree = rail.tree
+    away = op.named_attribute(tree, "left", "FLOAT_VECTOR") * rail.side
+    top = op.vector(tree, 0.0, 0.0, op.named_attribute(tree, "tall"))
+    return put_on_points(
+        points, body, op.position(tree) + away * (rail.spacer + POST_DEPTH) + top, rotation=op.upright(away)
+    )
 
 
-def _bolts(tree: Tree, side: float) -> Value:
-    """Add nodes for the heads of a row of bolts; x is across the road, z = 0 the beam's top edge."""
-    radius, high = sizes.BOLT_HEAD
+def _bolts(tree: Tree) -> Value:
+    """Add nodes for the heads of a row of bolts; x points away from the posts, z = 0 is the beam's top edge."""
+    radius, height = sizes.BOLT_HEAD
     disc = tree.node("GeometryNodeMeshCircle", vertices=_BOLT_SIDES, radius=radius, fill_type="NGON").value
-    head = tree.node("GeometryNodeExtrudeMesh", disc, offset_scale=high, individual=False).value
+    head = tree.node("GeometryNodeExtrudeMesh", disc, offset_scale=height, individual=False).value
     heads = []
-    for depth, height, turn in sizes.BOLTS:
+    for depth, below, turn in sizes.BOLTS:
         # From facing up to facing the road, and then along with the flank's slope.
-        tilt = (0.0, side * (math.pi / 2.0 - turn), 0.0)
-        flank = op.transform(head, rotation=tilt)
+        flank = op.transform(head, rotation=(0.0, math.pi / 2.0 - turn, 0.0))
         outwards = math.cos(turn) * sizes.LAP_SHEET, math.sin(turn) * sizes.LAP_SHEET
-        heads.append(move_geometry(flank, (side * (depth + outwards[0]), 0.0, height + outwards[1])))
+        heads.append(move_geometry(flank, (depth + outwards[0], 0.0, below + outwards[1])))
     return op.join(*heads)
 
 
-def _reflector(tree: Tree, side: float) -> Value:
-    """Add nodes for a reflector's plate; x is across the road, z = 0 the beam's top edge."""
+def _reflector(tree: Tree) -> Value:
+    """Add nodes for a reflector's plate; x points away from the posts, z = 0 is the beam's top edge."""
     (inner, low), (outer, high) = sizes.REFLECTOR
     plate = tree.node("GeometryNodeMeshCube", size=1.0).value
-    share = op.component(op.position(tree), "X") * side + 0.5
-    tall = op.component(op.position(tree), "Z") * (share * (high - low) + low)
-    x = (share * (outer - inner) + inner) * side
-    y = op.component(op.position(tree), "Y") * sizes.REFLECTOR_PLATE
-    return op.set_position(plate, op.vector(tree, x, y, tall + sizes.REFLECTOR_MIDDLE))
+    share = op.component(op.position(tree), "X") + 0.5
+    height = op.component(op.position(tree), "Z") * (share * (high - low) + low)
+    thickness = op.component(op.position(tree), "Y") * sizes.REFLECTOR_PLATE
+    corner = op.vector(tree, share * (outer - inner) + inner, thickness, height + sizes.REFLECTOR_MIDDLE)
+    return op.set_position(plate, corner)
 
 
 def _instances(tree: Tree, posts: Value, rail: _Rail) -> list[Value]:
