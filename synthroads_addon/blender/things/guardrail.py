@@ -105,7 +105,7 @@ def guardrail_group(tree: Tree) -> None:
                 _side_group(), line=line, laps=laps, bolts=bolts, reflectors=reflectors, side=side, spacer=rail.spacer
             )
             parts.append(op.only_if(present, beam["Beam"]))
-            plates.append(op.only_if(present, beam["Reflectors"]))
+            plates.append(op.only_if(present, beam["Plates"]))
     with tree.frame("Posts from the start on, where the beam is high enough"):
         posts = place_on_ground(_post_rows(tree, rail))
         posts = op.delete_points(posts, op.named_attribute(tree, "tall") < sizes.LOWEST_POST)
@@ -190,7 +190,7 @@ def _side_group(tree: Tree) -> None:
     tree.output("Beam", op.join(beam, op.delete_degenerate(laps), heads), description="Beam with splices and bolts")
     with tree.frame("Reflectors"):
         plates = _in_beam(rail, rail.reflectors, _reflector(tree))
-    tree.output("Reflectors", plates, description="Reflectors, as instances")
+    tree.output("Plates", plates, description="Plates of the reflectors, as instances")
 
 
 def _sweep(rail: _Side, line: Value, outline: list[tuple[float, float, float]]) -> Value:
