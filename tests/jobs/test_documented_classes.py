@@ -54,7 +54,8 @@ def test_the_page_leads_from_a_scheme_to_a_network(tmp_path: Path) -> None:
     (scores,) = told["evaluate"]["tests"].values()
     by_class = scores["classes"]
     assert {name: by_class[name]["support"] for name in NEW} == {name: counts[name] for name in NEW}
-    assert all(by_class[name]["iou"] > 0.05 for name in NEW), "they were learned"
+    learned = {name: by_class[name]["iou"] for name in NEW}
+    assert min(learned.values()) > 0.05, learned
     losses = [epoch["loss"] for epoch in json.loads((tmp_path / "out" / "fine-net" / HISTORY).read_text())]
     assert losses[-1] < 0.8 * losses[0], "the loss falls"
     labelled = laspy.read(tmp_path / "out" / "labelled.laz")
