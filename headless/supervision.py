@@ -123,7 +123,7 @@ class _ErrorPipe:
         self._hear, self._say = os.pipe()
 
     def redirect(self) -> None:
-        """In the child, redirect file descriptor 2 into the pipe, and what Python code prints of exceptions that it caught.
+        """In the child, redirect file descriptor 2 into the pipe, and tracebacks that Python code prints by itself.
 
         Python's ``sys.stderr`` keeps the terminal.
         """

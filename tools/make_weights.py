@@ -112,7 +112,7 @@ PLANS = {
         Domain(density=(5.0, 15.0), platforms=("tripod",)),
         (
             "Three trainings that differ in their seed alone differ by up to 14 points on one real sweep.",
-            "Sidewalks and kerbs it has never seen: in towns much of them becomes road, and of the road becomes ground.",
+            "Sidewalks and kerbs it has never seen: in towns road and ground are taken for one another.",
             "Markings are found where the intensity tells them, which in sweeps of cars' heads it hardly does.",
         ),
         {"test_sweeps": "sweeps of its own"},
@@ -185,16 +185,17 @@ def train(plan: Plan, folder: Path, options: list[str]) -> tuple[float, str]:
     On a GPU that is time by the clock, else processor time.
     """
     kept = folder / "minutes.json"
-    before = read_json(kept) if kept.is_file() else {"minutes": 0.0, "machine": "one core"}
+    told = read_json(kept) if kept.is_file() else {}
+    minutes, machine = float(told.get("minutes", 0.0)), str(told.get("machine", "one core"))
     if not (folder / METRICS).is_file():
         graphics = torch.cuda.get_device_name() if torch.cuda.is_available() else None
         begin = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime, time.perf_counter()
         run_command("train", plan.configuration, "--output", str(folder), "--resume", *options)
         end = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime, time.perf_counter()
-        spent = (end[1] - begin[1] if graphics else end[0] - begin[0]) / 60.0
-        before = {"minutes": before["minutes"] + spent, "machine": graphics or "one core"}
-        write_file(kept, canonical_json(before).encode(), overwrite=True)
-    return float(before["minutes"]), str(before["machine"])
+        minutes += (end[1] - begin[1] if graphics else end[0] - begin[0]) / 60.0
+        machine = graphics or "one core"
+        write_file(kept, canonical_json({"minutes": minutes, "machine": machine}).encode(), overwrite=True)
+    return minutes, machine
 
 
 def training_roads(plan: Plan, data: Path) -> int:
