@@ -129,6 +129,13 @@ def test_every_drawn_value_lies_within_its_interval(design_class: str, cross_sec
     assert check(parameters) == []
 
 
+def test_pylons_stand_clear_of_a_bridges_embankment_far_from_the_road() -> None:
+    """On one of two among ten thousand roads where one stood on it."""
+    parameters = sample_road(scenario_of("EKA1B", "RQ36", 600.0, vegetation=WOODED), 40218)
+    assert {"PowerLine", "Overpass"} <= set(objects_by_type(parameters))
+    assert check(parameters) == []
+
+
 @pytest.mark.slow
 def test_the_share_of_trucks_varies_between_its_limits() -> None:
     """Which can't be read off a road: the spread is that of a uniform share and of counting."""

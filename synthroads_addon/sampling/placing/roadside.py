@@ -118,13 +118,13 @@ class _Zones:
         return int(per_km * self.site.length / 1000.0 + rng.random())
 
 
-def _crossings(site: PlacementSite, objects: Mapping[str, RoadObject]) -> Iterator[Range]:
-    """Yield the stretches of road that the embankments of bridges take."""
+def _crossings(site: PlacementSite, objects: Mapping[str, RoadObject], far: float = FARTHEST) -> Iterator[Range]:
+    """Yield the stretches of road that the embankments of bridges take up to a distance (m) from the centreline."""
     for item in objects.values():
         if isinstance(item, Overpass):
             turn = math.radians(item.rotation_deg)
             wide = item.width / 2.0 + _EMBANKMENT * site.terrain.batter_slope
-            half = wide / math.cos(turn) + FARTHEST * abs(math.tan(turn))
+            half = wide / math.cos(turn) + far * abs(math.tan(turn))
             yield item.station - half, item.station + half
 
 
@@ -134,12 +134,9 @@ def _power_line(site: PlacementSite, objects: Mapping[str, RoadObject]) -> Power
     height = draw(rng, limits.pylon_height)
     left, right = draw_between(rng, _PYLON_DISTANCES), draw_between(rng, _PYLON_DISTANCES)
     turn, sag, wanted = draw_between(rng, (-25.0, 25.0)), draw_between(rng, (3.0, 7.0)), rng.random()
-    start = draw_start(rng, free_ranges(0.0, site.length, Reservations(_crossings(site, objects))), 10.0)
-    if wanted >= limits.power_line or start is None:
-        return None
-    return PowerLine(
+    line = PowerLine(
         instance=1,
-        station=round_value(start + 5.0),
+        station=0.0,
         offset=0.0,
         rotation_deg=turn,
         left_distance=left,
@@ -147,6 +144,14 @@ def _power_line(site: PlacementSite, objects: Mapping[str, RoadObject]) -> Power
         height=height,
         sag=round_value(min(sag, 0.2 * height)),
     )
+    taken = Reservations(_crossings(site, objects))
+    for pylon in line.footprint():
+        for low, high in _crossings(site, objects, _PYLON_DISTANCES[1]):
+            taken.add(low - pylon.end, high - pylon.start)
+    start = draw_start(rng, free_ranges(0.0, site.length, taken), 10.0)
+    if wanted >= limits.power_line or start is None:
+        return None
+    return line.model_copy(update={"station": round_value(start + 5.0)})
 
 
 def _hedges(zones: _Zones, rng: np.random.Generator) -> Iterator[tuple[str, Hedge]]:
