@@ -12,7 +12,7 @@ from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import load_scenario
 
-CHECKSUM = "e608b4477ecdf6cd87d2d1745d8af1b02e95200ed43ad5bfb704f22deb49516b"
+CHECKSUM = "59ef1b1dca4a25a758bb4678f785e8c4a23209bbc47c68b235dadaedff9badbf"
 EVERYTHING = ["exits=1", "entries=1", "emergency_bays=1"]
 
 

@@ -108,7 +108,7 @@ def test_a_road_is_seen_the_same_after_one_with_other_seed_wear_and_wetness_is_b
 def test_both_roads_in_one_scan_have_their_own_materials() -> None:
     first = build_small(parameters(), parts=PARTS)
     second = build_small(parameters(**WET), parts=PARTS, place=BESIDE)
-    assert used_by(first) == {"asphalt", "verge", "median", "paint_white", "galvanised_steel"}
+    assert used_by(first) == {"asphalt", "verge", "median", "paint_white", "galvanised_steel", "reflector"}
     differ = {name for name in used_by(second) if name != entry_of(name)}
     assert {entry_of(name) for name in used_by(second)} == used_by(first)
     assert {entry_of(name) for name in differ} == {"asphalt", "verge", "paint_white"}
@@ -127,7 +127,7 @@ def test_to_build_a_road_again_leaves_no_materials_behind_and_those_of_others_as
     count = len(bpy.data.materials)
     for seed in (11, 12, 4):
         first = build_small(parameters(seed=seed), parts=PARTS, place=BuildTarget(first.road_id))
-        assert used_by(first) == {"asphalt", "verge", "median", "paint_white", "galvanised_steel"}
+        assert used_by(first) == {"asphalt", "verge", "median", "paint_white", "galvanised_steel", "reflector"}
         assert len(bpy.data.materials) == count
     assert described() == kept
     bpy.ops.mesh.primitive_plane_add()
