@@ -22,7 +22,7 @@ pytestmark = [
     pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="open files are counted in /proc"),
 ]
 
-SCENES = int(os.environ.get("ENDURANCE_SCENES") or 100)
+SCENES = int(os.environ.get("ENDURANCE_SCENES") or 200)
 SCANS = 100
 GROWTH = 8.0
 """MB that the last quarter of some work may take above its second."""
