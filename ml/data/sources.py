@@ -278,7 +278,7 @@ def tile_of(points: PointBlock, scene: str, origin: Float, scale: float) -> Clou
         (points.xyz - origin).astype(np.float32),
         eight_bits(points.rgb, int(points.rgb.max())) if points.rgb.any() else None,
         strength if strength.any() else None,
-        np.where(points.class_id == UNLABELLED, IGNORED, points.class_id).astype(np.int16),
+        np.where(points.class_id == UNLABELLED, IGNORED, points.class_id.astype(np.int16)),
     )
 
 

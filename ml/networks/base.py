@@ -7,6 +7,8 @@ from typing import Any, ParamSpec, TypeVar
 import torch
 from torch import Tensor, nn
 
+from synthroads_addon.base.errors import InputError
+
 from ..configuration import Part
 
 Batch = dict[str, Tensor]
@@ -44,3 +46,16 @@ class SegmentationNetwork(Part):
     def prepare(self, batch: Batch) -> Batch:
         """Return the batch with what the network needs precomputed on the CPU, in workers; here unchanged."""
         return batch
+
+    def shift_scores(self, model: nn.Module, offsets: Tensor) -> None:
+        """Add offsets (C,) to the class scores of a network, in place: to the bias of its last linear layer.
+
+        Raises:
+            InputError: it has no such layer with as many outputs.
+        """
+        layers = [layer for layer in model.modules() if isinstance(layer, nn.Linear)]
+        bias = layers[-1].bias if layers and layers[-1].out_features == len(offsets) else None
+        if bias is None:
+            raise InputError("fitted_offsets", True, f"needs a network with a last linear layer; {self.name} has none")
+        with torch.no_grad():
+            bias.add_(offsets.to(bias))

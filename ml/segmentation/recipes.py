@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from pydantic import Field, field_validator, model_validator
@@ -76,9 +76,20 @@ class SegmentationConfiguration(Configuration):
     effects: CropEffects = Field(CropEffects(), description="What happens to crops.")
     adaptation: Adaptation = Field(Adaptation(), description="What brings domains nearer.")
     label_smoothing: float = quantity(0.2, ge=0, lt=1, unit="1", description="Share of the loss for all classes.")
-    class_weights: bool = Field(True, description="Weigh classes by 1 / (f + 0.02), f their share of the points.")
+    class_weights: float = quantity(
+        1.0, ge=0, le=1, unit="1", description="Power p of the weights (f + 0.02)^-p, f a class's share; 0: all alike."
+    )
+    fitted_offsets: bool = Field(
+        False, description="Add to each class's score what makes the mean IoU of the training tiles largest."
+    )
     fine_tuning: Schedule = Field(Schedule(epochs=30, learning_rate=0.001), description="Second part of fine_tuned.")
     data: Data = Field(Data(), description="Where points come from.")
+
+    @field_validator("class_weights", mode="before")
+    @classmethod
+    def _read_switch(cls, power: Any) -> Any:
+        """Return the power 1 for true and 0 for false, as older configurations have it."""
+        return float(power) if isinstance(power, bool) else power
 
     @field_validator("features")
     @classmethod
@@ -129,9 +140,9 @@ def class_shares(tiles: Sequence[CloudTile], classes: int) -> Float:
     return np.asarray(counts / counts.sum(), dtype=np.float64)
 
 
-def class_weights(shares: Float) -> Float:
-    """Return the classes' loss weights (C,): 1 / (share + 0.02), scaled to the mean 1."""
-    weights = 1.0 / (shares + 0.02)
+def class_weights(shares: Float, power: float = 1.0) -> Float:
+    """Return the classes' loss weights (C,): 1 / (share + 0.02) to a power, scaled to the mean 1."""
+    weights = (shares + 0.02) ** -power
     return np.asarray(weights / weights.mean(), dtype=np.float64)
 
 

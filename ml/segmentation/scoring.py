@@ -100,13 +100,31 @@ def label_tile(
     keep = voxel_sample(tile.coord, settings.voxel)
     small = tile.select(keep)
     own = _needed_points(small.coord, tile.coord, core, settings.voxel)
-    small = replace(small, segment=np.full(len(small), IGNORED, dtype=np.int16))
     labels = np.zeros(len(small), dtype=np.int16)
-    for number, (inside, seen) in enumerate(overlapping_pieces(small.coord[:, :2], own)):
-        batch = make_item(crop_of(small.select(seen), scaling), settings, stream(seed, "missing features", number))
-        best = classifier(batch).argmax(dim=1).cpu().numpy()
-        labels[inside] = best[np.searchsorted(seen, inside)]
+    for inside, scores in piece_scores(small, scaling, classifier, settings, own, seed):
+        labels[inside] = scores.argmax(dim=1).cpu().numpy()
     return nearest_labels(small.coord[own], labels[own], tile.coord if core is None else tile.coord[core])
+
+
+def piece_scores(
+    tile: CloudTile,
+    scaling: Scaling,
+    classifier: Classifier,
+    settings: CropSettings,
+    own: Bool | None = None,
+    seed: int = 0,
+) -> Iterator[tuple[Index, Tensor]]:
+    """Yield the class scores (n, C) of a thinned tile's points, piece by piece, with the points' indices (n,).
+
+    Args:
+        tile: N points, one per voxel; its labels aren't looked at.
+        scaling, classifier, settings, seed: see `label_tile`.
+        own: (N,) which points' scores are wanted; all if not given.
+    """
+    tile = replace(tile, segment=np.full(len(tile), IGNORED, dtype=np.int16))
+    for number, (inside, seen) in enumerate(overlapping_pieces(tile.coord[:, :2], own)):
+        batch = make_item(crop_of(tile.select(seen), scaling), settings, stream(seed, "missing features", number))
+        yield inside, classifier(batch)[torch.from_numpy(np.searchsorted(seen, inside))]
 
 
 def _needed_points(small: Float32, full: Float32, core: Bool | None, voxel: float) -> Bool:

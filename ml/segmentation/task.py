@@ -22,7 +22,7 @@ from ..data.sources import Source
 from ..data.tiles import CloudTile, scalings
 from ..data.workers import report_lost_workers
 from ..onnx_export import Exportable
-from ..processes import helper_processes
+from ..processes import helper_processes, process_number
 from ..runs import PRETRAINING, Run
 from ..scores.confusion import Confusion, score_table
 from ..scores.pictures import comparison
@@ -31,10 +31,13 @@ from ..training_loop import Figures, chosen_device, fit
 from .exporting import exportable_network
 from .loading import CropBatches, read_domains, thin_tiles
 from .network import build, scores_of
+from .offsets import fit_offsets
 from .prediction import Labelling, predict_file
 from .recipes import SegmentationConfiguration, class_shares, class_weights
 from .scoring import check_tests, classifier, label_tile, score, score_all, trained_model
 
+OFFSETS = "offsets"
+"""Key of the checkpoint's offsets that were added to the network's scores, (C,)."""
 _ONE_TILE = 5_000_000
 """Points of a cloud up to which it is scored as one tile."""
 SegmentationRun = Run[SegmentationConfiguration]
@@ -178,7 +181,22 @@ def train_network(run: Run[SegmentationConfiguration], progress: Progress = sile
         _fit(model, replace(run, configuration=second), {"real": domains["real"]}, validation, progress)
     else:
         _fit(model, run, domains, validation, progress)
+    if configuration.fitted_offsets:
+        _shift_scores(model, run, domains)
     return model.eval(), domains
+
+
+def _shift_scores(model: nn.Module, run: Run[SegmentationConfiguration], domains: Domains) -> None:
+    """Fit the scores' offsets on the training tiles, add them to the network and save it; once in a run."""
+    if process_number():
+        return
+    configuration, state = run.configuration, run.last_checkpoint()
+    if state is None or OFFSETS in state:
+        return
+    tiles = [tile for several in domains.values() for tile in several]
+    offsets = torch.from_numpy(fit_offsets(tiles, classifier(model, configuration), configuration))
+    configuration.network.shift_scores(model, offsets)
+    run.save({**state, "model": model.state_dict(), OFFSETS: offsets})
 
 
 def _pretraining(run: Run[SegmentationConfiguration]) -> Run[SegmentationConfiguration]:
@@ -230,8 +248,7 @@ def objective(
         InputError: no point has a label.
     """
     shares = class_shares(tiles, len(class_names(configuration.scheme())))
-    shares = class_weights(shares) if configuration.class_weights else np.ones_like(shares)
-    weights = torch.from_numpy(shares.astype(np.float32)).to(device)
+    weights = torch.from_numpy(class_weights(shares, configuration.class_weights).astype(np.float32)).to(device)
 
     def loss(model: nn.Module, batch: Item) -> tuple[Tensor, Figures]:
         scores, truth = scores_of(model, batch), batch["segment"]

@@ -337,7 +337,7 @@ def test_job_script_for_slurm(tmp_path: Path) -> None:
 def reference(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The reference set at draft fidelity, thinly scanned."""
     folder = tmp_path_factory.mktemp("reference") / "set"
-    cheap = ["fidelity=draft", "scan.lines_per_second=20", "scan.platform.speed=40", "colour.source=material"]
+    cheap = ["fidelity=draft", "scan.lines_per_second=20", "scan.platform.speed=100", "colour.source=material"]
     cheap += ["vegetation_detail=0.1", "scan.rays_per_pulse=1"]
     options = [word for change in cheap for word in ("--set", change)]
     call = [sys.executable, "-m", "headless.dataset", "reference", "--output", str(folder), "--jobs", "2", *options]

@@ -15,6 +15,8 @@ CREASE = 0.005
 """Largest angle between two faces that count as one plane, rad."""
 FINEST, MOST_CELLS = 0.02, 1 << 24
 """Least width of the grids' cells, m, and how many there may be in the finest grid."""
+_CELL = 0.7
+"""Width of the grids' cells by the footprints' radius: a footprint is then three of them wide, as grids allow."""
 _STEEPEST = 0.5
 """Least vertical component of the normal of a face that counts as ground."""
 _LEVEL = 0.06
@@ -22,6 +24,10 @@ _LEVEL = 0.06
 _LOWERED = 0.03
 """How far below its place the edge of a plane stands in a beam's way, m: what ends at the height of the plane is no
 obstacle, but for where a footprint reaches it; what stands higher has faces of its own there."""
+_BESIDE, _ABOVE = 1, 2
+"""Kinds of edges in their grid: those beside a face, and those of what lies on pavement as thin as paint."""
+_ROUNDING = 1e-4
+"""How far from a triangle's sides a footprint stays that lies within it, m: corners are in single precision."""
 _LONGEST_PIECE, _LONGEST_PLANT_PIECE, _PLANT_CELL = 0.2, 2.0, 0.25
 """Pieces of things and of plants that are drawn as boxes, m; and least width of the cells that plants are drawn in."""
 
@@ -53,11 +59,13 @@ class BareGround:
         bounds = np.array([turned.min(axis=1), turned.max(axis=1)], np.float64)
         self._corner, self._size = bounds[0], bounds[1] - bounds[0]
         turned -= turned.min(axis=1)[:, None]
+        self._faces, self._corners = ground, turned[:2, mesh.triangles[ground]]
         area = float(np.prod(bounds[1, :2] - bounds[0, :2]))
-        cell = max(FINEST, footprint, (area / most_cells) ** 0.5)
+        cell = max(FINEST, _CELL * footprint, (area / most_cells) ** 0.5)
         self._edges = PlanGrids(bounds[1, :2] - bounds[0, :2], cell, np.uint8, 0)
         self._things = HeightGrids(bounds, cell)
-        self._draw_edges(turned, _border_edges(mesh, ground, normal), cell)
+        for edges, kind in zip(_plane_edges(mesh, ground, normal), (_BESIDE, _ABOVE), strict=True):
+            self._draw_edges(turned, edges, cell, kind)
         plant = mesh.class_id == class_id("vegetation")
         self._things.draw_triangles(turned, mesh.triangles[~self.face & ~plant], _LONGEST_PIECE)
         self._things.draw_triangles(turned, mesh.triangles[plant], _LONGEST_PLANT_PIECE, _PLANT_CELL)
@@ -76,8 +84,8 @@ class BareGround:
     def _turn(self, x: Float, y: Float) -> tuple[Float, Float]:
         return self._cosine * x + self._sine * y, self._cosine * y - self._sine * x
 
-    def _draw_edges(self, vertices: Float32, edges: Index, cell: float) -> None:
-        """Draw edges (E, 2), the vertices' numbers, cut into pieces no longer than a cell."""
+    def _draw_edges(self, vertices: Float32, edges: Index, cell: float, kind: int) -> None:
+        """Draw edges (E, 2) of a kind, the vertices' numbers, cut into pieces no longer than a cell."""
         begins, ends = vertices[:, edges[:, 0]], vertices[:, edges[:, 1]]
         length = np.hypot(*(ends - begins)[:2])
         count = np.maximum(np.ceil(length / cell), 1.0).astype(np.intp)
@@ -87,14 +95,17 @@ class BareGround:
         one = begins[:, edge] + place * way
         other = one + way
         low, high = np.minimum(one, other), np.maximum(one, other)
-        self._edges.draw(0, low[:2], high[:2], 1)
+        self._edges.draw(0, low[:2], high[:2], kind)
         high[2] -= np.float32(_LOWERED)
         self._things.draw_boxes(low, high)
 
-    def check_footprints(self, place: Float, spans: tuple[Float, Float], towards: Float) -> tuple[Bool, Bool]:
+    def check_footprints(
+        self, face: Index, place: Float, spans: tuple[Float, Float], towards: Float
+    ) -> tuple[Bool, Bool]:
         """Return which footprints (N,) lie on one plane, and which of these beams surely meet nothing before it.
 
         Args:
+            face: (N,) that the footprints' middles are on.
             place: (3, N) middle of the footprints, local, m.
             spans: (3, N) each, half the footprints' axes on the plane that they are on, m.
             towards: (3, N) unit vectors back to the scanner; the third component is positive.
@@ -107,12 +118,28 @@ class BareGround:
         corner = np.array([m - h - c for m, h, c in zip(middle, half, self._corner, strict=True)])
         width = 2.0 * np.maximum(half[0], half[1])
         level, last = self._edges.level_of(width), len(self._edges.cells) - 1
-        whole = (level <= last) & (self._edges.largest(np.minimum(level, last), corner[0], corner[1]) == 0)
+        nearest = self._edges.largest(np.minimum(level, last), corner[0], corner[1])
+        whole = (level <= last) & (nearest == 0)
+        beside = np.flatnonzero((level <= last) & (nearest == _BESIDE))
+        half_axes = [np.array(axis[:2])[:, beside] for axis in (one, other)]
+        whole[beside] = self._within_faces(face[beside], np.array(middle[:2])[:, beside], *half_axes)
         rows = np.flatnonzero(whole)
         back = np.array([*self._turn(towards[0, rows], towards[1, rows]), towards[2, rows]])
         alone = np.zeros(len(whole), bool)
         alone[rows] = self._things.passed_by(corner[:, rows], width[rows], back)
         return whole, alone
+
+    def _within_faces(self, face: Index, middle: Float, one: Float, other: Float) -> Bool:
+        """Return which footprints (N,), ellipses in plan with half axes (2, N), lie within the face of their middle."""
+        corners = self._corners[:, np.searchsorted(self._faces, face)] + self._corner[:2, None, None]
+        within = np.ones(len(face), bool)
+        for i in range(3):
+            a, b, c = (corners[:, :, (i + step) % 3] for step in range(3))
+            inward = np.array([a[1] - b[1], b[0] - a[0]])
+            inward *= np.sign(_dot(inward, c - a)) / np.maximum(np.hypot(*inward), _ROUNDING)
+            reach = np.hypot(_dot(inward, one), _dot(inward, other))
+            within &= _dot(inward, middle - a) >= reach + _ROUNDING
+        return within
 
     def passed_by(self, origins: Float, directions: Float, spread: float) -> Bool:
         """Return a mask (N,) of the beams that surely pass by all of the scene, of those whose axis meets nothing.
@@ -152,10 +179,16 @@ def _normals(mesh: SceneMesh, faces: Index) -> Float:
     return np.asarray(normal / np.where(length > 0.0, length, 1.0)[:, None])
 
 
-def _border_edges(mesh: SceneMesh, faces: Index, normal: Float) -> Index:
-    """Return the vertices (E, 2) of the edges at which a plane of ground ends.
+def _dot(a: Float, b: Float) -> Float:
+    """Return the products (N,) of vectors (2, N)."""
+    return np.asarray(a[0] * b[0] + a[1] * b[1])
 
-    That is where a face has no neighbour, or one of another material, or at an angle of more than `CREASE`.
+
+def _plane_edges(mesh: SceneMesh, faces: Index, normal: Float) -> tuple[Index, Index]:
+    """Return the vertices (E, 2) of the edges at which a plane of ground ends, in two parts.
+
+    That is between two faces of which one is of another material, or at an angle of more than `CREASE`, and where a
+    face has no neighbour. The second part is where pavement or what is painted on it has none: it may lie on another.
     """
     triangles = mesh.triangles[faces]
     sides = np.sort(np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)]), axis=1).astype(np.intp)
@@ -168,5 +201,6 @@ def _border_edges(mesh: SceneMesh, faces: Index, normal: Float) -> Index:
     first, second = owner[starts], owner[starts + (count > 1)]
     material = mesh.material[faces]
     level = np.linalg.norm(np.cross(normal[first], normal[second]), axis=1) <= np.sin(CREASE)
-    inner = (count == 2) & level & (material[first] == material[second])
-    return np.asarray(sides[order[starts[~inner]]])
+    ends = ~((count == 2) & level & (material[first] == material[second]))
+    thin = np.isin(mesh.class_id[faces[first]], [class_id("road"), class_id("road_marking")]) & (count != 2)
+    return sides[order[starts[ends & ~thin]]], sides[order[starts[ends & thin]]]

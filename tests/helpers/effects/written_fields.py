@@ -31,7 +31,7 @@ WRITTEN: dict[str, Written] = {
     "scan.section_length": Written(25.0),
     "scan.most_pulses": Written(10**9),
     # Where a ray passes the edge of two faces, casters may choose either.
-    "scan.caster": Written("bvhtree", changes=CLOUD, same=0.999),
+    "scan.caster": Written("bvhtree", changes=CLOUD | {"preview_intensity.png"}, same=0.999),
     "scan.threads": Written(2),
     "scan.footprints": Written("where_needed"),
     "cloud.formats": Written(["laz", "npz"], adds=frozenset({"cloud.npz"})),

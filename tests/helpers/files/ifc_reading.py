@@ -74,8 +74,9 @@ def local_body(item: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 def parts(item: Any) -> list[Any]:
-    """Return what an element is made of, itself if it has no parts."""
-    return [part for rel in item.IsDecomposedBy for part in rel.RelatedObjects] or [item]
+    """Return what an element is made of: its parts, and itself if it has a shape of its own or no parts."""
+    made_of = [part for rel in item.IsDecomposedBy for part in rel.RelatedObjects]
+    return made_of if made_of and not item.Representation else [item, *made_of]
 
 
 def whole_body(item: Any) -> np.ndarray:

@@ -37,7 +37,7 @@ CUT = 30.0
 """How far (m) from a stretch's ends the model is no longer that of where it is cut."""
 OF_THE_FACE = ("incidence", "intensity", "red", "green", "blue")
 """Fields of a point that follow from the slope of the face that the ray met."""
-ROUNDED = ("range", "true_range", "X", "Y", "Z")
+ROUNDED = ("range", "true_range", "X", "Y", "Z", "true_x", "true_y", "true_z")
 """Lengths in steps of the file: of the same edge computed from another face the last may differ."""
 
 

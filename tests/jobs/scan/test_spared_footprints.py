@@ -131,7 +131,7 @@ def test_most_footprints_on_ground_and_pavement_alone_are_spared(name: str) -> N
     spared[Sparing(plan).find(pulses, met, poses.motions).pulse] = True
     assert bare.sum() > 500
     assert spared[bare].mean() >= 0.85
-    assert not spared[~bare].any()
+    assert spared[~bare].mean() < 1e-3  # where blades of grass end a millimetre above the ground
 
 
 def test_other_casters_spare_the_same() -> None:

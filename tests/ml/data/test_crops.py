@@ -192,6 +192,9 @@ def test_class_weights_are_the_recipes() -> None:
     weights = class_weights(shares)
     assert weights.mean() == pytest.approx(1.0)
     assert weights[5] / weights[0] == pytest.approx((shares[0] + 0.02) / 0.02)
+    half = class_weights(shares, 0.5)
+    assert half[5] / half[0] == pytest.approx(np.sqrt(weights[5] / weights[0]))
+    assert class_weights(shares, 0.0).tolist() == [1.0] * 6
     with pytest.raises(InputError, match="label"):
         class_shares([replace(tile, segment=np.full_like(tile.segment, IGNORED))], 5)
 

@@ -1,0 +1,72 @@
+"""Offsets of the class scores by which a trained network reaches its best mean IoU on what it has learned from.
+
+The likeliest class of a point is hardly ever a rare one: a network that knows how rare markings are in a sweep finds
+none, and one that learned with weights finds them where none are. The best thresholds lie between.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from synthroads_addon.base.arrays import Float, Float32, Int
+
+from ..data.classes import IGNORED
+from ..data.tiles import CloudTile, scalings
+from .recipes import SegmentationConfiguration
+from .scoring import Classifier, piece_scores
+
+MOST_POINTS = 2_000_000
+"""Points that offsets are fitted to; of more tiles every n-th is taken."""
+_STEPS = (1.0, 0.5, 0.25)
+_LEAST_GAIN = 1e-4
+"""Gain in mean IoU for which an offset is changed: less is chance."""
+
+
+def fit_offsets(tiles: Sequence[CloudTile], classifier: Classifier, configuration: SegmentationConfiguration) -> Float:
+    """Return the offsets (C,) of the classes' scores by which the mean IoU over thinned, labelled tiles is largest.
+
+    Args:
+        tiles: of the training.
+        classifier: scores of the trained network.
+        configuration: of the training.
+    """
+    every = -(-sum(map(len, tiles)) // MOST_POINTS)
+    chosen = tiles[::every]
+    scaling = scalings(tiles, configuration.intensity)
+    scores: list[Float32] = []
+    truth: list[Int] = []
+    for tile in chosen:
+        for inside, found in piece_scores(tile, scaling[tile.scene], classifier, configuration.crop_settings()):
+            known = tile.segment[inside] != IGNORED
+            scores.append(found.float().cpu().numpy()[known])
+            truth.append(tile.segment[inside][known].astype(np.int64))
+    return best_offsets(np.concatenate(scores), np.concatenate(truth))
+
+
+def best_offsets(scores: Float32, truth: Int) -> Float:
+    """Return the offsets (C,) at which the mean IoU of the largest scores (N, C) against true classes (N,) is largest.
+
+    It goes up one class at a time, by ever smaller steps. Classes without a point don't count and get none.
+    """
+    there = np.unique(truth)
+    offsets = np.zeros(scores.shape[1])
+    best = _mean_iou(scores, truth, there)
+    for step in _STEPS:
+        improved = True
+        while improved:
+            improved = False
+            for place in there:
+                for change in (step, -step):
+                    tried = offsets.copy()
+                    tried[place] += change
+                    reached = _mean_iou(scores + tried.astype(np.float32), truth, there)
+                    if reached > best + _LEAST_GAIN:
+                        offsets, best, improved = tried, reached, True
+    return offsets
+
+
+def _mean_iou(scores: Float32, truth: Int, there: Int) -> float:
+    classes = scores.shape[1]
+    pairs = np.bincount(truth * classes + scores.argmax(axis=1), minlength=classes**2).reshape(classes, classes)
+    union = pairs.sum(axis=0) + pairs.sum(axis=1) - np.diag(pairs)
+    return float((np.diag(pairs)[there] / union[there]).mean())
