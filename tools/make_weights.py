@@ -113,7 +113,7 @@ PLANS = {
         ("train_sweeps",),
         Domain(density=(5.0, 15.0), platforms=("tripod",)),
         (
-            "Three trainings that differ in their seed alone differ by up to 14 points on one real sweep.",
+            "Three trainings that differ in their seed alone differ by up to nine points on one real sweep.",
             "Sidewalks and kerbs it has never seen: in towns road and ground are taken for one another.",
             "Markings are found where the intensity tells them, which in sweeps of cars' heads it hardly does.",
         ),
