@@ -211,10 +211,9 @@ class TestGroups:
     def test_inputs_are_described_and_limited(self) -> None:
         for group in all_groups():
             assert group.description, group.name
-            names = [item.name for item in group.interface.items_tree if item.item_type == "SOCKET"]
-            for item in group.interface.items_tree:
-                if item.item_type != "SOCKET":
-                    continue
+            sockets = [item for item in group.interface.items_tree if item.item_type == "SOCKET"]
+            names = [item.name for item in sockets]
+            for item in sockets:
                 where = f"{group.name}: {item.name}"
                 assert item.in_out == "OUTPUT" or item.description, where
                 if item.in_out == "INPUT" and item.socket_type in ("NodeSocketFloat", "NodeSocketInt"):

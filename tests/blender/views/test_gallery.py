@@ -28,7 +28,7 @@ def short_roads(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Mo
 @pytest.mark.parametrize(
     "only",
     [
-        "materials-base_color",
+        pytest.param("materials-base_color", marks=pytest.mark.any_blender),
         pytest.param("scene-rural-driver", marks=[pytest.mark.any_blender, pytest.mark.slow]),
         pytest.param("materials-lit", marks=[pytest.mark.any_blender, pytest.mark.slow]),
     ],
