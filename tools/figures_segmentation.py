@@ -1,13 +1,12 @@
 """Write the tables and pictures of docs/segmentation.md from what was trained and measured.
 
     python tools/figures_segmentation.py --small out/segmentation --mixing out/mixing-small \\
-        --gantries out/gantries-small --run out/any-scanner-1 --run out/any-scanner-2 --real REAL_FOLDER \\
-        --prediction out/prediction/prediction.json --packed out/train.npz --forecast out/forecast.json \\
+        --gantries out/gantries-small --real REAL_FOLDER --prediction out/prediction/prediction.json \\
+        --packed out/train.npz --forecast out/forecast.json \\
         --document docs/segmentation.md --pictures docs/pictures
 
-What isn't given is left out, and its tables in the document stay as they are. Runs are one network trained with several
-seeds; they are scored here on the labelled real clouds, and the first one's classes are drawn. Everything else was
-measured by the commands that stand beside the tables.
+What isn't given is left out, and its tables in the document stay as they are. The models that come with the package are
+scored and drawn here on the labelled real clouds. Everything else was measured by the commands that stand beside the tables.
 """
 
 from __future__ import annotations
@@ -25,18 +24,22 @@ from headless.marked_documents import put_tables  # noqa: E402
 from ml.data.pack import CROP, pack_summary  # noqa: E402
 from ml.data.packed import PackReader  # noqa: E402
 from ml.data.sources import Source  # noqa: E402
-from ml.runs import HISTORY, METRICS, PRETRAINING, Run  # noqa: E402
+from ml.runs import HISTORY, METRICS, PRETRAINING  # noqa: E402
 from ml.scores.confusion import table_by_class, tables_by_test  # noqa: E402
 from ml.scores.metrics import Spread, finite_values  # noqa: E402
 from ml.scores.pictures import comparison  # noqa: E402
 from ml.segmentation.experiment import RESULTS  # noqa: E402
 from ml.segmentation.scoring import score, trained_model  # noqa: E402
+from ml.shipped import open_shipped  # noqa: E402
 from synthroads_addon.base.errors import InputError, SynthRoadsError  # noqa: E402
 from synthroads_addon.base.files import write_file  # noqa: E402
 from synthroads_addon.base.schema import read_json  # noqa: E402
 
-REAL_CLOUDS = {"semantickitti": "semkitti_seq00_000000.laz", "ign": "ign_lidarhd_street.laz"}
-"""Mapping of classes, which names table and picture, and the file in the folder of real clouds."""
+REAL_CLOUDS = {
+    "semantickitti": ("semkitti_seq00_000000.laz", "segmentation-sweeps"),
+    "ign": ("ign_lidarhd_street.laz", "segmentation-overhead"),
+}
+"""Mapping of classes, which names table and picture; the file in the folder of real clouds, and the model for it."""
 _WHOLE = 1000.0
 """Edge of the tiles that real clouds are cut into, m: the largest, so that each is one."""
 
@@ -70,23 +73,20 @@ def training_seconds(run: Path) -> float:
     return sum(epoch["seconds"] for path in parts for epoch in read_json(path))
 
 
-def real_tables(runs: Sequence[Path], folder: Path, pictures: Path) -> dict[str, str]:
-    """Score runs on the labelled real clouds, write pictures of the first run's classes; return Markdown tables."""
-    found: dict[str, list[dict[str, Any]]] = {name: [] for name in REAL_CLOUDS}
-    for place, path in enumerate(runs):
-        run = Run.open(path)
-        model = trained_model(run)
-        for name, file in REAL_CLOUDS.items():
-            source = Source(path=str(folder / file), mapping=name, tile=_WHOLE)
-            confusion, shown = score(model, run.configuration, [source])
-            found[name].append(confusion.to_dict())
-            if place == 0 and shown is not None:
-                picture = comparison(*shown, source.targets(run.configuration.scheme()))
-                write_file(pictures / f"segmentation-{name}.png", picture, overwrite=True)
-    note = {
-        name: f"{scores[0]['ignored']:,} points without such a class don't count." for name, scores in found.items()
-    }
-    return {f"real-{name}": f"{table_by_class(scores)}\n\n{note[name]}" for name, scores in found.items()}
+def real_tables(folder: Path, pictures: Path) -> dict[str, str]:
+    """Score the package's models on the labelled real clouds and write pictures; return Markdown tables."""
+    found: dict[str, str] = {}
+    for name, (file, shipped) in REAL_CLOUDS.items():
+        run = open_shipped(shipped)
+        source = Source(path=str(folder / file), mapping=name, tile=_WHOLE)
+        confusion, shown = score(trained_model(run), run.configuration, [source])
+        scores = confusion.to_dict()
+        note = f"{scores['ignored']:,} points without such a class don't count."
+        found[f"real-{name}"] = f"{table_by_class([scores])}\n\n{note}"
+        if shown is not None:
+            picture = comparison(*shown, source.targets(run.configuration.scheme()))
+            write_file(pictures / f"segmentation-{name}.png", picture, overwrite=True)
+    return found
 
 
 def prediction_table(file: Path) -> str:
@@ -139,26 +139,24 @@ def expected_tables(arguments: argparse.Namespace) -> list[str]:
 def tables(arguments: argparse.Namespace) -> Mapping[str, str]:
     """Make the document's Markdown tables that the arguments ask for, by name."""
     found = {name: read(getattr(arguments, name)) for name, read in READERS.items() if getattr(arguments, name)}
-    return found | (real_tables(arguments.run, arguments.real, arguments.pictures) if arguments.real else {})
+    return found | (real_tables(arguments.real, arguments.pictures) if arguments.real else {})
 
 
 def arguments_of(words: Sequence[str] | None) -> argparse.Namespace:
-    """Return the parsed arguments of the command line; exits if --run and --real aren't given together."""
+    """Return the parsed arguments of the command line."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--small", type=Path, metavar="RUN", help="the small training, `segmentation-small`")
     parser.add_argument("--mixing", type=Path, metavar="DIR", help="the experiment on real, synthetic and mixed data")
     parser.add_argument("--gantries", type=Path, metavar="DIR", help="the experiment on shield gantries")
-    parser.add_argument("--run", type=Path, action="append", default=[], metavar="RUN", help="a run to be scored")
-    parser.add_argument("--real", type=Path, metavar="DIR", help="labelled real clouds, which the runs are scored on")
+    parser.add_argument(
+        "--real", type=Path, metavar="DIR", help="labelled real clouds: the package's models are scored"
+    )
     parser.add_argument("--prediction", type=Path, metavar="FILE", help="result of tools/measure_prediction.py")
     parser.add_argument("--packed", type=Path, metavar="FILE", help="file of `synthroads pack`")
     parser.add_argument("--forecast", type=Path, metavar="FILE", help="file of `synthroads forecast`")
     parser.add_argument("--pictures", type=Path, default=Path(), metavar="DIR", help="folder for the pictures")
     parser.add_argument("--document", type=Path, metavar="FILE", help="Markdown whose tables are replaced")
-    arguments = parser.parse_args(words)
-    if bool(arguments.run) != bool(arguments.real):
-        parser.error("--run and --real need each other")
-    return arguments
+    return parser.parse_args(words)
 
 
 def main(words: Sequence[str] | None = None) -> None:
