@@ -6,7 +6,7 @@
         --document docs/segmentation.md --pictures docs/pictures
 
 What isn't given is left out, and its tables in the document stay as they are. The models that come with the package are
-scored and drawn here on the labelled real clouds. Everything else was measured by the commands that stand beside the tables.
+scored and drawn here on the labelled real clouds. Everything else was measured by the commands beside the tables.
 """
 
 from __future__ import annotations
