@@ -23,7 +23,7 @@ EXTRAS = {
     "demo": "blender",
     "docs": "docs",
     # `ml` on one Python only, as on Linux PyPI's torch comes with gigabytes of CUDA.
-    "tests-3.11": "blender,dev,judges,ml",
+    "tests-3.11": "blender,dev,judges,ml,onnx",
     "tests-3.13": "blender,dev,judges",
 }
 """Extras of pyproject.toml that are installed into each environment."""

@@ -11,7 +11,7 @@ COMMANDS = {
     "generate": "make a road, scan it and write cloud, parameters and pictures",
     "parameters": "sample road parameters and write them to standard output",
     "check": "list the rules of the guidelines that a road breaks",
-    "twin": "write a road's geometric-semantic model: CityJSON, IFC, OpenDRIVE, GeoJSON",
+    "twin": "write a road's geometric-semantic model: CityJSON, IFC, OpenDRIVE, GeoJSON, OpenCRG",
     "dataset": "make a data set of many scenes from a recipe",
     "cloud": "describe, thin out, map, convert and draw point cloud files",
     "scan": "scan a scene that is there already: .blend, .glb, .obj and others",
