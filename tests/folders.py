@@ -6,11 +6,13 @@ BLENDER_TESTS = ("blender", "jobs", "ui")
 
 LONG_FILES = (
     *("jobs/test_dataset.py", "jobs/measure/test_tradeoff.py", "blender/model/test_road_variants.py"),
+    *("jobs/test_kills.py", "jobs/scan/test_long_road.py", "jobs/test_panoptic.py", "blender/model/test_stretches.py"),
     *("jobs/test_scan_scene.py", "blender/cameras/test_cameras.py", "ui/work/test_rendered_scan.py"),
     *("jobs/scan/test_by_section.py", "jobs/choose/test_search.py", "ui/work/test_build.py"),
     *("blender/nodes/test_nodes.py", "blender/views/test_gallery.py", "jobs/test_faults.py", "jobs/test_generate.py"),
     *("blender/model/test_every_class.py", "ui/work/test_scan.py", "ui/panels/test_calibration.py"),
     *("blender/model/test_build.py", "ui/panels/test_road_files.py", "ui/panels/test_export.py"),
+    *("robustness/test_endurance.py", "ml/segmentation/test_learning.py", "twin/test_trace.py"),
     *("twin/ifc/test_ifc.py", "packaging/test_extension.py", "fitting/test_fit.py", "twin/opendrive/test_opendrive.py"),
     *("twin/cityjson/test_cityjson.py", "ml/centerline/test_task.py", "ml/segmentation/test_task.py"),
     *("judges/test_judges.py", "sampling/test_road.py", "sampling/test_section.py", "scanning/platforms/test_path.py"),
