@@ -12,6 +12,7 @@ from synthroads_addon.base.arrays import Float, Float32, Int
 
 from ..data.classes import IGNORED
 from ..data.tiles import CloudTile, scalings
+from ..scores.confusion import Confusion
 from .recipes import SegmentationConfiguration
 from .scoring import Classifier, piece_scores
 
@@ -46,11 +47,11 @@ def fit_offsets(tiles: Sequence[CloudTile], classifier: Classifier, configuratio
 def best_offsets(scores: Float32, truth: Int) -> Float:
     """Return the offsets (C,) at which the mean IoU of the largest scores (N, C) against true classes (N,) is largest.
 
-    It goes up one class at a time, by ever smaller steps. Classes without a point don't count and get none.
+    It goes up one class at a time, by ever smaller steps. Classes without a point get none.
     """
     there = np.unique(truth)
     offsets = np.zeros(scores.shape[1])
-    best = _mean_iou(scores, truth, there)
+    best = _mean_iou(scores, truth)
     for step in _STEPS:
         improved = True
         while improved:
@@ -59,14 +60,13 @@ def best_offsets(scores: Float32, truth: Int) -> Float:
                 for change in (step, -step):
                     tried = offsets.copy()
                     tried[place] += change
-                    reached = _mean_iou(scores + tried.astype(np.float32), truth, there)
+                    reached = _mean_iou(scores + tried.astype(np.float32), truth)
                     if reached > best + _LEAST_GAIN:
                         offsets, best, improved = tried, reached, True
     return offsets
 
 
-def _mean_iou(scores: Float32, truth: Int, there: Int) -> float:
-    classes = scores.shape[1]
-    pairs = np.bincount(truth * classes + scores.argmax(axis=1), minlength=classes**2).reshape(classes, classes)
-    union = pairs.sum(axis=0) + pairs.sum(axis=1) - np.diag(pairs)
-    return float((np.diag(pairs)[there] / union[there]).mean())
+def _mean_iou(scores: Float32, truth: Int) -> float:
+    confusion = Confusion([str(place) for place in range(scores.shape[1])])
+    confusion.add(truth, scores.argmax(axis=1))
+    return confusion.mean("iou")

@@ -153,7 +153,7 @@ class Sparing:
         origin, direction = self._outer_rays(pulses, some)
         reach = np.stack([distance for _, distance, _ in self._ray_hits(some)][1:])
         deepest = np.abs(self._reach).max() * some.distance / np.abs(some.along)
-        reach -= _CLEARANCE + CREASE * deepest / np.abs(some.along)
+        reach -= _CLEARANCE + 2.0 * CREASE * deepest / np.abs(some.along)
         free = self.plan.target.unblocked(origin, direction, reach).all(axis=0)
         kept = np.ones(len(found.pulse), bool)
         kept[doubtful[~free]] = False

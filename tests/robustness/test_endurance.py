@@ -16,6 +16,7 @@ import pytest
 from headless.dataset_run import DatasetRun, Outcome, local_processes
 from synthroads_addon.dataset.recipe import Recipe
 from synthroads_addon.scenario.scenario import Scenario
+from tests.helpers.process_memory import memory_mb
 
 pytestmark = [
     pytest.mark.slow,
@@ -44,7 +45,7 @@ def resident_mb() -> float:
     """Return what this process holds, MB, without what the C library keeps of what is free: that varies by 100 MB."""
     gc.collect()
     ctypes.CDLL(None).malloc_trim(0)
-    return int(Path("/proc/self/status").read_text().split("VmRSS:")[1].split()[0]) / 1000.0
+    return memory_mb()
 
 
 def open_files() -> int:

@@ -16,6 +16,7 @@ from headless.commands import command
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.cloud.formats.registry import open_cloud, open_writer
 from tests.helpers.clouds.random_points import make_points
+from tests.helpers.process_memory import STATUS, memory_mb, reset_peak
 
 COUNT = 6000
 GIGABYTES = 4
@@ -41,21 +42,6 @@ def write(path: Path, xyz: np.ndarray, scale: float = 0.001, offset: float = 0.0
 
 def with_strays(*strays: tuple[float, float, float]) -> np.ndarray:
     return np.concatenate([strip(), np.array(strays)])
-
-
-def status_kilobytes(name: str) -> int:
-    """Return one of this process's figures as Linux tells them, kB; 0 elsewhere."""
-    if sys.platform != "linux":
-        return 0
-    lines = Path("/proc/self/status").read_text().splitlines()
-    return next(int(line.split()[1]) for line in lines if line.startswith(f"{name}:"))
-
-
-def resident_in_a_new_peak() -> int:
-    """Return the memory of this process, kB, and have its peak counted anew: other tests have taken theirs."""
-    if sys.platform == "linux":
-        Path("/proc/self/clear_refs").write_text("5")
-    return status_kilobytes("VmRSS")
 
 
 ODD: dict[str, Callable[[Path], Path]] = {
@@ -103,13 +89,16 @@ def test_each_command_works_or_says_in_a_line_what_is_wrong(
     if sys.platform != "win32":
         pytest.importorskip("scipy", reason="reconstruction needs SciPy")
         commands.append(["reconstruct", cloud, "--output", tmp_path / "road", "--no-picture"])
-    before = resident_in_a_new_peak()
+    before = 0.0
+    if STATUS.exists():
+        reset_peak()
+        before = memory_mb()
     for first, *words in commands:
         code = command(str(first), [*map(str, words), "--quiet"])
         told = [line for line in capsys.readouterr().err.splitlines() if line.startswith("error:")]
         assert (code, len(told)) in ((0, 0), (2, 1)), (first, words[0], code, told)
-    if sys.platform == "linux":
-        assert status_kilobytes("VmHWM") - before < GIGABYTES * 2**20
+    if STATUS.exists():
+        assert memory_mb("VmHWM") - before < 1000.0 * GIGABYTES
 
 
 def test_pictures_show_the_cloud_and_not_what_strays_from_it(

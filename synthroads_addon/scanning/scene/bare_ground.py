@@ -136,9 +136,9 @@ class BareGround:
         for i in range(3):
             a, b, c = (corners[:, :, (i + step) % 3] for step in range(3))
             inward = np.array([a[1] - b[1], b[0] - a[0]])
-            inward *= np.sign(_dot(inward, c - a)) / np.maximum(np.hypot(*inward), _ROUNDING)
-            reach = np.hypot(_dot(inward, one), _dot(inward, other))
-            within &= _dot(inward, middle - a) >= reach + _ROUNDING
+            inward *= np.sign((inward * (c - a)).sum(axis=0)) / np.maximum(np.hypot(*inward), _ROUNDING)
+            reach = np.hypot((inward * one).sum(axis=0), (inward * other).sum(axis=0))
+            within &= (inward * (middle - a)).sum(axis=0) >= reach + _ROUNDING
         return within
 
     def passed_by(self, origins: Float, directions: Float, spread: float) -> Bool:
@@ -177,11 +177,6 @@ def _normals(mesh: SceneMesh, faces: Index) -> Float:
     normal = np.cross(b - a, c - a)
     length = np.linalg.norm(normal, axis=1)
     return np.asarray(normal / np.where(length > 0.0, length, 1.0)[:, None])
-
-
-def _dot(a: Float, b: Float) -> Float:
-    """Return the products (N,) of vectors (2, N)."""
-    return np.asarray(a[0] * b[0] + a[1] * b[1])
 
 
 def _plane_edges(mesh: SceneMesh, faces: Index, normal: Float) -> tuple[Index, Index]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-from pathlib import Path
 
 import bpy
 import pytest
@@ -13,15 +12,11 @@ from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.road.stretches import stretches
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
-
-
-def resident_mb() -> float:
-    status = Path("/proc/self/status").read_text()
-    return int(status.split("VmRSS:")[1].split()[0]) / 1000.0
+from tests.helpers.process_memory import STATUS, memory_mb
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="resident memory is read from /proc")
+@pytest.mark.skipif(not STATUS.exists(), reason="resident memory is read from /proc")
 def test_memory_stays_flat_over_20_km() -> None:
     parameters = sample_road(RoadScenario(length=20_000.0), 4)
     peaks = []
@@ -29,7 +24,7 @@ def test_memory_stays_flat_over_20_km() -> None:
         build_road(parameters, 0.02, 0.3, stretch=stretch)
         triangles = len(scene_mesh().triangles)
         gc.collect()
-        peaks.append(resident_mb())
+        peaks.append(memory_mb())
         print(f"{stretch[0]:7.0f} m: {peaks[-1]:6.0f} MB, {triangles:,} triangles, {len(bpy.data.node_groups)} groups")
     # The first ones fill Blender's caches; what later ones take depends on what stands there.
     assert max(peaks[-4:]) < 1.10 * max(peaks[1:5])
