@@ -139,7 +139,7 @@ class _Search:
     def _time_many_rays(self, most: float) -> None:
         """Time the largest number of rays per pulse whose timing is expected to take at most so many seconds."""
         while True:
-            fitting = [rays for rays in self.rays if 2.0 * TIMED_SHARE * self.times.scan_seconds(rays) <= most]
+            fitting = [rays for rays in self.rays if TIMED_SHARE * self.times.scan_seconds(rays) <= most]
             if (rays := max(fitting, default=0)) <= max(self.times.timed):
                 return
             self.times.calibrate(rays, *self._trial.time_scan(self.rays[rays]))

@@ -43,9 +43,10 @@ LINES, PULSES = 64, 1024
 """Stretches that errors are taken of, and the pulses of each."""
 _TIMED_PULSES = 1 << 15
 """Least pulses of each stretch that is timed; a whole block if that is more, as every block costs time by itself."""
-_TIMED = 4
-TIMED_SHARE = 0.1
-"""Stretches that are timed at least, and the largest share of the path that twice as many may be."""
+_FEW, _FEW_SHARE = 4, 0.05
+"""Stretches that are timed at least, and the largest share of the path that they may be."""
+TIMED_SHARE = 5.0 * _FEW_SHARE
+"""Largest share of the path that is scanned when it is timed: three times the few stretches, and twice as many."""
 _COLOURED = 8
 """Scan lines that errors of colours are taken of."""
 
@@ -143,17 +144,17 @@ class Trial:
         """Measure stretches and return the projected seconds and number of points of the whole scan into files.
 
         Few stretches and twice as many tell what every scan takes from what each pulse takes; before these, the few
-        are scanned once, as the first scan waits for much that later ones find done. Colours are the materials' means
-        and the relief is the coarsest: what more than that costs is known apart.
+        are scanned once, as the first scan waits for much that later ones find done. After these they are scanned once
+        more, and the shorter time counts, as other work on the machine may have disturbed one. Colours are the
+        materials' means and the relief is the coarsest: what more than that costs is known apart.
         """
         workers = self.plan.threads or available_cores()
-        few = workers * -(-_TIMED // workers)  # no worker waits for another at the end
-        turns = ((few, TIMED_SHARE / 2.0), (few, TIMED_SHARE / 2.0), (2 * few, TIMED_SHARE))
-        _, (less, soon, _), (more, late, points) = [self._time_stretches(rings, *turn) for turn in turns]
-        rate = late / more
-        if more > less and late > soon:  # else the clock shows no difference, or other work on the machine
-            rate = min(rate, (late - soon) / (more - less))
-        return late + rate * (self.pulses - more), round(points * self.pulses / more)
+        few = workers * -(-_FEW // workers), _FEW_SHARE  # no worker waits for another at the end
+        many = 2 * few[0], 2.0 * _FEW_SHARE
+        _, (less, before, _), (more, late, points), (_, after, _) = [
+            self._time_stretches(rings, *stretches) for stretches in (few, few, many, few)
+        ]
+        return _project((less, min(before, after)), (more, late), self.pulses), round(points * self.pulses / more)
 
     def _time_stretches(self, rings: tuple[int, ...], count: int, share: float) -> tuple[int, float, int]:
         """Scan so many stretches, at most a share of the path, into files; return pulses, seconds, points."""
@@ -168,3 +169,17 @@ class Trial:
             seconds = self.clock() - begin
         # Pulses come in whole lines, so that stretches hold fewer of them than their duration says.
         return sum(map(plan.pulse_count, plan.path.strips)), seconds, files.counts.points
+
+
+def _project(few: tuple[int, float], many: tuple[int, float], pulses: int) -> float:
+    """Return the seconds that so many pulses take, by the numbers and seconds of few pulses and of many.
+
+    No scan takes longer per pulse than a shorter one, nor less time in all: where the clock says so other work on the
+    machine disturbed it, and the shorter time per pulse counts.
+    """
+    (less, soon), (more, late) = few, many
+    rate = min(soon / less, late / more)
+    late = rate * more
+    if more > less and late > soon:
+        rate = min(rate, (late - soon) / (more - less))
+    return late + rate * (pulses - more)

@@ -17,8 +17,8 @@ from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scenario.scenario import Scenario
 from tests.jobs.scan.test_plan import StandIns, planned
 
-RATE, EACH, FIRST = 2e-6, 0.5, 30.0
-"""Seconds of a pulse, of every scan, and of the first one besides."""
+RATE, EACH, FIRST, OTHERS = 2e-6, 0.5, 30.0, 5.0
+"""Seconds of a pulse, of every scan, of the first one besides, and of work of others that disturbs one."""
 
 
 @dataclass
@@ -27,21 +27,25 @@ class MadeUpScans:
 
     each: float
     now: float = 100.0
-    first: bool = True
+    scans: int = 0
     block: float = 0.0
+    disturbed: int | None = None
 
     def record(self, plans: Iterable[ScanPlan], files: CloudFiles, timer: StageTimer, announce: bool) -> dict[str, Any]:
         for plan in plans:
             pulses = sum(map(plan.pulse_count, plan.path.strips))
-            self.now += self.each + RATE * pulses + (FIRST if self.first else 0.0) + self.block * plan.cut.count()
-            self.first = False
+            self.now += self.each + RATE * pulses + (0.0 if self.scans else FIRST) + self.block * plan.cut.count()
+            self.now += OTHERS if self.scans == self.disturbed else 0.0
+            self.scans += 1
             files.counts.points += pulses // 2
         return {}
 
 
-@pytest.mark.parametrize("each", [0.0, EACH])
-def test_a_scan_of_a_fixed_time_and_a_rate_is_predicted_exactly(each: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    scans = MadeUpScans(each)
+@pytest.mark.parametrize(("each", "disturbed"), [(0.0, None), (EACH, None), (EACH, 0), (EACH, 1), (0.0, 2), (EACH, 3)])
+def test_a_scan_of_a_fixed_time_and_a_rate_is_predicted_exactly_though_others_disturb_one(
+    each: float, disturbed: int | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scans = MadeUpScans(each, disturbed=disturbed)
     monkeypatch.setattr("synthroads_addon.jobs.choose.trial.record_to_files", scans.record)
     plan = planned(StandIns(), seconds=75.0)
     trial = Trial(Site(Scenario.from_dict({"fidelity": "draft"}), plan.path), plan, clock=lambda: scans.now)
