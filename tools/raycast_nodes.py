@@ -116,4 +116,5 @@ def _cast_group() -> bpy.types.NodeTree:
     )
     store = {"data_type": "INT", "domain": "POINT", "name": "face", "value": cast["Attribute"]}
     tree.output("Geometry", tree.node("GeometryNodeStoreNamedAttribute", points, **store).value)
+    tree.finish()
     return group

@@ -122,10 +122,10 @@ def pavement_look(shade: Shade, kind: str, wear: Wear) -> tuple[Look, Value | No
     raw.node_tree = look_group(kind)
     for name, value in zip(("Polish", "Seed"), wear, strict=True):
         if name in raw.inputs:
-            raw.inputs[name].default_value = value
+            tree.feed(raw.inputs[name], value)
     for name, entry in ((ATTRIBUTE, "Place"), (SHAPE, "Shape"), (AGE, "Age")):
         if entry in raw.inputs:
             attribute = tree.node("ShaderNodeAttribute", attribute_name=name)["Vector"]
-            tree.group.links.new(attribute.source(), raw.inputs[entry])
+            tree.feed(raw.inputs[entry], attribute)
     outputs = {output.name: Value(tree, output, "VALUE") for output in raw.outputs}
     return Look(outputs["Brightness"], outputs["Roughness"]), outputs.get("Height")

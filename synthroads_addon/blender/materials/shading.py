@@ -102,14 +102,14 @@ def shade(
         if varied.factor is not None:
             color = tree.node("ShaderNodeVectorMath", color, varied.factor, operation="MULTIPLY").value
         if isinstance(color, Value):
-            tree.group.links.new(color.source(), surface.raw.inputs["Base Color"])
+            tree.feed(surface.raw.inputs["Base Color"], color)
         values = {name: _varied(varied, name) for name in ("roughness", "metallic", "specular")}
         entries = (("roughness", "Roughness"), ("metallic", "Metallic"), ("specular", "Specular IOR Level"))
         for name, entry in entries:
             if isinstance(value := values[name], Value):
-                tree.group.links.new(value.source(), surface.raw.inputs[entry])
+                tree.feed(surface.raw.inputs[entry], value)
         if (normal := _normal(varied)) is not None:
-            tree.group.links.new(normal.source(), surface.raw.inputs["Normal"])
+            tree.feed(surface.raw.inputs["Normal"], normal)
         seen = surface.value
         if varied.transparency:
             clear = tree.node("ShaderNodeBsdfTransparent").value
@@ -121,6 +121,7 @@ def shade(
             _layer(tree, name, value=value)
     item.diffuse_color = (*mean.base_color, 1.0)
     item.roughness, item.metallic = mean.roughness, mean.metallic
+    tree.finish()
     if images:
         _remove_idle(item.node_tree)
     arrange(item.node_tree)

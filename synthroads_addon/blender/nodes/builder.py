@@ -22,7 +22,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from functools import cache, wraps
+from functools import cache, partial, wraps
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,7 @@ import bpy
 
 from ...base.files import PRESETS
 from ...base.turns.stepper import yield_if_due
+from .changes import Change, make_changes
 from .layout import arrange
 
 KEY = "synthroads_key"
@@ -155,7 +156,7 @@ class Node:
 
 
 class Tree:
-    """A node group under construction.
+    """A node group under construction: its links and its inputs' values come into it with `finish`.
 
     Attributes:
         group: Blender's.
@@ -171,6 +172,12 @@ class Tree:
         self._panel: Any = None
         self._inputs: dict[str, bpy.types.Node] = {}
         self._output: bpy.types.Node | None = None
+        self._changes: list[Change] = []
+
+    def finish(self) -> None:
+        """Link all that is to be linked, and set the inputs' values."""
+        changes, self._changes = self._changes, []
+        make_changes(changes)
 
     # Interface
 
@@ -213,7 +220,7 @@ class Tree:
         self.makes = self.makes or value.kind
         if self._output is None:
             self._output = self.group.nodes.new("NodeGroupOutput")
-        self.group.links.new(value.source(), self._output.inputs[name])
+        self.feed(self._output.inputs[name], value)
 
     @contextmanager
     def panel(self, name: str) -> Iterator[None]:
@@ -267,10 +274,10 @@ class Tree:
                 inputs[name.rstrip("_")] = value
         sockets = [socket for socket in raw.inputs if socket.enabled]
         for socket, operand in zip(sockets, operands, strict=False):
-            self._feed(socket, operand)
+            self.feed(socket, operand)
         named = {socket.name.lower().replace(" ", "_"): socket for socket in sockets}
         for name, operand in inputs.items():
-            self._feed(named[name], operand)
+            self.feed(named[name], operand)
         return Node(self, raw)
 
     def call(self, group: bpy.types.NodeTree, **inputs: Operand) -> Node:
@@ -279,30 +286,31 @@ class Tree:
         raw.node_tree = group
         named = {socket.name.lower().replace(" ", "_"): socket for socket in raw.inputs}
         for name, operand in inputs.items():
-            self._feed(named[name.rstrip("_")], operand)
+            self.feed(named[name.rstrip("_")], operand)
         return Node(self, raw)
 
     def link_all(self, socket: bpy.types.NodeSocket, values: list[Value]) -> None:
         """Link several values to a socket that takes more than one, in order."""
         # Blender puts the newest link of such a socket on top, that is first.
         for value in reversed(values):
-            self.group.links.new(value.source(), socket)
+            self.feed(socket, value)
+
+    def feed(self, socket: bpy.types.NodeSocket, operand: Operand) -> None:
+        """Have an input linked or its value set."""
+        if isinstance(operand, Value):
+            self._changes.append(partial(self.group.links.new, operand.source(), socket))
+            return
+        if socket.type == "VECTOR" and isinstance(operand, int | float):
+            operand = (operand, operand, operand)
+        elif socket.type == "MENU" and isinstance(operand, str):  # a property of the node in older releases
+            operand = operand.replace("_", " ").title()
+        self._changes.append(partial(setattr, socket, "default_value", operand))
 
     def _new(self, kind: str) -> bpy.types.Node:
-        yield_if_due()  # a large group takes a second: each node updates the whole tree
+        yield_if_due()  # a large group takes half a second: each node updates the whole tree
         raw = self.group.nodes.new(kind)
         raw.parent = self._frame
         return raw
-
-    def _feed(self, socket: bpy.types.NodeSocket, operand: Operand) -> None:
-        if isinstance(operand, Value):
-            self.group.links.new(operand.source(), socket)
-        elif socket.type == "VECTOR" and isinstance(operand, int | float):
-            socket.default_value = (operand, operand, operand)
-        elif socket.type == "MENU" and isinstance(operand, str):  # a property of the node in older releases
-            socket.default_value = operand.replace("_", " ").title()
-        else:
-            socket.default_value = operand
 
 
 def _kind(operand: Operand) -> str:
@@ -380,6 +388,7 @@ def node_group(
     if kind == "GeometryNodeTree":
         group.is_modifier = tree.makes == "GEOMETRY"
     group.color_tag = _TAGS.get(tree.makes, "CONVERTER")
+    tree.finish()
     arrange(group)
     return group
 

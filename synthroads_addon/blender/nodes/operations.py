@@ -114,8 +114,8 @@ def choose(index: Value, items: list[tuple[float, float, float]]) -> Value:
         node.raw.index_switch_items.new()
     sockets = [socket for socket in node.raw.inputs if socket.enabled and socket.type == "VECTOR"]
     for socket, item in zip(sockets, items, strict=True):
-        socket.default_value = item
-    index.tree.group.links.new(index.source(), node.raw.inputs[0])
+        index.tree.feed(socket, item)
+    index.tree.feed(node.raw.inputs[0], index)
     return node.value
 
 
