@@ -89,24 +89,37 @@ class RoadGeometry:
 
     def boundary_elevations(self, station: ArrayLike) -> Float:
         """Return the (N, M + 1) local elevations of the strips' boundaries at N stations, m, without damage."""
+        return self.boundaries(station)[1]
+
+    def boundaries(self, station: ArrayLike) -> tuple[Float, Float]:
+        """Return `offsets` and `boundary_elevations` at N stations, which together take little longer than one."""
         station = np.atleast_1d(np.asarray(station, dtype=np.float64))
+        distances = {side: section.distances(station) for side, section in self.sections.items()}
         relative = {
-            side: section.elevations(station, self.crossfall(section.carriageway, station))
+            side: section.elevations(station, self.crossfall(section.carriageway, station), distances[side])
             for side, section in self.sections.items()
         }
-        return self.profile.elevation(station)[:, None] + self._across(relative, False)
+        heights = self.profile.elevation(station)[:, None] + self._across(relative, False)
+        return self._across(distances, True), heights
 
-    def elevation(self, station: ArrayLike, offset: ArrayLike) -> Float:
-        """Return the surface's local elevation (N,), m, damage included; NaN outside the outermost boundaries."""
+    def elevation(
+        self, station: ArrayLike, offset: ArrayLike, boundaries: tuple[Float, Float] | None = None
+    ) -> Float:
+        """Return the surface's local elevation (N,), m, damage included; NaN outside the outermost boundaries.
+
+        Args:
+            station, offset: (N,), m.
+            boundaries: `boundaries` there, if they are known.
+        """
         station, offset = _flat_arrays(station, offset)
-        strip = self.strip_index(station, offset)
+        offsets, heights = boundaries or self.boundaries(station)
+        strip = self._strip_between(offsets, offset)
         inside = np.flatnonzero(strip >= 0)
         result = np.full(offset.shape, np.nan)
-        heights, offsets = self.boundary_elevations(station[inside]), self.offsets(station[inside])
-        index, row = strip[inside], np.arange(len(inside))
-        left, right = offsets[row, index], offsets[row, index + 1]
+        index = strip[inside]
+        left, right = offsets[inside, index], offsets[inside, index + 1]
         share = (left - offset[inside]) / np.maximum(left - right, 1e-300)
-        result[inside] = heights[row, index] * (1.0 - share) + heights[row, index + 1] * share
+        result[inside] = heights[inside, index] * (1.0 - share) + heights[inside, index + 1] * share
         for section in self.sections.values():
             if section.carriageway.pavement.ruts or section.carriageway.pavement.potholes:
                 result -= damage_depth(section, station, offset)
@@ -115,7 +128,10 @@ class RoadGeometry:
     def strip_index(self, station: ArrayLike, offset: ArrayLike) -> Index:
         """Return the index (N,) into `strips` of the strip at stations and offsets (N,), m; -1 outside the road."""
         station, offset = _flat_arrays(station, offset)
-        boundaries = self.offsets(station)
+        return self._strip_between(self.offsets(station), offset)
+
+    def _strip_between(self, boundaries: Float, offset: Float) -> Index:
+        """Return the index (N,) of the strip at offsets (N,) between the boundaries' offsets (N, M + 1)."""
         index = np.count_nonzero(boundaries >= offset[:, None], axis=1) - 1
         last = len(self.strips) - 1
         # The right-most boundary belongs to the right-most strip that has a width.

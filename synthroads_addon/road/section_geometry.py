@@ -67,16 +67,6 @@ class CarriagewaySection:
             return inner
         return (inner + self.main_edge(station)) / 2.0
 
-    def plane_edge(self, station: ArrayLike) -> Float:
-        """Return the (N,) distances, m, up to which the surface lies in the pavement's plane; beyond the verge falls.
-
-        Only behind a ramp's end is it not the pavement's edge.
-        """
-        station = np.atleast_1d(np.asarray(station, dtype=np.float64))
-        near = [shape for shape in self.turnouts if shape.reaches(station)]
-        extra = sum((shape.widths(station).verge_extra for shape in near), np.zeros(station.shape))
-        return self.paved_edge(station) + extra
-
     def lane_boundaries(self, station: ArrayLike) -> Float:
         """Return the (N, lanes + 1) distances from the centreline of the lanes' boundaries, outermost first, m."""
         first = self.kinds.index("lane")
@@ -87,19 +77,22 @@ class CarriagewaySection:
         at, distances = self.kinds.index(kind), self.distances(station)
         return distances[:, at], distances[:, at + 1]
 
-    def elevations(self, station: ArrayLike, crossfall: Float) -> Float:
+    def elevations(self, station: Float, crossfall: Float, distances: Float | None = None) -> Float:
         """Return the (N, B) heights of the strips' boundaries above the profile, innermost first, m.
 
         Args:
             station: (N,) stations, m.
             crossfall: (N,) crossfall there, m/m, positive where the surface falls to the right.
+            distances: (N, B) `distances` there, if they are known.
         """
-        distances, pivot = self.distances(station), self.pivot(station)
-        plane = np.minimum(distances, self.plane_edge(station)[:, None])
+        distances = self.distances(station) if distances is None else distances
+        # Up to here it lies in the pavement's plane: up to the pavement's edge, and behind a ramp's end as far beyond.
+        near = [shape.widths(station).verge_extra for shape in self.turnouts if shape.reaches(station)]
+        plane = np.minimum(distances, sum(near, distances[:, -2])[:, None])
         # A surface that falls to the right rises with the offset, and the offset is sign * distance outwards.
         rise = self.carriageway.sign * crossfall[:, None]
         verge_fall = (distances - plane) * self.carriageway.verge_slope_percent / 100.0
-        return rise * (plane - pivot[:, None]) - verge_fall
+        return rise * (plane - self.pivot(station)[:, None]) - verge_fall
 
     def kinks(self) -> list[float]:
         """Return the stations (m, unsorted) at which the rate of change of a strip's width jumps."""

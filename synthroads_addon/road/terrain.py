@@ -120,9 +120,9 @@ def surface_elevation(geometry: RoadGeometry, station: Float, offset: Float) -> 
     Beside the road the batter rises or falls from the verge's edge until it meets the ground, with swale and roundings
     as in `batter_height`; without a terrain the road's edge goes on level.
     """
-    edges = geometry.offsets(station)
-    within = np.clip(offset, edges[:, -1], edges[:, 0])
-    height = geometry.elevation(station, within)
+    boundaries = geometry.boundaries(station)
+    within = np.clip(offset, boundaries[0][:, -1], boundaries[0][:, 0])
+    height = geometry.elevation(station, within, boundaries)
     terrain = geometry.parameters.terrain
     beside = np.flatnonzero(within != offset)
     if terrain is not None and len(beside):

@@ -88,7 +88,7 @@ def strip_surfaces(geometry: RoadGeometry, stations: Float, tolerance: float) ->
         stations: (N,) stations at which it is sampled.
         tolerance: chord error within damage, m.
     """
-    offsets, heights = geometry.offsets(stations), geometry.boundary_elevations(stations)
+    offsets, heights = geometry.boundaries(stations)
     plan, heading, _ = geometry.alignment.frame(stations)
     middle = (stations[:-1] + stations[1:]) / 2.0
     damages, lanes = _damages_by_strip(geometry, tolerance), _lane_numbers(geometry)

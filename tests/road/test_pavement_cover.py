@@ -89,5 +89,7 @@ def test_widths_at_one_station_are_those_among_many() -> None:
     for section in geometry.sections.values():
         alone = np.concatenate([section.distances(station) for station in stations])
         assert np.array_equal(alone, section.distances(stations))
-        assert np.array_equal([section.plane_edge(s)[0] for s in stations], section.plane_edge(stations))
+        crossfall = np.linspace(-0.05, 0.05, len(stations))
+        heights = [section.elevations(stations[i : i + 1], crossfall[i : i + 1])[0] for i in range(len(stations))]
+        assert np.array_equal(heights, section.elevations(stations, crossfall))
         assert np.isnan(section.distances([np.nan, stations[0]])[0, -1]) or not section.turnouts

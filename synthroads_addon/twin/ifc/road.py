@@ -372,8 +372,7 @@ def _write_median_surface(scene: Scene, index: int, name: str, part: Entity) -> 
     ifc, geometry = scene.ifc, scene.geometry
     strip = geometry.strips[index]
     station = scene.stations
-    sides = geometry.offsets(station)[:, index : index + 2][:, ::-1]
-    heights = geometry.boundary_elevations(station)[:, index : index + 2][:, ::-1]
+    sides, heights = (values[:, index : index + 2][:, ::-1] for values in geometry.boundaries(station))
     plan = geometry.alignment.place(np.repeat(station, 2), sides.ravel())
     points = np.column_stack([plan, heights.ravel()])
     shape = ifc.shape([ifc.mesh(points, grid_triangles(len(station), 2), False)], "Tessellation")

@@ -125,8 +125,8 @@ class LanePlan:
     def verge_fall(self, station: Float) -> Float:
         """Return how far (N,) the verge's outer edge lies below the carriageway's plane at stations (N,), m."""
         edge = 0 if self.side == "left" else -1
-        offset, level = self.geometry.offsets(station)[:, edge], self.geometry.boundary_elevations(station)[:, edge]
-        return np.asarray(self.frame.plane_elevation(station, offset) - level)
+        offsets, levels = self.geometry.boundaries(station)
+        return np.asarray(self.frame.plane_elevation(station, offsets[:, edge]) - levels[:, edge])
 
     def median_fall(self, station: Float) -> Float:
         """Return how far (N,) the other carriageway's inner edge lies below this one's plane, m."""
