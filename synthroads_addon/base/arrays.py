@@ -1,4 +1,4 @@
-"""Types of arrays by what they hold, records of arrays, and a threshold that parts an array's values in two."""
+"""Types of arrays by what they hold, records of arrays, values that repeat, and a threshold that parts them in two."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -34,6 +34,19 @@ class ArrayRows:
             return None if arrays[0] is None else np.concatenate(arrays)
 
         return cls(*(joined([getattr(part, field.name) for part in parts]) for field in fields(cls)))
+
+
+def without_repeats(values: Float) -> tuple[Float, Index]:
+    """Return values (N,) less those that equal the one before them, (K,), and the (N,) indices of all among these.
+
+    Values that hardly repeat are returned all. So a function of few values that many things share is calculated once
+    for each.
+    """
+    first = np.ones(len(values), np.bool_)
+    np.not_equal(values[1:], values[:-1], out=first[1:])
+    if 2 * np.count_nonzero(first) > len(values):
+        return values, np.arange(len(values))
+    return values[first], np.cumsum(first) - 1
 
 
 def otsu_threshold(values: Float) -> float:

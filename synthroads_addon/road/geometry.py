@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.arrays import Float, Index, Int
+from ..base.arrays import Float, Index, Int, without_repeats
 from .alignment import Alignment, Element
 from .damage import damage_depth
 from .instances import InstanceNumbers
@@ -94,13 +94,15 @@ class RoadGeometry:
     def boundaries(self, station: ArrayLike) -> tuple[Float, Float]:
         """Return `offsets` and `boundary_elevations` at N stations, which together take little longer than one."""
         station = np.atleast_1d(np.asarray(station, dtype=np.float64))
-        distances = {side: section.distances(station) for side, section in self.sections.items()}
+        once, index = without_repeats(station)
+        distances = {side: section.distances(once) for side, section in self.sections.items()}
         relative = {
-            side: section.elevations(station, self.crossfall(section.carriageway, station), distances[side])
+            side: section.elevations(once, self.crossfall(section.carriageway, once), distances[side])
             for side, section in self.sections.items()
         }
-        heights = self.profile.elevation(station)[:, None] + self._across(relative, False)
-        return self._across(distances, True), heights
+        offsets = self._across(distances, True)
+        heights = self.profile.elevation(once)[:, None] + self._across(relative, False)
+        return (offsets, heights) if len(once) == len(station) else (offsets[index], heights[index])
 
     def elevation(
         self, station: ArrayLike, offset: ArrayLike, boundaries: tuple[Float, Float] | None = None
@@ -135,9 +137,8 @@ class RoadGeometry:
         index = np.count_nonzero(boundaries >= offset[:, None], axis=1) - 1
         last = len(self.strips) - 1
         # The right-most boundary belongs to the right-most strip that has a width.
-        at_end = offset == boundaries[:, -1]
-        widest_last = last - np.argmax(np.diff(boundaries, axis=1)[:, ::-1] < 0.0, axis=1)
-        index = np.where(at_end, widest_last, index)
+        at_end = np.flatnonzero(offset == boundaries[:, -1])
+        index[at_end] = last - np.argmax(np.diff(boundaries[at_end], axis=1)[:, ::-1] < 0.0, axis=1)
         return np.where((index < 0) | (index > last), -1, index)
 
     def instances(self, strip: SurfaceStrip, station: ArrayLike) -> Int:

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base.arrays import Float
+from ..base.arrays import Float, without_repeats
 from .objects import nominal_width, width_at, width_kinks
 from .section import Carriageway, Turnout
 from .turnout_geometry import TURNOUT_STRIPS, TurnoutShape
@@ -43,7 +43,9 @@ class CarriagewaySection:
         station = np.atleast_1d(np.asarray(station, dtype=np.float64))
         if self._constant is not None:
             return np.repeat(self._constant, len(station), axis=0)
-        return self._distances(station)
+        once, index = without_repeats(station)  # the places of a grid have few stations
+        distances = self._distances(once)
+        return distances if len(once) == len(station) else distances[index]
 
     def paved_edge(self, station: ArrayLike) -> Float:
         """Return the (N,) distances from the centreline of the pavement's outer edge, ramps and bays included, m."""
