@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import tomllib
 from pathlib import Path
 from typing import Any
 
+import astroid
+from astroid.brain.brain_dataclasses import dataclass_transform, is_decorated_with_dataclass
 from sphinx.ext.autodoc.mock import mock
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -49,10 +52,34 @@ suppress_warnings = [
 ]
 
 
+# It would find out which values each field of a dataclass can have: a minute, of which nothing is shown.
+astroid.MANAGER.unregister_transform(astroid.nodes.ClassDef, dataclass_transform, is_decorated_with_dataclass)
+
+MODULE_LIST = re.compile(r"^\.\. toctree::\n(?: +:\w+:.*\n)*\n((?:\s*/reference/api/\S+\n)+)", re.MULTILINE)
+MODULE_TITLE = re.compile(r"^(\w+(?:\.\w+)*)\.\w+\n=+\n", re.MULTILINE)
+
+
+def link_modules(docname: str, content: list[str]) -> None:
+    """Have the page of a package link to its modules, and theirs to it, instead of all being in every page's menu.
+
+    A menu of five hundred pages, made anew for each of them, took longer than all else together.
+    """
+    if not docname.startswith("reference/api/"):
+        return
+
+    def links(found: re.Match[str]) -> str:
+        names = [path.split("/")[3:-1] for path in found[1].split()]
+        return "\n".join(f"* :py:mod:`{'.'.join(name)}`" for name in names) + "\n"
+
+    text = MODULE_TITLE.sub(r"\g<0>\nIn :py:mod:`\1`.\n", MODULE_LIST.sub(links, content[0]), count=1)
+    content[0] = f":orphan:\n\n{text}"
+
+
 def fill(app: Any, docname: str, content: list[str]) -> None:
     """Put generated text in the place of a page's marks; PyTorch, which configurations' modules import, is mocked."""
     with mock(["matplotlib", "scipy", "skimage", "torch"]):
         content[0] = filled(content[0])
+    link_modules(docname, content)
 
 
 def setup(app: Any) -> dict[str, bool]:
