@@ -104,9 +104,7 @@ class RoadGeometry:
         heights = self.profile.elevation(once)[:, None] + self._across(relative, False)
         return (offsets, heights) if len(once) == len(station) else (offsets[index], heights[index])
 
-    def elevation(
-        self, station: ArrayLike, offset: ArrayLike, boundaries: tuple[Float, Float] | None = None
-    ) -> Float:
+    def elevation(self, station: ArrayLike, offset: ArrayLike, boundaries: tuple[Float, Float] | None = None) -> Float:
         """Return the surface's local elevation (N,), m, damage included; NaN outside the outermost boundaries.
 
         Args:

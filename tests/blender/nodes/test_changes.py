@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from functools import partial
+from itertools import pairwise
 
 import bpy
 import pytest
@@ -18,9 +19,7 @@ def changes_of_chain(kind: str = "GeometryNodeTree") -> tuple[bpy.types.NodeTree
     """Return a tree of nodes that add, and changes that link them in a row and have each add 2."""
     tree = bpy.data.node_groups.new("Chain", kind)
     nodes = [tree.nodes.new("ShaderNodeMath") for _ in range(COUNT)]
-    changes: list[Change] = [
-        partial(tree.links.new, one.outputs[0], other.inputs[0]) for one, other in zip(nodes, nodes[1:], strict=False)
-    ]
+    changes: list[Change] = [partial(tree.links.new, one.outputs[0], other.inputs[0]) for one, other in pairwise(nodes)]
     changes += [partial(setattr, node.inputs[1], "default_value", 2.0) for node in nodes]
     return tree, changes
 

@@ -174,17 +174,20 @@ def scenes() -> dict[str, list[str]]:
 class Done:
     """A job that is done: as it was asked for, its report, and its seconds by the clock."""
 
+    number: int
+    choice: str
     asked: Scenario
     report: dict[str, Any]
     seconds: float
 
     @classmethod
-    def of(cls, name: str, number: int, folder: Path, choice: str) -> Done:
+    def of(cls, number: int, folder: Path, choice: str) -> Done:
         """Do the job of one of `scenes` with a choice."""
+        name = list(scenes())[number]
         common = ('outputs=["cloud"]', "colour.rgb=false", f"seed={100 + number}", choice)
         asked, begun = load_scenario(name, [*scenes()[name], *common]), time.perf_counter()
         report = generate(Job(asked, folder / name, new_file=True, begun=begun))
-        return cls(asked, report, time.perf_counter() - begun)
+        return cls(number, choice, asked, report, time.perf_counter() - begun)
 
     def deviation(self) -> float:
         """Return how much longer it took than was expected, as a share of that."""
@@ -199,7 +202,14 @@ class Done:
 def within_tolerance(tmp_path_factory: pytest.TempPathFactory) -> list[Done]:
     """Do the five jobs within a tolerance."""
     folder, choice = tmp_path_factory.mktemp("tolerance"), "tolerance=height=4mm,position=3cm,intensity=10%,labels=2%"
-    return [Done.of(name, number, folder, choice) for number, name in enumerate(scenes())]
+    return [Done.of(number, folder, choice) for number in range(len(scenes()))]
+
+
+def unforeseen(jobs: list[Done], folder: Path) -> list[str]:
+    """Return the jobs that took more or less time than was expected, twice: other work on the machine disturbs one."""
+    off = [done for done in jobs if abs(done.deviation()) > NEAR]
+    again = [Done.of(done.number, folder / "again", done.choice) for done in off]
+    return [f"{first}; {second}" for first, second in zip(off, again, strict=True) if abs(second.deviation()) > NEAR]
 
 
 def errors_afterwards(scenario: Scenario) -> dict[str, float]:
@@ -236,17 +246,17 @@ def test_no_tolerance_is_broken_in_scenes_that_the_table_was_not_made_with(withi
 
 @pytest.mark.alone
 @pytest.mark.slow
-def test_the_time_of_a_tolerance_is_foreseen(within_tolerance: list[Done]) -> None:
+def test_the_time_of_a_tolerance_is_foreseen(within_tolerance: list[Done], tmp_path: Path) -> None:
     for done in within_tolerance:
         print(done)
-    assert [str(done) for done in within_tolerance if abs(done.deviation()) > NEAR] == []
+    assert unforeseen(within_tolerance, tmp_path) == []
 
 
 @pytest.mark.alone
 @pytest.mark.slow
 def test_a_time_is_kept_and_foreseen(tmp_path: Path) -> None:
-    jobs = [Done.of(name, number, tmp_path, f"time_budget={BUDGET}") for number, name in enumerate(scenes())]
+    jobs = [Done.of(number, tmp_path, f"time_budget={BUDGET}") for number in range(len(scenes()))]
     for done in jobs:
         print(done)
     assert [str(done) for done in jobs if done.seconds > BUDGET] == []
-    assert [str(done) for done in jobs if abs(done.deviation()) > NEAR] == []
+    assert unforeseen(jobs, tmp_path) == []
