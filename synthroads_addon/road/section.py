@@ -214,13 +214,31 @@ class Median(RoadObject):
 class Ramp(Model):
     """The first part of an exit ramp or the last of an entry ramp: in plan a clothoid away from the main road.
 
-    At the distance x (m, along the centreline) from the gore's tip its inner edge has moved x^3 / (6 A^2) away.
+    At the distance x (m, along the centreline) from the gore's tip its inner edge has moved x^3 / (6 A^2) away. Up to
+    the nose it lies in the main road's plane; from there on it turns about its inner edge to a crossfall of its own,
+    and that edge leaves the plane by a vertical curve to a grade of its own.
     """
 
     length: float = quantity(85.0, ge=10, le=400, unit="m", description="Along the centreline, from the gore's tip.")
     clothoid_parameter: float = quantity(90.0, ge=30, le=500, unit="m", description="A of the clothoid.")
     lane_width: float = quantity(4.5, ge=3, le=8, unit="m", description="Width of the ramp's lane.")
     edge_strip_width: float = quantity(0.75, ge=0, le=2, unit="m", description="Width of either edge strip.")
+    crossfall_percent: float | None = quantity(
+        None,
+        ge=-12,
+        le=12,
+        unit="%",
+        description="Positive where it falls to the right; that of the main road if not given.",
+    )
+    run_off_length: float = quantity(
+        20.0, ge=5, le=200, unit="m", description="Over which the crossfall comes to that, from the nose on."
+    )
+    grade_percent: float = quantity(
+        0.0, ge=-8, le=8, unit="%", description="Against the main road's; positive where it rises behind the nose."
+    )
+    rounding_radius: float = quantity(
+        1000.0, ge=200, le=50_000, unit="m", description="Radius of the vertical curve that begins at the nose."
+    )
 
 
 class Turnout(RoadObject):

@@ -1,14 +1,30 @@
 """One carriageway's cross-section at any station: its strips and how far from the centreline their boundaries lie."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.arrays import Float, without_repeats
 from .objects import nominal_width, width_at, width_kinks
-from .section import Carriageway, Turnout
-from .turnout_geometry import TURNOUT_STRIPS, TurnoutShape
+from .section import Carriageway, Ramp, Turnout
+from .turnout_geometry import TURNOUT_STRIPS, RampSurface, TurnoutShape, ramp_width
+
+
+@dataclass(frozen=True)
+class RampFields:
+    """By how much a ramp leaves the pavement's plane, by station (N,).
+
+    Attributes:
+        begin: distance from the centreline from which it does, m.
+        lift: height above the plane there, m.
+        tilt: how much more it rises outwards than the plane, up to the pavement's edge, m/m.
+    """
+
+    begin: Float
+    lift: Float
+    tilt: Float
 
 
 class CarriagewaySection:
@@ -88,13 +104,60 @@ class CarriagewaySection:
             distances: (N, B) `distances` there, if they are known.
         """
         distances = self.distances(station) if distances is None else distances
-        # Up to here it lies in the pavement's plane: up to the pavement's edge, and behind a ramp's end as far beyond.
-        near = [shape.widths(station).verge_extra for shape in self.turnouts if shape.reaches(station)]
-        plane = np.minimum(distances, sum(near, distances[:, -2])[:, None])
+        plane = np.minimum(distances, self._plane_edge(station, distances)[:, None])
         # A surface that falls to the right rises with the offset, and the offset is sign * distance outwards.
-        rise = self.carriageway.sign * crossfall[:, None]
+        rise = self.carriageway.sign * crossfall
         verge_fall = (distances - plane) * self.carriageway.verge_slope_percent / 100.0
-        return rise * (plane - self.pivot(station)[:, None]) - verge_fall
+        heights = rise[:, None] * (plane - self.pivot(station)[:, None]) - verge_fall
+        for ramp, surface in self._ramps(station):
+            begin, tilt = distances[:, self._beyond_island], surface.own * (self._own_rise(ramp) - rise)
+            on_ramp = surface.lift[:, None] + tilt[:, None] * (plane - begin[:, None])[:, self._beyond_island :]
+            heights[:, self._beyond_island :] += surface.there[:, None] * on_ramp
+            heights[:, -1] += surface.behind * (surface.lift + tilt * ramp_width(ramp))
+        return heights
+
+    def ramp_fields(self, station: Float, crossfall: Float) -> RampFields:
+        """Return by how much `elevations` leave the pavement's plane at stations (N,), m, by the crossfall (N,) there.
+
+        In the step at a ramp's end they are those of either end of it.
+        """
+        distances, rise = self.distances(station), self.carriageway.sign * crossfall
+        fields = RampFields(*(np.zeros(station.shape) for _ in range(3)))
+        for ramp, surface in self._ramps(station):
+            ended, tilt = surface.there < 0.5, surface.own * (self._own_rise(ramp) - rise)
+            begin = np.where(ended, self._plane_edge(station, distances), distances[:, self._beyond_island])
+            lift = np.where(ended, surface.behind * (surface.lift + tilt * ramp_width(ramp)), surface.lift)
+            mine = np.where(ended, surface.behind, surface.lift * surface.lift + surface.own) > 0.0
+            fields = RampFields(
+                np.where(mine, begin, fields.begin),
+                np.where(mine, lift, fields.lift),
+                np.where(mine & ~ended, tilt, fields.tilt),
+            )
+        return fields
+
+    def _ramps(self, station: Float) -> Iterator[tuple[Ramp, RampSurface]]:
+        """Yield the ramps near stations (N,) that leave the pavement's plane, and how they lie there."""
+        for shape in self.turnouts:
+            surface = shape.ramp_surface(station) if shape.reaches(station) else None
+            if shape.turnout.ramp is not None and surface is not None:
+                yield shape.turnout.ramp, surface
+
+    def _own_rise(self, ramp: Ramp) -> float:
+        """Return how much a ramp with all of its own crossfall rises outwards, m/m."""
+        return self.carriageway.sign * (ramp.crossfall_percent or 0.0) / 100.0
+
+    @property
+    def _beyond_island(self) -> int:
+        """Return the index of the boundary at which ramps begin."""
+        return self.kinds.index("island") + 1
+
+    def _plane_edge(self, station: Float, distances: Float) -> Float:
+        """Return the distances (N,), m, up to which the surface lies in the pavement's plane; beyond the verge falls.
+
+        Only behind a ramp's end is it not the pavement's edge.
+        """
+        near = [shape.widths(station).verge_extra for shape in self.turnouts if shape.reaches(station)]
+        return np.asarray(sum(near, distances[:, -2]))
 
     def kinks(self) -> list[float]:
         """Return the stations (m, unsorted) at which the rate of change of a strip's width jumps."""
@@ -104,6 +167,10 @@ class CarriagewaySection:
     def steps(self) -> list[tuple[float, float]]:
         """Return the (lowest, highest) stations, m, of the few centimetres over which the pavement's width jumps."""
         return [step for shape in self.turnouts for step in shape.steps()]
+
+    def ramp_bend(self, station: Float) -> Float:
+        """Return the second derivative (N,) by station of a ramp's height above the pavement's plane, 1/m."""
+        return sum((shape.ramp_bend(station) for shape in self.turnouts), np.zeros(station.shape))
 
     def bend(self, station: Float) -> Float:
         """Return the largest second derivative (N,) of a boundary's distance by station, 1/m."""

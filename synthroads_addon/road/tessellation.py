@@ -76,6 +76,8 @@ def _chord_spacing(geometry: RoadGeometry, kinks: Float, tolerance: float) -> Fl
         bend = bend + section.bend(samples.ravel()).reshape(samples.shape).max(axis=0)
     horizontal = bend * (1.0 + bend * reach)
     vertical = np.abs(geometry.profile.curvature(samples)).max(axis=0)
+    for section in geometry.sections.values():
+        vertical = vertical + section.ramp_bend(samples.ravel()).reshape(samples.shape).max(axis=0)
     return np.sqrt(8.0 * _SHARE * tolerance / np.maximum(np.maximum(horizontal, vertical), 1e-12))
 
 

@@ -53,6 +53,23 @@ class TurnoutWidths:
     verge_extra: Float
 
 
+@dataclass(frozen=True)
+class RampSurface:
+    """How a ramp lies against the main road's plane, (N,).
+
+    Attributes:
+        there: 1 up to the ramp's end, 0 behind it; over the step between in between.
+        behind: share of what it has at its end that the verge behind it still has; 0 up to there.
+        lift: height of its inner edge above the plane, m.
+        own: share of its own crossfall that it has.
+    """
+
+    there: Float
+    behind: Float
+    lift: Float
+    own: Float
+
+
 class TurnoutShape:
     """The widths that one turnout gives its carriageway's strips, by station.
 
@@ -87,6 +104,8 @@ class TurnoutShape:
         marks = [self.station(w) for w in (0.0, self._taper, self._tip, last)]
         if self.turnout.ramp:
             marks += [self.nose_station(behind) for behind in NOSE_ROUND[2:].tolist()]
+            last = self.turnout.ramp.length - self.nose
+            marks += [self.nose_station(min(behind, last)) for behind in self._surface_marks(self.turnout.ramp)]
         return [*marks, *(station for step in self.steps() for station in step)]
 
     def steps(self) -> list[tuple[float, float]]:
@@ -123,6 +142,34 @@ class TurnoutShape:
         x = self._x(station)
         return np.where((x > 0.0) & (x < ramp.length), x / ramp.clothoid_parameter**2, 0.0)
 
+    def ramp_bend(self, station: Float) -> Float:
+        """Return the second derivative (N,) by station of the height of the ramp's inner edge, 1/m; 0 without any."""
+        ramp = self.turnout.ramp
+        if ramp is None or ramp.grade_percent == 0.0:
+            return np.zeros(station.shape)
+        behind = self._x(station) - self.nose
+        return np.where((behind > 0.0) & (behind < _curve_length(ramp)), 1.0 / ramp.rounding_radius, 0.0)
+
+    def ramp_surface(self, station: Float) -> RampSurface | None:
+        """Return how the ramp lies at stations (N,), m; None where it has neither crossfall nor grade of its own."""
+        ramp = self.turnout.ramp
+        if ramp is None or (ramp.crossfall_percent is None and ramp.grade_percent == 0.0):
+            return None
+        x = self._x(station)
+        there, blend = _end_of_ramp(ramp, x)
+        behind = np.clip(x, self.nose, ramp.length) - self.nose
+        curve = np.minimum(behind, _curve_length(ramp))
+        rounded = np.copysign(curve**2 / (2.0 * ramp.rounding_radius), ramp.grade_percent)
+        lift = rounded + ramp.grade_percent / 100.0 * (behind - curve)
+        own = np.zeros(x.shape) if ramp.crossfall_percent is None else np.minimum(behind / ramp.run_off_length, 1.0)
+        return RampSurface(there, (1.0 - there) * blend, lift, own)
+
+    @staticmethod
+    def _surface_marks(ramp: Ramp) -> list[float]:
+        """Return the distances behind the nose, m, at which the change of the ramp's heights jumps."""
+        marks = [ramp.run_off_length] if ramp.crossfall_percent is not None else []
+        return [*marks, _curve_length(ramp)] if ramp.grade_percent else marks
+
     def widths(self, station: Float) -> TurnoutWidths:
         """Return the widths of the turnout's strips, and how others change, at stations (N,), m."""
         full = width_at(self.carriageway.hard_shoulder_width, station)
@@ -139,7 +186,7 @@ class TurnoutShape:
         opened = np.clip(w / self._taper, 0.0, 1.0)
         to_ramp = np.clip(x / self.nose, 0.0, 1.0)
         behind_nose = np.clip((x - self.nose) / STEP, 0.0, 1.0)
-        there = 1.0 - np.clip((x - ramp.length) / STEP, 0.0, 1.0)
+        there, blend = _end_of_ramp(ramp, x)
         wedge = np.clip(x, 0.0, ramp.length) ** 3 / (6.0 * ramp.clothoid_parameter**2)
 
         def between(lane: float, of_ramp: float) -> Float:
@@ -159,8 +206,7 @@ class TurnoutShape:
         strips["turnout_shoulder"] = between(turnout.shoulder_width, 0.0)
         before = full * (1.0 - opened) * (1.0 - behind_nose)
         hard_shoulder = there * (before + behind_nose * shoulder) + (1.0 - there) * full
-        blend = np.clip(1.0 - (x - ramp.length - STEP) / BLEND, 0.0, 1.0)
-        at_end = wedge - shoulder + ramp.lane_width + 2.0 * ramp.edge_strip_width
+        at_end = wedge - shoulder + ramp_width(ramp)
         return TurnoutWidths(strips, hard_shoulder, there * beside, (1.0 - there) * blend * at_end)
 
     def _w(self, station: Float) -> Float:
@@ -168,3 +214,19 @@ class TurnoutShape:
 
     def _x(self, station: Float) -> Float:
         return self._w(station) - self._taper - self.turnout.lane_length
+
+
+def ramp_width(ramp: Ramp) -> float:
+    """Return the width (m) of a ramp behind the nose: its lane and both edge strips."""
+    return ramp.lane_width + 2.0 * ramp.edge_strip_width
+
+
+def _curve_length(ramp: Ramp) -> float:
+    """Return the length (m) of a ramp's vertical curve."""
+    return abs(ramp.grade_percent) / 100.0 * ramp.rounding_radius
+
+
+def _end_of_ramp(ramp: Ramp, x: Float) -> tuple[Float, Float]:
+    """Return at distances (N,) from the gore's tip, m, how much of a ramp is there, and of its width behind its end."""
+    there = 1.0 - np.clip((x - ramp.length) / STEP, 0.0, 1.0)
+    return there, np.clip(1.0 - (x - ramp.length - STEP) / BLEND, 0.0, 1.0)

@@ -46,6 +46,8 @@ _FIELDS: dict[str, tuple[type[Model], str]] = {
     "turnouts.shoulder_width": (Turnout, "shoulder_width"),
     "turnouts.ramp_length": (Ramp, "length"),
     "turnouts.ramp_clothoid": (Ramp, "clothoid_parameter"),
+    "turnouts.ramp_crossfall": (Ramp, "crossfall_percent"),
+    "turnouts.ramp_grade": (Ramp, "grade_percent"),
     "turnouts.bay_length": (Turnout, "lane_length"),
     "turnouts.bay_taper_length": (Turnout, "taper_in_length"),
     "turnouts.bay_width": (Turnout, "lane_width"),

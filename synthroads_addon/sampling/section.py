@@ -33,7 +33,7 @@ from ..road.parameters import AlignmentObject
 from ..road.section import Carriageway, Lane, Pavement, Pothole, Ramp, Rut, Turnout
 from ..road.things.limits import Interval
 from ..road.turnout_geometry import BLEND, NOSE_BEFORE_END, NOSE_WIDTH, STEP
-from ..scenario.road import FreeCrossSection, RoadScenario
+from ..scenario.road import FreeCrossSection, RoadScenario, TurnoutLimits
 from .pavement_damage import PavementDamage
 from .placing.draw import draw, draw_between
 from .surface_course import SurfaceCourses
@@ -258,6 +258,15 @@ def sample_turnout(
     )
 
 
+def lay_ramp(limits: TurnoutLimits, turnout: Turnout, side: Side, rng: np.random.Generator) -> Turnout:
+    """Return a turnout whose ramp has a drawn crossfall, which falls away from the main road, and a drawn grade."""
+    if turnout.ramp is None:
+        return turnout
+    fall, grade = (draw_between(rng, bounds(limit)) for limit in (limits.ramp_crossfall, limits.ramp_grade))
+    own = {"crossfall_percent": fall if side == "right" else -fall, "grade_percent": grade}
+    return turnout.model_copy(update={"ramp": turnout.ramp.model_copy(update=own)})
+
+
 def cross_section_of(scenario: RoadScenario) -> StandardCrossSection:
     """Return the cross-section of one direction: the standard one or the one by hand, with what the scenario changes.
 
@@ -303,7 +312,8 @@ class CarriagewaySampler:
             name = f"{place.kind.replace('_', '-')}-{side}"
             number = sum(other.startswith(name) for other in turnouts) + 1
             turnout = sample_turnout(self.scenario, self.ramps, place, side, self.length, rng)
-            turnouts[name if number == 1 else f"{name}-{number}"] = turnout
+            laid = lay_ramp(self.scenario.turnouts, turnout, side, stream(self.seed, "ramp surface", name, number))
+            turnouts[name if number == 1 else f"{name}-{number}"] = laid
         return self._carriageway(side, lanes, rng), turnouts
 
     def _change_lane(

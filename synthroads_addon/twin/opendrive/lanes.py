@@ -4,6 +4,7 @@ import numpy as np
 
 from ...road.objects import Side
 from ...road.section import Lane
+from ...road.turnout_geometry import TURNOUT_STRIPS
 from .marks import RoadMarks
 from .pieces import Float, chord_stations, fit_cubics, join_cubics, merge_similar
 from .sections import LanePlan, LaneSection, LaneStrip
@@ -16,6 +17,8 @@ HEIGHT_TOLERANCE = 1e-4
 
 _WITH_LIMIT = ("driving", "exit", "entry")
 """Types of the lanes to which the carriageway's speed limits apply."""
+_LEAVING_PLANE = ("verge", "median", *TURNOUT_STRIPS)
+"""Strips whose edges may lie off the carriageway's plane."""
 _CLOSED = "stop"
 """Type of the lanes that only emergency vehicles may drive on."""
 
@@ -55,7 +58,7 @@ def _add_side(parent: Element, plan: LanePlan, limits: SpeedLimits, marks: RoadM
         _widths(lane, plan, section, strip)
         marks.write(lane, number, sign * lane_number)
         _traffic(lane, limits, section, strip)
-        if strip.kind in ("verge", "median"):
+        if strip.kind in _LEAVING_PLANE:
             _heights(lane, plan, section, strip)
         _notes(lane, plan, side, strip)
 
@@ -92,20 +95,25 @@ def _traffic(lane: Element, limits: SpeedLimits, section: LaneSection, strip: La
 
 
 def _heights(lane: Element, plan: LanePlan, section: LaneSection, strip: LaneStrip) -> None:
-    """Add the `height` elements of a verge's or the median's lane, whose outer edge leaves the carriageway's plane."""
-    fall = plan.verge_fall if strip.kind == "verge" else plan.median_fall
+    """Add the `height` elements of a lane whose edges leave the carriageway's plane: verge, median, a ramp's."""
 
-    def drop(station: Float) -> Float:
-        return plan.frame.h_coordinate(station, fall(station))[:, None]
+    def heights(station: Float) -> Float:
+        if strip.kind == "median":
+            falls = np.column_stack([np.zeros(len(station)), plan.median_fall(station)])
+        else:
+            falls = plan.falls(station)[:, strip.index : strip.index + 2]
+        return np.column_stack([plan.frame.h_coordinate(station, fall) for fall in falls.T])
 
     first, last = section.pieces
-    stations = chord_stations(drop, plan.widths.borders[first : last + 1], HEIGHT_TOLERANCE)
-    values = drop(stations)[:, 0]
-    if np.ptp(values) <= HEIGHT_TOLERANCE / 10.0:
+    stations = chord_stations(heights, plan.widths.borders[first : last + 1], HEIGHT_TOLERANCE)
+    values = heights(stations)
+    if np.ptp(values, axis=0).max() <= HEIGHT_TOLERANCE / 10.0:
         stations, values = stations[:1], values[:1]
-    for station, value in zip(stations.tolist(), values.tolist(), strict=True):
-        outer = round(value, 6)
-        element(lane, "height", {"sOffset": station - section.start, "inner": 0.0, "outer": outer})
+        if strip.kind not in ("verge", "median") and np.abs(values).max() <= HEIGHT_TOLERANCE / 10.0:
+            return
+    for station, (inner, outer) in zip(stations.tolist(), values.tolist(), strict=True):
+        edges = {"inner": round(inner, 6) + 0.0, "outer": round(outer, 6) + 0.0}
+        element(lane, "height", {"sOffset": station - section.start, **edges})
 
 
 def _notes(lane: Element, plan: LanePlan, side: Side, strip: LaneStrip) -> None:

@@ -116,17 +116,21 @@ class LanePlan:
     def offsets(self, station: Float) -> Float:
         """Return t (N, M) of the carriageway's strip borders, from the inside out, at stations (N,), m."""
         sign = self.frame.section.carriageway.sign
-        distances = sign * self.frame.section.distances(station)
-        below = np.zeros(distances.shape)
-        below[:, -1] = self.verge_fall(station)
+        distances, below = sign * self.frame.section.distances(station), self.falls(station)
         columns = range(distances.shape[1])
         return np.stack([self.frame.t_coordinate(station, distances[:, i], below[:, i]) for i in columns], axis=1)
 
-    def verge_fall(self, station: Float) -> Float:
-        """Return how far (N,) the verge's outer edge lies below the carriageway's plane at stations (N,), m."""
-        edge = 0 if self.side == "left" else -1
-        offsets, levels = self.geometry.boundaries(station)
-        return np.asarray(self.frame.plane_elevation(station, offsets[:, edge]) - levels[:, edge])
+    def falls(self, station: Float) -> Float:
+        """Return how far (N, M) the strips' borders, from the inside out, lie below the carriageway's plane, m.
+
+        Those of the main road lie in it; the verge's outer edge doesn't, nor do ramps with a plane of their own.
+        """
+        section = self.frame.section
+        crossfall = self.frame.crossfall(station)
+        distances = section.distances(station)
+        rise = section.carriageway.sign * crossfall[:, None]
+        plane = rise * (distances - section.pivot(station)[:, None])
+        return np.asarray(plane - section.elevations(station, crossfall, distances))
 
     def median_fall(self, station: Float) -> Float:
         """Return how far (N,) the other carriageway's inner edge lies below this one's plane, m."""

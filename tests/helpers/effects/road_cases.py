@@ -20,8 +20,10 @@ LENGTH = 60.0
 """Length of the road, m."""
 SIGN = {"shape": "rectangle", "width": 2.0, "height": 1.6, "text": ["Ausfahrt"], "posts": 2}
 OFF = {"carriageway": "right", "start_station": 5.0, "lane_width": 3.5, "lane_length": 12.0, "shoulder_width": 1.0}
+RAMP: Data = {"length": 25.0, "clothoid_parameter": 40.0, "crossfall_percent": 6.0, "run_off_length": 6.0}
+RAMP |= {"grade_percent": 3.0, "rounding_radius": 250.0}
 TURNOUTS: Data = {
-    "exit": OFF | {"kind": "exit", "taper_in_length": 10.0, "ramp": {"length": 25.0, "clothoid_parameter": 40.0}},
+    "exit": OFF | {"kind": "exit", "taper_in_length": 10.0, "ramp": RAMP},
     "entry": OFF | {"kind": "entry", "start_station": 5.0, "taper_out_length": 10.0, "ramp": {"length": 25.0}},
     "bay": {"carriageway": "left", "kind": "emergency_bay", "start_station": 10.0, "lane_length": 10.0}
     | {"lane_width": 3.0, "taper_in_length": 10.0, "taper_out_length": 10.0},

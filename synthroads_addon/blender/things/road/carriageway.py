@@ -13,6 +13,7 @@ from ...nodes import operations as op
 from ...nodes.axis import rows_along
 from ...nodes.builder import Operand, Tree, Value, makes_group, node_group, offer_group
 from ...nodes.inputs import (
+    FAR,
     Input,
     Inputs,
     backbone_socket,
@@ -36,8 +37,18 @@ _CONTRAST = (-1.0, 4.0)
 _CROSSFALL = "Fall of the pavement to the right (m/m), which may be a field"
 
 
-class Section(Inputs):
-    """Inputs of a carriageway's cross section: side, edge of the pavement, pivot, crossfall, verge's slope."""
+class _Ramp(Inputs):
+    ramp_begin = metres(0.0, _FAR, "Distance of the axis from where a ramp leaves the pavement's plane")
+    ramp_lift = metres(0.0, FAR, "Height of the ramp above that plane there, which may be a field")
+    ramp_tilt = number(0.0, (-0.25, 0.25), "How much more the ramp rises outwards than that plane (m/m)")
+
+
+RAMP_FIELDS = tuple(field.name for field in _Ramp.fields())
+"""Inputs that say how ramps leave the pavement's plane, fields on the backbone."""
+
+
+class Section(_Ramp):
+    """Inputs of a carriageway's cross section: side, edge of the pavement, pivot, crossfall, verge's slope, ramps."""
 
     left_side = boolean(False, "On the left of the axis, else on its right")
     paved_edge = metres(14.0, _FAR, "Distance of the axis from where the verge begins")
@@ -60,7 +71,12 @@ def height_group(tree: Tree) -> None:
         side = op.switch(section.left_side, -1.0, 1.0)
         rise = section.crossfall * side
         beyond = op.maximum(distance - paved, 0.0)
-        height = rise * (op.minimum(distance, paved) - section.pivot) - beyond * section.verge_slope
+        plane = op.minimum(distance, paved)
+        height = rise * (plane - section.pivot) - beyond * section.verge_slope
+    with tree.frame("A ramp has a plane of its own"):
+        # The boundary from which on it has is rounded to single precision in two ways.
+        on_ramp = section.ramp_lift + section.ramp_tilt * (plane - section.ramp_begin)
+        height = height + op.switch(distance > section.ramp_begin - 0.001, 0.0, on_ramp)
     tree.output("Height", height, description="Height above the axis, per row of the backbone (m)")
     tree.output("Offset", distance * side, description="Offset, positive to the left (m)")
 
@@ -175,7 +191,7 @@ class _Place(Inputs):
     crossfall = number(0.025, (-0.12, 0.12), _CROSSFALL)
 
 
-class _Turnouts(Inputs):
+class _Turnouts(_Ramp):
     whole_hard_shoulder_width = metres(2.5, (0.0, 6.0), "Width that the hard shoulder has where there is no turnout")
     verge_extra_width = metres(0.0, (0.0, 50.0), "Width that the verge has in addition behind a ramp")
     turnout_instance = instance_number()
@@ -198,6 +214,7 @@ def _build(tree: Tree, lanes: int, turnouts: bool) -> None:
         distances, plane, pivot = _boundaries(strips, widths, side, more)
     section: dict[str, Operand] = {"left_side": place.left_side, "crossfall": place.crossfall}
     section |= {"paved_edge": plane, "pivot": pivot, "verge_slope": side.verge_slope}
+    section |= {field: more.values[field] for field in RAMP_FIELDS} if more else {}
     with tree.frame("Pavement and verge"):
         parts = []
         on_left = op.switch(place.left_side, 0, CODES)

@@ -176,7 +176,8 @@ def varying_widths(geometry: RoadGeometry, station: Float) -> dict[str, Float]:
     """Return the backbone's attributes (N,) of varying widths at stations (N,), by name: shares of the input, or m.
 
     A strip whose width changes has its share of the width that the input holds; the hard shoulder beside turnouts also
-    ``..._main``, the share without them. Turnouts' strips have their widths, and the verge its ``..._extra``.
+    ``..._main``, the share without them. Turnouts' strips have their widths, the verge its ``..._extra``, and ramps
+    ``..._ramp_begin``, ``..._ramp_lift``, ``..._ramp_tilt``, see `RampFields`.
     """
     values: dict[str, Float] = {}
     road, words = geometry.parameters, names_in_words(geometry.parameters)
@@ -194,6 +195,8 @@ def varying_widths(geometry: RoadGeometry, station: Float) -> dict[str, Float]:
                 values[attribute_name(layout.side, marking.name)] = share
         if layout.turnouts:
             values |= _turnout_widths(layout.side, section, station)
+            ramps = section.ramp_fields(station, geometry.crossfall(section.carriageway, station))
+            values |= {attribute_name(layout.side, f"ramp {name}"): value for name, value in vars(ramps).items()}
     return values
 
 

@@ -16,7 +16,7 @@ from ...nodes.builder import Node, Tree, Value, node_group, offer_group
 from ...nodes.inputs import Input, Inputs, input_name, inputs_class, instance_number, material_of, metres, socket
 from ...nodes.solids import row_of_points
 from ...nodes.strip import strip_group
-from .carriageway import SideInputs, age_fields, carriageway_group, width_fields
+from .carriageway import RAMP_FIELDS, SideInputs, age_fields, carriageway_group, width_fields
 from .layout import TURNOUT_NAMES, MarkingLayout, SideLayout, attribute_name, detail_field, strips_of, width_field
 from .markings import declare_line, markings_group
 
@@ -143,6 +143,7 @@ def _surface(tree: Tree, side: _Side, backbone: Value, verge: Value) -> Node:
         whole = side.widths.values[width_field("Hard Shoulder")] * side.attribute("Hard Shoulder Main")
         values |= {"whole_hard_shoulder_width": whole, "verge_extra_width": side.attribute("Verge Extra")}
         values["turnout_instance"] = _turnout_instance(side)
+        values |= _ramps(side)
     return tree.call(
         carriageway_group(layout.lanes, turnouts),
         backbone=backbone,
@@ -153,6 +154,11 @@ def _surface(tree: Tree, side: _Side, backbone: Value, verge: Value) -> Node:
         **side.ages.values,
         verge_material=verge,
     )
+
+
+def _ramps(side: _Side) -> dict[str, Value]:
+    """Add nodes for how ramps leave the pavement's plane, by input field."""
+    return {field: side.attribute(field) for field in RAMP_FIELDS}
 
 
 def _turnout_instance(side: _Side) -> Value:
@@ -181,6 +187,7 @@ def _markings(tree: Tree, backbone: Value, side: _Side, materials: _RoadMaterial
         crossfall=op.named_attribute(tree, f"crossfall_{layout.side.lower()}"),
         verge_slope=side.inputs.verge_slope,
         first_station=side.inputs.first_station,
+        **(_ramps(side) if turnouts else {}),
         material=materials.marking_material,
         yellow_material=materials.yellow_marking_material,
         **{name.lower().replace(" ", "_"): value for name, value in values.items()},
