@@ -12,6 +12,7 @@ from ...road.objects import RoadObject
 from .barriers import median_barriers, plan_noise_barrier, roadside_barriers
 from .construction import construction_zones
 from .delineators import delineator_stations, delineators
+from .drainage import gutters
 from .equipment import plan_periodic, plan_traffic_lights
 from .layout import Layout
 from .random import plan_random_equipment, plan_random_signs, random_front, random_median_barrier
@@ -90,6 +91,7 @@ def _objects_behind_barriers(
     for roadside in layout.sides.values():
         yield from roadside.objects()
     yield from median_signs(layout)
+    yield from gutters(layout)
     yield from gantries(layout, planned, streams["structures"])
     if bridge:
         yield "overpass", overpass(layout, bridge, streams["structures"])

@@ -1,0 +1,89 @@
+"""Drainage: gutters in the median where a carriageway falls towards it, and shafts beside the road (RAS-Ew, REwS)."""
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from ...base.schema import round_value
+from ...road.section import Carriageway
+from ...road.things.gutter import Gutter
+from ...road.things.shaft import Shaft
+from .draw import draw
+from .layout import Layout, PlacementRequest, Roadside
+from .ranges import Range, nearest_free
+from .registry import small_thing
+
+GUTTER = 0.4
+"""Width of gutters, m."""
+_SHORTEST = 20.0
+"""Least length of a gutter, m."""
+_HALF, _ROOM = 0.5, 10.0
+"""What a shaft takes to either side along the road, and how far it may be moved for what stands there, m."""
+_DEEP = -1.0
+"""Mean height of the road above the ground, m, up to which its shafts lie in the swale."""
+
+
+@small_thing("drainage")
+def plan_shafts(layout: Layout, rng: np.random.Generator) -> None:
+    """Put shafts at even distances beside the road: inlets in the swale of a cutting, else manholes."""
+    furniture, terrain = layout.site.scenario.furniture, layout.site.terrain
+    if not furniture.shafts:
+        return
+    swale = terrain.swale_width if terrain.embankment_height <= _DEEP else 0.0
+    for roadside in layout.sides.values():
+        spacing, size = draw(rng, furniture.shaft_spacing), draw(rng, furniture.shaft_size)
+        for wanted in np.arange(spacing * rng.random(), layout.length, spacing).tolist():
+            station = nearest_free(wanted, _HALF, _ROOM, layout.length, roadside.near, roadside.turnouts)
+            if station is not None:
+                roadside.put(_shaft(layout, roadside, round_value(station), size, swale))
+
+
+def _shaft(layout: Layout, roadside: Roadside, station: float, size: float, swale: float) -> PlacementRequest:
+    """Return the request of a shaft of a size beside a road with a swale of a width (all m), 0 for none."""
+    fields = {"kind": "inlet" if swale else "manhole", "size": size}
+    edge = float(layout.site.sections[roadside.side].road_edge(station)[0])
+    distance = edge + swale / 2.0 if swale else None
+    return PlacementRequest("shaft", Shaft, station, _HALF, size, fields, distance=distance)
+
+
+def gutters(layout: Layout) -> Iterator[tuple[str, Gutter]]:
+    """Yield (id, gutter) beside the inner edges of carriageways where they fall towards the median."""
+    if not layout.site.scenario.furniture.gutters or len(layout.sides) < 2:
+        return
+    for side, carriageway in layout.site.carriageways.items():
+        inner = carriageway.inner_offset
+        if isinstance(inner, tuple) or inner < GUTTER:
+            continue
+        stretches = [span for span in inward_stretches(carriageway, layout.length) if span[1] - span[0] >= _SHORTEST]
+        for number, (start, end) in enumerate(stretches, 1):
+            yield (
+                f"gutter-{side}-{number}",
+                Gutter(
+                    instance=1,
+                    start_station=start,
+                    end_station=end,
+                    offset=round_value(carriageway.sign * (inner - GUTTER / 2.0)),
+                    kerb_side="right" if side == "left" else "left",
+                    width=GUTTER,
+                ),
+            )
+
+
+def inward_stretches(carriageway: Carriageway, length: float) -> list[Range]:
+    """Return the stretches (m) of a road of a length (m) on which a carriageway falls towards the median."""
+    points = [(point.station, carriageway.sign * point.crossfall_percent) for point in carriageway.crossfall]
+    points = [(min(0.0, points[0][0]), points[0][1]), *points, (max(length, points[-1][0]), points[-1][1])]
+    found: list[Range] = []
+    for (s0, a), (s1, b) in pairwise(points):
+        if max(a, b) <= 0.0 or s1 <= s0:
+            continue
+        # Where it passes through 0 between them.
+        low = s0 if a > 0.0 else s0 + (s1 - s0) * -a / (b - a)
+        high = s1 if b > 0.0 else s0 + (s1 - s0) * a / (a - b)
+        low, high = round_value(max(low, 0.0)), round_value(min(high, length))
+        if found and low <= found[-1][1]:
+            found[-1] = found[-1][0], high
+        elif high > low:
+            found.append((low, high))
+    return found
