@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import AnyArray, Float
+from ..base.arrays import AnyArray, Float, Index
 from ..cloud.layers import optional_arrays
-from ..cloud.points import NO_MATERIAL
+from ..cloud.points import NO_MATERIAL, PointBlock
 from ..materials.reflectance import reflectivity
 from ..materials.surfaces import Surfaces
 from .colour.colour import LayerSource, LayerValues, SeenPoints, sample_points
@@ -15,7 +15,8 @@ from .plan import ScanPlan
 from .receiving.detector import Readout
 from .receiving.radiometry import DARKEST_DB, decibels
 from .receiving.response import range_corrected
-from .relief.micro_relief import BeamEnds, shift_by_relief
+from .relief.micro_relief import BeamEnds, MicroRelief, ReliefField, shift_by_relief
+from .relief.normals import turn_normals
 from .returns import number_returns
 from .scan import BlockResult
 
@@ -44,21 +45,29 @@ class Finish:
             result = self._with_layers(result, result.seen)
         points = result.points
         if result.seen is not None and plan.relief is not None:
-            pavement, seen = plan.pavement, result.seen.position
-            # What moves is smooth: for all that has a relief the beam is the one that the scene at time 0 was seen by.
-            points = shift_by_relief(
-                points,
-                BeamEnds(seen + plan.frame_origin, result.seen.towards_scanner, plan.setting.beam_angle),
-                plan.relief,
-                plan.relief_strength,
-                plan.seed,
-                plan.relief_octaves,
-                None if pavement is None else pavement.heights(points.instance_id, seen + plan.target.origin),
-            )
+            points = self._with_relief(points, result.seen, plan.relief)
         changes: dict[str, AnyArray | None] = dict.fromkeys(points.attributes().keys() & OPTIONAL - plan.kept_layers)
         if plan.range_corrected:
             changes["intensity"] = range_corrected(points.intensity, points.range, plan.setting)
         return replace(result, points=points.with_arrays(changes), seen=None)
+
+    def _with_relief(self, points: PointBlock, seen: SeenPoints, relief: MicroRelief) -> PointBlock:
+        """Return points shifted to where their beams meet the surface's relief, with its normals if they are wanted."""
+        plan, pavement, place = self.plan, self.plan.pavement, seen.position + self.plan.target.origin
+        # What moves is smooth: for all that has a relief the beam is the one that the scene at time 0 was seen by.
+        ends = BeamEnds(seen.position + plan.frame_origin, seen.towards_scanner, plan.setting.beam_angle)
+        how = relief, plan.relief_strength, plan.seed, plan.relief_octaves
+        raised = None if pavement is None else pavement.heights(points.instance_id, place)
+        shifted = shift_by_relief(points, ends, *how, raised)
+        if not plan.relief_normals or shifted is points:
+            return shifted
+        field = ReliefField(points, ends, *how)
+
+        def heights(rows: Index, beside: Float) -> Float:
+            of_pavement = 0.0 if pavement is None else pavement.heights(points.instance_id[rows], place[rows] + beside)
+            return field.heights(rows, beside) + of_pavement
+
+        return turn_normals(shifted, field.rough, ends.towards, heights)
 
     def _with_layers(self, result: BlockResult, seen: SeenPoints) -> BlockResult:
         """Return a block with its points' colours and layers, and with the intensities that follow from these."""

@@ -121,6 +121,7 @@ class ScanPlan:
         relief: micro-relief of the materials; None without.
         relief_strength: factor on it.
         relief_octaves: of it.
+        relief_normals: whether normals and incidence angles follow it, and the pavement's heights.
         pavement: heights of the pavement, which points have as well where there is a micro-relief; None without.
         threads: blocks that are worked on at once; 0 for every core.
         request: colours and layers that are asked of the scene.
@@ -157,6 +158,7 @@ class ScanPlan:
     relief: MicroRelief | None = None
     relief_strength: float = 0.0
     relief_octaves: int = 4
+    relief_normals: bool = False
     pavement: PavementRelief | None = None
     threads: int = 0
     request: LayerRequest | None = None

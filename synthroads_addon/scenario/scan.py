@@ -41,6 +41,9 @@ class ScanScenario(DeviceChoice):
         (1, 8),
         inherits="fidelity.relief_octaves",
     )
+    relief_normals: bool = Field(
+        False, description="Have normals and incidence angles of the points follow micro-relief and pavement."
+    )
     reflection: Literal["lambert", "oren_nayar"] = Field(
         "lambert",
         description="How rough surfaces reflect.",

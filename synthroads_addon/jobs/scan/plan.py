@@ -146,6 +146,7 @@ def plan_scan(
         relief=relief,
         relief_strength=scan.relief,
         relief_octaves=settings.relief_octaves,
+        relief_normals=scan.relief_normals,
         pavement=conditions.pavement if shifts else None,
         threads=scan.threads,
         request=LayerRequest(

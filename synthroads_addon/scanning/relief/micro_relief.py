@@ -167,8 +167,7 @@ def shift_by_relief(
         return points
     if points.normal is None or points.material is None:
         raise ValueError("the roughness adjustment needs the points' normals and materials")
-    # Points in the air, whose number is beyond all materials', have none.
-    rough = np.flatnonzero(np.take(np.append(relief.amplitude, 0.0), points.material, mode="clip"))
+    rough = ReliefField(points, ends, relief, strength, seed, octaves).rough
     material = points.material[rough]
     if raised is not None:
         for arrays in (("xyz", "range"), ("true_xyz", "true_range")):
@@ -176,16 +175,47 @@ def shift_by_relief(
     if not len(rough):
         return points
     cosine = np.cos(np.radians(points.incidence_deg[rough].astype(np.float64)))
-    footprint = _footprint(points.range[rough], cosine, ends.divergence) if ends.divergence else None
-    wavelength = relief.wavelength[material]
-    height = noise_field(ends.position[rough], wavelength, seed, octaves, footprint)
-    height *= strength * relief.amplitude[material]
+    field = ReliefField(points, ends, relief, strength, seed, octaves)
+    height, wavelength = field.heights(rough), relief.wavelength[material]
     sine = np.sqrt(1.0 - cosine**2)
     nearer = height / np.maximum(cosine, np.abs(height) * sine / (_NEXT_PEAK * wavelength))
     place, distance = points.xyz.copy(), points.range.copy()
     place[rough] += nearer[:, None] * ends.towards[rough]
     distance[rough] -= nearer
     return points.with_arrays({"xyz": place, "range": distance})
+
+
+@dataclass(frozen=True)
+class ReliefField:
+    """The micro-relief that a scanner sees at N points: the mean over each beam's footprint.
+
+    Attributes:
+        points, ends, relief, strength, seed, octaves: as `shift_by_relief` takes them.
+    """
+
+    points: PointBlock
+    ends: BeamEnds
+    relief: MicroRelief
+    strength: float
+    seed: int
+    octaves: int
+
+    @property
+    def rough(self) -> Index:
+        """Return the rows (K,) of the points whose material has a relief; those in the air have none."""
+        assert self.points.material is not None
+        return np.flatnonzero(np.take(np.append(self.relief.amplitude, 0.0), self.points.material, mode="clip"))
+
+    def heights(self, rows: Index, beside: Float | float = 0.0) -> Float:
+        """Return the heights (K,) above the smooth surface at places beside rough points, (K, 3) from them, m."""
+        assert self.points.material is not None
+        material, footprint = self.points.material[rows], None
+        if self.ends.divergence:
+            cosine = np.cos(np.radians(self.points.incidence_deg[rows].astype(np.float64)))
+            footprint = _footprint(self.points.range[rows], cosine, self.ends.divergence)
+        place = self.ends.position[rows] + beside
+        height = noise_field(place, self.relief.wavelength[material], self.seed, self.octaves, footprint)
+        return np.asarray(height * (self.strength * self.relief.amplitude[material]))
 
 
 def _footprint(distance: Float, cosine: Float, divergence: float) -> tuple[Float, Float]:

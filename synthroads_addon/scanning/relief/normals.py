@@ -1,0 +1,53 @@
+"""Normals of a rough surface: those of the smooth one, turned by the slope of what is raised above it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ...base.arrays import AnyArray, Float, Index
+from ...cloud.points import PointBlock
+
+Heights = Callable[[Index, Float], Float]
+"""Heights above the smooth surface, (K,) m, of some rows (K,) at places (K, 3) beside theirs, m."""
+
+STEP = 0.0005
+"""Half the distance of the places between which slopes are measured, m: a sixth of the finest relief's wavelength."""
+
+
+def turn_normals(points: PointBlock, rows: Index, towards: AnyArray, heights: Heights) -> PointBlock:
+    """Return the points with normals and incidence angles of the raised surface; all else is kept.
+
+    A height h above the smooth surface, along its normal n, has the normal n - grad h. A normal that would look away
+    from the scanner, which sees its point, is at right angles to the beam at most.
+
+    Args:
+        points: with `normal`.
+        rows: (K,) those that may lie on something raised.
+        towards: (N, 3) unit vectors to the scanner.
+        heights: of the raised surface.
+    """
+    assert points.normal is not None
+    normal = points.normal[rows].astype(np.float64)
+    turned = normal.copy()
+    for along in _tangents(normal):
+        slope = (heights(rows, STEP * along) - heights(rows, -STEP * along)) / (2.0 * STEP)
+        turned -= slope[:, None] * along
+    turned /= np.linalg.norm(turned, axis=1)[:, None]
+    cosine = np.einsum("ij,ij->i", turned, towards[rows])
+    away = np.minimum(cosine, 0.0)[:, None] * towards[rows]
+    turned -= away
+    turned /= np.linalg.norm(turned, axis=1)[:, None]
+    normals, incidence = points.normal.copy(), points.incidence_deg.copy()
+    normals[rows] = turned
+    incidence[rows] = np.degrees(np.arccos(np.clip(cosine, 0.0, 1.0)))
+    return points.with_arrays({"normal": normals, "incidence_deg": incidence})
+
+
+def _tangents(normal: Float) -> tuple[Float, Float]:
+    """Return two unit vectors (N, 3) at right angles to unit normals (N, 3) and to each other."""
+    axis = np.where(np.abs(normal[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
+    first = np.cross(axis, normal)
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    return first, np.cross(normal, first)
