@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from functools import cache
 from itertools import pairwise
@@ -165,6 +165,14 @@ def _pole_spacing(objects: Objects, _: RoadParameters) -> Iterator[float]:
         yield min(b - a for a, b in pairwise(stations))
 
 
+def _shaft_spacing(objects: Objects, _: RoadParameters) -> Iterator[float]:
+    for sign in (-1.0, 1.0):
+        stations = sorted(item.station for item in objects["Shaft"] if item.offset * sign > 0.0)
+        apart = Counter(round(b - a, 6) for a, b in pairwise(stations)).most_common(1)
+        if apart and apart[0][1] > 2:  # some are moved for what stands there
+            yield apart[0][0]
+
+
 def _construction_length(objects: Objects, _: RoadParameters) -> Iterator[float]:
     for sign in (-1.0, 1.0):
         stations = [item.station for item in objects["ConstructionBeacon"] if item.offset * sign > 0.0]
@@ -216,6 +224,8 @@ EXTRACTORS: dict[str, Extractor] = {
     "turnouts.shoulder_width": _turnout(lambda item: item.shoulder_width),
     "turnouts.ramp_length": _turnout(lambda item: item.ramp.length),
     "turnouts.ramp_clothoid": _turnout(lambda item: item.ramp.clothoid_parameter),
+    "turnouts.ramp_crossfall": _turnout(lambda item: abs(item.ramp.crossfall_percent)),
+    "turnouts.ramp_grade": _turnout(lambda item: item.ramp.grade_percent),
     "turnouts.bay_length": _turnout(lambda item: item.lane_length, bay=True),
     "turnouts.bay_taper_length": _turnout(lambda item: item.taper_in_length, bay=True),
     "turnouts.bay_width": _turnout(lambda item: item.lane_width, bay=True),
@@ -236,6 +246,8 @@ EXTRACTORS: dict[str, Extractor] = {
     "furniture.lighting_height": _field("Pole", "height", kind="lighting"),
     "furniture.surveillance_height": _field("Pole", "height", kind="surveillance"),
     "furniture.cabinets_per_km": _cabinets_per_km,
+    "furniture.shaft_spacing": _shaft_spacing,
+    "furniture.shaft_size": _field("Shaft", "size"),
     "furniture.overpass_clearance": _field("Overpass", "clearance"),
     "furniture.overpass_width": _field("Overpass", "width"),
     "furniture.construction_length": _construction_length,
