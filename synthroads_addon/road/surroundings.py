@@ -44,6 +44,12 @@ class Terrain(RoadObject):
     swale_depth: float = quantity(
         0.0, ge=0, le=1, unit="m", description="Depth of that swale's middle below the verge's edge."
     )
+    ditch_width: float = quantity(
+        0.0, ge=0, le=5, unit="m", description="Width of the ditch at the foot of an embankment; 0 for none."
+    )
+    ditch_depth: float = quantity(
+        0.0, ge=0, le=1, unit="m", description="Depth of that ditch's middle below the ground."
+    )
     seed: int = quantity(ge=0, le=2**63 - 1, unit="1", description="Seed of the undulation.")
     elevation_model: str | None = Field(
         None, description="File of a digital elevation model that takes the undulation's place."

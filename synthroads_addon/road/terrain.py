@@ -2,7 +2,8 @@
 
 The batter's heights count from the road's edge, distances outwards from it. Where the ground at the edge is higher the
 road lies in a cutting, and the edge is followed by a swale and a batter that rises to the ground; else by a crest and
-a batter that falls to it. Where batter and ground meet, a parabola with two equal tangents rounds them.
+a batter that falls to it. Where batter and ground meet, a parabola with two equal tangents rounds them, or there is a
+ditch at the foot of the embankment.
 """
 
 from functools import lru_cache
@@ -22,7 +23,8 @@ GROUND_MARGIN = 12.0
 """Heights of the ground are wanted this far (m) beyond the terrain's half width and the road's ends."""
 
 SWALE_FROM, SWALE_FULL = 0.2, 0.8
-"""Height of the ground at the road's edge above it from which there is a swale, and from which it is full, m."""
+"""Height of the ground at the road's edge above it from which there is a swale, and from which it is full, m; so deep
+below it there is a ditch at the embankment's foot."""
 
 _WAVES = 24
 _OCTAVES = 3.0
@@ -159,7 +161,7 @@ def highest_pavement(geometry: RoadGeometry, station: Float, offset: Float) -> f
 
 def is_shaped(terrain: Terrain) -> bool:
     """Return whether anything but the two planes of the batter lies between road and ground."""
-    return bool(terrain.crest_length or terrain.rounding_length or terrain.swale_width)
+    return bool(terrain.crest_length or terrain.rounding_length or terrain.swale_width or terrain.ditch_width)
 
 
 def batter_height(terrain: Terrain, distance: Float, ground: Float, at_edge: Float) -> Float:
@@ -178,6 +180,12 @@ def batter_height(terrain: Terrain, distance: Float, ground: Float, at_edge: Flo
     if width:
         upper = upper - depth * np.sin(np.pi * np.minimum(distance / width, 1.0)) ** 2
     cutting = np.maximum(-_smooth_maximum(-ground, -upper, rounding), lower - 2.0 * depth)
+    if terrain.ditch_width:
+        ditch = ditch_share(terrain, at_edge)
+        # How far beyond the foot a place lies, on level ground.
+        beyond = np.clip((ground - lower) * terrain.batter_slope / terrain.ditch_width, 0.0, 1.0)
+        ground = ground - ditch * terrain.ditch_depth * np.sin(np.pi * beyond) ** 2
+        rounding = rounding * (1.0 - ditch)
     embankment = np.minimum(_smooth_maximum(ground, lower, rounding), upper)
     return np.where(at_edge > 0.0, cutting, embankment)
 
@@ -185,6 +193,18 @@ def batter_height(terrain: Terrain, distance: Float, ground: Float, at_edge: Flo
 def swale_share(at_edge: Float) -> Float:
     """Return the share (N,) of its full depth that a swale has, by the ground's height at the road's edge (N,), m."""
     return np.clip((at_edge - SWALE_FROM) / (SWALE_FULL - SWALE_FROM), 0.0, 1.0)
+
+
+def ditch_share(terrain: Terrain, at_edge: Float) -> Float:
+    """Return the share (N,) of its full depth that a ditch has; beside it the batter's foot isn't rounded."""
+    return swale_share(-at_edge) if terrain.ditch_width else np.zeros(at_edge.shape)
+
+
+def foot_reach(terrain: Terrain, at_edge: Float) -> tuple[Float, Float]:
+    """Return how far (N,) before and beyond the batter's foot rounding or ditch reach, m."""
+    ditch = ditch_share(terrain, at_edge)
+    tangent = rounding_height(terrain, at_edge) * terrain.batter_slope * (1.0 - ditch)
+    return tangent, np.maximum(tangent, np.where(ditch > 0.0, terrain.ditch_width, 0.0))
 
 
 def rounding_height(terrain: Terrain, at_edge: Float) -> Float:

@@ -61,7 +61,7 @@ _FIELDS: dict[str, tuple[type[Model], str]] = {
     "undulation": (Terrain, "undulation"),
     "wavelength": (Terrain, "wavelength"),
     "batter_slope": (Terrain, "batter_slope"),
-    **{name: (Terrain, name) for name in ("crest_length", "rounding_length", "swale_width")},
+    **{name: (Terrain, name) for name in ("crest_length", "rounding_length", "swale_width", "ditch_width")},
     **{f"landscape.{name}": (Landscape, name) for name in ("hill_height", "hill_length", "parcel_size")},
     "vegetation.tree_height": (Vegetation, "height_min"),
     "vegetation.shrub_height": (Vegetation, "height_min"),

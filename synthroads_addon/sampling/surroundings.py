@@ -47,6 +47,8 @@ _MODELS = list(VEHICLE_TYPES)
 _LIGHT_SUMS = np.cumsum([0.0 if kind.heavy else kind.weight for kind in VEHICLE_TYPES.values()])
 _HEAVY_SUMS = np.cumsum([kind.weight if kind.heavy else 0.0 for kind in VEHICLE_TYPES.values()])
 _COLORS = list(COLORS)
+NARROWEST_DITCH = 0.5
+"""Width of a ditch, m, below which there is none."""
 _COLOR_SUMS = np.cumsum(list(COLORS.values()))
 
 
@@ -63,6 +65,9 @@ def sample_terrain(scenario: RoadScenario, seed: int) -> Terrain:
     batter = stream(seed, "terrain", "batter")
     shape = {name: draw(batter, getattr(scenario, name)) for name in ("crest_length", "rounding_length", "swale_width")}
     shape["swale_depth"] = round_value(shape["swale_width"] * SWALE_DEPTH_SHARE)
+    ditch = draw(stream(seed, "terrain", "ditch"), scenario.ditch_width)
+    shape["ditch_width"] = ditch if ditch >= NARROWEST_DITCH else 0.0
+    shape["ditch_depth"] = round_value(shape["ditch_width"] * SWALE_DEPTH_SHARE)
     return Terrain(instance=1, seed=_seed(rng), **drawn, **shape, **given)
 
 

@@ -267,6 +267,9 @@ class RoadScenario(ClosedModel):
     swale_width: Interval = interval(
         1.0, 2.5, "m", "Width of swales in cuttings, whose depth is a fifth of it; 0 for none.", title="Swale"
     )
+    ditch_width: Interval = interval(
+        0.0, 2.0, "m", "Width of ditches at the foot of embankments, a fifth of it deep; 0 for none.", title="Ditch"
+    )
     half_width: float = quantity(78.0, "m", "Reach built to either side.", (5, 1000), title="Reach Each Side")
     elevation_model: str | None = Field(
         None,

@@ -12,9 +12,9 @@ from ..road.geometry import RoadGeometry
 from ..road.surroundings import Terrain
 from ..road.terrain import (
     batter_begin,
+    foot_reach,
     ground_elevation,
     is_shaped,
-    rounding_height,
     shaped_width,
     swale_share,
 )
@@ -31,7 +31,7 @@ _LOOKED_AT = 5_000
 _FIRST_LOOK = 1.0  # m, between places at which a batter's toe is looked for
 _HALVINGS = 30
 _SHAPE_PIECES, _TOE_PIECES = 8, 8
-"""Pieces of the ground's cross-section over crest or swale, and over the rounding of the toe."""
+"""Pieces of the ground's cross-section over crest or swale, and over the rounding of the toe or the ditch there."""
 _LEAST_WIDTH = 0.3
 """Least width of crest or swale in the triangles, m."""
 
@@ -162,9 +162,9 @@ def _columns_to_toe(terrain: Terrain, toe: Float, at_edge: Float) -> Float:
     at_edge = np.nan_to_num(at_edge)
     # Not at the edge itself, where the road's points are.
     shaped = np.maximum(shaped_width(terrain, at_edge), _LEAST_WIDTH)
-    tangent = rounding_height(terrain, at_edge) * terrain.batter_slope
-    begin = np.maximum(toe - tangent, shaped)
-    end = np.maximum(toe + tangent, begin)
+    before, beyond = foot_reach(terrain, at_edge)
+    begin = np.maximum(toe - before, shaped)
+    end = np.maximum(toe + beyond, begin)
     over_shape = shaped[:, None] * (np.arange(1, _SHAPE_PIECES + 1) / _SHAPE_PIECES)
     over_toe = begin[:, None] + (end - begin)[:, None] * np.linspace(0.0, 1.0, _TOE_PIECES + 1)
     return np.column_stack([over_shape, over_toe])

@@ -7,7 +7,7 @@ import pytest
 
 from synthroads_addon.base.arrays import Float
 from synthroads_addon.road.surroundings import Terrain
-from synthroads_addon.road.terrain import batter_height, swale_share
+from synthroads_addon.road.terrain import batter_height, ditch_share, foot_reach, swale_share
 
 SLOPE, CREST, ROUNDING, WIDE, DEEP = 1.6, 0.8, 2.4, 2.0, 0.4
 
@@ -77,3 +77,33 @@ def test_a_swale_begins_with_the_cutting() -> None:
     assert swale_share(at_edge) == pytest.approx([0.0, 0.0, 0.5, 1.0])
     found = batter_height(terrain(swale_width=WIDE, swale_depth=DEEP), middle, np.full(4, 3.0), at_edge)
     assert found[1:] == pytest.approx([0.0, -DEEP / 2.0, -DEEP])
+
+
+def test_a_ditch_lies_at_the_foot_of_an_embankment() -> None:
+    item = terrain(crest_length=CREST, rounding_length=ROUNDING, ditch_width=WIDE, ditch_depth=DEEP)
+    toe = CREST + 6.0 * SLOPE
+    beyond = np.array([-1.0, 0.0, WIDE / 4.0, WIDE / 2.0, WIDE, WIDE + 1.0])
+    found = heights(item, toe + beyond, -6.0)
+    # The foot isn't rounded: the batter goes on into the ditch.
+    assert found == pytest.approx([-6.0 + 1.0 / SLOPE, -6.0, -6.0 - DEEP / 2.0, -6.0 - DEEP, -6.0, -6.0])
+    assert heights(item, toe + beyond, 6.0) == pytest.approx(
+        heights(SHAPED.model_copy(update={"swale_width": 0.0}), toe + beyond, 6.0)
+    )
+
+
+@pytest.mark.parametrize(("above", "share"), [(-0.2, 0.0), (-0.5, 0.5), (-0.8, 1.0), (0.5, 0.0)])
+def test_a_ditch_begins_with_the_embankment(above: float, share: float) -> None:
+    item = terrain(ditch_width=WIDE, ditch_depth=DEEP)
+    assert ditch_share(item, np.array([above]))[0] == pytest.approx(share)
+    low = heights(item, np.linspace(0.0, 8.0, 8001), above).min()
+    assert low == pytest.approx(min(above, 0.0) - share * DEEP, abs=1e-4)
+    before, beyond = foot_reach(item, np.array([above]))
+    assert (before[0], beyond[0]) == (0.0, pytest.approx(WIDE if share else 0.0))
+
+
+@pytest.mark.parametrize("above", [-0.3, -0.5, -0.9, -4.0])
+def test_beside_a_ditch_there_is_no_step(above: float) -> None:
+    item = terrain(crest_length=CREST, rounding_length=ROUNDING, ditch_width=WIDE, ditch_depth=DEEP)
+    distance = np.linspace(0.0, 20.0, 20_001)
+    slopes = np.diff(heights(item, distance, above)) / np.diff(distance)
+    assert np.abs(slopes).max() < max(1.0 / SLOPE, np.pi * DEEP / WIDE) + 0.05

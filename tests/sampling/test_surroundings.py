@@ -99,11 +99,13 @@ def assert_covers(values: Iterable[float], limits: Interval, share: float = 0.9)
 def test_terrain_covers_its_limits() -> None:
     scenario = RoadScenario()
     grounds = [sample_terrain(scenario, seed) for seed in SEEDS]
-    shape = ("crest_length", "rounding_length", "swale_width")
+    shape = ("crest_length", "rounding_length", "swale_width", "ditch_width")
     for name in ("embankment_height", "undulation", "wavelength", "batter_slope", *shape):
         assert_covers((getattr(ground, name) for ground in grounds), getattr(scenario, name))
     assert {ground.half_width for ground in grounds} == {scenario.half_width}
     assert [ground.swale_depth for ground in grounds] == pytest.approx([g.swale_width / 5.0 for g in grounds])
+    assert [ground.ditch_depth for ground in grounds] == pytest.approx([g.ditch_width / 5.0 for g in grounds])
+    assert min(ground.ditch_width for ground in grounds if ground.ditch_width) >= 0.5
     assert {ground.instance for ground in grounds} == {1}
     assert len({ground.seed for ground in grounds}) == len(SEEDS)
 

@@ -37,7 +37,8 @@ Float = NDArray[np.float64]
 _FINE = 0.12
 """Share of even spacing among the columns; the rest grows away from the road."""
 _SHAPE_PIECES, _TOE_PIECES = 10, 8
-"""Pieces of the cross-section over crest or swale, up to where the batter is a plane, and over its rounded toe."""
+"""Pieces of the cross-section over crest or swale, up to where the batter is a plane, and over its rounded toe or the
+ditch there."""
 
 
 class _Shape(Inputs):
@@ -48,6 +49,8 @@ class _Shape(Inputs):
     rounding_length = metres(0.0, (0.0, 10.0), "Tangent length of the rounding of batter and ground; on low ones less")
     swale_width = metres(0.0, (0.0, 5.0), "Width of the swale between verge and batter of a cutting; 0 for none")
     swale_depth = metres(0.0, (0.0, 1.0), "Depth of that swale's middle below the verge's edge")
+    ditch_width = metres(0.0, (0.0, 5.0), "Width of the ditch at the foot of an embankment; 0 for none")
+    ditch_depth = metres(0.0, (0.0, 1.0), "Depth of that ditch's middle below the ground")
 
 
 class _Terrain(Inputs):
@@ -131,9 +134,10 @@ def _side_group(tree: Tree) -> None:
         rounding = op.minimum(shape.rounding_length / shape.batter_slope, op.unary("ABSOLUTE", at_edge))
         shaped = op.switch(at_edge > 0.0, shape.crest_length * 2.0, shape.swale_width)
         over_shape = shaped * op.minimum(rank * (1.0 / _SHAPE_PIECES), 1.0)
-        tangent = rounding * shape.batter_slope
+        ditch = _ditch_share(shape, at_edge)
+        tangent = rounding * shape.batter_slope * (1.0 - ditch)
         begin = op.maximum(toe - tangent, shaped)
-        end = op.maximum(toe + tangent, begin)
+        end = op.maximum(toe + op.maximum(tangent, op.switch(ditch > 0.0, 0.0, shape.ditch_width)), begin)
         rounded = begin + (end - begin) * op.clip((rank - (_SHAPE_PIECES + 1)) * (1.0 / (_TOE_PIECES - 1)), 0.0, 1.0)
         distance = op.switch(rank > _SHAPE_PIECES, over_shape, op.maximum(spread_out, rounded))
         distance = op.minimum(distance, farthest)
@@ -170,8 +174,20 @@ def _batter_group(tree: Tree) -> None:
     with tree.frame("Where they meet the ground"):
         rounding = op.minimum(shape.rounding_length / shape.batter_slope, op.unary("ABSOLUTE", at_edge))
         cutting = op.maximum(-_smooth_maximum(-ground, -upper, rounding), lower - depth * 2.0)
+    with tree.frame("Ditch at the foot of an embankment"):
+        ditch = _ditch_share(shape, at_edge)
+        beyond = (ground - lower) * shape.batter_slope / op.maximum(shape.ditch_width, 1e-6)
+        across = op.unary("SINE", op.clip(beyond, 0.0, 1.0) * math.pi)
+        ground = ground - ditch * shape.ditch_depth * op.power(across, 2.0)
+        rounding = rounding * (1.0 - ditch)
         embankment = op.minimum(_smooth_maximum(ground, lower, rounding), upper)
     tree.output("Height", op.switch(at_edge > 0.0, embankment, cutting), description="Above the road's edge (m)")
+
+
+def _ditch_share(shape: _Shape, at_edge: Value) -> Value:
+    """Add nodes for the share of its full depth that a ditch has; 0 without one."""
+    share = op.clip((-at_edge - SWALE_FROM) * (1.0 / (SWALE_FULL - SWALE_FROM)), 0.0, 1.0)
+    return op.switch(shape.ditch_width > 0.0, 0.0, share)
 
 
 def _rise(distance: Value, tangent: Value) -> Value:

@@ -77,7 +77,7 @@ SHEETS = (
         "environment",
         2,
         "road.embankment_height road.batter_slope road.crest_length road.rounding_length road.swale_width "
-        "road.undulation road.wavelength road.half_width road.elevation_model",
+        "road.ditch_width road.undulation road.wavelength road.half_width road.elevation_model",
     ),
     PanelFields("landscape", "Landscape", "environment", 3, "road.landscape.*"),
     PanelFields(

@@ -127,6 +127,11 @@ CUTTING = {
     "objects.terrain.swale_width": 2.0,
     "objects.terrain.swale_depth": 0.4,
 }
+BANK = {
+    "objects.terrain.embankment_height": 2.0,
+    "objects.terrain.ditch_width": 2.0,
+    "objects.terrain.ditch_depth": 0.4,
+}
 PLANTED: Data = {"type": "Vegetation", "instance": 900, "kind": "shrub", "species": "hazel", "density": 0.05}
 PLANTED |= {"band_start": 1.0, "band_end": 6.0, "height_min": 1.0, "height_max": 2.0, "seed": 1}
 CASES: dict[str, Case] = {
@@ -175,6 +180,8 @@ CASES: dict[str, Case] = {
     "Asset.library": Case(value=str(OTHER_LIBRARY)),
     "Guardrail.reflector_spacing": Case(value=6.0),
     "Terrain.swale_width": Case(given=CUTTING),
+    "Terrain.ditch_width": Case(given=BANK, value=2.5),
+    "Terrain.ditch_depth": Case(given=BANK, value=0.8),
     "Terrain.swale_depth": Case(given=CUTTING),
     "Terrain.elevation_model": Case(value=str(ELEVATIONS)),
     "Carriageway.pavement.ruts": Case(owner="right"),

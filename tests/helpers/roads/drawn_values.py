@@ -273,7 +273,7 @@ EXTRACTORS: dict[str, Extractor] = {
     "undulation": _field("Terrain", "undulation"),
     "wavelength": _field("Terrain", "wavelength"),
     "batter_slope": _field("Terrain", "batter_slope"),
-    **{name: _field("Terrain", name) for name in ("crest_length", "rounding_length", "swale_width")},
+    **{name: _field("Terrain", name) for name in ("crest_length", "rounding_length", "swale_width", "ditch_width")},
     "vegetation.tree_height": _heights("tree"),
     "vegetation.shrub_height": _heights("shrub"),
     "vegetation.grass_height": _field("Vegetation", "height_min", "height_max", kind="grass"),
