@@ -17,12 +17,12 @@ class RampFields:
     """By how much a ramp leaves the pavement's plane, by station (N,).
 
     Attributes:
-        begin: distance from the centreline from which it does, m.
+        width: from where on it does to the pavement's edge, m: what is edited inside of it moves both alike.
         lift: height above the plane there, m.
         tilt: how much more it rises outwards than the plane, up to the pavement's edge, m/m.
     """
 
-    begin: Float
+    width: Float
     lift: Float
     tilt: Float
 
@@ -125,11 +125,11 @@ class CarriagewaySection:
         fields = RampFields(*(np.zeros(station.shape) for _ in range(3)))
         for ramp, surface in self._ramps(station):
             ended, tilt = surface.there < 0.5, surface.own * (self._own_rise(ramp) - rise)
-            begin = np.where(ended, self._plane_edge(station, distances), distances[:, self._beyond_island])
+            width = np.where(ended, 0.0, self._plane_edge(station, distances) - distances[:, self._beyond_island])
             lift = np.where(ended, surface.behind * (surface.lift + tilt * ramp_width(ramp)), surface.lift)
             mine = np.where(ended, surface.behind, surface.lift * surface.lift + surface.own) > 0.0
             fields = RampFields(
-                np.where(mine, begin, fields.begin),
+                np.where(mine, width, fields.width),
                 np.where(mine, lift, fields.lift),
                 np.where(mine & ~ended, tilt, fields.tilt),
             )

@@ -32,7 +32,7 @@ from ..road.objects import Side, WidthPoint, nominal_width, width_at
 from ..road.parameters import AlignmentObject
 from ..road.section import Carriageway, Lane, Pavement, Pothole, Ramp, Rut, Turnout
 from ..road.things.limits import Interval
-from ..road.turnout_geometry import BLEND, NOSE_BEFORE_END, NOSE_WIDTH, STEP
+from ..road.turnout_geometry import BLEND, NOSE_BEFORE_END, NOSE_WIDTH, STEP, TurnoutShape
 from ..scenario.road import FreeCrossSection, RoadScenario, TurnoutLimits
 from .pavement_damage import PavementDamage
 from .placing.draw import draw, draw_between
@@ -42,6 +42,8 @@ FeatureKind = Literal["exit", "entry", "emergency_bay", "lane_change"]
 
 RAMP_LANE, RAMP_EDGE_STRIP = 4.5, 0.75
 """Widths of a ramp's lane and of either edge strip, m."""
+SHARPEST_RIDGE = 5.0
+"""Largest difference of the crossfalls of ramp and main road, %."""
 TURNOUT_EDGE_STRIP = 0.5
 """Width of the edge strip outside a deceleration or acceleration lane, m."""
 FARTHEST_REACH = 90.0
@@ -258,13 +260,20 @@ def sample_turnout(
     )
 
 
-def lay_ramp(limits: TurnoutLimits, turnout: Turnout, side: Side, rng: np.random.Generator) -> Turnout:
-    """Return a turnout whose ramp has a drawn crossfall, which falls away from the main road, and a drawn grade."""
+def lay_ramp(limits: TurnoutLimits, turnout: Turnout, road: Carriageway, rng: np.random.Generator) -> Turnout:
+    """Return a turnout whose ramp has a drawn crossfall, which falls away from the main road, and a drawn grade.
+
+    The crossfall differs by no more than `SHARPEST_RIDGE` from that of the carriageway at the nose.
+    """
     if turnout.ramp is None:
         return turnout
     fall, grade = (draw_between(rng, bounds(limit)) for limit in (limits.ramp_crossfall, limits.ramp_grade))
-    own = {"crossfall_percent": fall if side == "right" else -fall, "grade_percent": grade}
-    return turnout.model_copy(update={"ramp": turnout.ramp.model_copy(update=own)})
+    station, percent = zip(*((point.station, point.crossfall_percent) for point in road.crossfall), strict=True)
+    there = float(np.interp(TurnoutShape(turnout, road).nose_station(), station, percent))
+    wanted = -road.sign * fall
+    own = round_value(min(max(wanted, there - SHARPEST_RIDGE), there + SHARPEST_RIDGE))
+    ramp = turnout.ramp.model_copy(update={"crossfall_percent": own, "grade_percent": grade})
+    return turnout.model_copy(update={"ramp": ramp})
 
 
 def cross_section_of(scenario: RoadScenario) -> StandardCrossSection:
@@ -312,9 +321,12 @@ class CarriagewaySampler:
             name = f"{place.kind.replace('_', '-')}-{side}"
             number = sum(other.startswith(name) for other in turnouts) + 1
             turnout = sample_turnout(self.scenario, self.ramps, place, side, self.length, rng)
-            laid = lay_ramp(self.scenario.turnouts, turnout, side, stream(self.seed, "ramp surface", name, number))
-            turnouts[name if number == 1 else f"{name}-{number}"] = laid
-        return self._carriageway(side, lanes, rng), turnouts
+            turnouts[name if number == 1 else f"{name}-{number}"] = turnout
+        road = self._carriageway(side, lanes, rng)
+        return road, {name: self._lay_ramp(name, turnout, road) for name, turnout in turnouts.items()}
+
+    def _lay_ramp(self, name: str, turnout: Turnout, road: Carriageway) -> Turnout:
+        return lay_ramp(self.scenario.turnouts, turnout, road, stream(self.seed, "ramp surface", name))
 
     def _change_lane(
         self, lanes: tuple[Lane, ...], place: TurnoutPlace, side: Side, rng: np.random.Generator

@@ -62,8 +62,10 @@ class TurnoutLimits(ClosedModel):
     shoulder_width: Interval = interval(0.0, 2.0, "m", "Hard shoulder beside it.")
     ramp_length: Interval = interval(65.0, 100.0, "m", "Length of the ramp that is built; never above its A.")
     ramp_clothoid: Interval = interval(75.0, 120.0, "m", "Clothoid parameter A of the ramp.")
-    ramp_crossfall: Interval = interval(2.5, 6.0, "%", "Fall of the ramp away from the main road.")
-    ramp_grade: Interval = interval(-4.0, 4.0, "%", "Grade of the ramp against the main road's.")
+    ramp_crossfall: Interval = interval(
+        2.5, 5.0, "%", "Fall of the ramp away from the main road; at most 5 % from the main road's."
+    )
+    ramp_grade: Interval = interval(-1.5, 1.5, "%", "Grade of the ramp against the main road's.")
     bay_length: Interval = interval(40.0, 60.0, "m", "Length of an emergency bay at full width.")
     bay_taper_length: Interval = interval(20.0, 30.0, "m", "Length of its tapers.")
     bay_width: Interval = interval(3.0, 3.5, "m", "Width of an emergency bay.")

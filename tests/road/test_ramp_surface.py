@@ -95,8 +95,8 @@ def test_the_fields_of_the_nodes_give_the_same_heights(kind: str, side: str) -> 
     fields, distances = section.ramp_fields(station, crossfall), section.distances(station)
     extra = plain.distances(station)[:, -1] - section.carriageway.verge_width - plain.paved_edge(station)
     plane = np.minimum(distances, (plain.paved_edge(station) + extra)[:, None])
-    on_ramp = fields.lift[:, None] + fields.tilt[:, None] * (plane - fields.begin[:, None])
-    added = np.where(distances > fields.begin[:, None] - 0.001, on_ramp, 0.0)
+    begin = plane[:, -1:] - fields.width[:, None]
+    added = np.where(distances > begin - 0.001, fields.lift[:, None] + fields.tilt[:, None] * (plane - begin), 0.0)
     assert heights(plain, station) + added == pytest.approx(heights(section, station), abs=1e-4)
     assert np.ptp(added) > 0.5
 

@@ -300,7 +300,6 @@ def draws(road: RoadParameters) -> Iterator[tuple[str, float]]:
         if turnout.ramp:
             yield from (("ramp", turnout.ramp.length), ("clothoid", turnout.ramp.clothoid_parameter))
             yield "shoulder", turnout.shoulder_width
-            yield "ramp crossfall", abs(turnout.ramp.crossfall_percent or 0.0)
             yield "ramp grade", turnout.ramp.grade_percent
 
 
@@ -333,7 +332,6 @@ def test_draws_reach_all_of_their_intervals() -> None:
         "shoulder": turnouts.shoulder_width,
         "ramp": turnouts.ramp_length,
         "clothoid": turnouts.ramp_clothoid,
-        "ramp crossfall": turnouts.ramp_crossfall,
         "ramp grade": turnouts.ramp_grade,
     }
     assert drawn.keys() == limits.keys()

@@ -326,13 +326,15 @@ _SOURCES = (
     # One has the colour's attribute, one groups of its own, which are written in the road's field.
     *("materials/looks.py", "materials/pavement.py", "../road/pavement/*.py"),
 )
-"""Source files that node groups follow from, beside the table of vehicles."""
+"""Source files that node groups follow from, beside the table of vehicles and the typeface."""
+TYPEFACE = PRESETS / "fonts" / "road.ttf"
+"""Typeface of the signs."""
 
 
 @cache
 def _sources_digest() -> bytes:
     """Return a SHA-256 digest of the source files of all node groups: a change to any makes new groups; cached."""
-    return files_digest(*source_files(_SOURCES), PRESETS / "vehicles.json")
+    return files_digest(*source_files(_SOURCES), PRESETS / "vehicles.json", TYPEFACE)
 
 
 def source_files(patterns: Iterable[str]) -> list[Path]:

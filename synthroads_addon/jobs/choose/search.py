@@ -118,6 +118,7 @@ class _Search:
         found = self._measure()
         rays = int(cheapest(self._options(found), self.limits).changes.get("scan.rays_per_pulse", max(self.rays)))
         self.times.calibrate(rays, *self._trial.time_scan(self.rays[rays]))
+        self._time_relief()
         return found, cheapest(self._options(found), self.limits)
 
     def _choose_by_time(self, budget: float) -> tuple[_Findings, Option]:
@@ -131,10 +132,16 @@ class _Search:
         times.calibrate(fewest, *self._try_model(self.models[0]).time_scan(self.rays[fewest]))
         if (fastest := times.scan_seconds(fewest) + times.other_seconds(self.scenario)) > left():
             raise too_short_error(left(), fastest)
+        self._time_relief()
         self._time_many_rays(_TIMING * left())
         # The error of the height follows from the model, without a measurement.
         found = self._measure() if set(self.limits) - {"height"} else self._table_errors()
         return found, best_in_time(self._options(found), _SURE * left(), self._reference_errors(), self.limits)
+
+    def _time_relief(self) -> None:
+        """Time the finest micro-relief there is to choose, with the fewest rays per pulse, as it costs by the point."""
+        if (octaves := max(self.octaves, default=2)) > 2:
+            self.times.relief = octaves, self._trial.time_relief(self.rays[min(self.rays)], octaves)
 
     def _time_many_rays(self, most: float) -> None:
         """Time the largest number of rays per pulse whose timing is expected to take at most so many seconds."""

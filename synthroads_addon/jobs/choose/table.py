@@ -83,6 +83,8 @@ class JobTimes:
         points: of the whole scan, once they are known.
         speed: seconds here for a second of the table, once that is known.
         timed: seconds of the whole scan by rays per pulse, projected from short runs.
+        relief: octaves of the relief that were timed, and the seconds of the whole scan that they take beyond two; None
+            before.
     """
 
     table: Table
@@ -91,6 +93,7 @@ class JobTimes:
     points: int = 0
     speed: float = 1.0
     timed: dict[int, float] = field(default_factory=dict)
+    relief: tuple[int, float] | None = None
 
     def calibrate(self, rays: int, seconds: float, points: int) -> None:
         """Set the number of points, and the machine's speed, from a timed scan with a number of rays per pulse."""
@@ -121,10 +124,15 @@ class JobTimes:
     def relief_seconds(self, octaves: int) -> float:
         """Return the additional seconds of a micro-relief with so many octaves, beyond the two included in the scan.
 
-        The table has processor seconds, and `speed` is a second here for one of the table's cores together.
+        Where some were timed the table only says how others compare to them. It has processor seconds, and `speed` is a
+        second here for one of the table's cores together.
         """
-        extra = nearest_row(self.table.octave, octaves) - nearest_row(self.table.octave, 2)
-        return max(0.0, extra) * 1e-6 * self.points * self.speed / self.table.cores
+        if self.relief is not None and (timed := self._extra_octaves(self.relief[0])) > 0.0:
+            return self.relief[1] * self._extra_octaves(octaves) / timed
+        return self._extra_octaves(octaves) * 1e-6 * self.points * self.speed / self.table.cores
+
+    def _extra_octaves(self, octaves: int) -> float:
+        return max(0.0, nearest_row(self.table.octave, octaves) - nearest_row(self.table.octave, 2))
 
     def colour_seconds(self, source: str, images: int, megapixels: float) -> float:
         """Return the additional seconds of a colour source beyond the materials' mean colours."""

@@ -156,10 +156,24 @@ class Trial:
         ]
         return _project((less, min(before, after)), (more, late), self.pulses), round(points * self.pulses / more)
 
-    def _time_stretches(self, rings: tuple[int, ...], count: int, share: float) -> tuple[int, float, int]:
+    def time_relief(self, rings: tuple[int, ...], octaves: int) -> float:
+        """Measure stretches and return the projected seconds that so many octaves take beyond two in the whole scan.
+
+        Stretches with and without them take turns, and the shorter of two times counts, as in `time_scan`.
+        """
+        seconds: dict[int, list[float]] = {2: [], octaves: []}
+        pulses = 1
+        for number in (2, octaves) * 2:
+            pulses, took, _ = self._time_stretches(rings, _FEW, _FEW_SHARE, number)
+            seconds[number].append(took)
+        return max(0.0, min(seconds[octaves]) - min(seconds[2])) * self.pulses / pulses
+
+    def _time_stretches(
+        self, rings: tuple[int, ...], count: int, share: float, octaves: int = 2
+    ) -> tuple[int, float, int]:
         """Scan so many stretches, at most a share of the path, into files; return pulses, seconds, points."""
         request = self.layer_request({"colour.source": "material"})
-        plan = replace(self.plan, rings=rings, relief_octaves=2, request=request)
+        plan = replace(self.plan, rings=rings, relief_octaves=octaves, request=request)
         pulses = max(plan.cut.size, _TIMED_PULSES)
         plan = replace(plan, path=scatter_stretches(plan.path, count, pulses / plan.setting.shot_rate, 0.5, share))
         with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:

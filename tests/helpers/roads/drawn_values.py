@@ -11,12 +11,14 @@ from typing import Any, Literal, get_args, get_origin
 import numpy as np
 
 from synthroads_addon.base.schema import ClosedModel, Model
+from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.guidelines import LIMITS
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.surroundings import MaterialVariation
 from synthroads_addon.road.things.limits import Interval
 from synthroads_addon.road.things.vehicles import VEHICLE_TYPES
 from synthroads_addon.sampling.forest import MANTLE
+from synthroads_addon.sampling.section import SHARPEST_RIDGE
 from synthroads_addon.sampling.pavement_damage import CRACKS_PER_KM
 from synthroads_addon.scenario.road import RoadScenario
 
@@ -165,6 +167,21 @@ def _pole_spacing(objects: Objects, _: RoadParameters) -> Iterator[float]:
         yield min(b - a for a, b in pairwise(stations))
 
 
+def _ramp_falls(objects: Objects, parameters: RoadParameters) -> Iterator[float]:
+    """Yield how much ramps fall outwards, as drawn: those that the main road's crossfall limited are left out."""
+    sections = RoadGeometry(parameters).sections
+    for section in sections.values():
+        sign, points = section.carriageway.sign, section.carriageway.crossfall
+        for shape in section.turnouts:
+            if (ramp := shape.turnout.ramp) is not None:
+                assert ramp.crossfall_percent is not None
+                there = np.interp(
+                    shape.nose_station(), [p.station for p in points], [p.crossfall_percent for p in points]
+                )
+                if abs(ramp.crossfall_percent - there) < SHARPEST_RIDGE - 1e-6:
+                    yield -sign * ramp.crossfall_percent
+
+
 def _shaft_spacing(objects: Objects, _: RoadParameters) -> Iterator[float]:
     for sign in (-1.0, 1.0):
         stations = sorted(item.station for item in objects["Shaft"] if item.offset * sign > 0.0)
@@ -224,7 +241,7 @@ EXTRACTORS: dict[str, Extractor] = {
     "turnouts.shoulder_width": _turnout(lambda item: item.shoulder_width),
     "turnouts.ramp_length": _turnout(lambda item: item.ramp.length),
     "turnouts.ramp_clothoid": _turnout(lambda item: item.ramp.clothoid_parameter),
-    "turnouts.ramp_crossfall": _turnout(lambda item: abs(item.ramp.crossfall_percent)),
+    "turnouts.ramp_crossfall": _ramp_falls,
     "turnouts.ramp_grade": _turnout(lambda item: item.ramp.grade_percent),
     "turnouts.bay_length": _turnout(lambda item: item.lane_length, bay=True),
     "turnouts.bay_taper_length": _turnout(lambda item: item.taper_in_length, bay=True),

@@ -38,7 +38,7 @@ _CROSSFALL = "Fall of the pavement to the right (m/m), which may be a field"
 
 
 class _Ramp(Inputs):
-    ramp_begin = metres(0.0, _FAR, "Distance of the axis from where a ramp leaves the pavement's plane")
+    ramp_width = metres(0.0, _FAR, "Width of a ramp that leaves the pavement's plane, up to the pavement's edge")
     ramp_lift = metres(0.0, FAR, "Height of the ramp above that plane there, which may be a field")
     ramp_tilt = number(0.0, (-0.25, 0.25), "How much more the ramp rises outwards than that plane (m/m)")
 
@@ -75,8 +75,9 @@ def height_group(tree: Tree) -> None:
         height = rise * (plane - section.pivot) - beyond * section.verge_slope
     with tree.frame("A ramp has a plane of its own"):
         # The boundary from which on it has is rounded to single precision in two ways.
-        on_ramp = section.ramp_lift + section.ramp_tilt * (plane - section.ramp_begin)
-        height = height + op.switch(distance > section.ramp_begin - 0.001, 0.0, on_ramp)
+        begin = paved - section.ramp_width
+        on_ramp = section.ramp_lift + section.ramp_tilt * (plane - begin)
+        height = height + op.switch(distance > begin - 0.001, 0.0, on_ramp)
     tree.output("Height", height, description="Height above the axis, per row of the backbone (m)")
     tree.output("Offset", distance * side, description="Offset, positive to the left (m)")
 

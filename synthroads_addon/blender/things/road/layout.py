@@ -177,7 +177,7 @@ def varying_widths(geometry: RoadGeometry, station: Float) -> dict[str, Float]:
 
     A strip whose width changes has its share of the width that the input holds; the hard shoulder beside turnouts also
     ``..._main``, the share without them. Turnouts' strips have their widths, the verge its ``..._extra``, and ramps
-    ``..._ramp_begin``, ``..._ramp_lift``, ``..._ramp_tilt``, see `RampFields`.
+    ``..._ramp_width``, ``..._ramp_lift``, ``..._ramp_tilt``, see `RampFields`.
     """
     values: dict[str, Float] = {}
     road, words = geometry.parameters, names_in_words(geometry.parameters)

@@ -6,14 +6,12 @@ from ...nodes import operations as op
 from ...nodes.builder import Tree, makes_group
 from ...nodes.inputs import Inputs, boolean, socket
 from ...nodes.solids import move_geometry
+from .typeface import CAPITAL, sign_typeface
 
 LINES = 6
 """Most lines of writing on one face."""
-CAPITAL = 0.682
-"""Height of a capital letter of Blender's own font at size 1."""
 LETTERS = 0.62
 """Height of a capital letter as a share of its line's height."""
-_RESOLUTION = 3  # straight pieces per curve of a letter
 _SMALLEST = 0.02
 """Letters lower than this (m) can't be read and are left out."""
 
@@ -72,8 +70,7 @@ def sign_line_group(tree: Tree) -> None:
     """The outlines of one line's letters of size 1 in the xy plane, from x = 0 on."""
     writing = tree.input("Writing", "String", description="What is written")
     with tree.frame("Letters"):
-        curves = tree.node("GeometryNodeStringToCurves", writing, size=1.0).value
-        curves = tree.node("GeometryNodeSetSplineResolution", curves, resolution=_RESOLUTION).value
+        curves = tree.node("GeometryNodeStringToCurves", writing, size=1.0, font=sign_typeface()).value
     with tree.frame("From x = 0 on"):
         # The bounds of instances would be those of each letter.
         extent = tree.node("GeometryNodeBoundBox", op.realize(curves), use_radius=False)
