@@ -18,8 +18,8 @@ from synthroads_addon.road.surroundings import MaterialVariation
 from synthroads_addon.road.things.limits import Interval
 from synthroads_addon.road.things.vehicles import VEHICLE_TYPES
 from synthroads_addon.sampling.forest import MANTLE
-from synthroads_addon.sampling.section import SHARPEST_RIDGE
 from synthroads_addon.sampling.pavement_damage import CRACKS_PER_KM
+from synthroads_addon.sampling.section import SHARPEST_RIDGE
 from synthroads_addon.scenario.road import RoadScenario
 
 Objects = dict[str, list[Any]]
