@@ -39,7 +39,7 @@ CAPITAL, SMALL, DESCENT = 7.0, 5.0, 2.0
 """Heights of capitals and of small letters, and how deep descenders reach, in widths of a stroke."""
 _ASCENT = 9.0
 """Height that line spacing leaves for capitals with dots, in widths of a stroke."""
-_TOLERANCE = 1.2 / 1000.0 * EM / UNIT
+_TOLERANCE = 2.0 / 1000.0 * EM / UNIT
 """Most that a straight piece may stand off from its arc, in widths of a stroke."""
 _LIMIT = 8.0
 """Longest mitre of a sharp corner, in half widths of a stroke."""
