@@ -35,7 +35,7 @@ class GutterLimits(Limits):
 class Gutter(LengthwiseThing):
     """A gutter along a pavement's edge. Its offset is that of its middle."""
 
-    points_class: ClassVar = "roadside"
+    points_class: ClassVar = "utility"
     order: ClassVar = 157
     limits: ClassVar = GutterLimits
     type: Literal["Gutter"] = "Gutter"

@@ -19,7 +19,7 @@ GUTTER = 0.4
 _SHORTEST = 20.0
 """Least length of a gutter, m."""
 _HALF, _ROOM = 0.5, 10.0
-"""What a shaft takes to either side along the road, and how far it may be moved for what stands there, m."""
+"""Room of a shaft to either side along the road, and how far it may be moved for what stands there, m."""
 _DEEP = -1.0
 """Mean height of the road above the ground, m, up to which its shafts lie in the swale."""
 
