@@ -30,12 +30,14 @@ class MadeUpScans:
     scans: int = 0
     block: float = 0.0
     disturbed: int | None = None
+    octave: float = 0.0
 
     def record(self, plans: Iterable[ScanPlan], files: CloudFiles, timer: StageTimer, announce: bool) -> dict[str, Any]:
         for plan in plans:
             pulses = sum(map(plan.pulse_count, plan.path.strips))
             self.now += self.each + RATE * pulses + (0.0 if self.scans else FIRST) + self.block * plan.cut.count()
             self.now += OTHERS if self.scans == self.disturbed else 0.0
+            self.now += self.octave * (plan.relief_octaves - 2) * pulses
             self.scans += 1
             files.counts.points += pulses // 2
         return {}
@@ -62,6 +64,24 @@ def test_what_every_block_takes_counts_as_often_as_there_are_blocks(monkeypatch:
     trial = Trial(Site(Scenario.from_dict({"fidelity": "draft"}), plan.path), plan, clock=lambda: scans.now)
     seconds, _ = trial.time_scan(())
     assert seconds == pytest.approx(RATE * trial.pulses + plan.cut.count(), rel=0.02)
+
+
+@pytest.mark.parametrize("disturbed", [1, 2])
+def test_what_a_finer_relief_takes_is_measured_though_others_disturb_one(
+    disturbed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scans = MadeUpScans(EACH, scans=1, disturbed=disturbed, octave=3e-7)
+    monkeypatch.setattr("synthroads_addon.jobs.choose.trial.record_to_files", scans.record)
+    plan = planned(StandIns(), seconds=75.0)
+    trial = Trial(Site(Scenario.from_dict({"fidelity": "draft"}), plan.path), plan, clock=lambda: scans.now)
+    seconds = trial.time_relief((), 6)
+    assert seconds == pytest.approx(4 * 3e-7 * trial.pulses, rel=1e-6)
+    times = JobTimes(shipped_table("uav"), area=1e4, pulses=10**6, points=10**6)
+    by_table = times.relief_seconds(4) / times.relief_seconds(6)
+    times.relief = 6, seconds
+    assert times.relief_seconds(2) == 0.0
+    assert times.relief_seconds(6) == pytest.approx(seconds)
+    assert times.relief_seconds(4) == pytest.approx(seconds * by_table)
 
 
 def test_two_timed_scans_tell_what_a_ray_costs_here() -> None:
