@@ -11,9 +11,9 @@ The file is a pickle: read none but your own.
 from __future__ import annotations
 
 import argparse
+import gzip
 import hashlib
 import json
-import lzma
 import os
 import pickle  # nosec B403 # one's own file, as the docstring says
 import subprocess
@@ -97,14 +97,14 @@ def save(path: Path, scenario: Scenario) -> None:
     scene = shown.read()
     kept = KeptScene(scenario.to_dict(), parameters.to_dict(), scene, constants(scene.static.materials))
     path.parent.mkdir(parents=True, exist_ok=True)
-    with lzma.open(path, "wb", preset=2) as file:
+    with gzip.open(path, "wb", compresslevel=3) as file:
         pickle.dump(tuple(kept), file)
     print(f"{path}: {len(scene.static):,} triangles, {path.stat().st_size / 1e6:.1f} MB")
 
 
 def scan(path: Path) -> dict[str, Any]:
     """Scan a kept scene with all cores that this process may use; return seconds, points and digest of the cloud."""
-    with lzma.open(path, "rb") as file:
+    with gzip.open(path, "rb") as file:
         kept = KeptScene(*pickle.load(file))  # nosec B301 # as above
     scenario, timer = Scenario.from_dict(kept.scenario), StageTimer()
     geometry = RoadGeometry(RoadParameters.from_dict(kept.road))

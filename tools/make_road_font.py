@@ -39,10 +39,10 @@ CAPITAL, SMALL, DESCENT = 7.0, 5.0, 2.0
 """Heights of capitals and of small letters, and how deep descenders reach, in widths of a stroke."""
 _ASCENT = 9.0
 """Height that line spacing leaves for capitals with dots, in widths of a stroke."""
-_TOLERANCE = 2.0 / 1000.0 * EM / UNIT
-"""Most that a straight piece may stand off from its arc, in widths of a stroke."""
-_LIMIT = 8.0
-"""Longest mitre of a sharp corner, in half widths of a stroke."""
+_TOLERANCE = 1.9 / 1000.0 * EM / UNIT
+"""Most that a straight piece may stand off from its arc, in widths of a stroke; more pieces are more triangles."""
+_FINE = 1e-5
+"""The same where the direction of the arc counts."""
 
 _FAR = 50.0
 """Further than any glyph reaches."""
@@ -78,13 +78,14 @@ class Stroke:
             points[0] = _beyond(*ends[0])
         if self.level[1]:
             points[-1] = _beyond(*ends[1])
-        line = LineString(_rounded(points, self.closed))
-        if any(self.trim):
-            line = substring(line, self.trim[0], line.length - self.trim[1])
+        sides = [_rounded(_beside(points, side * self.width / 2.0, self.closed), self.closed) for side in (1.0, -1.0)]
         if self.closed:
-            ring, half = Polygon(line), self.width / 2.0
-            return _offset(ring, half).difference(_offset(ring, -half))
-        area = line.buffer(self.width / 2.0, cap_style="flat", join_style="mitre", mitre_limit=_LIMIT)
+            return Polygon(sides[0]).symmetric_difference(Polygon(sides[1]))
+        area: BaseGeometry = Polygon([*sides[0], *reversed(sides[1])])
+        assert area.is_valid, f"the stroke from {self.points[0]} crosses itself"
+        for line, trim in ((points, self.trim[0]), (points[::-1], self.trim[1])):
+            if trim:
+                area = area.difference(_beginning(line, trim, self.width))
         for (inner, end), level in zip(ends, self.level, strict=True):
             if level and inner[1] != end[1]:
                 low, high = (end[1], _FAR) if inner[1] > end[1] else (-_FAR, end[1])
@@ -101,8 +102,28 @@ class Stroke:
         return replace(self, points=points)
 
 
-def _offset(ring: Polygon, distance: float) -> BaseGeometry:
-    return ring.buffer(distance, join_style="mitre", mitre_limit=_LIMIT)
+def _beside(points: Sequence[Point], distance: float, closed: bool) -> list[Point]:
+    """Return the corners of the line that runs at a distance on the left of another one; on its right if negative."""
+    found: list[Point] = []
+    count = len(points)
+    for number, (x, y, *rounding) in enumerate(points):
+        ends = [_direction(points[i % count], points[(i + 1) % count]) for i in (number - 1, number)]
+        if not closed and number in (0, count - 1):
+            ends = ends[1:] * 2 if number == 0 else ends[:1] * 2
+        (ax, ay), (bx, by) = ends
+        share = distance / (1.0 + ax * bx + ay * by)
+        turn = math.copysign(1.0, ax * by - ay * bx)
+        radius = rounding[0] - turn * distance if rounding else 0.0
+        found.append((x - (ay + by) * share, y + (ax + bx) * share, max(radius, 0.0)))
+    return found
+
+
+def _beginning(points: Sequence[Point], length: float, width: float) -> BaseGeometry:
+    """Return a polygon over a line's beginning of a length and what is before it, wider than the stroke."""
+    line = LineString(_rounded(points, closed=False, tolerance=_FINE))
+    (x, y), (ax, ay) = points[0][:2], _direction(points[0], points[1])
+    start = LineString([(x - 0.1 * ax, y - 0.1 * ay), *substring(line, 0.0, length).coords])
+    return start.buffer(width * 0.6, cap_style="flat", join_style="mitre")
 
 
 def _beyond(inner: Point, end: Point) -> Point:
@@ -114,7 +135,7 @@ def _beyond(inner: Point, end: Point) -> Point:
     return (end[0] + across * more, end[1] + up * more)
 
 
-def _rounded(points: Sequence[Point], closed: bool) -> list[tuple[float, float]]:
+def _rounded(points: Sequence[Point], closed: bool, tolerance: float = _TOLERANCE) -> list[tuple[float, float]]:
     """Return the points of a line whose corners with a radius are arcs of straight pieces."""
     found: list[tuple[float, float]] = []
     count = len(points)
@@ -126,17 +147,19 @@ def _rounded(points: Sequence[Point], closed: bool) -> list[tuple[float, float]]
         if ends or not radius:
             found.append((point[0], point[1]))
             continue
-        arc, taken[number] = _arc(before, point, after, radius)
+        arc, taken[number] = _arc(before, point, after, radius, tolerance)
         found += arc
     for number, point in enumerate(points):
         room = math.dist(points[number - 1][:2], point[:2]) if number or closed else math.inf
-        assert taken[number - 1] + taken[number] < room + 1e-9, f"no room for the arcs beside {point}"
+        assert taken[number - 1] + taken[number] < room + 1e-6, f"no room for the arcs beside {point}"
     if closed:
         found.append(found[0])
     return found
 
 
-def _arc(before: Point, corner: Point, after: Point, radius: float) -> tuple[list[tuple[float, float]], float]:
+def _arc(
+    before: Point, corner: Point, after: Point, radius: float, tolerance: float
+) -> tuple[list[tuple[float, float]], float]:
     """Return the points of the arc that rounds a corner between two others, and what it takes of either side."""
     (ax, ay), (bx, by) = _direction(before, corner), _direction(corner, after)
     turn = math.atan2(ax * by - ay * bx, ax * bx + ay * by)
@@ -144,7 +167,7 @@ def _arc(before: Point, corner: Point, after: Point, radius: float) -> tuple[lis
     side = math.copysign(1.0, turn)
     centre = (corner[0] - ax * long - ay * radius * side, corner[1] - ay * long + ax * radius * side)
     start = math.atan2(-ax * side, ay * side)
-    widest = 2.0 * math.acos((radius + 0.5) / (radius + 0.5 + _TOLERANCE))
+    widest = 2.0 * math.acos(radius / (radius + tolerance))
     pieces = max(1, round(math.ceil(math.pi / 2.0 / widest) * abs(turn) / (math.pi / 2.0)))
     # The pieces touch the arc in their middles: so the first and the last lie on the lines that it joins.
     step = turn / pieces
@@ -240,13 +263,13 @@ _CAPITALS: dict[str, Glyph] = {
         0.4,
         (
             _line(
-                (3.7, 4.2),
+                (3.7, 4.9),
                 (3.7, 6.5, 1.6),
                 (0.5, 6.5, 1.6),
                 (0.5, 0.5, 1.6),
                 (3.7, 0.5, 1.6),
-                (3.7, 2.8),
-                trim=(0.9, 0.9),
+                (3.7, 2.1),
+                trim=(0.2, 0.2),
             ),
         ),
     ),
@@ -259,7 +282,7 @@ _CAPITALS: dict[str, Glyph] = {
         (
             _line(
                 *(
-                    (3.7, 4.2),
+                    (3.7, 4.9),
                     (3.7, 6.5, 1.6),
                     (0.5, 6.5, 1.6),
                     (0.5, 0.5, 1.6),
@@ -267,7 +290,7 @@ _CAPITALS: dict[str, Glyph] = {
                     (3.7, 3.2),
                     (2.1, 3.2),
                 ),
-                trim=(0.9, 0.0),
+                trim=(0.2, 0.0),
             ),
         ),
     ),
@@ -296,15 +319,15 @@ _CAPITALS: dict[str, Glyph] = {
         (
             _line(
                 *(
-                    (3.55, 4.4),
+                    (3.55, 5.0),
                     (3.55, 6.5, 1.5),
                     (0.55, 6.5, 1.5),
                     (0.55, 4.25, 1.15),
                     (3.6, 2.9, 1.2),
                     (3.6, 0.5, 1.5),
                 ),
-                *((0.5, 0.5, 1.55), (0.5, 2.7)),
-                trim=(1.0, 1.0),
+                *((0.5, 0.5, 1.55), (0.5, 2.05)),
+                trim=(0.4, 0.35),
             ),
         ),
     ),
@@ -354,9 +377,9 @@ _SMALL_LETTERS: dict[str, Glyph] = {
         _ROUND,
         0.4,
         (
+            _line((0.5, 2.4), (3.2, 2.4), (3.2, 3.1)),
             _line(
-                *((0.5, 2.4), (3.2, 2.4), (3.2, 4.5, 1.35), (0.5, 4.5, 1.35), (0.5, 0.5, 1.35), (3.2, 0.5, 1.35)),
-                (3.2, 1.85),
+                *((3.2, 3.0), (3.2, 4.5, 1.35), (0.5, 4.5, 1.35), (0.5, 0.5, 1.35), (3.2, 0.5, 1.35), (3.2, 1.85)),
                 trim=(0.0, 0.7),
             ),
         ),
@@ -388,9 +411,9 @@ _SMALL_LETTERS: dict[str, Glyph] = {
         0.35,
         (
             _line(
-                *((2.9, 3.2), (2.9, 4.5, 1.0), (0.5, 4.5, 1.0), (0.5, 2.95, 0.75), (3.0, 2.15, 0.8), (3.0, 0.5, 1.0)),
-                *((0.4, 0.5, 1.0), (0.4, 1.7)),
-                trim=(0.7, 0.7),
+                *((2.9, 3.5), (2.9, 4.5, 1.0), (0.5, 4.5, 1.0), (0.5, 2.95, 0.75), (3.0, 2.15, 0.8), (3.0, 0.5, 1.0)),
+                *((0.4, 0.5, 1.0), (0.4, 1.5)),
+                trim=(0.4, 0.5),
             ),
         ),
     ),
@@ -433,22 +456,18 @@ def _figure(*strokes: Stroke) -> Glyph:
 _FIGURES: dict[str, Glyph] = {
     "0": _figure(_ring(0.5, 0.5, 3.6, 6.5)),
     "1": Glyph(0.5, 0.9, (_stem(1.9), _line((0.1, 4.996), (1.75, 6.646)))),
-    "2": _figure(
-        _line(
-            *((0.5, 4.4), (0.5, 6.5, 1.5), (3.5, 6.5, 1.5), (3.5, 3.95, 2.8), (0.95, 0.5), (4.0, 0.5)), trim=(0.3, 0.0)
-        )
-    ),
+    "2": _figure(_line(*((0.5, 4.7), (0.5, 6.5, 1.5), (3.5, 6.5, 1.5), (3.5, 3.95, 2.8), (0.95, 0.5), (4.0, 0.5)))),
     "3": _figure(
-        _line(*((0.6, 4.6), (0.6, 6.5, 1.4), (3.4, 6.5, 1.4), (3.4, 3.7, 1.4), (1.6, 3.7)), trim=(0.7, 0.0)),
-        _line(*((1.6, 3.7), (3.6, 3.7, 1.6), (3.6, 0.5, 1.6), (0.5, 0.5, 1.5), (0.5, 2.5)), trim=(0.0, 0.7)),
+        _line(*((0.6, 5.1), (0.6, 6.5, 1.4), (3.4, 6.5, 1.4), (3.4, 3.7, 1.4), (1.6, 3.7)), trim=(0.2, 0.0)),
+        _line(*((1.6, 3.7), (3.6, 3.7, 1.6), (3.6, 0.5, 1.6), (0.5, 0.5, 1.5), (0.5, 2.0)), trim=(0.0, 0.2)),
     ),
     "4": _figure(_slant((2.3, 7.0), (0.5, 1.9), (4.15, 1.9)), _stem(3.05, 0.0, 3.7)),
     "5": _figure(
         _bar(6.5, 0.6, 3.7),
         _stem(0.9, 3.0, 7.0),
         _line(
-            *((0.9, 3.0), (0.9, 4.3, 1.0), (3.6, 4.3, 1.7), (3.6, 0.5, 1.7), (0.5, 0.5, 1.4), (0.5, 2.4)),
-            trim=(0.0, 0.6),
+            *((0.9, 3.0), (0.9, 4.3, 1.0), (3.6, 4.3, 1.7), (3.6, 0.5, 1.7), (0.5, 0.5, 1.4), (0.5, 1.9)),
+            trim=(0.0, 0.1),
         ),
     ),
     "6": _figure(*_SIX),
@@ -473,9 +492,9 @@ _SIGNS: dict[str, Glyph] = {
         _OPEN,
         (
             _slant((4.5, 0.0), (1.7, 3.6)),
+            _line((3.0, 1.93), (0.7, 4.9, 0.9), (0.7, 6.5, 1.1), (2.9, 6.5, 1.1), (2.9, 5.2)),
             _line(
-                *((3.0, 1.93), (0.7, 4.9, 0.9), (0.7, 6.5, 1.1), (2.9, 6.5, 1.1), (2.9, 4.5, 1.0), (0.5, 3.0, 1.0)),
-                *((0.5, 0.5, 1.4), (3.5, 0.5, 1.9), (4.1, 2.9)),
+                *((2.9, 5.3), (2.9, 4.5, 1.0), (0.5, 3.0, 1.0), (0.5, 0.5, 1.4), (3.5, 0.5, 1.9), (4.1, 2.9)),
             ),
         ),
     ),
@@ -499,13 +518,12 @@ _SIGNS: dict[str, Glyph] = {
         0.4,
         (
             _line(
-                (0.5, 4.5),
+                (0.5, 4.9),
                 (0.5, 6.5, 1.45),
                 (3.4, 6.5, 1.45),
                 (3.4, 4.2, 1.3),
                 (1.8, 3.2, 0.6),
                 (1.8, 2.1),
-                trim=(0.4, 0.0),
             ),
             _dot(1.8, 0.0),
         ),

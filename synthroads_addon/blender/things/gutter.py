@@ -17,7 +17,7 @@ from .registry import model_part
 class _Gutter(Lengthwise):
     kerb_on_right = boolean(False, "The kerb is on its right, else on its left, seen with the stations")
     width = metres(0.4, (0.2, 1.0), "Width, kerb included")
-    kerb_height = metres(0.08, (0.02, 0.2), "Top of the kerb above the surface")
+    height = metres(0.08, (0.02, 0.2), "Top of the kerb above the surface")
     step = metres(2.0, (0.1, 8.0), "Largest length of a straight piece")
     instance = instance_number()
     material = material_of("the gutter", "concrete")
@@ -30,7 +30,7 @@ def gutter_group(tree: Tree) -> None:
     line = gutter.rows(gutter.step)
     with tree.frame("Channel and kerb"):
         channel = _solid(line, gutter, sizes.CHANNEL, sizes.RIM + BURIED)
-        kerb = _solid(line, gutter, sizes.BLOCK, gutter.kerb_height + BURIED)
+        kerb = _solid(line, gutter, sizes.BLOCK, gutter.height + BURIED)
     with tree.frame("Labels"):
         mesh = op.label(op.join(channel, kerb), class_id(Gutter.points_class), gutter.instance, gutter.material)
     tree.output("Mesh", mesh, description="Channel and kerb")

@@ -41,7 +41,7 @@ class Gutter(LengthwiseThing):
     type: Literal["Gutter"] = "Gutter"
     kerb_side: Literal["left", "right"] = Field("left", description="Side of its kerb, seen with the stations.")
     width: float = quantity(0.4, ge=0.2, le=1, unit="m", description="Width, kerb included.")
-    kerb_height: float = quantity(0.08, ge=0.02, le=0.2, unit="m", description="Top of the kerb above the surface.")
+    height: float = quantity(0.08, ge=0.02, le=0.2, unit="m", description="Top of the kerb above the surface.")
 
     def twin(self) -> TwinTypes:
         """Return its types in the twin formats: a gutter, which IFC counts among the pipes."""
@@ -59,7 +59,7 @@ class Gutter(LengthwiseThing):
         station = course.rows(self.offset_at, self.start_station, end, ())
         feet, left = course.feet(station, self.offset_at(station)), course.left(station)
         solids = []
-        for outline, top in ((CHANNEL, RIM), (BLOCK, self.kerb_height)):
+        for outline, top in ((CHANNEL, RIM), (BLOCK, self.height)):
             across, share = np.array(outline if self.kerb_side == "left" else mirrored(outline)).T
             height = share * (top + BURIED) - BURIED
             solids.append(Body(sweep(feet, left, across * self.width / 2.0, height), "concrete"))
@@ -67,7 +67,7 @@ class Gutter(LengthwiseThing):
 
     def footprint(self) -> Iterator[Block]:
         """Yield the box around the gutter, in which nothing else may stand."""
-        yield self.strip(*self.reach(), self.kerb_height)
+        yield self.strip(*self.reach(), self.height)
 
 
 def mirrored(outline: tuple[tuple[float, float], ...]) -> list[tuple[float, float]]:

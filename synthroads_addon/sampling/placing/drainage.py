@@ -6,11 +6,12 @@ from itertools import pairwise
 import numpy as np
 
 from ...base.schema import round_value
+from ...road.objects import width_at
 from ...road.section import Carriageway
 from ...road.things.gutter import Gutter
 from ...road.things.shaft import Shaft
 from .draw import draw
-from .layout import Layout, PlacementRequest, Roadside
+from .layout import SMALL_ZONE, Layout, PlacementRequest, Roadside
 from .ranges import Range, nearest_free
 from .registry import small_thing
 
@@ -41,10 +42,14 @@ def plan_shafts(layout: Layout, rng: np.random.Generator) -> None:
 
 def _shaft(layout: Layout, roadside: Roadside, station: float, size: float, swale: float) -> PlacementRequest:
     """Return the request of a shaft of a size beside a road with a swale of a width (all m), 0 for none."""
-    fields = {"kind": "inlet" if swale else "manhole", "size": size}
-    edge = float(layout.site.sections[roadside.side].road_edge(station)[0])
-    distance = edge + swale / 2.0 if swale else None
-    return PlacementRequest("shaft", Shaft, station, _HALF, size, fields, distance=distance)
+    shaft = Shaft(instance=1, station=station, offset=0.0, kind="inlet" if swale else "manhole", size=size)
+    (block,) = shaft.footprint()
+    room = block.high - block.low
+    verge = width_at(layout.site.carriageways[roadside.side].verge_width, station)
+    # To the middle of the swale, or behind a barrier that stands where that would be.
+    shift = max(0.0, float(verge) + swale / 2.0 - SMALL_ZONE - room / 2.0) if swale else 0.0
+    fields = {"kind": shaft.kind, "size": size}
+    return PlacementRequest("shaft", Shaft, station, _HALF, room, fields, shift)
 
 
 def gutters(layout: Layout) -> Iterator[tuple[str, Gutter]]:

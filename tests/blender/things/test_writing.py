@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from synthroads_addon.blender.files import empty_file
+from synthroads_addon.blender.nodes import builder
 from synthroads_addon.blender.nodes.builder import TYPEFACE
 from synthroads_addon.blender.things.sign.typeface import sign_typeface
 from synthroads_addon.blender.things.sign.writing import LETTERS, sign_writing_group
@@ -101,6 +102,12 @@ class TestTypeface:
         font = sign_typeface()
         font["synthroads_typeface"] = "older"
         assert sign_typeface() != font
+
+    def test_another_one_makes_new_groups(self, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+        other = tmp_path / "other.ttf"
+        other.write_bytes(TYPEFACE.read_bytes() + b"\0")
+        monkeypatch.setattr(builder, "TYPEFACE", other)
+        assert builder._sources_digest.__wrapped__() != builder._sources_digest()
 
     def test_it_goes_with_the_groups_into_another_file(self, tmp_path: Path) -> None:
         expected = written("Straße")

@@ -58,7 +58,8 @@ def test_shafts_stand_at_even_distances_in_swale_or_verge(limits: Any, kind: str
         assert 50.0 <= float(np.mean(apart)) <= 80.0
         beyond = np.array([abs(s.offset) - section.road_edge(s.station)[0] for s in shafts])
         if kind == "inlet":
-            assert beyond == pytest.approx(terrain.swale_width / 2.0)
+            assert beyond.min() > terrain.swale_width / 2.0 - 1e-6
+            assert np.median(beyond) == pytest.approx(terrain.swale_width / 2.0)
         else:
             assert (beyond + section.carriageway.verge_width > 1.0).all()
 
