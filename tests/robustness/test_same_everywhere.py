@@ -12,7 +12,7 @@ from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import load_scenario
 
-CHECKSUM = "59ef1b1dca4a25a758bb4678f785e8c4a23209bbc47c68b235dadaedff9badbf"
+CHECKSUM = "865f85e1a576ecf17c7e95722609eb909c570d6c450bba3070d4d206101a15d3"
 EVERYTHING = ["exits=1", "entries=1", "emergency_bays=1"]
 
 

@@ -10,7 +10,7 @@ from .body import BURIED, Body, Place, box, post
 from .limits import Interval, Limits, interval
 from .thing import Block, StandingThing, TwinTypes
 
-SIDES = 24
+SIDES = 16
 """Corners of a manhole's ring and cover."""
 LID, LID_RISE = 0.76, 0.006
 """Width of grating or cover as a share of the shaft's, and height by which it stands out of the concrete, m."""
@@ -48,17 +48,17 @@ class Shaft(StandingThing):
         return TwinTypes(entity, f"obstacle.{self.kind}", kind=self.kind)
 
     def bodies(self, place: Place) -> list[Body]:
-        """Return the closed solids of concrete and of grating or cover in its frame; a grating's slots are details."""
+        """Return the closed solid of its concrete in its frame; grating, slots or cover on it are details."""
         wide, tall, top = self.size * LID, self.height + BURIED, self.height + LID_RISE
         if self.kind == "manhole":
             ring, lid = post(self.size, -BURIED, self.height, sides=SIDES), post(wide, self.height, top, sides=SIDES)
-            return [Body(ring, "concrete"), Body(lid, "galvanised_steel")]
+            return [Body(ring, "concrete"), Body(lid, "galvanised_steel", "cover", detail=LID_RISE)]
         frame = box((self.size, self.size, tall), (0.0, 0.0, tall / 2.0 - BURIED))
         grating = box((wide, wide, LID_RISE), (0.0, 0.0, self.height + LID_RISE / 2.0))
         slots = box((wide, wide, SLOT_RISE), (0.0, 0.0, top + SLOT_RISE / 2.0))
         return [
             Body(frame, "concrete"),
-            Body(grating, "galvanised_steel"),
+            Body(grating, "galvanised_steel", "grating", detail=LID_RISE),
             Body(slots, "plastic_black", "slots", detail=SLOT_RISE),
         ]
 

@@ -34,6 +34,8 @@ NOTHING: dict[str, Any] = {
         "delineators": False,
         "kilometre_boards": False,
         "emergency_phones": False,
+        "gutters": False,
+        "shafts": False,
         "gantries": 0.0,
         "lighting": 0.0,
         "surveillance": 0.0,

@@ -15,10 +15,12 @@ from synthroads_addon.road.things.concrete_barrier import ConcreteBarrier
 from synthroads_addon.road.things.delineator import Delineator
 from synthroads_addon.road.things.gantry import Gantry
 from synthroads_addon.road.things.guardrail import Guardrail
+from synthroads_addon.road.things.gutter import Gutter
 from synthroads_addon.road.things.kilometre_board import KilometreBoard
 from synthroads_addon.road.things.noise_barrier import NoiseBarrier
 from synthroads_addon.road.things.overpass import Overpass
 from synthroads_addon.road.things.pole import Pole
+from synthroads_addon.road.things.shaft import Shaft
 from synthroads_addon.road.things.sign import TrafficSign
 from synthroads_addon.road.things.temporary_barrier import TemporaryBarrier
 from synthroads_addon.road.things.traffic_light import TrafficLight
@@ -48,6 +50,8 @@ SWITCHED_ON = merged(
             "delineators": True,
             "kilometre_boards": True,
             "emergency_phones": True,
+            "gutters": True,
+            "shafts": True,
             "cabinets_per_km": {"minimum": 0.0, "maximum": 3.0},
         }
     },
@@ -59,11 +63,13 @@ KINDS = {
     Delineator,
     Gantry,
     Guardrail,
+    Gutter,
     KilometreBoard,
     LineMarking,
     NoiseBarrier,
     Overpass,
     Pole,
+    Shaft,
     TemporaryBarrier,
     TrafficLight,
     TrafficSign,

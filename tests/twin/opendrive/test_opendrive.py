@@ -430,8 +430,9 @@ def test_road_marks_are_the_lines(road: RoadParameters, read: Roads) -> None:
         section = next(item for item in part.sections if item.start <= s[0] <= item.end)
         t = section.borders(s, part.lane_offset(s))[mark.lane] + mark.aside
         left, right = geometry.marking_edges(line, s)
-        # In plan; the width of the line itself is tilted as well.
-        plan = t * np.cos(part.superelevation(s))
+        # In plan; the width of the line itself is tilted as well, and a ramp lies above or below the road's plane.
+        above = section.lanes[mark.lane].height(s)[1] if mark.lane else 0.0
+        plan = t * np.cos(part.superelevation(s)) - above * np.sin(part.superelevation(s))
         assert np.abs(plan - (left + right) / 2.0)[away_from(geometry, s)].max(initial=0.0) < 0.3 * MILLIMETRE
         pieces.setdefault(mark.instance, []).append((mark.start, mark.end))
     for line in lines.values():
@@ -848,4 +849,4 @@ def test_long_road_has_a_small_file(tmp_path: Path) -> None:
     road = RoadParameters.from_dict(data)
     read = written(road, tmp_path)
     assert math.isclose(read.length, road.alignment.length)
-    assert (tmp_path / "road.xodr").stat().st_size < 1_000_000
+    assert (tmp_path / "road.xodr").stat().st_size < 1_200_000  # some 150 shafts are among its objects
