@@ -77,7 +77,7 @@ def _moved(data: dict[str, Any]) -> RoadParameters:
     return RoadParameters.from_dict(data)
 
 
-@pytest.fixture(scope="module", params=["straight", "curved"])
+@pytest.fixture(scope="module", params=["straight", pytest.param("curved", marks=pytest.mark.first_python)])
 def road(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[RoadParameters, Any]:
     """A road with every kind of object and a curved, sampled one, at UTM coordinates, each with its file."""
     if request.param == "straight":

@@ -27,6 +27,8 @@ from tests.helpers.clouds.random_points import make_points
 from tests.helpers.scenes.fake_layout import FakeLayout, drawn
 from tests.ui.panels.test_cloud_view import write
 
+pytestmark = pytest.mark.any_blender
+
 
 @pytest.fixture(autouse=True)
 def settings() -> Iterator[Any]:
