@@ -35,13 +35,15 @@ VILLAGE = (
 )
 BRIDGE = ("road.furniture.overpass=1", "road.barriers.concrete_median=1")
 TURNOUTS = ("road.turnouts.exits=1", "road.turnouts.emergency_bays=1")
+CURVED = ('road.radius={"minimum": 300, "maximum": 500}',)
+"""So tight that a carriageway falls towards the median, where it has a gutter then."""
 SETS = {
     "RQ43.5": ("EKA1A", 400, BRIDGE),
     "RQ36": ("EKA1A", 700, WORKS),
     "RQ31": ("EKA1B", 400, BRIDGE),
     "RQ28": ("EKA2", 300, (*ASSETS, *VILLAGE)),
     "RQ38.5": ("EKA3", 700, TURNOUTS),
-    "RQ31.5": ("EKA3", 200, ()),
+    "RQ31.5": ("EKA3", 200, CURVED),
     "RQ25": ("EKA3", 200, ()),
 }
 """Cross-section -> design class, length (m), and what it has besides."""
