@@ -2,7 +2,6 @@
 
 import argparse
 import json
-import os
 import platform
 import subprocess
 import sys
@@ -21,7 +20,7 @@ from headless.messages import progress_bar
 from headless.waves import CELLS, write_waves
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import output_folder
-from synthroads_addon.base.machine import available_cores, machine
+from synthroads_addon.base.machine import available_cores, cores_of_children, machine
 from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.scenario.scenario import Scenario, load_scenario
 
@@ -104,14 +103,8 @@ def _runs(arguments: argparse.Namespace, waves: dict[str, Any]) -> dict[str, Any
 def _measure_in_process(part: dict[str, Any], cores: int) -> dict[str, Any]:
     """Measure a part in a new process limited to so many cores, and return its result."""
     command = [sys.executable, str(Path(__file__).resolve()), _PART, json.dumps(part), "--json"]
-    before = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else None
-    if before is not None:
-        os.sched_setaffinity(0, sorted(before)[:cores])  # the child inherits it
-    try:
+    with cores_of_children(cores):
         done = subprocess.run(command, capture_output=True, text=True, check=False)
-    finally:
-        if before is not None:
-            os.sched_setaffinity(0, before)
     if done.returncode:
         raise RuntimeError(f"{part['part']} failed: {done.stderr.strip()}")
     result: dict[str, Any] = json.loads(done.stdout)

@@ -14,7 +14,6 @@ import argparse
 import gzip
 import hashlib
 import json
-import os
 import pickle  # nosec B403 # one's own file, as the docstring says
 import subprocess
 import sys
@@ -27,7 +26,7 @@ from typing import Any, NamedTuple
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from synthroads_addon.base.machine import available_cores
+from synthroads_addon.base.machine import available_cores, cores_of_children
 from synthroads_addon.base.progress import StageTimer, peak_memory_mb
 from synthroads_addon.blender.casters.embree import EmbreeCaster
 from synthroads_addon.jobs.scan.plan import Site
@@ -125,13 +124,8 @@ def scan(path: Path) -> dict[str, Any]:
 
 def in_process(path: Path, cores: int) -> dict[str, Any]:
     """Scan a kept scene in a new process that may use so many cores; return what `scan` does."""
-    before = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, sorted(before)[:cores])  # the child inherits it
-    try:
-        command = [sys.executable, __file__, "scan", str(path)]
-        done = subprocess.run(command, check=True, capture_output=True, text=True)
-    finally:
-        os.sched_setaffinity(0, before)
+    with cores_of_children(cores):
+        done = subprocess.run([sys.executable, __file__, "scan", str(path)], check=True, capture_output=True, text=True)
     result: dict[str, Any] = json.loads(done.stdout)
     return result
 

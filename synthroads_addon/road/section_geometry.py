@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from ..base.arrays import Float, without_repeats
 from .objects import nominal_width, width_at, width_kinks
-from .section import Carriageway, Ramp, Turnout
+from .section import Carriageway, Turnout
 from .turnout_geometry import TURNOUT_STRIPS, RampSurface, TurnoutShape, ramp_width
 
 
@@ -17,7 +17,7 @@ class RampFields:
     """By how much a ramp leaves the pavement's plane, by station (N,).
 
     Attributes:
-        width: from where on it does to the pavement's edge, m: what is edited inside of it moves both alike.
+        width: of the ramp, from where it leaves the plane to the pavement's edge, m.
         lift: height above the plane there, m.
         tilt: how much more it rises outwards than the plane, up to the pavement's edge, m/m.
     """
@@ -109,11 +109,11 @@ class CarriagewaySection:
         rise = self.carriageway.sign * crossfall
         verge_fall = (distances - plane) * self.carriageway.verge_slope_percent / 100.0
         heights = rise[:, None] * (plane - self.pivot(station)[:, None]) - verge_fall
-        for ramp, surface in self._ramps(station):
-            begin, tilt = distances[:, self._beyond_island], surface.own * (self._own_rise(ramp) - rise)
-            on_ramp = surface.lift[:, None] + tilt[:, None] * (plane - begin[:, None])[:, self._beyond_island :]
-            heights[:, self._beyond_island :] += surface.there[:, None] * on_ramp
-            heights[:, -1] += surface.behind * (surface.lift + tilt * ramp_width(ramp))
+        for surface, tilt, behind in self._ramps(station, rise):
+            first = self._beyond_island
+            on_ramp = surface.lift[:, None] + tilt[:, None] * (plane[:, first:] - distances[:, first, None])
+            heights[:, first:] += surface.there[:, None] * on_ramp
+            heights[:, -1] += behind
         return heights
 
     def ramp_fields(self, station: Float, crossfall: Float) -> RampFields:
@@ -123,11 +123,11 @@ class CarriagewaySection:
         """
         distances, rise = self.distances(station), self.carriageway.sign * crossfall
         fields = RampFields(*(np.zeros(station.shape) for _ in range(3)))
-        for ramp, surface in self._ramps(station):
-            ended, tilt = surface.there < 0.5, surface.own * (self._own_rise(ramp) - rise)
+        for surface, tilt, behind in self._ramps(station, rise):
+            ended = surface.there < 0.5
             width = np.where(ended, 0.0, self._plane_edge(station, distances) - distances[:, self._beyond_island])
-            lift = np.where(ended, surface.behind * (surface.lift + tilt * ramp_width(ramp)), surface.lift)
-            mine = np.where(ended, surface.behind, surface.lift * surface.lift + surface.own) > 0.0
+            lift = np.where(ended, behind, surface.lift)
+            mine = np.where(ended, surface.behind > 0.0, (surface.lift != 0.0) | (surface.own > 0.0))
             fields = RampFields(
                 np.where(mine, width, fields.width),
                 np.where(mine, lift, fields.lift),
@@ -135,16 +135,19 @@ class CarriagewaySection:
             )
         return fields
 
-    def _ramps(self, station: Float) -> Iterator[tuple[Ramp, RampSurface]]:
-        """Yield the ramps near stations (N,) that leave the pavement's plane, and how they lie there."""
-        for shape in self.turnouts:
-            surface = shape.ramp_surface(station) if shape.reaches(station) else None
-            if shape.turnout.ramp is not None and surface is not None:
-                yield shape.turnout.ramp, surface
+    def _ramps(self, station: Float, rise: Float) -> Iterator[tuple[RampSurface, Float, Float]]:
+        """Yield of each ramp near that leaves the pavement's plane how it lies, its tilt, and its verge's lift behind.
 
-    def _own_rise(self, ramp: Ramp) -> float:
-        """Return how much a ramp with all of its own crossfall rises outwards, m/m."""
-        return self.carriageway.sign * (ramp.crossfall_percent or 0.0) / 100.0
+        Args:
+            station: (N,) stations, m.
+            rise: (N,) how much the plane rises outwards there, m/m. The tilt (N,), m/m, is what the ramp rises more;
+                the lift (N,), m, is that of the verge's outer edge behind the ramp's end.
+        """
+        for shape in self.turnouts:
+            ramp, surface = shape.turnout.ramp, shape.ramp_surface(station) if shape.reaches(station) else None
+            if ramp is not None and surface is not None:
+                tilt = surface.own * (self.carriageway.sign * (ramp.crossfall_percent or 0.0) / 100.0 - rise)
+                yield surface, tilt, surface.behind * (surface.lift + tilt * ramp_width(ramp))
 
     @property
     def _beyond_island(self) -> int:

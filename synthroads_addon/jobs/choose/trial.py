@@ -148,9 +148,7 @@ class Trial:
         more, and the shorter time counts, as other work on the machine may have disturbed one. Colours are the
         materials' means and the relief is the coarsest: what more than that costs is known apart.
         """
-        workers = self.plan.threads or available_cores()
-        few = workers * -(-_FEW // workers), _FEW_SHARE  # no worker waits for another at the end
-        many = 2 * few[0], 2.0 * _FEW_SHARE
+        few, many = (self._few, _FEW_SHARE), (2 * self._few, 2.0 * _FEW_SHARE)
         _, (less, before, _), (more, late, points), (_, after, _) = [
             self._time_stretches(rings, *stretches) for stretches in (few, few, many, few)
         ]
@@ -161,12 +159,16 @@ class Trial:
 
         Stretches with and without them take turns, and the shorter of two times counts, as in `time_scan`.
         """
-        seconds: dict[int, list[float]] = {2: [], octaves: []}
-        pulses = 1
-        for number in (2, octaves) * 2:
-            pulses, took, _ = self._time_stretches(rings, _FEW, _FEW_SHARE, number)
-            seconds[number].append(took)
-        return max(0.0, min(seconds[octaves]) - min(seconds[2])) * self.pulses / pulses
+        turns = (2, octaves, 2, octaves)
+        timed = [self._time_stretches(rings, self._few, _FEW_SHARE, number) for number in turns]
+        pulses, seconds = timed[0][0], [took for _, took, _ in timed]
+        return max(0.0, min(seconds[1::2]) - min(seconds[::2])) * self.pulses / pulses
+
+    @property
+    def _few(self) -> int:
+        """Return the number of the few stretches: no worker waits for another at the end."""
+        workers = self.plan.threads or available_cores()
+        return workers * -(-_FEW // workers)
 
     def _time_stretches(
         self, rings: tuple[int, ...], count: int, share: float, octaves: int = 2

@@ -53,16 +53,14 @@ class Gutter(LengthwiseThing):
 
     def bodies(self, course: Course) -> list[Body]:
         """Return the closed solids of channel and kerb in local coordinates; none off the road."""
-        end = self.end_on(course.length)
-        if end is None:
+        line = self.line(course)
+        if line is None:
             return []
-        station = course.rows(self.offset_at, self.start_station, end, ())
-        feet, left = course.feet(station, self.offset_at(station)), course.left(station)
         solids = []
         for outline, top in ((CHANNEL, RIM), (BLOCK, self.height)):
             across, share = np.array(outline if self.kerb_side == "left" else mirrored(outline)).T
             height = share * (top + BURIED) - BURIED
-            solids.append(Body(sweep(feet, left, across * self.width / 2.0, height), "concrete"))
+            solids.append(Body(sweep(*line, across * self.width / 2.0, height), "concrete"))
         return solids
 
     def footprint(self) -> Iterator[Block]:

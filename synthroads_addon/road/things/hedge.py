@@ -57,15 +57,13 @@ class Hedge(LengthwiseThing):
 
     def bodies(self, course: Course) -> list[Body]:
         """Return the closed outline that its leaves fill, in local coordinates; none off the road."""
-        end = self.end_on(course.length)
-        if end is None:
+        line = self.line(course)
+        if line is None:
             return []
-        station = course.rows(self.offset_at, self.start_station, end, ())
         flank = np.array(OUTLINE)
         across = np.append(flank[:, 0], -flank[::-1, 0]) * self.width / 2.0
         height = np.append(flank[:, 1], flank[::-1, 1]) * self.height
-        feet = course.feet(station, self.offset_at(station))
-        return [Body(sweep(feet, course.left(station), across, height), "leaves")]
+        return [Body(sweep(*line, across, height), "leaves")]
 
     def leaves_per_metre(self) -> int:
         """Return the number of leaves in each metre of its length."""

@@ -170,6 +170,14 @@ class LengthwiseThing(Thing, LineObject):
         end = min(self.end_station, length)
         return end if end - self.start_station >= _SHORTEST else None
 
+    def line(self, course: Course) -> tuple[Float, Float] | None:
+        """Return the points (N, 3) below its axis and the unit vectors (N, 3) to its left there; None off the road."""
+        end = self.end_on(course.length)
+        if end is None:
+            return None
+        station = course.rows(self.offset_at, self.start_station, end, ())
+        return course.feet(station, self.offset_at(station)), course.left(station)
+
     def ramp_length(self, end: float) -> float:
         """Return the length (m) over which either end is ramped down if it ends at a station (m); 0 if none is."""
         ramp = min(float(getattr(self, "terminal_length", 0.0)), (end - self.start_station) / 2.0)

@@ -51,15 +51,13 @@ class Wall(LengthwiseThing):
 
     def bodies(self, course: Course) -> list[Body]:
         """Return the closed solids of wall and coping in local coordinates; none off the road."""
-        end = self.end_on(course.length)
-        if end is None:
+        line = self.line(course)
+        if line is None:
             return []
-        station = course.rows(self.offset_at, self.start_station, end, ())
-        feet, left = course.feet(station, self.offset_at(station)), course.left(station)
         side, upper = np.array([1.0, 1.0, -1.0, -1.0]), np.array([False, True, True, False])
         body, top = self.height - COPING, self.thickness / 2.0
-        wall = sweep(feet, left, side * top, np.where(upper, body, -BURIED))
-        coping = sweep(feet, left, side * (top + OVERHANG), np.where(upper, self.height, body))
+        wall = sweep(*line, side * top, np.where(upper, body, -BURIED))
+        coping = sweep(*line, side * (top + OVERHANG), np.where(upper, self.height, body))
         return [Body(wall, MATERIALS[self.kind]), Body(coping, "noise_concrete")]
 
     def footprint(self) -> Iterator[Block]:
