@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+import bpy
+
 from . import operations as op
 from .builder import Operand, Tree, Value
 
@@ -23,6 +25,13 @@ def move_geometry(geometry: Value, by: Operand) -> Value:
 def paint_faces(geometry: Value, material: Value, selection: Value | bool = True) -> Value:
     """Add a node that sets the material of all or the selected faces; return the geometry."""
     return geometry.tree.node("GeometryNodeSetMaterial", geometry, selection, material=material).value
+
+
+def picked_material(tree: Tree, name: str) -> Value:
+    """Add a node that holds the file's material of a name."""
+    node = tree.node("GeometryNodeInputMaterial")
+    node.raw.material = bpy.data.materials[name]
+    return node.value
 
 
 def flip_faces(geometry: Value, selection: Value | bool = True) -> Value:

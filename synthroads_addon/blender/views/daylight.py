@@ -1,4 +1,4 @@
-"""Sun, sky, haze, landscape and cameras of a road, kept in the file: for the user's own pictures, never for a scan."""
+"""Sun, sky, haze, landscape, sward and cameras of a road, kept in the file: for the user's pictures, not for scans."""
 
 import math
 from collections.abc import Iterator
@@ -16,6 +16,7 @@ from .clouds import add_clouds
 from .exposure import level_irradiance, stops_for, sun_and_sky
 from .haze import haze_body, haze_light, light_below
 from .landscape import add_landscape, remove_landscape
+from .sward import Lawn, add_sward, remove_sward
 from .viewpoints import Viewpoint, aerial_view, driver_view
 
 VIEW = "synthroads_view"
@@ -32,8 +33,8 @@ _LOWEST_SKY = 0.02
 def add_views(scene: bpy.types.Scene, parameters: RoadParameters, matrix: Matrix) -> None:
     """Add a road's sun, sky with clouds, haze, landscape and cameras to a scene, replacing those of an earlier call.
 
-    Other lights and cameras stay. The driver's camera becomes the scene's if it has none, or one of ours. The scene's
-    exposure becomes that of the light.
+    Other lights and cameras stay. A dense sward grows around the driver's camera, which becomes the scene's if it has
+    none, or one of ours. The scene's exposure becomes that of the light.
 
     Args:
         scene: that shows the road.
@@ -52,6 +53,7 @@ def add_views(scene: bpy.types.Scene, parameters: RoadParameters, matrix: Matrix
         scene.view_settings.exposure = stops_for(level_irradiance(environment))
     add_clouds(scene.world, environment)
     add_landscape(scene, parameters, matrix)
+    add_sward(scene, parameters, Lawn.of(scene, matrix), driver_view(parameters).place, matrix)
     for name, view in _VIEWS.items():
         camera = _mark(name, _camera(_NAMES[name], view(parameters), matrix), scene)
         if name == current:
@@ -59,8 +61,9 @@ def add_views(scene: bpy.types.Scene, parameters: RoadParameters, matrix: Matrix
 
 
 def remove_views(scene: bpy.types.Scene) -> None:
-    """Remove the sun, haze, landscape and cameras of `add_views` from a scene, with their data; the world stays."""
+    """Remove what `add_views` added to a scene, with its data; the world stays."""
     remove_landscape(scene)
+    remove_sward(scene)
     items = list(views_of(scene).values())
     data = [item.data for item in items if item.data is not None]
     bpy.data.batch_remove(items)

@@ -23,12 +23,15 @@ from ...scanning.scene.mesh import SceneMesh
 from ...scenario.road import RoadScenario
 from ..files import empty_file
 from ..materials import material
+from ..materials.looks import COLOR
 from ..materials.shading import LAYERS
 from ..materials.surface_layers import PROPERTY
 from ..model.build import build_road
 from ..scene.evaluated import scene_mesh
+from ..things.meshes import attribute
 from . import pictures
 from .landscape import add_landscape
+from .sward import Lawn, add_sward
 from .viewpoints import Viewpoint, aerial_view, driver_view
 
 PRESET = PRESETS / "gallery.json"
@@ -37,7 +40,11 @@ _NEAR = 5.0
 """Distance from an object's middle within which its parts are shown close up, m."""
 _PITCH = 1.6
 """Distance of the materials' cubes from middle to middle, m."""
+_ON_CUBES = {COLOR: (0.03, 0.09, 0.3), "shade": 0.5}
+"""Attributes that some materials take from what they are on: a car's colour, and the brightness of a gantry's steel."""
 _DAYLIGHT = Environment(sun_azimuth_deg=215.0, sun_elevation_deg=42.0, cloud_cover=0.35, cloud_size=250.0)
+_HERE = Matrix.Identity(4)
+"""From the road's coordinates to the scene's."""
 _NOT_SHOWN = ("Alignment", "Carriageway", "Median", "Terrain", "LineMarking", "Landscape")
 
 
@@ -58,14 +65,14 @@ def make_gallery(folder: Path, quality: Quality, only: str, say: Callable[[str],
     preset = read_json(PRESET)
     made: list[Path] = []
     closed_up: set[str] = set()
-    for name, scene in preset["scenes"].items():
-        made += _scene_pictures(folder, name, scene, quality, only, say, closed_up)
+    for name, settings in preset["scenes"].items():
+        made += _scene_pictures(folder, name, settings, quality, only, say, closed_up)
     for design_class, section in preset["design_classes"].items():
         name = f"class-{design_class.lower()}"
         if only in name:
             road = {"design_class": design_class, "cross_section": section, "length": 800.0}
-            parameters = _build_scene({"road": road, "seed": 2})
-            _aim_camera(aerial_view(parameters))
+            scene = _build_scene({"road": road, "seed": 2})
+            scene.aim_camera(aerial_view(scene.parameters))
             made.append(_render(folder / f"{name}.png", quality, say))
     made += _material_pictures(folder, quality, only, say)
     return made
@@ -74,7 +81,7 @@ def make_gallery(folder: Path, quality: Quality, only: str, say: Callable[[str],
 def _scene_pictures(
     folder: Path,
     name: str,
-    scene: dict[str, Any],
+    settings: dict[str, Any],
     quality: Quality,
     only: str,
     say: Callable[[str], None],
@@ -83,32 +90,44 @@ def _scene_pictures(
     views = {"aerial": aerial_view, "driver": driver_view}
     if only and not only.startswith("object") and not any(only in f"scene-{name}-{view}" for view in views):
         return []
-    parameters = _build_scene(scene)
+    scene = _build_scene(settings)
     made = []
-    for view, seen_from in views.items():
-        if only in f"scene-{name}-{view}":
-            _aim_camera(seen_from(parameters))
-            made.append(_render(folder / f"scene-{name}-{view}.png", quality, say))
+    for seen, viewpoint in views.items():
+        if only in f"scene-{name}-{seen}":
+            scene.aim_camera(viewpoint(scene.parameters))
+            made.append(_render(folder / f"scene-{name}-{seen}.png", quality, say))
     mesh = scene_mesh()
-    for kind, item in _shown_objects(parameters):
+    for kind, item in _shown_objects(scene.parameters):
         picture = f"object-{kind}"
-        if kind not in closed_up and only in picture and _close_up(parameters, mesh, item):
+        if kind in closed_up or only not in picture:
+            continue
+        if (view := _close_view(scene.parameters, mesh, item)) is not None:
+            scene.aim_camera(view)
             closed_up.add(kind)
             made.append(_render(folder / f"{picture}.png", quality.half(), say))
     return made
 
 
-def _build_scene(scene: dict[str, Any]) -> RoadParameters:
+@dataclass(frozen=True)
+class _Scene:
+    """The scene in the open file: its road, and where grass grows."""
+
+    parameters: RoadParameters
+    lawn: Lawn
+
+    def aim_camera(self, view: Viewpoint) -> None:
+        """Put the camera, and the sward around it, into the scene in place of earlier ones."""
+        pictures.camera(view.place, view.target, view.lens)
+        add_sward(bpy.context.scene, self.parameters, self.lawn, view.place, _HERE)
+
+
+def _build_scene(settings: dict[str, Any]) -> _Scene:
     empty_file()
-    parameters = sample_road(RoadScenario.from_dict(scene["road"]), scene["seed"])
+    parameters = sample_road(RoadScenario.from_dict(settings["road"]), settings["seed"])
     build_road(parameters, _TOLERANCE)
     pictures.light(_DAYLIGHT)
-    add_landscape(bpy.context.scene, parameters, Matrix.Identity(4))
-    return parameters
-
-
-def _aim_camera(view: Viewpoint) -> None:
-    pictures.camera(view.place, view.target, view.lens)
+    add_landscape(bpy.context.scene, parameters, _HERE)
+    return _Scene(parameters, Lawn.of(bpy.context.scene, _HERE))
 
 
 def _shown_objects(parameters: RoadParameters) -> Iterator[tuple[str, str]]:
@@ -129,12 +148,12 @@ def _shown_objects(parameters: RoadParameters) -> Iterator[tuple[str, str]]:
         yield "-".join(filter(None, (name.lower(), species or variant))), key
 
 
-def _close_up(parameters: RoadParameters, mesh: SceneMesh, name: str) -> bool:
-    """Aim the camera at an object's faces from the road, at a distance by their size; return False if it has none."""
+def _close_view(parameters: RoadParameters, mesh: SceneMesh, name: str) -> Viewpoint | None:
+    """Return a view of an object's faces from the road, at a distance by their size; None if it has none."""
     geometry = RoadGeometry(parameters)
     corners = mesh.vertices[mesh.triangles[geometry.numbers.belong(name, mesh.instance_id)]].reshape(-1, 3)
     if not len(corners):
-        return False
+        return None
     station, offset = geometry.alignment.project(corners[:, :2].astype(np.float64))
     # Of what is long or scattered, a piece in its middle.
     anchor = np.argmin(np.abs(station - np.median(station)))
@@ -153,8 +172,7 @@ def _close_up(parameters: RoadParameters, mesh: SceneMesh, name: str) -> bool:
     towards_road = -side if abs(np.median(offset)) > 1.5 else 1.0
     eye = Vector(centre.tolist()) - along * (0.8 * traffic * away) + across * (0.6 * towards_road * away)
     eye.z += 0.25 * away
-    pictures.camera(eye, centre.tolist(), 40.0)
-    return True
+    return Viewpoint(np.array(eye), centre, 40.0)
 
 
 def _material_pictures(folder: Path, quality: Quality, only: str, say: Callable[[str], None]) -> list[Path]:
@@ -187,7 +205,10 @@ def _cube(name: str, column: int, row: int) -> None:
     """Add a cube of one material, with its name below, at a column and row of the wall to the scene."""
     place = Vector((_PITCH * column, 0.0, -_PITCH * row))
     bpy.ops.mesh.primitive_cube_add(size=1.0, location=place)
-    bpy.context.object.data.materials.append(material(name))
+    cube = bpy.context.object.data
+    cube.materials.append(material(name))
+    for key, value in _ON_CUBES.items():
+        attribute(cube, key, np.repeat([value], len(cube.vertices), axis=0))
     below = place + Vector((-0.5, -0.5, -0.72))
     bpy.ops.object.text_add(location=below, rotation=(math.pi / 2.0, 0.0, 0.0))
     bpy.context.object.data.body, bpy.context.object.data.size = name.replace("_", " "), 0.15

@@ -11,7 +11,7 @@ import numpy as np
 from ....road.landscape.trees import LandTrees
 from ...nodes import operations as op
 from ...nodes.builder import Tree, Value, node_group
-from ...nodes.solids import paint_faces
+from ...nodes.solids import paint_faces, picked_material
 from ...things.meshes import attribute, fill
 
 _BROADLEAVES, _CONIFERS = 4, 2
@@ -57,7 +57,7 @@ def _build(tree: Tree, materials: tuple[tuple[str, str], ...], bare: bool) -> No
             leaves = "spruce_leaves" if conifer else ("maple_leaves", "birch_leaves")[number % 2]
             leaves = "maple_bark" if bare and not conifer else leaves
             made = _crown(tree, "spruce_leaves" if conifer else "maple_leaves", number, bare and not conifer)
-            made = paint_faces(made, _picked(tree, names[leaves]))
+            made = paint_faces(made, picked_material(tree, names[leaves]))
             crowns.append(tree.node("GeometryNodeGeometryToInstance", op.join(made, _trunk(tree, names))).value)
     with tree.frame("On the points"):
         woods = tree.node(
@@ -72,16 +72,9 @@ def _build(tree: Tree, materials: tuple[tuple[str, str], ...], bare: bool) -> No
     tree.output("Instances", woods, description="Trees")
 
 
-def _picked(tree: Tree, name: str) -> Value:
-    """Add a node that holds a material."""
-    node = tree.node("GeometryNodeInputMaterial")
-    node.raw.material = bpy.data.materials[name]
-    return node.value
-
-
 def _trunk(tree: Tree, names: dict[str, str]) -> Value:
     trunk = tree.node("GeometryNodeMeshCone", vertices=5, radius_bottom=0.03, radius_top=0.015, depth=0.5).value
-    return paint_faces(trunk, _picked(tree, names["maple_bark"]))
+    return paint_faces(trunk, picked_material(tree, names["maple_bark"]))
 
 
 def _crown(tree: Tree, leaves: str, seed: int, bare: bool) -> Value:
