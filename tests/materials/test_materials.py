@@ -110,6 +110,19 @@ def test_water_drowns_beads_and_smooths_facets_but_leaves_sheeting() -> None:
     assert vary_material("sheeting_white", MEAN, WET) == materials()["sheeting_white"]
 
 
+def test_grass_is_the_less_green_the_drier_it_is_and_never_without_red() -> None:
+    for name in ("verge", "median", "grass_ground", "grass", "meadow", "ryegrass", "reed"):
+        colors = [
+            np.array(vary_material(name, MaterialVariation(grass_dryness=dryness), DRY).base_color)
+            for dryness in np.linspace(0.0, 1.0, 11)
+        ]
+        redness = [red / green for red, green, _ in colors]
+        assert np.all(np.diff(redness) > 0.0), name
+        assert 0.35 < redness[0] < 0.65, f"{name}: chlorophyll takes half of the red of lush grass, not all"
+        assert redness[-1] == pytest.approx(0.27 / 0.22)
+        assert max(np.abs(np.diff(colors, axis=0)).max(axis=1)) < 0.04, "no step where the table's mean is"
+
+
 def test_the_default_road_has_the_tables_means() -> None:
     for name, mean in materials().items():
         same = vary_material(name, MEAN, DRY)
