@@ -94,7 +94,7 @@ def test_no_tree_grows_in_a_building() -> None:
 def test_bare_plants_have_twigs_of_bark_where_leaves_were() -> None:
     stand = {"type": "Vegetation", "kind": "tree", "density": 0.005, "band_start": 1.0, "band_end": 20.0}
     stand |= {"height_min": 8.0, "height_max": 9.0, "seed": 3}
-    trees = {"maple": stand | {"species": "maple"}, "spruce": stand | {"species": "spruce"}, "hedge": HEDGE}
+    trees = {species: stand | {"species": species} for species in ("maple", "birch", "spruce")} | {"hedge": HEDGE}
     area: dict[tuple[str, str], float] = {}
     for season in ("summer", "winter"):
         parameters = RoadParameters.from_dict(
@@ -106,7 +106,9 @@ def test_bare_plants_have_twigs_of_bark_where_leaves_were() -> None:
             names = [mesh.materials[number] for number in np.unique(mesh.material)]
             leafy = name == "spruce" or season == "summer"
             assert any("leaves" in material for material in names) == leafy, (name, season)
+            if name == "birch":
+                assert ("hazel_bark" in names) == (not leafy), "a birch's twigs aren't white as its trunk"
             a, b, c = np.moveaxis(mesh.vertices[mesh.triangles].astype(np.float64), 1, 0)
             area[name, season] = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
     assert area["spruce", "winter"] == pytest.approx(area["spruce", "summer"])
-    assert all(0.04 < area[name, "winter"] / area[name, "summer"] < 0.4 for name in ("maple", "hedge"))
+    assert all(0.04 < area[name, "winter"] / area[name, "summer"] < 0.4 for name in ("maple", "birch", "hedge"))

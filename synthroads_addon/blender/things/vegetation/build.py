@@ -20,6 +20,8 @@ from .grass import grass_group
 from .shrub import shrub_group
 from .tree import tree_group
 
+_DARK_TWIGS = {"birch": "hazel_bark"}
+"""Material of the twigs of species whose bark is white on trunk and branches alone."""
 _SIDES = {"both": 0, "left": 1, "right": -1}
 _GROUPS = {"grass": grass_group, "shrub": shrub_group, "tree": tree_group}
 
@@ -77,4 +79,4 @@ def _further_inputs(plants: Vegetation, builder: ModelBuilder) -> dict[str, Any]
         return {"bark_material": bark, "leaves_material": leaves, **side}
     shape = species_shapes()[plants.kind][plants.species]
     twigs = {name: shape[name] * factor for name, factor in BARE_TWIGS.items()}
-    return {"bark_material": bark, "leaves_material": bark, **twigs, **side}
+    return {"bark_material": bark, "leaves_material": _DARK_TWIGS.get(plants.species, bark), **twigs, **side}
