@@ -35,6 +35,7 @@ from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.scanning.colour.colour import LayerSource, surface_constants
 from synthroads_addon.scanning.colour.request import LayerRequest, material_layers
+from synthroads_addon.scanning.relief.normal_images import NormalImage
 from synthroads_addon.scanning.scene.caster import Caster
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.motion import ScannedScene
@@ -75,6 +76,10 @@ class KeptServices:
     def reflectance_varies(self, names: Sequence[str]) -> bool:
         """Return that no layer varies: the means are all there is."""
         return False
+
+    def normal_images(self, names: Sequence[str]) -> dict[int, NormalImage]:
+        """Return that no material has a normal image."""
+        return {}
 
     def layers(self, request: LayerRequest, progress: Callable[[float], None]) -> AbstractContextManager[LayerSource]:
         """Return the context of the means as the points' layers."""

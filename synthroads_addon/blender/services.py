@@ -11,10 +11,11 @@ from ..materials.table import Material
 from ..scanning.colour.colour import LayerSource, takes_nodes
 from ..scanning.colour.request import LayerRequest, material_layers
 from ..scanning.finish import OF_INTENSITY
+from ..scanning.relief.normal_images import NormalImage
 from ..scanning.scene.caster import Caster
 from ..scanning.scene.mesh import SceneMesh
 from .cameras import HAS_RETURN_CAMERA, MaterialSnapshot, layer_source, snapshot_layers, varying_materials
-from .cameras.surfaces import scene_constants
+from .cameras.surfaces import normal_images, scene_constants
 from .casters import make_caster
 from .materials import constants
 
@@ -34,6 +35,10 @@ class BlenderServices:
         """Return whether a layer that the intensity depends on varies over some of these materials."""
         return bool(scene_constants(names).varying_layers(OF_INTENSITY))
 
+    def normal_images(self, names: Sequence[str]) -> dict[int, NormalImage]:
+        """Return the normal images of the open file's materials of these names, by their index."""
+        return normal_images(names)
+
     def layers(self, request: LayerRequest, progress: Callable[[float], None]) -> AbstractContextManager[LayerSource]:
         """Return the context of a source of the points' colours and layers, rendering as the request asks."""
         return layer_source(request, progress=progress)
@@ -50,6 +55,7 @@ class SnapshotServices:
 
     def __init__(self, names: Sequence[str], calls: MainThreadCalls | None = None, folder: Path | None = None) -> None:
         self._means, self._constants = list(constants(names).values()), scene_constants(names)
+        self._normal_images = normal_images(names)
         self._calls, self._snapshot = calls, None
         if calls is not None and folder is not None:
             self._snapshot = MaterialSnapshot(names, varying_materials(self._constants), folder)
@@ -70,6 +76,10 @@ class SnapshotServices:
     def reflectance_varies(self, names: Sequence[str]) -> bool:
         """Return whether some of the materials reflect otherwise at other places."""
         return bool(self._constants.varying_layers(OF_INTENSITY))
+
+    def normal_images(self, names: Sequence[str]) -> dict[int, NormalImage]:
+        """Return the normal images of all materials of the snapshot, by their index; `names` is ignored."""
+        return self._normal_images
 
     @contextmanager
     def layers(self, request: LayerRequest, progress: Callable[[float], None]) -> Iterator[LayerSource]:

@@ -16,7 +16,7 @@ from .table import Material, materials
 
 DRY_GRASS = (0.27, 0.22, 0.11)
 GREEN_GRASS = (0.58, 0.92, 0.7)
-"""What lush grass reflects of red, green and blue, of the table's mean: chlorophyll takes most of the red, so that a
+"""Shares of the table's red, green and blue that lush grass reflects: chlorophyll takes most of the red, so that a
 meadow's is half of its green. Assumed, after spectra of green grass (4 % in the red, 9 % in the green)."""
 WET_BASE, WET_SPECULAR, WET_ROUGHNESS = 0.45, 0.5, 0.6
 """Share that water takes of a porous surface's base colour, of what it reflects at 905 nm, and of its roughness."""

@@ -16,7 +16,7 @@ from .receiving.detector import Readout
 from .receiving.radiometry import DARKEST_DB, decibels
 from .receiving.response import range_corrected
 from .relief.micro_relief import BeamEnds, MicroRelief, ReliefField, shift_by_relief
-from .relief.normals import turn_normals
+from .relief.normals import tilt_normals, turn_normals
 from .returns import number_returns
 from .scan import BlockResult
 
@@ -46,6 +46,8 @@ class Finish:
         points = result.points
         if result.seen is not None and plan.relief is not None:
             points = self._with_relief(points, result.seen, plan.relief)
+        if result.seen is not None and plan.normal_images is not None:
+            points = tilt_normals(points, *self._tilts(points, result.seen), result.seen.towards_scanner)
         changes: dict[str, AnyArray | None] = dict.fromkeys(points.attributes().keys() & OPTIONAL - plan.kept_layers)
         if plan.range_corrected:
             changes["intensity"] = range_corrected(points.intensity, points.range, plan.setting)
@@ -69,6 +71,14 @@ class Finish:
 
         return turn_normals(shifted, field.rough, ends.towards, heights)
 
+    def _tilts(self, points: PointBlock, seen: SeenPoints) -> tuple[Index, Float]:
+        """Return the points that normal images tilt, and by what; see `NormalImages.tilts`."""
+        plan = self.plan
+        assert plan.normal_images is not None
+        place, footprint = seen.position + plan.target.origin, points.range * plan.setting.beam_angle
+        local, normal = seen.position + plan.frame_origin, np.asarray(seen.normal, np.float64)
+        return plan.normal_images.tilts(seen.material, points.instance_id, place, local, normal, footprint)
+
     def _with_layers(self, result: BlockResult, seen: SeenPoints) -> BlockResult:
         """Return a block with its points' colours and layers, and with the intensities that follow from these."""
         plan = self.plan
@@ -80,6 +90,9 @@ class Finish:
         if plan.detects_after_layers:
             assert plan.material_means is not None
             factors = layer_brightness(plan.material_means, seen, values)
+            if plan.normal_images is not None:
+                rows, tilts = self._tilts(result.points, seen)
+                factors[rows] *= tilted_brightness(seen.normal[rows], tilts, seen.towards_scanner[rows])
             changes["intensity"] = result.points.intensity * factors
             if (power := result.points.array("power_db")) is not None:
                 changes["power_db"] = np.maximum(power + decibels(factors), DARKEST_DB)
@@ -106,6 +119,20 @@ def layer_brightness(means: Surfaces, seen: SeenPoints, values: LayerValues) -> 
     factor = np.asarray(by_layers / np.maximum(usual, _DARKEST))
     factor[seen.material == NO_MATERIAL] = 1.0
     return factor
+
+
+def tilted_brightness(normal: AnyArray, tilts: Float, towards: AnyArray) -> Float:
+    """Return factors (K,) by which points are brighter for the tilt of their normals, as a matt surface is (Lambert).
+
+    Args:
+        normal: (K, 3) unit normals of the faces.
+        tilts: (K, 3) along the faces.
+        towards: (K, 3) unit vectors to the scanner.
+    """
+    turned = normal + tilts
+    turned /= np.linalg.norm(turned, axis=1)[:, None]
+    before, after = (np.einsum("ij,ij->i", one, towards) for one in (normal, turned))
+    return np.asarray(np.maximum(after, 0.0) / np.maximum(before, _DARKEST))
 
 
 def read_echoes(result: BlockResult, plan: ScanPlan) -> BlockResult:

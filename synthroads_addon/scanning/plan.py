@@ -28,6 +28,7 @@ from .noise import Noise
 from .platforms.path import Path, Strip
 from .receiving.response import laser_gains
 from .relief.micro_relief import MicroRelief
+from .relief.normal_images import NormalImage, NormalImages
 from .relief.pavement import PavementRelief
 from .scene.bare_ground import BareGround
 from .scene.caster import Caster
@@ -53,6 +54,10 @@ class SceneServices(Protocol):
 
     def reflectance_varies(self, names: Sequence[str]) -> bool:
         """Return whether any of these materials has a reflectance that varies from place to place."""
+        ...
+
+    def normal_images(self, names: Sequence[str]) -> dict[int, NormalImage]:
+        """Return the normal images of these materials, by their index in the names."""
         ...
 
     def layers(self, request: LayerRequest, progress: Callable[[float], None]) -> AbstractContextManager[LayerSource]:
@@ -122,6 +127,7 @@ class ScanPlan:
         relief_strength: factor on it.
         relief_octaves: of it.
         relief_normals: whether normals and incidence angles follow it, and the pavement's heights.
+        normal_images: that tilt normals, incidence angles and, with layers, intensities; None where nothing does.
         pavement: heights of the pavement, which points have as well where there is a micro-relief; None without.
         threads: blocks that are worked on at once; 0 for every core.
         request: colours and layers that are asked of the scene.
@@ -159,6 +165,7 @@ class ScanPlan:
     relief_strength: float = 0.0
     relief_octaves: int = 4
     relief_normals: bool = False
+    normal_images: NormalImages | None = None
     pavement: PavementRelief | None = None
     threads: int = 0
     request: LayerRequest | None = None

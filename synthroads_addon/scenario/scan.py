@@ -42,7 +42,8 @@ class ScanScenario(DeviceChoice):
         inherits="fidelity.relief_octaves",
     )
     relief_normals: bool = Field(
-        False, description="Have normals and incidence angles of the points follow micro-relief and pavement."
+        False,
+        description="Have normals and incidence angles of the points follow micro-relief, pavement and normal images.",
     )
     reflection: Literal["lambert", "oren_nayar"] = Field(
         "lambert",

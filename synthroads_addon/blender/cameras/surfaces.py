@@ -9,8 +9,11 @@ import bpy
 import numpy as np
 
 from ...scanning.colour.colour import MATERIAL_LAYERS, SurfaceConstants, surface_constants
+from ...scanning.relief.normal_images import NormalImage
 from ..materials import constants, scene_name
+from ..materials.image import linear_pixels
 from ..materials.surface_layers import LayerNodes, layer_expressions, varies
+from ..materials.textures import NORMAL_IMAGE, is_normal_image
 
 NUMBER = "sr_material"
 """Output that shows the material's number, for renderers that have no pass for it."""
@@ -23,6 +26,19 @@ def scene_constants(names: Sequence[str]) -> SurfaceConstants:
         for layer, expression in layer_expressions(item).items():
             varying[layer][index] |= varies(expression)
     return surface_constants([constants(names)[name] for name in names], varying)
+
+
+def normal_images(names: Sequence[str]) -> dict[int, NormalImage]:
+    """Return the normal images of a road's textures on the named materials, by the material's index."""
+    found = {}
+    for index, item in numbered_materials(names):
+        if NORMAL_IMAGE in item:
+            tile, along = item[NORMAL_IMAGE]
+            nodes = item.node_tree.nodes if item.node_tree else ()
+            images = [node.image for node in nodes if node.type == "TEX_IMAGE" and is_normal_image(node.image)]
+            if images:
+                found[index] = NormalImage.of(linear_pixels(images[0]), tile, bool(along))
+    return found
 
 
 @contextmanager

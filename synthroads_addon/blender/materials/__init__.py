@@ -22,7 +22,7 @@ from .looks import is_worn, vary_color
 from .shading import shade
 from .surface_layers import PROPERTY, layer_expressions, mean_value
 from .texture_nodes import texture_values
-from .textures import Texture, load_texture, remove_unused_images
+from .textures import NORMAL_IMAGE, Texture, load_texture, remove_unused_images
 
 MEAN = "synthroads_mean"
 """Custom property of a Blender material: its mean properties, as JSON."""
@@ -92,6 +92,8 @@ class RoadMaterials:
         images = None
         if texture is not None:
             images = partial(texture_values, texture=texture, factors=texture.factors(self._table(name), mean))
+            if "normal" in texture.images:
+                made[NORMAL_IMAGE] = [texture.tile, float(texture.along)]
         shade(made, mean, partial(vary_color, name, self._wear), images)
         self._made.add(made.session_uid)
         return made

@@ -19,6 +19,8 @@ from .image import mean_pixel
 
 SOURCE, STAMP, MEAN_PIXEL = "synthroads_texture", "synthroads_stamp", "synthroads_mean"
 """Custom properties of an image: its file, when that was last changed and its size, its mean linear colour."""
+NORMAL_IMAGE = "synthroads_normal_image"
+"""Custom property of a material whose textures have a normal image: its tile (m), and 1 where it lies along roads."""
 _NUMBERS = ("roughness", "metallic", "specular")
 _LARGEST = 1024
 """Side beyond which an image's mean is taken of a smaller copy, px."""
@@ -74,6 +76,11 @@ def load_texture(texture: MaterialTexture, along: bool) -> Texture:
         files = sorted(texture_files(texture.folder).items())
         images = {layer: _image(path.absolute(), f"SR {texture.material} {layer}", layer) for layer, path in files}
     return Texture(images, texture.tile, along)
+
+
+def is_normal_image(image: bpy.types.Image | None) -> bool:
+    """Return whether an image is the normals of a road's textures."""
+    return image is not None and SOURCE in image and Path(image[SOURCE]).stem.lower() == "normal"
 
 
 def remove_unused_images() -> None:

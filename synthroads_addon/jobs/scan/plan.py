@@ -30,6 +30,7 @@ from ...scanning.plan import ScanConditions, ScanPlan, SceneServices
 from ...scanning.platforms.guides import RoadGuide
 from ...scanning.platforms.path import Path as ScanPath
 from ...scanning.relief.micro_relief import micro_relief
+from ...scanning.relief.normal_images import NormalImages
 from ...scanning.scene.bare_ground import MOST_CELLS, BareGround
 from ...scanning.scene.classify import classify_scene
 from ...scanning.scene.mesh import SceneMesh
@@ -94,6 +95,7 @@ def plan_scan(
     kept, coloured, rings = scenario.kept_layers, scenario.coloured_layers, scenario.beam_rings
     scan, settings, table = scenario.scan, scenario.settings(), scenario.own_materials()
     materials, shifts = scene.static.materials, scan.relief > 0.0
+    tilting = services.normal_images(materials) if scan.relief_normals else {}
     colour = scenario.colour.settings(scenario.fidelity, path.typical_range)
     setting, loss = scanner_setting(scan), scan.attenuation
     weather = scan.weather or weather_of(conditions.environment)
@@ -135,8 +137,8 @@ def plan_scan(
         air_class=scenario.cloud.scheme().source_ids().get(AIR_CLASS, UNLABELLED),
         ground=ground,
         beam=scan.beam,
-        measured_layers=(kept & optional_arrays("scan")) | ({"normal", "material"} if shifts else set()),
-        records_seen_points=bool(coloured) or by_layers or shifts,
+        measured_layers=(kept & optional_arrays("scan")) | ({"normal", "material"} if shifts or tilting else set()),
+        records_seen_points=bool(coloured) or by_layers or shifts or bool(tilting),
         detects_after_layers=by_layers,
         on_vehicle=scan.platform.driven,
         colour_layers=coloured,
@@ -147,6 +149,7 @@ def plan_scan(
         relief_strength=scan.relief,
         relief_octaves=settings.relief_octaves,
         relief_normals=scan.relief_normals,
+        normal_images=NormalImages(tilting, conditions.pavement) if tilting else None,
         pavement=conditions.pavement if shifts else None,
         threads=scan.threads,
         request=LayerRequest(

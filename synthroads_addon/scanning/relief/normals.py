@@ -1,4 +1,4 @@
-"""Normals of a rough surface: those of the smooth one, turned by the slope of what is raised above it."""
+"""Normals of a rough surface: the smooth one's, turned by slopes of what is raised above it, or as images say."""
 
 from __future__ import annotations
 
@@ -34,10 +34,28 @@ def turn_normals(points: PointBlock, rows: Index, towards: AnyArray, heights: He
     for along in _tangents(normal):
         slope = (heights(rows, STEP * along) - heights(rows, -STEP * along)) / (2.0 * STEP)
         turned -= slope[:, None] * along
-    turned /= np.linalg.norm(turned, axis=1)[:, None]
+    return _with_normals(points, rows, turned, towards)
+
+
+def tilt_normals(points: PointBlock, rows: Index, tilts: Float, towards: AnyArray) -> PointBlock:
+    """Return the points with normals n + tilt, of length 1, in place of n, and their incidence angles; see above.
+
+    Args:
+        points: with `normal`.
+        rows: (K,) those that tilt.
+        tilts: (K, 3) along the surface.
+        towards: (N, 3) unit vectors to the scanner.
+    """
+    assert points.normal is not None
+    return _with_normals(points, rows, points.normal[rows].astype(np.float64) + tilts, towards)
+
+
+def _with_normals(points: PointBlock, rows: Index, turned: Float, towards: AnyArray) -> PointBlock:
+    """Return the points of which some rows (K,) have other normals (K, 3), of any length, seen by the scanner."""
+    assert points.normal is not None
+    turned = turned / np.linalg.norm(turned, axis=1)[:, None]
     cosine = np.einsum("ij,ij->i", turned, towards[rows])
-    away = np.minimum(cosine, 0.0)[:, None] * towards[rows]
-    turned -= away
+    turned -= np.minimum(cosine, 0.0)[:, None] * towards[rows]
     turned /= np.linalg.norm(turned, axis=1)[:, None]
     normals, incidence = points.normal.copy(), points.incidence_deg.copy()
     normals[rows] = turned

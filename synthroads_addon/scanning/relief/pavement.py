@@ -7,7 +7,7 @@ from typing import NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.arrays import Float
+from ...base.arrays import Float, Index
 from ...road.geometry import RoadGeometry
 from ...road.objects import Side
 from ...road.pavement.cover import MarkingFilms
@@ -75,16 +75,31 @@ class PavementRelief:
             place: (N, 3) where they are, map coordinates, m.
         """
         result = np.zeros(len(instance))
-        if not len(self._first):
-            return result
-        block = np.searchsorted(self._first, instance, "right") - 1
-        known = np.flatnonzero((block >= 0) & (instance < self._end[block]))
+        block, known = self._blocks_of(instance)
         for number, kind in enumerate(_KINDS):
             rows = known[self._kind[block[known]] == number]
             if len(rows):
                 local = place[rows, :2] - self._origin
                 result[rows] = self._height[block[rows]] + self._kind_heights(kind, local)
         return result
+
+    def on_pavement(self, instance: NDArray[np.integer]) -> Index:
+        """Return the rows (K,) of instance numbers (N,) of pavements and of what is painted there."""
+        return self._blocks_of(instance)[1]
+
+    def along_road(self, place: Float) -> tuple[Float, Float, Float]:
+        """Return station (N,), offset (N,), m, and unit vector forwards (N, 3), level, at map places (N, 3), m."""
+        alignment = self._surface.geometry.alignment
+        station, offset = alignment.project(place[:, :2] - self._origin)
+        heading = alignment.heading(station)
+        return station, offset, np.column_stack([np.cos(heading), np.sin(heading), np.zeros(len(station))])
+
+    def _blocks_of(self, instance: NDArray[np.integer]) -> tuple[Index, Index]:
+        """Return the blocks (N,) that instance numbers may be in, and the rows (K,) of those that are in one."""
+        if not len(self._first):
+            return np.zeros(len(instance), np.intp), np.zeros(0, np.intp)
+        block = np.searchsorted(self._first, instance, "right") - 1
+        return block, np.flatnonzero((block >= 0) & (instance < self._end[block]))
 
     def _kind_heights(self, kind: _Kind, place: Float) -> Float:
         """Return the heights (K,) of the pavement at places (K, 2) in the road's local frame, as a kind has it."""

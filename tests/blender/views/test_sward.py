@@ -87,9 +87,7 @@ def test_tufts_stand_on_the_lawn_and_are_dense_near_the_camera(meadow: Meadow) -
         assert off_plane[inside].min() < 1e-4
     distance = np.linalg.norm(places - meadow.place, axis=1)
     area = [_lawn_area(meadow, *ring) for ring in RINGS]
-    near, farther = (
-        np.count_nonzero(_within(distance, *ring)) / size for ring, size in zip(RINGS, area, strict=True)
-    )
+    near, farther = (np.count_nonzero(_within(distance, *ring)) / size for ring, size in zip(RINGS, area, strict=True))
     assert 5.0 < near < 15.0
     assert 1.0 < farther < 0.5 * near
     assert distance.max() < 120.0

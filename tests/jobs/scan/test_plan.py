@@ -20,6 +20,7 @@ from synthroads_addon.scanning.colour.colour import LayerSource, MaterialLayers,
 from synthroads_addon.scanning.colour.request import LayerRequest
 from synthroads_addon.scanning.plan import ScanConditions, ScanPlan
 from synthroads_addon.scanning.record import CollectedBlocks, record
+from synthroads_addon.scanning.relief.normal_images import NormalImage
 from synthroads_addon.scanning.scene.caster import Caster
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.motion import ScannedScene
@@ -46,6 +47,9 @@ class StandIns:
 
     def reflectance_varies(self, names: Sequence[str]) -> bool:
         return False
+
+    def normal_images(self, names: Sequence[str]) -> dict[int, NormalImage]:
+        return {}
 
     def materials(self, names: Sequence[str]) -> list[Material]:
         return [materials()[name] for name in names]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.arrays import Float
+from synthroads_addon.base.classes import class_id
 from synthroads_addon.base.random_streams import stream
 from synthroads_addon.cloud.points import PointBlock, concatenate
 from synthroads_addon.jobs.open_scene import RoadScene
@@ -28,6 +29,7 @@ from tests.helpers.scenes.texture_folder import (
     BRIGHT,
     DARK,
     ROUGH,
+    SIZE,
     SMOOTH,
     checkerboard,
     fields_at,
@@ -52,10 +54,15 @@ def textured_road(folder: Path) -> RoadParameters:
     return RoadParameters.from_dict(data)
 
 
-def scan(parameters: RoadParameters) -> PointBlock:
-    """Return the points of a scan without noise, coloured by the base colour."""
+def scan(parameters: RoadParameters, *, normals: bool = False) -> PointBlock:
+    """Return the points of a scan without noise, coloured by the base colour; normals may follow images."""
     cloud = {"attributes": ["damage", "noise_free", "normal", "roughness", "specular"]}
-    changes = {"relief": 0.0, "noise": {"range_sigma": 0.0}, "platform": SCAN["scan"]["platform"] | {"speed": 4.0}}
+    changes = {
+        "relief_normals": normals,
+        "relief": 0.0,
+        "noise": {"range_sigma": 0.0},
+        "platform": SCAN["scan"]["platform"] | {"speed": 4.0},
+    }
     colour = {"source": "nodes", "mode": "unlit"}
     settings = {"geometric_tolerance": 0.001, "scan": SCAN["scan"] | changes, "cloud": cloud, "colour": colour}
     scene = RoadScene(Scenario.from_dict(SCAN | settings), RoadGeometry(parameters))
@@ -105,3 +112,44 @@ def test_points_have_the_images_values_at_their_station_and_offset(tmp_path: Pat
     rows = np.flatnonzero(paved & certain & (damage == "none"))
     by_field = [float(np.median(points.array("intensity")[rows[dark[rows] == kind]])) for kind in (True, False)]
     assert by_field[0] < 0.75 * by_field[1]
+
+
+@pytest.mark.any_blender
+def test_normals_and_intensities_follow_normal_images_on_request(tmp_path: Path) -> None:
+    lean = np.array([0.25, -0.4])
+    code = np.append(lean, 1.0) / np.linalg.norm(np.append(lean, 1.0)) / 2.0 + 0.5
+    image = np.tile(np.uint8([128, 128, 255]), (SIZE, SIZE, 1))
+    image[: SIZE // 2, : SIZE // 2] = np.round(code * 255.0)
+    write_set(tmp_path / "asphalt", TILE, normal=image)
+    data = deepcopy(base_road({}))
+    data["materials"] = {"textures": [choices[0].to_dict() for choices in texture_sets(str(tmp_path)).values()]}
+    parameters = RoadParameters.from_dict(data)
+    geometry = RoadGeometry(parameters)
+    smooth, turned = scan(parameters), scan(parameters, normals=True)
+    assert np.array_equal(smooth.xyz, turned.xyz)
+    place = smooth.array("true_xyz")[:, :2] - parameters.transform.translate[:2]
+    station, offset = geometry.alignment.project(place)
+    dark, first, _ = fields_at(station, offset, TILE)
+    halves_at = np.column_stack([station, offset]) / (TILE / 2.0)
+    # A beam's footprint takes the mean of pixels.
+    certain = np.abs(halves_at - np.round(halves_at)).min(axis=1) * TILE / 2.0 > 0.4
+    right = parameters.carriageway("right")
+    assert right is not None
+    rows = (smooth.instance_id == right.instance) & (smooth.class_id == class_id("road")) & certain
+    leaning = (dark & first)[rows]  # the lower left quarter of the image
+    assert min(leaning.sum(), (~leaning).sum()) > 500
+    heading = geometry.alignment.heading(station[rows])
+    forwards = np.column_stack([np.cos(heading), np.sin(heading), np.zeros(rows.sum())])
+    before, after = (block.array("normal")[rows].astype(np.float64) for block in (smooth, turned))
+    left = np.cross(before, forwards)
+    expected = before + leaning[:, None] * (lean[0] * forwards + lean[1] * left)
+    expected /= np.linalg.norm(expected, axis=1)[:, None]
+    # A byte of the image is 0.4 % of a slope.
+    assert np.quantile(np.abs(after - expected).max(axis=1), 0.99) < 0.012
+    others = ~np.isin(smooth.class_id, [1, 2])
+    assert np.array_equal(smooth.array("normal")[others], turned.array("normal")[others])
+    assert np.array_equal(smooth.intensity[others], turned.intensity[others])
+    cosine = [np.cos(np.radians(block.incidence_deg[rows].astype(np.float64))) for block in (smooth, turned)]
+    assert np.abs(cosine[1] / cosine[0] - 1.0).max() > 0.1
+    brighter = turned.intensity[rows] / smooth.intensity[rows]
+    assert np.quantile(np.abs(brighter / (cosine[1] / cosine[0]) - 1.0), 0.95) < 0.02
