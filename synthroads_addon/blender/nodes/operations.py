@@ -8,6 +8,7 @@ SMALLEST_AREA = 1e-7
 """Faces smaller than this (m2) come from strips of no width or cut offset curves; damage has larger cells."""
 
 _DATA_TYPES = {"VALUE": "FLOAT", "INT": "INT", "BOOLEAN": "BOOLEAN", "VECTOR": "FLOAT_VECTOR"}
+_CAPTURE_TYPES = {"VALUE": "FLOAT", "INT": "INT", "BOOLEAN": "BOOLEAN", "VECTOR": "VECTOR"}
 _SWITCH_TYPES = {"VALUE": "FLOAT", "INT": "INT", "BOOLEAN": "BOOLEAN", "VECTOR": "VECTOR"}
 
 
@@ -181,6 +182,15 @@ def store(geometry: Value, name: str, value: Operand, domain: str = "POINT") -> 
     return geometry.tree.node(
         "GeometryNodeStoreNamedAttribute", geometry, data_type=kind, domain=domain, name=name, value=value
     ).value
+
+
+def capture(geometry: Value, **values: Value) -> tuple[Value, dict[str, Value]]:
+    """Add a node that evaluates several fields on the points together; return the geometry, and the values by name."""
+    node = geometry.tree.node("GeometryNodeCaptureAttribute", geometry)
+    for name, value in values.items():
+        node.raw.capture_items.new(_CAPTURE_TYPES[value.kind], name)
+        geometry.tree.feed(next(socket for socket in node.raw.inputs if socket.name == name), value)
+    return node["Geometry"], {name: node[name] for name in values}
 
 
 def delete_faces(geometry: Value, selection: Value) -> Value:

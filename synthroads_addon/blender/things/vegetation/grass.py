@@ -45,17 +45,20 @@ def grass_group(tree: Tree) -> None:
         shape = _Tuft(tree)
 
     with tree.frame("Places on the terrain"):
-        points = points_in_band(tree, stand, stand.density * stand.detail)
-        ground = op.object_geometry(stand.terrain)
-        distance = op.sample_surface(ground, op.named_attribute(tree, "distance"), op.position(tree))
-        share = op.switch(distance < roadside.mown_width, 1.0, roadside.roadside_height)
+        distance = op.named_attribute(tree, "distance")
+        points = points_in_band(tree, stand, stand.density * stand.detail, found=distance)
+        near = op.named_attribute(tree, "found") < roadside.mown_width
+        share = op.switch(near, 1.0, roadside.roadside_height)
         points = op.store(op.store(points, "share", share), "strip", _on_right(tree))
     with tree.frame("Places on verges and median"):
         beside = op.named_attribute(tree, "class_id", "INT").equals(class_id("roadside"))
         faces = op.separate(op.object_geometry(stand.road), beside, "FACE")
         density = roadside.roadside_density * stand.detail
-        mown = points_on(tree, stand, faces, density, roadside.roadside_reach, stand.seed + 7)
-        mown = op.store(mown, "strip", op.switch(_in_median(tree, faces, roadside), 2 + _on_right(tree), 4))
+        instance = op.named_attribute(tree, "instance_id", "INT")
+        mown = points_on(tree, stand, faces, density, roadside.roadside_reach, stand.seed + 7, found=instance)
+        on = op.named_attribute(tree, "found", "INT")
+        in_median = (on - roadside.median_instance).equals(0) & ~roadside.median_instance.equals(0)
+        mown = op.store(mown, "strip", op.switch(in_median, 2 + _on_right(tree), 4))
         points = op.join(points, op.store(mown, "share", roadside.roadside_height))
     with tree.frame("Kinds of tufts"):
         variants = [tree.call(tuft_group(), **shape.values, seed=100 * n).value for n in range(_VARIANTS)]
@@ -74,18 +77,6 @@ def grass_group(tree: Tree) -> None:
 def _on_right(tree: Tree) -> Value:
     """Add nodes for 1 at points on the right of the axis, 0 at those on its left; a field."""
     return op.switch(op.named_attribute(tree, "offset") < 0.0, 0, 1)
-
-
-def _in_median(tree: Tree, faces: Value, roadside: _Roadside) -> Value:
-    """Add nodes for whether points on verges and median lie on the median, by the faces' instance; a field."""
-    at = tree.node(
-        "GeometryNodeSampleNearestSurface",
-        data_type="INT",
-        mesh=faces,
-        value=op.named_attribute(tree, "instance_id", "INT"),
-        sample_position=op.position(tree),
-    ).value
-    return (at - roadside.median_instance).equals(0) & ~roadside.median_instance.equals(0)
 
 
 @makes_group("SR Grass Tuft")

@@ -19,7 +19,7 @@ _ABOVE = 1000.0
 
 _ASIDE = 1.0
 """Distance (m) that the road's edge may have moved by hand before decided places beyond the band are left out."""
-_NEEDED_NO_MORE = ("distance", "station", "offset", "edge", "share", "id", "strip")
+_NEEDED_NO_MORE = ("distance", "station", "offset", "edge", "share", "id", "strip", "found")
 """Attributes of the places that the plants' many points would only carry along."""
 
 
@@ -60,11 +60,13 @@ def decided_places(tree: Tree) -> Value:
     return tree.input("Places", "Geometry", description=about)
 
 
-def points_in_band(tree: Tree, stand: Stand, density: Operand, places: Value | None = None) -> Value:
-    """Add nodes for random points on the terrain within the stand's band; `places` may decide which grow."""
+def points_in_band(
+    tree: Tree, stand: Stand, density: Operand, places: Value | None = None, found: Value | None = None
+) -> Value:
+    """Add nodes for random points on the terrain within the stand's band, see `points_on`."""
     surface = op.object_geometry(stand.terrain)
     band = stand.band_start, stand.band_end
-    return points_on(tree, stand, surface, density, stand.reach, stand.seed, band, places)
+    return points_on(tree, stand, surface, density, stand.reach, stand.seed, band, places, found)
 
 
 def points_on(
@@ -76,16 +78,18 @@ def points_on(
     seed: Value,
     band: tuple[Value, Value] | None = None,
     places: Value | None = None,
+    found: Value | None = None,
 ) -> Value:
     """Add nodes for random points on a surface at a uniform density per area, identified by metre of road.
 
     Args:
-        surface: its points carry their ``distance``.
+        surface: its points carry their ``distance``, if there is a band.
         density: points per area, 1/m2.
         reach: how far from the axis they are looked for, m.
         seed: of their places.
         band: limits of the distance, m; none if None.
         places: those that are decided, see `decided_places`; none if None.
+        found: field of the surface that the points carry as ``found``; none if None.
     """
     axis = op.object_geometry(stand.backbone)
     ribbon = station_ribbon(axis)
@@ -105,10 +109,12 @@ def points_on(
     points = op.delete_points(points, (station < first_station(axis)) | (station > last_station(axis)))
     above = look_up(ribbon, "axis", station) + look_up(ribbon, "left", station) * offset + (0.0, 0.0, _ABOVE)
     points = op.set_position(points, above)
+    looked_for = op.named_attribute(tree, "distance") if found is None else found
     ray = tree.node(
         "GeometryNodeRaycast",
+        data_type="INT" if looked_for.kind == "INT" else "FLOAT",
         target_geometry=surface,
-        attribute=op.named_attribute(tree, "distance"),
+        attribute=looked_for,
         source_position=op.position(tree),
         ray_length=2.0 * _ABOVE,
     )
@@ -125,7 +131,10 @@ def points_on(
             aside = (ray["Attribute"] < band[0] - _ASIDE) | (ray["Attribute"] > band[1] + _ASIDE)
             decided, stands = _decisions(stand, places, identity)
             gone = op.switch(decided, gone, ~ray["Is Hit"] | ~stands | aside)
-    return op.set_position(op.delete_points(points, gone), ray["Hit Position"])
+    # Together, as rays are dear.
+    points, at = op.capture(points, gone=gone, hit=ray["Hit Position"], found=ray["Attribute"])
+    points = op.set_position(op.delete_points(points, at["gone"]), at["hit"])
+    return points if found is None else op.store(points, "found", at["found"])
 
 
 def _decisions(stand: Stand, places: Value, identity: Value) -> tuple[Value, Value]:
