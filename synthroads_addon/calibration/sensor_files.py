@@ -19,8 +19,8 @@ from ..base.errors import InputError
 from ..base.files import write_file
 from ..base.schema import canonical_json
 from ..materials.surfaces import brightness_of, surfaces_of
-from ..scanning.devices.device import Device, ScannerSetting
 from ..materials.table import Material
+from ..scanning.devices.device import Device, ScannerSetting
 from .expected import FULL_SCALE
 from .fit import fitted_wavelength
 from .job import Calibration, CalibrationJob, class_views
@@ -54,7 +54,7 @@ USUAL: dict[str, dict[str, tuple[float, float]]] = {
         "scan.strip_errors.drift_sigma": (0.01, 0.05),
     },
 }
-"""What the shipped recipes draw for a platform and no cloud is asked for: how it sways, and how strips disagree."""
+"""Ranges that the shipped recipes draw from for what no cloud is asked for: how it sways, and how strips disagree."""
 _SWAY = {
     "airborne": {"shortest_period": 0.05, "longest_period": 20.0, "period_exponent": 0.5},
     "uav": {"shortest_period": 0.5, "longest_period": 10.0, "period_exponent": 1.0},
@@ -215,8 +215,8 @@ def _moving(estimate: SensorEstimate, device: Device, setting: ScannerSetting) -
     speed = lines * line
     rate = distance * device.pattern.sweep(setting.field_of_view) * lines / step
     usual = device.modes[0]
-    reach = usual.maximum_range * min(np.sqrt(usual.pulse_rate_khz * 1e3 / rate), 1.0)
-    reach = min(reach, 0.999 * device.unambiguous_range(rate))
+    # The detection threshold stays: by it the noise of faint echoes was told.
+    reach = min(float(np.sqrt(0.2 / setting.threshold)), 0.999 * device.unambiguous_range(rate))
     mode = usual.to_dict() | {"pulse_rate_khz": _short(rate / 1e3), "maximum_range": _short(reach)}
     finest = min(device.finest_angle_deg, float(np.rad2deg(step / distance)) * 0.9)
     fitted = Device.from_dict(device.to_dict() | {"modes": [mode], "finest_angle_deg": _short(finest)})
@@ -226,6 +226,7 @@ def _moving(estimate: SensorEstimate, device: Device, setting: ScannerSetting) -
     settings: dict[str, Any] = {"scan.lines_per_second": _short(lines), "scan.platform": platform}
     settings["scan.pulse_rate_khz"] = mode["pulse_rate_khz"]
     settings["scan.motion"] = _SWAY[kind]
+    settings["road.environment.wet"] = 0
     return "airborne-1000m", settings, fitted
 
 

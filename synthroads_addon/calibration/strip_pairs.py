@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..base.arrays import Float, Index
+from ..base.arrays import AnyArray, Float, Index
 
 _BINS, _REACH = 22, 2.2
 """Bins of the distance, up to so many times the points' usual distance."""
@@ -37,7 +37,7 @@ _PARTS = 3
 
 @dataclass(frozen=True)
 class StripPairs:
-    """What pairs of points say about strips.
+    """Strips as pairs of points tell them.
 
     Attributes:
         strips: how many overlap.
@@ -112,7 +112,7 @@ def _pairs_at_random(edges: Float) -> Float:
     return np.asarray(np.diff(cumulative))
 
 
-def _least_squares(terms: Float, sums: Float, pairs: Index) -> Float:
+def _least_squares(terms: Float, sums: AnyArray, pairs: Index) -> Float:
     """Return the coefficients of terms (K, T) that fit the means of K bins, each as sure as it has pairs."""
     weight = np.sqrt(pairs)
     mean = sums / np.maximum(pairs, 1)

@@ -149,7 +149,13 @@ def test_a_table_for_the_recipe_leaves_the_sensors_noise_to_the_sensor(
     cloud, _ = airborne
     spreads = []
     for name, more in (("alone", []), ("beside", ["--save-recipe", str(tmp_path / "r.yaml")])):
-        files = ["--save", str(tmp_path / f"{name}.json"), "--save-device", str(tmp_path / f"{name}-device.json"), *more]
+        files = [
+            "--save",
+            str(tmp_path / f"{name}.json"),
+            "--save-device",
+            str(tmp_path / f"{name}-device.json"),
+            *more,
+        ]
         words = ["--class-field", "label", "--material", f"asphalt={ASPHALT_LABEL}", "--device", "riegl-vq-780i"]
         assert main(["calibrate", "--real", str(cloud), *words, "--range", "800", "--quiet", *files]) == 0
         spreads.append(read_material_table(tmp_path / f"{name}.json")["asphalt"].spread_below)
