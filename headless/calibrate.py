@@ -113,15 +113,17 @@ def run(arguments: argparse.Namespace) -> Outcome:
         raise InputError("--save-recipe", str(arguments.save_recipe), "needs --save-device, which it scans with")
     progress = progress_bar(arguments)
     result = exhaust(calibration_steps(job), lambda share: progress("calibrate", share))
+    sensor = fit_sensor(result) if arguments.save_device else None
     if arguments.save:
-        save_fitted(result, arguments.save, arguments.overwrite)
+        # Scans by the recipe have the sensor's noise beside the materials' own spread.
+        fitted = sensor.materials if sensor and arguments.save_recipe else None
+        save_fitted(result, arguments.save, arguments.overwrite, fitted)
     if arguments.plot:
         from synthroads_addon.calibration.plot import save_plot
 
         save_plot(result, arguments.plot, arguments.overwrite)
     data, lines = result.to_dict(), summary(result)
-    if arguments.save_device:
-        sensor = fit_sensor(result)
+    if sensor:
         save_device(sensor, arguments.save_device, arguments.overwrite)
         if arguments.save_recipe:
             device, table = arguments.save_device, arguments.save

@@ -196,7 +196,7 @@ def fitted_slope(incidence: Float, linear: Float) -> float | None:
     return float(slopes[misfit.std(axis=1).argmin()])
 
 
-def fitted_wavelength(place: Float, intensity: Float) -> float:
+def fitted_wavelength(place: Float, intensity: Float, noise: float = 0.0) -> float:
     """Return that of `WAVELENGTHS`, m, whose random field correlates over distance most like a real class.
 
     Intensities are taken by rank, as normal scores, so that no model of the distribution is needed. What is compared
@@ -205,9 +205,10 @@ def fitted_wavelength(place: Float, intensity: Float) -> float:
     Args:
         place: (N, 3) m.
         intensity: (N,) in any unit.
+        noise: share of the variance that is the single points' and no field's.
     """
     squares = [_members(place, size) for size in _CELLS]
-    real = _variance_within(_normal_scores(intensity), squares)
+    real = np.maximum((_variance_within(_normal_scores(intensity), squares) - noise) / (1.0 - noise), 0.0)
     misfits = []
     for wavelength in WAVELENGTHS:
         values = noise_field(place - place.min(axis=0), wavelength, 1, OCTAVES)

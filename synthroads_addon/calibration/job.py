@@ -268,8 +268,16 @@ def calibration_steps(job: CalibrationJob) -> Generator[float, None, Calibration
     return _result(job, table, inputs, fits)
 
 
-def save_fitted(result: Calibration, path: Path, overwrite: bool = False) -> None:
+def save_fitted(
+    result: Calibration, path: Path, overwrite: bool = False, fitted: Mapping[str, Material] | None = None
+) -> None:
     """Write the fitted materials, with the others of the job's own table, to a material table file.
+
+    Args:
+        result: of the calibration.
+        path: of the table.
+        overwrite: replace a file that is there.
+        fitted: the fitted materials by name, if others than the result's.
 
     Raises:
         InputError: nothing was fitted, or the file can't be written, see `write_material_table`.
@@ -277,7 +285,7 @@ def save_fitted(result: Calibration, path: Path, overwrite: bool = False) -> Non
     if result.job.real is None or not result.job.fit:
         raise InputError("--save", str(path), "needs a cloud that materials are fitted to")
     rows = dict(read_material_table(result.job.table)) if result.job.table else {}
-    rows |= {entry.target.material: entry.after for entry in result.compared}
+    rows |= fitted or {entry.target.material: entry.after for entry in result.compared}
     write_material_table(path, rows, overwrite)
 
 

@@ -8,10 +8,12 @@ points within squares of `EDGE`, whose parabola and mean brightness are taken of
   over the cosine of the incidence angle.
 - **speckle**: half the mean squared difference of neighbours' brightness in dB. Points with times are compared within
   their strip, which ends where nothing is recorded for `_PAUSE`, and the gain's step between strips is how far their
-  means in one square differ. Without times what strips of different gain give to it is taken off; the step then
-  follows from the kurtosis: two normal distributions apart by G have an excess kurtosis of -2 (G / 2)^4 over their
-  variance squared. It comes out too small where squares hold few points of one of the strips.
+  means in one square differ. Without times the pairs of points say how many strips there are, how far these differ,
+  and what is left to single echoes (`strip_pairs`). Where points lie at random, the step follows from the kurtosis of
+  the brightness: two normal distributions apart by G have an excess kurtosis of -2 (G / 2)^4 over their variance
+  squared.
 - **range walk**: the residuals' covariance with the brightness over the speckle's variance.
+- **range delay**: the residuals' skewness, -2 q^3 with the share q of their standard deviation that is a delay.
 - **range exponent**: the slope of the median brightness over the logarithm of the range, where ranges differ by a
   factor of 1.5; it tells numbers that are compensated for the range from the received power.
 - **steps**: the bits of the numbers, from the smallest step between those that occur.
@@ -31,6 +33,7 @@ import numpy as np
 from ..base.arrays import AnyArray, Float, Index
 from ..base.errors import InputError
 from ..cloud.selection.classes import RealClass
+from .strip_pairs import strip_pairs
 
 EDGE = 1.5
 """Edge of the squares, m."""
@@ -52,6 +55,8 @@ _LEAST_COSINE = 0.02
 _RING_DEG = 0.1
 """Rings of a head are told apart by this much of their elevation."""
 _FEWEST_OF_RING, _FEWEST_RINGS = 30, 6
+_OUTLIER, _LARGEST_DELAY = 4.0, 0.9
+"""Residuals beyond so many interquartile ranges are of kerbs and cars, not of the sensor; largest share of a delay."""
 _SPEED_OF_PULSES = 2.0
 """Consecutive pulses lie nearer to each other than so many times their usual distance."""
 
@@ -65,13 +70,14 @@ class SensorEstimate:
         range_sigma: standard deviation of the range of bright echoes, m.
         faint_range_sigma: what the range of an echo at the median brightness has besides, m.
         range_walk: m by which an echo is ranged nearer for each dB of speckle.
+        range_delay: share of the range's standard deviation that is an exponential delay.
         speckle: relative standard deviation of the power.
         gain_step_db: between overlapping strips, dB.
         range_exponent: power of the range that the brightness goes with; None where ranges hardly differ.
         bits: of the numbers; None where they have no steps.
         zeros: share of the points without a number.
         density: points to the m2.
-        strips: that are told apart by times; 1 without.
+        strips: that overlap, as times or pairs of points tell; 1 if neither does.
         distance: median range, m; None where unknown.
         incidence: median incidence angle, rad.
         pulse_spacing: between consecutive pulses on the ground, m; None without times.
@@ -83,6 +89,7 @@ class SensorEstimate:
     range_sigma: float
     faint_range_sigma: float
     range_walk: float
+    range_delay: float
     speckle: float
     gain_step_db: float
     range_exponent: float | None
@@ -146,13 +153,19 @@ def estimate_sensor(
     rows, squares = _squares_of(road.place, level, np.zeros(len(level), dtype=np.int64) if strip is None else strip)
     cosine = np.cos(np.broadcast_to(incidence, len(level)))[rows]
     ranged = squares.height / np.maximum(cosine, _LEAST_COSINE)
-    step, speckle = _gain_and_speckle(road.place[rows], squares, strip is None)
+    told = strip_pairs(road.place[rows, :2], squares.owner, ranged, squares.level, EDGE) if strip is None else None
+    # What the parabola follows of a point's own deviation is lost to the covariance with its brightness.
+    shared = float(np.mean(ranged * squares.level)) / np.sqrt(1.0 - squares.fitted)
+    strips = 1 if strip is None else int(strip.max()) + 1
+    if told is not None:
+        step, speckle = told.gain_step, float(np.sqrt(told.noise)) * _DECIBEL
+        strips, shared = told.strips, told.covariance
+    else:
+        step, speckle = _gain_and_speckle(road.place[rows], squares, strip is None)
     if strip is not None:
         step = _gain_step(road.place, level, strip)
     azimuth_step, gains = (None, None) if scanner is None else _rings(road.place - scanner, level)
     steady, faint = _range_noise(ranged, squares)
-    # What the parabola follows of a point's own deviation is lost to the covariance with its brightness.
-    shared = float(np.mean(ranged * squares.level)) / np.sqrt(1.0 - squares.fitted)
     walk = shared / max((speckle / _DECIBEL) ** 2, 1e-12)
     known = np.broadcast_to(np.asarray(distance, dtype=np.float64), len(level))
     return SensorEstimate(
@@ -160,13 +173,14 @@ def estimate_sensor(
         range_sigma=steady,
         faint_range_sigma=faint,
         range_walk=max(walk, 0.0),
+        range_delay=_range_delay(ranged, squares.fitted),
         speckle=speckle,
         gain_step_db=step,
         range_exponent=_range_exponent(level, known),
         bits=number_bits(road.intensity),
         zeros=road.zeros / max(road.zeros + len(level), 1),
         density=_density(road.place),
-        strips=1 if strip is None else int(strip.max()) + 1,
+        strips=strips,
         distance=float(np.median(known)) if np.isfinite(known).all() else None,
         incidence=float(np.median(incidence)),
         pulse_spacing=None if time is None else pulse_spacing(road.place, time),
@@ -228,6 +242,18 @@ def _range_noise(ranged: Float, squares: _Squares) -> tuple[float, float]:
     slope = min(max(slope / (1.0 - squares.fitted), 0.0), float(np.mean(variance)))
     steady = max(float(np.mean(variance - slope * weakness)), 0.0)
     return float(np.sqrt(steady)), float(np.sqrt(slope))
+
+
+def _range_delay(ranged: Float, fitted: float) -> float:
+    """Return the share of the residuals' (N,) standard deviation that is an exponential delay, by their skewness.
+
+    Of a point's own deviation the share ``fitted`` is lost to the parabola: of its cube three times as much as of its
+    square.
+    """
+    quartiles = np.quantile(ranged, (0.25, 0.75))
+    inner = ranged[np.abs(ranged) < _OUTLIER * float(np.diff(quartiles)[0])]
+    skew = float(np.mean((inner - inner.mean()) ** 3)) / max(float(inner.std()) ** 3, 1e-30) / (1.0 - fitted) ** 1.5
+    return float(np.clip(np.cbrt(-skew / 2.0), 0.0, _LARGEST_DELAY))
 
 
 def _gain_step(place: Float, level: Float, strip: Index) -> float:

@@ -19,8 +19,10 @@ from ..base.errors import InputError
 from ..base.files import write_file
 from ..base.schema import canonical_json
 from ..materials.surfaces import brightness_of, surfaces_of
+from ..materials.table import Material
 from ..scanning.devices.device import Device, ScannerSetting
 from .expected import FULL_SCALE
+from .fit import fitted_wavelength
 from .job import Calibration, CalibrationJob, class_views
 from .sensor import SensorEstimate, estimate_sensor
 
@@ -31,6 +33,32 @@ SPEED = 60.0
 AIRBORNE = 200.0
 """Scanners farther away than this, m, fly in an aircraft, nearer ones on a UAV or stand."""
 _LEAST_STEP_DB = 0.5
+_STEPS = (1.0 / 3.0, 4.0 / 3.0)
+"""Range of the gain's step, as shares of the fitted one: other roads lie elsewhere in the overlap of the strips."""
+_LEAST_SPREAD, _MOST_NOISE = 0.02, 0.95
+"""Spread that a material keeps when the sensor explains all of it, and share of the variance that is taken off."""
+USUAL: dict[str, dict[str, tuple[float, float]]] = {
+    "airborne": {
+        "scan.motion.position_sigma": (0.2, 0.8),
+        "scan.motion.attitude_sigma_deg": (0.2, 0.4),
+        "scan.motion.heading_sigma_deg": (1.0, 3.0),
+        "scan.strip_errors.boresight_sigma_deg": (0.0005, 0.002),
+        "scan.strip_errors.drift_sigma": (0.005, 0.02),
+    },
+    "uav": {
+        "scan.motion.position_sigma": (0.05, 0.3),
+        "scan.motion.attitude_sigma_deg": (0.5, 2.0),
+        "scan.motion.heading_sigma_deg": (0.5, 3.0),
+        "scan.strip_errors.boresight_sigma_deg": (0.002, 0.01),
+        "scan.strip_errors.lever_arm_sigma": (0.005, 0.02),
+        "scan.strip_errors.drift_sigma": (0.01, 0.05),
+    },
+}
+"""Ranges that the shipped recipes draw from for what no cloud is asked for: how it sways, and how strips disagree."""
+_SWAY = {
+    "airborne": {"shortest_period": 0.05, "longest_period": 20.0, "period_exponent": 0.5},
+    "uav": {"shortest_period": 0.5, "longest_period": 10.0, "period_exponent": 1.0},
+}
 _DIGITS = 4
 
 
@@ -43,14 +71,18 @@ class FittedSensor:
         device: the base device with the fitted values.
         scan: settings of a scan with it, path in the scenario -> value.
         drawn: fitted values that a recipe draws from a range about them, likewise.
+        usual: what the cloud doesn't say, or says of its own road alone, and a recipe draws from wider ranges.
         scenario: built-in one that a recipe begins with.
+        materials: the fitted ones by name, whose spread is what the sensor doesn't explain.
     """
 
     estimate: SensorEstimate
     device: Device
     scan: dict[str, Any]
     drawn: dict[str, float]
+    usual: dict[str, tuple[float, float]]
     scenario: str
+    materials: dict[str, Material]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the estimates and the settings that follow from them as JSON data."""
@@ -78,11 +110,38 @@ def fit_sensor(result: Calibration) -> FittedSensor:
     estimate = estimate_sensor(real, linear, distance, incidence, scanner)
     device = _fitted_device(result, setting, estimate)
     scan, drawn = _receiver_settings(estimate, device)
+    usual: dict[str, tuple[float, float]] = {}
     if scanner is None:
         scenario, spacing, device = _moving(estimate, device, setting)
+        usual = dict(USUAL[spacing["scan.platform"]["kind"]])
+        if (step := estimate.gain_step_db) > 0.0:
+            usual["scan.strip_errors.gain_step_db"] = _short(step * _STEPS[0]), _short(step * _STEPS[1])
     else:
         scenario, spacing = _standing(estimate, device, setting)
-    return FittedSensor(estimate, device, scan | spacing, drawn, scenario)
+    return FittedSensor(estimate, device, scan | spacing, drawn, usual, scenario, _surfaces_alone(result, estimate))
+
+
+def _surfaces_alone(result: Calibration, estimate: SensorEstimate) -> dict[str, Material]:
+    """Return a calibration's materials, with what speckle and the gain of strips spread taken off their own spread.
+
+    The fit gives a material all that its class varies by. A scan that adds the sensor's part would vary by it twice.
+    """
+    gain = estimate.gain_step_db * np.log(10.0) / 10.0
+    noise = estimate.speckle**2 + 0.5 * gain**2 * (1.0 - 1.0 / estimate.strips)
+    rows = {}
+    for entry in result.compared:
+        row, real, update = entry.after, entry.real, {}
+        if real is None:
+            continue
+        varying = float(np.log(np.maximum(result.job.receiver.to_linear(real.intensity), 1e-300)).var())
+        share = min(noise / max(varying, 1e-12), 1.0)
+        for name in ("spread_below", "spread_above"):
+            fitted = getattr(row, name)
+            update[name] = round(min(max(fitted * np.sqrt(1.0 - share), _LEAST_SPREAD), fitted), 4)
+        if "wavelength" in result.job.parts:
+            update["spread_wavelength"] = fitted_wavelength(real.place, real.intensity, min(share, _MOST_NOISE))
+        rows[entry.target.material] = row.model_copy(update=update)
+    return rows
 
 
 def _views_of_points(job: CalibrationJob, result: Calibration) -> tuple[Float, Float]:
@@ -102,6 +161,7 @@ def _fitted_device(result: Calibration, setting: ScannerSetting, estimate: Senso
     receiver = dict(data.get("receiver") or {})
     receiver["faint_range_sigma"] = _short(estimate.faint_range_sigma * _over_threshold(result, setting, estimate))
     receiver["range_walk"] = _short(estimate.range_walk)
+    receiver["range_delay"] = _short(estimate.range_delay)
     if estimate.bits is not None:
         receiver["bits"] = estimate.bits
     model = job.receiver
@@ -136,10 +196,8 @@ def _receiver_settings(estimate: SensorEstimate, device: Device) -> tuple[dict[s
         "scan.noise.range_sigma": estimate.range_sigma,
         "scan.receiver.faint_range_sigma": device.receiver.faint_range_sigma or 0.0,
         "scan.receiver.range_walk": estimate.range_walk,
+        "scan.receiver.range_delay": estimate.range_delay,
     }
-    if estimate.gain_step_db > 0.0:
-        # The mean distance of two normal values is 2 / sqrt(pi) of their deviation.
-        drawn["scan.strip_errors.gain_sigma_db"] = estimate.gain_step_db * np.sqrt(np.pi) / 2.0
     if device.receiver.compression:
         drawn["scan.receiver.compression"] = min(device.receiver.compression, 1.0 / (1.0 + SPREAD))
     return scan, {name: _short(value) for name, value in drawn.items() if value > 1e-6}
@@ -157,8 +215,8 @@ def _moving(estimate: SensorEstimate, device: Device, setting: ScannerSetting) -
     speed = lines * line
     rate = distance * device.pattern.sweep(setting.field_of_view) * lines / step
     usual = device.modes[0]
-    reach = usual.maximum_range * min(np.sqrt(usual.pulse_rate_khz * 1e3 / rate), 1.0)
-    reach = min(reach, 0.999 * device.unambiguous_range(rate))
+    # The detection threshold stays: by it the noise of faint echoes was told.
+    reach = min(float(np.sqrt(0.2 / setting.threshold)), 0.999 * device.unambiguous_range(rate))
     mode = usual.to_dict() | {"pulse_rate_khz": _short(rate / 1e3), "maximum_range": _short(reach)}
     finest = min(device.finest_angle_deg, float(np.rad2deg(step / distance)) * 0.9)
     fitted = Device.from_dict(device.to_dict() | {"modes": [mode], "finest_angle_deg": _short(finest)})
@@ -167,6 +225,8 @@ def _moving(estimate: SensorEstimate, device: Device, setting: ScannerSetting) -
     platform = {"kind": kind, "height": _short(height), "speed": _short(speed), "lateral_offsets": offsets}
     settings: dict[str, Any] = {"scan.lines_per_second": _short(lines), "scan.platform": platform}
     settings["scan.pulse_rate_khz"] = mode["pulse_rate_khz"]
+    settings["scan.motion"] = _SWAY[kind]
+    settings["road.environment.wet"] = 0
     return "airborne-1000m", settings, fitted
 
 
@@ -221,7 +281,8 @@ def save_recipe(sensor: FittedSensor, path: Path, device: Path, table: Path | No
         "draw": {
             name: {"minimum": _short(value * (1.0 - SPREAD)), "maximum": _short(value * (1.0 + SPREAD))}
             for name, value in sensor.drawn.items()
-        },
+        }
+        | {name: {"minimum": low, "maximum": high} for name, (low, high) in sensor.usual.items()},
         "groups": [{"name": "roads", "scenes": 8, "split": {"train": 6, "validation": 1, "test": 1}}],
     }
     text = "# Written by synthroads calibrate; groups and roads are an example to be changed.\n"

@@ -8,12 +8,13 @@ from typing import Literal
 
 import numpy as np
 from pydantic import Field, model_validator
+from scipy.spatial import cKDTree
 
 from ..base.errors import InputError, nearest_name
 from ..base.schema import ClosedModel, Finite, quantity, read_yaml
 from ..cloud.formats.registry import ENDINGS
 from ..cloud.selection.classes import RealClass, RealCloud, class_by_label, read_real_cloud
-from ..cloud.selection.pavement import RoadClasses, road_classes
+from ..cloud.selection.pavement import CLEAR, RoadClasses, road_classes
 
 LISTS = (".yaml", ".yml", ".json")
 ROAD = "road"
@@ -99,7 +100,21 @@ def read_compared(path: Path, row: ListedCloud) -> ComparedCloud:
     else:
         found = {ROAD: class_by_label(cloud, row.road)}
         found |= _other_classes(cloud, row, path.name)
+        if "marking" in found:
+            found[ROAD] = _clear_of(found[ROAD], found["marking"])
     return ComparedCloud(path.stem, {name: _with_view(points, row) for name, points in found.items()})
+
+
+def _clear_of(road: RealClass, marking: RealClass) -> RealClass:
+    """Return the pavement's points that are `CLEAR` of every marking, as those told beside an axis are.
+
+    Where a marking was taken out the pavement has a gap, which says nothing about the scanner.
+    """
+    nearest = cKDTree(marking.place[:, :2]).query(road.place[:, :2], distance_upper_bound=CLEAR)[0]
+    kept = ~np.isfinite(nearest)
+    names = ("place", "intensity", "distance", "incidence", "returns")
+    time = None if road.time is None else road.time[kept]
+    return replace(road, time=time, **{name: getattr(road, name)[kept] for name in names})
 
 
 def _other_classes(cloud: RealCloud, row: ListedCloud, file: str) -> dict[str, RealClass]:

@@ -141,7 +141,7 @@ class Receiver(ClosedModel):
     range_walk: float | None = quantity(
         None,
         "m/dB",
-        "How much nearer an echo is ranged for each dB by which speckle makes it brighter.",
+        "How much nearer an echo is ranged for each dB by which speckle and the strip's gain make it brighter.",
         (0, 0.1),
         inherits="device.range_walk",
         unset="None",

@@ -396,8 +396,9 @@ class BlockScan:
             delayed = setting.receiver.range_delay or 0.0
             range_errors = errors.range_errors(number_in_block[pulse], number, delayed)
             distance = distance + range_sigma(setting, echoes.range, along, echoes.intensity) * range_errors
-            if speckle is not None and setting.receiver.range_walk:
-                distance = distance + range_walk(setting, speckle, plan.noise.speckle)
+            if setting.receiver.range_walk:
+                gain = strip_gain(plan.strip_errors, plan.seed, strip.index)
+                distance = distance + range_walk(setting, speckle, plan.noise.speckle, gain)
         normal = None
         if plan.records_seen_points or "normal" in plan.measured_layers:
             normal = target.normals(face, along, pulses.time[pulse], motions)

@@ -5,7 +5,9 @@ A point's place is that of the platform, plus the platform's rotation times bore
 constant in the scanner's frame and the same in all strips, so that strips flown to and fro disagree; a strip's position
 errs by an offset that changes evenly from its beginning to its end, other ones in each strip. All are normally
 distributed and drawn from the scan's seed, and the report says them. A strip's echoes have a gain as well, as the
-laser's power and the air differ from strip to strip.
+laser's power and the air differ from strip to strip. Where strips overlap one sees a road from nearly above and the
+next one aslant, so that raw numbers go with the cube of the angle's cosine (two squares by the range, one by Lambert's
+law): every second strip may be brighter by a step of its own.
 """
 
 from typing import Any
@@ -33,6 +35,13 @@ class StripErrors(ClosedModel):
     )
 
     gain_sigma_db: float = quantity(0.0, "dB", "Brightness of each strip's echoes.", (0, 10), title="Gain (dB)")
+    gain_step_db: float = quantity(
+        0.0,
+        "dB",
+        "How much brighter the first, third and so on are than the others: seen from nearly above, not aslant.",
+        (0, 10),
+        title="Gain Step (dB)",
+    )
 
     @property
     def moves_points(self) -> bool:
@@ -57,10 +66,11 @@ def drift(errors: StripErrors, seed: int, strip: int) -> tuple[Float, Float]:
 
 
 def strip_gain(errors: StripErrors, seed: int, strip: int) -> float:
-    """Return the factor on the power of a strip's echoes, log-normal with a median of 1."""
-    if not errors.gain_sigma_db:
-        return 1.0
-    return float(10.0 ** (errors.gain_sigma_db / 10.0 * stream(seed, "strip gain", strip).standard_normal()))
+    """Return the factor on the power of a strip's echoes: log-normal about half the step, up or down by turns."""
+    decibels = (0.5 - strip % 2) * errors.gain_step_db
+    if errors.gain_sigma_db:
+        decibels += errors.gain_sigma_db * stream(seed, "strip gain", strip).standard_normal()
+    return float(10.0 ** (decibels / 10.0)) if decibels else 1.0
 
 
 def with_strip_errors(
@@ -87,7 +97,7 @@ def with_strip_errors(
 
 def strip_error_report(errors: StripErrors, seed: int, strips: tuple[Strip, ...]) -> dict[str, Any]:
     """Return the errors of a scan as JSON data; empty without any."""
-    if not errors.moves_points and not errors.gain_sigma_db:
+    if not errors.moves_points and not errors.gain_sigma_db and not errors.gain_step_db:
         return {}
     rows = []
     for strip in strips:

@@ -41,7 +41,7 @@ EFFECTS: dict[str, tuple[str, ...]] = {
     "mirror-clock": ("scan.mirror_clock=locked",),
     "strip-errors": tuple(
         f"scan.strip_errors.{name}=0"
-        for name in ("boresight_sigma_deg", "lever_arm_sigma", "drift_sigma", "gain_sigma_db")
+        for name in ("boresight_sigma_deg", "lever_arm_sigma", "drift_sigma", "gain_sigma_db", "gain_step_db")
     ),
     "weather": ("scan.weather=null", "scan.attenuation=0"),
     "weather-echoes": ("scan.weather.echoes=false",),

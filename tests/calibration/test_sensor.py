@@ -22,7 +22,7 @@ from synthroads_addon.cloud.points import PointBlock, concatenate
 from synthroads_addon.cloud.selection.classes import RealClass
 from synthroads_addon.dataset.recipe import load_recipe, scene_jobs
 from synthroads_addon.materials.surfaces import surfaces_of
-from synthroads_addon.materials.table import materials
+from synthroads_addon.materials.table import materials, read_material_table
 from synthroads_addon.scanning.devices.device import load_device
 from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scanning.platforms.polyline import PolylineGuide
@@ -80,6 +80,12 @@ AIRBORNE = [
 ]
 
 
+SWAYING = [
+    *("scan.motion.attitude_sigma_deg=0.2", "scan.motion.position_sigma=0.4", "scan.motion.shortest_period=0.05"),
+    *("scan.motion.longest_period=20", "scan.motion.period_exponent=0.5"),
+]
+
+
 @pytest.fixture(scope="module")
 def airborne(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ScanPlan]:
     """Write a cloud of two strips from the air, as linear numbers."""
@@ -119,6 +125,51 @@ def test_an_airborne_sensor_is_found_again(
     assert found["gain_step_db"] == pytest.approx(abs(gains[0] - gains[1]), abs=0.15)
     assert found["strips"] == 2
     assert found["pulse_spacing"] == pytest.approx(800.0 * plan.setting.angle_step, rel=0.05)
+
+
+def test_without_times_pairs_of_points_tell_strips_and_what_parts_them() -> None:
+    """How many overlap, the gain's step within 0.2 dB, what is left to single echoes, and how they are ranged by it."""
+    points, plan = measured("airborne-1000m", [*AIRBORNE, *SWAYING])
+    asphalt = points.select(np.flatnonzero(points.instance_id == ASPHALT_LABEL))
+    power, none = asphalt.intensity * 800.0**2, np.zeros(len(asphalt))
+    road = RealClass("", asphalt.xyz, power, 0, none, none, none.astype(np.uint8))
+    found = estimate_sensor(road, power, np.array([800.0]), np.array([0.0]))
+    gains = [10.0 * np.log10(strip_gain(plan.strip_errors, plan.seed, strip)) for strip in (0, 1)]
+    assert found.strips == 2
+    assert found.gain_step_db == pytest.approx(abs(gains[0] - gains[1]), abs=0.2)
+    noise = 1.0 / (6.0 * materials()["asphalt"].reflectivity / 800.0**2 / plan.setting.threshold)
+    assert found.speckle == pytest.approx(np.hypot(0.17, noise), rel=0.15)
+    assert found.range_walk == pytest.approx(0.003, rel=0.4)
+
+
+def test_a_table_for_the_recipe_leaves_the_sensors_noise_to_the_sensor(
+    airborne: tuple[Path, ScanPlan], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The plane is even: the fit gives its asphalt all that varies, the recipe's table hardly anything."""
+    cloud, _ = airborne
+    spreads = []
+    for name, more in (("alone", []), ("beside", ["--save-recipe", str(tmp_path / "r.yaml")])):
+        files = [
+            "--save",
+            str(tmp_path / f"{name}.json"),
+            "--save-device",
+            str(tmp_path / f"{name}-device.json"),
+            *more,
+        ]
+        words = ["--class-field", "label", "--material", f"asphalt={ASPHALT_LABEL}", "--device", "riegl-vq-780i"]
+        assert main(["calibrate", "--real", str(cloud), *words, "--range", "800", "--quiet", *files]) == 0
+        spreads.append(read_material_table(tmp_path / f"{name}.json")["asphalt"].spread_below)
+    assert spreads[0] > 0.2
+    assert spreads[1] < 0.1
+
+
+def test_a_delay_of_the_ranges_is_found_again() -> None:
+    rng = np.random.default_rng(4)
+    late = 0.5 * (rng.exponential(1.0, 60_000) - 1.0) + np.sqrt(0.75) * rng.standard_normal(60_000)
+    place, none = np.column_stack([rng.uniform(0, 55, (60_000, 2)), -0.02 * late]), np.zeros(60_000)
+    road = RealClass("", place, none + 1.0, 0, none, none, none.astype(np.uint8))
+    found = estimate_sensor(road, 10.0 ** rng.normal(0, 0.05, 60_000), np.array([800.0]), np.array([0.0]))
+    assert found.range_delay == pytest.approx(0.5, rel=0.1)
 
 
 def test_the_written_device_and_recipe_scan_as_the_cloud_was_measured(

@@ -95,7 +95,7 @@ def test_names_can_be_chosen_by_their_beginning(capsys: Capture) -> None:
     for argv in (both_sides, [*both_sides[:1], *both_sides[2:], "--json"]):
         assert cli.main(argv) == 0
         found = json.loads(capsys.readouterr().out)["devices"]
-        assert [one["name"] for one in found] == ["livox-mid-70", "velodyne-vlp-16"]
+        assert [one["name"] for one in found] == ["livox-mid-70", "velodyne-vlp-16", "velodyne-vlp-32c"]
     assert "did you mean 'riegl-vq-450'" in refused(capsys, "devices", "rigel-vq-450")
     assert "fields is 'scan.x': no field of the scenario begins so" in refused(capsys, "fields", "scan.x")
     assert "--of is 'segmentation': is for fields only" in refused(capsys, "devices", "--of", "segmentation")

@@ -52,7 +52,9 @@ NOISE = Noise(
     speckle=0.2,
     dropout=0.05,
 )
-STRIP_ERRORS = StripErrors(boresight_sigma_deg=0.01, lever_arm_sigma=0.01, drift_sigma=0.02, gain_sigma_db=0.5)
+STRIP_ERRORS = StripErrors(
+    boresight_sigma_deg=0.01, lever_arm_sigma=0.01, drift_sigma=0.02, gain_sigma_db=0.5, gain_step_db=0.8
+)
 RAIN = Rain(rate_mm_h=25.0, echoes=True)
 
 

@@ -9,6 +9,7 @@ from scipy import stats
 from synthroads_addon.scanning.noise import Noise
 from synthroads_addon.scanning.receiver import Receiver
 from synthroads_addon.scanning.receiving.range_noise import range_sigma
+from synthroads_addon.scanning.strip_errors import StripErrors, strip_gain
 from tests.helpers.scenes.scan_scenes import Standing, plane, scan_block, scan_of
 
 SIGMA = 0.01
@@ -91,3 +92,13 @@ def test_bright_speckle_is_ranged_nearer_without_a_bias() -> None:
     slope, _ = np.polyfit(level, shift, 1)
     assert slope == pytest.approx(-0.004, rel=1e-3)
     assert abs(shift.mean()) < min(1e-4, 5 * shift.std() / np.sqrt(len(shift)))
+
+
+def test_a_bright_strip_is_ranged_nearer_and_all_strips_together_are_not() -> None:
+    plan = replace(scan_of(plane(), 1, range_sigma=1e-9), strip_errors=StripErrors(gain_sigma_db=1.0))
+    strip = plan.path.strips[0]
+    walking = replace(plan.setting, receiver=Receiver(range_walk=0.004))
+    calm, points = (scan_block(p, strip, 0).points for p in (plan, replace(plan, setting=walking)))
+    gains = [10 * np.log10(strip_gain(plan.strip_errors, seed, 0)) for seed in range(plan.seed, plan.seed + 900)]
+    np.testing.assert_allclose(points.range - calm.range, -0.004 * gains[0], atol=1e-7)
+    assert abs(0.004 * np.mean(gains)) < 1e-3

@@ -72,14 +72,20 @@ def test_points_are_off_by_what_the_report_says_and_the_truth_is_kept(heading: f
 
 def test_strips_are_as_bright_as_the_report_says() -> None:
     plan = scan_of(plane(), 1, TwoStrips())
-    brighter = replace(plan, strip_errors=StripErrors(gain_sigma_db=1.0))
+    brighter = replace(plan, strip_errors=StripErrors(gain_sigma_db=1.0, gain_step_db=1.5))
     for strip, row in zip(plan.path.strips, brighter.summary()["strip_errors"]["strips"], strict=True):
         calm, points = (scan_block(one, strip, 0).points for one in (plan, brighter))
         np.testing.assert_allclose(points.intensity, calm.intensity * 10 ** (row["gain_db"] / 10), rtol=1e-6)
         np.testing.assert_array_equal(points.xyz, calm.xyz)
-    levels = [10 * np.log10(strip_gain(brighter.strip_errors, seed, 3)) for seed in range(400)]
+    levels = [10 * np.log10(strip_gain(brighter.strip_errors, seed, 3)) + 0.75 for seed in range(400)]
     counts = np.bincount((stats.norm.cdf(levels) * 20).astype(int), minlength=20)
     assert stats.chisquare(counts).pvalue > 0.001
+
+
+def test_strips_differ_by_their_step_by_turns_and_the_report_says_so() -> None:
+    plan = replace(scan_of(plane(), 1, TwoStrips()), strip_errors=StripErrors(gain_step_db=1.4))
+    gains = [row["gain_db"] for row in plan.summary()["strip_errors"]["strips"]]
+    np.testing.assert_allclose(gains, [0.7, -0.7], atol=1e-6)
 
 
 def test_nothing_is_reported_or_moved_without_errors() -> None:

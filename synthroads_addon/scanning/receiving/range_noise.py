@@ -17,8 +17,9 @@ them has a mean: ranges stay unbiased. All of it is left out where sigma_0 is 0.
 
 A bright echo passes a fixed threshold earlier than a faint one and is ranged nearer: range walk (Amann et al. 2001,
 Laser ranging: a critical review of usual techniques for distance measurement, Opt. Eng. 40). Scanners correct for it
-by the power that a surface usually gives; what is left follows the power's noise. So a part of the error goes with the
-logarithm of the speckle, which has its mean taken off.
+by the power that a surface usually gives; what is left follows what nobody knows of the power: its noise, and how much
+more or less a strip's laser and air let through than usual. So a part of the error goes with the logarithm of the
+speckle, which has its mean taken off, and of the strip's gain.
 """
 
 import numpy as np
@@ -63,18 +64,22 @@ def range_sigma(setting: ScannerSetting, distance: Float, cosine: Float, intensi
     return np.asarray(np.sqrt(variance))
 
 
-def range_walk(setting: ScannerSetting, speckle: Float, sigma: float) -> Float:
-    """Return by how much farther echoes (N,) are ranged for what speckle does to their power, m.
+def range_walk(setting: ScannerSetting, speckle: Float | None, sigma: float, gain: float) -> Float | float:
+    """Return by how much farther echoes (N,) are ranged for what changes their power unknown to the scanner, m.
 
     Args:
         setting: the scanner's.
-        speckle: (N,) factors on the power, gamma distributed with mean 1.
+        speckle: (N,) factors on the power, gamma distributed with mean 1; None without.
         sigma: their standard deviation.
+        gain: factor on the power of the strip's echoes.
     """
+    walk = (setting.receiver.range_walk or 0.0) * _DECIBELS
+    if speckle is None:
+        return float(-walk * np.log(gain))
     looks = 1.0 / sigma**2
     # The mean logarithm of a gamma variable over its mean, digamma(m) - ln m, by its asymptotic series.
     mean = -0.5 / looks - 1.0 / (12.0 * looks**2) + 1.0 / (120.0 * looks**4)
-    return np.asarray((setting.receiver.range_walk or 0.0) * _DECIBELS * (mean - np.log(np.maximum(speckle, 1e-12))))
+    return np.asarray(walk * (mean - np.log(gain) - np.log(np.maximum(speckle, 1e-12))))
 
 
 def tail_factors(random: np.random.Generator, count: int, freedom: float) -> Float32:
