@@ -6,6 +6,8 @@ beside: a stretch of a road has the whole road's plants. `road.vegetation.plants
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from ....road.instances import SPARE
 from ....road.vegetation.plants import BREADTH, BREADTHS, CHANCE, HEIGHT, KIND, OFFSET, PICK, STATION
 from ...nodes import operations as op
@@ -65,8 +67,16 @@ def points_in_band(
 ) -> Value:
     """Add nodes for random points on the terrain within the stand's band, see `points_on`."""
     surface = op.object_geometry(stand.terrain)
-    band = stand.band_start, stand.band_end
-    return points_on(tree, stand, surface, density, stand.reach, stand.seed, band, places, found)
+    band = _Band(stand.band_start, stand.band_end, places)
+    return points_on(tree, stand, surface, density, stand.reach, stand.seed, band, found)
+
+
+class _Band(NamedTuple):
+    """Limits of a stand's distance from the verge, m, and its places that are decided, see `decided_places`, or None."""
+
+    start: Value
+    end: Value
+    places: Value | None
 
 
 def points_on(
@@ -76,8 +86,7 @@ def points_on(
     density: Operand,
     reach: Value,
     seed: Value,
-    band: tuple[Value, Value] | None = None,
-    places: Value | None = None,
+    band: _Band | None = None,
     found: Value | None = None,
 ) -> Value:
     """Add nodes for random points on a surface at a uniform density per area, identified by metre of road.
@@ -87,8 +96,7 @@ def points_on(
         density: points per area, 1/m2.
         reach: how far from the axis they are looked for, m.
         seed: of their places.
-        band: limits of the distance, m; none if None.
-        places: those that are decided, see `decided_places`; none if None.
+        band: that they grow in; none if None.
         found: field of the surface that the points carry as ``found``; none if None.
     """
     axis = op.object_geometry(stand.backbone)
@@ -123,13 +131,13 @@ def points_on(
     needed = per_metre * ground / op.maximum(op.component(ray["Hit Normal"], "Z"), 0.1)
     gone = ~ray["Is Hit"] | (op.random(tree, 0.0, 1.0, seed + CHANCE, identity) * each > needed)
     if band is not None:
-        gone = gone | (ray["Attribute"] < band[0]) | (ray["Attribute"] > band[1])
-        if places is not None:
+        gone = gone | (ray["Attribute"] < band.start) | (ray["Attribute"] > band.end)
+        if band.places is not None:
             assert isinstance(stand, PlantStand)
             gone = gone | (station < stand.start_station) | (station > stand.end_station)
             gone = gone | (offset * stand.on_side < 0.0)
-            aside = (ray["Attribute"] < band[0] - _ASIDE) | (ray["Attribute"] > band[1] + _ASIDE)
-            decided, stands = _decisions(stand, places, identity)
+            aside = (ray["Attribute"] < band.start - _ASIDE) | (ray["Attribute"] > band.end + _ASIDE)
+            decided, stands = _decisions(stand, band.places, identity)
             gone = op.switch(decided, gone, ~ray["Is Hit"] | ~stands | aside)
     # Together, as rays are dear.
     points, at = op.capture(points, gone=gone, hit=ray["Hit Position"], found=ray["Attribute"])
