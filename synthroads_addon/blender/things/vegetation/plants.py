@@ -72,7 +72,7 @@ def points_in_band(
 
 
 class _Band(NamedTuple):
-    """Limits of a stand's distance from the verge, m, and its places that are decided, see `decided_places`, or None."""
+    """Limits of a distance from the verge, m, and the places decided beforehand, see `decided_places`, or None."""
 
     start: Value
     end: Value
