@@ -34,6 +34,7 @@ from ...scanning.scene.bare_ground import MOST_CELLS, BareGround
 from ...scanning.scene.classify import classify_scene
 from ...scanning.scene.mesh import SceneMesh
 from ...scanning.scene.motion import ScannedScene
+from ...scanning.scene.outline import Outline
 from ...scanning.scene.target import Target
 from ...scanning.sway import with_motion
 from ...scanning.weather.registry import weather_of
@@ -120,6 +121,10 @@ def plan_scan(
     ground, all_from_surfaces = None, not effects and multipath is None
     if settings.footprints == "where_needed" and (rings or scenario.chooses) and all_from_surfaces:
         ground = _bare_ground(usual, surfaces, cut, outer_radii(rings, setting.divergence))
+    outline = None
+    if rings and not effects and len(usual.triangles):
+        margin = max(outer_radii(rings, setting.divergence)) * setting.maximum_range
+        outline = Outline(usual, lambda mesh: services.caster(scan.caster, mesh), margin)
     return ScanPlan(
         target=target,
         surfaces=surfaces,
@@ -134,6 +139,7 @@ def plan_scan(
         multipath=multipath,
         air_class=scenario.cloud.scheme().source_ids().get(AIR_CLASS, UNLABELLED),
         ground=ground,
+        outline=outline,
         beam=scan.beam,
         measured_layers=(kept & optional_arrays("scan")) | ({"normal", "material"} if shifts else set()),
         records_seen_points=bool(coloured) or by_layers or shifts,
