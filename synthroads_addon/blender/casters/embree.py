@@ -11,10 +11,15 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
+from ...base.arrays import Float32
 from ...scanning.scene.mesh import SceneMesh
 
 _AT_ONCE = 20_000
 """Triangles that are handed over together: meanwhile no other thread runs, and Blender's window stands still."""
+
+
+_SPREAD = 1.5
+"""Vertices per corner of some triangles up to which all of a run of vertices are handed over rather than sorted out."""
 
 
 class _NativeErrors(logging.Handler):
@@ -50,9 +55,7 @@ class EmbreeCaster:
         firsts = range(0, len(mesh.triangles), _AT_ONCE)
         for first in firsts:
             triangles = mesh.triangles[first : first + _AT_ONCE]
-            used, corners = np.unique(triangles, return_inverse=True)
-            corners = corners.reshape(triangles.shape).astype(np.int32)
-            self._meshes.append(TriangleMesh(self._scene, mesh.vertices[used], corners))
+            self._meshes.append(TriangleMesh(self._scene, *_used_vertices(mesh.vertices, triangles)))
         self._firsts = np.array([*firsts, 0], np.int32)
         "First face of each mesh; the last is that of none, -1."
         if self._meshes:
@@ -82,3 +85,12 @@ class EmbreeCaster:
             return np.zeros(len(origins), bool)
         limit = np.array(np.broadcast_to(maximum_range, len(origins)), np.float32)
         return np.asarray(self._scene.run(origins, directions, dists=limit, query="OCCLUDED") == 0)
+
+
+def _used_vertices(vertices: Float32, triangles: NDArray[np.int32]) -> tuple[Float32, NDArray[np.int32]]:
+    """Return the vertices (U, 3) that some triangles (N, 3) of a mesh need, and the triangles by these."""
+    first, last = int(triangles.min()), int(triangles.max())
+    if last - first < _SPREAD * triangles.size:  # nearly all of those in between: what is built together lies together
+        return vertices[first : last + 1], triangles - np.int32(first)
+    used, corners = np.unique(triangles, return_inverse=True)
+    return vertices[used], corners.reshape(triangles.shape).astype(np.int32)
