@@ -137,7 +137,7 @@ class BlockScan:
         if towards is not None:
             number = np.flatnonzero(towards)
             pulses = pulses.select(number)
-        if plan.outline is not None and not self._in_air:
+        if plan.outline is not None and plan.rays_per_pulse > 1 and not self._in_air:
             near = np.flatnonzero(~self._missing(plan.outline, pulses, poses.motions))
             if len(near) < len(number):
                 number, pulses = number[near], pulses.select(near)

@@ -15,7 +15,7 @@ from ...base.arrays import Float32
 from ...scanning.scene.mesh import SceneMesh
 
 _AT_ONCE = 20_000
-"""Triangles that are handed over together: meanwhile no other thread runs, and Blender's window stands still."""
+"""Triangles that are handed over together where others wait: meanwhile no other thread runs, and no window moves."""
 
 
 _SPREAD = 1.5
@@ -44,17 +44,19 @@ class EmbreeCaster:
     Args:
         mesh: what rays are cast at.
         robust: no ray slips through an edge that two faces share; a little slower.
+        in_pieces: hand the mesh over in pieces, so that other threads run in between; it then casts a little slower.
     """
 
     name = "embree"
     main_thread_only = False
 
-    def __init__(self, mesh: SceneMesh, robust: bool = True) -> None:
+    def __init__(self, mesh: SceneMesh, robust: bool = True, in_pieces: bool = False) -> None:
         self._scene = EmbreeScene(robust=robust)
         self._meshes: list[TriangleMesh] = []
-        firsts = range(0, len(mesh.triangles), _AT_ONCE)
+        at_once = _AT_ONCE if in_pieces else max(1, len(mesh.triangles))
+        firsts = range(0, len(mesh.triangles), at_once)
         for first in firsts:
-            triangles = mesh.triangles[first : first + _AT_ONCE]
+            triangles = mesh.triangles[first : first + at_once]
             self._meshes.append(TriangleMesh(self._scene, *_used_vertices(mesh.vertices, triangles)))
         self._firsts = np.array([*firsts, 0], np.int32)
         "First face of each mesh; the last is that of none, -1."

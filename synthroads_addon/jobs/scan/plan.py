@@ -19,7 +19,7 @@ from ...materials.table import Material, entry_of
 from ...materials.variation import vary_material, water_film
 from ...road.geometry import RoadGeometry
 from ...road.instances import InstanceNumbers
-from ...scanning.beam import outer_radii
+from ...scanning.beam import RINGS, outer_radii
 from ...scanning.blocks import Blocks
 from ...scanning.colour.colour import takes_nodes
 from ...scanning.colour.request import LayerRequest
@@ -123,7 +123,8 @@ def plan_scan(
         ground = _bare_ground(usual, surfaces, cut, outer_radii(rings, setting.divergence))
     outline = None
     if rings and not effects and len(usual.triangles):
-        margin = max(outer_radii(rings, setting.divergence)) * setting.maximum_range
+        widest = max(max(outer_radii(pattern, setting.divergence)) for pattern in RINGS.values())
+        margin = widest * setting.maximum_range  # measurements take the plan with other rays per pulse
         outline = Outline(usual, lambda mesh: services.caster(scan.caster, mesh), margin)
     return ScanPlan(
         target=target,
