@@ -65,7 +65,10 @@ def job(cores: int, settings: dict[str, Any]) -> dict[str, Any]:
 def measure(lengths: Sequence[int], speeds: Sequence[int], cores: Sequence[int]) -> dict[str, Any]:
     """Return results by what varies: ``begin``, and lists of ``length``, ``points`` and ``cores``."""
     most = cores[-1]
-    results: dict[str, Any] = {"machine": machine({}), "begin": {"length": TINY, **job(most, {**THIN, "road.length": TINY})}}
+    results: dict[str, Any] = {
+        "machine": machine({}),
+        "begin": {"length": TINY, **job(most, {**THIN, "road.length": TINY})},
+    }
     varied = {
         "length": [(length, most, {"road.length": length}) for length in lengths],
         "points": [(SHORT, most, {"road.length": SHORT, "scan.platform.speed": speed}) for speed in speeds],

@@ -1,4 +1,4 @@
-"""Coarse boxes that hold all of a scene: most beams that meet nothing pass all of them by, which costs one quick ray."""
+"""Coarse boxes that hold all of a scene: most beams that meet nothing pass them all by, which one quick ray tells."""
 
 from __future__ import annotations
 
@@ -19,8 +19,10 @@ _ROUNDING = 1e-5
 """How much larger boxes are for the rounding of places and rays, by the extent of the scene."""
 _PROBED, _WORTH_ASKING = 16, 0.1
 """Of so many beams one is asked first, and the others only if this share of them passes the scene by."""
-_SIDES = ((0, 2, 1), (1, 2, 3), (4, 5, 6), (5, 7, 6), (0, 1, 4), (1, 5, 4), (2, 6, 3), (3, 6, 7), (0, 4, 2), (2, 4, 6))
-_SIDES += ((1, 3, 5), (3, 7, 5))
+_SIDES = (
+    *((0, 2, 1), (1, 2, 3), (4, 5, 6), (5, 7, 6), (0, 1, 4), (1, 5, 4)),
+    *((2, 6, 3), (3, 6, 7), (0, 4, 2), (2, 4, 6), (1, 3, 5), (3, 7, 5)),
+)
 """Triangles of a box, by the numbers of its corners: x, y and z are high where the bits 4, 2 and 1 are set."""
 
 
@@ -73,9 +75,9 @@ def _boxes(mesh: SceneMesh, margin: float) -> tuple[Float, Float]:
     cells = np.array(np.nonzero(highest > -np.inf))
     margin += _ROUNDING * float(np.abs(bounds).max() + size.max())
     beside = bounds[0, :2, None] + cell * cells
-    low = np.array([*(beside - margin), -lowest[*cells] - margin])
-    high = np.array([*(beside + cell + margin), highest[*cells] + margin])
-    return low, high
+    first = np.array([*(beside - margin), -lowest[*cells] - margin], np.float64)
+    last = np.array([*(beside + cell + margin), highest[*cells] + margin], np.float64)
+    return first, last
 
 
 def _box_mesh(low: Float, high: Float, origin: Float) -> SceneMesh:

