@@ -79,7 +79,9 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         casting = {rays: _measure_casting(replace(bare, rings=RINGS[rays])) for rays in _RAYS}
         writing = _measure_writing(files)
         own = casting[plan.rays_per_pulse]
-        floors = [*casting.values(), writing, _scan_rate(files, timer.stages["scan"]["seconds"], own, writing)]
+        scanning = timer.stages["scan"]["seconds"]
+        assert scanning is not None
+        floors = [*casting.values(), writing, _scan_rate(files, scanning, own, writing)]
         assert plan.request is not None
         if scenario.colour.source != "material":
             floors.append(measure_rendering(plan.request, _VIEWS))
