@@ -139,7 +139,8 @@ def _measure_waves(rays: int, scene: Path, triangles: int) -> dict[str, float]:
     stages, counts = report["stages"], report["counts"]
     seconds = stages["scan"]["seconds"]
     if rays > 1:
-        return {"waves_rays": counts["rays"] / seconds / 1e6}
+        # As HELIOS++ counts them: all that the pulses have, also where these are known to meet nothing.
+        return {"waves_rays": counts["pulses"] * rays / seconds / 1e6}
     opening = sum(stages[name]["seconds"] for name in ("scene", "scene mesh", "caster"))
     memory = 1e6 * ((stages["caster"]["peak_memory_mb"] or 0.0) - before) / triangles
     return {"waves_pulses": counts["pulses"] / seconds / 1e6, "waves_memory": memory, "waves_opening": opening}

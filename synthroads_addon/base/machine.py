@@ -1,10 +1,11 @@
 """The machine that something was measured on, in words."""
 
+import ctypes
 import mmap
 import os
 import platform
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -60,6 +61,15 @@ def prepare_memory() -> None:
         raise MemoryError(f"less than {LEAST_MEMORY >> 20} MB can be had") from None
     square = np.ones((256, 256))
     square @ square
+
+
+def release_memory() -> None:
+    """Give back to the system what the C library keeps of freed memory, where it can: much, after much has been built.
+
+    What is built next lies elsewhere than what was there before, so that gaps are left and memory grows without this.
+    """
+    with suppress(OSError, AttributeError, TypeError):  # none but glibc has it
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _processor() -> str:

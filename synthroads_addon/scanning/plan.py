@@ -34,6 +34,7 @@ from .scene.bare_ground import BareGround
 from .scene.caster import Caster
 from .scene.gaps import LeafGaps
 from .scene.mesh import SceneMesh
+from .scene.outline import Outline
 from .scene.target import Target
 from .strip_errors import StripErrors, strip_error_report
 
@@ -110,6 +111,8 @@ class ScanPlan:
         multipath: ghost echoes over surfaces that mirror; None without.
         air_class: ``class_id`` of the echoes that these add.
         ground: where footprints that meet one plane alone are spared; None: every footprint is cast in full.
+        outline: of the static scene, with room for a pulse's rays, by which pulses that meet nothing aren't cast; None:
+            all are that the scene's bounds don't rule out.
         beam: whether the rays of a pulse diverge from the aperture or run parallel.
         measured_layers: names of the optional per-point layers that the scan itself fills.
         records_seen_points: whether blocks tell where each point was seen (`BlockResult.seen`), for colours and relief.
@@ -150,6 +153,7 @@ class ScanPlan:
     multipath: Multipath | None = None
     air_class: int = UNLABELLED
     ground: BareGround | None = None
+    outline: Outline | None = None
     beam: Literal["conical", "cylindrical"] = "conical"
     measured_layers: frozenset[str] = frozenset()
     records_seen_points: bool = False

@@ -11,7 +11,7 @@ from ..base.arrays import Bool, Float, Float32, Index, Int, UInt8
 from ..base.random_streams import stream
 from ..cloud.points import PointBlock, concatenate, make_block
 from ..materials.surfaces import brightness_of, spread_factors
-from .beam import conical_directions, cylindrical_offsets
+from .beam import conical_directions, cylindrical_offsets, outer_radii
 from .colour.colour import SeenPoints
 from .devices.shots import shots
 from .effects import apply_effect
@@ -36,6 +36,7 @@ from .returns import (
     merge_echoes,
     number_returns,
 )
+from .scene.outline import Outline
 from .scene.target import FirstHits
 from .sparing import PartlyTraced, Sparing, Traced, count_footprints
 from .strip_errors import strip_gain, with_strip_errors
@@ -136,6 +137,10 @@ class BlockScan:
         if towards is not None:
             number = np.flatnonzero(towards)
             pulses = pulses.select(number)
+        if plan.outline is not None and plan.rays_per_pulse > 1 and not self._in_air:
+            near = np.flatnonzero(~self._missing(plan.outline, pulses, poses.motions))
+            if len(near) < len(number):
+                number, pulses = number[near], pulses.select(near)
         traced, echoes, tally = self.traced_echoes(strip, pulses, poses.motions, key)
         if setting.receiver.echo_separation == "waveform":
             echoes = merge_peaks(echoes, setting.range_resolution)
@@ -157,6 +162,18 @@ class BlockScan:
         intensity, clipped = readout.read(points.intensity, points.range, setting, plan.gains)
         points = replace(points, intensity=intensity)
         return BlockResult(points, seen, count, tally.rays, weak, clipped, footprints=tally.footprints)
+
+    def _missing(self, outline: Outline, pulses: Pulses, motions: list[Track]) -> Bool:
+        """Return a mask (P,) of pulses that surely meet nothing, by the outline of the static scene and what moves."""
+        setting, target = self.plan.setting, self.plan.target
+        missing = outline.passed_by(pulses.origin, pulses.direction, setting.maximum_range)
+        rows = np.flatnonzero(missing) if target.moving else ()
+        if len(rows):
+            radius = max(outer_radii(self.plan.rings, setting.divergence)) * setting.maximum_range
+            origin, direction = (np.take(vectors, rows, axis=1) for vectors in (pulses.origin, pulses.direction))
+            reach = np.full(len(rows), setting.maximum_range)
+            missing[rows] = ~target.near_moving(origin, direction, reach, pulses.time[rows], motions, radius)
+        return missing
 
     def traced_echoes(
         self, strip: Strip, pulses: Pulses, motions: list[Track], key: int

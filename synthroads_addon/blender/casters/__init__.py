@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import bpy
+
 from ...base.errors import InputError
 from ...scanning.scene.caster import Caster
 from ...scanning.scene.mesh import SceneMesh
@@ -19,7 +21,7 @@ def make_caster(name: str, mesh: SceneMesh) -> Caster:
         try:
             from .embree import EmbreeCaster
 
-            return EmbreeCaster(mesh)
+            return EmbreeCaster(mesh, in_pieces=not bpy.app.background)
         except ImportError:
             if name == "embree":
                 raise InputError("scan.caster", name, "needs the package embreex; bvhtree is always there") from None

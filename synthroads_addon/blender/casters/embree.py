@@ -11,10 +11,15 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 from numpy.typing import NDArray
 
+from ...base.arrays import Float32
 from ...scanning.scene.mesh import SceneMesh
 
 _AT_ONCE = 20_000
-"""Triangles that are handed over together: meanwhile no other thread runs, and Blender's window stands still."""
+"""Triangles that are handed over together where others wait: meanwhile no other thread runs, and no window moves."""
+
+
+_SPREAD = 1.5
+"""Vertices per corner of some triangles up to which all of a run of vertices are handed over rather than sorted out."""
 
 
 class _NativeErrors(logging.Handler):
@@ -39,20 +44,20 @@ class EmbreeCaster:
     Args:
         mesh: what rays are cast at.
         robust: no ray slips through an edge that two faces share; a little slower.
+        in_pieces: hand the mesh over in pieces, so that other threads run in between; it then casts a little slower.
     """
 
     name = "embree"
     main_thread_only = False
 
-    def __init__(self, mesh: SceneMesh, robust: bool = True) -> None:
+    def __init__(self, mesh: SceneMesh, robust: bool = True, in_pieces: bool = False) -> None:
         self._scene = EmbreeScene(robust=robust)
         self._meshes: list[TriangleMesh] = []
-        firsts = range(0, len(mesh.triangles), _AT_ONCE)
+        at_once = _AT_ONCE if in_pieces else max(1, len(mesh.triangles))
+        firsts = range(0, len(mesh.triangles), at_once)
         for first in firsts:
-            triangles = mesh.triangles[first : first + _AT_ONCE]
-            used, corners = np.unique(triangles, return_inverse=True)
-            corners = corners.reshape(triangles.shape).astype(np.int32)
-            self._meshes.append(TriangleMesh(self._scene, mesh.vertices[used], corners))
+            triangles = mesh.triangles[first : first + at_once]
+            self._meshes.append(TriangleMesh(self._scene, *_used_vertices(mesh.vertices, triangles)))
         self._firsts = np.array([*firsts, 0], np.int32)
         "First face of each mesh; the last is that of none, -1."
         if self._meshes:
@@ -82,3 +87,12 @@ class EmbreeCaster:
             return np.zeros(len(origins), bool)
         limit = np.array(np.broadcast_to(maximum_range, len(origins)), np.float32)
         return np.asarray(self._scene.run(origins, directions, dists=limit, query="OCCLUDED") == 0)
+
+
+def _used_vertices(vertices: Float32, triangles: NDArray[np.int32]) -> tuple[Float32, NDArray[np.int32]]:
+    """Return the vertices (U, 3) that some triangles (N, 3) of a mesh need, and the triangles by these."""
+    first, last = int(triangles.min()), int(triangles.max())
+    if last - first < _SPREAD * triangles.size:  # nearly all of those in between: what is built together lies together
+        return vertices[first : last + 1], triangles - np.int32(first)
+    used, corners = np.unique(triangles, return_inverse=True)
+    return vertices[used], corners.reshape(triangles.shape).astype(np.int32)

@@ -78,11 +78,13 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         bare = replace(plan, records_seen_points=False, measured_layers=frozenset())
         casting = {rays: _measure_casting(replace(bare, rings=RINGS[rays])) for rays in _RAYS}
         writing = _measure_writing(files)
-        floors = [*casting.values(), writing]
+        own = casting[plan.rays_per_pulse]
+        scanning = timer.stages["scan"]["seconds"]
+        assert scanning is not None
+        floors = [*casting.values(), writing, _scan_rate(files, scanning, own, writing)]
         assert plan.request is not None
         if scenario.colour.source != "material":
             floors.append(measure_rendering(plan.request, _VIEWS))
-    own = casting[plan.rays_per_pulse]
     lines = {
         "points": files.counts.points / 1e6,
         "seconds": seconds,
@@ -94,6 +96,21 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         "writing": writing["ours"],
     }
     return {"cores": available_cores(), "stages": timer.stages, "lines": lines, "floors": floors}
+
+
+def _scan_rate(files: CloudFiles, seconds: float, casting: Rate, writing: Rate) -> Rate:
+    """Return the points of the whole scan per second, beside bare casting of its rays and compression of its points.
+
+    Args:
+        files: that the scan was written to.
+        seconds: of the scan.
+        casting, writing: rates of these, with as many rays per pulse as the scan's.
+    """
+    counts = files.counts
+    least = counts.rays / casting["floor"] + counts.points / writing["floor"]
+    name = "scan; Embree and lazrs alone, one after the other"
+    rates = {"ours": counts.points / seconds / 1e6, "floor": counts.points / least}
+    return {"name": name, "unit": "million points/s", **rates}
 
 
 def _measure_casting(plan: ScanPlan) -> Rate:

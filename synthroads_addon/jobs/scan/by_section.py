@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...base.arrays import Float
+from ...base.machine import release_memory
 from ...base.progress import StageTimer
 from ...blender.materials import RoadMaterials
 from ...blender.model.build import build_road, remove_road
@@ -84,6 +85,7 @@ class SectionScan:
             finally:
                 remove_road()
                 gc.collect()
+                release_memory()
             done += len(section.blocks)
             self.scanned += 1
 

@@ -19,7 +19,7 @@ from ...materials.table import Material, entry_of
 from ...materials.variation import vary_material, water_film
 from ...road.geometry import RoadGeometry
 from ...road.instances import InstanceNumbers
-from ...scanning.beam import outer_radii
+from ...scanning.beam import RINGS, outer_radii
 from ...scanning.blocks import Blocks
 from ...scanning.colour.colour import takes_nodes
 from ...scanning.colour.request import LayerRequest
@@ -35,6 +35,7 @@ from ...scanning.scene.bare_ground import MOST_CELLS, BareGround
 from ...scanning.scene.classify import classify_scene
 from ...scanning.scene.mesh import SceneMesh
 from ...scanning.scene.motion import ScannedScene
+from ...scanning.scene.outline import Outline
 from ...scanning.scene.target import Target
 from ...scanning.sway import with_motion
 from ...scanning.weather.registry import weather_of
@@ -122,6 +123,11 @@ def plan_scan(
     ground, all_from_surfaces = None, not effects and multipath is None
     if settings.footprints == "where_needed" and (rings or scenario.chooses) and all_from_surfaces:
         ground = _bare_ground(usual, surfaces, cut, outer_radii(rings, setting.divergence))
+    outline = None
+    if rings and not effects and len(usual.triangles):
+        widest = max(max(outer_radii(pattern, setting.divergence)) for pattern in RINGS.values())
+        margin = widest * setting.maximum_range  # measurements take the plan with other rays per pulse
+        outline = Outline(usual, lambda mesh: services.caster(scan.caster, mesh), margin)
     return ScanPlan(
         target=target,
         surfaces=surfaces,
@@ -136,6 +142,7 @@ def plan_scan(
         multipath=multipath,
         air_class=scenario.cloud.scheme().source_ids().get(AIR_CLASS, UNLABELLED),
         ground=ground,
+        outline=outline,
         beam=scan.beam,
         measured_layers=(kept & optional_arrays("scan")) | ({"normal", "material"} if shifts or tilting else set()),
         records_seen_points=bool(coloured) or by_layers or shifts or bool(tilting),

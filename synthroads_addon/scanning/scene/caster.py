@@ -90,4 +90,12 @@ class FacePlanes:
         return result
 
 
+def as_rows(vectors: Float) -> Float32:
+    """Return vectors (3, ...) as float32 rows (..., 3), the layout that casters take."""
+    result = np.empty((*vectors.shape[1:], 3), dtype=np.float32)
+    for i in range(3):
+        result[..., i] = vectors[i]
+    return result
+
+
 _BLOCK = 1 << 16

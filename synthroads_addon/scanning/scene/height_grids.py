@@ -35,7 +35,7 @@ class PlanGrids:
         cells: (L,) widths of the grids' cells, m; in the last grid the area is one box.
     """
 
-    def __init__(self, size: Float, cell: float, dtype: DTypeLike, empty: int) -> None:
+    def __init__(self, size: Float, cell: float, dtype: DTypeLike, empty: float) -> None:
         shapes = [tuple(max(1, int(np.ceil(side / cell))) for side in size)]
         while max(shapes[-1]) > WINDOW:
             shapes.append(tuple(-(-side // 2) for side in shapes[-1]))
@@ -58,12 +58,18 @@ class PlanGrids:
             cell += np.minimum(first[1] + column, last[1])
             np.maximum.at(grid.reshape(-1), cell, value)
 
-    def finish(self) -> None:
-        """Give each grid what was drawn in the others, and make the grids ready to be asked."""
+    def spread(self) -> AnyArray:
+        """Give each grid what was drawn in coarser ones; return the finest, whose values are then whole."""
         grids = self._grids
         for fine, coarse in zip(grids[-2::-1], grids[:0:-1], strict=True):
             for part, inner in _quarters(fine, coarse):
                 np.maximum(part, inner, out=part)
+        return grids[0]
+
+    def finish(self) -> None:
+        """Give each grid what was drawn in the others, and make the grids ready to be asked."""
+        self.spread()
+        grids = self._grids
         for fine, coarse in pairwise(grids):
             for part, inner in _quarters(fine, coarse):
                 np.maximum(part, inner, out=inner)
@@ -131,7 +137,7 @@ class HeightGrids:
         for start in range(0, len(triangles), _AT_ONCE):
             corners = vertices[:, triangles[start : start + _AT_ONCE].T]  # coordinate, corner, triangle
             for part in _pieces(corners, longest):
-                self.draw_boxes(*_extremes(part), finest)
+                self.draw_boxes(*extremes(part), finest)
 
     def draw_boxes(self, low: Float32, high: Float32, finest: float = 0.0) -> None:
         """Draw boxes with corners (3, N), m, each in the grid of the finest cells of which it is two wide at most.
@@ -228,7 +234,7 @@ class _Beams:
         return _Beams(**{name: array[rows] for name, array in values.items()})
 
 
-def _extremes(corners: Float32) -> tuple[Float32, Float32]:
+def extremes(corners: Float32) -> tuple[Float32, Float32]:
     """Return the smallest and the largest coordinates (D, T) of triangles (D, 3, T), by coordinate and corner."""
     a, b, c = (corners[:, i] for i in range(3))
     return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
@@ -237,7 +243,7 @@ def _extremes(corners: Float32) -> tuple[Float32, Float32]:
 def _pieces(corners: Float32, longest: float) -> Iterator[Float32]:
     """Yield triangles (3, 3, T), by coordinate and corner, the long ones cut at the middle of their longest side."""
     while corners.shape[2]:
-        low, high = _extremes(corners[:2])
+        low, high = extremes(corners[:2])
         long = np.maximum(*(high - low)) > longest
         if not long.any():
             yield corners

@@ -13,7 +13,7 @@ from ...base.classes import UNLABELLED
 from ...cloud.points import NO_MATERIAL
 from ..knots import PoseCache, Track, track_knots
 from .bundles import Bundles
-from .caster import Caster, FacePlanes
+from .caster import Caster, FacePlanes, as_rows
 from .mesh import SceneMesh
 from .motion import MovingMesh, ScannedScene
 
@@ -185,7 +185,7 @@ class Target:
             reach: how far is looked, m.
         """
         towards = np.broadcast_to(direction[:, None], origins.shape)
-        free = ~self.caster.occluded(_as_rows(origins), _as_rows(towards), reach)
+        free = ~self.caster.occluded(as_rows(origins), as_rows(towards), reach)
         if not self.moving or not len(times):
             return free
         rays = Bundles.gather(origins, towards, times, np.full(len(times), reach))
@@ -328,17 +328,9 @@ def _as_rays(origins: Float, directions: Float) -> tuple[Float32, Float32]:
         directions: (3, ...).
     """
     shape = (*directions.shape[:0:-1], 3)
-    rows = (_as_rows(np.moveaxis(vectors.T, -1, 0)) for vectors in (origins, directions))
+    rows = (as_rows(np.moveaxis(vectors.T, -1, 0)) for vectors in (origins, directions))
     begin, towards = (np.broadcast_to(array, shape).reshape(-1, 3) for array in rows)
     return begin, towards
-
-
-def _as_rows(vectors: Float) -> Float32:
-    """Return vectors (3, ...) as float32 rows (..., 3), the layout that casters take."""
-    result = np.empty((*vectors.shape[1:], 3), dtype=np.float32)
-    for i in range(3):
-        result[..., i] = vectors[i]
-    return result
 
 
 def _cast_moving(part: _TargetPart, track: Track, rays: Bundles, maximum_range: float, nearest: FirstHits) -> None:
@@ -364,7 +356,7 @@ def _clear_blocked(part: _TargetPart, track: Track, rays: Bundles, reach: float,
     rotation, place, present = track.at(rays.times[near])
     near, rotation, place = near[present], rotation[:, present], place[:, present]
     begin, towards = _unrotate(rotation, rays.origins[:, near] - place), _unrotate(rotation, rays.directions[:, near])
-    free[near[part.caster.occluded(_as_rows(begin), _as_rows(towards), reach)]] = False
+    free[near[part.caster.occluded(as_rows(begin), as_rows(towards), reach)]] = False
 
 
 def _crosses_box(begin: Float, towards: Float, reach: Float, half: Float) -> Bool:

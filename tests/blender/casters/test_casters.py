@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -121,6 +122,17 @@ def test_no_ray_slips_through_an_edge(name: str) -> None:
     directions = goals - origins
     directions /= np.linalg.norm(directions, axis=1)[:, None]
     assert (make_caster(name, mesh).cast(origins, directions.astype(np.float32), RANGE) >= 0).all()
+
+
+def test_a_mesh_in_pieces_has_the_faces_of_a_whole_one() -> None:
+    """Also where the pieces' vertices lie all over the mesh, which are sorted out then."""
+    mesh, (origins, directions) = waves(160), rays()
+    order = stream(0, "order").permutation(len(mesh))
+    for triangles in (mesh.triangles, mesh.triangles[order]):
+        one = replace(mesh, triangles=triangles)
+        whole, pieces = (EmbreeCaster(one, in_pieces=kind).cast(origins, directions, RANGE) for kind in (False, True))
+        assert whole.max() > 2 * 20_000  # several pieces
+        np.testing.assert_array_equal(pieces, whole)
 
 
 @pytest.mark.parametrize("name", NAMES)
