@@ -131,6 +131,8 @@ def _branches(tree: Tree, points: Value, thick: Value) -> Value:
         rotation=tree.node("FunctionNodeAlignRotationToVector", vector=along, axis="Z").value,
         scale=op.vector(tree, width, width, length),
     ).value
+    for name in ("end", "share", "size"):  # the many points of many plants would carry them along
+        branches = tree.node("GeometryNodeRemoveAttribute", branches, name=name).value
     return op.realize(branches)
 
 
