@@ -9,8 +9,10 @@ from typing import Any
 import bpy
 
 _NOT_SETTINGS = frozenset(bpy.types.Node.bl_rna.properties.keys()) | {"node_tree", "active_index", "active_item"}
-_ITEMS = ("index_switch_items", "enum_items", "capture_items")
+_ITEMS = ("index_switch_items", "enum_items")
 """Collections of nodes whose length is a number of sockets."""
+_CAPTURED = {"FLOAT_VECTOR": "VECTOR"}
+"""Type of a captured value, as its node says it -> as it is made; the others are called the same."""
 _PLAIN_KINDS = ("BOOLEAN", "INT", "FLOAT", "ENUM", "STRING")
 _SOCKET_FIELDS = ("description", "subtype", "min_value", "max_value", "default_value")
 
@@ -79,6 +81,8 @@ def _node_line(node: bpy.types.Node, numbers: dict[str, int]) -> dict[str, Any]:
     line["place"] = list(node.location)
     line["settings"] = {name: _plain(getattr(node, name)) for name in _settings(node)}
     line["items"] = {name: len(getattr(node, name)) for name in _ITEMS if hasattr(node, name)}
+    captured = getattr(node, "capture_items", ())
+    line["captured"] = [[_CAPTURED.get(item.data_type, item.data_type), item.name] for item in captured]
     line["calls"] = node.node_tree.name if node.type == "GROUP" else None
     values = ((number, getattr(socket, "default_value", None)) for number, socket in enumerate(node.inputs))
     line["inputs"] = {str(number): _plain(value) for number, value in values if _plain(value) is not None}
@@ -96,6 +100,8 @@ def _make_node(group: bpy.types.NodeTree, line: dict[str, Any]) -> bpy.types.Nod
     for name, count in line["items"].items():
         while len(getattr(node, name)) < count:
             getattr(node, name).new()
+    for kind, name in line["captured"]:
+        node.capture_items.new(kind, name)
     for number, value in line["inputs"].items():
         node.inputs[int(number)].default_value = value
     return node
