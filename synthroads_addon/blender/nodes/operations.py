@@ -8,8 +8,7 @@ SMALLEST_AREA = 1e-7
 """Faces smaller than this (m2) come from strips of no width or cut offset curves; damage has larger cells."""
 
 _DATA_TYPES = {"VALUE": "FLOAT", "INT": "INT", "BOOLEAN": "BOOLEAN", "VECTOR": "FLOAT_VECTOR"}
-_CAPTURE_TYPES = {"VALUE": "FLOAT", "INT": "INT", "BOOLEAN": "BOOLEAN", "VECTOR": "VECTOR"}
-_SWITCH_TYPES = {"VALUE": "FLOAT", "INT": "INT", "BOOLEAN": "BOOLEAN", "VECTOR": "VECTOR"}
+_SOCKET_TYPES = {"VALUE": "FLOAT", "INT": "INT", "BOOLEAN": "BOOLEAN", "VECTOR": "VECTOR"}
 
 
 def index(tree: Tree) -> Value:
@@ -99,7 +98,7 @@ def component(a: Value, axis: str) -> Value:
 def switch(condition: Value, false: Operand, true: Operand) -> Value:
     """Add a switch node: `true` where the condition holds, else `false`."""
     kinds = [value.kind for value in (false, true) if isinstance(value, Value)]
-    kind = _SWITCH_TYPES.get(kinds[0] if kinds else "VALUE", kinds[0] if kinds else "FLOAT")
+    kind = _SOCKET_TYPES.get(kinds[0] if kinds else "VALUE", kinds[0] if kinds else "FLOAT")
     return condition.tree.node("GeometryNodeSwitch", condition, false, true, input_type=kind).value
 
 
@@ -188,9 +187,29 @@ def capture(geometry: Value, **values: Value) -> tuple[Value, dict[str, Value]]:
     """Add a node that evaluates several fields on the points together; return the geometry, and the values by name."""
     node = geometry.tree.node("GeometryNodeCaptureAttribute", geometry)
     for name, value in values.items():
-        node.raw.capture_items.new(_CAPTURE_TYPES[value.kind], name)
+        node.raw.capture_items.new(_SOCKET_TYPES[value.kind], name)
         geometry.tree.feed(next(socket for socket in node.raw.inputs if socket.name == name), value)
     return node["Geometry"], {name: node[name] for name in values}
+
+
+def one_on_each(points: Value, bodies: Value, pick: str) -> Value:
+    """Add nodes that put one of some instances on each point, as its attributes say; return the instances.
+
+    Args:
+        points: with ``size`` (a vector), ``turn`` about the vertical (rad) and the number of their body.
+        bodies: the instances to choose from.
+        pick: name of the attribute with that number.
+    """
+    tree = points.tree
+    return tree.node(
+        "GeometryNodeInstanceOnPoints",
+        points,
+        instance=bodies,
+        pick_instance=True,
+        instance_index=named_attribute(tree, pick, "INT"),
+        rotation=turn(tree, z=named_attribute(tree, "turn")),
+        scale=named_attribute(tree, "size", "FLOAT_VECTOR"),
+    ).value
 
 
 def delete_faces(geometry: Value, selection: Value) -> Value:

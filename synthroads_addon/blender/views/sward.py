@@ -172,13 +172,5 @@ def _build(tree: Tree, material: str) -> None:
         painted = [paint_faces(tuft, picked_material(tree, material)) for tuft in tufts]
         bodies = op.join(*(tree.node("GeometryNodeGeometryToInstance", tuft).value for tuft in painted))
     with tree.frame("On the points"):
-        sward = tree.node(
-            "GeometryNodeInstanceOnPoints",
-            points,
-            instance=bodies,
-            pick_instance=True,
-            instance_index=op.named_attribute(tree, "tuft", "INT"),
-            rotation=op.turn(tree, z=op.named_attribute(tree, "turn")),
-            scale=op.named_attribute(tree, "size", "FLOAT_VECTOR"),
-        ).value
+        sward = op.one_on_each(points, bodies, "tuft")
     tree.output("Instances", sward, description="Grass")

@@ -60,15 +60,7 @@ def _build(tree: Tree, materials: tuple[tuple[str, str], ...], bare: bool) -> No
             made = paint_faces(made, picked_material(tree, names[leaves]))
             crowns.append(tree.node("GeometryNodeGeometryToInstance", op.join(made, _trunk(tree, names))).value)
     with tree.frame("On the points"):
-        woods = tree.node(
-            "GeometryNodeInstanceOnPoints",
-            points,
-            instance=op.join(*crowns),
-            pick_instance=True,
-            instance_index=op.named_attribute(tree, "crown", "INT"),
-            rotation=op.turn(tree, z=op.named_attribute(tree, "turn")),
-            scale=op.named_attribute(tree, "size", "FLOAT_VECTOR"),
-        ).value
+        woods = op.one_on_each(points, op.join(*crowns), "crown")
     tree.output("Instances", woods, description="Trees")
 
 
