@@ -113,9 +113,14 @@ class CropDataset(Dataset[Item]):
         return len(self.plan)
 
     def __getitem__(self, place: int) -> Item:
+        crop, random = self.crop(place)
+        return make_item(crop, self.settings, random)
+
+    def crop(self, place: int) -> tuple[Crop, np.random.Generator]:
+        """Return a planned crop with its effects, and the random stream that goes on after them."""
         draw = self.plan[place]
         random = stream(self.seed, "crop", self.epoch, draw.tile, draw.number)
-        return _draw_crop(self, draw.tile, random)
+        return _draw_crop(self, draw.tile, random), random
 
 
 @dataclass(eq=False)
@@ -136,7 +141,7 @@ class CropStream(IterableDataset[Item]):
         worker = get_worker_info()
         random = stream(self.seed, "crops", 0 if worker is None else worker.id)
         while True:
-            yield _draw_crop(self, int(random.integers(len(self.tiles))), random)
+            yield make_item(_draw_crop(self, int(random.integers(len(self.tiles))), random), self.settings, random)
 
 
 def cut_crop(tile: CloudTile, middle: Float32, points: int, scaling: Scaling) -> Crop:
@@ -157,6 +162,12 @@ def crop_of(tile: CloudTile, scaling: Scaling) -> Crop:
     return Crop(tile.coord, None if tile.strength is None else scaling.apply(tile.strength), color, tile.segment)
 
 
+def centred(coord: AnyArray) -> Float32:
+    """Return coordinates (N, 3) less the mean of x and y and the median of z."""
+    middle = [*coord[:, :2].mean(axis=0, dtype=np.float64), np.median(coord[:, 2])]
+    return np.asarray((coord - np.array(middle)).astype(np.float32))
+
+
 def make_item(crop: Crop, settings: CropSettings, random: np.random.Generator) -> Item:
     """Return a crop as a dictionary of tensors (see the module), centred; noise stands for missing features.
 
@@ -168,8 +179,7 @@ def make_item(crop: Crop, settings: CropSettings, random: np.random.Generator) -
     count = len(crop)
     if count == 0:
         raise InputError("crop", 0, "has no points")
-    middle = [*crop.coord[:, :2].mean(axis=0, dtype=np.float64), np.median(crop.coord[:, 2])]
-    coord = (crop.coord - np.array(middle)).astype(np.float32)
+    coord = centred(crop.coord)
     color = _noise(random, (count, 3)) if crop.color is None else crop.color
     strength = _noise(random, (count, 1)) if crop.strength is None else crop.strength[:, None]
     columns = np.concatenate([coord / COORDINATE_SPAN, color, strength], axis=1)
@@ -187,13 +197,13 @@ def make_item(crop: Crop, settings: CropSettings, random: np.random.Generator) -
     return {name: torch.from_numpy(np.ascontiguousarray(array)) for name, array in arrays.items()}
 
 
-def _draw_crop(crops: CropDataset | CropStream, place: int, random: np.random.Generator) -> Item:
-    """Return an augmented crop as an item, around a random point of the tile, or of the tile that the seeds choose."""
+def _draw_crop(crops: CropDataset | CropStream, place: int, random: np.random.Generator) -> Crop:
+    """Return an augmented crop around a random point of the tile, or of the tile that the seeds choose."""
     number, point = crops.seeds.draw(place, random)
     tile = crops.tiles[number]
     crop = cut_crop(tile, tile.coord[point], crops.settings.points, crops.scalings[tile.scene])
     apply_effects("segmentation", crop, crops.effects, random)
-    return make_item(crop, crops.settings, random)
+    return crop
 
 
 def collate(items: Sequence[Item]) -> Item:

@@ -2,7 +2,7 @@
 
 import tempfile
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -121,11 +121,16 @@ def _folder_tiles(path: Path, scheme: ClassScheme, source: Source) -> Iterator[C
         yield from pointcept_tiles(root, scheme, source.split)
         return
     folder = path / source.split if source.split else path
+    for cloud in clouds_below(folder):
+        yield from cloud_tiles(cloud, scheme, source, cloud.relative_to(folder).with_suffix("").as_posix())
+
+
+def clouds_below(folder: Path) -> list[Path]:
+    """Return the clouds in a folder and those below it, sorted; raise `MissingFileError` if there are none."""
     clouds = sorted(file for file in files_below(folder) if file.suffix.lower() in ENDINGS and file.is_file())
     if not clouds:
         raise MissingFileError(str(folder), None, "holds neither tiles of a data set nor clouds")
-    for cloud in clouds:
-        yield from cloud_tiles(cloud, scheme, source, cloud.relative_to(folder).with_suffix("").as_posix())
+    return clouds
 
 
 def pointcept_root(path: Path) -> Path | None:
@@ -221,14 +226,40 @@ def cloud_tiles(path: Path, scheme: ClassScheme, source: Source, scene: str | No
     Raises:
         InputError: the cloud has no points, or no labels of its own and there is no mapping, or it is damaged.
     """
+    yield from _tiles_of_cloud(path, source.tile, scene, lambda cloud: labelled_blocks(cloud, scheme, source))
+
+
+def unlabelled_tiles(source: Source, voxel: float) -> Iterator[CloudTile]:
+    """Yield the tiles of a cloud, or of all clouds in a folder, thinned to one point per voxel, all labels `IGNORED`.
+
+    Raises:
+        MissingFileError: there is no cloud.
+        InputError: a cloud is damaged, or has no points.
+    """
+    path = Path(source.path)
+    clouds = clouds_below(path / source.split if source.split else path) if path.is_dir() else [path]
+    for number, cloud in enumerate(clouds):
+        for tile in _tiles_of_cloud(cloud, source.tile, f"{number}/{cloud.stem}", unlabelled_blocks):
+            yield tile.select(voxel_sample(tile.coord, voxel))
+
+
+def unlabelled_blocks(cloud: CloudReader) -> Iterator[PointBlock]:
+    """Yield a cloud's blocks without labels, whatever they are."""
+    for block in cloud.blocks():
+        yield _with_places(block, np.full(len(block), IGNORED, dtype=np.int16))
+
+
+def _tiles_of_cloud(
+    path: Path, edge: float, scene: str | None, blocks: Callable[[CloudReader], Iterator[PointBlock]]
+) -> Iterator[CloudTile]:
+    """Yield a cloud's blocks, as a function gives them, sorted into square tiles of an edge (m)."""
     with open_cloud(path) as cloud, tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
         if not cloud.header.count:
             raise InputError(str(path), 0, "holds no points to learn from")
         scale = steps_per_unit(cloud)
         low = np.min([block.xyz.min(axis=0) for block in cloud.blocks() if len(block)], axis=0)
-        origin = np.floor(low)
-        with TileSorter(source.tile, origin, Path(folder)) as sorter:
-            sorter.add(labelled_blocks(cloud, scheme, source))
+        with TileSorter(edge, np.floor(low), Path(folder)) as sorter:
+            sorter.add(blocks(cloud))
             for part in sorter.tiles():
                 yield tile_of(part.points, scene or path.stem, part.corner, scale)
 

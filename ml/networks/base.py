@@ -36,6 +36,11 @@ class SegmentationNetwork(Part):
 
     name: str
 
+    @property
+    def prepares_on_gpu(self) -> bool:
+        """Return whether `prepare` works on a GPU's tensors; else workers prepare batches on the CPU."""
+        return False
+
     def build(self, features: int, classes: int) -> nn.Module:
         """Return the network with random weights.
 
@@ -44,7 +49,7 @@ class SegmentationNetwork(Part):
         raise NotImplementedError
 
     def prepare(self, batch: Batch) -> Batch:
-        """Return the batch with what the network needs precomputed on the CPU, in workers; here unchanged."""
+        """Return the batch with what the network needs precomputed, on the batch's device; here unchanged."""
         return batch
 
     def shift_scores(self, model: nn.Module, offsets: Tensor) -> None:

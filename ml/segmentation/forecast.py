@@ -35,10 +35,11 @@ def forecast(configuration: SegmentationConfiguration, steps: int) -> dict[str, 
     One more step goes first and isn't counted.
 
     Raises:
-        InputError: the data are missing, or their tiles have fewer points than a crop; or the set-up is fine-tuning.
+        InputError: the data are missing, or their tiles have fewer points than a crop; or the set-up has several
+            trainings.
     """
-    if configuration.set_up == "fine_tuned":
-        raise InputError("set_up", configuration.set_up, "has two trainings: forecast each by itself")
+    if configuration.set_up in ("fine_tuned", "self_trained"):
+        raise InputError("set_up", configuration.set_up, "has several trainings: forecast each by itself")
     device = chosen_device(configuration)
     sources = [source for found in configuration.needed_sources().values() for source in found]
     count = sum(tile_count(source, configuration) for source in sources)
@@ -91,7 +92,7 @@ def timed_steps(
     optimizer = optimizer_of(model, configuration.schedule)
     loss = objective(configuration, tiles, device)
     wall, cpu = [], []
-    enough = CropBatches(configuration.model_copy(update={"crops_per_tile": configuration.batch}), [tiles])
+    enough = CropBatches(configuration.model_copy(update={"crops_per_tile": configuration.batch}), [tiles], device)
     batches = chain.from_iterable(map(enough, count()))  # epoch after epoch
     for _ in range(steps + 1):
         begin = time.perf_counter(), time.process_time()

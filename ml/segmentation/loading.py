@@ -12,12 +12,14 @@ from synthroads_addon.base.random_streams import stream
 
 from ..data.classes import class_names
 from ..data.crops import CropDataset, Draw, Item, Seeds, collate
+from ..data.exchange import ExchangedCrops
 from ..data.sources import Source, read_tiles
 from ..data.tiles import CloudTile, scalings
 from ..data.workers import load_batches
-from .network import overlay_clouds
+from .network import gpu_prepares, overlay_clouds
 from .recipes import SegmentationConfiguration, mapped_intensities, plan
 
+_CPU = torch.device("cpu")
 SMALLEST_SHARE = 0.25
 """Of a crop's points: tiles with fewer are left out of training, unless all have."""
 
@@ -58,14 +60,21 @@ class CropBatches:
     Args:
         configuration: of the training.
         domains: the tiles of each; the synthetic ones first where there are two.
+        device: that they are for; on a GPU the network may prepare them itself.
     """
 
-    def __init__(self, configuration: SegmentationConfiguration, domains: Iterable[Sequence[CloudTile]]) -> None:
+    def __init__(
+        self,
+        configuration: SegmentationConfiguration,
+        domains: Iterable[Sequence[CloudTile]],
+        device: torch.device = _CPU,
+    ) -> None:
         self.configuration = configuration
+        self.device = device
         self.domains = list(domains)
         self.tiles = [tile for tiles in self.domains for tile in tiles]
         self.scaling = scalings(self.tiles, configuration.intensity)
-        self.seeds = Seeds(self.tiles, len(class_names(configuration.scheme())), configuration.balanced)
+        self.seeds = self._seeds(self.tiles, balanced=configuration.balanced)
 
     def __len__(self) -> int:
         return math.ceil(self.configuration.crops_per_tile * len(self.tiles) / self.configuration.batch)
@@ -74,46 +83,93 @@ class CropBatches:
         """Yield the batches of an epoch whose numbers, from 0, `share` selects."""
         given, sizes = self.configuration, [len(tiles) for tiles in self.domains]
         draws = plan(sizes, given.crops_per_tile, given.synthetic_share, given.seed, epoch)
-        crops = CropDataset(
-            self.tiles,
-            self.scaling,
-            given.crop_settings(),
-            draws,
-            self.seeds,
-            effects=given.effects,
-            seed=given.seed,
-            epoch=epoch,
-        )
-        yield from _load_crops(crops, given, epoch, given.adaptation.mix3d, share)
+        crops = self._crops(self.tiles, draws, self.seeds, epoch)
+        yield from _load_crops(crops, given, epoch, given.adaptation.mix3d, share, self.device)
+
+    def _seeds(self, tiles: Sequence[CloudTile], *, balanced: bool) -> Seeds:
+        return Seeds(tiles, len(class_names(self.configuration.scheme())), balanced)
+
+    def _crops(self, tiles: Sequence[CloudTile], draws: Sequence[Draw], seeds: Seeds, epoch: int) -> CropDataset:
+        given = self.configuration
+        settings, scaling = given.crop_settings(), self.scaling
+        return CropDataset(tiles, scaling, settings, draws, seeds, effects=given.effects, seed=given.seed, epoch=epoch)
+
+
+class ExchangedBatches(CropBatches):
+    """Training batches of pairs of crops, synthetic and target ones, with parts of each other in them.
+
+    Args: see `CropBatches`; the domains are synthetic tiles and those of the target with believed labels.
+    """
+
+    def __len__(self) -> int:
+        return math.ceil(self._pairs() / self._pairs_per_batch())
+
+    def __call__(self, epoch: int, share: slice = slice(None)) -> Iterator[Item]:
+        """Yield the batches of an epoch whose numbers, from 0, `share` selects."""
+        given, (synthetic, target) = self.configuration, self.domains
+        parts = [
+            self._crops(tiles, self._draws(len(tiles), place, epoch), self._seeds(tiles, balanced=balanced), epoch)
+            for place, (tiles, balanced) in enumerate([(synthetic, given.balanced), (target, False)])
+        ]
+        pairs = ExchangedCrops(parts[0], parts[1], given.seed, epoch)
+        yield from _load_crops(pairs, given, epoch, 0.0, share, self.device, self._pairs_per_batch())
+
+    def _pairs(self) -> int:
+        """Return the pairs of an epoch: as many as there are crops of synthetic tiles."""
+        return self.configuration.crops_per_tile * len(self.domains[0])
+
+    def _pairs_per_batch(self) -> int:
+        return max(self.configuration.batch // 2, 1)
+
+    def _draws(self, tiles: int, place: int, epoch: int) -> list[Draw]:
+        """Return one draw of a domain's tiles for each pair, all tiles as often, in random order."""
+        order = stream(self.configuration.seed, "pairs", place, epoch).permutation(self._pairs())
+        # Crops of the two domains have numbers, and with them random streams, of their own.
+        return [Draw(int(number % tiles), int(number // tiles) * 2 + place) for number in order]
 
 
 def _load_crops(
-    dataset: CropDataset, configuration: SegmentationConfiguration, epoch: int, mix3d: float, share: slice
+    dataset: CropDataset | ExchangedCrops,
+    configuration: SegmentationConfiguration,
+    epoch: int,
+    mix3d: float,
+    share: slice,
+    device: torch.device,
+    size: int | None = None,
 ) -> Iterator[Item]:
-    numbers, size = range(len(dataset)), configuration.batch
+    """Yield batches of so many elements of a data set; as the configuration says if not given."""
+    numbers, size = range(len(dataset)), size or configuration.batch
     return load_batches(
         dataset,
         [numbers[first : first + size] for first in numbers[::size][share]],
-        Collate(configuration, epoch, mix3d),
+        Collate(configuration, epoch, mix3d, gpu_prepares(configuration, device)),
         configuration.workers,
-        pin_memory=configuration.device != "cpu" and torch.cuda.is_available(),
+        pin_memory=device.type == "cuda",
     )
 
 
 @dataclass(frozen=True)
 class Collate:
-    """Collate function run in the workers: batches items, at random overlays them (Mix3D), and finds neighbours."""
+    """Collate function run in the workers: batches items, at random overlays them (Mix3D), and prepares them.
+
+    Attributes:
+        configuration, epoch: of the training.
+        mix3d: share of batches that are overlaid.
+        late: whether batches are left to be prepared by the network's device.
+    """
 
     configuration: SegmentationConfiguration
     epoch: int
     mix3d: float
+    late: bool
 
-    def __call__(self, items: Sequence[Item]) -> Item:
-        """Return the items' batch, perhaps overlaid, prepared for the network."""
+    def __call__(self, found: Sequence[Item] | Sequence[list[Item]]) -> Item:
+        """Return the batch of items or of pairs, perhaps overlaid, prepared unless the GPU does that."""
+        items = [item for each in found for item in (each if isinstance(each, list) else [each])]
         batch = collate(items)
         if self.mix3d and self._chance(items[0]) < self.mix3d:
             batch = overlay_clouds(batch)
-        return self.configuration.network.prepare(batch)
+        return batch if self.late else self.configuration.network.prepare(batch)
 
     def _chance(self, first: Item) -> float:
         """Return a random number from 0 to 1 seeded by the first item's points: workers don't know batch numbers."""
@@ -121,7 +177,9 @@ class Collate:
         return float(stream(self.configuration.seed, "mix3d", self.epoch, content).random())
 
 
-def adaptation_batches(tiles: list[CloudTile], configuration: SegmentationConfiguration) -> Iterator[Item]:
+def adaptation_batches(
+    tiles: list[CloudTile], configuration: SegmentationConfiguration, device: torch.device = _CPU
+) -> Iterator[Item]:
     """Yield batches of random unaugmented crops of a test's tiles, for AdaBN; none without tiles."""
     if not tiles:
         return
@@ -137,4 +195,4 @@ def adaptation_batches(tiles: list[CloudTile], configuration: SegmentationConfig
         Seeds(tiles, 0, balanced=False),
         seed=configuration.seed,
     )
-    yield from _load_crops(dataset, configuration, 0, 0.0, slice(None))
+    yield from _load_crops(dataset, configuration, 0, 0.0, slice(None), device)

@@ -29,14 +29,27 @@ def scores_of(model: nn.Module, batch: Item) -> Tensor:
     return scores
 
 
-def adapt_network(model: nn.Module, batches: Iterable[Item]) -> nn.Module:
+def gpu_prepares(configuration: SegmentationConfiguration, device: torch.device) -> bool:
+    """Return whether batches are prepared on the device, a GPU, and not by workers on the CPU."""
+    return device.type != "cpu" and configuration.network.prepares_on_gpu
+
+
+def prepare_on_gpu(configuration: SegmentationConfiguration, batch: Item) -> Item:
+    """Return a batch prepared where it lies on a GPU and the network can do it there; else as it is."""
+    late = gpu_prepares(configuration, batch["coord"].device)
+    return configuration.network.prepare(batch) if late else batch
+
+
+def adapt_network(model: nn.Module, batches: Iterable[Item], configuration: SegmentationConfiguration) -> nn.Module:
     """Return a copy of a network whose batch norms have the statistics of other points (AdaBN).
 
     Raises:
         InputError: there are no points.
     """
     other = deepcopy(model)
-    adapt_norms(other, batches, lambda batch: scores_of(other, move_to_device(other, batch)))
+    adapt_norms(
+        other, batches, lambda batch: scores_of(other, prepare_on_gpu(configuration, move_to_device(other, batch)))
+    )
     return other
 
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 else:
     NetworkModel = network_union("segmentation", "pointnext")
 
-SetUp = Literal["real", "synthetic", "mixed", "mixed_mapped", "fine_tuned"]
+SetUp = Literal["real", "synthetic", "mixed", "mixed_mapped", "fine_tuned", "self_trained"]
 
 
 class Adaptation(Part):
@@ -41,11 +41,21 @@ class Adaptation(Part):
     mix3d: float = quantity(0.0, ge=0, le=1, unit="1", description="Share of batches whose crops are laid over others.")
 
 
+class SelfTraining(Part):
+    """Options of self-training on unlabelled clouds, the set-up `self_trained`."""
+
+    rounds: int = quantity(2, ge=1, le=20, unit="1", description="How often labels are guessed and learned from.")
+    believed: float = quantity(
+        0.5, gt=0, le=1, unit="1", description="Share of the points called each class whose label is learned."
+    )
+
+
 class Data(Part):
     """Sources of real and synthetic training, validation and test points."""
 
     real: tuple[Source, ...] = Field((), description="Real training data, or what stands in for it.")
     synthetic: tuple[Source, ...] = Field((), description="Synthetic training data.")
+    target: tuple[Source, ...] = Field((), description="Clouds without labels that self-training adapts to.")
     validation: tuple[Source, ...] = Field((), description="Scored after each epoch; never trained on.")
     tests: dict[str, tuple[Source, ...]] = Field({}, description="Scored at the end, each by itself.")
 
@@ -82,7 +92,11 @@ class SegmentationConfiguration(Configuration):
     fitted_offsets: bool = Field(
         False, description="Add to each class's score what makes the mean IoU of the training tiles largest."
     )
-    fine_tuning: Schedule = Field(Schedule(epochs=30, learning_rate=0.001), description="Second part of fine_tuned.")
+    fine_tuning: Schedule = Field(
+        Schedule(epochs=30, learning_rate=0.001), description="Second part of fine_tuned; each round of self_trained."
+    )
+    self_training: SelfTraining = Field(SelfTraining(), description="Learning from unlabelled clouds.")
+    start: str = Field("", description="Run's folder or shipped model whose weights are begun with; random if empty.")
     data: Data = Field(Data(), description="Where points come from.")
 
     @field_validator("class_weights", mode="before")
@@ -120,11 +134,14 @@ class SegmentationConfiguration(Configuration):
         Raises:
             InputError: the set-up needs data of a kind and none are named.
         """
-        wanted = {"real": ("real",), "synthetic": ("synthetic",)}.get(self.set_up, ("synthetic", "real"))
+        alone = {"real": ("real",), "synthetic": ("synthetic",), "self_trained": ("synthetic",)}
+        wanted = alone.get(self.set_up, ("synthetic", "real"))
         found = {"real": self.data.real, "synthetic": self.data.synthetic}
         for domain in wanted:
             if not found[domain]:
                 raise InputError(f"data.{domain}", [], f"must name training data, which the set-up {self.set_up} needs")
+        if self.set_up == "self_trained" and not self.data.target:
+            raise InputError("data.target", [], "must name clouds to adapt to, which the set-up self_trained needs")
         return {domain: found[domain] for domain in wanted}
 
 

@@ -27,7 +27,7 @@ from ..runs import Run
 from ..scores.confusion import Confusion
 from ..training_loop import chosen_device, move_to_device
 from .loading import adaptation_batches, thin_tiles
-from .network import adapt_network, build, scores_of
+from .network import adapt_network, build, gpu_prepares, prepare_on_gpu, scores_of
 from .recipes import SegmentationConfiguration
 
 EDGE = 24.0
@@ -173,7 +173,9 @@ def classifier(model: nn.Module, configuration: SegmentationConfiguration) -> Cl
     def scores(batch: Item) -> Tensor:
         model.eval()
         with torch.inference_mode():
-            return scores_of(model, move_to_device(model, configuration.network.prepare(batch)))
+            if not gpu_prepares(configuration, next(model.parameters()).device):
+                batch = configuration.network.prepare(batch)
+            return scores_of(model, prepare_on_gpu(configuration, move_to_device(model, batch)))
 
     return scores
 
@@ -220,7 +222,8 @@ def score(
     if configuration.adaptation.adabn:
         tiles = list(thin_tiles(sources, configuration, "test"))
         with report_lost_workers(configuration.workers):
-            model = adapt_network(model, adaptation_batches(tiles, configuration))
+            batches = adaptation_batches(tiles, configuration, next(model.parameters()).device)
+            model = adapt_network(model, batches, configuration)
     scores = classifier(model, configuration)
     shown = None
     for source in sources:

@@ -26,15 +26,17 @@ from ..processes import helper_processes, process_number
 from ..runs import PRETRAINING, Run
 from ..scores.confusion import Confusion, score_table
 from ..scores.pictures import comparison
+from ..shipped import open_run
 from ..tasks import Evaluation, Prediction
 from ..training_loop import Figures, chosen_device, fit
 from .exporting import exportable_network
-from .loading import CropBatches, read_domains, thin_tiles
-from .network import build, scores_of
+from .loading import CropBatches, ExchangedBatches, read_domains, thin_tiles
+from .network import build, prepare_on_gpu, scores_of
 from .offsets import fit_offsets
 from .prediction import Labelling, predict_file
 from .recipes import SegmentationConfiguration, class_shares, class_weights
 from .scoring import check_tests, classifier, label_tile, score, score_all, trained_model
+from .self_training import believed_labels, target_tiles
 
 OFFSETS = "offsets"
 """Key of the checkpoint's offsets that were added to the network's scores, (C,)."""
@@ -175,7 +177,11 @@ def train_network(run: Run[SegmentationConfiguration], progress: Progress = sile
     validation = list(thin_tiles(configuration.data.validation, configuration, "validation"))
     torch.manual_seed(configuration.seed)
     model = build(configuration).to(device)
-    if configuration.set_up == "fine_tuned":
+    if configuration.start:
+        _begin_with(model, configuration)
+    if configuration.set_up == "self_trained":
+        _self_train(model, run, domains, validation, progress)
+    elif configuration.set_up == "fine_tuned":
         _fit(model, _pretraining(run), {"synthetic": domains["synthetic"]}, validation, progress)
         second = configuration.model_copy(update={"schedule": configuration.fine_tuning})
         _fit(model, replace(run, configuration=second), {"real": domains["real"]}, validation, progress)
@@ -199,8 +205,43 @@ def _shift_scores(model: nn.Module, run: Run[SegmentationConfiguration], domains
     run.save({**state, "model": model.state_dict(), OFFSETS: offsets})
 
 
+def _begin_with(model: nn.Module, configuration: SegmentationConfiguration) -> None:
+    """Load the weights that a training begins with, in place.
+
+    Raises:
+        MissingFileError: there is no such run or model.
+        InputError: it is of another network, of other classes, or sees other features.
+    """
+    before = open_run(Path(configuration.start))
+    for name in ("task", "classes", "features", "intensity", "network"):
+        told, wanted = getattr(before.configuration, name, None), getattr(configuration, name)
+        if told != wanted:
+            raise InputError("start", configuration.start, f"must have the same {name}: it has {told}, not {wanted}")
+    model.load_state_dict(trained_model(before).state_dict())
+
+
+def _self_train(
+    model: nn.Module,
+    run: Run[SegmentationConfiguration],
+    domains: Domains,
+    validation: list[CloudTile],
+    progress: Progress,
+) -> None:
+    """Train on synthetic tiles unless the training has a start, then round by round on the target's tiles as well."""
+    configuration = run.configuration
+    if not configuration.start:
+        _fit(model, _pretraining(run), domains, validation, progress)
+    target, rounds = target_tiles(configuration), configuration.self_training.rounds
+    part = configuration.model_copy(update={"schedule": configuration.fine_tuning})
+    for number in range(1, rounds + 1):
+        labelled = believed_labels(target, classifier(model, configuration), configuration)
+        folder = run.folder / PRETRAINING / f"round-{number}"
+        told = replace(run, configuration=part) if number == rounds else Run.start(folder, part, resume=True)
+        _fit(model, told, {**domains, "target": labelled}, validation, progress)
+
+
 def _pretraining(run: Run[SegmentationConfiguration]) -> Run[SegmentationConfiguration]:
-    """Start or resume the run of fine-tuning's first part, on synthetic data, in the run's folder; return it."""
+    """Start or resume the run of a training's first part, on synthetic data, in the run's folder; return it."""
     configuration = run.configuration.model_copy(update={"set_up": "synthetic"})
     return Run.start(run.folder / PRETRAINING, configuration, resume=True)
 
@@ -214,7 +255,9 @@ def _fit(
 ) -> None:
     """Train the model in place on some domains by the run's schedule, to the last epoch's weights."""
     configuration = run.configuration
-    batches, device = CropBatches(configuration, domains.values()), next(model.parameters()).device
+    device = next(model.parameters()).device
+    kind = ExchangedBatches if "target" in domains else CropBatches
+    batches = kind(configuration, domains.values(), device)
     loss = objective(configuration, batches.tiles, device)
     validate = _validation(configuration, validation) if validation else None
     with report_lost_workers(configuration.workers):
@@ -251,7 +294,7 @@ def objective(
     weights = torch.from_numpy(class_weights(shares, configuration.class_weights).astype(np.float32)).to(device)
 
     def loss(model: nn.Module, batch: Item) -> tuple[Tensor, Figures]:
-        scores, truth = scores_of(model, batch), batch["segment"]
+        scores, truth = scores_of(model, prepare_on_gpu(configuration, batch)), batch["segment"]
         value = smoothed_loss(scores, truth, weights, configuration.label_smoothing)
         known = truth != IGNORED
         right = (scores.detach().argmax(dim=1) == truth) & known

@@ -52,7 +52,7 @@ _STRIDE = 4
 """One in so many points stays."""
 _CHUNK = 1 << 15
 """Queries whose pairs are held at once."""
-_TINY = 1e-8
+TINY = 1e-8
 """Added to distances, m, before they are inverted: as in PointNet++."""
 
 
@@ -91,7 +91,7 @@ def build_neighbours(coord: torch.Tensor, offset: torch.Tensor, neighbourhood: N
         InputError: the offsets don't fit the points, a coordinate is not finite, or a cloud spans more cells of
             its thinnings than 2^62.
     """
-    ends = _check_ends(coord, offset)
+    ends = check_ends(coord, offset)
     bounds = list(itertools.pairwise([0, *ends.tolist()])) or [(0, 0)]
     clouds = [_stages_of(coord[begin:end].numpy(), neighbourhood) for begin, end in bounds]
     stages = range(len(neighbourhood.inner) + 1)
@@ -108,7 +108,8 @@ def build_neighbours(coord: torch.Tensor, offset: torch.Tensor, neighbourhood: N
     return packed
 
 
-def _check_ends(coord: torch.Tensor, offset: torch.Tensor) -> Int:
+def check_ends(coord: torch.Tensor, offset: torch.Tensor) -> Int:
+    """Return where each packed cloud ends (B,); raise `InputError` unless that fits the points and all are finite."""
     if coord.ndim != 2 or coord.shape[1] != 3 or not coord.is_floating_point():
         raise InputError("coord", tuple(coord.shape), "must be floating-point numbers of the shape (N, 3)")
     ends = np.asarray(offset.cpu().numpy(), dtype=np.int64)
@@ -229,6 +230,6 @@ def nearest_three(points: Float, tree: cKDTree | None) -> tuple[Int, Float]:
     if tree is not None:
         count = min(tree.n, 3)
         distance, index = tree.query(points, k=[*range(1, count + 1)])
-        nearest[:, :count], weight[:, :count] = index, 1.0 / (distance + _TINY)
+        nearest[:, :count], weight[:, :count] = index, 1.0 / (distance + TINY)
         weight /= weight.sum(axis=1, keepdims=True)
     return nearest, weight

@@ -20,6 +20,7 @@ from synthroads_addon.base.schema import quantity
 
 from ...registry import network
 from ..base import Batch, SegmentationNetwork
+from . import gpu_neighbours
 from .grouping import Grouping, Norm, interpolate, normalised_max, normalised_max_of_two
 from .neighbours import Neighbourhood, Neighbours, Sampling, build_neighbours
 
@@ -69,8 +70,14 @@ class PointNeXtOptions(SegmentationNetwork):
         return PointNeXt(self, features, classes)
 
     def prepare(self, batch: Batch) -> Batch:
-        """Return the batch with all stages' sampled points and neighbour indices added, computed on the CPU."""
-        return batch | build_neighbours(batch["coord"], batch["offset"], self.neighbourhood)
+        """Return the batch with all stages' sampled points and neighbour indices added."""
+        search = build_neighbours if batch["coord"].device.type == "cpu" else gpu_neighbours.build_neighbours
+        return batch | search(batch["coord"], batch["offset"], self.neighbourhood)
+
+    @property
+    def prepares_on_gpu(self) -> bool:
+        """Return whether neighbours are found on a GPU: not with farthest points, one after the other."""
+        return self.sampling == "grid"
 
 
 class PointNeXt(nn.Module):

@@ -23,7 +23,7 @@ from ml.data.classes import IGNORED
 from ml.data.sources import Source, read_tiles
 from ml.data.tiles import scalings
 from ml.runs import CHECKPOINT, PRETRAINING, Run
-from ml.segmentation import experiment, task
+from ml.segmentation import experiment, loading, network, scoring, task
 from ml.segmentation.experiment import configurations, load_experiment, table
 from ml.segmentation.loading import CropBatches, adaptation_batches, read_domains
 from ml.segmentation.network import build
@@ -116,6 +116,29 @@ def test_best_answer_to_a_smoothed_label_is_the_label_however_rare_others_are() 
         smoothed_loss(scores, truth, weight, 0.2).backward()
         descent.step()
     assert scores.softmax(dim=1)[0].tolist() == pytest.approx([0.84, 0.04, 0.04, 0.04, 0.04], abs=0.01)
+
+
+def test_batches_that_are_left_to_a_gpu_give_the_same_network(
+    data: Path, trained: Trained, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for module in (loading, network, scoring):
+        monkeypatch.setattr(module, "gpu_prepares", lambda *_: True)  # as if this processor were one
+    kind = type(small(data).network)
+    looked, prepare = [], kind.prepare
+
+    def counted(options: Any, batch: Any) -> Any:
+        looked.append("positions0" in batch)
+        return prepare(options, batch)
+
+    monkeypatch.setattr(kind, "prepare", counted)
+    configuration = small(data, set_up="real", fine_tuning=FINE_TUNING)
+    run = Run.start(tmp_path / "run", configuration)
+    task.train(run)
+    assert same(weights(tmp_path / "run"), weights(trained("real")))
+    model, tiles = scoring.trained_model(run), read_domains(configuration)["real"]
+    network.adapt_network(model, adaptation_batches(tiles, configuration), configuration)
+    assert looked
+    assert not any(looked)  # each batch once
 
 
 @pytest.mark.parametrize("set_up", ["real", "mixed_mapped"])

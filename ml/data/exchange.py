@@ -1,0 +1,68 @@
+"""Crops of two domains with parts of each other in them.
+
+Saltori et al., "CoSMix: compositional semantic mix for domain adaptation in 3D LiDAR segmentation" (2022): points of
+some classes are laid into the other domain's crop, so that the surroundings don't tell a network which domain it is in.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from synthroads_addon.base.arrays import Bool
+from synthroads_addon.base.random_streams import stream
+
+from .classes import IGNORED
+from .crops import CropDataset, Item, centred, make_item
+from .samples import Crop
+
+
+@dataclass(frozen=True)
+class ExchangedCrops:
+    """Pairs of crops, a synthetic and a target one, each with points of some of the other's classes laid into it.
+
+    Attributes:
+        synthetic, target: the crops of an epoch, as many of each.
+        seed, epoch: of the choice of classes.
+    """
+
+    synthetic: CropDataset
+    target: CropDataset
+    seed: int
+    epoch: int
+
+    def __len__(self) -> int:
+        return len(self.synthetic)
+
+    def __getitem__(self, place: int) -> list[Item]:
+        """Return the pair at a place as two items."""
+        given, random = self.synthetic.crop(place)
+        wanted, _ = self.target.crop(place)
+        pair = exchanged(given, wanted, stream(self.seed, "exchange", self.epoch, place))
+        return [make_item(crop, self.synthetic.settings, random) for crop in pair]
+
+
+def exchanged(one: Crop, other: Crop, random: np.random.Generator) -> tuple[Crop, Crop]:
+    """Return two crops, centred, each with the other's points of a random half of the other's classes laid into it."""
+    centred_pair = [replace(crop, coord=centred(crop.coord)) for crop in (one, other)]
+    taken = [_some_classes(crop, random) for crop in centred_pair]
+    first, second = centred_pair
+    return _joined(first, second, taken[1]), _joined(second, first, taken[0])
+
+
+def _some_classes(crop: Crop, random: np.random.Generator) -> Bool:
+    """Return a mask (N,) of the points of a random half of a crop's classes, at least one where it has any."""
+    there = np.unique(crop.segment[crop.segment != IGNORED])
+    chosen = random.permutation(there)[: -(-len(there) // 2)]
+    return np.asarray(np.isin(crop.segment, chosen))
+
+
+def _joined(crop: Crop, other: Crop, keep: Bool) -> Crop:
+    """Return a crop with some of another's points behind its own; what either lacks is missing in all."""
+    parts: dict[str, Any] = {}
+    for name in crop.per_point:
+        own, more = getattr(crop, name), getattr(other, name)
+        parts[name] = None if own is None or more is None else np.concatenate([own, more[keep]])
+    return replace(crop, **parts)

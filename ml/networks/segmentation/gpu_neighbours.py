@@ -1,0 +1,303 @@
+"""Thinned stages and neighbour indices of packed clouds in plain PyTorch, on the device where the points lie.
+
+What `neighbours.build_neighbours` finds with k-d trees on the CPU, cloud by cloud, is found here for all clouds of a
+batch at once, by sorting points into cells: the same samples and the same neighbours. It is for GPUs, on which a
+training would otherwise wait for its workers; on a CPU k-d trees are faster.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from synthroads_addon.base.errors import InputError
+
+from .neighbours import TINY, Neighbourhood, Neighbours, check_ends
+
+_PAIRS = {"cpu": 1 << 20}
+"""Pairs of queries and candidates that are held at once."""
+_PAIRS_ELSEWHERE = 1 << 25
+_LARGEST_KEY = 2**62
+
+
+def build_neighbours(coord: Tensor, offset: Tensor, neighbourhood: Neighbourhood) -> Neighbours:
+    """Return thinned stages and neighbour indices of packed clouds as tensors on their device, see `Neighbours`.
+
+    Args:
+        coord: (N, 3) float32 or float64, m.
+        offset: (B,) integers: where each cloud ends. Clouds may be empty or of one point.
+        neighbourhood: what to look for; its sampling must be ``grid``.
+
+    Raises:
+        InputError: the offsets don't fit the points, a coordinate is not finite, a cloud spans more cells of its
+            thinnings than 2^62, or the sampling is another one, which is a loop over points.
+    """
+    if neighbourhood.sampling != "grid":
+        raise InputError("sampling", neighbourhood.sampling, "must be grid where neighbours are found on a GPU")
+    ends = torch.from_numpy(check_ends(coord, offset)).to(coord.device)
+    count = len(ends)
+    cloud = _clouds_of(ends, len(coord))
+    local = _about_middle(coord, cloud, count)
+    order = _geometric_order(local, cloud)
+    # What the network sees is rounded to the coordinates' dtype, so neighbours are those of the rounded positions.
+    points = _Points(local[order].double(), cloud, count)  # sorting by cloud leaves which point is of which
+    found: Neighbours = {"positions0": local, "offset0": ends}
+    for stage, inner in enumerate(neighbourhood.inner, start=1):
+        radius = neighbourhood.stage_radius(stage)
+        sample = _grid_sample(points, radius * 2.0 / 3.0)
+        kept = points.select(sample)
+        found[f"positions{stage}"] = kept.xyz.to(local.dtype)
+        found[f"offset{stage}"] = torch.searchsorted(kept.cloud, torch.arange(count, device=coord.device), right=True)
+        found[f"sample{stage}"] = sample
+        found[f"group{stage}"] = _first_in_ball(kept, points, radius, neighbourhood.neighbours)
+        if inner:
+            found[f"inner{stage}"] = _first_in_ball(kept, kept, 2 * radius, neighbourhood.neighbours)
+        nearest, weight = _nearest_three(points, kept, radius)
+        found[f"nearest{stage}"], found[f"weight{stage}"] = nearest, weight.to(local.dtype)
+        points = kept
+    return _in_given_order(found, order)
+
+
+@dataclass(frozen=True)
+class _Points:
+    """Points of a stage.
+
+    Attributes:
+        xyz: (N, 3) float64, m, those of each cloud one after the other.
+        cloud: (N,) which cloud each is of.
+        count: number of clouds.
+    """
+
+    xyz: Tensor
+    cloud: Tensor
+    count: int
+
+    def __len__(self) -> int:
+        return len(self.xyz)
+
+    def select(self, keep: Tensor) -> _Points:
+        """Return the points at these indices."""
+        return _Points(self.xyz[keep], self.cloud[keep], self.count)
+
+
+@dataclass(frozen=True)
+class _Cells:
+    """Cells that points are sorted into, numbered so that those along z follow each other and no two clouds touch.
+
+    Attributes:
+        edge: of a cell, m.
+        low: (3,) least cell of all points.
+        spans: cells along each axis, with one more on either side.
+    """
+
+    edge: float
+    low: Tensor
+    spans: tuple[int, int, int]
+
+    @classmethod
+    def around(cls, points: _Points, edge: float) -> _Cells:
+        """Return cells of an edge for some points, of which there is at least one."""
+        cells = torch.floor(points.xyz / edge)
+        low = cells.amin(dim=0)
+        wide, deep, tall = (int(span) for span in (cells.amax(dim=0) - low + 3).tolist())
+        _check_cells((wide, deep, tall), points.count)
+        return cls(edge, low, (wide, deep, tall))
+
+    def places(self, points: _Points) -> Tensor:
+        """Return each point's cell (N, 3), counted from 1."""
+        return (torch.floor(points.xyz / self.edge) - self.low).long() + 1
+
+    def keys(self, places: Tensor, cloud: Tensor) -> Tensor:
+        """Return the number of cells (...), given their places (..., 3) and clouds (...)."""
+        wide, deep, tall = self.spans
+        return ((cloud * wide + places[..., 0]) * deep + places[..., 1]) * tall + places[..., 2]
+
+
+def _check_cells(spans: tuple[int, int, int], clouds: int) -> None:
+    if spans[0] * spans[1] * spans[2] * max(clouds, 1) >= _LARGEST_KEY:
+        raise InputError("coord", " x ".join(map(str, spans)), "must span fewer than 2^62 cells in all")
+
+
+def _clouds_of(ends: Tensor, points: int) -> Tensor:
+    """Return for each of so many packed points (N,) the number of its cloud."""
+    return torch.searchsorted(ends, torch.arange(points, device=ends.device), right=True)
+
+
+def _lowest(xyz: Tensor, cloud: Tensor, count: int) -> Tensor:
+    """Return the least coordinates of each cloud (B, 3); infinity for an empty one."""
+    least = xyz.new_full((count, 3), torch.inf)
+    return least.scatter_reduce_(0, cloud[:, None].expand(-1, 3), xyz, "amin")
+
+
+def _about_middle(coord: Tensor, cloud: Tensor, count: int) -> Tensor:
+    """Return coordinates (N, 3) centred on the middle of their cloud's bounding box."""
+    exact = coord.double()
+    middle = 0.5 * (_lowest(exact, cloud, count) - _lowest(-exact, cloud, count))
+    return (exact - middle[cloud]).to(coord.dtype)
+
+
+def _geometric_order(points: Tensor, cloud: Tensor) -> Tensor:
+    """Return the permutation (N,) of `neighbours.geometric_order`, of each cloud by itself."""
+    bits = (points.double() + 0.0).contiguous().view(torch.int64)  # + 0.0: one zero, not two
+    key = torch.zeros_like(cloud)
+    for axis in range(3):
+        key = _mix_bits(key ^ bits[:, axis])
+    order = torch.argsort(key ^ _signed(1 << 63), stable=True)  # as if it had no sign
+    return order[torch.argsort(cloud[order], stable=True)]
+
+
+def _mix_bits(key: Tensor) -> Tensor:
+    """Return hashes of 64-bit keys, as `neighbours` does: SplitMix64's finaliser on numbers with a sign."""
+    key = key + _signed(0x9E3779B97F4A7C15)
+    key = (key ^ _shifted(key, 30)) * _signed(0xBF58476D1CE4E5B9)
+    key = (key ^ _shifted(key, 27)) * _signed(0x94D049BB133111EB)
+    return key ^ _shifted(key, 31)
+
+
+def _signed(number: int) -> int:
+    """Return the number with a sign whose 64 bits are those of a number without."""
+    return number - (1 << 64) if number >= 1 << 63 else number
+
+
+def _shifted(key: Tensor, bits: int) -> Tensor:
+    """Return 64-bit keys shifted to the right, zeros from the left."""
+    return (key >> bits) & ((1 << (64 - bits)) - 1)
+
+
+def _grid_sample(points: _Points, edge: float) -> Tensor:
+    """Return the ascending indices of the point nearest to the centre of each occupied cell, as `voxel_sample` does."""
+    if not len(points):
+        return points.cloud
+    steps = (points.xyz - _lowest(points.xyz, points.cloud, points.count)[points.cloud]) / edge
+    cells = torch.floor(steps)
+    wide, deep, tall = (int(span) for span in (cells.amax(dim=0) + 1).tolist())
+    _check_cells((wide, deep, tall), points.count)
+    number = cells.long()
+    key = ((points.cloud * wide + number[:, 0]) * deep + number[:, 1]) * tall + number[:, 2]
+    order = torch.argsort(_squared(steps - cells - 0.5), stable=True)
+    order = order[torch.argsort(key[order], stable=True)]
+    return order[_first_of_each(key[order])].sort().values
+
+
+def _squared(vectors: Tensor) -> Tensor:
+    """Return the squared lengths (N,) of vectors (N, 3), summed in the order in which NumPy sums them."""
+    squares = vectors * vectors
+    return squares[:, 0] + squares[:, 1] + squares[:, 2]
+
+
+def _first_of_each(sorted_values: Tensor) -> Tensor:
+    """Return a mask (N,) of the first of each run of equal values."""
+    first = torch.ones_like(sorted_values, dtype=torch.bool)
+    first[1:] = sorted_values[1:] != sorted_values[:-1]
+    return first
+
+
+def _pairs(queries: _Points, support: _Points, edge: float) -> Iterator[tuple[Tensor, Tensor, Tensor]]:
+    """Yield (query, support point, distance) of all pairs in neighbouring cells of an edge, by blocks of queries.
+
+    All support points within the edge of a query are among them. The arrays (P,) have the queries in ascending order,
+    and a query's pairs are never parted.
+    """
+    cells = _Cells.around(support, edge)
+    key, order = cells.keys(cells.places(support), support.cloud).sort(stable=True)
+    limits = torch.tensor(cells.spans, device=key.device) - 1
+    # Of far queries too, whose cells don't hold anything: the nearest ones that are numbered.
+    place = cells.places(queries).clamp(min=torch.zeros_like(limits), max=limits)
+    around = torch.cartesian_prod(torch.arange(-1, 2), torch.arange(-1, 2)).to(place)
+    columns = place[:, None].expand(-1, len(around), 3).clone()
+    columns[..., :2] += around
+    inside = ((columns[..., :2] >= 0) & (columns[..., :2] <= limits[:2])).all(dim=-1)
+    columns[..., :2].clamp_(min=0)
+    low, high = (columns.clone() for _ in range(2))
+    low[..., 2].sub_(1).clamp_(min=0)
+    high[..., 2] = torch.minimum(high[..., 2] + 1, limits[2])
+    cloud = queries.cloud[:, None].expand(-1, len(around))
+    begin = torch.searchsorted(key, cells.keys(low, cloud))
+    length = (torch.searchsorted(key, cells.keys(high, cloud), right=True) - begin) * inside
+    total = length.sum(dim=1).cumsum(dim=0)
+    for rows in _blocks(total, _PAIRS.get(key.device.type, _PAIRS_ELSEWHERE)):
+        flat = length[rows].reshape(-1)
+        column = torch.repeat_interleave(torch.arange(len(flat), device=key.device), flat)
+        within = torch.arange(len(column), device=key.device) - (flat.cumsum(dim=0) - flat)[column]
+        other = order[begin[rows].reshape(-1)[column] + within]
+        query = rows.start + torch.div(column, len(around), rounding_mode="floor")
+        yield query, other, _squared(queries.xyz[query] - support.xyz[other]).sqrt()
+
+
+def _blocks(total: Tensor, pairs: int) -> Iterator[slice]:
+    """Yield slices of queries with at most so many pairs, or one query; `total` (M,) is their running sum."""
+    sums = total.cpu()
+    first, before = 0, 0
+    while first < len(sums):
+        last = max(int(torch.searchsorted(sums, before + pairs, right=True)), first + 1)
+        yield slice(first, last)
+        first, before = last, int(sums[last - 1])
+
+
+def _first_in_ball(queries: _Points, support: _Points, radius: float, limit: int) -> Tensor:
+    """Return indices (M, limit) int32 of the first support points in each query's ball, padded with the first.
+
+    Every query is a support point itself, so that no ball is empty.
+    """
+    found = torch.full((len(queries), limit), -1, dtype=torch.int32, device=queries.xyz.device)
+    if not len(queries):
+        return found
+    for query, other, distance in _pairs(queries, support, radius):
+        near = distance < radius
+        key = (query[near] * len(support) + other[near]).sort().values
+        row = torch.div(key, len(support), rounding_mode="floor")
+        rank = _ranks(row)
+        taken = rank < limit
+        found[row[taken], rank[taken]] = (key % len(support))[taken].int()
+    return torch.where(found < 0, found[:, :1], found)
+
+
+def _ranks(sorted_values: Tensor) -> Tensor:
+    """Return the place (N,) of each value in its run of equal ones, from 0."""
+    places = torch.arange(len(sorted_values), device=sorted_values.device)
+    return places - torch.cummax(places * _first_of_each(sorted_values), dim=0).values
+
+
+def _nearest_three(points: _Points, kept: _Points, radius: float) -> tuple[Tensor, Tensor]:
+    """Return indices (N, 3) int32 and inverse-distance weights (N, 3) of each point's three nearest kept ones.
+
+    Where a cloud has fewer, the index of the others is its first, and their weight 0.
+    """
+    device = points.xyz.device
+    nearest, weight = (
+        torch.zeros((len(points), 3), dtype=torch.int64, device=device),
+        points.xyz.new_zeros(len(points), 3),
+    )
+    if not len(points):
+        return nearest.int(), weight
+    begins = torch.searchsorted(kept.cloud, torch.arange(points.count, device=device))
+    nearest = begins[points.cloud][:, None].repeat(1, 3)
+    wanted = torch.bincount(kept.cloud, minlength=points.count).clamp(max=3)[points.cloud]
+    extent = float((kept.xyz.amax(dim=0) - kept.xyz.amin(dim=0)).amax())
+    left, edge = torch.arange(len(points), device=device), 4.0 / 3.0 * radius
+    while len(left):
+        asked = points.select(left)
+        place, distance = nearest[left], points.xyz.new_full((len(left), 3), torch.inf)
+        for query, other, apart in _pairs(asked, kept, edge):
+            order = torch.argsort(apart, stable=True)
+            order = order[torch.argsort(query[order], stable=True)]
+            rank = _ranks(query[order])
+            order, rank = order[rank < 3], rank[rank < 3]
+            place[query[order], rank], distance[query[order], rank] = other[order], apart[order]
+        last = distance.gather(1, (wanted[left] - 1)[:, None])[:, 0]
+        done = (last <= edge) | torch.full_like(last, edge > 2.0 * (extent + radius), dtype=torch.bool)
+        nearest[left[done]] = place[done]
+        weight[left[done]] = 1.0 / (distance[done] + TINY)
+        left, edge = left[~done], 2.0 * edge
+    return nearest.int(), weight / weight.sum(dim=1, keepdim=True)
+
+
+def _in_given_order(found: Neighbours, order: Tensor) -> Neighbours:
+    """Return tensors whose indices into the clouds, found for points in `order`, are mapped back to the given order."""
+    place = torch.empty_like(order)
+    place[order] = torch.arange(len(order), device=order.device)
+    turned = {name: order[found[name].long()].to(found[name].dtype) for name in ("sample1", "group1")}
+    return found | turned | {name: found[name][place] for name in ("nearest1", "weight1")}
