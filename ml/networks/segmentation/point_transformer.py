@@ -71,7 +71,7 @@ class PointTransformerOptions(SegmentationNetwork):
     def _require_multiples(cls, number: int, field: ValidationInfo) -> int:
         step = 8 if field.field_name == "patch" else 6
         if number % step:
-            raise ValueError(f"must be a multiple of {step}")
+            raise ValueError(f"must be a multiple of {step}, not {number}")
         return number
 
     @model_validator(mode="after")
@@ -156,13 +156,13 @@ class PointTransformer(nn.Module):
             InputError: features and coordinates don't fit each other or the network, or there is no grid for them.
         """
         cells = batch if "cell0" in batch else build_cells(batch["coord"], batch["offset"], self.options.grid)
-        shape = (len(cells["cell0"]), self.features)
+        shape = (cells["cell0"].shape[0], self.features)  # an export would take `len` for a constant
         if tuple(feat.shape) != shape:
             raise InputError("feat", tuple(feat.shape), f"must have the shape {shape}")
         views = [self._views(cells, stage) for stage in range(len(self.stages))]
-        filled = cells["near0"] if "near0" in cells else cells["grid0"]
+        first = cells["near0"] if "near0" in cells else cells["grid0"]
         points = self.stem(torch.cat([feat, cells["inside0"].to(feat.dtype)], dim=1))
-        values = points.new_zeros(len(filled), points.shape[1], dtype=cells["share0"].dtype)
+        values = points.new_zeros(first.shape[0], points.shape[1], dtype=cells["share0"].dtype)
         values = values.index_add(0, cells["cell0"], points * cells["share0"][:, None])
         levels = [points]
         for stage, blocks in enumerate(self.stages):
