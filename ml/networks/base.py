@@ -1,6 +1,7 @@
 """Base of the networks that give every point a class; and what networks compute in single precision always."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import wraps
 from typing import Any, ParamSpec, TypeVar
 
@@ -31,6 +32,19 @@ def full_precision(function: Callable[P, R]) -> Callable[P, R]:
     return exact
 
 
+@dataclass(frozen=True)
+class Exported:
+    """Tensors that a network's ONNX file takes beside the features.
+
+    Attributes:
+        inputs: an example of each by name.
+        lengths: of each the axes that may have any length, and the lengths' names; ``points0`` is that of the features.
+    """
+
+    inputs: Batch
+    lengths: Mapping[str, Mapping[int, str]]
+
+
 class SegmentationNetwork(Part):
     """Base of a segmentation network's options: name and sizes; builds the network."""
 
@@ -51,6 +65,14 @@ class SegmentationNetwork(Part):
     def prepare(self, batch: Batch) -> Batch:
         """Return the batch with what the network needs precomputed, on the batch's device; here unchanged."""
         return batch
+
+    def exported(self, batch: Batch) -> Exported:
+        """Return what the network needs of a batch beside the features, so that it can be written as ONNX.
+
+        Raises:
+            InputError: it can't.
+        """
+        raise InputError("network.name", self.name, "can't be written as ONNX: it doesn't say what it needs of a cloud")
 
     def shift_scores(self, model: nn.Module, offsets: Tensor) -> None:
         """Add offsets (C,) to the class scores of a network, in place: to the bias of its last linear layer.

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import pytest
 import torch
+from pydantic import Field
 
 from ml.centerline.exporting import exportable_network as exportable_centerline
 from ml.centerline.predictor import CenterlinePredictor, UseOptions
 from ml.centerline.task import _first_model
 from ml.configuration import load_configuration
+from ml.networks.base import SegmentationNetwork
 from ml.onnx_export import TOLERANCE, Exportable, largest_difference, onnx_bytes, write_onnx
 from ml.segmentation.exporting import exportable_network as exportable_segmentation
 from ml.segmentation.network import build
+from ml.segmentation.recipes import SegmentationConfiguration
 from synthroads_addon.base.errors import InputError, OutputError
 
 for _package in ("onnx", "onnxscript", "onnxruntime"):
@@ -36,7 +40,21 @@ def segmentation() -> Exportable:
     return exportable_segmentation(build(configuration).eval(), configuration)
 
 
-@pytest.mark.parametrize("network", [centerline, segmentation])
+def transformer() -> SegmentationConfiguration:
+    changes = ["network.channels=[12, 12, 24]", "network.blocks=[1, 1, 2]", "network.head_width=12", "network.patch=64"]
+    found: SegmentationConfiguration = load_configuration(
+        "segmentation-transformer", [*changes, 'data.synthetic=[{"path": "roads"}]']
+    )
+    return found
+
+
+def segmentation_transformer() -> Exportable:
+    configuration = transformer()
+    torch.manual_seed(1)
+    return exportable_segmentation(build(configuration).eval(), configuration)
+
+
+@pytest.mark.parametrize("network", [centerline, segmentation, segmentation_transformer])
 def test_onnx_runtime_says_what_pytorch_says(network: object, tmp_path: Path) -> None:
     made = network()  # type: ignore[operator]
     told = write_onnx(made, tmp_path / "model.onnx")
@@ -60,6 +78,29 @@ def test_lengths_are_free_and_another_network_is_told_apart() -> None:
     changed = largest_difference(replace(made, model=other.model), content)
     assert changed is not None
     assert changed > TOLERANCE
+
+
+def test_clouds_of_a_transformer_may_be_of_any_size() -> None:
+    """Fewer points and one cloud, then more and larger ones: other numbers of cells and patches, and longer patches."""
+    configuration, made = transformer(), segmentation_transformer()
+    content = onnx_bytes(made)
+    draw = torch.Generator().manual_seed(7)
+    for counts, edge in (([300], 5.0), ([4000, 70, 900, 2000, 10], 20.0)):
+        coord = torch.rand(sum(counts), 3, generator=draw) * torch.tensor([edge, edge, 2.0])
+        found = configuration.network.exported({"coord": coord, "offset": torch.tensor(counts).cumsum(0)})
+        feat = torch.randn(sum(counts), len(configuration.features), generator=draw)
+        difference = largest_difference(replace(made, inputs={"feat": feat, **found.inputs}), content)
+        assert difference is not None
+        assert difference < TOLERANCE
+
+
+def test_a_network_that_says_nothing_of_its_clouds_is_refused() -> None:
+    class Silent(SegmentationNetwork):
+        name: Literal["silent"] = Field("silent")
+
+    configuration = transformer().model_copy(update={"network": Silent()})
+    with pytest.raises(InputError, match=r"network.name is 'silent': can't be written as ONNX"):
+        exportable_segmentation(torch.nn.Identity(), configuration)
 
 
 def test_a_difference_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

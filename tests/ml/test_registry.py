@@ -37,7 +37,7 @@ PAGE = (ROOT / "docs/extend/network.md").read_text(encoding="utf-8")
 
 
 def test_networks_are_those_of_the_folders() -> None:
-    assert list(networks("segmentation")) == ["pointnext"]
+    assert list(networks("segmentation")) == ["point-transformer", "pointnext"]
     assert list(networks("centerline")) == ["sequence", "single", "transformer"]
     assert set(FOLDERS) == set(TASKS)
 

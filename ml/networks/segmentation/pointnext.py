@@ -19,7 +19,7 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import quantity
 
 from ...registry import network
-from ..base import Batch, SegmentationNetwork
+from ..base import Batch, Exported, SegmentationNetwork
 from . import gpu_neighbours
 from .grouping import Grouping, Norm, interpolate, normalised_max, normalised_max_of_two
 from .neighbours import Neighbourhood, Neighbours, Sampling, build_neighbours
@@ -78,6 +78,18 @@ class PointNeXtOptions(SegmentationNetwork):
     def prepares_on_gpu(self) -> bool:
         """Return whether neighbours are found on a GPU: not with farthest points, one after the other."""
         return self.sampling == "grid"
+
+    def exported(self, batch: Batch) -> Exported:
+        """Return the stages' points and who looks at whom, and their lengths' names."""
+        found = build_neighbours(batch["coord"], batch["offset"], self.neighbourhood)
+        inputs = {name: value for name, value in found.items() if not name.startswith("offset")}
+        return Exported(inputs, {name: {0: f"points{_rows_of(name)}"} for name in inputs})
+
+
+def _rows_of(name: str) -> int:
+    """Return the stage whose points an array of `Neighbours` has rows for."""
+    stage = int(name[-1])
+    return stage - 1 if name[:-1] in ("nearest", "weight") else stage
 
 
 class PointNeXt(nn.Module):

@@ -1,0 +1,210 @@
+"""Which cells of a grid a cloud fills, stage by stage, and which of them look at which: in plain PyTorch, on any device.
+
+Points are gathered into the cells of a grid, these into cells twice as wide, and so on. In the first stages each cell
+looks at the cells around it; in the later ones cells are sorted along space-filling curves, and each looks at those of
+its patch, a stretch of the curve. All of it is sorting and searching of numbers that tell cells apart.
+
+Clouds of a batch are packed, and each has its grid from its own lowest corner: nothing leads from one to another, and a
+batch gives what its clouds give one by one. Cells are numbered by their place and curves visit a cell once, so the
+order of the points has no say.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from synthroads_addon.base.errors import InputError
+
+from .curves import BITS, Curve, curve_codes
+
+Cells = dict[str, Tensor]
+"""Tensors by name; ``s`` is a stage's number from 0, with M_s cells, N the number of points:
+
+- ``cell0`` (N,) int64: the cell of each point
+- ``share0`` (N,): one over the number of points in its cell
+- ``inside0`` (N, 3): its place in the cell, -0.5 to 0.5 along each axis
+- ``ends{s}`` (B,) int64: where each cloud's cells end
+- ``near{s}`` (M_s, 27 or 7) int32, early stages: the cells around each, by rising place; M_s where there is none
+- ``parent{s}`` (M_{s-1},) int64, s > 0: the cell of this stage that each one of the stage before lies in
+- ``children{s}`` (M_s, 8) int64, s > 0: the cells of the stage before in each; empty octants have another one's
+- ``grid{s}`` (M_s, 3), late stages: the cells' places, in units of their edge
+- ``patch{s}`` (C, P, K) int64, late stages: the cells of each patch along each of C curves
+- ``place{s}`` (C, M_s) int64, late stages: where in all patches (P x K) each cell is asked for what it sees
+- ``filled{s}`` (P, K) bool, late stages: which places of the patches count; left out where all do
+"""
+
+LARGEST = (1 << BITS) - 2
+"""Cells along an axis of a cloud, one to either side being left free."""
+_MOST_CLOUDS = 1 << 14
+_AXES = 3
+_CROSS = [4, 10, 12, 13, 14, 16, 22]
+"""Out of the 27 cells around one: itself and those that share a face with it."""
+_MULTIPLE = 8
+"""Of the length of patches: what attention on a GPU needs."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Options for the cells of a cloud and what they look at.
+
+    Attributes:
+        cell: edge of the cells of stage 0, m; it doubles with each stage.
+        stages: number of them.
+        attention_from: the first stage whose cells look along curves, and not around themselves.
+        cross: look at the 6 cells that share a face, not at all 26.
+        curves: that late stages are sorted along.
+        patch: cells that look at each other along a curve; a multiple of 8.
+    """
+
+    cell: float
+    stages: int
+    attention_from: int
+    cross: bool
+    curves: tuple[Curve, ...]
+    patch: int
+
+
+def build_cells(coord: Tensor, offset: Tensor, grid: Grid, *, always_masked: bool = False) -> Cells:
+    """Return the cells of packed clouds, their neighbours and patches, on the device of the coordinates; see `Cells`.
+
+    Args:
+        coord: (N, 3) floating-point numbers, m.
+        offset: (B,) integers: where each cloud ends. Clouds may be empty or of one point.
+        grid: what to make.
+        always_masked: give ``filled{s}`` also where all places count.
+
+    Raises:
+        InputError: the offsets don't fit the points, a coordinate is not finite, there are more than 16,384 clouds, or
+            a cloud is wider than 65,534 cells.
+    """
+    counts = _points_of_clouds(coord, offset)
+    clouds = len(counts)
+    cloud = torch.repeat_interleave(torch.arange(clouds, device=coord.device), counts, output_size=len(coord))
+    places, inside = _places(coord, cloud, clouds, grid.cell)
+    keys, cell = torch.unique(_keys(cloud, places), return_inverse=True)
+    points = torch.bincount(cell, minlength=len(keys)).to(coord.dtype)
+    found: Cells = {"cell0": cell, "share0": points.reciprocal()[cell], "inside0": inside}
+    for stage in range(grid.stages):
+        if stage:
+            cloud, places = _apart(keys)
+            coarse, parent = torch.unique(_keys(cloud, places >> 1), return_inverse=True)
+            found |= {f"parent{stage}": parent, f"children{stage}": _children(places, parent, len(coarse))}
+            keys = coarse
+        cloud, places = _apart(keys)
+        counts = torch.bincount(cloud, minlength=clouds)
+        found[f"ends{stage}"] = counts.cumsum(0)
+        if stage < grid.attention_from:
+            near = _cells_around(keys)
+            found[f"near{stage}"] = near[:, _CROSS].contiguous() if grid.cross else near
+            continue
+        patch, place, filled = _patches(places, cloud, counts, grid)
+        found |= {f"grid{stage}": places.to(coord.dtype), f"patch{stage}": patch, f"place{stage}": place}
+        if filled is not None or always_masked:
+            full = torch.ones(patch.shape[1:], dtype=torch.bool, device=coord.device)
+            found[f"filled{stage}"] = full if filled is None else filled
+    return found
+
+
+def _points_of_clouds(coord: Tensor, offset: Tensor) -> Tensor:
+    """Return the number of points of each cloud (B,) int64, on the coordinates' device; raise `InputError` at faults."""
+    if coord.ndim != 2 or coord.shape[1] != _AXES or not coord.is_floating_point():
+        raise InputError("coord", tuple(coord.shape), "must be floating-point numbers of the shape (N, 3)")
+    ends = [int(end) for end in offset.flatten().tolist()]
+    counts = [end - begin for begin, end in zip([0, *ends], ends, strict=False)]
+    if offset.ndim != 1 or min(counts, default=0) < 0 or (ends[-1] if ends else 0) != len(coord):
+        raise InputError("offset", ends, f"must rise from 0 or more to the number of points, {len(coord)}")
+    if len(ends) > _MOST_CLOUDS:
+        raise InputError("offset", len(ends), f"must not have more than {_MOST_CLOUDS} clouds")
+    if not bool(torch.isfinite(coord).all()):
+        raise InputError("coord", "NaN or infinity", "must be finite numbers, m")
+    return torch.tensor(counts, dtype=torch.int64, device=coord.device)
+
+
+def _places(coord: Tensor, cloud: Tensor, clouds: int, edge: float) -> tuple[Tensor, Tensor]:
+    """Return the points' cells (N, 3), counted from each cloud's lowest, and their places in them (N, 3)."""
+    scaled = coord / edge
+    floor = scaled.floor()
+    lowest = floor.new_zeros(clouds, _AXES)
+    lowest.scatter_reduce_(0, cloud[:, None].expand(-1, _AXES), floor, "amin", include_self=False)
+    cells = floor - lowest[cloud]
+    if len(cells) and (widest := float(cells.max())) >= LARGEST:
+        raise InputError("network.cell", edge, f"must be so large that no cloud is wider than {LARGEST} cells: "
+                         f"one is {widest + 1:.0f} wide")
+    return cells.long(), scaled - floor - 0.5
+
+
+def _keys(cloud: Tensor, places: Tensor) -> Tensor:
+    """Return a number (M,) for each cell: by cloud, x, y, z, each counted from 1, so that cells around have one too."""
+    x, y, z = (places + 1).unbind(1)
+    return (((cloud << BITS | x) << BITS | y) << BITS) | z
+
+
+def _apart(keys: Tensor) -> tuple[Tensor, Tensor]:
+    """Return clouds (M,) and places (M, 3) of cells' numbers."""
+    last = (1 << BITS) - 1
+    places = torch.stack([(keys >> 2 * BITS) & last, (keys >> BITS) & last, keys & last], dim=1) - 1
+    return keys >> 3 * BITS, places
+
+
+def _children(places: Tensor, parent: Tensor, count: int) -> Tensor:
+    """Return for each of `count` cells the cells (8,) of the stage before in it; for empty octants another of them."""
+    odd = places & 1
+    octant = odd[:, 0] << 2 | odd[:, 1] << 1 | odd[:, 2]
+    table = torch.full((count * 8,), -1, dtype=torch.int64, device=places.device)
+    table[parent * 8 + octant] = torch.arange(len(places), device=places.device)
+    table = table.view(count, 8)
+    return torch.where(table < 0, table.amax(dim=1, keepdim=True), table)
+
+
+def _cells_around(keys: Tensor) -> Tensor:
+    """Return the 27 cells around each of M cells (M, 27) int32, by rising x, y, z; M where there is none.
+
+    Of three cells in a column, those that are there follow each other in the sorted numbers: one search finds them.
+    """
+    count = len(keys)
+    sides = torch.arange(-1, 2, device=keys.device)
+    columns = ((sides[:, None] << BITS) + sides).flatten() << BITS
+    wanted = keys[:, None] + columns - 1
+    first = torch.searchsorted(keys, wanted)
+    ended = torch.cat([keys, keys.new_full((1,), -1)])
+    near = torch.empty(count, 9, 3, dtype=torch.int32, device=keys.device)
+    for up in range(3):
+        there = ended[first] == wanted + up
+        near[:, :, up] = torch.where(there, first, count)
+        first += there
+    return near.flatten(1)
+
+
+def _patches(places: Tensor, cloud: Tensor, counts: Tensor, grid: Grid) -> tuple[Tensor, Tensor, Tensor | None]:
+    """Return cells of the patches (C, P, K), each cell's place in them (C, M), and which places count (P, K) or None.
+
+    Each cloud's curve is cut into stretches as equal as can be, as few as have room in patches. A patch has its stretch
+    in the middle and the cells before and after it; where a cloud is too small to fill one, places stay empty.
+    """
+    device = places.device
+    sizes: list[int] = counts.tolist()
+    width = min(grid.patch, -(-max(sizes, default=0) // _MULTIPLE) * _MULTIPLE)
+    numbers = [-(-size // width) if size else 0 for size in sizes]
+    number = torch.tensor(numbers, dtype=torch.int64, device=device)
+    begin, first = counts.cumsum(0) - counts, number.cumsum(0) - number
+
+    owner = torch.repeat_interleave(torch.arange(len(sizes), device=device), number, output_size=sum(numbers))
+    size, parts = counts[owner], number[owner]
+    own = torch.arange(sum(numbers), device=device) - first[owner]
+    low, high = ((one * size + parts - 1).div(parts, rounding_mode="floor") for one in (own, own + 1))
+    start = (low - (width - (high - low)).div(2, rounding_mode="floor")).clamp(min=0)
+    start = torch.minimum(start, (size - width).clamp(min=0))
+    slots = start[:, None] + torch.arange(width, device=device)
+    filled = slots < size[:, None]
+    slots = begin[owner][:, None] + torch.minimum(slots, size[:, None] - 1)
+
+    rank = torch.arange(len(places), device=device) - begin[cloud]
+    patch = first[cloud] + (rank * number[cloud]).div(counts[cloud], rounding_mode="floor")
+    asked = patch * width + rank - start[patch]
+    orders = [torch.argsort(cloud << 3 * BITS | curve_codes(places, curve)) for curve in grid.curves]
+    order = torch.stack(orders)
+    place = torch.empty_like(order).scatter_(1, order, asked.expand_as(order))
+    return order[:, slots], place, None if all(size >= width for size in sizes if size) else filled

@@ -1,0 +1,338 @@
+"""A transformer for points in plain PyTorch: convolutions in early stages, attention along curves in late ones.
+
+After two papers. Wu et al., "Point Transformer V3: simpler, faster, stronger" (2024): points are sorted along several
+space-filling curves, and attention works in patches of a curve; stages pool the cells of a grid, and are unpooled with
+what the stage before knew. Yue et al., "LitePT: lighter yet stronger point transformer" (2025): early stages with many
+cells need convolutions alone, late ones attention alone, where rotations of queries and keys by the place of a cell
+(Su et al., "RoFormer", 2021) say where it is; a decoder needs no blocks.
+
+All blocks are pre-norm with stochastic depth (Huang et al. 2016). Around points and in convolutions norms are batch
+norms, so that they can be adapted to other clouds; in attention they are layer norms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import cycle, pairwise, repeat
+from typing import Literal
+
+import torch
+import torch.nn.functional as F  # noqa: N812 (its name everywhere)
+from pydantic import Field, ValidationInfo, field_validator, model_validator
+from torch import Tensor, nn
+
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.schema import quantity
+
+from ...registry import network
+from ..base import Batch, Exported, SegmentationNetwork, full_precision
+from .cell_convolution import Around, CellConvolution
+from .cells import Cells, Grid, build_cells
+from .curves import CURVES, Curve
+from .grouping import Norm, gather_max
+from .pointnext import Pointwise
+
+_LARGEST_WIDTH = 2048
+_LONGEST_WAVE = 100.0
+"""Base of the rotations' frequencies: the slowest turn by about one part in so many per cell."""
+
+
+@network("segmentation")
+class PointTransformerOptions(SegmentationNetwork):
+    """Options of the network `point-transformer`: its stages, what cells look at, and what is dropped in training."""
+
+    name: Literal["point-transformer"] = Field("point-transformer", description="Network.")
+    cell: float = quantity(0.2, gt=0, le=100, unit="m", description="Edge of the first stage's cells; it doubles.")
+    channels: tuple[int, ...] = Field((24, 48, 96, 144), min_length=1, max_length=8, description="Of each stage.")
+    blocks: tuple[int, ...] = Field((2, 2, 3, 1), min_length=1, max_length=8, description="Of each stage.")
+    attention_from: int = quantity(
+        2, ge=0, le=8, unit="1", description="First stage, from 0, whose blocks are attention; before it, convolutions."
+    )
+    decoder_blocks: int = quantity(0, ge=0, le=8, unit="1", description="Blocks of each stage on the way back.")
+    kernel: Literal["cube", "cross"] = Field("cube", description="All 26 cells around one, or the 6 that share a face.")
+    curves: tuple[Curve, ...] = Field(CURVES, min_length=1, description="Curves that blocks of attention follow in turn.")
+    shuffle: bool = Field(True, description="In training, draw anew in each step which block follows which curve.")
+    patch: int = quantity(256, ge=8, le=4096, unit="1", description="Cells that attend to each other.")
+    head_width: int = quantity(24, ge=6, le=384, unit="1", description="Channels of a head of attention.")
+    expansion: int = quantity(4, ge=1, le=16, unit="1", description="Width of a block's layers, in channels of its stage.")
+    drop_path: float = quantity(0.1, ge=0, lt=1, unit="1", description="Share of clouds that skip the last block.")
+    dropout: float = quantity(0.3, ge=0, lt=1, unit="1", description="Dropout of the head.")
+
+    @field_validator("curves")
+    @classmethod
+    def _refuse_repetitions(cls, curves: tuple[Curve, ...]) -> tuple[Curve, ...]:
+        if len(set(curves)) < len(curves):
+            raise ValueError("curves must differ")
+        return curves
+
+    @field_validator("patch", "head_width")
+    @classmethod
+    def _require_multiples(cls, number: int, field: ValidationInfo) -> int:
+        step = 8 if field.field_name == "patch" else 6
+        if number % step:
+            raise ValueError(f"must be a multiple of {step}, not {number}")
+        return number
+
+    @model_validator(mode="after")
+    def _check_stages(self) -> PointTransformerOptions:
+        if len(self.channels) != len(self.blocks):
+            raise ValueError(f"blocks must be as many as channels, {len(self.channels)}")
+        if min(self.blocks) < 0 or max(self.blocks) > 64:  # noqa: PLR2004
+            raise ValueError("blocks must be numbers from 0 to 64")
+        if min(self.channels) < 1 or max(self.channels) > _LARGEST_WIDTH:
+            raise ValueError(f"channels must be numbers from 1 to {_LARGEST_WIDTH}")
+        for stage, width in enumerate(self.channels):
+            if stage >= self.attention_from and width % self.head_width:
+                raise ValueError(f"channels of stages with attention must be multiples of head_width, {self.head_width}")
+        return self
+
+    @property
+    def grid(self) -> Grid:
+        """Return the options by which cells and patches are found."""
+        stages, cross = len(self.channels), self.kernel == "cross"
+        return Grid(self.cell, stages, self.attention_from, cross, self.curves, self.patch)
+
+    def build(self, features: int, classes: int) -> nn.Module:
+        """Return a network with random weights for points of `features` numbers and `classes` scores."""
+        return PointTransformer(self, features, classes)
+
+    def exported(self, batch: Batch) -> Exported:
+        """Return what is found of a batch's cells, and their lengths' names."""
+        cells = build_cells(batch["coord"], batch["offset"], self.grid, always_masked=True)
+        inputs = {name: value for name, value in cells.items() if not name.startswith("ends")}
+        return Exported(inputs, {name: _lengths(name) for name in inputs})
+
+
+def _lengths(name: str) -> dict[int, str]:
+    """Return which axes of one of `Cells` may have any length, and what the lengths are called."""
+    kind, stage = name[:-1], int(name[-1])
+    if kind in ("cell", "share", "inside"):
+        return {0: "points0"}
+    if kind == "patch":
+        return {1: f"patches{stage}", 2: f"width{stage}"}
+    if kind == "filled":
+        return {0: f"patches{stage}", 1: f"width{stage}"}
+    return {1 if kind == "place" else 0: f"cells{stage - 1 if kind == 'parent' else stage}"}
+
+
+class PointTransformer(nn.Module):
+    """Convolutions and attention on the cells of packed clouds, and a class for every point.
+
+    Args:
+        options: its stages.
+        features: of a point.
+        classes: of the output.
+    """
+
+    def __init__(self, options: PointTransformerOptions, features: int, classes: int) -> None:
+        super().__init__()
+        self.options, self.features = options, features
+        channels = options.channels
+        drops = iter(torch.linspace(0.0, options.drop_path, sum(options.blocks)).tolist())
+        self.stem = Pointwise(features + 3, channels[0])
+        self.pools = nn.ModuleList(Pool(few, many) for few, many in pairwise(channels))
+        self.stages = nn.ModuleList(
+            nn.ModuleList(_block(options, stage, next(drops)) for _ in range(count))
+            for stage, count in enumerate(options.blocks)
+        )
+        self.unpools = nn.ModuleList(Unpool(few, many) for few, many in pairwise((channels[0], *channels)))
+        self.decoder = nn.ModuleList(
+            nn.ModuleList(_block(options, stage, 0.0) for _ in range(options.decoder_blocks))
+            for stage in range(len(channels) - 1)
+        )
+        self.head = nn.Sequential(
+            Pointwise(channels[0], channels[0]), nn.Dropout(options.dropout), nn.Linear(channels[0], classes)
+        )
+
+    def forward(self, feat: Tensor, batch: Batch) -> Tensor:
+        """Return the class scores (logits) of each point, (N, classes).
+
+        Args:
+            feat: (N, features).
+            batch: with ``coord`` (N, 3) and ``offset`` (B,), or with what `build_cells` finds of them.
+
+        Raises:
+            InputError: features and coordinates don't fit each other or the network, or there is no grid for them.
+        """
+        cells = batch if "cell0" in batch else build_cells(batch["coord"], batch["offset"], self.options.grid)
+        shape = (cells["cell0"].shape[0], self.features)  # an export would take `len` for a constant
+        if tuple(feat.shape) != shape:
+            raise InputError("feat", tuple(feat.shape), f"must have the shape {shape}")
+        views = [self._views(cells, stage) for stage in range(len(self.stages))]
+        first = cells["near0"] if "near0" in cells else cells["grid0"]
+        points = self.stem(torch.cat([feat, cells["inside0"].to(feat.dtype)], dim=1))
+        values = points.new_zeros(first.shape[0], points.shape[1], dtype=cells["share0"].dtype)
+        values = values.index_add(0, cells["cell0"], points * cells["share0"][:, None])
+        levels = [points]
+        for stage, blocks in enumerate(self.stages):
+            if stage:
+                values = self.pools[stage - 1](values, cells[f"children{stage}"])
+            for block in blocks:
+                values = block(values, next(views[stage]))
+            levels.append(values)
+        for stage in range(len(self.stages) - 1, -1, -1):
+            parent = cells[f"parent{stage}"] if stage else cells["cell0"]
+            values = self.unpools[stage](levels[stage], values, parent)
+            for block in self.decoder[stage - 1] if stage else ():
+                values = block(values, next(views[stage - 1]))
+        scores: Tensor = self.head(values)
+        return scores
+
+    def _views(self, cells: Cells, stage: int) -> Iterator[View]:
+        """Yield for each further block of a stage what its cells look at, without end."""
+        ends = cells.get(f"ends{stage}")
+        if stage < self.options.attention_from:
+            yield from repeat(View(ends, around=Around(cells[f"near{stage}"])))
+        curves = list(range(len(self.options.curves)))
+        if self.training and self.options.shuffle:
+            curves = torch.randperm(len(curves)).tolist()
+        turns = rotations(cells[f"grid{stage}"], self.options.head_width)
+        for curve in cycle(curves):
+            patch, place = cells[f"patch{stage}"][curve], cells[f"place{stage}"][curve]
+            yield View(ends, patch=patch, place=place, filled=cells.get(f"filled{stage}"), turns=turns)
+
+
+@dataclass(frozen=True)
+class View:
+    """Cells of a stage that look at each other in a block: around each, or along a curve.
+
+    Attributes:
+        ends: where each cloud's cells end (B,); None where nothing is dropped.
+        around: the cells around each, for convolutions.
+        patch, place, filled: of one curve, see `Cells`; for attention.
+        turns: of `rotations`, for attention.
+    """
+
+    ends: Tensor | None
+    around: Around | None = None
+    patch: Tensor | None = None
+    place: Tensor | None = None
+    filled: Tensor | None = None
+    turns: tuple[Tensor, Tensor] | None = None
+
+
+def rotations(places: Tensor, width: int) -> tuple[Tensor, Tensor]:
+    """Return cosines and sines (M, 1, width / 2) of the angles by which places (M, 3) turn a head's pairs of channels.
+
+    A third of the pairs turns with each axis, by frequencies from one down to about `_LONGEST_WAVE` times lower.
+    """
+    pairs = width // 6
+    frequency = _LONGEST_WAVE ** -(torch.arange(pairs, dtype=places.dtype, device=places.device) / pairs)
+    angle = (places[:, :, None] * frequency).flatten(1)[:, None]
+    return angle.cos(), angle.sin()
+
+
+@full_precision
+def turned(values: Tensor, cosine: Tensor, sine: Tensor) -> Tensor:
+    """Return values (M, heads, width) with their pairs of channels, half the width apart, turned by angles."""
+    first, second = values.chunk(2, dim=-1)
+    return torch.cat([first * cosine - second * sine, first * sine + second * cosine], dim=-1)
+
+
+def skipped(change: Tensor, ends: Tensor | None, share: float, training: bool) -> Tensor:
+    """Return the change (M, C) that a block makes, in training without that of a random share of the clouds.
+
+    What stays is scaled up, so that the mean is as it is without.
+
+    Args:
+        change: of the cells.
+        ends: where each cloud's cells end (B,).
+        share: of the clouds.
+        training: whether any are left out.
+    """
+    if not training or not share or ends is None:
+        return change
+    kept = (torch.rand(len(ends), device=change.device) >= share).to(change.dtype) / (1.0 - share)
+    counts = torch.diff(ends, prepend=ends.new_zeros(1))
+    return change * torch.repeat_interleave(kept, counts, output_size=len(change))[:, None]
+
+
+def _block(options: PointTransformerOptions, stage: int, drop: float) -> nn.Module:
+    """Return a new block of a stage."""
+    width = options.channels[stage]
+    if stage < options.attention_from:
+        return ConvolutionBlock(width, 7 if options.kernel == "cross" else 27, drop)
+    return AttentionBlock(width, options.head_width, options.expansion, drop)
+
+
+class ConvolutionBlock(nn.Module):
+    """Convolution over the cells around each, a pointwise layer, and what there was."""
+
+    def __init__(self, width: int, places: int, drop: float) -> None:
+        super().__init__()
+        self.norm = Norm(width)
+        self.look = CellConvolution(places, width, width)
+        self.look_norm = Norm(width)
+        self.mix = nn.Linear(width, width)
+        self.drop = drop
+
+    def forward(self, values: Tensor, view: View) -> Tensor:
+        """Return the cells' features (M, width) after the block; the shape stays."""
+        assert view.around is not None
+        seen = F.relu_(self.look_norm(self.look(self.norm(values), view.around)))
+        return values + skipped(self.mix(seen), view.ends, self.drop, self.training)
+
+
+class AttentionBlock(nn.Module):
+    """Attention among the cells of each patch of a curve, then two pointwise layers; both added to what there was."""
+
+    def __init__(self, width: int, head_width: int, expansion: int, drop: float) -> None:
+        super().__init__()
+        self.head_width = head_width
+        self.norm = nn.LayerNorm(width)
+        self.look = nn.Linear(width, 3 * width)
+        self.join = nn.Linear(width, width)
+        self.wide_norm = nn.LayerNorm(width)
+        self.widen = nn.Linear(width, width * expansion)
+        self.narrow = nn.Linear(width * expansion, width)
+        self.drop = drop
+
+    def forward(self, values: Tensor, view: View) -> Tensor:
+        """Return the cells' features (M, width) after the block; the shape stays."""
+        values = values + skipped(self._attention(self.norm(values), view), view.ends, self.drop, self.training)
+        wide = F.gelu(self.widen(self.wide_norm(values)))
+        return values + skipped(self.narrow(wide), view.ends, self.drop, self.training)
+
+    def _attention(self, values: Tensor, view: View) -> Tensor:
+        """Return what each cell (M, width) takes from the cells of its patch."""
+        assert view.patch is not None
+        assert view.place is not None
+        assert view.turns is not None
+        asked, offered, told = self.look(values).unflatten(1, (3, -1, self.head_width)).unbind(1)
+        asked, offered = (turned(each, *view.turns).to(told.dtype) for each in (asked, offered))
+        together = torch.stack([asked, offered, told], dim=1)
+        patches = together.index_select(0, view.patch.reshape(-1)).unflatten(0, view.patch.shape)
+        asked, offered, told = patches.transpose(1, 3).unbind(2)  # (P, heads, K, width of a head)
+        mask = None if view.filled is None else view.filled[:, None, None]
+        seen = F.scaled_dot_product_attention(asked, offered, told, attn_mask=mask)
+        taken = seen.transpose(1, 2).flatten(2).flatten(0, 1).index_select(0, view.place)
+        joined: Tensor = self.join(taken)
+        return joined
+
+
+class Pool(nn.Module):
+    """Layer to the cells of the next stage: of each channel the largest among a cell's up to eight."""
+
+    def __init__(self, few: int, many: int) -> None:
+        super().__init__()
+        self.linear = nn.Linear(few, many, bias=False)
+        self.norm = Norm(many)
+
+    def forward(self, values: Tensor, children: Tensor) -> Tensor:
+        """Return features (M, many) of the wider cells from those of the cells within, (N, few)."""
+        return F.relu_(self.norm(gather_max(self.linear(values), children)))
+
+
+class Unpool(nn.Module):
+    """Layer back to the stage before: what its cells had, and what the cell has that each lies in."""
+
+    def __init__(self, few: int, many: int) -> None:
+        super().__init__()
+        self.own = Pointwise(few, few)
+        self.wide = Pointwise(many, few)
+
+    def forward(self, own: Tensor, wide: Tensor, parent: Tensor) -> Tensor:
+        """Return features (N, few) of cells with (N, few) in wider cells with (M, many), those that `parent` names."""
+        joined: Tensor = self.own(own) + self.wide(wide).index_select(0, parent)
+        return joined
