@@ -29,7 +29,7 @@ CURVES = "curves.png"
 CALIBRATION = "calibration.json"
 PRETRAINING = "pretraining"
 """Folder, within that of a fine-tuned run, of what it began with."""
-FREE_WHEN_RESUMING = ("threads", "device", "workers")
+FREE_WHEN_RESUMING = ("threads", "device", "workers", "prepare_on")
 """Fields that may change between the parts of one training: they say where it runs, not what it learns."""
 
 C = TypeVar("C", bound=Configuration)
@@ -152,7 +152,7 @@ def stream_seed(seed: int, *purpose: str | int) -> int:
 
 
 def lasting_data(configuration: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a configuration's data without the fields that may change on resuming (threads, device, workers)."""
+    """Return a configuration's data without the fields of `FREE_WHEN_RESUMING`."""
     return {name: value for name, value in configuration.items() if name not in FREE_WHEN_RESUMING}
 
 

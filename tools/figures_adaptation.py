@@ -33,7 +33,13 @@ from synthroads_addon.base.schema import read_json  # noqa: E402
 
 GAP = 10.0
 """Degrees between the halves of a sweep that belong to neither."""
-LEARNING = ("schedule.learning_rate=0.001", "fine_tuning.learning_rate=0.001", "threads=1")
+LEARNING = (
+    "schedule.learning_rate=0.001",
+    "fine_tuning.learning_rate=0.001",
+    "threads=1",
+    "workers=1",
+    "prepare_on=cpu",
+)
 """Changes of the configuration that all trainings share: they begin with weights that are learned already."""
 SWEEPS = ("crop_points=12000", "batch=6", "class_weights=0", "fitted_offsets=true")
 """Changes with which `segmentation-sweeps` was trained."""

@@ -89,7 +89,7 @@ PLANS = {
         "Five classes on and beside roads, from the air and from UAVs",
         "segmentation",
         "segmentation-any-scanner",
-        ("schedule.epochs=36", "batch=8", "threads=1", "workers=3"),
+        ("schedule.epochs=36", "batch=8", "threads=1", "workers=3", "prepare_on=cpu"),
         ("train", "train_sweeps"),
         Domain(density=(8.0, 1500.0), platforms=("airborne", "uav")),
         (
@@ -108,7 +108,7 @@ PLANS = {
             # Of three seeds the best on sweeps of its own.
             *("seed=1", "schedule.epochs=64", "batch=6", "crop_points=12000", "crops_per_tile=3"),
             # Balanced crops hold rare classes often already: with weights as well they are found where they aren't.
-            *("class_weights=0", "fitted_offsets=true", "threads=1", "workers=2"),
+            *("class_weights=0", "fitted_offsets=true", "threads=1", "workers=2", "prepare_on=cpu"),
         ),
         ("train_sweeps",),
         Domain(density=(5.0, 15.0), platforms=("tripod",)),

@@ -96,6 +96,10 @@ class SegmentationConfiguration(Configuration):
         Schedule(epochs=30, learning_rate=0.001), description="Second part of fine_tuned; each round of self_trained."
     )
     self_training: SelfTraining = Field(SelfTraining(), description="Learning from unlabelled clouds.")
+    prepare_on: Literal["auto", "cpu"] = Field(
+        "auto",
+        description="Where batches are prepared: by the GPU where there is one and the network can, or workers.",
+    )
     start: str = Field("", description="Run's folder or shipped model whose weights are begun with; random if empty.")
     data: Data = Field(Data(), description="Where points come from.")
 
