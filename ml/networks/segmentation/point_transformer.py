@@ -61,7 +61,7 @@ class PointTransformerOptions(SegmentationNetwork):
         4, ge=1, le=16, unit="1", description="Width of a block's layers, in channels of its stage."
     )
     drop_path: float = quantity(0.1, ge=0, lt=1, unit="1", description="Share of clouds that skip the last block.")
-    dropout: float = quantity(0.3, ge=0, lt=1, unit="1", description="Dropout of the head.")
+    dropout: float = quantity(0.5, ge=0, lt=1, unit="1", description="Dropout of the head.")
 
     @field_validator("curves")
     @classmethod
