@@ -1,4 +1,4 @@
-"""Train a model: PointNeXt for segmentation, or one of the centreline models, as a configuration says."""
+"""Train a model: a network for segmentation, or one of the centreline models, as a configuration says."""
 
 import argparse
 import sys

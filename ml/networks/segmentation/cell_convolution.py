@@ -3,10 +3,10 @@
 Graham, Engelcke and van der Maaten, "3D semantic segmentation with submanifold sparse convolutional networks" (2018):
 only filled cells have a result, so that surfaces stay as thin as they are.
 
-On a CPU it is done place by place for the pairs of cells that are there: of a surface a fourth or less. A GPU would wait
-for so many small steps; there all places are gathered, empty ones as zeros, and one product of matrices does the rest.
-Either way nothing of the size cells x places x channels is kept for the gradient, and no two numbers are added to one
-at the same time, so that all runs are the same.
+On a CPU it is done place by place for the pairs of cells that are there: of a surface not half of them. A GPU would
+wait for so many small steps; there all places are gathered, empty ones as zeros, and one product of matrices does the
+rest. Either way nothing of the size cells x places x channels is kept for the gradient, and no two numbers are added to
+one at the same time, so that all runs are the same.
 """
 
 from collections.abc import Iterator
@@ -36,7 +36,7 @@ class CellConvolution(nn.Module):
     def forward(self, values: Tensor, around: "Around") -> Tensor:
         """Return features (M, many) of cells with features (M, few)."""
         device = values.device.type
-        weight = self.weight
+        weight: Tensor = self.weight
         if torch.is_autocast_enabled(device):
             half = torch.get_autocast_dtype(device)
             values, weight = values.to(half), weight.to(half)
@@ -88,7 +88,7 @@ class _Pairwise(torch.autograd.Function):
     @staticmethod
     def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor | None, Tensor | None, None]:
         values, weight = ctx.saved_tensors
-        of_values = _sums(*values.shape, values) if ctx.needs_input_grad[0] else None
+        of_values = _sums(len(values), values.shape[1], values) if ctx.needs_input_grad[0] else None
         of_weight = torch.empty_like(weight) if ctx.needs_input_grad[1] else None
         for place, (own, other) in enumerate(ctx.around.pairs()):
             gradient = gradients[0].index_select(0, own)

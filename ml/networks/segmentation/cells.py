@@ -1,4 +1,4 @@
-"""Which cells of a grid a cloud fills, stage by stage, and which of them look at which: in plain PyTorch, on any device.
+"""Which cells of a grid a cloud fills, stage by stage, and which look at which: in plain PyTorch, on any device.
 
 Points are gathered into the cells of a grid, these into cells twice as wide, and so on. In the first stages each cell
 looks at the cells around it; in the later ones cells are sorted along space-filling curves, and each looks at those of
@@ -109,7 +109,7 @@ def build_cells(coord: Tensor, offset: Tensor, grid: Grid, *, always_masked: boo
 
 
 def _points_of_clouds(coord: Tensor, offset: Tensor) -> Tensor:
-    """Return the number of points of each cloud (B,) int64, on the coordinates' device; raise `InputError` at faults."""
+    """Return the number of points of each cloud (B,), on the coordinates' device; raise `InputError` at faults."""
     if coord.ndim != 2 or coord.shape[1] != _AXES or not coord.is_floating_point():
         raise InputError("coord", tuple(coord.shape), "must be floating-point numbers of the shape (N, 3)")
     ends = [int(end) for end in offset.flatten().tolist()]
@@ -131,8 +131,11 @@ def _places(coord: Tensor, cloud: Tensor, clouds: int, edge: float) -> tuple[Ten
     lowest.scatter_reduce_(0, cloud[:, None].expand(-1, _AXES), floor, "amin", include_self=False)
     cells = floor - lowest[cloud]
     if len(cells) and (widest := float(cells.max())) >= LARGEST:
-        raise InputError("network.cell", edge, f"must be so large that no cloud is wider than {LARGEST} cells: "
-                         f"one is {widest + 1:.0f} wide")
+        raise InputError(
+            "network.cell",
+            edge,
+            f"must be so large that no cloud is wider than {LARGEST} cells: one is {widest + 1:.0f} wide",
+        )
     return cells.long(), scaled - floor - 0.5
 
 

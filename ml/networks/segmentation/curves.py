@@ -97,5 +97,3 @@ def _direction(digit: int) -> int:
         return 0
     ones = digit if digit % 2 else digit - 1
     return ((ones ^ (ones + 1)).bit_length() - 1) % _AXES
-
-

@@ -51,13 +51,17 @@ class PointTransformerOptions(SegmentationNetwork):
     )
     decoder_blocks: int = quantity(0, ge=0, le=8, unit="1", description="Blocks of each stage on the way back.")
     kernel: Literal["cube", "cross"] = Field("cube", description="All 26 cells around one, or the 6 that share a face.")
-    curves: tuple[Curve, ...] = Field(CURVES, min_length=1, description="Curves that blocks of attention follow in turn.")
+    curves: tuple[Curve, ...] = Field(
+        CURVES, min_length=1, description="Curves that blocks of attention follow in turn."
+    )
     shuffle: bool = Field(True, description="In training, draw anew in each step which block follows which curve.")
     patch: int = quantity(256, ge=8, le=4096, unit="1", description="Cells that attend to each other.")
     head_width: int = quantity(24, ge=6, le=384, unit="1", description="Channels of a head of attention.")
-    expansion: int = quantity(4, ge=1, le=16, unit="1", description="Width of a block's layers, in channels of its stage.")
+    expansion: int = quantity(
+        4, ge=1, le=16, unit="1", description="Width of a block's layers, in channels of its stage."
+    )
     drop_path: float = quantity(0.1, ge=0, lt=1, unit="1", description="Share of clouds that skip the last block.")
-    dropout: float = quantity(0.3, ge=0, lt=1, unit="1", description="Dropout of the head.")
+    dropout: float = quantity(0.5, ge=0, lt=1, unit="1", description="Dropout of the head.")
 
     @field_validator("curves")
     @classmethod
@@ -78,13 +82,15 @@ class PointTransformerOptions(SegmentationNetwork):
     def _check_stages(self) -> PointTransformerOptions:
         if len(self.channels) != len(self.blocks):
             raise ValueError(f"blocks must be as many as channels, {len(self.channels)}")
-        if min(self.blocks) < 0 or max(self.blocks) > 64:  # noqa: PLR2004
+        if min(self.blocks) < 0 or max(self.blocks) > 64:
             raise ValueError("blocks must be numbers from 0 to 64")
         if min(self.channels) < 1 or max(self.channels) > _LARGEST_WIDTH:
             raise ValueError(f"channels must be numbers from 1 to {_LARGEST_WIDTH}")
         for stage, width in enumerate(self.channels):
             if stage >= self.attention_from and width % self.head_width:
-                raise ValueError(f"channels of stages with attention must be multiples of head_width, {self.head_width}")
+                raise ValueError(
+                    f"channels of stages with attention must be multiples of head_width, {self.head_width}"
+                )
         return self
 
     @property
@@ -116,6 +122,16 @@ def _lengths(name: str) -> dict[int, str]:
     return {1 if kind == "place" else 0: f"cells{stage - 1 if kind == 'parent' else stage}"}
 
 
+class Blocks(nn.ModuleList):
+    """Blocks of a stage, one after the other."""
+
+    def forward(self, values: Tensor, views: Iterator[View]) -> Tensor:
+        """Return the cells' features (M, width) after all blocks, each of which has the next view."""
+        for block in self:
+            values = block(values, next(views))
+        return values
+
+
 class PointTransformer(nn.Module):
     """Convolutions and attention on the cells of packed clouds, and a class for every point.
 
@@ -133,12 +149,12 @@ class PointTransformer(nn.Module):
         self.stem = Pointwise(features + 3, channels[0])
         self.pools = nn.ModuleList(Pool(few, many) for few, many in pairwise(channels))
         self.stages = nn.ModuleList(
-            nn.ModuleList(_block(options, stage, next(drops)) for _ in range(count))
+            Blocks(_block(options, stage, next(drops)) for _ in range(count))
             for stage, count in enumerate(options.blocks)
         )
         self.unpools = nn.ModuleList(Unpool(few, many) for few, many in pairwise((channels[0], *channels)))
         self.decoder = nn.ModuleList(
-            nn.ModuleList(_block(options, stage, 0.0) for _ in range(options.decoder_blocks))
+            Blocks(_block(options, stage, 0.0) for _ in range(options.decoder_blocks))
             for stage in range(len(channels) - 1)
         )
         self.head = nn.Sequential(
@@ -168,14 +184,13 @@ class PointTransformer(nn.Module):
         for stage, blocks in enumerate(self.stages):
             if stage:
                 values = self.pools[stage - 1](values, cells[f"children{stage}"])
-            for block in blocks:
-                values = block(values, next(views[stage]))
+            values = blocks(values, views[stage])
             levels.append(values)
         for stage in range(len(self.stages) - 1, -1, -1):
             parent = cells[f"parent{stage}"] if stage else cells["cell0"]
             values = self.unpools[stage](levels[stage], values, parent)
-            for block in self.decoder[stage - 1] if stage else ():
-                values = block(values, next(views[stage - 1]))
+            if stage:
+                values = self.decoder[stage - 1](values, views[stage - 1])
         scores: Tensor = self.head(values)
         return scores
 

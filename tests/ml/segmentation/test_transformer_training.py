@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import torch
 
@@ -14,10 +13,8 @@ from ml.runs import Run
 from ml.safetensors import read_tensors
 from ml.segmentation import task
 from ml.segmentation.network import build
-from ml.segmentation.prediction import PREDICTED
 from ml.shipped import ship
 from ml.tasks import Prediction
-from synthroads_addon.cloud.formats.registry import open_cloud
 from tests.helpers.clouds.segmentation_data import road_block, road_tile, toy, write_cloud, write_pointcept
 
 torch.set_num_threads(1)
@@ -60,20 +57,17 @@ def test_learns_nearly_the_same_in_bfloat16(data: Path, tmp_path: Path) -> None:
 
 
 def test_a_trained_one_labels_clouds_and_is_shipped(data: Path, tmp_path: Path) -> None:
-    run, weights, _ = trained(data, tmp_path / "run", schedule={"epochs": 8}, fitted_offsets=True)
+    run, weights, _ = trained(data, tmp_path / "run", schedule={"epochs": 25}, fitted_offsets=True)
     metrics = json.loads((tmp_path / "run/metrics.json").read_text())
-    assert metrics["tests"]["unseen"]["mean_iou"] > 0.35
+    assert metrics["tests"]["unseen"]["mean_iou"] > 0.5
     write_cloud(tmp_path / "cloud.laz", road_block(4000, 5, length=20.0))
     told = task.predict(run, Prediction(tmp_path / "cloud.laz", tmp_path / "labelled.laz"))
     assert sum(told["classes"].values()) == told["points"] == 4000
     assert sum(number > 100 for number in told["classes"].values()) >= 3
-    with open_cloud(tmp_path / "labelled.laz") as cloud:
-        assert cloud.header.count == 4000
-    assert PREDICTED == "predicted_class"
 
     assert ship(run, tmp_path / "model.safetensors") < 1e6
     shipped = read_tensors(tmp_path / "model.safetensors")
     model = build(run.configuration)
-    model.load_state_dict({name: value.float() if value.is_floating_point() else value for name, value in shipped.items()})
+    model.load_state_dict({name: value.to(weights[name].dtype) for name, value in shipped.items()})
     for name, value in weights.items():
-        np.testing.assert_allclose(model.state_dict()[name], value, rtol=1e-3, atol=1e-6)
+        assert torch.allclose(model.state_dict()[name], value, rtol=1e-3, atol=1e-6), name

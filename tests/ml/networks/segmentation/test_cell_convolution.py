@@ -30,7 +30,9 @@ def filled(cross: bool = False) -> tuple[Tensor, Tensor]:
 @pytest.mark.parametrize("chunk", [1, 1 << 26])
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("cross", [False, True])
-def test_equals_a_convolution_of_the_whole_box(way: type, cross: bool, chunk: int, monkeypatch) -> None:  # noqa: ANN001
+def test_equals_a_convolution_of_the_whole_box(
+    way: type, cross: bool, chunk: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(cell_convolution, "_CHUNK", chunk)
     cells, near = filled(cross)
     torch.manual_seed(2)
@@ -41,7 +43,9 @@ def test_equals_a_convolution_of_the_whole_box(way: type, cross: bool, chunk: in
     box = torch.zeros(1, FEW, 6, 5, 4, dtype=torch.float64)
     box[0, :, cells[:, 0], cells[:, 1], cells[:, 2]] = values.T
     wanted = F.conv3d(box, whole.permute(2, 1, 0).reshape(MANY, FEW, 3, 3, 3), padding=1)
-    assert torch.allclose(way.apply(values, weight, Around(near)), wanted[0][:, cells[:, 0], cells[:, 1], cells[:, 2]].T)
+    assert torch.allclose(
+        way.apply(values, weight, Around(near)), wanted[0][:, cells[:, 0], cells[:, 1], cells[:, 2]].T
+    )
 
 
 @pytest.mark.parametrize("way", WAYS)

@@ -96,6 +96,22 @@ def test_a_cloud_may_lie_anywhere() -> None:
     assert torch.allclose(run(model, (moved, feat)), run(model, (coord, feat)), rtol=0, atol=1e-9)
 
 
+def test_points_twice_are_as_good_as_once() -> None:
+    model = network(small()).eval()
+    coord, feat = random_cloud(300)
+    twice = run(model, (torch.cat([coord, coord]), torch.cat([feat, feat])))
+    assert torch.allclose(twice, run(model, (coord, feat)).repeat(2, 1), rtol=0, atol=1e-12)
+
+
+def test_attention_knows_where_cells_are() -> None:
+    model = network(small()).eval()
+    batch = batch_of(random_cloud(300))
+    cells = build_cells(batch["coord"], batch["offset"], model.options.grid)
+    assert torch.allclose(model(batch["feat"], cells | {"grid2": cells["grid2"] + 3}), model(batch["feat"], cells))
+    elsewhere = cells | {"grid2": cells["grid2"] * 2}
+    assert not torch.allclose(model(batch["feat"], elsewhere), model(batch["feat"], cells))
+
+
 def test_what_fills_a_patch_up_is_not_seen() -> None:
     model = network(small()).eval()
     batch = batch_of(random_cloud(10, 1), random_cloud(400, 2), random_cloud(5, 3))
