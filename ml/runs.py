@@ -28,7 +28,7 @@ METRICS = "metrics.json"
 CURVES = "curves.png"
 CALIBRATION = "calibration.json"
 PRETRAINING = "pretraining"
-"""Folder, within that of a fine-tuned run, of what it began with."""
+"""Folder, within that of a fine-tuned or self-trained run, of what it began with, and of its rounds but the last."""
 FREE_WHEN_RESUMING = ("threads", "device", "workers", "prepare_on")
 """Fields that may change between the parts of one training: they say where it runs, not what it learns."""
 

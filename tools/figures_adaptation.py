@@ -205,9 +205,8 @@ def table(rows: Sequence[tuple[Case, dict[str, float]]]) -> str:
     lines = [f"| {' | '.join(['', 'tested on', *columns, 'each seed'])} |", f"|---|---|{'--:|' * len(columns)}---|"]
     for title, test in dict.fromkeys((case.title, case.test.stem) for case, _ in rows):
         found = [told for case, told in rows if (case.title, case.test.stem) == (title, test)]
-        cells = [
-            f"{statistics.mean(told[name] for told in found):.1f}" if name in found[0] else "–" for name in columns
-        ]
+        columns_of = [[told[name] for told in found if name in told] for name in columns]
+        cells = [f"{statistics.mean(values):.1f}" if values else "–" for values in columns_of]
         each = ", ".join(f"{told['mean']:.1f}" for told in found)
         lines.append(f"| {' | '.join([title, test, *cells, each])} |")
     return "\n".join(lines)

@@ -2,7 +2,7 @@
 
 import tempfile
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -57,13 +57,14 @@ class Source(Part):
         return mapping.targets(names) if mapping else names
 
 
-def read_tiles(source: Source, scheme: ClassScheme, voxel: float | None) -> Iterator[CloudTile]:
+def read_tiles(source: Source, scheme: ClassScheme, voxel: float | None, *, labels: bool = True) -> Iterator[CloudTile]:
     """Yield the tiles of a source of labelled points, thinned to one point per voxel, ordered by name.
 
     Args:
         source: where they are.
         scheme: classes that are learned.
         voxel: edge of the cells of which one point each is kept, m; None for all points.
+        labels: whether labels are read; else all are `IGNORED`, and clouds need none.
 
     Raises:
         MissingFileError: there is nothing.
@@ -79,9 +80,9 @@ def read_tiles(source: Source, scheme: ClassScheme, voxel: float | None) -> Iter
     elif path.is_file() and path.suffix.lower() == ".npz" and _is_pack(path):
         tiles = _packed_tiles(path, scheme, voxel)
     elif path.is_file():
-        tiles = cloud_tiles(path, scheme, source)
+        tiles = cloud_tiles(path, scheme, source, labels=labels)
     elif path.is_dir():
-        tiles = _folder_tiles(path, scheme, source)
+        tiles = _folder_tiles(path, scheme, source, labels=labels)
     else:
         raise MissingFileError(str(path), None, "no such file or folder of labelled points")
     for tile in tiles:
@@ -89,7 +90,8 @@ def read_tiles(source: Source, scheme: ClassScheme, voxel: float | None) -> Iter
             kept = slice(None) if voxel is None else voxel_sample(tile.coord, voxel)
         except ValueError:
             raise InputError(str(path), None, f"a tile of {tile.scene} is too large for cells of {voxel:g} m") from None
-        yield tile.select(kept)
+        thin = tile.select(kept)
+        yield thin if labels else replace(thin, segment=np.full(len(thin), IGNORED, dtype=np.int16))
 
 
 def _is_pack(path: Path) -> bool:
@@ -115,14 +117,15 @@ def _places(numbers: AnyArray, known: Bool, table: NDArray[np.int16]) -> NDArray
     return np.where(known, table[np.where(known, numbers, 0)], IGNORED).astype(np.int16)
 
 
-def _folder_tiles(path: Path, scheme: ClassScheme, source: Source) -> Iterator[CloudTile]:
+def _folder_tiles(path: Path, scheme: ClassScheme, source: Source, *, labels: bool) -> Iterator[CloudTile]:
     root = pointcept_root(path)
     if root is not None:
         yield from pointcept_tiles(root, scheme, source.split)
         return
     folder = path / source.split if source.split else path
     for cloud in clouds_below(folder):
-        yield from cloud_tiles(cloud, scheme, source, cloud.relative_to(folder).with_suffix("").as_posix())
+        name = cloud.relative_to(folder).with_suffix("").as_posix()
+        yield from cloud_tiles(cloud, scheme, source, name, labels=labels)
 
 
 def clouds_below(folder: Path) -> list[Path]:
@@ -212,7 +215,9 @@ def _array(folder: Path, name: str, entry: tuple[int, ...], kind: str) -> AnyArr
     return np.asarray(array)
 
 
-def cloud_tiles(path: Path, scheme: ClassScheme, source: Source, scene: str | None = None) -> Iterator[CloudTile]:
+def cloud_tiles(
+    path: Path, scheme: ClassScheme, source: Source, scene: str | None = None, *, labels: bool = True
+) -> Iterator[CloudTile]:
     """Yield one cloud's labelled points as square tiles of edge `source.tile`, in bounded memory.
 
     The classes are those of the project's own clouds, or of another's attribute by the source's mapping.
@@ -222,46 +227,27 @@ def cloud_tiles(path: Path, scheme: ClassScheme, source: Source, scene: str | No
         scheme: classes that are learned.
         source: mapping, and edge of the tiles.
         scene: name that tells the cloud from the source's others; the file's if not given.
+        labels: whether labels are read; else all are `IGNORED`.
 
     Raises:
         InputError: the cloud has no points, or no labels of its own and there is no mapping, or it is damaged.
     """
-    yield from _tiles_of_cloud(path, source.tile, scene, lambda cloud: labelled_blocks(cloud, scheme, source))
-
-
-def unlabelled_tiles(source: Source, voxel: float) -> Iterator[CloudTile]:
-    """Yield the tiles of a cloud, or of all clouds in a folder, thinned to one point per voxel, all labels `IGNORED`.
-
-    Raises:
-        MissingFileError: there is no cloud.
-        InputError: a cloud is damaged, or has no points.
-    """
-    path = Path(source.path)
-    clouds = clouds_below(path / source.split if source.split else path) if path.is_dir() else [path]
-    for number, cloud in enumerate(clouds):
-        for tile in _tiles_of_cloud(cloud, source.tile, f"{number}/{cloud.stem}", unlabelled_blocks):
-            yield tile.select(voxel_sample(tile.coord, voxel))
+    with open_cloud(path) as cloud, tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
+        if not cloud.header.count:
+            raise InputError(str(path), 0, "holds no points to learn from")
+        scale = steps_per_unit(cloud)
+        low = np.min([block.xyz.min(axis=0) for block in cloud.blocks() if len(block)], axis=0)
+        origin = np.floor(low)
+        with TileSorter(source.tile, origin, Path(folder)) as sorter:
+            sorter.add(labelled_blocks(cloud, scheme, source) if labels else unlabelled_blocks(cloud))
+            for part in sorter.tiles():
+                yield tile_of(part.points, scene or path.stem, part.corner, scale)
 
 
 def unlabelled_blocks(cloud: CloudReader) -> Iterator[PointBlock]:
     """Yield a cloud's blocks without labels, whatever they are."""
     for block in cloud.blocks():
         yield _with_places(block, np.full(len(block), IGNORED, dtype=np.int16))
-
-
-def _tiles_of_cloud(
-    path: Path, edge: float, scene: str | None, blocks: Callable[[CloudReader], Iterator[PointBlock]]
-) -> Iterator[CloudTile]:
-    """Yield a cloud's blocks, as a function gives them, sorted into square tiles of an edge (m)."""
-    with open_cloud(path) as cloud, tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
-        if not cloud.header.count:
-            raise InputError(str(path), 0, "holds no points to learn from")
-        scale = steps_per_unit(cloud)
-        low = np.min([block.xyz.min(axis=0) for block in cloud.blocks() if len(block)], axis=0)
-        with TileSorter(edge, np.floor(low), Path(folder)) as sorter:
-            sorter.add(blocks(cloud))
-            for part in sorter.tiles():
-                yield tile_of(part.points, scene or path.stem, part.corner, scale)
 
 
 def yardstick_tiles(folder: Path, scheme: ClassScheme, source: Source) -> Iterator[CloudTile]:

@@ -33,7 +33,7 @@ def full_precision(function: Callable[P, R]) -> Callable[P, R]:
 
 
 @dataclass(frozen=True)
-class Exported:
+class OnnxInputs:
     """Tensors that a network's ONNX file takes beside the features.
 
     Attributes:
@@ -66,7 +66,7 @@ class SegmentationNetwork(Part):
         """Return the batch with what the network needs precomputed, on the batch's device; here unchanged."""
         return batch
 
-    def exported(self, batch: Batch) -> Exported:
+    def onnx_inputs(self, batch: Batch) -> OnnxInputs:
         """Return what the network needs of a batch beside the features, so that it can be written as ONNX.
 
         Raises:

@@ -105,6 +105,7 @@ def _fill_sources(data: Data, folders: Mapping[str, str]) -> Data:
     return Data(
         real=tuple(map(fill, data.real)),
         synthetic=tuple(map(fill, data.synthetic)),
+        target=tuple(map(fill, data.target)),
         validation=tuple(map(fill, data.validation)),
         tests={name: tuple(map(fill, sources)) for name, sources in data.tests.items()},
     )

@@ -44,7 +44,7 @@ def exportable_network(model: nn.Module, configuration: SegmentationConfiguratio
     points = _CLOUDS * _POINTS
     coord = torch.rand(points, 3, generator=draw) * torch.tensor([_CUBE, _CUBE, 1.0])
     offset = torch.arange(_POINTS, points + 1, _POINTS)
-    found = configuration.network.exported({"coord": coord, "offset": offset})
+    found = configuration.network.onnx_inputs({"coord": coord, "offset": offset})
     feat = torch.randn(points, len(configuration.features), generator=draw)
     names = tuple(found.inputs)
     dynamic = {"feat": {0: "points0"}, **found.lengths}

@@ -1,4 +1,4 @@
-"""Batches for training and for the norms' statistics: tiles read, crops drawn, neighbours found in the workers."""
+"""Batches for training and for the norms' statistics: tiles read, crops drawn and prepared in workers."""
 
 import math
 import zlib
@@ -19,7 +19,6 @@ from ..data.workers import load_batches
 from .network import gpu_prepares, overlay_clouds
 from .recipes import SegmentationConfiguration, mapped_intensities, plan
 
-_CPU = torch.device("cpu")
 SMALLEST_SHARE = 0.25
 """Of a crop's points: tiles with fewer are left out of training, unless all have."""
 
@@ -35,22 +34,32 @@ def read_domains(configuration: SegmentationConfiguration) -> dict[str, list[Clo
     """
     domains: dict[str, list[CloudTile]] = {}
     for domain, sources in configuration.needed_sources().items():
-        tiles = list(thin_tiles(sources, configuration, domain))
-        least = SMALLEST_SHARE * configuration.crop_points
-        enough = [tile for tile in tiles if len(tile) >= least]
-        domains[domain] = enough or [tile for tile in tiles if len(tile)]
+        domains[domain] = large_enough(list(thin_tiles(sources, configuration, domain)), configuration)
     if configuration.set_up == "mixed_mapped":
         domains["synthetic"] = mapped_intensities(domains["synthetic"], domains["real"])
     return domains
 
 
-def thin_tiles(sources: Sequence[Source], configuration: SegmentationConfiguration, title: str) -> Iterator[CloudTile]:
+def large_enough(tiles: Sequence[CloudTile], configuration: SegmentationConfiguration) -> list[CloudTile]:
+    """Return the tiles with at least `SMALLEST_SHARE` of a crop's points; all with any point if there are none."""
+    least = SMALLEST_SHARE * configuration.crop_points
+    return [tile for tile in tiles if len(tile) >= least] or [tile for tile in tiles if len(tile)]
+
+
+def thin_tiles(
+    sources: Sequence[Source], configuration: SegmentationConfiguration, title: str, *, labels: bool = True
+) -> Iterator[CloudTile]:
     """Yield the sources' tiles thinned to one point per training voxel, scenes renamed to ``TITLE/PLACE/SCENE``.
 
     Scenes of two sources may have one name: here they have others, so that their intensities are scaled apart.
+
+    Args:
+        sources, configuration: of the training.
+        title: of the domain.
+        labels: whether labels are read; else all are `IGNORED`.
     """
     for place, source in enumerate(sources):
-        for tile in read_tiles(source, configuration.scheme(), configuration.voxel):
+        for tile in read_tiles(source, configuration.scheme(), configuration.voxel, labels=labels):
             yield replace(tile, scene=f"{title}/{place}/{tile.scene}")
 
 
@@ -67,14 +76,14 @@ class CropBatches:
         self,
         configuration: SegmentationConfiguration,
         domains: Iterable[Sequence[CloudTile]],
-        device: torch.device = _CPU,
+        device: torch.device,
     ) -> None:
         self.configuration = configuration
         self.device = device
         self.domains = list(domains)
         self.tiles = [tile for tiles in self.domains for tile in tiles]
         self.scaling = scalings(self.tiles, configuration.intensity)
-        self.seeds = self._seeds(self.tiles, balanced=configuration.balanced)
+        self.seeds = self._seeds()
 
     def __len__(self) -> int:
         return math.ceil(self.configuration.crops_per_tile * len(self.tiles) / self.configuration.batch)
@@ -83,11 +92,12 @@ class CropBatches:
         """Yield the batches of an epoch whose numbers, from 0, `share` selects."""
         given, sizes = self.configuration, [len(tiles) for tiles in self.domains]
         draws = plan(sizes, given.crops_per_tile, given.synthetic_share, given.seed, epoch)
-        crops = self._crops(self.tiles, draws, self.seeds, epoch)
+        crops = self._crops(self.tiles, draws, self.seeds[0], epoch)
         yield from _load_crops(crops, given, epoch, given.adaptation.mix3d, share, self.device)
 
-    def _seeds(self, tiles: Sequence[CloudTile], *, balanced: bool) -> Seeds:
-        return Seeds(tiles, len(class_names(self.configuration.scheme())), balanced)
+    def _seeds(self) -> list[Seeds]:
+        """Return where crops are cut out: in all tiles alike."""
+        return [Seeds(self.tiles, len(class_names(self.configuration.scheme())), self.configuration.balanced)]
 
     def _crops(self, tiles: Sequence[CloudTile], draws: Sequence[Draw], seeds: Seeds, epoch: int) -> CropDataset:
         given = self.configuration
@@ -101,17 +111,22 @@ class ExchangedBatches(CropBatches):
     Args: see `CropBatches`; the domains are synthetic tiles and those of the target with believed labels.
     """
 
+    def _seeds(self) -> list[Seeds]:
+        """Return where crops of each domain are cut out; believed labels are too few to balance classes by them."""
+        classes, (synthetic, target) = len(class_names(self.configuration.scheme())), self.domains
+        return [Seeds(synthetic, classes, self.configuration.balanced), Seeds(target, classes, balanced=False)]
+
     def __len__(self) -> int:
         return math.ceil(self._pairs() / self._pairs_per_batch())
 
     def __call__(self, epoch: int, share: slice = slice(None)) -> Iterator[Item]:
         """Yield the batches of an epoch whose numbers, from 0, `share` selects."""
-        given, (synthetic, target) = self.configuration, self.domains
-        parts = [
-            self._crops(tiles, self._draws(len(tiles), place, epoch), self._seeds(tiles, balanced=balanced), epoch)
-            for place, (tiles, balanced) in enumerate([(synthetic, given.balanced), (target, False)])
-        ]
-        pairs = ExchangedCrops(parts[0], parts[1], given.seed, epoch)
+        given = self.configuration
+        synthetic, target = (
+            self._crops(tiles, self._draws(len(tiles), place, epoch), seeds, epoch)
+            for place, (tiles, seeds) in enumerate(zip(self.domains, self.seeds, strict=True))
+        )
+        pairs = ExchangedCrops(synthetic, target, given.seed, epoch)
         yield from _load_crops(pairs, given, epoch, 0.0, share, self.device, self._pairs_per_batch())
 
     def _pairs(self) -> int:
@@ -155,21 +170,21 @@ class Collate:
     Attributes:
         configuration, epoch: of the training.
         mix3d: share of batches that are overlaid.
-        late: whether batches are left to be prepared by the network's device.
+        left_to_gpu: whether batches are left to be prepared by the network's device.
     """
 
     configuration: SegmentationConfiguration
     epoch: int
     mix3d: float
-    late: bool
+    left_to_gpu: bool
 
-    def __call__(self, found: Sequence[Item] | Sequence[list[Item]]) -> Item:
+    def __call__(self, drawn: Sequence[Item] | Sequence[list[Item]]) -> Item:
         """Return the batch of items or of pairs, perhaps overlaid, prepared unless the GPU does that."""
-        items = [item for each in found for item in (each if isinstance(each, list) else [each])]
+        items = [item for each in drawn for item in (each if isinstance(each, list) else [each])]
         batch = collate(items)
         if self.mix3d and self._chance(items[0]) < self.mix3d:
             batch = overlay_clouds(batch)
-        return batch if self.late else self.configuration.network.prepare(batch)
+        return batch if self.left_to_gpu else self.configuration.network.prepare(batch)
 
     def _chance(self, first: Item) -> float:
         """Return a random number from 0 to 1 seeded by the first item's points: workers don't know batch numbers."""
@@ -178,7 +193,7 @@ class Collate:
 
 
 def adaptation_batches(
-    tiles: list[CloudTile], configuration: SegmentationConfiguration, device: torch.device = _CPU
+    tiles: list[CloudTile], configuration: SegmentationConfiguration, device: torch.device
 ) -> Iterator[Item]:
     """Yield batches of random unaugmented crops of a test's tiles, for AdaBN; none without tiles."""
     if not tiles:

@@ -155,16 +155,24 @@ def trained_model(run: Run[SegmentationConfiguration]) -> nn.Module:
     Raises:
         InputError: the checkpoint is damaged or of another network.
     """
-    device = chosen_device(run.configuration)
-    state = run.last_checkpoint(device)
+    model = build(run.configuration).to(chosen_device(run.configuration))
+    load_weights(model, run)
+    return model.eval()
+
+
+def load_weights(model: nn.Module, run: Run[SegmentationConfiguration]) -> None:
+    """Load the weights of a run's last checkpoint into a network, in place, on the network's device.
+
+    Raises:
+        InputError: the checkpoint is damaged or of another network.
+    """
+    state = run.last_checkpoint(next(model.parameters()).device)
     if state is None:
         raise InputError(str(run.folder), None, "holds no checkpoint")
-    model = build(run.configuration).to(device)
     try:
         model.load_state_dict(state["model"])
     except (KeyError, RuntimeError):
         raise InputError(str(run.folder), None, "its checkpoint is of another network than its configuration") from None
-    return model.eval()
 
 
 def classifier(model: nn.Module, configuration: SegmentationConfiguration) -> Classifier:

@@ -16,8 +16,8 @@ from synthroads_addon.base.arrays import AnyArray, Float32
 from synthroads_addon.base.errors import InputError
 
 from ..data.classes import IGNORED, class_names
-from ..data.sources import unlabelled_tiles
 from ..data.tiles import CloudTile, scalings
+from .loading import large_enough, thin_tiles
 from .recipes import SegmentationConfiguration
 from .scoring import Classifier, piece_scores
 
@@ -26,13 +26,13 @@ def target_tiles(configuration: SegmentationConfiguration) -> list[CloudTile]:
     """Read the thinned tiles of the target domain, without labels; labels that their files hold aren't looked at.
 
     Raises:
-        MissingFileError, InputError: there are none, or they are damaged.
+        MissingFileError, InputError: there are none, they are damaged, or hold no points.
     """
-    found: list[CloudTile] = []
-    for place, source in enumerate(configuration.data.target):
-        for tile in unlabelled_tiles(source, configuration.voxel):
-            found.append(replace(tile, scene=f"target/{place}/{tile.scene}"))
-    return found
+    found = thin_tiles(configuration.data.target, configuration, "target", labels=False)
+    tiles = large_enough(list(found), configuration)
+    if not tiles:
+        raise InputError("data.target", 0, "holds no points to learn from")
+    return tiles
 
 
 def believed_labels(
@@ -44,12 +44,7 @@ def believed_labels(
         tiles: thinned ones, whose labels aren't looked at.
         classifier: scores of the network.
         configuration: of the training; ``self_training.believed`` is the share.
-
-    Raises:
-        InputError: there are no points.
     """
-    if not sum(map(len, tiles)):
-        raise InputError("data.target", 0, "holds no points to learn from")
     scaling = scalings(tiles, configuration.intensity)
     labels, sureness = [], []
     for tile in tiles:

@@ -35,7 +35,7 @@ from .network import build, prepare_on_gpu, scores_of
 from .offsets import fit_offsets
 from .prediction import Labelling, predict_file
 from .recipes import SegmentationConfiguration, class_shares, class_weights
-from .scoring import check_tests, classifier, label_tile, score, score_all, trained_model
+from .scoring import check_tests, classifier, label_tile, load_weights, score, score_all, trained_model
 from .self_training import believed_labels, target_tiles
 
 OFFSETS = "offsets"
@@ -217,7 +217,7 @@ def _begin_with(model: nn.Module, configuration: SegmentationConfiguration) -> N
         told, wanted = getattr(before.configuration, name, None), getattr(configuration, name)
         if told != wanted:
             raise InputError("start", configuration.start, f"must have the same {name}: it has {told}, not {wanted}")
-    model.load_state_dict(trained_model(before).state_dict())
+    load_weights(model, before)
 
 
 def _self_train(
@@ -228,16 +228,17 @@ def _self_train(
     progress: Progress,
 ) -> None:
     """Train on synthetic tiles unless the training has a start, then round by round on the target's tiles as well."""
-    configuration = run.configuration
+    configuration, rounds = run.configuration, run.configuration.self_training.rounds
+    target = target_tiles(configuration)  # before hours of training, so that faults are told first
     if not configuration.start:
         _fit(model, _pretraining(run), domains, validation, progress)
-    target, rounds = target_tiles(configuration), configuration.self_training.rounds
     part = configuration.model_copy(update={"schedule": configuration.fine_tuning})
     for number in range(1, rounds + 1):
-        labelled = believed_labels(target, classifier(model, configuration), configuration)
         folder = run.folder / PRETRAINING / f"round-{number}"
-        told = replace(run, configuration=part) if number == rounds else Run.start(folder, part, resume=True)
-        _fit(model, told, {**domains, "target": labelled}, validation, progress)
+        last = number == rounds
+        round_run = replace(run, configuration=part) if last else Run.start(folder, part, resume=True)
+        labelled = believed_labels(target, classifier(model, configuration), configuration)
+        _fit(model, round_run, {**domains, "target": labelled}, validation, progress)
 
 
 def _pretraining(run: Run[SegmentationConfiguration]) -> Run[SegmentationConfiguration]:

@@ -87,7 +87,7 @@ def test_clouds_of_a_transformer_may_be_of_any_size() -> None:
     draw = torch.Generator().manual_seed(7)
     for counts, edge in (([300], 5.0), ([4000, 70, 900, 2000, 10], 20.0)):
         coord = torch.rand(sum(counts), 3, generator=draw) * torch.tensor([edge, edge, 2.0])
-        found = configuration.network.exported({"coord": coord, "offset": torch.tensor(counts).cumsum(0)})
+        found = configuration.network.onnx_inputs({"coord": coord, "offset": torch.tensor(counts).cumsum(0)})
         feat = torch.randn(sum(counts), len(configuration.features), generator=draw)
         difference = largest_difference(replace(made, inputs={"feat": feat, **found.inputs}), content)
         assert difference is not None

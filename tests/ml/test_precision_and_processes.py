@@ -122,7 +122,7 @@ def test_two_processes_fine_tune_and_go_on_where_they_were(data: Path, tmp_path:
 
 def test_shares_of_an_epoch_are_all_of_its_batches(data: Path) -> None:
     configuration = segmentation(data, effects={"jitter": 0.01})
-    batches = CropBatches(configuration, read_domains(configuration).values())
+    batches = CropBatches(configuration, read_domains(configuration).values(), torch.device("cpu"))
 
     def drawn(share: slice) -> list[torch.Tensor]:
         return [one["coord"] for one in batches(3, share)]

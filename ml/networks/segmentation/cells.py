@@ -4,8 +4,8 @@ Points are gathered into the cells of a grid, these into cells twice as wide, an
 looks at the cells around it; in the later ones cells are sorted along space-filling curves, and each looks at those of
 its patch, a stretch of the curve. All of it is sorting and searching of numbers that tell cells apart.
 
-Clouds of a batch are packed, and each has its grid from its own lowest corner: nothing leads from one to another, and a
-batch gives what its clouds give one by one. Cells are numbered by their place and curves visit a cell once, so the
+Clouds of a batch are packed, and each has its cells counted from its own lowest: nothing leads from one to another, and
+a batch gives what its clouds give one by one. Cells are numbered by their place and curves visit a cell once, so the
 order of the points has no say.
 """
 
@@ -13,12 +13,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from torch import Tensor
 
 from synthroads_addon.base.errors import InputError
 
 from .curves import BITS, Curve, curve_codes
+from .neighbours import check_ends
 
 Cells = dict[str, Tensor]
 """Tensors by name; ``s`` is a stage's number from 0, with M_s cells, N the number of points:
@@ -110,17 +112,10 @@ def build_cells(coord: Tensor, offset: Tensor, grid: Grid, *, always_masked: boo
 
 def _points_of_clouds(coord: Tensor, offset: Tensor) -> Tensor:
     """Return the number of points of each cloud (B,), on the coordinates' device; raise `InputError` at faults."""
-    if coord.ndim != 2 or coord.shape[1] != _AXES or not coord.is_floating_point():
-        raise InputError("coord", tuple(coord.shape), "must be floating-point numbers of the shape (N, 3)")
-    ends = [int(end) for end in offset.flatten().tolist()]
-    counts = [end - begin for begin, end in zip([0, *ends], ends, strict=False)]
-    if offset.ndim != 1 or min(counts, default=0) < 0 or (ends[-1] if ends else 0) != len(coord):
-        raise InputError("offset", ends, f"must rise from 0 or more to the number of points, {len(coord)}")
+    ends = check_ends(coord, offset)
     if len(ends) > _MOST_CLOUDS:
         raise InputError("offset", len(ends), f"must not have more than {_MOST_CLOUDS} clouds")
-    if not bool(torch.isfinite(coord).all()):
-        raise InputError("coord", "NaN or infinity", "must be finite numbers, m")
-    return torch.tensor(counts, dtype=torch.int64, device=coord.device)
+    return torch.from_numpy(np.diff(ends, prepend=0)).to(coord.device)
 
 
 def _places(coord: Tensor, cloud: Tensor, clouds: int, edge: float) -> tuple[Tensor, Tensor]:

@@ -19,7 +19,7 @@ from .neighbours import TINY, Neighbourhood, Neighbours, check_ends
 
 _PAIRS = {"cpu": 1 << 20}
 """Pairs of queries and candidates that are held at once."""
-_PAIRS_ELSEWHERE = 1 << 25
+_PAIRS_ELSEWHERE = 1 << 23
 _LARGEST_KEY = 2**62
 
 
@@ -267,12 +267,9 @@ def _nearest_three(points: _Points, kept: _Points, radius: float) -> tuple[Tenso
     Where a cloud has fewer, the index of the others is its first, and their weight 0.
     """
     device = points.xyz.device
-    nearest, weight = (
-        torch.zeros((len(points), 3), dtype=torch.int64, device=device),
-        points.xyz.new_zeros(len(points), 3),
-    )
+    weight = points.xyz.new_zeros(len(points), 3)
     if not len(points):
-        return nearest.int(), weight
+        return weight.int(), weight
     begins = torch.searchsorted(kept.cloud, torch.arange(points.count, device=device))
     nearest = begins[points.cloud][:, None].repeat(1, 3)
     wanted = torch.bincount(kept.cloud, minlength=points.count).clamp(max=3)[points.cloud]

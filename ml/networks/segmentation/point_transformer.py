@@ -26,7 +26,7 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import quantity
 
 from ...registry import network
-from ..base import Batch, Exported, SegmentationNetwork, full_precision
+from ..base import Batch, OnnxInputs, SegmentationNetwork, full_precision
 from .cell_convolution import Around, CellConvolution
 from .cells import Cells, Grid, build_cells
 from .curves import CURVES, Curve
@@ -35,7 +35,7 @@ from .pointnext import Pointwise
 
 _LARGEST_WIDTH = 2048
 _LONGEST_WAVE = 100.0
-"""Base of the rotations' frequencies: the slowest turn by about one part in so many per cell."""
+"""Base of the rotations' frequencies, which fall from one by equal ratios towards one over this."""
 
 
 @network("segmentation")
@@ -103,11 +103,11 @@ class PointTransformerOptions(SegmentationNetwork):
         """Return a network with random weights for points of `features` numbers and `classes` scores."""
         return PointTransformer(self, features, classes)
 
-    def exported(self, batch: Batch) -> Exported:
+    def onnx_inputs(self, batch: Batch) -> OnnxInputs:
         """Return what is found of a batch's cells, and their lengths' names."""
         cells = build_cells(batch["coord"], batch["offset"], self.grid, always_masked=True)
         inputs = {name: value for name, value in cells.items() if not name.startswith("ends")}
-        return Exported(inputs, {name: _lengths(name) for name in inputs})
+        return OnnxInputs(inputs, {name: _lengths(name) for name in inputs})
 
 
 def _lengths(name: str) -> dict[int, str]:
@@ -178,8 +178,10 @@ class PointTransformer(nn.Module):
         views = [self._views(cells, stage) for stage in range(len(self.stages))]
         first = cells["near0"] if "near0" in cells else cells["grid0"]
         points = self.stem(torch.cat([feat, cells["inside0"].to(feat.dtype)], dim=1))
-        values = points.new_zeros(first.shape[0], points.shape[1], dtype=cells["share0"].dtype)
-        values = values.index_add(0, cells["cell0"], points * cells["share0"][:, None])
+        # In single precision at least: cells of many points sum many small shares.
+        share = cells["share0"].to(torch.promote_types(feat.dtype, torch.float32))
+        values = points.new_zeros(first.shape[0], points.shape[1], dtype=share.dtype)
+        values = values.index_add(0, cells["cell0"], points * share[:, None])
         levels = [points]
         for stage, blocks in enumerate(self.stages):
             if stage:
@@ -230,7 +232,7 @@ class View:
 def rotations(places: Tensor, width: int) -> tuple[Tensor, Tensor]:
     """Return cosines and sines (M, 1, width / 2) of the angles by which places (M, 3) turn a head's pairs of channels.
 
-    A third of the pairs turns with each axis, by frequencies from one down to about `_LONGEST_WAVE` times lower.
+    A third of the pairs turns with each axis: pair k of K by the frequency ``_LONGEST_WAVE ** (-k / K)``.
     """
     pairs = width // 6
     frequency = _LONGEST_WAVE ** -(torch.arange(pairs, dtype=places.dtype, device=places.device) / pairs)

@@ -19,7 +19,7 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import quantity
 
 from ...registry import network
-from ..base import Batch, Exported, SegmentationNetwork
+from ..base import Batch, OnnxInputs, SegmentationNetwork
 from . import gpu_neighbours
 from .grouping import Grouping, Norm, interpolate, normalised_max, normalised_max_of_two
 from .neighbours import Neighbourhood, Neighbours, Sampling, build_neighbours
@@ -79,11 +79,11 @@ class PointNeXtOptions(SegmentationNetwork):
         """Return whether neighbours are found on a GPU: not with farthest points, one after the other."""
         return self.sampling == "grid"
 
-    def exported(self, batch: Batch) -> Exported:
+    def onnx_inputs(self, batch: Batch) -> OnnxInputs:
         """Return the stages' points and who looks at whom, and their lengths' names."""
         found = build_neighbours(batch["coord"], batch["offset"], self.neighbourhood)
         inputs = {name: value for name, value in found.items() if not name.startswith("offset")}
-        return Exported(inputs, {name: {0: f"points{_rows_of(name)}"} for name in inputs})
+        return OnnxInputs(inputs, {name: {0: f"points{_rows_of(name)}"} for name in inputs})
 
 
 def _rows_of(name: str) -> int:

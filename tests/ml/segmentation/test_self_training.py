@@ -12,16 +12,20 @@ import pytest
 import torch
 
 from ml.data.classes import IGNORED
-from ml.data.sources import Source, unlabelled_tiles
-from ml.runs import PRETRAINING, Run
+from ml.data.sources import Source, read_tiles
+from ml.runs import CONFIGURATION, PRETRAINING, Run
 from ml.segmentation import task
+from ml.segmentation.experiment import Experiment, configurations
 from ml.segmentation.loading import ExchangedBatches, read_domains
 from ml.segmentation.recipes import SegmentationConfiguration
 from ml.segmentation.self_training import believed_labels, target_tiles
+from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError
+from synthroads_addon.base.files import write_file
 from tests.helpers.clouds.segmentation_data import road_block, road_tile, toy, write_cloud, write_pointcept
 
 torch.set_num_threads(1)
+CPU = torch.device("cpu")
 
 
 @pytest.fixture(autouse=True)
@@ -71,12 +75,12 @@ def test_a_clouds_labels_are_not_looked_at(data: Path, tmp_path: Path) -> None:
     write_cloud(tmp_path / "labelled.laz", block)
     found = []
     for path in (data / "target.laz", tmp_path / "labelled.laz"):
-        tiles = list(unlabelled_tiles(Source(path=str(path), tile=1000), 0.3))
+        tiles = list(read_tiles(Source(path=str(path), tile=1000), class_scheme("5"), 0.3, labels=False))
         assert all((tile.segment == IGNORED).all() for tile in tiles)
         found.append(tiles)
     assert np.array_equal(found[0][0].coord, found[1][0].coord)
     with pytest.raises(MissingFileError):
-        list(unlabelled_tiles(Source(path=str(tmp_path), split="none"), 0.3))
+        list(read_tiles(Source(path=str(tmp_path), split="none"), class_scheme("5"), 0.3, labels=False))
 
 
 def test_of_each_class_the_surest_are_believed(data: Path) -> None:
@@ -105,11 +109,11 @@ def test_batches_hold_pairs_of_both_domains(data: Path) -> None:
     configuration = self_trained(data, batch=4, crops_per_tile=3)
     (synthetic,) = read_domains(configuration).values()
     target = [replace(tile, segment=np.full(len(tile), 4, np.int16)) for tile in target_tiles(configuration)]
-    batches = ExchangedBatches(configuration, [synthetic, target])
+    batches = ExchangedBatches(configuration, [synthetic, target], CPU)
     found = list(batches(0))
     assert len(found) == len(batches) == 3  # six pairs, two in a batch
     assert [len(batch["offset"]) for batch in found] == [4, 4, 4]
-    again = list(ExchangedBatches(configuration, [synthetic, target])(0))
+    again = list(ExchangedBatches(configuration, [synthetic, target], CPU)(0))
     assert all(torch.equal(one[name], other[name]) for one, other in zip(found, again, strict=True) for name in one)
     assert not torch.equal(found[0]["coord"], next(iter(batches(1)))["coord"])
     for batch in found:
@@ -155,6 +159,8 @@ def test_a_training_begins_with_the_weights_of_another(data: Path, tmp_path: Pat
     task.train(Run.start(tmp_path / "first", first))
     nothing = {"epochs": 1, "learning_rate": 1e-12, "final_learning_rate": 0.0}
     start = {"start": str(tmp_path / "first")}
+    told = json.loads((tmp_path / "first" / CONFIGURATION).read_text())
+    write_file(tmp_path / "first" / CONFIGURATION, json.dumps({**told, "threads": 3}).encode(), overwrite=True)
     task.train(Run.start(tmp_path / "second", self_trained(data, set_up="synthetic", schedule=nothing, **start)))
     one, two = weights(tmp_path / "first"), weights(tmp_path / "second")
     learned = [name for name in one if not name.endswith(("running_mean", "running_var", "num_batches_tracked"))]
@@ -163,6 +169,7 @@ def test_a_training_begins_with_the_weights_of_another(data: Path, tmp_path: Pat
     task.train(Run.start(tmp_path / "third", self_trained(data, self_training={"rounds": 1}, **start)))
     assert not (tmp_path / "third" / PRETRAINING / "checkpoint.pt").exists()
     assert not same(weights(tmp_path / "third"), one)
+    assert torch.get_num_threads() == 1  # as this training says, not the one that it begins with
 
 
 def test_faults_of_a_start_and_of_a_target_are_told(data: Path, tmp_path: Path) -> None:
@@ -175,5 +182,19 @@ def test_faults_of_a_start_and_of_a_target_are_told(data: Path, tmp_path: Path) 
     other = self_trained(data, set_up="synthetic", start=str(tmp_path / "first"), features=["x", "y", "z"])
     with pytest.raises(InputError, match="the same features"):
         task.train(Run.start(tmp_path / "b", other))
-    told = json.loads((tmp_path / "first" / "configuration.json").read_text())
-    assert told["start"] == ""
+    nothing = {**sources, "target": [{"path": str(tmp_path / "missing.laz")}]}
+    with pytest.raises(MissingFileError, match="missing"):
+        task.train(Run.start(tmp_path / "c", self_trained(data, data=nothing)))
+    assert not (tmp_path / "c" / PRETRAINING).exists()  # before anything is trained
+
+
+def test_an_experiments_targets_are_filled_in() -> None:
+    told = Experiment.from_dict(
+        {
+            "title": "adapted",
+            "data": {domain: [{"path": "{NAME}/" + domain}] for domain in ("real", "synthetic", "target")},
+            "variants": {"adapted": {"set": {"set_up": "self_trained"}}},
+        }
+    )
+    (found,) = configurations(told, {"NAME": "here"}).values()
+    assert found.data.target[0].path == "here/target"

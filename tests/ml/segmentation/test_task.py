@@ -136,7 +136,7 @@ def test_batches_that_are_left_to_a_gpu_give_the_same_network(
     task.train(run)
     assert same(weights(tmp_path / "run"), weights(trained("real")))
     model, tiles = scoring.trained_model(run), read_domains(configuration)["real"]
-    network.adapt_network(model, adaptation_batches(tiles, configuration), configuration)
+    network.adapt_network(model, adaptation_batches(tiles, configuration, torch.device("cpu")), configuration)
     assert looked
     assert not any(looked)  # each batch once
 
@@ -271,7 +271,7 @@ def test_a_variant_is_tested_anew_when_its_network_or_its_settings_have_changed(
 def test_clouds_are_laid_over_as_often_as_asked(data: Path) -> None:
     for share, wanted in ((0.0, [4]), (1.0, [2]), (0.5, [2, 4])):
         configuration = toy(data, adaptation={"mix3d": share}, crops_per_tile=12, crop_points=64)
-        batches = CropBatches(configuration, read_domains(configuration).values())
+        batches = CropBatches(configuration, read_domains(configuration).values(), torch.device("cpu"))
         sizes = [len(batch["offset"]) for batch in batches(1)]
         assert sorted(set(sizes)) == wanted
         assert sizes == [len(batch["offset"]) for batch in batches(1)]
@@ -490,7 +490,8 @@ def test_norms_are_adapted_by_points_and_not_by_tiles(data: Path) -> None:
     large, sliver = road_tile(1900, 1, "large"), road_tile(100, 2, "sliver")
     configuration = toy(data, adaptation={"adabn": True, "adabn_crops": 200}, batch=1, crop_points=64)
     dark = replace(sliver, strength=np.zeros_like(sliver.strength))
-    of_sliver = [not bool(batch["strength"].any()) for batch in adaptation_batches([large, dark], configuration)]
+    batches = adaptation_batches([large, dark], configuration, torch.device("cpu"))
+    of_sliver = [not bool(batch["strength"].any()) for batch in batches]
     assert len(of_sliver) == 200
     assert 0.01 < np.mean(of_sliver) < 0.12  # 5 % of the points
 

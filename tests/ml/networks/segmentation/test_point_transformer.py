@@ -201,6 +201,16 @@ def test_takes_clouds_of_any_size(training: bool, sizes: tuple[int, ...]) -> Non
     assert all(bool(torch.isfinite(buffer).all()) for buffer in model.buffers())
 
 
+def test_coordinates_may_be_more_exact_than_the_network() -> None:
+    model = network(small()).float().eval()
+    coord, feat = random_cloud(200)
+    with torch.inference_mode():
+        exact = run(model, (coord, feat.float()))
+        single = run(model, (coord.float(), feat.float()))
+    assert exact.dtype == torch.float32
+    assert torch.allclose(exact, single, atol=1e-4)
+
+
 def road(count: int, seed: int) -> tuple[dict[str, Tensor], Tensor]:
     """Return a batch of one crop of a road, and its labels."""
     xyz, _, intensity, label = road_points(count, seed, length=12.0)
