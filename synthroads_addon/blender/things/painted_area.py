@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import chain
 from typing import NamedTuple
 
 import bpy
@@ -44,6 +45,8 @@ from .registry import model_part
 
 _LONGEST = 1.0
 """Outlines are cut into pieces no longer than this (m), so that they follow the road's curves and its crossfall."""
+_WIDEST = 1.0
+"""Nothing reaches farther along the road beyond its corners: a crack's band is 0.2 m wide at most, m."""
 
 
 class _Outlines(Inputs):
@@ -180,14 +183,18 @@ def _damaged(builder: ModelBuilder) -> Iterator[_Area]:
     # Of the whole road, as an area may reach over the end of the stretch.
     for name, carriageway in geometry.parameters.of_type(Carriageway).items():
         pavement = carriageway.pavement
-        part, own = len(pavement.ruts) + len(pavement.potholes), _COURSES.index(pavement.kind)
-        for patch in pavement.patches:
+        first, own = len(pavement.ruts) + len(pavement.potholes), _COURSES.index(pavement.kind)
+        for part, patch in enumerate(pavement.patches, first):
+            if not _reaches(builder, patch.outline):
+                continue
             instance, code = geometry.numbers.part(name, part)[1], damage_code(PATCH, patch.age)
             for piece in _pieces(patch_outline(patch), *builder.stretch):
                 yield _Area(piece, PATCH_FILM, instance, code, 0)
-            part += 1
+        first += len(pavement.patches)
         films = MarkingFilms(geometry, carriageway.side)
-        for crack in pavement.cracks:
+        for part, crack in enumerate(pavement.cracks, first):
+            if not _reaches(builder, chain.from_iterable(crack.lines)):
+                continue
             instance, code = (
                 geometry.numbers.part(name, part)[1],
                 damage_code(SEALED_CRACK if crack.sealed else OPEN_CRACK),
@@ -195,13 +202,23 @@ def _damaged(builder: ModelBuilder) -> Iterator[_Area]:
             legs = [piece for outline in crack_outlines(crack) for piece in _pieces(outline, *builder.stretch)]
             for piece, film in films.cut(legs):
                 yield _Area(piece, film + CRACK_FILM, instance, code, _crack_course(crack, pavement))
-            part += 1
-        for marking in pavement.removed_markings:
+        first += len(pavement.cracks)
+        for part, marking in enumerate(pavement.removed_markings, first):
+            if not _reaches(builder, [(marking.start_station, 0.0), (marking.end_station, 0.0)]):
+                continue
             instance, code = geometry.numbers.part(name, part)[1], damage_code(REMOVED_MARKING)
             for outline in removed_outlines(marking, pavement, geometry.length):
                 for piece in _pieces(outline, *builder.stretch):
                     yield _Area(piece, REMOVED_FILM, instance, code, own)
-            part += 1
+
+
+def _reaches(builder: ModelBuilder, corners: Iterable[tuple[float, float]]) -> bool:
+    """Return whether damage along these corners, in station and offset, can reach into the stretch that is built.
+
+    A long road has thousands of damages, whose outlines would be worked out for each of its sections.
+    """
+    (start, end), stations = builder.stretch, [station for station, _ in corners]
+    return min(stations) < end + _WIDEST and max(stations) > start - _WIDEST
 
 
 def _crack_course(crack: Crack, pavement: Pavement) -> int:
