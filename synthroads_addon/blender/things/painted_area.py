@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import chain
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import bpy
 import numpy as np
@@ -33,7 +33,7 @@ from ...road.pavement.outlines import (
     removed_outlines,
 )
 from ...road.pavement.places import pavement_places
-from ...road.section import ASPHALTS, CONCRETES, Arrow, Carriageway, Crack, Hatching, Pavement
+from ...road.section import ASPHALTS, CONCRETES, Arrow, Carriageway, Crack, Hatching, Pavement, RemovedMarking
 from ..nodes import operations as op
 from ..nodes.backbone import height_on, look_up, station_ribbon
 from ..nodes.builder import Tree, Value, makes_group
@@ -43,6 +43,7 @@ from .meshes import attribute, fill_polygons, signed_instance
 from .model_builder import ModelBuilder
 from .registry import model_part
 
+T = TypeVar("T")
 _LONGEST = 1.0
 """Outlines are cut into pieces no longer than this (m), so that they follow the road's curves and its crossfall."""
 _WIDEST = 1.0
@@ -184,17 +185,13 @@ def _damaged(builder: ModelBuilder) -> Iterator[_Area]:
     for name, carriageway in geometry.parameters.of_type(Carriageway).items():
         pavement = carriageway.pavement
         first, own = len(pavement.ruts) + len(pavement.potholes), _COURSES.index(pavement.kind)
-        for part, patch in enumerate(pavement.patches, first):
-            if not _reaches(builder, patch.outline):
-                continue
+        for part, patch in _near(builder, pavement.patches, first, lambda patch: patch.outline):
             instance, code = geometry.numbers.part(name, part)[1], damage_code(PATCH, patch.age)
             for piece in _pieces(patch_outline(patch), *builder.stretch):
                 yield _Area(piece, PATCH_FILM, instance, code, 0)
         first += len(pavement.patches)
         films = MarkingFilms(geometry, carriageway.side)
-        for part, crack in enumerate(pavement.cracks, first):
-            if not _reaches(builder, chain.from_iterable(crack.lines)):
-                continue
+        for part, crack in _near(builder, pavement.cracks, first, lambda crack: chain.from_iterable(crack.lines)):
             instance, code = (
                 geometry.numbers.part(name, part)[1],
                 damage_code(SEALED_CRACK if crack.sealed else OPEN_CRACK),
@@ -203,22 +200,36 @@ def _damaged(builder: ModelBuilder) -> Iterator[_Area]:
             for piece, film in films.cut(legs):
                 yield _Area(piece, film + CRACK_FILM, instance, code, _crack_course(crack, pavement))
         first += len(pavement.cracks)
-        for part, marking in enumerate(pavement.removed_markings, first):
-            if not _reaches(builder, [(marking.start_station, 0.0), (marking.end_station, 0.0)]):
-                continue
+        for part, marking in _near(builder, pavement.removed_markings, first, _ends):
             instance, code = geometry.numbers.part(name, part)[1], damage_code(REMOVED_MARKING)
             for outline in removed_outlines(marking, pavement, geometry.length):
                 for piece in _pieces(outline, *builder.stretch):
                     yield _Area(piece, REMOVED_FILM, instance, code, own)
 
 
-def _reaches(builder: ModelBuilder, corners: Iterable[tuple[float, float]]) -> bool:
-    """Return whether damage along these corners, in station and offset, can reach into the stretch that is built.
+def _near(
+    builder: ModelBuilder, items: Sequence[T], first: int, corners: Callable[[T], Iterable[tuple[float, float]]]
+) -> Iterator[tuple[int, T]]:
+    """Yield damages that can reach into the stretch that is built, each with its part's number, counted from ``first``.
 
-    A long road has thousands of damages, whose outlines would be worked out for each of its sections.
+    A long road has thousands of them, whose outlines would be worked out for each of its sections.
+
+    Args:
+        builder: of the stretch.
+        items: the damages.
+        first: number of the first one's part.
+        corners: returns stations and offsets, m, that a damage lies between.
     """
-    (start, end), stations = builder.stretch, [station for station, _ in corners]
-    return min(stations) < end + _WIDEST and max(stations) > start - _WIDEST
+    start, end = builder.stretch
+    for part, item in enumerate(items, first):
+        stations = [station for station, _ in corners(item)]
+        if min(stations) < end + _WIDEST and max(stations) > start - _WIDEST:
+            yield part, item
+
+
+def _ends(marking: RemovedMarking) -> list[tuple[float, float]]:
+    """Return the two ends of a removed marking, stations and offsets, m."""
+    return [(marking.start_station, marking.offset), (marking.end_station, marking.offset)]
 
 
 def _crack_course(crack: Crack, pavement: Pavement) -> int:

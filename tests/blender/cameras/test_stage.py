@@ -29,4 +29,5 @@ def test_a_stage_leaves_no_picture(tmp_path: Path) -> None:
         release_memory()
         memory.append(memory_mb())
     print([round(held) for held in memory])
-    assert min(memory[-4:]) < min(memory[:4]) + PICTURE  # one picture is sometimes still held, as the buffer of an image
+    # One picture is sometimes still held, as the buffer of an image.
+    assert min(memory[-4:]) < min(memory[:4]) + PICTURE

@@ -1,4 +1,4 @@
-"""What is held between a long road's sections doesn't grow from one to the next, colours by materials' nodes included."""
+"""What is held between a long road's sections doesn't grow, where materials' nodes give the colours as well."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SECTIONS, LENGTH = 16, 40.0
 POINTS = 100_000
 """Points of each section at least: so many that pictures of them would show if they were left."""
 GROWTH = 30.0
-"""MB that is held after the last four sections at most above what is held in the middle: with pictures left it was 50."""
+"""MB that may be held after the last four sections above what is held in the middle: with pictures left it was 50."""
 
 
 def dense() -> Scenario:
