@@ -16,9 +16,9 @@ from .finish import Finish
 from .plan import ScanPlan
 from .scan import BlockResult, BlockScan, join_results
 
-RETURNS_AT_ONCE = 400_000
+RETURNS_AT_ONCE = 250_000
 """Points that are rendered together: each rendering takes a tenth of a second whatever their number."""
-_AHEAD = 12
+_AHEAD = 8
 """Blocks that are computed ahead while others are rendered: about as many points as are rendered together."""
 _FINISHED_AT_ONCE = 2
 """So many of these lots of points are finished side by side: one while another is rendered."""

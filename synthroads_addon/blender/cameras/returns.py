@@ -24,7 +24,7 @@ BLOCK = 1 << 20
 _HEIGHT = 1024
 _SMALLEST = 64
 """Width and height of an image, px: Cycles reads very narrow textures wrongly."""
-RENDERINGS_KEPT = 12
+RENDERINGS_KEPT = 19
 """Renderings after which the renderer begins anew: it keeps the images of rays, 60 bytes for each of them."""
 _BEFORE = 0.002
 """How far before the return its ray starts, m: behind leaves, not before them."""

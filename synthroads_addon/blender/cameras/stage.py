@@ -26,6 +26,8 @@ from .versions import eevee_engine, multilayer_exr
 NAME = "SR Stage"
 _LEAST_FREE = 1 << 16
 """Bytes that are free on a disk to which an image could be written to its end."""
+_SMALLEST = 4
+"""Width and height of the smallest picture that Blender renders, px."""
 SUN_GROUP, SKY_GROUP = "sun", "sky"
 """Light groups of the lit image, where both are rendered."""
 _POSITION, _DEPTH = "Position", "Depth"
@@ -113,6 +115,19 @@ class RenderStage:
         except (OSError, LookupError, StopIteration, RuntimeError) as error:
             raise temporary_folder_error(self.folder, error) from None
 
+    def drop_picture(self) -> None:
+        """Have Blender hold no large picture of the scene: 5.2 keeps the last one even where the scene is removed."""
+        if not self.images:
+            return
+        scene, render = self.scene, self.scene.render
+        render.use_persistent_data, scene.world = False, None
+        for item in list(scene.collection.objects):
+            if item != self.camera:
+                scene.collection.objects.unlink(item)
+        render.resolution_x = render.resolution_y = _SMALLEST
+        with _silence(), stderr_if_it_succeeds():
+            bpy.ops.render.render(scene=scene.name)
+
     def forget(self) -> None:
         """Make the renderer drop the data it keeps from image to image."""
         self.scene.render.use_persistent_data = False
@@ -194,7 +209,9 @@ def new_stage(
         _set_engine(scene, engine, passes)
         _set_passes(scene, passes)
         multilayer_exr(scene.render.image_settings)
-        yield RenderStage(scene, camera, passes, folder)
+        result = RenderStage(scene, camera, passes, folder)
+        stack.callback(result.drop_picture)
+        yield result
 
 
 def _remove_stage(scene: bpy.types.Scene) -> None:

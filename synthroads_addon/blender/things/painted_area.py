@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import chain
+from typing import NamedTuple, TypeVar
 
 import bpy
 import numpy as np
@@ -32,7 +33,7 @@ from ...road.pavement.outlines import (
     removed_outlines,
 )
 from ...road.pavement.places import pavement_places
-from ...road.section import ASPHALTS, CONCRETES, Arrow, Carriageway, Crack, Hatching, Pavement
+from ...road.section import ASPHALTS, CONCRETES, Arrow, Carriageway, Crack, Hatching, Pavement, RemovedMarking
 from ..nodes import operations as op
 from ..nodes.backbone import height_on, look_up, station_ribbon
 from ..nodes.builder import Tree, Value, makes_group
@@ -42,8 +43,11 @@ from .meshes import attribute, fill_polygons, signed_instance
 from .model_builder import ModelBuilder
 from .registry import model_part
 
+T = TypeVar("T")
 _LONGEST = 1.0
 """Outlines are cut into pieces no longer than this (m), so that they follow the road's curves and its crossfall."""
+_WIDEST = 1.0
+"""Nothing reaches farther along the road beyond its corners: a crack's band is 0.2 m wide at most, m."""
 
 
 class _Outlines(Inputs):
@@ -180,14 +184,14 @@ def _damaged(builder: ModelBuilder) -> Iterator[_Area]:
     # Of the whole road, as an area may reach over the end of the stretch.
     for name, carriageway in geometry.parameters.of_type(Carriageway).items():
         pavement = carriageway.pavement
-        part, own = len(pavement.ruts) + len(pavement.potholes), _COURSES.index(pavement.kind)
-        for patch in pavement.patches:
+        first, own = len(pavement.ruts) + len(pavement.potholes), _COURSES.index(pavement.kind)
+        for part, patch in _near(builder, pavement.patches, first, lambda patch: patch.outline):
             instance, code = geometry.numbers.part(name, part)[1], damage_code(PATCH, patch.age)
             for piece in _pieces(patch_outline(patch), *builder.stretch):
                 yield _Area(piece, PATCH_FILM, instance, code, 0)
-            part += 1
+        first += len(pavement.patches)
         films = MarkingFilms(geometry, carriageway.side)
-        for crack in pavement.cracks:
+        for part, crack in _near(builder, pavement.cracks, first, lambda crack: chain.from_iterable(crack.lines)):
             instance, code = (
                 geometry.numbers.part(name, part)[1],
                 damage_code(SEALED_CRACK if crack.sealed else OPEN_CRACK),
@@ -195,13 +199,37 @@ def _damaged(builder: ModelBuilder) -> Iterator[_Area]:
             legs = [piece for outline in crack_outlines(crack) for piece in _pieces(outline, *builder.stretch)]
             for piece, film in films.cut(legs):
                 yield _Area(piece, film + CRACK_FILM, instance, code, _crack_course(crack, pavement))
-            part += 1
-        for marking in pavement.removed_markings:
+        first += len(pavement.cracks)
+        for part, marking in _near(builder, pavement.removed_markings, first, _ends):
             instance, code = geometry.numbers.part(name, part)[1], damage_code(REMOVED_MARKING)
             for outline in removed_outlines(marking, pavement, geometry.length):
                 for piece in _pieces(outline, *builder.stretch):
                     yield _Area(piece, REMOVED_FILM, instance, code, own)
-            part += 1
+
+
+def _near(
+    builder: ModelBuilder, items: Sequence[T], first: int, corners: Callable[[T], Iterable[tuple[float, float]]]
+) -> Iterator[tuple[int, T]]:
+    """Yield damages that can reach into the stretch that is built, each with its part's number, counted from ``first``.
+
+    A long road has thousands of them, whose outlines would be worked out for each of its sections.
+
+    Args:
+        builder: of the stretch.
+        items: the damages.
+        first: number of the first one's part.
+        corners: returns stations and offsets, m, that a damage lies between.
+    """
+    start, end = builder.stretch
+    for part, item in enumerate(items, first):
+        stations = [station for station, _ in corners(item)]
+        if min(stations) < end + _WIDEST and max(stations) > start - _WIDEST:
+            yield part, item
+
+
+def _ends(marking: RemovedMarking) -> list[tuple[float, float]]:
+    """Return the two ends of a removed marking, stations and offsets, m."""
+    return [(marking.start_station, marking.offset), (marking.end_station, marking.offset)]
 
 
 def _crack_course(crack: Crack, pavement: Pavement) -> int:

@@ -78,16 +78,20 @@ class SectionScan:
     def plans(self, timer: StageTimer) -> Generator[ScanPlan, None, None]:
         """Build each section in turn and yield its plan; the section is removed when the next one is asked for."""
         done, total = 0, self.cut.count()
-        for section in self.sections():
-            shares = done / total, (done + len(section.blocks)) / total
-            try:
-                yield replace(self.plan(section, timer), progress=shares)
-            finally:
-                remove_road()
-                gc.collect()
-                release_memory()
-            done += len(section.blocks)
-            self.scanned += 1
+        gc.freeze()  # what is there before needn't be looked through after each section
+        try:
+            for section in self.sections():
+                shares = done / total, (done + len(section.blocks)) / total
+                try:
+                    yield replace(self.plan(section, timer), progress=shares)
+                finally:
+                    remove_road()
+                    gc.collect()
+                    release_memory()
+                done += len(section.blocks)
+                self.scanned += 1
+        finally:
+            gc.unfreeze()
 
     def plan(self, section: RoadSection, timer: StageTimer) -> ScanPlan:
         """Build a section in the open file and return the plan of its blocks of pulses."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,12 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.cameras import HAS_RETURN_CAMERA
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.scene.evaluated import scene_mesh
+from synthroads_addon.blender.things import painted_area
 from synthroads_addon.jobs.generate import Job, generate
 from synthroads_addon.jobs.scan.plan import Site
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
-from synthroads_addon.road.section import LineMarking
+from synthroads_addon.road.section import Crack, LineMarking
 from synthroads_addon.road.surroundings import Vegetation
 from synthroads_addon.road.things.concrete_barrier import ConcreteBarrier
 from synthroads_addon.road.things.guardrail import Guardrail
@@ -196,3 +198,21 @@ def test_as_much_is_built_as_the_rays_reach(tmp_path: Path, kind: str, pitch: fl
     tilted = parts[4].start - parts[4].low
     if pitch:
         assert tilted > 60.0 * np.tan(np.deg2rad(pitch))
+
+
+@pytest.mark.any_blender
+def test_only_damages_of_the_stretch_are_worked_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    parameters, low, high = sample_road(RoadScenario(length=600.0), 4), 250.0, 300.0
+    stations: list[float] = []
+    make = painted_area.crack_outlines
+
+    def crack_outlines(crack: Crack) -> Iterator[Any]:
+        stations.extend(station for line in crack.lines for station, _ in line)
+        return make(crack)
+
+    monkeypatch.setattr(painted_area, "crack_outlines", crack_outlines)
+    build_road(parameters, 0.02, 0.0, parts=("damaged_areas",), stretch=(low, high))
+    longest = 20.0
+    assert stations
+    assert min(stations) > low - longest
+    assert max(stations) < high + longest
