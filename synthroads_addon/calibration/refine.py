@@ -5,8 +5,8 @@ parabola follows of a strip's step, is counted twice or not at all. So the setti
 search begins. The real cloud's own pavement is scanned anew with them (`simulation`), window by window; the
 medians of its patches' statistics (`cloud.selection.patches`) are compared with the real ones, and the settings moved
 until both agree: the method of simulated moments (McFadden 1989, Econometrica 57). The random numbers stay the same
-from step to step, so that what a change does isn't hidden by them. The search is Gauss and Newton's with Broyden's updates
-of the derivatives, and each setting is held by a weak prior about its beginning.
+from step to step, so that what a change does isn't hidden by them. The search is Gauss and Newton's with Broyden's
+updates of the derivatives, and each setting is held by a weak prior about its beginning.
 
 Scatter of the statistics over the windows says how much each of them counts.
 """
@@ -39,7 +39,7 @@ _BRIGHTNESS_GROUPS = 8
 _PRIOR = 1.5
 """Standard deviation of a setting about where the search begins, in the search's own units."""
 _STEP, _LARGEST_MOVE = 0.25, 0.6
-_ROUNDS, _MOVES = 2, 4
+_ROUNDS, _MOVES = 3, 3
 """How often the derivatives are measured, and moves with their updates."""
 _LEAST_SCATTER = 0.01
 
@@ -70,6 +70,12 @@ class Setting:
         """Return the setting's value at a place of the search, 0 where it begins."""
         value = self.begin * float(np.exp(x)) if self.logarithmic else self.begin + x * self.unit
         return min(max(value, self.low), self.high)
+
+    def reach(self) -> tuple[float, float]:
+        """Return the places of the search at which the setting comes to its limits."""
+        if not self.logarithmic:
+            return (self.low - self.begin) / self.unit, (self.high - self.begin) / self.unit
+        return float(np.log(self.low / self.begin)), float(np.log(self.high / self.begin))
 
 
 @dataclass(frozen=True)
@@ -118,31 +124,34 @@ def refine_settings(road: RealClass, settings: Sequence[Setting], simulate: Simu
         return np.asarray((np.nanmean(moments(x), axis=0) - real) / scatter)
 
     start = np.asarray((np.nanmean(first, axis=0) - real) / scatter)
-    x, missed = _search(miss, start, len(settings))
+    x, missed = _search(miss, start, np.array([setting.reach() for setting in settings]).T)
     values = {setting.path: setting.value(place) for setting, place in zip(settings, x, strict=True)}
     shown = [dict(zip(names, map(float, real + scatter * part), strict=True)) for part in (0.0 * start, start, missed)]
     return Refined(values, *shown)
 
 
-def _search(miss: Callable[[Float], Float], start: Float, count: int) -> tuple[Float, Float]:
+def _search(miss: Callable[[Float], Float], start: Float, limits: Float) -> tuple[Float, Float]:
     """Return where a miss (M,) is least, by Gauss and Newton with Broyden's updates, and the miss there.
 
     Args:
         miss: over the statistics' scatter, at a place (N,) of the search.
         start: the miss at 0.
-        count: N.
+        limits: (2, N) least and largest places.
     """
-    x, missed = np.zeros(count), start
+    low, high = limits
+    x, missed = np.zeros(len(low)), start
     for _ in range(_ROUNDS):
-        slope = np.column_stack([(miss(x + _STEP * unit) - missed) / _STEP for unit in np.eye(count)])
+        steps = np.where(x + _STEP <= high, _STEP, -_STEP)
+        slope = np.column_stack([(miss(x + step) - missed) / step.sum() for step in np.diag(steps)])
         damping = 1.0
         for _ in range(_MOVES):
-            normal = slope.T @ slope + np.eye(count) / _PRIOR**2
+            normal = slope.T @ slope + np.eye(len(x)) / _PRIOR**2
             pull = slope.T @ missed + x / _PRIOR**2
             move = np.linalg.solve(normal + (damping - 1.0) * np.diag(np.diag(normal)), -pull)
             move *= min(1.0, _LARGEST_MOVE / float(np.abs(move).max()))
+            move = np.clip(x + move, low, high) - x
             tried = miss(x + move)
-            slope += np.outer(tried - missed - slope @ move, move) / float(move @ move)
+            slope += np.outer(tried - missed - slope @ move, move) / max(float(move @ move), 1e-12)
             if _cost(tried, x + move) < _cost(missed, x):
                 x, missed, damping = x + move, tried, max(damping / 2.0, 1.0)
             else:

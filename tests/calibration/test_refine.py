@@ -49,13 +49,13 @@ TRUTH = {
     SPREAD: 0.12,
 }
 BEGIN = (
-    Setting("scan.lines_per_second", 250.0, 50.0, 300.0),
+    Setting("scan.lines_per_second", 225.0, 50.0, 300.0),
     Setting("scan.noise.range_sigma", 0.038, 0.001, 0.2),
     Setting("scan.receiver.range_delay", 0.2, 0.0, 0.9, False, 0.3),
-    Setting("scan.noise.speckle", 0.22, 0.01, 0.6),
-    Setting("scan.noise.speckle_normal", 0.3, 0.0, 1.0, False, 0.5),
-    Setting("scan.strip_errors.gain_step_db", 0.8, 0.0, 6.0, False, 0.5),
-    Setting(SPREAD, 0.05, 0.005, 0.5),
+    Setting("scan.noise.speckle", 0.19, 0.01, 0.6),
+    Setting("scan.noise.speckle_normal", 0.5, 0.0, 1.0, False, 0.5),
+    Setting("scan.strip_errors.gain_step_db", 1.1, 0.0, 6.0, False, 0.5),
+    Setting(SPREAD, 0.075, 0.005, 0.5),
 )
 TOLERANCE = {
     "scan.lines_per_second": 18.0,
