@@ -82,6 +82,8 @@ _VIEW_MARGIN = 1.1
 _AT_THE_EDGE = 4.0
 """The road lies so far from the edge of the field of view at least, deg: aircraft sway."""
 _FREE = {"scan.mirror_clock": "free"}
+_KNOWN = 1.1
+"""Factor within which the spacing stays that times or lines tell."""
 _MOST_STRIPS = 8
 _MOST_SPREAD = 1.0
 _POWER = {"scan.receiver.response": "power", "scan.receiver.bits": None}
@@ -223,13 +225,13 @@ class _MovingSensor:
     def settings(self) -> list[Setting]:
         """Return the settings that are refined, with the values that formulas give and the usual ones begin with."""
         estimate = self.estimate
-        ratio = _USUAL_RATIO
+        ratio, room = _USUAL_RATIO, 3.0
         if estimate.pulse_spacing is not None:
-            ratio = estimate.pulse_spacing**2 * estimate.density / self.strips
+            ratio, room = estimate.pulse_spacing**2 * estimate.density / self.strips, _KNOWN
         noise = _noise_of(estimate, self.device)
         middle = {path: float(np.sqrt(low * high)) for path, (low, high) in self.usual.items()}
         rows = [
-            Setting(_RATIO, float(np.clip(ratio, 0.3, 3.0)), 0.2, 5.0),
+            Setting(_RATIO, ratio, ratio / room, ratio * room),
             Setting(_DENSITY, 1.0, 0.5, 2.0),
             Setting(_TEXTURE, 1.0, 0.1, 10.0),
         ]
