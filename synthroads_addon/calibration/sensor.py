@@ -19,8 +19,8 @@ points within squares of `EDGE`, whose parabola and mean brightness are taken of
 - **steps**: the bits of the numbers, from the smallest step between those that occur.
 - **zeros**: the share of points without a number, of the nearer half of all.
 - **spacing**: points to the square metre; the distance between consecutive pulses, by times or by lines
-  (`pulse_lines`); of a head that turns about one place, the median step of the azimuth within rings of like elevation, and by how much the
-  brightness of rings differs: the gains of its lasers.
+  (`pulse_lines`); of a head that turns about one place, the median step of the azimuth within rings of like
+  elevation, and by how much the brightness of rings differs: the gains of its lasers.
 """
 
 from __future__ import annotations

@@ -19,10 +19,8 @@ from synthroads_addon.calibration.refine import Refined, Setting, refine_setting
 from synthroads_addon.calibration.simulation import LevelPavement, simulate_pavement
 from synthroads_addon.cloud.selection.classes import RealClass
 from synthroads_addon.materials.table import materials
-from synthroads_addon.scanning.devices.device import setting_of
 from synthroads_addon.scenario.scan import ScanScenario, scanner_setting
 from synthroads_addon.scenario.scenario import apply_values, load_scenario
-from tests.helpers.scenes.scanners import preset
 
 LANES = ((-5.0, -1.5), (1.5, 5.0))
 SPREAD = "spread"
@@ -142,7 +140,6 @@ def test_a_settings_place_in_the_search_keeps_its_limits() -> None:
 def test_a_pavement_that_nobody_sees_is_refused() -> None:
     data = apply_values(load_scenario("airborne-1000m").to_dict(), FIXED)
     scenario = ScanScenario.from_dict(data["scan"])
-    blind = setting_of(preset("riegl-vq-780i"), scenario)
     dark = materials()["asphalt"].model_copy(update={"base_color": (0.0, 0.0, 0.0), "specular": 0.0})
     with pytest.raises(InputError, match="no pavement that the fitted scanner would see"):
-        simulate_pavement(scenario, blind, LevelPavement(10.0, 10.0, dark), "asphalt", 1)
+        simulate_pavement(scenario, scanner_setting(scenario), LevelPavement(10.0, 10.0, dark), "asphalt", 1)
