@@ -52,6 +52,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     files.add_argument("--save-device", type=Path, metavar="FILE", help=text)
     text = "write a recipe that scans roads with it and with the fitted materials (.yaml)"
     files.add_argument("--save-recipe", type=Path, metavar="FILE", help=text)
+    text = "take the sensor from formulas alone, without simulated scans that refine it"
+    files.add_argument("--formulas", action="store_true", help=text)
     files.add_argument("--plot", type=Path, metavar="FILE", help="draw the distributions (.png)")
     files.add_argument("--overwrite", action="store_true", help="replace files that are already there")
 
@@ -113,7 +115,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
         raise InputError("--save-recipe", str(arguments.save_recipe), "needs --save-device, which it scans with")
     progress = progress_bar(arguments)
     result = exhaust(calibration_steps(job), lambda share: progress("calibrate", share))
-    sensor = fit_sensor(result) if arguments.save_device else None
+    sensor = fit_sensor(result, not arguments.formulas) if arguments.save_device else None
     if arguments.save:
         # Scans by the recipe have the sensor's noise beside the materials' own spread.
         fitted = sensor.materials if sensor and arguments.save_recipe else None

@@ -41,6 +41,7 @@ from synthroads_addon.base.progress import StageTimer, silent  # noqa: E402
 from synthroads_addon.cloud.formats.registry import open_cloud  # noqa: E402
 from synthroads_addon.cloud.points import PointBlock, concatenate  # noqa: E402
 from synthroads_addon.cloud.selection.classes import RealClass  # noqa: E402
+from synthroads_addon.cloud.selection.patches import Patches, join_patches, make_patches  # noqa: E402
 from synthroads_addon.comparison.classifier import distinguish  # noqa: E402
 from synthroads_addon.comparison.clouds import (  # noqa: E402
     ROAD,
@@ -49,7 +50,6 @@ from synthroads_addon.comparison.clouds import (  # noqa: E402
     find_clouds,
     read_compared,
 )
-from synthroads_addon.comparison.patches import Patches, join_patches, make_patches  # noqa: E402
 from synthroads_addon.dataset.recipe import load_recipe, scene_jobs  # noqa: E402
 from synthroads_addon.jobs.generate import RoadSource, make_road  # noqa: E402
 from synthroads_addon.jobs.open_scene import RoadScene  # noqa: E402

@@ -18,9 +18,9 @@ points within squares of `EDGE`, whose parabola and mean brightness are taken of
   factor of 1.5; it tells numbers that are compensated for the range from the received power.
 - **steps**: the bits of the numbers, from the smallest step between those that occur.
 - **zeros**: the share of points without a number, of the nearer half of all.
-- **spacing**: points to the square metre; where points have times, the distance between consecutive pulses; of a head
-  that turns about one place, the median step of the azimuth within rings of like elevation, and by how much the
-  brightness of rings differs: the gains of its lasers.
+- **spacing**: points to the square metre; the distance between consecutive pulses, by times or by lines
+  (`pulse_lines`); of a head that turns about one place, the median step of the azimuth within rings of like
+  elevation, and by how much the brightness of rings differs: the gains of its lasers.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ import numpy as np
 from ..base.arrays import AnyArray, Float, Index
 from ..base.errors import InputError
 from ..cloud.selection.classes import RealClass
+from .pulse_lines import pulse_step
 from .strip_pairs import strip_pairs
 
 EDGE = 1.5
@@ -80,7 +81,8 @@ class SensorEstimate:
         strips: that overlap, as times or pairs of points tell; 1 if neither does.
         distance: median range, m; None where unknown.
         incidence: median incidence angle, rad.
-        pulse_spacing: between consecutive pulses on the ground, m; None without times.
+        pulse_spacing: between consecutive pulses on the ground, m, by times or by how points lie; None where neither
+            tells, or of a head that stands.
         azimuth_step: of a head's firing sequences, rad; None where nobody says from where all was seen.
         laser_gain_db: standard deviation of the gains of a head's lasers, dB; likewise.
     """
@@ -167,6 +169,7 @@ def estimate_sensor(
     azimuth_step, gains = (None, None) if scanner is None else _rings(road.place - scanner, level)
     steady, faint = _range_noise(ranged, squares)
     walk = shared / max((speckle / _DECIBEL) ** 2, 1e-12)
+    density = _density(road.place)
     known = np.broadcast_to(np.asarray(distance, dtype=np.float64), len(level))
     return SensorEstimate(
         squares=squares.count,
@@ -179,11 +182,11 @@ def estimate_sensor(
         range_exponent=_range_exponent(level, known),
         bits=number_bits(road.intensity),
         zeros=road.zeros / max(road.zeros + len(level), 1),
-        density=_density(road.place),
+        density=density,
         strips=strips,
         distance=float(np.median(known)) if np.isfinite(known).all() else None,
         incidence=float(np.median(incidence)),
-        pulse_spacing=None if time is None else pulse_spacing(road.place, time),
+        pulse_spacing=_pulse_spacing(road.place, time, density, strips) if scanner is None else None,
         azimuth_step=azimuth_step,
         laser_gain_db=gains,
     )
@@ -350,6 +353,12 @@ def _density(place: Float) -> float:
     around = ((1, 0), (-1, 0), (0, 1), (0, -1))
     inner = [all((x + a, y + b) in keys for a, b in around) for x, y in cells.tolist()]
     return float(count[np.array(inner)].mean()) if any(inner) else float(count.mean())
+
+
+def _pulse_spacing(place: Float, time: Float | None, density: float, strips: int) -> float | None:
+    """Return the distance on the ground between consecutive pulses, m; None where neither times nor places tell."""
+    by_time = None if time is None else pulse_spacing(place, time)
+    return pulse_step(place, density, strips) if by_time is None else by_time
 
 
 def pulse_spacing(place: AnyArray, time: Float) -> float | None:

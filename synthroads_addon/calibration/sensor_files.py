@@ -2,12 +2,14 @@
 
 The device is the calibration's own one with what the cloud says in place of what its file said: the range's noise, how
 numbers are made of the power, the pulse rate that gives the points' spacing. The recipe draws each fitted value from a
-range about it, as a cloud of one survey says little about the next one.
+range about it. Of a scanner that moves, what formulas say (`sensor`) is where the search for settings begins whose
+simulated scans have the cloud's statistics (`refine`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,23 +20,29 @@ from ..base.arrays import Float
 from ..base.errors import InputError
 from ..base.files import write_file
 from ..base.schema import canonical_json
+from ..cloud.selection.classes import RealClass
 from ..materials.surfaces import brightness_of, surfaces_of
 from ..materials.table import Material
-from ..scanning.devices.device import Device, ScannerSetting
+from ..road.section import ASPHALTS, CONCRETES
+from ..road.surroundings import MaterialVariation
+from ..scanning.devices.device import Device, ScannerSetting, setting_of
+from ..scenario.scan import ScanScenario
+from ..scenario.scenario import apply_values, load_scenario
 from .expected import FULL_SCALE
 from .fit import fitted_wavelength
 from .job import Calibration, CalibrationJob, class_views
+from .refine import Refined, Setting, refine_settings, window_edge
 from .sensor import SensorEstimate, estimate_sensor
+from .simulation import LevelPavement, simulate_pavement
 
-SPREAD = 0.15
-"""Recipes draw fitted values from a range of this share to either side."""
+SPREAD, SPREAD_OF_STRIPS = 0.05, 0.15
+"""Recipes draw fitted values from a range of this share to either side; what differs from strip to strip from another.
+"""
 SPEED = 60.0
 """Speed of an aircraft, m/s, where times don't say it."""
 AIRBORNE = 200.0
 """Scanners farther away than this, m, fly in an aircraft, nearer ones on a UAV or stand."""
 _LEAST_STEP_DB = 0.5
-_STEPS = (1.0 / 3.0, 4.0 / 3.0)
-"""Range of the gain's step, as shares of the fitted one: other roads lie elsewhere in the overlap of the strips."""
 _LEAST_SPREAD, _MOST_NOISE = 0.02, 0.95
 """Spread that a material keeps when the sensor explains all of it, and share of the variance that is taken off."""
 USUAL: dict[str, dict[str, tuple[float, float]]] = {
@@ -42,23 +50,44 @@ USUAL: dict[str, dict[str, tuple[float, float]]] = {
         "scan.motion.position_sigma": (0.2, 0.8),
         "scan.motion.attitude_sigma_deg": (0.2, 0.4),
         "scan.motion.heading_sigma_deg": (1.0, 3.0),
-        "scan.strip_errors.boresight_sigma_deg": (0.0005, 0.002),
-        "scan.strip_errors.drift_sigma": (0.005, 0.02),
+        "scan.noise.angle_sigma_mrad": (0.01, 0.03),
+        "scan.strip_errors.boresight_sigma_deg": (0.0001, 0.0003),
+        "scan.strip_errors.drift_sigma": (0.001, 0.003),
     },
     "uav": {
         "scan.motion.position_sigma": (0.05, 0.3),
         "scan.motion.attitude_sigma_deg": (0.5, 2.0),
         "scan.motion.heading_sigma_deg": (0.5, 3.0),
+        "scan.noise.angle_sigma_mrad": (0.02, 0.2),
         "scan.strip_errors.boresight_sigma_deg": (0.002, 0.01),
         "scan.strip_errors.lever_arm_sigma": (0.005, 0.02),
         "scan.strip_errors.drift_sigma": (0.01, 0.05),
     },
 }
-"""Ranges that the shipped recipes draw from for what no cloud is asked for: how it sways, and how strips disagree."""
+"""Ranges that the shipped recipes draw from: how it sways, and how strips disagree. A search begins at their middle."""
 _SWAY = {
-    "airborne": {"shortest_period": 0.05, "longest_period": 20.0, "period_exponent": 0.5},
+    "airborne": {"shortest_period": 0.2, "longest_period": 20.0, "period_exponent": 0.8},
     "uav": {"shortest_period": 0.5, "longest_period": 10.0, "period_exponent": 1.0},
 }
+_RATIO, _DENSITY, _TEXTURE, _ASLANT = "spacing ratio", "density", "texture", "aslant"
+"""What is fitted besides settings of the scenario: pulses' spacing over lines', points, the materials' spread, and the
+angle at which the second strip sees the road, deg."""
+_FROM_ABOVE, _USUAL_ASLANT = -3.0, 18.0
+"""Angles at which one strip sees the road, and at which the search for the other one's begins, deg."""
+_USUAL_RATIO, _USUAL_NORMAL = 1.2, 0.7
+_PERIOD = "scan.motion.shortest_period"
+_OF_STRIPS = tuple(f"scan.strip_errors.{name}" for name in ("gain_step_db", "drift_sigma"))
+_SHARES = ("scan.noise.speckle_normal", "scan.receiver.range_delay", "scan.receiver.compression")
+_VIEW_MARGIN = 1.1
+_AT_THE_EDGE = 4.0
+"""The road lies so far from the edge of the field of view at least, deg: aircraft sway."""
+_FREE = {"scan.mirror_clock": "free"}
+_KNOWN = 1.1
+"""Factor within which the spacing stays that times or lines tell."""
+_MOST_STRIPS = 8
+_MOST_SPREAD = 1.0
+_POWER = {"scan.receiver.response": "power", "scan.receiver.bits": None}
+"""Simulated scans give the received power, as what they are compared with is led back to it."""
 _DIGITS = 4
 
 
@@ -67,16 +96,18 @@ class FittedSensor:
     """A sensor that was fitted to a cloud.
 
     Attributes:
-        estimate: what the cloud says.
+        estimate: what the cloud says by formulas.
+        refined: how its settings were refined by simulated scans; None if they weren't.
         device: the base device with the fitted values.
         scan: settings of a scan with it, path in the scenario -> value.
         drawn: fitted values that a recipe draws from a range about them, likewise.
-        usual: what the cloud doesn't say, or says of its own road alone, and a recipe draws from wider ranges.
+        usual: what the cloud doesn't say, and a recipe draws from the shipped ones' ranges.
         scenario: built-in one that a recipe begins with.
         materials: the fitted ones by name, whose spread is what the sensor doesn't explain.
     """
 
     estimate: SensorEstimate
+    refined: Refined | None
     device: Device
     scan: dict[str, Any]
     drawn: dict[str, float]
@@ -86,11 +117,17 @@ class FittedSensor:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the estimates and the settings that follow from them as JSON data."""
-        return {"estimate": self.estimate.to_dict(), "receiver": self.device.receiver.to_dict(), "scan": self.scan}
+        refined = None if self.refined is None else self.refined.to_dict()
+        fitted = {"receiver": self.device.receiver.to_dict(), "scan": self.scan, "drawn": self.drawn}
+        return {"estimate": self.estimate.to_dict(), "refined": refined, **fitted}
 
 
-def fit_sensor(result: Calibration) -> FittedSensor:
+def fit_sensor(result: Calibration, simulated: bool = True) -> FittedSensor:
     """Return the sensor that explains the first class of a calibration, which must be pavement.
+
+    Args:
+        result: of the calibration.
+        simulated: whether the settings of a scanner that moves are refined by simulated scans.
 
     Raises:
         InputError: there is no cloud or no device, or too little pavement.
@@ -109,16 +146,185 @@ def fit_sensor(result: Calibration) -> FittedSensor:
     scanner = None if job.scanner is None else np.array(job.scanner)
     estimate = estimate_sensor(real, linear, distance, incidence, scanner)
     device = _fitted_device(result, setting, estimate)
-    scan, drawn = _receiver_settings(estimate, device)
-    usual: dict[str, tuple[float, float]] = {}
-    if scanner is None:
-        scenario, spacing, device = _moving(estimate, device, setting)
-        usual = dict(USUAL[spacing["scan.platform"]["kind"]])
-        if (step := estimate.gain_step_db) > 0.0:
-            usual["scan.strip_errors.gain_step_db"] = _short(step * _STEPS[0]), _short(step * _STEPS[1])
-    else:
+    surfaces = _surfaces_alone(result, estimate)
+    if scanner is not None:
+        drawn = _drawn_values(_noise_of(estimate, device))
         scenario, spacing = _standing(estimate, device, setting)
-    return FittedSensor(estimate, device, scan | spacing, drawn, usual, scenario, _surfaces_alone(result, estimate))
+        return FittedSensor(estimate, None, device, _FREE | spacing, drawn, {}, scenario, surfaces)
+    material = surfaces[first.target.material]
+    moving = _MovingSensor(estimate, device, setting, material, first.target.material, job.attenuation)
+    begin, refined = moving.settings(), None
+    values = {one.path: one.begin for one in begin}
+    if simulated:
+        refined = refine_settings(replace(real, intensity=linear), begin, moving.simulate)
+        values = refined.values
+    spacing, device = moving.scanner(values)
+    drawn = _drawn_values({path: value for path, value in values.items() if path.startswith("scan.")})
+    usual = {path: limits for path, limits in moving.usual.items() if path not in drawn}
+    spread = {"spread_below": round(moving.spreads(values)[0], 4), "spread_above": round(moving.spreads(values)[1], 4)}
+    surfaces |= {first.target.material: surfaces[first.target.material].model_copy(update=spread)}
+    # The materials' brightness was fitted for this air.
+    air = {"scan.attenuation": job.attenuation}
+    scan = _FREE | spacing | _same_surface(first.target.material) | air
+    return FittedSensor(estimate, refined, device, scan, drawn, usual, "airborne-1000m", surfaces)
+
+
+def _same_surface(material: str) -> dict[str, Any]:
+    """Return the limits of roads whose pavement is of a material as it is in the table: of one kind, age and wear."""
+    concrete = material in CONCRETES
+    kinds = {"road.pavement.concretes" if concrete else "road.pavement.asphalts": [material]}
+    usual = MaterialVariation()
+    names = ("asphalt_age", "asphalt_brightness", "concrete_brightness", "paint_wear")
+    values = ((name, getattr(usual, name)) for name in names)
+    aged = {f"road.materials.{name}": {"minimum": value, "maximum": value} for name, value in values}
+    same = {"road.environment.wet": 0, "road.pavement.concrete": float(concrete), "road.pavement.renewed": 0.0}
+    return same | (kinds if material in (*ASPHALTS, *CONCRETES) else {}) | aged
+
+
+@dataclass(frozen=True)
+class _MovingSensor:
+    """A scanner that flies over the road as densely as the cloud is.
+
+    Attributes:
+        estimate: what the cloud says by formulas.
+        device: with the noise and response that these say.
+        setting: of the calibration's device.
+        material: of the pavement, with the spread that the sensor doesn't explain.
+        name: of the material in the table.
+        attenuation: of the air, 1/m of range.
+    """
+
+    estimate: SensorEstimate
+    device: Device
+    setting: ScannerSetting
+    material: Material
+    name: str
+    attenuation: float
+
+    @property
+    def distance(self) -> float:
+        """The usual range, m."""
+        return self.estimate.distance or AIRBORNE
+
+    @property
+    def kind(self) -> str:
+        """The platform's kind, by the usual range."""
+        return "airborne" if self.distance > AIRBORNE else "uav"
+
+    @property
+    def usual(self) -> dict[str, tuple[float, float]]:
+        """The ranges that the shipped recipes draw from for this kind of platform."""
+        return USUAL[self.kind]
+
+    @property
+    def strips(self) -> int:
+        """How many strips overlap."""
+        least = 2 if self.estimate.gain_step_db > _LEAST_STEP_DB else 1
+        return min(max(self.estimate.strips, least), _MOST_STRIPS)
+
+    def settings(self) -> list[Setting]:
+        """Return the settings that are refined, with the values that formulas give and the usual ones begin with."""
+        estimate = self.estimate
+        ratio, room = _USUAL_RATIO, 3.0
+        if estimate.pulse_spacing is not None:
+            ratio, room = estimate.pulse_spacing**2 * estimate.density / self.strips, _KNOWN
+        noise = _noise_of(estimate, self.device)
+        middle = {path: float(np.sqrt(low * high)) for path, (low, high) in self.usual.items()}
+        rows = [
+            Setting(_RATIO, ratio, ratio / room, ratio * room),
+            Setting(_DENSITY, 1.0, 0.5, 2.0),
+            Setting(_TEXTURE, 1.0, 0.1, 10.0),
+        ]
+        for name, high in (("motion.attitude_sigma_deg", 10.0), ("motion.heading_sigma_deg", 10.0)):
+            rows.append(Setting(f"scan.{name}", middle[f"scan.{name}"], 1e-3, high))
+        fastest, slowest = (_SWAY[self.kind][name] for name in ("shortest_period", "longest_period"))
+        rows.append(Setting(_PERIOD, fastest, 0.02, 0.5 * slowest))
+        rows.append(Setting("scan.noise.angle_sigma_mrad", middle["scan.noise.angle_sigma_mrad"], 1e-4, 20.0))
+        for name, high in (("noise.range_sigma", 1.0), ("receiver.faint_range_sigma", 10.0), ("noise.speckle", 1.0)):
+            rows.append(Setting(f"scan.{name}", max(noise[f"scan.{name}"], 1e-4), 1e-4, high))
+        rows.append(Setting("scan.noise.speckle_normal", _USUAL_NORMAL, 0.0, 1.0, False, 0.5))
+        rows.append(Setting("scan.receiver.range_delay", noise["scan.receiver.range_delay"], 0.0, 0.9, False, 0.3))
+        rows.append(Setting("scan.receiver.range_walk", noise["scan.receiver.range_walk"], 0.0, 0.1, False, 0.003))
+        if self.strips > 1:
+            step, drift = _OF_STRIPS
+            half = 0.5 * np.rad2deg(self.setting.field_of_view) - _AT_THE_EDGE
+            aslant = min(_USUAL_ASLANT, half)
+            rows.append(Setting(_ASLANT, aslant, 0.0, max(half, 0.0), False, 6.0))
+            rows += [
+                Setting(step, self._unseen_step(aslant), 0.0, 10.0, False, 0.5),
+                Setting(drift, middle[drift], 1e-4, 1.0),
+            ]
+        return rows
+
+    def _unseen_step(self, aslant: float) -> float:
+        """Return what of the gain's step between strips isn't the angles' doing, dB, with the second one's, deg."""
+        near, far = (30.0 * np.log10(np.cos(np.deg2rad(angle))) for angle in (_FROM_ABOVE, aslant))
+        return max(self.estimate.gain_step_db - float(near - far), 0.0)
+
+    def spreads(self, values: Mapping[str, float]) -> tuple[float, float]:
+        """Return the material's spread below and above its median."""
+        factor, most = values[_TEXTURE], _MOST_SPREAD
+        return min(self.material.spread_below * factor, most), min(self.material.spread_above * factor, most)
+
+    def scanner(self, values: Mapping[str, float]) -> tuple[dict[str, Any], Device]:
+        """Return settings and device of the scanner with values of `settings`."""
+        estimate, device, distance, strips = self.estimate, self.device, self.distance, self.strips
+        height = float(distance * np.cos(estimate.incidence))
+        density = estimate.density * values[_DENSITY]
+        step = float(np.sqrt(values[_RATIO] * strips / density))
+        line = strips / (density * step)
+        slowest, fastest = device.lines_per_second
+        lines = float(np.clip(SPEED / line, slowest, fastest))
+        rate = distance * device.pattern.sweep(self.setting.field_of_view) * lines / step
+        # The detection threshold stays: by it the noise of faint echoes was told.
+        reach = min(float(np.sqrt(0.2 / self.setting.threshold)), 0.999 * device.unambiguous_range(rate))
+        mode = device.modes[0].to_dict() | {"pulse_rate_khz": _short(rate / 1e3), "maximum_range": _short(reach)}
+        finest = min(device.finest_angle_deg, float(np.rad2deg(step / distance)) * 0.9)
+        noise = {"faint_range_sigma": values["scan.receiver.faint_range_sigma"]}
+        noise |= {name: values[f"scan.receiver.{name}"] for name in ("range_walk", "range_delay")}
+        data = device.to_dict()
+        receiver = dict(data["receiver"]) | {name: _short(value) for name, value in noise.items()}
+        data |= {"modes": [mode], "finest_angle_deg": _short(finest), "receiver": receiver}
+        data["range_sigma"] = _short(values["scan.noise.range_sigma"])
+        angles = np.deg2rad(np.linspace(_FROM_ABOVE, values[_ASLANT], strips)) if strips > 1 else np.zeros(1)
+        offsets = [_short(height * float(np.tan(angle))) for angle in angles]
+        platform = {"kind": self.kind, "height": _short(height), "speed": _short(lines * line)}
+        settings: dict[str, Any] = {"scan.lines_per_second": _short(lines)}
+        settings["scan.platform"] = platform | {"lateral_offsets": offsets}
+        settings["scan.pulse_rate_khz"] = mode["pulse_rate_khz"]
+        settings["scan.motion"] = _SWAY[self.kind]
+        return settings, Device.from_dict(data)
+
+    def simulate(self, values: Mapping[str, float], seed: int) -> RealClass:
+        """Return a scan of level pavement with values of `settings`."""
+        spacing, device = self.scanner(values)
+        edge = window_edge(self.estimate.density)
+        middle = {path: float(np.sqrt(low * high)) for path, (low, high) in self.usual.items()}
+        given = {path: value for path, value in values.items() if path.startswith("scan.")}
+        changes = _FREE | spacing | middle | given | _POWER | {"scan.attenuation": self.attenuation}
+        data = apply_values(load_scenario("airborne-1000m").to_dict(), changes)
+        scan = ScanScenario.from_dict(data["scan"])
+        below, above = self.spreads(values)
+        pavement = LevelPavement(
+            edge, edge, self.material.model_copy(update={"spread_below": below, "spread_above": above})
+        )
+        return simulate_pavement(
+            scan, self._narrowed(device, scan, spacing["scan.platform"], edge), pavement, self.name, seed
+        )
+
+    def _narrowed(self, device: Device, scan: ScanScenario, platform: Mapping[str, Any], edge: float) -> ScannerSetting:
+        """Return the scanner's setting with a view of the pavement alone where its optics can have one."""
+        setting = setting_of(device, scan, scan.noise.range_sigma)
+        if device.pattern.fixed_view:
+            return setting
+        aside = max(map(abs, platform["lateral_offsets"])) + edge / 2.0
+        view = 2.0 * np.arctan(_VIEW_MARGIN * aside / platform["height"])
+        view += 6.0 * np.deg2rad(scan.motion.attitude_sigma_deg)
+        if view >= setting.field_of_view:
+            return setting
+        return setting_of(
+            device, scan.model_copy(update={"field_of_view_deg": float(np.rad2deg(view))}), scan.noise.range_sigma
+        )
 
 
 def _surfaces_alone(result: Calibration, estimate: SensorEstimate) -> dict[str, Material]:
@@ -128,7 +334,7 @@ def _surfaces_alone(result: Calibration, estimate: SensorEstimate) -> dict[str, 
     """
     gain = estimate.gain_step_db * np.log(10.0) / 10.0
     noise = estimate.speckle**2 + 0.5 * gain**2 * (1.0 - 1.0 / estimate.strips)
-    rows = {}
+    rows: dict[str, Material] = {}
     for entry in result.compared:
         row, real, update = entry.after, entry.real, {}
         if real is None:
@@ -188,10 +394,9 @@ def _over_threshold(result: Calibration, setting: ScannerSetting, estimate: Sens
     return max(brightness * loss / estimate.distance**2 / setting.threshold, 1.0)
 
 
-def _receiver_settings(estimate: SensorEstimate, device: Device) -> tuple[dict[str, Any], dict[str, float]]:
-    """Return the settings of a scan that follow from the noise, and those that are drawn about their value."""
-    scan: dict[str, Any] = {"scan.mirror_clock": "free"}
-    drawn = {
+def _noise_of(estimate: SensorEstimate, device: Device) -> dict[str, float]:
+    """Return the settings of a scan that follow from the noise, as formulas tell it."""
+    noise = {
         "scan.noise.speckle": estimate.speckle,
         "scan.noise.range_sigma": estimate.range_sigma,
         "scan.receiver.faint_range_sigma": device.receiver.faint_range_sigma or 0.0,
@@ -199,35 +404,13 @@ def _receiver_settings(estimate: SensorEstimate, device: Device) -> tuple[dict[s
         "scan.receiver.range_delay": estimate.range_delay,
     }
     if device.receiver.compression:
-        drawn["scan.receiver.compression"] = min(device.receiver.compression, 1.0 / (1.0 + SPREAD))
-    return scan, {name: _short(value) for name, value in drawn.items() if value > 1e-6}
+        noise["scan.receiver.compression"] = min(device.receiver.compression, 1.0 / (1.0 + SPREAD))
+    return noise
 
 
-def _moving(estimate: SensorEstimate, device: Device, setting: ScannerSetting) -> tuple[str, dict[str, Any], Device]:
-    """Return scenario, settings and device of a scanner that flies over the road as densely as the cloud."""
-    strips = min(max(estimate.strips, 2 if estimate.gain_step_db > _LEAST_STEP_DB else 1), 8)
-    distance = estimate.distance or AIRBORNE
-    height = float(distance * np.cos(estimate.incidence))
-    step = estimate.pulse_spacing or float(np.sqrt(strips / estimate.density))
-    line = strips / (estimate.density * step)
-    slowest, fastest = device.lines_per_second
-    lines = float(np.clip(SPEED / line, slowest, fastest))
-    speed = lines * line
-    rate = distance * device.pattern.sweep(setting.field_of_view) * lines / step
-    usual = device.modes[0]
-    # The detection threshold stays: by it the noise of faint echoes was told.
-    reach = min(float(np.sqrt(0.2 / setting.threshold)), 0.999 * device.unambiguous_range(rate))
-    mode = usual.to_dict() | {"pulse_rate_khz": _short(rate / 1e3), "maximum_range": _short(reach)}
-    finest = min(device.finest_angle_deg, float(np.rad2deg(step / distance)) * 0.9)
-    fitted = Device.from_dict(device.to_dict() | {"modes": [mode], "finest_angle_deg": _short(finest)})
-    kind = "airborne" if distance > AIRBORNE else "uav"
-    offsets = [_short(0.05 * height * place) for place in np.linspace(-1.0, 1.0, strips)] if strips > 1 else [0.0]
-    platform = {"kind": kind, "height": _short(height), "speed": _short(speed), "lateral_offsets": offsets}
-    settings: dict[str, Any] = {"scan.lines_per_second": _short(lines), "scan.platform": platform}
-    settings["scan.pulse_rate_khz"] = mode["pulse_rate_khz"]
-    settings["scan.motion"] = _SWAY[kind]
-    settings["road.environment.wet"] = 0
-    return "airborne-1000m", settings, fitted
+def _drawn_values(values: Mapping[str, float]) -> dict[str, float]:
+    """Return the values that a recipe draws about: all that aren't nearly 0."""
+    return {path: _short(value) for path, value in values.items() if value > 1e-6}
 
 
 def _standing(estimate: SensorEstimate, device: Device, setting: ScannerSetting) -> tuple[str, dict[str, Any]]:
@@ -278,15 +461,19 @@ def save_recipe(sensor: FittedSensor, path: Path, device: Path, table: Path | No
             **({} if table is None else {"materials_table": str(table)}),
             **sensor.scan,
         },
-        "draw": {
-            name: {"minimum": _short(value * (1.0 - SPREAD)), "maximum": _short(value * (1.0 + SPREAD))}
-            for name, value in sensor.drawn.items()
-        }
+        "draw": {name: _about(name, value) for name, value in sensor.drawn.items()}
         | {name: {"minimum": low, "maximum": high} for name, (low, high) in sensor.usual.items()},
         "groups": [{"name": "roads", "scenes": 8, "split": {"train": 6, "validation": 1, "test": 1}}],
     }
     text = "# Written by synthroads calibrate; groups and roads are an example to be changed.\n"
     write_file(path, (text + yaml.safe_dump(data, sort_keys=False)).encode(), "--save-recipe", overwrite)
+
+
+def _about(path: str, value: float) -> dict[str, float]:
+    """Return the range that a recipe draws a setting from whose fitted value is given."""
+    share = SPREAD_OF_STRIPS if path in _OF_STRIPS else SPREAD
+    high = value * (1.0 + share)
+    return {"minimum": _short(value * (1.0 - share)), "maximum": _short(min(high, 1.0) if path in _SHARES else high)}
 
 
 def _short(value: float) -> float:

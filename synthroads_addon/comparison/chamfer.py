@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..base.arrays import Float
-from .patches import Patches
+from ..cloud.selection.patches import Patches
 
 MOST_PAIRS = 400
 

@@ -20,8 +20,8 @@ from sklearn.model_selection import StratifiedGroupKFold
 
 from ..base.arrays import Bool, Float, Index
 from ..base.errors import InputError
+from ..cloud.selection.patches import FEATURES, GROUPS, Patches, match_density
 from .chamfer import mean_chamfer
-from .patches import FEATURES, GROUPS, Patches, match_density
 
 FOLDS = 5
 BLOCK = 20.0

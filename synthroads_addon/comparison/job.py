@@ -12,9 +12,9 @@ import numpy as np
 
 from ..base.arrays import Float
 from ..cloud.selection.classes import RealClass
+from ..cloud.selection.patches import FEATURES, Patches, join_patches, make_patches
 from .classifier import Distinction, distinguish
 from .clouds import ROAD, ComparedCloud, find_clouds, read_compared
-from .patches import FEATURES, Patches, join_patches, make_patches
 
 RINGS = (4.0, 6.0, 10.0, 15.0, 20.0, 30.0, 50.0)
 """Edges of the ranges by which clouds are described whose points say how far they were seen from, m."""

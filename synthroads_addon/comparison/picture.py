@@ -10,8 +10,8 @@ import numpy as np
 
 from ..base.arrays import Float
 from ..base.files import write_file
+from ..cloud.selection.patches import FEATURES, GROUPS
 from .job import CloudComparison, DescribedCloud
-from .patches import FEATURES, GROUPS
 
 _COLUMNS = 6
 _BINS = 40

@@ -28,6 +28,10 @@ BLOCK = 4096
 """Knots of a block."""
 
 _AXES = 6
+_FAINTEST = 0.05
+"""Least factor on an intensity: its noise doesn't take all of an echo's light."""
+_DRAWN = 400_000
+"""Factors of which the mean logarithm is taken: it is known to a few thousandths of their standard deviation."""
 
 
 class Noise(ClosedModel):
@@ -60,6 +64,14 @@ class Noise(ClosedModel):
         "Relative standard deviation of the intensity: speckle and the detector's noise.",
         (0, 1),
         title="Intensity",
+    )
+    speckle_normal: float = quantity(
+        0.0,
+        "1",
+        "Share of the intensity's variance that is normally distributed, as the mean over many grains and the "
+        "detector's noise are; the rest is speckle, which is gamma distributed.",
+        (0, 1),
+        title="Normal Part of It",
     )
     dropout: float = quantity(0.0, "1", "Share of the returns that is lost at random.", (0, 1), title="Lost Returns")
 
@@ -122,14 +134,41 @@ def shares(random: np.random.Generator, count: int) -> Float32:
     return random.random(count, dtype=np.float32)
 
 
-def speckle_factors(random: np.random.Generator, count: int, sigma: float) -> Float32:
-    """Draw speckle factors (N,) on intensities: gamma distributed with mean 1 and standard deviation sigma.
+def speckle_factors(random: np.random.Generator, count: int, sigma: float, normal: float = 0.0) -> Float32:
+    """Draw factors (N,) on intensities with mean 1 and standard deviation sigma: a gamma and a normal part together.
 
-    The light of a rough surface within one pulse is the sum of m = 1 / sigma^2 independent speckles (Goodman 2007,
-    Speckle Phenomena in Optics, chapter 4).
+    The light of a rough surface within one pulse is the sum of m = 1 / s^2 independent speckles, s being their relative
+    standard deviation (Goodman 2007, Speckle Phenomena in Optics, chapter 4). What a footprint's many grains reflect
+    together, and the detector's noise, are sums of many small parts: normal, by the central limit theorem. In decibels
+    the one has the skewness -s, the other three times that.
+
+    Args:
+        random: the stream.
+        count: of factors.
+        sigma: of both together.
+        normal: share of the variance that is normal.
     """
-    looks = 1.0 / (sigma * sigma)
-    return np.asarray(random.standard_gamma(looks, count, dtype=np.float32) / np.float32(looks))
+    speckle = sigma * np.sqrt(1.0 - normal)
+    if speckle:
+        looks = 1.0 / (speckle * speckle)
+        factors = random.standard_gamma(looks, count, dtype=np.float32) / np.float32(looks)
+    else:
+        factors = np.ones(count, dtype=np.float32)
+    if normal:
+        factors += np.float32(sigma * np.sqrt(normal)) * random.standard_normal(count, dtype=np.float32)
+        np.maximum(factors, np.float32(_FAINTEST), out=factors)
+    return np.asarray(factors)
+
+
+@lru_cache(maxsize=16)
+def mean_log_factor(sigma: float, normal: float = 0.0) -> float:
+    """Return the mean natural logarithm of `speckle_factors`: of gamma ones by formula, else of many that are drawn."""
+    if not normal:
+        looks = 1.0 / sigma**2
+        # digamma(m) - ln m, by its asymptotic series.
+        return -0.5 / looks - 1.0 / (12.0 * looks**2) + 1.0 / (120.0 * looks**4)
+    drawn = speckle_factors(np.random.default_rng(0), _DRAWN, sigma, normal)
+    return float(np.mean(np.log(drawn, dtype=np.float64)))
 
 
 def measured_pose(position: Float, rotation: Float, errors: tuple[Float, Float]) -> tuple[Float, Float]:

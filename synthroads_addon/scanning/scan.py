@@ -247,7 +247,9 @@ class BlockScan:
             values("range noise", ranges, standard_normal),
             angles() if noise.angle_sigma_mrad else None,
             values("dropouts", noise.dropout, shares),
-            values("speckle", noise.speckle, partial(speckle_factors, sigma=noise.speckle)),
+            values(
+                "speckle", noise.speckle, partial(speckle_factors, sigma=noise.speckle, normal=noise.speckle_normal)
+            ),
             values("receiver noise", receiver.noise_sigma(plan.setting.threshold), standard_normal),
             values(
                 "range tails",
@@ -415,7 +417,7 @@ class BlockScan:
             distance = distance + range_sigma(setting, echoes.range, along, echoes.intensity) * range_errors
             if setting.receiver.range_walk:
                 gain = strip_gain(plan.strip_errors, plan.seed, strip.index)
-                distance = distance + range_walk(setting, speckle, plan.noise.speckle, gain)
+                distance = distance + range_walk(setting, speckle, plan.noise, gain)
         normal = None
         if plan.records_seen_points or "normal" in plan.measured_layers:
             normal = target.normals(face, along, pulses.time[pulse], motions)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from synthroads_addon.cloud.selection.patches import make_patches, match_density
 from synthroads_addon.comparison.chamfer import density_aware_chamfer, mean_chamfer
-from synthroads_addon.comparison.patches import make_patches, match_density
 from tests.helpers.clouds.pavement_points import pavement
 
 

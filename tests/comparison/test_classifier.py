@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.cloud.selection.patches import make_patches
 from synthroads_addon.comparison import classifier
 from synthroads_addon.comparison.classifier import distinguish, squared_discrepancy
-from synthroads_addon.comparison.patches import make_patches
 from tests.helpers.clouds.pavement_points import pavement
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.comparison.patches import EDGE, FEATURES, make_patches, match_density
+from synthroads_addon.cloud.selection.patches import EDGE, FEATURES, make_patches, match_density
 from tests.helpers.clouds.pavement_points import pavement
 
 RANDOM, LATTICE = "random", "lattice"

@@ -7,7 +7,8 @@ import pytest
 from scipy import stats
 
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.scanning.noise import Noise
+from synthroads_addon.scanning.noise import Noise, mean_log_factor, speckle_factors
+from synthroads_addon.scanning.receiver import Receiver
 from synthroads_addon.scanning.scan import BlockScan
 from synthroads_addon.scanning.scene.mesh import empty_scene_mesh
 from tests.helpers.scenes.scan_scenes import (
@@ -79,6 +80,30 @@ def test_speckle_is_gamma_distributed_with_its_own_stream() -> None:
     assert factor.mean() == pytest.approx(1.0, abs=0.01)
     again = scan_block(speckled, strip, 0).points
     np.testing.assert_array_equal(again.intensity, points.intensity)
+
+
+@pytest.mark.parametrize("normal", [0.5, 1.0])
+def test_a_part_of_the_intensitys_noise_is_normal(normal: float) -> None:
+    """Mean and deviation as said; skewness in decibels between a gamma distribution's and three times that."""
+    sigma = 0.2
+    factor = speckle_factors(np.random.default_rng(1), 200_000, sigma, normal).astype(np.float64)
+    assert factor.mean() == pytest.approx(1.0, abs=0.003)
+    assert factor.std() == pytest.approx(sigma, rel=0.01)
+    assert stats.skew(np.log(factor)) < -1.4 * sigma
+    assert mean_log_factor(sigma, normal) == pytest.approx(np.log(factor).mean(), abs=0.002)
+    if normal == 1.0:
+        counts = np.bincount((stats.norm.cdf(factor, 1.0, sigma) * 20).astype(int), minlength=20)
+        assert stats.chisquare(counts).pvalue > 0.001
+
+
+def test_normal_noise_leaves_walking_ranges_without_a_bias() -> None:
+    plan = replace(scan_of(plane(), range_sigma=1e-9), noise=Noise(speckle=0.3, speckle_normal=1.0))
+    strip = plan.path.strips[0]
+    walking = replace(plan.setting, receiver=Receiver(range_walk=0.02))
+    calm, points = (scan_block(p, strip, 0).points for p in (plan, replace(plan, setting=walking)))
+    shift = points.range - calm.range
+    assert shift.std() > 0.02
+    assert abs(shift.mean()) < 4.0 * shift.std() / np.sqrt(len(shift))
 
 
 def test_pointing_errors_are_normal_along_both_axes() -> None:

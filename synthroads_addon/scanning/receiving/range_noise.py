@@ -26,6 +26,7 @@ import numpy as np
 
 from ...base.arrays import Float, Float32
 from ..devices.device import ScannerSetting
+from ..noise import Noise, mean_log_factor
 from .waveform import FULL_WIDTH
 
 _LEAST_COSINE = 1e-3
@@ -64,21 +65,19 @@ def range_sigma(setting: ScannerSetting, distance: Float, cosine: Float, intensi
     return np.asarray(np.sqrt(variance))
 
 
-def range_walk(setting: ScannerSetting, speckle: Float | None, sigma: float, gain: float) -> Float | float:
+def range_walk(setting: ScannerSetting, speckle: Float | None, noise: Noise, gain: float) -> Float | float:
     """Return by how much farther echoes (N,) are ranged for what changes their power unknown to the scanner, m.
 
     Args:
         setting: the scanner's.
-        speckle: (N,) factors on the power, gamma distributed with mean 1; None without.
-        sigma: their standard deviation.
+        speckle: (N,) factors on the power, of mean 1; None without.
+        noise: by which they were drawn.
         gain: factor on the power of the strip's echoes.
     """
     walk = (setting.receiver.range_walk or 0.0) * _DECIBELS
     if speckle is None:
         return float(-walk * np.log(gain))
-    looks = 1.0 / sigma**2
-    # The mean logarithm of a gamma variable over its mean, digamma(m) - ln m, by its asymptotic series.
-    mean = -0.5 / looks - 1.0 / (12.0 * looks**2) + 1.0 / (120.0 * looks**4)
+    mean = mean_log_factor(noise.speckle, noise.speckle_normal)
     return np.asarray(walk * (mean - np.log(gain) - np.log(np.maximum(speckle, 1e-12))))
 
 

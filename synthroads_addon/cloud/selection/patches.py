@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from ..base.arrays import AnyArray, Float, Index
-from ..base.errors import InputError
-from ..cloud.selection.classes import RealClass
+from ...base.arrays import AnyArray, Float, Index
+from ...base.errors import InputError
+from .classes import RealClass
 
 EDGE = 1.5
 """Edge of a patch, m."""

@@ -1,0 +1,63 @@
+"""Scan lines of a cloud without times: how far consecutive pulses of a line lie apart.
+
+Points of one line follow each other at one distance in one direction, those of neighbouring lines are shifted at random
+along it. So among the differences of pairs of points, those within a narrow band along the lines have a peak at the
+pulses' distance, in no other direction so high. Within blocks of `_BLOCK` the direction of that band is sought first,
+and the peak then; the median of the blocks that show one counts.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..base.arrays import AnyArray, Float
+
+_BLOCK = 15.0
+"""Edge of a block, m: within it lines are straight and parallel."""
+_FEWEST, _MOST_BLOCKS, _FEWEST_BLOCKS = 300, 60, 3
+_BAND = 0.08
+"""Half width of the band along the lines, of the points' usual distance."""
+_NEAREST, _FARTHEST = 0.5, 1.8
+"""Distances of consecutive pulses are sought between these shares of the points' usual distance."""
+_DIRECTIONS, _BINS = 90, 52
+_CLEAR = 1.8
+"""A block shows lines where its fullest direction holds so many times as many pairs as a usual one."""
+
+
+def pulse_step(place: Float, density: float, strips: int) -> float | None:
+    """Return the distance of consecutive pulses on the ground, m; None where no lines show.
+
+    Args:
+        place: (N, 2 or more) points of all strips, m.
+        density: of all strips together, 1/m2.
+        strips: that overlap.
+    """
+    usual = float(np.sqrt(strips / density))
+    cell = np.floor(place[:, :2] / _BLOCK).astype(np.int64)
+    _, owner, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
+    order = np.argsort(owner.ravel(), kind="stable")
+    blocks = [rows for rows in np.split(order, np.cumsum(count)[:-1]) if len(rows) >= _FEWEST]
+    blocks = blocks[:: max(len(blocks) // _MOST_BLOCKS, 1)]
+    found = [_step_of_block(place[rows, :2], usual) for rows in blocks]
+    steps = [step for step in found if step is not None]
+    return float(np.median(steps)) if len(steps) >= _FEWEST_BLOCKS else None
+
+
+def _step_of_block(place: AnyArray, usual: float) -> float | None:
+    """Return the distance of consecutive pulses in one block, m; None where it shows no lines."""
+    local = place - place.mean(axis=0)
+    pairs = cKDTree(local).query_pairs(_FARTHEST * usual, output_type="ndarray")
+    apart = local[pairs[:, 1]] - local[pairs[:, 0]]
+    apart = apart[np.hypot(*apart.T) > _NEAREST * usual]
+    angle = np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS
+    across = np.abs(np.outer(apart[:, 0], -np.sin(angle)) + np.outer(apart[:, 1], np.cos(angle)))
+    inside = across < _BAND * usual
+    held = inside.sum(axis=0)
+    best = int(held.argmax())
+    if held[best] < _CLEAR * max(float(np.median(held)), 1.0):
+        return None
+    length = np.hypot(*apart[inside[:, best]].T)
+    count, edges = np.histogram(length, _BINS, (_NEAREST * usual, _FARTHEST * usual))
+    smooth = np.convolve(count, np.ones(5), "same")
+    return float((edges[:-1] + edges[1:])[int(smooth.argmax())] / 2.0)

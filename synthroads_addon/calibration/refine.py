@@ -1,0 +1,243 @@
+"""Settings of a moving scanner, refined until a simulated scan has the statistics of the real one.
+
+Estimates by formula take the points' noise apart one cause after the other: what two causes have in common, or what a
+parabola follows of a strip's step, is counted twice or not at all. So the settings that they give are only where the
+search begins. The real cloud's own pavement is scanned anew with them (`simulation`), window by window; the
+medians of its patches' statistics (`cloud.selection.patches`) are compared with the real ones, and the settings moved
+until both agree: the method of simulated moments (McFadden 1989, Econometrica 57). The random numbers stay the same
+from step to step, so that what a change does isn't hidden by them. The search is Gauss and Newton's with Broyden's
+updates of the derivatives, and each setting is held by a weak prior about its beginning.
+
+Scatter of the statistics over the windows says how much each of them counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..base.arrays import Bool, Float
+from ..base.errors import InputError
+from ..base.random_streams import stream
+from ..cloud.selection.classes import RealClass
+from ..cloud.selection.patches import FEATURES, make_patches
+
+_WINDOWS = 8
+"""Windows of the real pavement that are scanned anew."""
+_NARROWEST, _WIDEST, _POINTS = 8.0, 30.0, 15_000.0
+"""Edge of such a window, m, and points of one that is pavement all over."""
+_REACH, _SHARE = 1.5, 0.5
+"""A place is pavement where so large a share of the usual points lies within so many usual distances of it."""
+_USED = tuple(name for name in FEATURES if name not in ("curvature", "level_db"))
+"""Statistics that are compared: a patch's curvature is its road's, and its level says how the whole road varies."""
+_LOGARITHMIC = ("residual_mm", "intensity_iqr_db", "neighbour_noise_db", "spacing_variation", "eighth_neighbour")
+_BRIGHTNESS_GROUPS = 8
+_PRIOR = 1.5
+"""Standard deviation of a setting about where the search begins, in the search's own units."""
+_STEP, _LARGEST_MOVE = 0.25, 0.6
+_ROUNDS, _MOVES = 3, 3
+"""How often the derivatives are measured, and moves with their updates."""
+_LEAST_SCATTER = 0.01
+
+Simulate = Callable[[Mapping[str, float], int], RealClass]
+"""Gives the points of a level pavement about the origin, scanned with settings and a seed."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A setting that is fitted.
+
+    Attributes:
+        path: in the scenario, or a name of the caller's.
+        begin: value at which the search begins.
+        low, high: limits.
+        logarithmic: whether the search goes by the logarithm; else by the value over ``unit``.
+        unit: one step's size where it isn't.
+    """
+
+    path: str
+    begin: float
+    low: float
+    high: float
+    logarithmic: bool = True
+    unit: float = 1.0
+
+    def value(self, x: float) -> float:
+        """Return the setting's value at a place of the search, 0 where it begins."""
+        value = self.begin * float(np.exp(x)) if self.logarithmic else self.begin + x * self.unit
+        return min(max(value, self.low), self.high)
+
+    def reach(self) -> tuple[float, float]:
+        """Return the places of the search at which the setting comes to its limits."""
+        if not self.logarithmic:
+            return (self.low - self.begin) / self.unit, (self.high - self.begin) / self.unit
+        return float(np.log(self.low / self.begin)), float(np.log(self.high / self.begin))
+
+
+@dataclass(frozen=True)
+class Refined:
+    """Settings that were refined.
+
+    Attributes:
+        values: of each setting, by its path.
+        real, before, after: the statistics of the real cloud, and of the simulated ones at the beginning and the end.
+    """
+
+    values: dict[str, float]
+    real: dict[str, float]
+    before: dict[str, float]
+    after: dict[str, float]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return settings and statistics as JSON data, numbers to four digits."""
+        return {
+            name: {key: float(f"{value:.4g}") for key, value in part.items()} for name, part in asdict(self).items()
+        }
+
+
+def refine_settings(road: RealClass, settings: Sequence[Setting], simulate: Simulate) -> Refined:
+    """Return the settings with which simulated scans of a real pavement have its statistics.
+
+    Args:
+        road: points of the real pavement, with intensities in proportion to the light.
+        settings: to be fitted.
+        simulate: scans a square of `window_edge` about the origin, or more of it.
+
+    Raises:
+        InputError: the real pavement, or a simulated one, has too few points in patches.
+    """
+    windows = _windows(road)
+    names, real = _moments(road)
+
+    def moments(x: Float) -> Float:
+        values = {setting.path: setting.value(place) for setting, place in zip(settings, x, strict=True)}
+        return np.array([_moments(window.cut(simulate(values, number)))[1] for number, window in enumerate(windows)])
+
+    first = moments(np.zeros(len(settings)))
+    scatter = np.maximum(np.nanstd(first, axis=0) / np.sqrt(len(windows)), _LEAST_SCATTER)
+
+    def miss(x: Float) -> Float:
+        return np.asarray((np.nanmean(moments(x), axis=0) - real) / scatter)
+
+    start = np.asarray((np.nanmean(first, axis=0) - real) / scatter)
+    x, missed = _search(miss, start, np.array([setting.reach() for setting in settings]).T)
+    values = {setting.path: setting.value(place) for setting, place in zip(settings, x, strict=True)}
+    shown = [dict(zip(names, map(float, real + scatter * part), strict=True)) for part in (0.0 * start, start, missed)]
+    return Refined(values, *shown)
+
+
+def _search(miss: Callable[[Float], Float], start: Float, limits: Float) -> tuple[Float, Float]:
+    """Return where a miss (M,) is least, by Gauss and Newton with Broyden's updates, and the miss there.
+
+    Args:
+        miss: over the statistics' scatter, at a place (N,) of the search.
+        start: the miss at 0.
+        limits: (2, N) least and largest places.
+    """
+    low, high = limits
+    x, missed = np.zeros(len(low)), start
+    for _ in range(_ROUNDS):
+        steps = np.where(x + _STEP <= high, _STEP, -_STEP)
+        slope = np.column_stack([(miss(x + step) - missed) / step.sum() for step in np.diag(steps)])
+        damping = 1.0
+        for _ in range(_MOVES):
+            normal = slope.T @ slope + np.eye(len(x)) / _PRIOR**2
+            pull = slope.T @ missed + x / _PRIOR**2
+            move = np.linalg.solve(normal + (damping - 1.0) * np.diag(np.diag(normal)), -pull)
+            move *= min(1.0, _LARGEST_MOVE / float(np.abs(move).max()))
+            move = np.clip(x + move, low, high) - x
+            tried = miss(x + move)
+            slope += np.outer(tried - missed - slope @ move, move) / max(float(move @ move), 1e-12)
+            if _cost(tried, x + move) < _cost(missed, x):
+                x, missed, damping = x + move, tried, max(damping / 2.0, 1.0)
+            else:
+                damping *= 3.0
+    return x, missed
+
+
+def _cost(missed: Float, x: Float) -> float:
+    return float(missed @ missed + x @ x / _PRIOR**2)
+
+
+@dataclass(frozen=True)
+class _Window:
+    """A window of the real pavement: simulated points are cut to where its points are.
+
+    Attributes:
+        edge: of the window, m.
+        tree: of its points in plan, from its middle, m.
+        reach: within which points are counted, m.
+        fewest: points within that reach where there is pavement.
+    """
+
+    edge: float
+    tree: cKDTree
+    reach: float
+    fewest: float
+
+    def cut(self, scan: RealClass) -> RealClass:
+        """Return the simulated points that lie on the window's pavement."""
+        return select_points(scan, self.holds(scan.place[:, :2]))
+
+    def holds(self, place: Float) -> Bool:
+        """Return a mask (N,) of the places that are pavement."""
+        inside = (np.abs(place) < self.edge / 2.0).all(axis=1)
+        count = np.zeros(len(place))
+        count[inside] = self.tree.query_ball_point(place[inside], self.reach, return_length=True)
+        return np.asarray(count >= self.fewest)
+
+
+def window_edge(density: float) -> float:
+    """Return the edge of the square about the origin that a simulated scan of a density (1/m2) must cover, m."""
+    return float(np.clip(np.sqrt(_POINTS / density), _NARROWEST, _WIDEST))
+
+
+def select_points(road: RealClass, keep: Bool) -> RealClass:
+    """Return some points of a class; its zeros are as many as before."""
+    per_point = ("place", "intensity", "distance", "incidence", "returns")
+    parts = {name: getattr(road, name)[keep] for name in per_point}
+    return replace(road, **parts, time=None if road.time is None else road.time[keep])
+
+
+def _windows(road: RealClass) -> list[_Window]:
+    """Return windows of a real pavement about some of its points, spread at random."""
+    place = road.place[:, :2]
+    tree = cKDTree(place)
+    random = stream(0, "calibration windows")
+    middles = place[random.choice(len(place), _WINDOWS, replace=len(place) < _WINDOWS)]
+    density = float(np.median(make_patches(road, "--real").density))
+    edge, reach = window_edge(density), _REACH / np.sqrt(density)
+    near = (tree.query_ball_point(middle, edge) for middle in middles)
+    fewest = _SHARE * np.pi * _REACH**2
+    return [
+        _Window(edge, cKDTree(place[rows] - middle), reach, fewest) for middle, rows in zip(middles, near, strict=True)
+    ]
+
+
+def _moments(road: RealClass) -> tuple[list[str], Float]:
+    """Return names and values of the statistics that are compared: medians over patches; NaN without any."""
+    names = [*_USED, "density", "faint_share"]
+    try:
+        patches = make_patches(road, "--real")
+    except (InputError, ValueError):
+        return names, np.full(len(names), np.nan)
+    middle = dict(zip(FEATURES, np.median(patches.values, axis=0), strict=True))
+    values = [float(np.log(middle[name])) if name in _LOGARITHMIC else float(middle[name]) for name in _USED]
+    return names, np.array([*values, float(np.log(np.median(patches.density))), _faint_share(road)])
+
+
+def _faint_share(road: RealClass) -> float:
+    """Return by how much the spread of heights falls from the faintest to the brightest points, of its mean."""
+    level = np.log(road.intensity)
+    cell = np.unique(np.floor(road.place[:, :2]).astype(np.int64), axis=0, return_inverse=True)[1].ravel()
+    count = np.bincount(cell)
+    height, brightness = (values - (np.bincount(cell, values) / count)[cell] for values in (road.place[:, 2], level))
+    many = count[cell] >= _BRIGHTNESS_GROUPS
+    order = np.argsort(brightness[many])
+    spread = [float(part.std()) for part in np.array_split(height[many][order], _BRIGHTNESS_GROUPS)]
+    places = np.linspace(-0.5, 0.5, _BRIGHTNESS_GROUPS)
+    return float(np.polyfit(places, spread, 1)[0] / max(np.mean(spread), 1e-9))

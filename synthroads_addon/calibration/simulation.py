@@ -1,0 +1,138 @@
+"""Scans of a level pavement: what a scanner would record of it, without Blender and within seconds.
+
+Settings that are fitted to a real cloud are checked, and corrected, by what the same estimates say of such a scan. The
+scanner's own loop makes it, with the noise, sway, strips and surfaces that a scenario names; only the rays are cast by
+formula.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.arrays import AnyArray, Bool, Float32
+from ..base.errors import InputError
+from ..cloud.points import concatenate
+from ..cloud.selection.classes import RealClass
+from ..materials.surfaces import surfaces_of
+from ..materials.table import Material
+from ..scanning.devices.device import ScannerSetting
+from ..scanning.plan import ScanPlan
+from ..scanning.platforms.polyline import PolylineGuide
+from ..scanning.relief.micro_relief import micro_relief
+from ..scanning.scan import BlockScan
+from ..scanning.scene.mesh import SceneMesh
+from ..scanning.scene.motion import ScannedScene
+from ..scanning.scene.target import Target
+from ..scanning.sway import with_motion
+from ..scenario.scan import ScanScenario
+
+_OVERRUN = 20.0
+"""The path goes on for so long before and behind the pavement, m: swaying scanners look there as well."""
+_LEAST_SLOPE = 1e-12
+
+
+@dataclass
+class LevelPavement:
+    """A level rectangle of one material about the origin, along x, as a scene and its own caster.
+
+    Attributes:
+        length, width: m.
+        material: of all of it.
+    """
+
+    length: float
+    width: float
+    material: Material
+    name: str = "formula"
+    main_thread_only: bool = False
+
+    def mesh(self, material: str) -> SceneMesh:
+        """Return its two triangles, whose material has a name."""
+        x, y = self.length / 2.0, self.width / 2.0
+        corners = [(-x, -y, 0.0), (x, -y, 0.0), (x, y, 0.0), (-x, y, 0.0)]
+        return SceneMesh(
+            vertices=np.array(corners, dtype=np.float32),
+            triangles=np.array([(0, 1, 2), (0, 2, 3)], dtype=np.int32),
+            class_id=np.ones(2, dtype=np.uint8),
+            instance_id=np.ones(2, dtype=np.uint32),
+            material=np.zeros(2, dtype=np.uint16),
+            materials=(material,),
+            origin=np.zeros(3),
+        )
+
+    def cast(self, origins: Float32, directions: Float32, maximum_range: float) -> NDArray[np.int32]:
+        """Return the triangle that each ray (N, 3) meets, -1 for none; see `scanning.scene.caster.Caster`."""
+        x, y = self._met(origins, directions, maximum_range)
+        above = y * self.length > x * self.width
+        return np.where(np.isfinite(x), above, -1).astype(np.int32)
+
+    def occluded(self, origins: Float32, directions: Float32, maximum_range: float | Float32) -> Bool:
+        """Return which rays (N, 3) meet it within a range; see `scanning.scene.caster.Caster`."""
+        return np.asarray(np.isfinite(self._met(origins, directions, maximum_range)[0]))
+
+    def _met(self, origins: Float32, directions: Float32, reach: float | Float32) -> tuple[AnyArray, AnyArray]:
+        """Return where rays meet it, x and y, m; infinite where they don't."""
+        from_, to = origins.astype(np.float64), directions.astype(np.float64)
+        down = np.where(to[:, 2] < -_LEAST_SLOPE, to[:, 2], -_LEAST_SLOPE)
+        distance = -from_[:, 2] / down
+        x, y = (from_[:, axis] + distance * to[:, axis] for axis in (0, 1))
+        meets = (np.abs(x) <= self.length / 2.0) & (np.abs(y) <= self.width / 2.0)
+        meets &= (distance > 0.0) & (distance <= reach)
+        return np.where(meets, x, np.inf), np.where(meets, y, np.inf)
+
+
+def simulate_pavement(
+    scan: ScanScenario, setting: ScannerSetting, pavement: LevelPavement, name: str, seed: int
+) -> RealClass:
+    """Return the points that a scenario's scanner records of a pavement along whose middle it moves.
+
+    Args:
+        scan: its path and its errors.
+        setting: the scanner.
+        pavement: what is scanned.
+        name: of its material in the table, by which it has its relief.
+        seed: of everything random.
+
+    Raises:
+        InputError: nothing of the pavement is recorded.
+    """
+    mesh = pavement.mesh(name)
+    half = pavement.length / 2.0 + _OVERRUN
+    guide = PolylineGuide(np.array([[-half, 0.0, 0.0], [half, 0.0, 0.0]]))
+    plan = ScanPlan(
+        target=Target(ScannedScene(mesh, ()), lambda _: pavement),
+        surfaces=surfaces_of([pavement.material], scan.reflection),
+        setting=setting,
+        path=with_motion(scan.platform.make_path(guide), scan.motion, seed),
+        rings=(),
+        seed=seed,
+        noise=scan.noise,
+        strip_errors=scan.strip_errors,
+        attenuation=scan.attenuation or 0.0,
+        measured_layers=frozenset({"normal", "material"}),
+        records_seen_points=True,
+        relief=micro_relief([name], [pavement.material]) if scan.relief else None,
+        relief_strength=scan.relief,
+    )
+    stages = BlockScan(plan)
+    blocks = [stages.scan_block(*block).points for block in plan.blocks()]
+    recorded = [block for block in blocks if len(block)]
+    if not recorded:
+        raise InputError("--real", None, "has no pavement that the fitted scanner would see")
+    points = concatenate(recorded)
+    lit = np.flatnonzero(points.intensity > 0.0)
+    zeros, points = len(points) - len(lit), points.select(lit)
+    unknown = np.full(len(points), np.nan)
+    return RealClass(
+        selection="simulated",
+        place=points.xyz,
+        intensity=points.intensity.astype(np.float64),
+        zeros=zeros,
+        distance=unknown,
+        incidence=unknown,
+        returns=points.number_of_returns,
+        time=points.gps_time,
+    )
