@@ -65,7 +65,9 @@ class CropBatches:
         self.domains = list(domains)
         self.tiles = [tile for tiles in self.domains for tile in tiles]
         self.scaling = scalings(self.tiles, configuration.intensity)
-        self.seeds = Seeds(self.tiles, len(class_names(configuration.scheme())), configuration.balanced)
+        # Where a share is stated, a crop stays in the domain that it was planned in, whatever class is looked for.
+        groups = [len(tiles) for tiles in self.domains] if configuration.synthetic_share is not None else ()
+        self.seeds = Seeds(self.tiles, len(class_names(configuration.scheme())), configuration.balanced, groups)
 
     def __len__(self) -> int:
         return math.ceil(self.configuration.crops_per_tile * len(self.tiles) / self.configuration.batch)

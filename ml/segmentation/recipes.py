@@ -102,8 +102,6 @@ class SegmentationConfiguration(Configuration):
     def _check_data(self) -> SegmentationConfiguration:
         if self.synthetic_share is not None and not self.set_up.startswith("mixed"):
             raise ValueError(f"synthetic_share is for mixed set-ups, not for {self.set_up}")
-        if self.synthetic_share is not None and self.balanced:
-            raise ValueError("synthetic_share has no effect where balanced is true: set one of them")
         return self
 
     def scheme(self) -> ClassScheme:
