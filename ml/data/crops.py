@@ -70,9 +70,7 @@ class Seeds:
         groups: numbers of tiles, one after another, of the groups that a balanced draw doesn't leave; one if empty.
     """
 
-    def __init__(
-        self, tiles: Sequence[CloudTile], classes: int, balanced: bool, groups: Sequence[int] = ()
-    ) -> None:
+    def __init__(self, tiles: Sequence[CloudTile], classes: int, balanced: bool, groups: Sequence[int] = ()) -> None:
         self._tiles = tiles
         self._counts = np.array([tile.class_counts(classes) for tile in tiles]) if balanced else None
         self._ends = np.cumsum(groups or [len(tiles)])

@@ -23,9 +23,10 @@ from ml.data.classes import IGNORED
 from ml.data.crops import Seeds
 from ml.data.sources import Source, read_tiles
 from ml.data.tiles import scalings
+from ml.experiments import configurations, load_experiment
 from ml.runs import CHECKPOINT, PRETRAINING, Run
 from ml.segmentation import experiment, task
-from ml.segmentation.experiment import configurations, load_experiment, table
+from ml.segmentation.experiment import table
 from ml.segmentation.loading import CropBatches, adaptation_batches, read_domains
 from ml.segmentation.network import build
 from ml.segmentation.recipes import Data, SegmentationConfiguration, plan
@@ -325,6 +326,8 @@ def test_shipped_configurations_and_experiments_are_whole() -> None:
     for name in known:
         assert load_configuration(name).task == "segmentation"
     for path in EXPERIMENTS.glob("*.yaml"):
+        if path.stem.startswith("centerline-"):
+            continue
         found = load_experiment(path.stem)
         made = configurations(found, {"real": "a", "synthetic": "b"})
         assert list(made) == list(found.variants)
