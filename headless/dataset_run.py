@@ -116,6 +116,17 @@ class WorkerClosing:
         return self.is_set()
 
 
+def scene_task(job: SceneJob, recipe: Recipe) -> dict[str, Any]:
+    """Return what a scene's process has to be told, as JSON data."""
+    return {
+        "name": job.name,
+        "number": job.number,
+        "split": job.split,
+        "scenario": job.scenario.to_dict(),
+        "recipe": recipe.to_dict(),
+    }
+
+
 def run_on_worker(folder: str) -> Outcome:
     """Run the task in a folder on a Dask worker with its share of the cores; return how it ended.
 
@@ -323,14 +334,7 @@ class DatasetRun:
     def _write_task(self, job: SceneJob) -> str:
         """Write a scene's task file into a new work folder, and return that folder."""
         folder = Path(tempfile.mkdtemp(prefix=f"{job.name}-", dir=self.folder / WORK))
-        task = {
-            "name": job.name,
-            "number": job.number,
-            "split": job.split,
-            "scenario": job.scenario.to_dict(),
-            "recipe": self.recipe.to_dict(),
-        }
-        (folder / TASK).write_text(json.dumps(task), encoding="utf-8")
+        (folder / TASK).write_text(json.dumps(scene_task(job, self.recipe)), encoding="utf-8")
         return str(folder)
 
     def _publish(self, outcome: Outcome) -> None:

@@ -1,6 +1,6 @@
 """The roads that a configuration names, and the batches of an epoch."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
@@ -21,6 +21,7 @@ from .corridor import Learned, Truth
 from .effects import SequenceEffects
 from .effects.slices import SequenceCrop
 from .roads import LearningRoad, axis_beside, clouds_with_axes, read_measured, read_scene, scene_folders
+from .scene_stream import EpochScenes, SceneStream, StreamOptions
 from .slices import Batch, Sample, SliceDataset, SliceSettings, collate, mirror_batch
 from .workers import load_batches
 
@@ -29,11 +30,11 @@ APART = 20.0
 
 
 class MeasuredRoad(Part):
-    """A real cloud and its axis, or all those of a folder; the whole roads, or the part of each between two stations."""
+    """A real cloud and its axis, or all those of a folder: whole roads, or of each what lies between two stations."""
 
     cloud: str = Field(
         min_length=1,
-        description="Cloud, or a folder of clouds with axes beside them: NAME_axis.csv, NAME.geojson.",
+        description="Cloud, or a folder of clouds with axes beside them, NAME_axis.csv or the like.",
     )
     axis: str = Field(
         "", description="CSV or GeoJSON with a cloud's axis, in its map coordinates; that beside it if empty."
@@ -75,7 +76,12 @@ class DataOptions(Part):
     """Training data. Paths count from the working folder."""
 
     data_sets: tuple[str, ...] = Field((), description="Folders that `synthroads dataset` made.")
-    train_split: str = Field("train", description="Split of the data sets that weights are learned from.")
+    stream: StreamOptions | None = Field(
+        None, description="Roads that are made while the training goes on, to learn from beside those of the data sets."
+    )
+    train_split: str = Field(
+        "train", description="Split of the data sets that weights are learned from; none of them if empty."
+    )
     validation_split: str = Field("validation", description="Split that curves and calibration are made with.")
     calibration_split: str = Field(
         "",
@@ -144,7 +150,7 @@ def read_roads(data: DataOptions, truth: Learned, progress: Progress = silent) -
         MissingFileError, InputError: a file or folder is missing or damaged, or holds nothing of use.
     """
     cache = Path(data.cache) if data.cache else None
-    train = _read_scenes(data.data_sets, data.train_split, truth, cache, progress)
+    train = _read_scenes(data.data_sets, data.train_split, truth, cache, progress) if data.train_split else []
     validation = _read_scenes(data.data_sets, data.validation_split, truth, cache, progress)
     share = 0.0 if data.measured_validation else data.measured_validation_share
     measured: list[LearningRoad] = []
@@ -153,7 +159,7 @@ def read_roads(data: DataOptions, truth: Learned, progress: Progress = silent) -
         measured.append(learned)
         measured_validation += kept
     measured_validation += _read_measured(data.measured_validation, truth, progress)
-    if not train and not measured:
+    if not train and not measured and data.stream is None:
         raise InputError("data", list(data.data_sets), f"holds no road with a {truth} to learn from")
     if not validation and not measured_validation:
         raise InputError("data", list(data.data_sets), f"holds no road with a {truth} to validate with")
@@ -223,6 +229,39 @@ class Batches:
         order = stream(self.seed, "order", epoch, turn).permutation(self.drawn_per_epoch)
         numbers = order if turn else np.arange(len(order))
         return turn, numbers[place * size : (place + 1) * size].tolist()
+
+
+class StreamedBatches:
+    """Training batches like those of `Batches`, whose synthetic roads are also those of a stream's scenes.
+
+    Args:
+        roads: to learn from; the stream's come behind the synthetic ones.
+        batches: makes an epoch's `Batches` of the roads that it draws from.
+        stream: of the scenes.
+        truth: what is learned.
+    """
+
+    def __init__(self, roads: Roads, batches: Callable[[Roads], Batches], stream: SceneStream, truth: Learned) -> None:
+        self._roads, self._batches, self._truth = roads, batches, truth
+        self._scenes = EpochScenes(stream, self._read)
+
+    def _read(self, number: int, folder: Path) -> list[LearningRoad]:
+        """Return the roads of a scene; points are read whole, as the scene is removed one day."""
+        (scene,) = (folder / "scenes").iterdir()
+        return [replace(road, name=f"{number:06d}-{road.name}") for road in read_scene(scene, self._truth)]
+
+    def __call__(self, epoch: int, share: slice = slice(None)) -> Iterator[Batch]:
+        """Yield the batches of an epoch whose numbers, from 0, `share` selects.
+
+        Raises:
+            InputError: a scene can't be made, or all of them together have no road to learn from.
+        """
+        train = [*self._roads.train, *self._scenes(epoch)]
+        if not train:
+            raise InputError(
+                "data.stream", epoch, f"none of the scenes of this epoch has a {self._truth} to learn from"
+            )
+        yield from self._batches(replace(self._roads, train=train))(epoch, share)
 
 
 def _first_occurrences(batches: Sequence[Sequence[int]]) -> list[list[int]]:

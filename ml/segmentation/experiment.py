@@ -36,6 +36,7 @@ class Experiment(AnyExperiment):
         return Data(
             real=tuple(map(fill, self.data.real)),
             synthetic=tuple(map(fill, self.data.synthetic)),
+            stream=self.data.stream,
             validation=tuple(map(fill, self.data.validation)),
             tests={name: tuple(map(fill, sources)) for name, sources in self.data.tests.items()},
         ).to_dict()
