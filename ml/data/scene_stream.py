@@ -227,7 +227,7 @@ class SceneStream:
 
 
 class EpochScenes:
-    """What is read of the scenes of an epoch, and kept as long as later ones draw from it.
+    """Reader of the scenes of an epoch, which keeps what it has read as long as later ones draw from it.
 
     Args:
         stream: of the scenes.

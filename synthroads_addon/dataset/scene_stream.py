@@ -26,7 +26,7 @@ _REMOVED = ".removed-"
 
 
 class StreamPlan(ClosedModel):
-    """What a stream is made from."""
+    """Plan of a stream: all that its scenes are made from."""
 
     recipe: Recipe = Field(description="Recipe.")
     split: str = Field(description="Split of the recipe whose scenes are made.")

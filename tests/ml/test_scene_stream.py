@@ -6,6 +6,7 @@ The scenes are made by `tests/helpers/quick_producer.py`, without Blender; a slo
 from __future__ import annotations
 
 import importlib.util
+import json
 import subprocess
 import sys
 import time
@@ -306,6 +307,45 @@ def test_centrelines_are_learned_from_a_stream_with_the_same_bits(tmp_path: Path
     assert not (whole.folder / SCENES).exists()
 
 
+SCRIPT = """
+import sys
+from pathlib import Path
+from ml.configuration import from_data
+from ml.data import scene_stream
+from ml.runs import Run
+from ml.segmentation import task
+from synthroads_addon.base.schema import read_json
+scene_stream.PRODUCER = sys.argv[3:]
+task.train(Run.start(Path(sys.argv[2]), from_data(read_json(Path(sys.argv[1])), "test"), resume=True))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="kills by signal")
+def test_killed_it_ends_as_undisturbed(data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In its third epoch, with scenes being made; the producers, whom nobody tells, end too."""
+    whole = Run.start(tmp_path / "whole", small(data))
+    task.train(whole)
+    (tmp_path / "toy.json").write_text(json.dumps(small(data).to_dict()))
+    killed = tmp_path / "killed"
+    with monkeypatch.context() as patch:
+        patch.setenv("QUICK_DELAY", "2")
+        arguments = [sys.executable, "-c", SCRIPT, str(tmp_path / "toy.json"), str(killed), *QUICK]
+        with subprocess.Popen(arguments, cwd=Path(__file__).resolve().parents[2]) as process:
+            while not (killed / "history.json").is_file() or len(json.loads((killed / "history.json").read_text())) < 2:
+                assert process.poll() is None
+                time.sleep(0.02)
+            process.kill()
+    until = time.monotonic() + 60.0
+    while (killed / SCENES / ".work").exists():
+        assert time.monotonic() < until, "the producers go on"
+        time.sleep(0.1)
+    resumed = Run.start(killed, small(data), resume=True)
+    task.train(resumed)
+    assert same(resumed, whole)
+    assert not (killed / SCENES).exists()
+
+
 TINY = """
 type: Recipe
 version: "1.0"
@@ -334,7 +374,7 @@ groups:
 def test_real_scenes_are_the_same_bytes_and_give_the_same_weights(
     data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Made by one process or by two at once; the producers are killed once, and the training resumed."""
+    """Made by one process, or by two at once."""
     monkeypatch.undo()
     (tmp_path / "tiny.yaml").write_text(TINY)
     found: list[dict[int, dict[str, str]]] = []
