@@ -40,7 +40,7 @@ from synthroads_addon.dataset.scene_stream import (
 )
 
 from ..configuration import Part
-from ..processes import process_number
+from ..processes import process_number, wait_for_all
 
 SCENES = "scenes"
 """Folder of the scenes in that of a run, where no other is named."""
@@ -129,6 +129,7 @@ class SceneStream:
                 self._begin()
             except OSError as error:
                 raise OutputError("data.stream", str(self.folder), f"cannot be written ({error.strerror})") from None
+        wait_for_all()  # nobody takes scenes of another plan, which are removed until here, for this one's
         return self
 
     def __exit__(

@@ -307,6 +307,25 @@ def test_centrelines_are_learned_from_a_stream_with_the_same_bits(tmp_path: Path
     assert not (whole.folder / SCENES).exists()
 
 
+@pytest.mark.slow
+def test_two_processes_learn_from_one_stream(data: Path, tmp_path: Path, log: Path) -> None:
+    """The same twice, and each scene is made once; scenes of another seed that are there before don't count."""
+    runs = []
+    for name in ("one", "other"):
+        folder = tmp_path / f"{name}-scenes"
+        with SceneStream(
+            StreamOptions.from_dict({**STREAM, "folder": str(folder)}), 7, tmp_path, 1, ("pointcept",)
+        ) as old:
+            old.begin_epoch(0)
+        log.unlink()
+        settings = small(data, processes=2, crops_per_epoch=8, schedule={"epochs": 2}, stream={"folder": str(folder)})
+        runs.append(Run.start(tmp_path / name, settings))
+        task.train(runs[-1])
+        assert sorted(number for number, *_ in begun(log)) == [0, 1, 2, 3]
+        assert not folder.exists()
+    assert same(*runs)
+
+
 SCRIPT = """
 import sys
 from pathlib import Path
