@@ -24,7 +24,7 @@ COMMANDS = {
     "evaluate": "measure a trained model",
     "predict": "label a cloud, or find its road, with a trained model",
     "export": "write a trained network as ONNX",
-    "experiment": "train variants of a segmentation with several seeds, and compare their scores",
+    "experiment": "train variants that differ in their data with several seeds, and compare their scores",
     "pack": "pack a data set's labelled points into one small file, to train from elsewhere",
     "forecast": "forecast how long a training of a segmentation takes on this machine",
     "centerline": "find the centreline of the road in a cloud, and where it is to be trusted",

@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterator, Set
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from threading import Event
 from typing import Any, Protocol, cast
@@ -113,6 +114,17 @@ class WorkerClosing:
         """Sleep for so many seconds; return whether the worker is closing."""
         time.sleep(timeout)
         return self.is_set()
+
+
+def scene_task(job: SceneJob, recipe: Recipe) -> dict[str, Any]:
+    """Return what a scene's process has to be told, as JSON data."""
+    return {
+        "name": job.name,
+        "number": job.number,
+        "split": job.split,
+        "scenario": job.scenario.to_dict(),
+        "recipe": recipe.to_dict(),
+    }
 
 
 def run_on_worker(folder: str) -> Outcome:
@@ -212,6 +224,7 @@ class DatasetRun:
         self._sequences = {f"{job.number:02d}" for job in self.jobs}
         self._recipe_text = self.recipe.to_json()
         self._generator = generator()
+        self._described: set[str] = set()
 
     def run(self, submit: Submit) -> Manifest:
         """Make all scenes that are missing, write the data set's descriptions, and return the manifest.
@@ -321,14 +334,7 @@ class DatasetRun:
     def _write_task(self, job: SceneJob) -> str:
         """Write a scene's task file into a new work folder, and return that folder."""
         folder = Path(tempfile.mkdtemp(prefix=f"{job.name}-", dir=self.folder / WORK))
-        task = {
-            "name": job.name,
-            "number": job.number,
-            "split": job.split,
-            "scenario": job.scenario.to_dict(),
-            "recipe": self.recipe.to_dict(),
-        }
-        (folder / TASK).write_text(json.dumps(task), encoding="utf-8")
+        (folder / TASK).write_text(json.dumps(scene_task(job, self.recipe)), encoding="utf-8")
         return str(folder)
 
     def _publish(self, outcome: Outcome) -> None:
@@ -342,6 +348,7 @@ class DatasetRun:
                 target = self.folder / name
                 target.parent.mkdir(parents=True, exist_ok=True)
                 (outcome.folder / FILES / name).rename(target)
+            self._describe_layouts()  # before it is recorded: a set that is stopped now can be learned from
             entry = SceneEntry.from_dict({**about, "status": "done", **done}, "scene")
             (outcome.folder / "report.json").replace(self.folder / "logs" / f"{job.name}.json")
             if not entry.points:
@@ -379,12 +386,21 @@ class DatasetRun:
         """Write the manifest, layout descriptions and data card of the data set, and remove the work folder."""
         manifest = self._manifest()
         write_manifest(self.folder, manifest)
-        texts = layout_descriptions(self.recipe, self.jobs)
-        texts["DATA_CARD.md"] = data_card(self.recipe, manifest, self.jobs)
-        for name, text in texts.items():
-            if (self.folder / name).parent.is_dir():
-                write_atomically(self.folder / name, text)
+        self._described.clear()
+        self._describe_layouts()
+        write_atomically(self.folder / "DATA_CARD.md", data_card(self.recipe, manifest, self.jobs))
         shutil.rmtree(self.folder / WORK, ignore_errors=True)
+
+    def _describe_layouts(self) -> None:
+        """Write the description of each layout that has a scene by now, unless this run has written it already."""
+        for name, text in self._layout_texts.items():
+            if name not in self._described and (self.folder / name).parent.is_dir():
+                write_atomically(self.folder / name, text)
+                self._described.add(name)
+
+    @cached_property
+    def _layout_texts(self) -> dict[str, str]:
+        return layout_descriptions(self.recipe, self.jobs)
 
 
 Submit = Callable[[list[str]], Iterator[Outcome]]

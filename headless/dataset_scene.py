@@ -84,7 +84,8 @@ def main() -> int:
         make_scene(read_json(path), path.parent, int(sys.argv[2]))
     except InputError as error:
         message = str(error).replace(str(path.parent), "")
-        write_atomically(path.parent / FAILED, json.dumps({"error": message}))
+        of_scenario = type(error) is InputError  # and not a file that is missing or can't be written
+        write_atomically(path.parent / FAILED, json.dumps({"error": message, "of_scenario": of_scenario}))
         return 2
     return 0
 

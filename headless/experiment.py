@@ -1,4 +1,4 @@
-"""Run an experiment: several trainings of a segmentation that differ in their data, each with several seeds.
+"""Run an experiment: several trainings that differ in their data, each with several seeds.
 
 One table has all scores. What is trained already isn't trained again: after an interruption the same command goes on.
 """
@@ -27,23 +27,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--configuration", metavar="NAME_OR_FILE", help=text)
     text = "seeds of each training, one after another (the experiment's)"
     parser.add_argument("--seeds", type=int, nargs="+", metavar="N", help=text)
+    text = (
+        "names of real roads, with commas, that are left out of the training together and tested on (can be repeated: "
+    )
+    text += "turn by turn), for centrelines (each road by itself)"
+    parser.add_argument("--leave-out", type=_names, action="append", default=[], metavar="ROADS", help=text)
     add_changes_argument(parser, "all configurations", "threads=1")
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads experiment`; return exit code, scores as JSON data and a printed table."""
-    from ml.segmentation.experiment import RESULTS, TABLE, configurations, load_experiment, run_experiment, table
+    from ml.experiments import RESULTS, TABLE, configurations, experiment_module, load_experiment
 
     experiment = load_experiment(arguments.experiment)
+    work = experiment_module(experiment.task)
     if arguments.configuration:
         experiment = experiment.model_copy(update={"configuration": arguments.configuration})
+    if arguments.leave_out:
+        if experiment.task != "centerline":
+            raise InputError("--leave-out", ",".join(arguments.leave_out[0]), "is for experiments with centrelines")
+        data = experiment.data.model_copy(update={"left_out": tuple(arguments.leave_out)})
+        experiment = experiment.model_copy(update={"data": data})
     configured = configurations(experiment, dict(arguments.data), arguments.changes)
     seeds = arguments.seeds or experiment.seeds
     for seed in seeds:
         if not 0 <= seed < 2**63:
             raise InputError("--seeds", seed, "must be whole numbers from 0")
-    results = run_experiment(experiment, configured, arguments.output, seeds, progress_bar(arguments))
-    text = f"{table(experiment.title, results)}\nwritten to {arguments.output}: {TABLE}, {RESULTS} and the runs"
+    results = work.run_experiment(experiment, configured, arguments.output, seeds, progress_bar(arguments))
+    shown = work.table(experiment.title, results, list(configured))
+    text = f"{shown}\nwritten to {arguments.output}: {TABLE}, {RESULTS} and the runs"
     return 0, {"title": experiment.title, "results": results}, text
 
 
@@ -52,6 +64,10 @@ def _folder(text: str) -> tuple[str, str]:
     if not name or not folder:
         raise argparse.ArgumentTypeError(f"is '{text}': must be NAME=FOLDER, e.g. real=out/standin")
     return name, folder
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(filter(None, text.split(",")))
 
 
 if __name__ == "__main__":

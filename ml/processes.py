@@ -44,6 +44,12 @@ def process_count() -> int:
     return distributed.get_world_size() if distributed.is_initialized() else 1
 
 
+def wait_for_all() -> None:
+    """Wait until all processes that train together have come here."""
+    if distributed.is_initialized():
+        distributed.barrier()
+
+
 def average(tensors: Sequence[Tensor]) -> None:
     """Replace tensors of one device and type, in place, by their means over all processes."""
     if process_count() == 1 or not tensors:

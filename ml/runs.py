@@ -31,6 +31,8 @@ PRETRAINING = "pretraining"
 """Folder, within that of a fine-tuned or self-trained run, of what it began with, and of its rounds but the last."""
 FREE_WHEN_RESUMING = ("threads", "device", "workers", "prepare_on")
 """Fields that may change between the parts of one training: they say where it runs, not what it learns."""
+_FREE_IN_STREAM = ("producers", "folder")
+"""Those of `data.stream`."""
 
 C = TypeVar("C", bound=Configuration)
 
@@ -152,8 +154,13 @@ def stream_seed(seed: int, *purpose: str | int) -> int:
 
 
 def lasting_data(configuration: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a configuration's data without the fields of `FREE_WHEN_RESUMING`."""
-    return {name: value for name, value in configuration.items() if name not in FREE_WHEN_RESUMING}
+    """Return a configuration's data without the fields that may change on resuming, those of `FREE_WHEN_RESUMING`."""
+    kept = {name: value for name, value in configuration.items() if name not in FREE_WHEN_RESUMING}
+    data = kept.get("data")
+    if isinstance(data, Mapping) and isinstance(data.get("stream"), Mapping):
+        lasting = {name: value for name, value in data["stream"].items() if name not in _FREE_IN_STREAM}
+        kept["data"] = {**data, "stream": lasting}
+    return kept
 
 
 def to_json_data(value: Any) -> Any:

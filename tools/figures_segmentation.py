@@ -24,11 +24,11 @@ from headless.marked_documents import put_tables  # noqa: E402
 from ml.data.pack import CROP, pack_summary  # noqa: E402
 from ml.data.packed import PackReader  # noqa: E402
 from ml.data.sources import Source  # noqa: E402
+from ml.experiments import RESULTS  # noqa: E402
 from ml.runs import HISTORY, METRICS, PRETRAINING  # noqa: E402
 from ml.scores.confusion import table_by_class, tables_by_test  # noqa: E402
 from ml.scores.metrics import Spread, finite_values  # noqa: E402
 from ml.scores.pictures import comparison  # noqa: E402
-from ml.segmentation.experiment import RESULTS  # noqa: E402
 from ml.segmentation.scoring import score, trained_model  # noqa: E402
 from ml.shipped import open_shipped  # noqa: E402
 from synthroads_addon.base.errors import InputError, SynthRoadsError  # noqa: E402

@@ -37,7 +37,7 @@ FILES = {
         "ml.segmentation.recipes:SegmentationConfiguration",
         "ml.segmentation.experiment:Experiment",
     ],
-    "centerline": ["ml.centerline.task:CenterlineConfiguration"],
+    "centerline": ["ml.centerline.task:CenterlineConfiguration", "ml.centerline.experiment:Experiment"],
 }
 """Name of a page part -> the classes that read the files which it describes."""
 _WORDING = Wording(lambda text: f"`{text}`", lambda name: f"[{name}](#{name.lower()})")

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from synthroads_addon.base.arrays import Float
-from synthroads_addon.base.errors import InputError, MissingFileError
+from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import write_file
 from synthroads_addon.base.progress import Progress, silent
 from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.dataset.manifest import MANIFEST
 
-from ..data.corridor import Learned
-from ..data.roads import LearningRoad, read_measured, read_scene, scene_folders
+from ..data.roads import LearningRoad, axis_beside, clouds_with_axes, read_measured, read_scene, scene_folders
+from ..data.slices import SliceSettings
 from ..networks.centerline.models import TARGETS
 from ..scores.baselines import SkeletonSettings
 from ..scores.distances import TARGET_METRICS, TargetErrors
@@ -40,8 +40,6 @@ if TYPE_CHECKING:
     from .task import CenterlineConfiguration
 
 
-AXIS_ENDINGS = ("_axis.csv", ".geojson")
-"""Ending of the name of a cloud's axis, after the cloud's name."""
 PICTURES = 3
 """Roads that are drawn."""
 _VIEW = 200.0
@@ -104,12 +102,18 @@ def read_cases(
                 for road in read_scene(folder, settings.truth, cache):
                     shown.append(make_case(road, seed, cropping=None, estimated=False, settings=settings))
         else:
-            road = _read_measured_case(path, settings.truth)
-            shown.append(make_case(road, seed, cropping=STRETCHES, estimated=True, settings=settings))
+            for cloud in clouds_with_axes(path) if path.is_dir() else [path]:
+                road = read_measured(cloud, axis_beside(cloud), settings.truth)
+                shown.append(measured_case(road, seed, settings))
     if not shown:
         names = ", ".join(str(path) for path in evaluation.data)
         raise InputError("data", names, f"holds no road with a {settings.truth} of the kind that was learned")
     return shown
+
+
+def measured_case(road: LearningRoad, seed: int, settings: SliceSettings) -> Case:
+    """Return a real road as it is measured on: both sides cropped, anew every 50 m, the path found in what is left."""
+    return make_case(road, seed, cropping=STRETCHES, estimated=True, settings=settings)
 
 
 def corridor_figures(predictor: CenterlinePredictor, shown: Sequence[Case]) -> dict[str, dict[str, float | None]]:
@@ -128,17 +132,6 @@ def corridor_figures(predictor: CenterlinePredictor, shown: Sequence[Case]) -> d
         target = TargetErrors(size, deviation[known, index], widths[known, index], name == "lanes")
         rows[name] = {figure: nan_to_none(value) for figure, value in figures(TARGET_METRICS, target).items()}
     return rows
-
-
-def _read_measured_case(cloud: Path, truth: Learned) -> LearningRoad:
-    found = [cloud.with_name(cloud.stem + ending) for ending in AXIS_ENDINGS]
-    there = [path for path in found if path.is_file()]
-    if not cloud.exists():
-        raise MissingFileError(str(cloud), None, "no such cloud, nor a data set's folder")
-    if not there:
-        names = " or ".join(path.name for path in found)
-        raise MissingFileError(str(cloud), None, f"has no axis beside it, {names}")
-    return read_measured(cloud, there[0], truth)
 
 
 def _draw(folder: Path, one: Case, predictor: CenterlinePredictor, name: str) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -17,10 +18,20 @@ from synthroads_addon.base.progress import Progress, silent
 from synthroads_addon.base.schema import canonical_json
 
 from ..configuration import Configuration
-from ..data.batches import Batches, BatchOptions, DataOptions, Roads, crop_only_effects, fixed_batches, read_roads
+from ..data.batches import (
+    Batches,
+    BatchOptions,
+    DataOptions,
+    Roads,
+    StreamedBatches,
+    crop_only_effects,
+    fixed_batches,
+    read_roads,
+)
 from ..data.effects import SequenceEffects
 from ..data.frames import read_path
 from ..data.roads import cut_strip
+from ..data.scene_stream import SceneStream
 from ..data.slices import Batch, SliceSettings
 from ..data.workers import report_lost_workers
 from ..networks.centerline.losses import LossOptions, centerline_loss
@@ -88,26 +99,41 @@ def train_network(run: Run[CenterlineConfiguration], progress: Progress = silent
     device = chosen_device(configuration)
     roads = read_roads(configuration.data, configuration.slices.truth, progress)
     model = _first_model(configuration).to(device)
-    batches = Batches(
-        roads,
-        configuration.slices,
-        configuration.effects,
-        configuration.batches,
-        configuration.seed,
-        configuration.data.measured_share,
-        configuration.workers,
-    )
-    with report_lost_workers(configuration.workers):
+
+    def batches_of(roads: Roads) -> Batches:
+        return Batches(
+            roads,
+            configuration.slices,
+            configuration.effects,
+            configuration.batches,
+            configuration.seed,
+            configuration.data.measured_share,
+            configuration.workers,
+        )
+
+    with _scene_stream(run, progress) as stream, report_lost_workers(configuration.workers):
+        truth = configuration.slices.truth
         fit(
             model,
             run,
-            batches,
+            batches_of(roads) if stream is None else StreamedBatches(roads, batches_of, stream, truth),
             configuration.batches.steps,
             centerline_loss(configuration.loss, configuration.slices.half_width),
             validate=_validation(configuration, roads),
             progress=progress,
         )
+    if stream is not None:
+        stream.remove()
     return model, roads
+
+
+def _scene_stream(run: Run[CenterlineConfiguration], progress: Progress) -> AbstractContextManager[SceneStream | None]:
+    """Return the context in which the configuration's stream of scenes flows; one of None where there is none."""
+    configuration = run.configuration
+    if configuration.data.stream is None:
+        return nullcontext()
+    epochs = configuration.schedule.epochs
+    return SceneStream(configuration.data.stream, configuration.seed, run.folder, epochs, progress=progress)
 
 
 def evaluate(

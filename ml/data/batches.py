@@ -1,6 +1,6 @@
 """The roads that a configuration names, and the batches of an epoch."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
@@ -20,16 +20,27 @@ from .axis import MeasuredAxis
 from .corridor import Learned, Truth
 from .effects import SequenceEffects
 from .effects.slices import SequenceCrop
-from .roads import LearningRoad, read_measured, read_scene, scene_folders
+from .roads import LearningRoad, axis_beside, clouds_with_axes, read_measured, read_scene, scene_folders
+from .scene_stream import EpochScenes, SceneStream, StreamOptions
 from .slices import Batch, Sample, SliceDataset, SliceSettings, collate, mirror_batch
 from .workers import load_batches
 
+APART = 20.0
+"""Length of a real road between what is learned from and what is validated with, m."""
+
 
 class MeasuredRoad(Part):
-    """A real cloud and its axis, or the part of it between two stations."""
+    """A real cloud and its axis, or all those of a folder: whole roads, or of each what lies between two stations."""
 
-    cloud: str = Field(description="Cloud.")
-    axis: str = Field(description="CSV or GeoJSON with the axis, in the cloud's map coordinates.")
+    cloud: str = Field(
+        min_length=1,
+        description="Cloud, or a folder of clouds with axes beside them, NAME_axis.csv or the like.",
+    )
+    axis: str = Field(
+        "", description="CSV or GeoJSON with a cloud's axis, in its map coordinates; that beside it if empty."
+    )
+    roads: tuple[str, ...] = Field((), description="Names of the folder's clouds, without endings; all if none.")
+    left_out: tuple[str, ...] = Field((), description="Names of clouds of the folder that aren't taken.")
     first: float = quantity(0.0, ge=0, unit="m", description="Station along the axis where the part begins.")
     last: float = quantity(1e9, gt=0, unit="m", description="Station where it ends.")
 
@@ -39,12 +50,38 @@ class MeasuredRoad(Part):
             raise ValueError(f"last must be larger than first, {self.first:g}")
         return self
 
+    def files(self) -> list[tuple[Path, Path]]:
+        """Return the paths of the clouds and of their axes, by name.
+
+        Raises:
+            MissingFileError: there is no such cloud or folder, or no axis beside a cloud.
+            InputError: `roads` or `left_out` name no cloud of the folder, or nothing is left.
+        """
+        path = Path(self.cloud)
+        if not path.is_dir():
+            return [(path, Path(self.axis) if self.axis else axis_beside(path))]
+        if self.axis:
+            raise InputError("axis", self.axis, f"{self.cloud} is a folder, whose clouds have their axes beside them")
+        found = {cloud.stem: cloud for cloud in clouds_with_axes(path)}
+        for which, names in (("roads", self.roads), ("left_out", self.left_out)):
+            if unknown := sorted(set(names) - set(found)):
+                raise InputError(which, unknown[0], f"must be of the roads of {path}: {', '.join(found)}")
+        kept = [name for name in found if name in (self.roads or found) and name not in self.left_out]
+        if not kept:
+            raise InputError("left_out", list(self.left_out), f"leaves no road of {path}")
+        return [(found[name], axis_beside(found[name])) for name in kept]
+
 
 class DataOptions(Part):
     """Training data. Paths count from the working folder."""
 
     data_sets: tuple[str, ...] = Field((), description="Folders that `synthroads dataset` made.")
-    train_split: str = Field("train", description="Split of the data sets that weights are learned from.")
+    stream: StreamOptions | None = Field(
+        None, description="Roads that are made while the training goes on, to learn from beside those of the data sets."
+    )
+    train_split: str = Field(
+        "train", description="Split of the data sets that weights are learned from; none of them if empty."
+    )
     validation_split: str = Field("validation", description="Split that curves and calibration are made with.")
     calibration_split: str = Field(
         "",
@@ -53,6 +90,14 @@ class DataOptions(Part):
     )
     measured: tuple[MeasuredRoad, ...] = Field((), description="Real roads to learn from.")
     measured_validation: tuple[MeasuredRoad, ...] = Field((), description="Real roads to validate with.")
+    measured_validation_share: float = quantity(
+        0.0,
+        ge=0,
+        le=0.5,
+        unit="1",
+        description="Of each real road to learn from, at its end: validated with instead, where no real roads are "
+        "named for that.",
+    )
     measured_share: float = quantity(
         0.5, ge=0, le=1, unit="1", description="Of the samples, where there are both kinds."
     )
@@ -60,8 +105,11 @@ class DataOptions(Part):
 
     @model_validator(mode="after")
     def _check_roads(self) -> Self:
-        if not self.data_sets and not (self.measured and self.measured_validation):
-            raise ValueError("name data_sets, or measured and measured_validation roads")
+        validated = self.measured_validation or self.measured_validation_share
+        if not self.data_sets and not (self.measured and validated):
+            raise ValueError(
+                "name data_sets, or measured and measured_validation roads (or a measured_validation_share)"
+            )
         return self
 
 
@@ -102,11 +150,16 @@ def read_roads(data: DataOptions, truth: Learned, progress: Progress = silent) -
         MissingFileError, InputError: a file or folder is missing or damaged, or holds nothing of use.
     """
     cache = Path(data.cache) if data.cache else None
-    train = _read_scenes(data.data_sets, data.train_split, truth, cache, progress)
+    train = _read_scenes(data.data_sets, data.train_split, truth, cache, progress) if data.train_split else []
     validation = _read_scenes(data.data_sets, data.validation_split, truth, cache, progress)
-    measured = [_read_measured_road(road, truth) for road in data.measured]
-    measured_validation = [_read_measured_road(road, truth) for road in data.measured_validation]
-    if not train and not measured:
+    share = 0.0 if data.measured_validation else data.measured_validation_share
+    measured: list[LearningRoad] = []
+    measured_validation: list[LearningRoad] = []
+    for learned, kept in (_learned_and_kept(road, share) for road in _read_measured(data.measured, truth, progress)):
+        measured.append(learned)
+        measured_validation += kept
+    measured_validation += _read_measured(data.measured_validation, truth, progress)
+    if not train and not measured and data.stream is None:
         raise InputError("data", list(data.data_sets), f"holds no road with a {truth} to learn from")
     if not validation and not measured_validation:
         raise InputError("data", list(data.data_sets), f"holds no road with a {truth} to validate with")
@@ -178,6 +231,39 @@ class Batches:
         return turn, numbers[place * size : (place + 1) * size].tolist()
 
 
+class StreamedBatches:
+    """Training batches like those of `Batches`, whose synthetic roads are also those of a stream's scenes.
+
+    Args:
+        roads: to learn from; the stream's come behind the synthetic ones.
+        batches: makes an epoch's `Batches` of the roads that it draws from.
+        stream: of the scenes.
+        truth: what is learned.
+    """
+
+    def __init__(self, roads: Roads, batches: Callable[[Roads], Batches], stream: SceneStream, truth: Learned) -> None:
+        self._roads, self._batches, self._truth = roads, batches, truth
+        self._scenes = EpochScenes(stream, self._read)
+
+    def _read(self, number: int, folder: Path) -> list[LearningRoad]:
+        """Return the roads of a scene; points are read whole, as the scene is removed one day."""
+        (scene,) = (folder / "scenes").iterdir()
+        return [replace(road, name=f"{number:06d}-{road.name}") for road in read_scene(scene, self._truth)]
+
+    def __call__(self, epoch: int, share: slice = slice(None)) -> Iterator[Batch]:
+        """Yield the batches of an epoch whose numbers, from 0, `share` selects.
+
+        Raises:
+            InputError: a scene can't be made, or all of them together have no road to learn from.
+        """
+        train = [*self._roads.train, *self._scenes(epoch)]
+        if not train:
+            raise InputError(
+                "data.stream", epoch, f"none of the scenes of this epoch has a {self._truth} to learn from"
+            )
+        yield from self._batches(replace(self._roads, train=train))(epoch, share)
+
+
 def _first_occurrences(batches: Sequence[Sequence[int]]) -> list[list[int]]:
     """Return of each batch the numbers that no batch before it has."""
     seen: set[int] = set()
@@ -243,13 +329,30 @@ def _read_scenes(
     return roads
 
 
-def _read_measured_road(road: MeasuredRoad, truth: Learned) -> LearningRoad:
-    """Read a measured road, its true axis clipped to the stations `first` to `last`."""
-    whole = read_measured(Path(road.cloud), Path(road.axis), truth)
-    assert whole.truth is not None
-    axis = whole.truth.axis
-    inside = (axis.station >= road.first) & (axis.station <= road.last)
+def _read_measured(roads: Sequence[MeasuredRoad], truth: Learned, progress: Progress) -> list[LearningRoad]:
+    """Read measured roads, the true axis of each clipped to the stations `first` to `last`."""
+    files = [(road, *paths) for road in roads for paths in road.files()]
+    found = []
+    for number, (road, cloud, axis) in enumerate(files):
+        progress(f"reading {cloud.name}", number / len(files))
+        found.append(_clip(read_measured(cloud, axis, truth), road.first, road.last, f"{axis}: first"))
+    return found
+
+
+def _clip(road: LearningRoad, first: float, last: float, field: str) -> LearningRoad:
+    """Return a road whose true axis is clipped to the stations `first` to `last`, m; the field is for the error."""
+    axis = road.known_truth.axis
+    inside = (axis.station >= first) & (axis.station <= last)
     if np.count_nonzero(inside) < 2:
-        raise InputError(f"{road.axis}: first", road.first, f"leaves nothing of an axis of {axis.length:.0f} m")
+        raise InputError(field, first, f"leaves nothing of an axis of {axis.length:.0f} m")
     part = MeasuredAxis(axis.points[inside], axis.joined[inside[:-1] & inside[1:]])
-    return replace(whole, truth=Truth.of_axis(part, whole.truth.kind))
+    return replace(road, truth=Truth.of_axis(part, road.known_truth.kind))
+
+
+def _learned_and_kept(road: LearningRoad, share: float) -> tuple[LearningRoad, list[LearningRoad]]:
+    """Return a road without a share of its length at the end, and that end, `APART` behind it; no end if that is 0."""
+    if not share:
+        return road, []
+    length = road.known_truth.axis.length
+    end, field = (1.0 - share) * length, f"{road.name}: measured_validation_share"
+    return _clip(road, 0.0, end, field), [_clip(road, min(end + APART, length), length, field)]

@@ -67,21 +67,29 @@ class Seeds:
         tiles: of all scenes.
         classes: number of classes.
         balanced: draw the class first, then the tile by its number of points of that class, then one of these.
+        groups: numbers of tiles, one after another, of the groups that a balanced draw doesn't leave; one if empty.
     """
 
-    def __init__(self, tiles: Sequence[CloudTile], classes: int, balanced: bool) -> None:
+    def __init__(self, tiles: Sequence[CloudTile], classes: int, balanced: bool, groups: Sequence[int] = ()) -> None:
         self._tiles = tiles
-        self._balanced = balanced
         self._counts = np.array([tile.class_counts(classes) for tile in tiles]) if balanced else None
+        self._ends = np.cumsum(groups or [len(tiles)])
 
     def draw(self, tile: int, random: np.random.Generator) -> tuple[int, int]:
-        """Return the indices of a tile and of a random point in it; a balanced draw chooses its own tile."""
-        if self._counts is None:
-            return tile, int(random.integers(len(self._tiles[tile])))
-        per_class = self._counts.sum(axis=0)
-        label = random.choice(np.flatnonzero(per_class))
-        chosen = int(random.choice(len(self._tiles), p=self._counts[:, label] / per_class[label]))
-        return chosen, int(random.choice(np.flatnonzero(self._tiles[chosen].segment == label)))
+        """Return the indices of a tile and of a random point in it; a balanced draw chooses a tile of the same group.
+
+        In a group without a labelled point it is any point of the given tile.
+        """
+        if self._counts is not None:
+            group = int(np.searchsorted(self._ends, tile, side="right"))
+            first, end = int(self._ends[group - 1]) if group else 0, int(self._ends[group])
+            counts = self._counts[first:end]
+            per_class = counts.sum(axis=0)
+            if per_class.any():
+                label = random.choice(np.flatnonzero(per_class))
+                chosen = first + int(random.choice(end - first, p=counts[:, label] / per_class[label]))
+                return chosen, int(random.choice(np.flatnonzero(self._tiles[chosen].segment == label)))
+        return tile, int(random.integers(len(self._tiles[tile])))
 
 
 @dataclass(eq=False)

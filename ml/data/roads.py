@@ -18,6 +18,7 @@ from synthroads_addon.base.errors import InputError, MissingFileError, OutputErr
 from synthroads_addon.base.random_streams import stream
 from synthroads_addon.base.scratch.folders import scratch_folder
 from synthroads_addon.cloud.formats.npz import ARCHIVE_FAULTS
+from synthroads_addon.cloud.formats.registry import ENDINGS
 from synthroads_addon.dataset.manifest import checksum, read_manifest
 from synthroads_addon.road.parameters import read_parameters
 
@@ -31,6 +32,8 @@ REACH = 45.0
 CLOUD, PARAMETERS = "cloud.laz", "parameters.json"
 STRIP = (6.0, 20.0)
 """Least and largest half width of strips that scans of road networks are cut into, m."""
+AXIS_ENDINGS = ("_axis.csv", ".geojson")
+"""Endings of the name of a cloud's axis, after the cloud's name."""
 _MARGIN = 2.0
 """Stretch of stations before and behind a slice that may hold points of it, beyond what its corners say, m."""
 _CACHED = {
@@ -192,6 +195,36 @@ def read_scene(folder: Path, kind: Learned, cache: Path | None = None) -> list[L
     found = truths(parameters, kind, whole.origin)
     names = [folder.name] if len(found) == 1 else [f"{folder.name}-{number + 1}" for number in range(len(found))]
     return [replace(whole, name=name, truth=truth) for name, truth in zip(names, found, strict=True)]
+
+
+def axis_beside(cloud: Path) -> Path:
+    """Return the file with a cloud's axis that lies beside it.
+
+    Raises:
+        MissingFileError: there is no such cloud, or no axis beside it.
+    """
+    if not cloud.exists():
+        raise MissingFileError(str(cloud), None, "no such cloud, nor a data set's folder")
+    found = [cloud.with_name(cloud.stem + ending) for ending in AXIS_ENDINGS]
+    there = next((path for path in found if path.is_file()), None)
+    if there is None:
+        names = " or ".join(path.name for path in found)
+        raise MissingFileError(str(cloud), None, f"has no axis beside it, {names}")
+    return there
+
+
+def clouds_with_axes(folder: Path) -> list[Path]:
+    """Return a folder's clouds that have an axis beside them, by name; other files in it don't matter.
+
+    Raises:
+        MissingFileError: there is none.
+    """
+    clouds = sorted(path for path in folder.iterdir() if path.suffix.lower() in ENDINGS and path.is_file())
+    found = [path for path in clouds if any(path.with_name(path.stem + end).is_file() for end in AXIS_ENDINGS)]
+    if not found:
+        allowed = f"holds no cloud with its axis beside it, NAME{' or NAME'.join(AXIS_ENDINGS)}"
+        raise MissingFileError(str(folder), None, allowed)
+    return found
 
 
 def read_measured(cloud: Path, axis: Path, kind: Learned, gap: float | None = None) -> LearningRoad:

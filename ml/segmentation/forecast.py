@@ -36,15 +36,19 @@ def forecast(configuration: SegmentationConfiguration, steps: int) -> dict[str, 
 
     Raises:
         InputError: the data are missing, or their tiles have fewer points than a crop; or the set-up has several
-            trainings.
+            trainings, or scenes are made meanwhile.
     """
     if configuration.set_up in ("fine_tuned", "self_trained"):
         raise InputError("set_up", configuration.set_up, "has several trainings: forecast each by itself")
+    if configuration.data.stream is not None:
+        allowed = "makes its scenes while it trains: forecast with data that are there, and data.stream=null"
+        raise InputError("data.stream", configuration.data.stream.recipe, allowed)
     device = chosen_device(configuration)
     sources = [source for found in configuration.needed_sources().values() for source in found]
     count = sum(tile_count(source, configuration) for source in sources)
     wall, cpu = timed_steps(configuration, _first_tiles(sources, configuration), steps, device)
-    per_epoch = math.ceil(configuration.crops_per_tile * count / configuration.batch) // configuration.processes
+    crops = configuration.crops_per_epoch or configuration.crops_per_tile * count
+    per_epoch = math.ceil(crops / configuration.batch) // configuration.processes
     whole = per_epoch * configuration.schedule.epochs
     return {
         "title": configuration.title,
@@ -92,7 +96,8 @@ def timed_steps(
     optimizer = optimizer_of(model, configuration.schedule)
     loss = objective(configuration, tiles, device)
     wall, cpu = [], []
-    enough = CropBatches(configuration.model_copy(update={"crops_per_tile": configuration.batch}), [tiles], device)
+    few = {"crops_per_tile": configuration.batch, "crops_per_epoch": None}
+    enough = CropBatches(configuration.model_copy(update=few), [tiles], device)
     batches = chain.from_iterable(map(enough, count()))  # epoch after epoch
     for _ in range(steps + 1):
         begin = time.perf_counter(), time.process_time()

@@ -2,17 +2,21 @@
 
 import math
 import zlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 import torch
 
+from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.random_streams import stream
 
 from ..data.classes import class_names
 from ..data.crops import CropDataset, Draw, Item, Seeds, collate
 from ..data.exchange import ExchangedCrops
+from ..data.scene_stream import EpochScenes, SceneStream
 from ..data.sources import Source, read_tiles
 from ..data.tiles import CloudTile, scalings
 from ..data.workers import load_batches
@@ -27,17 +31,26 @@ def read_domains(configuration: SegmentationConfiguration) -> dict[str, list[Clo
     """Read the thinned training tiles by domain (synthetic, real); intensities are mapped for `mixed_mapped`.
 
     A grid of tiles cuts slivers off at a road's ends. As every tile has as many crops, they would take up half of a
-    training on short roads.
+    training on short roads. Where there is a stream, whose scenes belong to the synthetic ones, all is as it was read:
+    see `StreamedCropBatches`.
 
     Raises:
         InputError: there are none, or they don't fit the configuration.
     """
     domains: dict[str, list[CloudTile]] = {}
     for domain, sources in configuration.needed_sources().items():
-        domains[domain] = large_enough(list(thin_tiles(sources, configuration, domain)), configuration)
-    if configuration.set_up == "mixed_mapped":
-        domains["synthetic"] = mapped_intensities(domains["synthetic"], domains["real"])
-    return domains
+        domains[domain] = list(thin_tiles(sources, configuration, domain))
+    return domains if configuration.data.stream else prepare_domains(domains, configuration)
+
+
+def prepare_domains(
+    domains: Mapping[str, Sequence[CloudTile]], configuration: SegmentationConfiguration
+) -> dict[str, list[CloudTile]]:
+    """Return domains without slivers, synthetic intensities mapped for `mixed_mapped`; see `read_domains`."""
+    prepared = {domain: large_enough(tiles, configuration) for domain, tiles in domains.items()}
+    if configuration.set_up == "mixed_mapped" and "real" in prepared and "synthetic" in prepared:
+        prepared["synthetic"] = mapped_intensities(prepared["synthetic"], prepared["real"])
+    return prepared
 
 
 def large_enough(tiles: Sequence[CloudTile], configuration: SegmentationConfiguration) -> list[CloudTile]:
@@ -86,18 +99,24 @@ class CropBatches:
         self.seeds = self._seeds()
 
     def __len__(self) -> int:
-        return math.ceil(self.configuration.crops_per_tile * len(self.tiles) / self.configuration.batch)
+        given = self.configuration
+        return math.ceil((given.crops_per_epoch or given.crops_per_tile * len(self.tiles)) / given.batch)
 
     def __call__(self, epoch: int, share: slice = slice(None)) -> Iterator[Item]:
         """Yield the batches of an epoch whose numbers, from 0, `share` selects."""
         given, sizes = self.configuration, [len(tiles) for tiles in self.domains]
-        draws = plan(sizes, given.crops_per_tile, given.synthetic_share, given.seed, epoch)
+        draws = plan(sizes, given.crops_per_tile, given.synthetic_share, given.seed, epoch, given.crops_per_epoch)
         crops = self._crops(self.tiles, draws, self.seeds[0], epoch)
         yield from _load_crops(crops, given, epoch, given.adaptation.mix3d, share, self.device)
 
     def _seeds(self) -> list[Seeds]:
-        """Return where crops are cut out: in all tiles alike."""
-        return [Seeds(self.tiles, len(class_names(self.configuration.scheme())), self.configuration.balanced)]
+        """Return where crops are cut out, in all tiles.
+
+        Where a share is stated, a crop stays in the domain that it was planned in, whatever class is looked for.
+        """
+        given = self.configuration
+        groups = [len(tiles) for tiles in self.domains] if given.synthetic_share is not None else ()
+        return [Seeds(self.tiles, len(class_names(given.scheme())), given.balanced, groups)]
 
     def _crops(self, tiles: Sequence[CloudTile], draws: Sequence[Draw], seeds: Seeds, epoch: int) -> CropDataset:
         given = self.configuration
@@ -131,7 +150,8 @@ class ExchangedBatches(CropBatches):
 
     def _pairs(self) -> int:
         """Return the pairs of an epoch: as many as there are crops of synthetic tiles."""
-        return self.configuration.crops_per_tile * len(self.domains[0])
+        given = self.configuration
+        return given.crops_per_epoch or given.crops_per_tile * len(self.domains[0])
 
     def _pairs_per_batch(self) -> int:
         return max(self.configuration.batch // 2, 1)
@@ -141,6 +161,62 @@ class ExchangedBatches(CropBatches):
         order = stream(self.configuration.seed, "pairs", place, epoch).permutation(self._pairs())
         # Crops of the two domains have numbers, and with them random streams, of their own.
         return [Draw(int(number % tiles), int(number // tiles) * 2 + place) for number in order]
+
+
+class StreamedCropBatches:
+    """Training batches of crops like those of `CropBatches`, whose synthetic tiles are also those of a stream's scenes.
+
+    Args:
+        configuration: of the training.
+        domains: the tiles of each as they were read, the synthetic ones first; the stream's come behind these.
+        stream: of the scenes.
+        device: see `CropBatches`.
+
+    Attributes:
+        epoch: the one that was begun last, None before the first.
+        tiles: those of that epoch.
+    """
+
+    def __init__(
+        self,
+        configuration: SegmentationConfiguration,
+        domains: Mapping[str, Sequence[CloudTile]],
+        stream: SceneStream,
+        device: torch.device,
+    ) -> None:
+        self.configuration, self._fixed, self.device = configuration, dict(domains), device
+        self._scenes = EpochScenes(stream, partial(streamed_tiles, configuration))
+        self.tiles: list[CloudTile] = []
+        self.epoch: int | None = None
+
+    def __len__(self) -> int:
+        given = self.configuration
+        assert given.crops_per_epoch is not None, "the configuration has seen to it"
+        return math.ceil(given.crops_per_epoch / given.batch)
+
+    def domains(self, epoch: int) -> dict[str, list[CloudTile]]:
+        """Return an epoch's tiles by domain, when all its scenes are there.
+
+        Raises:
+            InputError: a scene can't be made, or all of them together have no points.
+        """
+        tiles = [*self._fixed["synthetic"], *self._scenes(epoch)]
+        if not any(map(len, tiles)):
+            raise InputError("data.stream", epoch, "none of the scenes of this epoch has a tile with points")
+        return prepare_domains(self._fixed | {"synthetic": tiles}, self.configuration)
+
+    def __call__(self, epoch: int, share: slice = slice(None)) -> Iterator[Item]:
+        """Yield the batches of an epoch whose numbers, from 0, `share` selects."""
+        batches = CropBatches(self.configuration, self.domains(epoch).values(), self.device)
+        self.epoch, self.tiles = epoch, batches.tiles
+        yield from batches(epoch, share)
+
+
+def streamed_tiles(configuration: SegmentationConfiguration, number: int, folder: Path) -> list[CloudTile]:
+    """Return the thinned tiles of a stream's scene; none of one without tiles."""
+    if not any(folder.glob("pointcept/*/*/*/coord.npy")):
+        return []
+    return list(thin_tiles([Source(path=str(folder))], configuration, f"stream/{number}"))
 
 
 def _load_crops(

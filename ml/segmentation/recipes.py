@@ -19,6 +19,7 @@ from synthroads_addon.cloud.tools.quantile_mapping import LEVELS, QuantileMap
 from ..configuration import Configuration, Part, Schedule
 from ..data.crops import FEATURES, CropSettings, Draw, Feature
 from ..data.effects import CropEffects
+from ..data.scene_stream import StreamOptions
 from ..data.sources import FULL, Source
 from ..data.tiles import CloudTile
 from ..networks.base import SegmentationNetwork
@@ -56,6 +57,10 @@ class Data(Part):
     real: tuple[Source, ...] = Field((), description="Real training data, or what stands in for it.")
     synthetic: tuple[Source, ...] = Field((), description="Synthetic training data.")
     target: tuple[Source, ...] = Field((), description="Clouds without labels that self-training adapts to.")
+    stream: StreamOptions | None = Field(
+        None,
+        description="Synthetic training data that are made while the training goes on, beside those of `synthetic`.",
+    )
     validation: tuple[Source, ...] = Field((), description="Scored after each epoch; never trained on.")
     tests: dict[str, tuple[Source, ...]] = Field({}, description="Scored at the end, each by itself.")
 
@@ -73,6 +78,9 @@ class SegmentationConfiguration(Configuration):
     voxel: float = quantity(0.1, ge=0.02, le=5, unit="m", description="Grid of which one point per cell is kept.")
     crop_points: int = quantity(24_000, ge=64, le=2_000_000, unit="1", description="Points of a crop.")
     crops_per_tile: int = quantity(30, ge=1, le=100_000, unit="1", description="Crops of each tile and epoch.")
+    crops_per_epoch: int | None = quantity(
+        None, ge=1, le=100_000_000, unit="1", description="Crops of an epoch in all, in the place of crops_per_tile."
+    )
     batch: int = quantity(16, ge=1, le=1024, unit="1", description="Crops of a batch.")
     set_up: SetUp = Field("synthetic", description="Which data are trained on, and how.")
     synthetic_share: float | None = quantity(
@@ -120,8 +128,10 @@ class SegmentationConfiguration(Configuration):
     def _check_data(self) -> SegmentationConfiguration:
         if self.synthetic_share is not None and not self.set_up.startswith("mixed"):
             raise ValueError(f"synthetic_share is for mixed set-ups, not for {self.set_up}")
-        if self.synthetic_share is not None and self.balanced:
-            raise ValueError("synthetic_share has no effect where balanced is true: set one of them")
+        if self.data.stream is not None and self.set_up == "self_trained":
+            raise ValueError("data.stream is not for self_trained, whose rounds learn from the same scenes")
+        if self.data.stream is not None and self.crops_per_epoch is None:
+            raise ValueError("data.stream needs crops_per_epoch: its epochs have more tiles or fewer")
         return self
 
     def scheme(self) -> ClassScheme:
@@ -133,7 +143,7 @@ class SegmentationConfiguration(Configuration):
         return CropSettings(self.crop_points, self.voxel, self.features)
 
     def needed_sources(self) -> dict[str, tuple[Source, ...]]:
-        """Return the training sources of the set-up by domain.
+        """Return the training sources of the set-up by domain; the synthetic ones may be none where there is a stream.
 
         Raises:
             InputError: the set-up needs data of a kind and none are named.
@@ -142,7 +152,7 @@ class SegmentationConfiguration(Configuration):
         wanted = alone.get(self.set_up, ("synthetic", "real"))
         found = {"real": self.data.real, "synthetic": self.data.synthetic}
         for domain in wanted:
-            if not found[domain]:
+            if not found[domain] and not (domain == "synthetic" and self.data.stream is not None):
                 raise InputError(f"data.{domain}", [], f"must name training data, which the set-up {self.set_up} needs")
         if self.set_up == "self_trained" and not self.data.target:
             raise InputError("data.target", [], "must name clouds to adapt to, which the set-up self_trained needs")
@@ -200,7 +210,14 @@ def _histogram(tiles: Sequence[CloudTile], where: str) -> Int:
     return counts
 
 
-def plan(domains: Sequence[int], per_tile: int, synthetic_share: float | None, seed: int, epoch: int) -> list[Draw]:
+def plan(
+    domains: Sequence[int],
+    per_tile: int,
+    synthetic_share: float | None,
+    seed: int,
+    epoch: int,
+    total: int | None = None,
+) -> list[Draw]:
     """Return the planned crops of an epoch over the tiles of one or two domains, shuffled.
 
     Args:
@@ -208,11 +225,13 @@ def plan(domains: Sequence[int], per_tile: int, synthetic_share: float | None, s
         per_tile: crops of a tile; all tiles' together are the epoch's.
         synthetic_share: share of the first domain's crops; None for ``per_tile`` crops of every tile.
         seed, epoch: of the order, and of which tiles have one crop more where the share leaves a rest.
+        total: the epoch's crops, in the place of ``per_tile``.
     """
-    total = per_tile * sum(domains)
+    whole = sum(domains)
+    total = per_tile * whole if total is None else total
     random = stream(seed, "plan", epoch)
     if synthetic_share is None or len(domains) < 2:
-        counts = [per_tile * tiles for tiles in domains]
+        counts = np.diff(np.rint(total * np.cumsum([0, *domains]) / whole).astype(int)).tolist()
     else:
         first = min(max(round(total * synthetic_share), 1), total - 1)
         counts = [first, total - first]

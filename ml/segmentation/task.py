@@ -1,8 +1,9 @@
 """Segmentation as one of the learning tasks: train, evaluate, predict."""
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from synthroads_addon.cloud.formats.registry import ENDINGS, open_cloud
 
 from ..data.classes import IGNORED, class_names
 from ..data.crops import Item
+from ..data.scene_stream import SceneStream
 from ..data.sources import Source
 from ..data.tiles import CloudTile, scalings
 from ..data.workers import report_lost_workers
@@ -30,7 +32,7 @@ from ..shipped import open_run
 from ..tasks import Evaluation, Prediction
 from ..training_loop import Figures, chosen_device, fit
 from .exporting import exportable_network
-from .loading import CropBatches, ExchangedBatches, read_domains, thin_tiles
+from .loading import CropBatches, ExchangedBatches, StreamedCropBatches, read_domains, thin_tiles
 from .network import build, prepare_on_gpu, scores_of
 from .offsets import fit_offsets
 from .prediction import Labelling, predict_file
@@ -60,11 +62,13 @@ def train(run: SegmentationRun, progress: Progress = silent) -> dict[str, Any]:
     with helper_processes(run, train_network, device):
         model, domains = train_network(run, progress)
     tests = score_all(model, configuration, progress)
+    stream = configuration.data.stream
     metrics = {
         **{f"{name}_mean_iou": result["mean_iou"] for name, result in tests.items()},
         "parameters": sum(weight.numel() for weight in model.parameters()),
         "training_points": {name: sum(map(len, tiles)) for name, tiles in domains.items()},
         "training_tiles": {name: len(tiles) for name, tiles in domains.items()},
+        **({"streamed_scenes": stream.window(configuration.schedule.epochs - 1).stop} if stream else {}),
         "device": str(device),
         "peak_memory_mb": peak_memory_mb(),
         "tests": tests,
@@ -179,26 +183,47 @@ def train_network(run: Run[SegmentationConfiguration], progress: Progress = sile
     model = build(configuration).to(device)
     if configuration.start:
         _begin_with(model, configuration)
-    if configuration.set_up == "self_trained":
-        _self_train(model, run, domains, validation, progress)
-    elif configuration.set_up == "fine_tuned":
-        _fit(model, _pretraining(run), {"synthetic": domains["synthetic"]}, validation, progress)
-        second = configuration.model_copy(update={"schedule": configuration.fine_tuning})
-        _fit(model, replace(run, configuration=second), {"real": domains["real"]}, validation, progress)
-    else:
-        _fit(model, run, domains, validation, progress)
-    if configuration.fitted_offsets:
-        _shift_scores(model, run, domains)
+    with _scene_stream(run, progress) as stream:
+        if configuration.set_up == "self_trained":
+            _self_train(model, run, domains, validation, progress)
+        elif configuration.set_up == "fine_tuned":
+            _fit(model, _pretraining(run), {"synthetic": domains["synthetic"]}, validation, progress, stream)
+            second = configuration.model_copy(update={"schedule": configuration.fine_tuning})
+            _fit(model, replace(run, configuration=second), {"real": domains["real"]}, validation, progress)
+        else:
+            _fit(model, run, domains, validation, progress, stream)
+        if configuration.fitted_offsets:
+            _shift_scores(model, run, domains, stream)
+    if stream is not None:
+        stream.remove()
     return model.eval(), domains
 
 
-def _shift_scores(model: nn.Module, run: Run[SegmentationConfiguration], domains: Domains) -> None:
-    """Fit the scores' offsets on the training tiles, add them to the network and save it; once in a run."""
+def _scene_stream(
+    run: Run[SegmentationConfiguration], progress: Progress
+) -> AbstractContextManager[SceneStream | None]:
+    """Return the context in which the configuration's stream of scenes flows; one of None where there is none."""
+    configuration = run.configuration
+    options = configuration.data.stream
+    if options is None or configuration.set_up == "real":
+        return nullcontext()
+    epochs = configuration.schedule.epochs
+    return SceneStream(options, configuration.seed, run.folder, epochs, ("pointcept",), progress)
+
+
+def _shift_scores(
+    model: nn.Module, run: Run[SegmentationConfiguration], domains: Domains, stream: SceneStream | None
+) -> None:
+    """Fit the scores' offsets on the training tiles (of the last epoch), add them to the network, save it; once."""
     if process_number():
         return
     configuration, state = run.configuration, run.last_checkpoint()
     if state is None or OFFSETS in state:
         return
+    if stream is not None:
+        device = next(model.parameters()).device
+        batches = StreamedCropBatches(configuration, domains, stream, device)
+        domains = batches.domains(configuration.schedule.epochs - 1)
     tiles = [tile for several in domains.values() for tile in several]
     offsets = torch.from_numpy(fit_offsets(tiles, classifier(model, configuration), configuration))
     configuration.network.shift_scores(model, offsets)
@@ -253,13 +278,18 @@ def _fit(
     domains: Domains,
     validation: list[CloudTile],
     progress: Progress,
+    stream: SceneStream | None = None,
 ) -> None:
-    """Train the model in place on some domains by the run's schedule, to the last epoch's weights."""
-    configuration = run.configuration
-    device = next(model.parameters()).device
-    kind = ExchangedBatches if "target" in domains else CropBatches
-    batches = kind(configuration, domains.values(), device)
-    loss = objective(configuration, batches.tiles, device)
+    """Train the model in place on some domains, and a stream, by the run's schedule, to the last epoch's weights."""
+    configuration, device = run.configuration, next(model.parameters()).device
+    batches: CropBatches | StreamedCropBatches
+    if stream is None:
+        kind = ExchangedBatches if "target" in domains else CropBatches
+        batches = kind(configuration, domains.values(), device)
+        loss = objective(configuration, batches.tiles, device)
+    else:
+        batches = StreamedCropBatches(configuration, domains, stream, device)
+        loss = _objective_of_epochs(batches, device)
     validate = _validation(configuration, validation) if validation else None
     with report_lost_workers(configuration.workers):
         fit(model, run, batches, len(batches), loss, validate=validate, progress=progress)
@@ -300,6 +330,21 @@ def objective(
         known = truth != IGNORED
         right = (scores.detach().argmax(dim=1) == truth) & known
         return value, {"accuracy": float(right.sum() / known.sum().clamp_min(1))}
+
+    return loss
+
+
+def _objective_of_epochs(
+    batches: StreamedCropBatches, device: torch.device
+) -> Callable[[nn.Module, Item], tuple[Tensor, Figures]]:
+    """Return the `objective` whose classes weigh by their share of the tiles of the epoch that is under way."""
+
+    @lru_cache(maxsize=1)
+    def of_epoch(epoch: int | None) -> Callable[[nn.Module, Item], tuple[Tensor, Figures]]:
+        return objective(batches.configuration, batches.tiles, device)
+
+    def loss(model: nn.Module, batch: Item) -> tuple[Tensor, Figures]:
+        return of_epoch(batches.epoch)(model, batch)
 
     return loss
 

@@ -24,7 +24,7 @@ Split = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,30}$")]
 NEEDED_OUTPUTS = ("parameters", "cloud", "centerline")
 _UNSTABLE = "scene"
 """A .blend file is never the same twice, so that its checksum would say nothing."""
-_LARGEST_SEED = 2**63
+LARGEST_SEED = 2**63
 _DIGITS = 4
 """Digits of drawn numbers: enough to tell them apart, and few enough to read."""
 
@@ -127,7 +127,7 @@ class Recipe(ClosedModel):
     title: str = Field(min_length=1, max_length=200, description="Title.")
     description: str = Field("", description="What the set is for, in a few sentences: it stands in the data card.")
     licence: str = Field("CC-BY-4.0", min_length=1, description="Licence of the data (SPDX identifier).")
-    seed: int = quantity(1, "1", "Seed of everything random.", (0, _LARGEST_SEED - 1))
+    seed: int = quantity(1, "1", "Seed of everything random.", (0, LARGEST_SEED - 1))
     scenario: str = Field("rq31-600m", description="Built-in scenario or file that the groups start from.")
     set: dict[str, Any] = Field({}, description="Changes of every group's scenario, path: value.")
     draw: Draws = Field(
@@ -196,20 +196,30 @@ def scene_jobs(recipe: Recipe) -> list[SceneJob]:
     Raises:
         InputError: a scenario or a change is wrong; the message names the group.
     """
-    jobs: list[SceneJob] = []
-    for group in recipe.groups:
-        for place, split in enumerate(group.splits()):
-            name = f"{group.name}-{place + 1:0{max(2, len(str(group.scenes)))}d}"
-            try:
-                scenario = _scenario(recipe, group, name, place)
-            except InputError as error:
-                raise InputError(f"groups.{group.name}: {error.field}", error.value, error.allowed) from None
-            jobs.append(SceneJob(name, len(jobs), split, scenario))
-    return jobs
+    return [_job(recipe, number, *place) for number, place in enumerate(scene_places(recipe))]
+
+
+def scene_places(recipe: Recipe) -> list[tuple[SceneGroup, int, str]]:
+    """Return each scene's group, place in the group and split, in the recipe's order."""
+    return [(group, place, split) for group in recipe.groups for place, split in enumerate(group.splits())]
+
+
+def scene_job(recipe: Recipe, number: int) -> SceneJob:
+    """Return the scene of a number from 0 in the recipe's order; see `scene_jobs`."""
+    return _job(recipe, number, *scene_places(recipe)[number])
+
+
+def _job(recipe: Recipe, number: int, group: SceneGroup, place: int, split: str) -> SceneJob:
+    name = f"{group.name}-{place + 1:0{max(2, len(str(group.scenes)))}d}"
+    try:
+        scenario = _scenario(recipe, group, name, place)
+    except InputError as error:
+        raise InputError(f"groups.{group.name}: {error.field}", error.value, error.allowed) from None
+    return SceneJob(name, number, split, scenario)
 
 
 def _scenario(recipe: Recipe, group: SceneGroup, name: str, place: int) -> Scenario:
-    seed = int(stream(recipe.seed, "scene", name).integers(_LARGEST_SEED))
+    seed = int(stream(recipe.seed, "scene", name).integers(LARGEST_SEED))
     drawn = [_drawn_values(recipe.seed, name, part.draw) for part in (recipe, group)]
     changes = [{"seed": seed}, recipe.set, drawn[0], group.set, drawn[1]]
     if group.variants:

@@ -10,8 +10,8 @@ import pytest
 
 from ml.configuration import EXPERIMENTS, SHIPPED, load_configuration
 from ml.data.classes import MAPPINGS, load_mapping
+from ml.experiments import configurations, load_experiment
 from ml.runs import CHECKPOINT, CONFIGURATION, Run
-from ml.segmentation.experiment import configurations, load_experiment
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import read_json, read_yaml
 from tests.helpers.files.mutations import accepted, for_all, fuzz, json_files, yaml_files

@@ -10,6 +10,8 @@ import torch
 
 from headless.cli import main
 from ml.segmentation import forecast
+from ml.segmentation.recipes import SegmentationConfiguration
+from synthroads_addon.base.errors import InputError
 from tests.helpers.clouds.segmentation_data import road_tile, toy, write_pointcept
 
 torch.set_num_threads(1)
@@ -42,6 +44,17 @@ def test_a_trainings_time_is_its_steps_times_what_one_takes(
     assert "2 tiles, 3,200 points of a batch" in said
     assert main(["forecast", str(folder / "toy.yaml"), "--set", "crop_points=100000"]) == 2
     assert "must not exceed the points" in capsys.readouterr().err
+
+
+def test_crops_of_an_epoch_are_counted_as_stated_and_a_stream_is_refused(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(forecast, "timed_steps", lambda *_: (90.0, 80.0))
+    assert forecast.forecast(toy(folder, crops_per_epoch=21), 2)["steps_per_epoch"] == 6
+    data = toy(folder).data.to_dict() | {"stream": {"recipe": "small-roads"}}
+    streamed = SegmentationConfiguration.from_dict(toy(folder, crops_per_epoch=21).to_dict() | {"data": data})
+    with pytest.raises(InputError, match="forecast with data that are there"):
+        forecast.forecast(streamed, 2)
 
 
 def test_measured_steps_take_time(folder: Path) -> None:

@@ -13,9 +13,10 @@ import torch
 
 from ml.data.classes import IGNORED
 from ml.data.sources import Source, read_tiles
+from ml.experiments import configurations
 from ml.runs import CONFIGURATION, PRETRAINING, Run
 from ml.segmentation import task
-from ml.segmentation.experiment import Experiment, configurations
+from ml.segmentation.experiment import Experiment
 from ml.segmentation.loading import ExchangedBatches, read_domains
 from ml.segmentation.recipes import SegmentationConfiguration
 from ml.segmentation.self_training import believed_labels, target_tiles
@@ -170,6 +171,12 @@ def test_a_training_begins_with_the_weights_of_another(data: Path, tmp_path: Pat
     assert not (tmp_path / "third" / PRETRAINING / "checkpoint.pt").exists()
     assert not same(weights(tmp_path / "third"), one)
     assert torch.get_num_threads() == 1  # as this training says, not the one that it begins with
+
+
+def test_a_stream_is_not_for_self_training(data: Path) -> None:
+    sources = self_trained(data).to_dict()["data"] | {"stream": {"recipe": "small-roads"}}
+    with pytest.raises(InputError, match=r"stream is not for self_trained"):
+        self_trained(data, data=sources, crops_per_epoch=4)
 
 
 def test_faults_of_a_start_and_of_a_target_are_told(data: Path, tmp_path: Path) -> None:

@@ -1,0 +1,290 @@
+"""Experiments with centrelines: learned from real, synthetic and mixed roads, tested on real ones left out."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field
+
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.files import write_file
+from synthroads_addon.base.progress import Progress, silent
+from synthroads_addon.base.schema import canonical_json, read_json
+from synthroads_addon.dataset.manifest import checksum
+
+from ..configuration import Part
+from ..data.batches import MeasuredRoad
+from ..data.roads import LearningRoad, read_measured
+from ..experiments import Experiment as AnyExperiment
+from ..experiments import cached_scores, fill_path, with_seed, write_results
+from ..runs import CONFIGURATION, METRICS, Run, to_json_data
+from ..scores.baselines import SkeletonSettings
+from ..scores.distances import METRICS as FIGURES
+from ..scores.distances import over_roads
+from ..scores.evaluation import Predictor, evaluate, skeleton_predictor, trivial_predictors
+from ..scores.metrics import Metric, markdown, over_seeds
+from ..scores.tables import cell
+from .measuring import measured_case
+from .rules import views_predictor
+from .task import CenterlineConfiguration, load_predictor, train
+
+VIEWS, PATH = "views", "the displaced path"
+_SHOWN = ("mae", "chamfer_full", "coverage_68", "coverage_95")
+_LONGEST_NAME = 80
+Results = Mapping[str, Mapping[str, Mapping[str, Mapping[str, float | None]]]]
+"""Variant or rule -> seed -> road -> figures, as JSON data."""
+
+
+class Data(Part):
+    """Real and synthetic roads to learn from; real ones are left out in turns, to test on."""
+
+    real: tuple[MeasuredRoad, ...] = Field((), description="Real roads.")
+    synthetic: tuple[str, ...] = Field((), description="Folders that `synthroads dataset` made.")
+    left_out: tuple[tuple[str, ...], ...] = Field(
+        (), description="Names of the real roads that are left out together, turn by turn; each by itself if none."
+    )
+
+
+class Experiment(AnyExperiment):
+    """Trainings to be compared, as read from YAML; paths of data may begin with {NAME}, filled in by --data."""
+
+    task: Literal["centerline"] = Field("centerline", description="What is learned.")
+    configuration: str = Field("centerline-transformer", description="Configuration that all start from.")
+    data: Data = Field(description="Roads of all variants.")
+
+    def filled_data(self, folders: Mapping[str, str]) -> dict[str, Any]:
+        """Return data sets and real roads with {NAME} in all paths replaced by its folder; see the base class."""
+        real = [road.model_copy(update={"cloud": fill_path(road.cloud, folders)}) for road in self.data.real]
+        return {
+            "data_sets": [fill_path(path, folders) for path in self.data.synthetic],
+            "measured": [road.to_dict() for road in real],
+        }
+
+
+def run_experiment(
+    experiment: Experiment,
+    configured: Mapping[str, CenterlineConfiguration],
+    output: Path,
+    seeds: Sequence[int],
+    progress: Progress = silent,
+) -> dict[str, Any]:
+    """Train (unless done) and test all variants with the given seeds; return the figures, written after each.
+
+    A variant that learns from real roads is trained anew for each turn of roads that are left out, and tested on these.
+
+    Args:
+        experiment: what is compared.
+        configured: see `experiments.configurations`.
+        output: folder; ``VARIANT/without-ROADS/seed-N`` are the runs, or ``VARIANT/seed-N`` where no real road is
+            learned from, `RESULTS` and `TABLE` the figures.
+        seeds: one after another, each over all variants: a table is there as soon as the first is through.
+        progress: of each training.
+
+    Raises:
+        InputError: no variant learns from real roads, or what is to be left out isn't among them.
+    """
+    roads = _real_roads(configured)
+    turns = _turns(experiment.data.left_out, roads)
+    tested = [name for turn in turns for name in turn]
+    figures: dict[str, dict[str, Any]] = {name: {} for name in configured}
+    for seed in seeds:
+        for name, variant in experiment.variants.items():
+            found: dict[str, Any] = {}
+            for turn in turns:
+                configuration, out = _without(with_seed(configured[name], seed), turn, roads), _without_name(turn)
+                learned = output / (variant.of or name)
+                folder = (learned / out if configuration.data.measured else learned) / f"seed-{seed}"
+                if variant.of is None:
+                    _train(configuration, folder, progress)
+                file = output / name / f"{out}-seed-{seed}.json"
+                found |= _test(Run(folder, configuration), {road: roads[road] for road in turn}, file, progress)
+            figures[name][str(seed)] = {road: found[road] for road in tested}
+            write_results(output, figures, table(experiment.title, figures, list(configured)))
+        settings = configured[next(iter(configured))]
+        for rule, found in _rules(settings, seed, {road: roads[road] for road in tested}, output, progress).items():
+            figures.setdefault(rule, {})[str(seed)] = found
+        write_results(output, figures, table(experiment.title, figures, list(configured)))
+    return figures
+
+
+def _real_roads(configured: Mapping[str, CenterlineConfiguration]) -> dict[str, tuple[Path, Path]]:
+    """Return cloud and axis of each real road that a variant learns from, by name.
+
+    Raises:
+        InputError: there are none, or two have one name.
+    """
+    found: dict[str, tuple[Path, Path]] = {}
+    for configuration in configured.values():
+        for cloud, axis in (files for road in configuration.data.measured for files in road.files()):
+            if found.setdefault(cloud.stem, (cloud, axis)) != (cloud, axis):
+                raise InputError("data.real", cloud.stem, "is the name of several roads, by which they are left out")
+    if not found:
+        raise InputError("data.real", [], "must name real roads, which the variants are tested on")
+    return found
+
+
+def _turns(left_out: Sequence[Sequence[str]], roads: Mapping[str, object]) -> list[list[str]]:
+    """Return the names of the roads that are left out together, turn by turn; each by itself if nothing is stated.
+
+    Raises:
+        InputError: a name is none of the roads, or stands in two turns.
+    """
+    turns = [list(turn) for turn in left_out] or [[name] for name in roads]
+    names = [name for turn in turns for name in turn]
+    for name in names:
+        if name not in roads:
+            raise InputError("left_out", name, f"must be of the real roads: {', '.join(roads)}")
+        if names.count(name) > 1:
+            raise InputError("left_out", name, "is left out twice")
+    return turns
+
+
+def _without(
+    configuration: CenterlineConfiguration, turn: Sequence[str], roads: Mapping[str, tuple[Path, Path]]
+) -> CenterlineConfiguration:
+    """Return a variant's configuration with the roads of a turn left out of what it learns from.
+
+    Raises:
+        InputError: nothing else is left.
+    """
+    measured = []
+    for road in configuration.data.measured:
+        if Path(road.cloud).is_dir():
+            out = {*road.left_out, *(name for name in turn if roads[name][0].parent == Path(road.cloud))}
+            if any(cloud.stem not in out for cloud, _ in road.files()):
+                measured.append(road.model_copy(update={"left_out": tuple(sorted(out))}))
+        elif Path(road.cloud).stem not in turn:
+            measured.append(road)
+    if configuration.data.measured and not measured:
+        raise InputError("left_out", list(turn), "leaves no real road to learn from")
+    data = configuration.data.model_copy(update={"measured": tuple(measured)})
+    return configuration.model_copy(update={"data": data})
+
+
+def _without_name(turn: Sequence[str]) -> str:
+    """Return the name of the folder of the runs that a turn's roads were left out of."""
+    names = "+".join(turn)
+    if len(names) > _LONGEST_NAME:
+        names = f"{names[:_LONGEST_NAME]}-{hashlib.sha256(names.encode()).hexdigest()[:8]}"
+    return f"without-{names}"
+
+
+def _train(configuration: CenterlineConfiguration, folder: Path, progress: Progress) -> None:
+    run = Run.start(folder, configuration, resume=(folder / CONFIGURATION).is_file())
+    if not (folder / METRICS).is_file():
+        train(run, progress)
+
+
+def _test(
+    run: Run[CenterlineConfiguration], roads: Mapping[str, tuple[Path, Path]], file: Path, progress: Progress
+) -> dict[str, Any]:
+    """Return a trained run's figures by road, cached in a file as long as run, clouds and axes stay as they are."""
+
+    def score() -> dict[str, Any]:
+        return _measure({"": load_predictor(run)}, run.configuration, roads, progress)[""]
+
+    return cached_scores(run, file, score, roads=_checksums(roads))
+
+
+def _rules(
+    configuration: CenterlineConfiguration,
+    seed: int,
+    roads: Mapping[str, tuple[Path, Path]],
+    output: Path,
+    progress: Progress,
+) -> dict[str, dict[str, Any]]:
+    """Return the figures by road of all predictors that learn nothing, cached in the experiment's folder."""
+    file = output / "rules" / f"seed-{seed}.json"
+    made_from = {"slices": configuration.slices.to_dict(), "roads": _checksums(roads)}
+    rules: dict[str, dict[str, Any]]
+    if file.is_file() and (kept := read_json(file)).get("made_from") == made_from:
+        rules = kept["rules"]
+        return rules
+    trivial = {name: one for name, (one,) in trivial_predictors(configuration.slices.half_width).items()}
+    predictors = {VIEWS: views_predictor(), "skeleton": skeleton_predictor(SkeletonSettings())} | trivial
+    rules = _measure(predictors, with_seed(configuration, seed), roads, progress)
+    write_file(file, canonical_json({"made_from": made_from, "rules": rules}).encode(), overwrite=True)
+    return rules
+
+
+def _measure(
+    predictors: Mapping[str, Predictor],
+    configuration: CenterlineConfiguration,
+    roads: Mapping[str, tuple[Path, Path]],
+    progress: Progress,
+) -> dict[str, dict[str, Any]]:
+    """Return each predictor's figures by road as JSON data, all on the same points in the same frames."""
+    found: dict[str, dict[str, Any]] = {name: {} for name in predictors}
+    settings = configuration.slices
+    for number, (road, (cloud, axis)) in enumerate(roads.items()):
+        progress(f"measuring on {road}", number / len(roads))
+        read: LearningRoad = read_measured(cloud, axis, settings.truth)
+        case = measured_case(read, configuration.seed, settings)
+        for name, predictor in predictors.items():
+            found[name][road] = to_json_data(evaluate(predictor, case))
+    return found
+
+
+def _checksums(roads: Mapping[str, tuple[Path, Path]]) -> dict[str, list[str]]:
+    return {name: [checksum(path) for path in files] for name, files in roads.items()}
+
+
+def table(title: str, results: Results, variants: Sequence[str]) -> str:
+    """Return a Markdown page with a table per figure: variants and rules, road by road, mean (deviation over seeds).
+
+    Args:
+        title: above the tables.
+        results: figures of variants and of rules, see `Results`; those without a seed are left out.
+        variants: the variants' names; all others are rules, of which the best of each road is shown.
+    """
+    done = {name: seeds for name, seeds in results.items() if seeds}
+    first = next(iter(done.values()), {})
+    roads = list(next(iter(first.values()), {}))
+    spreads = {name: _spreads(seeds, roads) for name, seeds in done.items()}
+    lines = [
+        f"# {title}",
+        "",
+        "Mean (standard deviation over seeds, ddof 1); roads that were left out of the training.",
+        "",
+    ]
+    for figure in _SHOWN:
+        metric = FIGURES[figure]
+        rows = [
+            [name, *(cell(spread.get(figure), metric) for spread in spreads[name].values())]
+            for name in spreads
+            if name in (*variants, VIEWS)
+        ]
+        if not metric.title.startswith("in ") and len(done) > len(variants):
+            rows.append(_best_rule(spreads, variants, metric, figure))
+        lines += [f"**{metric.title}**", "", markdown(["", *roads, "all"], rows)]
+    counts = ", ".join(f"{name} {len(done[name])}" for name in variants if name in done)
+    return "\n".join([*lines, f"Seeds: {counts}.", ""])
+
+
+def _spreads(seeds: Mapping[str, Mapping[str, Any]], roads: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Return the spread over seeds of each figure by road, and of all roads together, weighted by their slices."""
+    by_seed = [{road: _numbers(found[road]) for road in roads} for found in seeds.values()]
+    for rows in by_seed:
+        rows["all"] = over_roads([rows[road] for road in roads])
+    return {road: over_seeds([rows[road] for rows in by_seed]) for road in (*roads, "all")}
+
+
+def _numbers(figures: Mapping[str, float | None]) -> dict[str, float]:
+    return {name: float("nan") if value is None else value for name, value in figures.items()}
+
+
+def _best_rule(
+    spreads: Mapping[str, Mapping[str, Any]], variants: Sequence[str], metric: Metric, figure: str
+) -> list[str]:
+    """Return a table's row with the smallest mean of a figure that a rule has on each road."""
+    rules = [name for name in spreads if name not in (*variants, VIEWS, PATH)]
+    row = ["best of the rules"]
+    for road in spreads[rules[0]]:
+        there = [spreads[name][road][figure] for name in rules if figure in spreads[name][road]]
+        row.append(
+            cell(min((one for one in there if one.mean == one.mean), key=lambda one: one.mean, default=None), metric)
+        )
+    return row
