@@ -313,6 +313,12 @@ class ChainFit:
         return float(np.sqrt(self.sum_of_squares / len(self.residuals)))
 
     @property
+    def noise(self) -> float:
+        """Return the standard deviation of the data, m, that the residuals tell: parameters take their share of them."""
+        spare = float(self.data.weights.sum()) - self.chain.freedom()
+        return float(np.sqrt(self.sum_of_squares / max(spare, 1.0)))
+
+    @property
     def p95(self) -> float:
         return float(np.percentile(np.abs(self.residuals), 95))
 

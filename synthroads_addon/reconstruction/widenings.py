@@ -16,7 +16,7 @@ from ..road.guidelines import EMERGENCY_BAY_LENGTH, EMERGENCY_BAY_TAPER, EMERGEN
 from .path import SPACING
 from .profiles import STRETCH
 from .section import MeasuredSection, Side, SideSection
-from .smoothing import robust_scale
+from .smoothing import correlation_factor, robust_scale
 
 APART = 0.75
 """An edge of the pavement so far, m, from the usual one is another cross-section's."""
@@ -30,6 +30,7 @@ _NARROWEST, _WIDEST = 0.6 * EMERGENCY_BAY_WIDTH, 5.0  # m: of a bay
 _SHORTEST_BAY = 0.4 * EMERGENCY_BAY_LENGTH
 _PAINTED = 0.6  # of a bay's length must be beside the edge line's paint, where that is seen
 _LEAST_TAPER = 5.0  # m
+_LEAST_SCATTER = 0.02  # m: of an edge's offset in one stretch
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,7 @@ class Bay:
         start, end: stations between which the pavement is wider, m.
         low_taper, high_taper: lengths over which it opens and closes, at the lower and the higher station, m.
         width: m, and its standard deviation.
+        covariance: (5, 5) of start, low taper, length at full width, high taper and width, m2.
     """
 
     side: Side
@@ -50,6 +52,16 @@ class Bay:
     high_taper: float
     width: float
     width_std: float
+    covariance: Float
+
+    def std_at(self, stations: Float) -> Float:
+        """Return the standard deviation (K,), m, of how much wider the pavement is at stations (K,)."""
+        shape = np.array(
+            [self.start, self.low_taper, self.end - self.start - self.low_taper - self.high_taper, self.high_taper]
+        )
+        shape = np.append(shape, self.width)
+        change = _trapezoid_jacobian(stations, shape)
+        return np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", change, self.covariance, change), 0.0))
 
 
 @dataclass(frozen=True)
@@ -107,14 +119,15 @@ def _bay(side: SideSection, stations: Float, run: slice) -> Bay | None:
     if not inside or np.nanmedian(beside[run]) < _NARROWEST or not _beside_line(side, run):
         return None
     near = np.isfinite(beside) & (stations > first - _AROUND) & (stations < last + _AROUND)
-    shape, residual = _fit_trapezoid(stations[near], beside[near], first, last)
-    start, low, length, high, width = shape
+    shape, residual, unit = _fit_trapezoid(stations[near], beside[near], first, last)
+    start, low, length, high, width = shape.tolist()
     fits = robust_scale(residual) < _MISFIT and float(np.sqrt(np.mean(residual**2))) < 2.0 * _MISFIT
     if not fits or not _NARROWEST <= width <= _WIDEST or length < _SHORTEST_BAY:
         return None
-    top = (stations[near] > start + low) & (stations[near] < start + low + length)
-    std = max(robust_scale(residual[top]) if top.sum() > 2 else np.inf, 0.02) / np.sqrt(max(int(top.sum()), 1))
-    return Bay(side.side, float(start), float(start + low + length + high), float(low), float(high), float(width), std)
+    scatter = max(robust_scale(residual), _LEAST_SCATTER)
+    covariance = scatter**2 * correlation_factor(residual) * unit
+    std = float(np.sqrt(covariance[-1, -1]))
+    return Bay(side.side, start, start + low + length + high, low, high, width, std, covariance)
 
 
 def _beside_line(side: SideSection, run: slice) -> bool:
@@ -127,14 +140,28 @@ def _beside_line(side: SideSection, run: slice) -> bool:
     return line.solid and len(known) > 0 and float(known.mean()) > _PAINTED
 
 
-def _fit_trapezoid(stations: Float, beside: Float, first: float, last: float) -> tuple[Float, Float]:
-    """Return start, low taper, length, high taper and width (5,), m, of the best trapezoid, and the residuals (N,)."""
+def _trapezoid(stations: Float, shape: Float) -> Float:
+    """Return how much wider (K,), m, the pavement is by start, low taper, length, high taper and width (5,), m."""
+    start, low, length, high, width = shape
+    rising = (stations - start) / low
+    falling = (start + low + length + high - stations) / high
+    return np.asarray(width * np.clip(np.minimum(rising, falling), 0.0, 1.0))
+
+
+def _trapezoid_jacobian(stations: Float, shape: Float) -> Float:
+    """Return the derivatives (K, 5) of `_trapezoid` by its shape, over half a stretch to either side of its corners."""
+    steps = np.diag([0.5 * STRETCH * SPACING] * 4 + [0.01])
+    steps[[1, 3], [1, 3]] = 1.0
+    return np.column_stack(
+        [(_trapezoid(stations, shape + step) - _trapezoid(stations, shape - step)) / (2.0 * step.sum()) for step in steps]
+    )
+
+
+def _fit_trapezoid(stations: Float, beside: Float, first: float, last: float) -> tuple[Float, Float, Float]:
+    """Return the shape (5,), m, of the best trapezoid, the residuals (N,), and its covariance for unit noise (5, 5)."""
 
     def residual(shape: Float) -> Float:
-        start, low, length, high, width = shape
-        rising = (stations - start) / low
-        falling = (start + low + length + high - stations) / high
-        return np.asarray(width * np.clip(np.minimum(rising, falling), 0.0, 1.0) - beside)
+        return _trapezoid(stations, shape) - beside
 
     width = float(np.percentile(beside[(stations >= first) & (stations <= last)], 70))
     taper = min(EMERGENCY_BAY_TAPER, 0.3 * (last - first) + _LEAST_TAPER)
@@ -144,7 +171,8 @@ def _fit_trapezoid(stations: Float, beside: Float, first: float, last: float) ->
     found = least_squares(
         residual, np.clip(begin, low + 1e-6, high - 1e-6), bounds=(low, high), loss="soft_l1", f_scale=0.2
     )
-    return np.asarray(found.x), residual(found.x)
+    normal = found.jac.T @ found.jac
+    return np.asarray(found.x), residual(found.x), np.linalg.pinv(normal, hermitian=True)
 
 
 def _unlike(side: SideSection, stations: Float, run: slice) -> Unlike:
