@@ -14,7 +14,8 @@ import numpy as np
 from scipy import ndimage
 
 from ..base.arrays import Bool, Float
-from .layout import RoadLayout, axis_guides
+from .layout import Band, RoadLayout, axis_from_lines, axis_guides
+from .lines import Line
 from .profiles import STRETCH, Profiles
 from .smoothing import difference_figures, robust_scale
 from .views.fusion import APART
@@ -88,12 +89,13 @@ def judge(profiles: Profiles, layout: RoadLayout, cores: Sequence[float], rivals
     """
     guides = axis_guides(layout)
     lines = np.mean([guide.measured for guide in guides], axis=0)
+    lines = np.where(np.isfinite(lines), lines, _carried(layout))
     middles = np.mean(pavement_edges(profiles, cores, layout.kind == "dual"), axis=0)
     what, edges = "the pavement's middle", "the pavement's edges aren't seen on both sides"
     unseen = np.isnan(middles)
     if layout.kind == "dual":
         what, edges = "the median's middle", "neither the median's edges nor lines on both sides of it are seen"
-        painted = np.all([np.isfinite(guide.measured) & (guide.width > 0.0) for guide in guides], axis=0)
+        painted = np.all([_is_painted(band, guide) for band, guide in zip(layout.bands, guides, strict=True)], axis=0)
         unseen &= ~_is_seen_nearby(painted)
     reasons = {
         "neither lines nor edges are seen": ~_is_seen_nearby(np.isfinite(lines)),
@@ -110,6 +112,20 @@ def judge(profiles: Profiles, layout: RoadLayout, cores: Sequence[float], rivals
         doubtful = ~ndimage.binary_opening(~doubtful, np.ones(_SHORTEST_TRUST))
     doubts = list(_doubts(profiles, doubtful, masks))
     return Judgement(doubts, float(1.0 - doubtful.mean()), lines, middles)
+
+
+def _carried(layout: RoadLayout) -> Float:
+    """Return how far to the left of the axis (K,), m, all lines together say that it is; NaN where there are none."""
+    return axis_from_lines(layout).raw if any(band.lines for band in layout.bands) else np.array(np.nan)
+
+
+def _is_painted(band: Band, guide: Line) -> Bool:
+    """Return in which stretches (K,) a carriageway's paint is seen: the line beside the median, or one parallel to it.
+
+    A line narrower than the distance of two rows of points may lie between them for long.
+    """
+    parallel = [line for line in band.lines if line.width > 0.0] if guide.width > 0.0 else []
+    return np.any([np.isfinite(line.measured) for line in [*parallel]] or [np.zeros(len(guide.measured), bool)], axis=0)
 
 
 def lane_roughness(profiles: Profiles, cores: Sequence[float]) -> Float:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.special import ndtr
 
 from ..base.arrays import Float
 
@@ -11,6 +12,9 @@ ORDER = 3
 """Order of the differences that are held small: a curvature that changes linearly costs nothing."""
 _ROUNDS = 6
 _BISQUARE = 4.685  # times the residuals' scale: from here on a value counts nothing
+_LEAST_SCATTER = 0.01  # m: of single offsets, beside the rows that they lie between
+_GRID = 0.002  # m
+_FAULTY = 0.02  # likelihood of a value whose interval misses the mean, relative to one whose interval holds it
 _FLOOR = 1e-9  # of the mean weight: what holds the solution where nothing was measured
 
 
@@ -105,6 +109,33 @@ def mean_with_std(values: Float, apart: Float | None = None) -> tuple[float, flo
     independent = max(1.0, kept.sum() / correlation_factor(values[kept] - middle))
     std = spread / float(np.sqrt(independent))
     return middle, float(np.hypot(std, hidden_std(apart[known], spread))) if apart is not None else std
+
+
+def interval_mean(values: Float, apart: Float) -> tuple[float, float]:
+    """Return the mean of values (K,) along the road that each lie midway between two rows of points, and its deviation.
+
+    A value is evenly likely everywhere between its rows, ``apart`` (K,) from each other, m, and so are all of them at
+    once where the rows run beside the road: however many there are, they say no more than one. Where the rows wander
+    only the places count that all intervals have in common. Intervals end softly, by how much values scatter beyond
+    them, and weigh as `correlation_factor` says. Values that are means of many points have no interval.
+    """
+    known = np.isfinite(values) & np.isfinite(apart)
+    values, half = values[known], 0.5 * apart[known]
+    if not len(values):
+        return float("nan"), float("inf")
+    middle = mean_with_std(values)[0]
+    beyond = np.maximum(np.abs(values - middle) - half, 0.0)
+    jump = robust_scale(np.diff(values)) / np.sqrt(2.0) if len(values) > 1 else 0.0
+    scatter = max(_LEAST_SCATTER, robust_scale(beyond), min(jump, float(np.median(half)) + _LEAST_SCATTER))
+    low, high = values - np.maximum(half, 0.5 * _LEAST_SCATTER), values + np.maximum(half, 0.5 * _LEAST_SCATTER)
+    place = np.arange(np.percentile(low, 1) - scatter, np.percentile(high, 99) + scatter + _GRID, _GRID)
+    shares = ndtr((place - low[:, None]) / scatter) - ndtr((place - high[:, None]) / scatter)
+    likely = np.log(np.maximum(shares / np.maximum(shares.max(axis=1, keepdims=True), 1e-12), _FAULTY)).sum(axis=0)
+    likely /= correlation_factor(values - middle)
+    weight = np.exp(likely - likely.max())
+    weight /= weight.sum()
+    mean = float(weight @ place)
+    return mean, float(np.hypot(np.sqrt(weight @ (place - mean) ** 2), _GRID))
 
 
 def hidden_std(apart: Float, scatter: float) -> float:

@@ -22,6 +22,7 @@ APART = 0.75
 """An edge of the pavement so far, m, from the usual one is another cross-section's."""
 SHORTEST = 25.0
 """A shorter stretch, m, is a fault in the picture."""
+_BACK = 0.1  # m: an edge so near to the usual one is back
 _CLOSING = 3  # stretches that an edge may not be seen within a run
 _AROUND = 40.0  # m before and behind a run that its shape is fitted to
 _NEAREST = 10.0  # m from a bay to where the road's edge is first or last seen
@@ -110,6 +111,19 @@ def _runs(side: SideSection, stations: Float) -> Iterator[slice]:
             yield run
 
 
+def _whole(run: slice, beside: Float, scatter: float) -> slice:
+    """Return a run with the stretches before and behind it over which the edge comes back to the usual one.
+
+    Two stretches in which it is there, or isn't seen, end it.
+    """
+    away = np.isfinite(beside) & (np.abs(beside) > max(_BACK, 3.0 * scatter))
+    away = ndimage.binary_closing(np.pad(away, 1), np.ones(2))[1:-1]
+    away[run] = True
+    label, _ = ndimage.label(away)
+    (found,) = ndimage.find_objects(label == label[run.start])
+    return slice(found[0].start, found[0].stop)
+
+
 def _bay(side: SideSection, stations: Float, run: slice) -> Bay | None:
     """Return the emergency bay that a run of wider pavement is; None if it is none."""
     beside = excess(side)
@@ -176,8 +190,9 @@ def _fit_trapezoid(stations: Float, beside: Float, first: float, last: float) ->
 
 
 def _unlike(side: SideSection, stations: Float, run: slice) -> Unlike:
-    half = 0.5 * STRETCH * SPACING
-    by = float(np.nanmedian(excess(side)[run]))
+    half, beside = 0.5 * STRETCH * SPACING, excess(side)
+    by = float(np.nanmedian(beside[run]))
+    run = _whole(run, beside, robust_scale(beside[side.usual & np.isfinite(beside)]))
     return Unlike(
         side.side, round(stations[run.start] - half, 1), round(stations[run.stop - 1] + half, 1), round(by, 2)
     )
