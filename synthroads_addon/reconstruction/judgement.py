@@ -91,6 +91,8 @@ def judge(profiles: Profiles, layout: RoadLayout, cores: Sequence[float], rivals
     lines = np.mean([guide.measured for guide in guides], axis=0)
     lines = np.where(np.isfinite(lines), lines, _carried(layout))
     middles = np.mean(pavement_edges(profiles, cores, layout.kind == "dual"), axis=0)
+    if profiles.paved is not None:  # where neither brightness nor height tells the edge the classes do
+        middles = np.where(np.isfinite(middles), middles, _middles_by_class(profiles, layout))
     what, edges = "the pavement's middle", "the pavement's edges aren't seen on both sides"
     unseen = np.isnan(middles)
     if layout.kind == "dual":
@@ -112,6 +114,14 @@ def judge(profiles: Profiles, layout: RoadLayout, cores: Sequence[float], rivals
         doubtful = ~ndimage.binary_opening(~doubtful, np.ones(_SHORTEST_TRUST))
     doubts = list(_doubts(profiles, doubtful, masks))
     return Judgement(doubts, float(1.0 - doubtful.mean()), lines, middles)
+
+
+def _middles_by_class(profiles: Profiles, layout: RoadLayout) -> Float:
+    """Return the middle (K,), m, of what the classes call the pavement, or of what lies between two; NaN if unseen."""
+    (right, left) = (layout.bands[0], layout.bands[-1])
+    if layout.kind == "dual":
+        return 0.5 * (right.edges[1].measured + left.edges[0].measured)
+    return 0.5 * (right.edges[0].measured + right.edges[1].measured)
 
 
 def _carried(layout: RoadLayout) -> Float:

@@ -47,6 +47,7 @@ class Band:
         lines: its lines from right to left.
         edges: its pavement's right and left edge as if they were lines, for want of lines.
         missing: offsets of lines that must be between its lines but aren't seen, m.
+        usual: (K,) the stretches in which it is as wide as usual; all if not given.
     """
 
     low: float
@@ -54,6 +55,11 @@ class Band:
     lines: list[Line]
     edges: tuple[Line, Line]
     missing: list[float] = field(default_factory=list)
+    usual: Bool | None = None
+
+    def place(self, line: Line) -> float:
+        """Return the median offset, m, of a line where the pavement is as wide as usual."""
+        return _place_in(line, self.usual)
 
     @property
     def width(self) -> float:
@@ -109,7 +115,7 @@ def find_layout(profiles: Profiles, lines: list[Line], wanted: RoadKind | None =
     # Rural roads have gaps in their lines, and no turnouts.
     least = _SEEN_RURAL if len(spans) == 1 or wanted == "single" else _SEEN
     parts = [_Part.of(profiles, paved, spans, number) for number in range(len(spans))]
-    bands = [_band(profiles, paved, part.span, part.main(lines, least)) for part in parts]
+    bands = [_band(profiles, paved, part, part.main(lines, least)) for part in parts]
     left_out = sum(all(line not in part.main(lines, least) for part in parts) for line in lines)
     if left_out:
         notes.append(f"{left_out} lines were seen on a small part of the road and left out")
@@ -277,22 +283,29 @@ def _blur(values: Grid) -> Grid:
         return np.where(weight > 0.05, mean / weight, np.nan)
 
 
-def _band(profiles: Profiles, paved: Grid, span: tuple[float, float], lines: list[Line]) -> Band:
+def _place_in(line: Line, usual: Bool | None) -> float:
+    """Return a line's median offset, m, in the stretches of a mask (K,), or in all where it is seen in none of them."""
+    inside = line.offsets[usual] if usual is not None else line.offsets
+    return float(np.nanmedian(inside)) if np.isfinite(inside).any() else line.offset
+
+
+def _band(profiles: Profiles, paved: Grid, part: _Part, lines: list[Line]) -> Band:
     """Return a strip of pavement with its lines; of two nearer than a lane the longer, more painted one is kept."""
-    low, high = span
-    inside = [line for line in lines if low - _BAND_MARGIN < line.offset < high + _BAND_MARGIN]
+    low, high = part.span
+    place = {id(line): _place_in(line, part.usual) for line in lines}
+    inside = [line for line in lines if low - _BAND_MARGIN < place[id(line)] < high + _BAND_MARGIN]
     kept: list[Line] = []
     for line in sorted(inside, key=lambda item: -item.length * (0.2 + item.width)):
-        if all(abs(line.offset - other.offset) >= _NARROWEST_LANE for other in kept):
+        if all(abs(place[id(line)] - place[id(other)]) >= _NARROWEST_LANE for other in kept):
             kept.append(line)
-    kept.sort(key=lambda line: line.offset)
+    kept.sort(key=lambda line: place[id(line)])
     missing = []
-    for right, left in pairwise(kept):
-        apart = left.offset - right.offset
-        if apart > _WIDEST_LANE:
-            count = round(apart / _USUAL_LANE)
-            missing += [right.offset + apart * (i + 1) / count for i in range(count - 1)]
-    return Band(low, high, kept, (_edge_line(profiles, paved, span, -1), _edge_line(profiles, paved, span, 1)), missing)
+    for right, left in pairwise(place[id(line)] for line in kept):
+        if left - right > _WIDEST_LANE:
+            count = round((left - right) / _USUAL_LANE)
+            missing += [right + (left - right) * (i + 1) / count for i in range(count - 1)]
+    edges = _edge_line(profiles, paved, part.span, -1), _edge_line(profiles, paved, part.span, 1)
+    return Band(low, high, kept, edges, missing, part.usual)
 
 
 def _edge_line(profiles: Profiles, paved: Grid, span: tuple[float, float], sign: int) -> Line:
@@ -387,7 +400,11 @@ def axis_guides(layout: RoadLayout) -> tuple[Line, ...]:
         right, left = layout.bands
         return right.guide(1), left.guide(-1)
     (band,) = layout.bands
-    return (band.middle,) if band.middle is not None else (band.guide(-1), band.guide(1))
+    if band.middle is not None:
+        return (band.middle,)
+    right, left = band.guide(-1), band.guide(1)
+    # A line on one side and the pavement's edge on the other have nothing between them that is the middle of both.
+    return (right, left) if (right.width > 0.0) == (left.width > 0.0) else band.edges
 
 
 def _vote_axis(lines: list[Line], axis: Float) -> Float:

@@ -267,7 +267,7 @@ def _carriageway(part: _SidePart) -> SideSection:
     if not _lacks_outer_lane(lines[-1], outer):
         boundaries[-1] = boundaries[-1].shift(-0.5 * line_width(lines[-1], "outer_edge", "dual", part.marked))
     first = _fill_with_median(first)
-    return _summarise_side(part.side, lines, boundaries, part.edge(first, False, first), outer)
+    return _summarise_side(part, lines, boundaries, part.edge(first, False, first), outer)
 
 
 def _half_section(part: _SidePart) -> SideSection:
@@ -290,7 +290,7 @@ def _half_section(part: _SidePart) -> SideSection:
         columns.append(_Boundary(place, place, outer.apart, visible))
     lines += [None] * (len(columns) - len(lines))
     inner = Edge(nowhere, nowhere)
-    half = _summarise_side(part.side, lines, columns, inner, outer)
+    half = _summarise_side(part, lines, columns, inner, outer)
     nothing = Estimate(0.0, 0.0)
     return replace(half, inner_offset=nothing, inner_strip=nothing, mirrored=mirrored)
 
@@ -322,7 +322,7 @@ def _assumed_section(part: _SidePart) -> SideSection:
     places = [first + sum(row.lanes[::-1][:i]) for i in range(len(row.lanes) + 1)]
     columns = [_Boundary(place, place, inner.apart, False) for place in places]
     lines: list[Line | None] = [None] * len(columns)
-    measured_side = _summarise_side(part.side, lines, columns, inner, outer)
+    measured_side = _summarise_side(part, lines, columns, inner, outer)
     lanes = [Estimate(lane, np.inf) for lane in reversed(row.lanes)]
     return replace(measured_side, lanes=lanes, inner_strip=Estimate(row.inner_edge_strip, np.inf), assumed=name)
 
@@ -342,12 +342,15 @@ def _fill_with_median(distance: Float) -> Float:
 
 
 def _summarise_side(
-    name: Side, lines: list[Line | None], boundaries: list[_Boundary], inner: Edge, outer: Edge
+    part: _SidePart, lines: list[Line | None], boundaries: list[_Boundary], inner: Edge, outer: Edge
 ) -> SideSection:
     """Return a side's widths, with standard deviations, from lines and edges measured in each stretch."""
     last = boundaries[-1]
     edge_seen = _is_visible(outer)
-    usual = _usual_stretches(outer.offsets - last.smoothed, lines[-1])
+    outside_of_lanes = outer.offsets - _fill_with_median(last.smoothed)
+    if part.band.usual is not None:
+        outside_of_lanes = np.where(part.band.usual, outside_of_lanes, np.nan)
+    usual = _usual_stretches(outside_of_lanes, lines[-1])
     where = usual if usual.sum() >= _FEWEST_STRETCHES else np.ones(len(usual), dtype=bool)
     places = [boundary.place(where) for boundary in boundaries]
     outside = Estimate(_USUAL_STRIP, np.inf)
@@ -358,7 +361,7 @@ def _summarise_side(
     strip, shoulder = _share_pavement(outside)
     inner_offset, inner_strip = _inner_widths(places[0], inner, where)
     return SideSection(
-        side=name,
+        side=part.side,
         lines=lines,
         inner_edge=inner,
         outer_edge=outer,
@@ -406,7 +409,7 @@ def _usual_stretches(outside: Float, line: Line | None) -> Bool:
 
 def _order_lines(band: Band, sign: int) -> tuple[list[Line | None], list[_Boundary]]:
     """Return lines outwards (None: unseen), and where they lie; unseen ones evenly between their neighbours."""
-    seen: list[tuple[float, Line | None]] = [(sign * line.offset, line) for line in band.lines]
+    seen: list[tuple[float, Line | None]] = [(sign * band.place(line), line) for line in band.lines]
     seen += [(sign * offset, None) for offset in band.missing]
     seen.sort(key=lambda item: item[0])
     lines = [line for _, line in seen]

@@ -62,7 +62,9 @@ class Bay:
         )
         shape = np.append(shape, self.width)
         change = _trapezoid_jacobian(stations, shape)
-        return np.sqrt(np.maximum(np.einsum("ki,ij,kj->k", change, self.covariance, change), 0.0))
+        bent = np.abs(change[:, :4]).max(axis=1) > 0.0  # near its tapers: no bay is quite a trapezoid
+        known = np.maximum(np.einsum("ki,ij,kj->k", change, self.covariance, change), 0.0)
+        return np.sqrt(known + np.where(bent, _LEAST_SCATTER, 0.0) ** 2)
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from .reconstruct import Reconstruction
 from .section import SideSection
 from .widenings import Bay, unlike_mask
 
+_ISLAND = 0.05  # m
 _LANE_THERE = 1.0  # m: a narrower lane begins or ends
 
 
@@ -41,9 +42,10 @@ class WidthErrors:
     @property
     def off(self) -> Float:
         """Return by how many of its deviations (K,) the width is off; 0 for a guess, NaN beyond the true road."""
-        with np.errstate(invalid="ignore", divide="ignore"):
-            off = np.abs(self.error) / self.std
-        return np.where(np.isinf(self.error), np.inf, np.where(np.isinf(self.std), 0.0 * self.error, off))
+        off = np.full(len(self.error), np.inf)
+        finite = ~np.isinf(self.error)
+        off[finite] = np.abs(self.error[finite]) / self.std[finite]
+        return off
 
 
 def compare_widths(found: Reconstruction, truth: RoadParameters) -> list[WidthErrors]:
@@ -92,8 +94,11 @@ def _pairs(
 def _widths(section: CarriagewaySection, station: Float) -> tuple[Float, Float, Float, Float]:
     """Return half of the median, inner strip, lanes from inside (K, lanes), and all pavement outside of these, m."""
     distances, lanes = section.distances(station), section.lane_boundaries(station)[:, ::-1]
-    inner = distances[:, 0]
-    return inner, lanes[:, 0] - inner, np.diff(lanes, axis=1), section.paved_edge(station) - lanes[:, -1]
+    inner, outer = distances[:, 0], section.paved_edge(station)
+    if "island" in section.kinds:  # beyond it lies a ramp, which is a road of its own
+        island, behind = section.boundaries_of("island", station)
+        outer = np.where(behind - island > _ISLAND, island, outer)
+    return inner, lanes[:, 0] - inner, np.diff(lanes, axis=1), outer - lanes[:, -1]
 
 
 def _with_bays(at: Float, std: float, bays: list[Bay]) -> Float:
