@@ -75,7 +75,7 @@ def reconstruct(cloud: RoadCloud, options: Options | None = None, progress: Prog
     along = alignment_path(fit.alignment)
     profiles = make_profiles(cloud, along, half, exact=True)
     layout = find_layout(profiles, find_lines(profiles), layout.kind)
-    section = measure_section(profiles, layout, cloud.marked)
+    section = measure_section(profiles, layout, cloud.marked, _axis_std(road.axis))
     if options.snap:
         section = snap_to_standard(section)
     surfaces = {side: _surface(profiles, section, side, rotation) for side in SIDES}
@@ -102,6 +102,11 @@ def reconstruct(cloud: RoadCloud, options: Options | None = None, progress: Prog
     judgement = judge(profiles, layout, carriageway_middles(section), _rivals_along(road, along, profiles))
     judgement = replace(judgement, sections=tuple(map(_section_doubt, others)))
     return Reconstruction(parameters, measured, road.axis, path, profiles, layout, surfaces, judgement, others, notes)
+
+
+def _axis_std(axis: FusedAxis) -> float:
+    """Return the standard deviation, m, of where the axis lies along the whole road."""
+    return float(np.median(axis.std[np.isfinite(axis.raw)]))
 
 
 def _section_doubt(other: Unlike) -> Doubt:

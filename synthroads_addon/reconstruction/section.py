@@ -146,16 +146,19 @@ class MeasuredSection:
         return Estimate(left.value + right.value, float(np.hypot(left.std, right.std)))
 
 
-def measure_section(profiles: Profiles, layout: RoadLayout, marked: bool) -> MeasuredSection:
+def measure_section(
+    profiles: Profiles, layout: RoadLayout, marked: bool, axis_std: float = 0.0
+) -> MeasuredSection:
     """Return the cross-section, with standard deviations, that profiles along the alignment show.
 
     Args:
         profiles: along the alignment, so that offset 0 is the axis.
         layout: of these profiles.
         marked: whether paint is known by class; if not, lines look wider than they are and get the usual widths.
+        axis_std: standard deviation of where the axis lies, m, from which all is measured.
     """
     bands = zip(SIDES, layout.bands * (2 if layout.kind == "single" else 1), strict=True)
-    parts = [_SidePart(profiles, layout, band, side, marked) for side, band in bands]
+    parts = [_SidePart(profiles, layout, band, side, marked, axis_std) for side, band in bands]
     if layout.kind == "single":
         return MeasuredSection("single", {part.side: _half_section(part) for part in parts}, layout.bands[0].middle)
     sides = {part.side: _carriageway(part) if len(part.band.lines) > 1 else _assumed_section(part) for part in parts}
@@ -175,7 +178,7 @@ class _SidePart:
     """Inputs for measuring one side of the road.
 
     Attributes:
-        profiles, layout, marked: as in `measure_section`.
+        profiles, layout, marked, axis_std: as in `measure_section`.
         band: the pavement that is its own, or that it has a half of.
         side: of the axis.
     """
@@ -185,6 +188,7 @@ class _SidePart:
     band: Band
     side: Side
     marked: bool
+    axis_std: float
 
     @property
     def sign(self) -> int:
@@ -353,6 +357,8 @@ def _summarise_side(
     usual = _usual_stretches(outside_of_lanes, lines[-1])
     where = usual if usual.sum() >= _FEWEST_STRETCHES else np.ones(len(usual), dtype=bool)
     places = [boundary.place(where) for boundary in boundaries]
+    if part.layout.kind == "single":  # its lanes begin at the axis
+        places[0] = replace(places[0], std=part.axis_std)
     outside = Estimate(_USUAL_STRIP, np.inf)
     if edge_seen:
         edge = Estimate.of(np.where(usual if usual.any() else True, outer.offsets, np.nan), outer.apart)
@@ -360,6 +366,7 @@ def _summarise_side(
     outside = Estimate(float(np.clip(outside.value, 0.0, 2.0 + _WIDEST)), outside.std)
     strip, shoulder = _share_pavement(outside)
     inner_offset, inner_strip = _inner_widths(places[0], inner, where)
+    inner_offset = replace(inner_offset, std=float(np.hypot(inner_offset.std, part.axis_std)))
     return SideSection(
         side=part.side,
         lines=lines,

@@ -67,8 +67,8 @@ def compare_widths(found: Reconstruction, truth: RoadParameters) -> list[WidthEr
         pairs = _pairs(measured, here.sections[name], there.sections[other], at, station)
         bays = [bay for bay in found.measured.bays if bay.side == name]
         for what, error, std in pairs:
-            if what == "median" and found.measured.section.kind == "single":
-                continue
+            if what in ("median", "inner strip") and found.measured.section.kind == "single":
+                continue  # they have none
             deviation = _with_bays(at, std, bays) if what == "outside" else np.full(len(at), std)
             result.append(WidthErrors(name, what, np.where(inside, error, np.nan), deviation, marked))
     return result
