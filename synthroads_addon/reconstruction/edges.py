@@ -7,7 +7,7 @@ import numpy as np
 
 from ..base.arrays import Float
 from .path import SPACING
-from .profiles import ACROSS, STRETCH, Grid, Profiles, SurfacePoints
+from .profiles import ACROSS, STRETCH, Grid, Profiles, SurfacePoints, row_gaps
 from .smoothing import bisquare, fill_gaps, robust_scale
 
 FARTHEST = 8.0
@@ -58,7 +58,7 @@ def paved_edge(profiles: Profiles, paved: Grid, begin: Float, sign: int, farthes
         edges[number] = _find_edge(share, float(profiles.offsets[column]), sign)
         if profiles.points is not None and np.isfinite(edges[number]):
             edges[number], apart[number] = _between_points(profiles.points, number, edges[number], sign)
-    return Edge(edges, apart)
+    return Edge(edges, apart if profiles.points is not None else row_gaps(profiles, edges))
 
 
 def _between_points(points: SurfacePoints, stretch: int, edge: float, sign: int) -> tuple[float, float]:

@@ -8,7 +8,7 @@ from scipy.signal import find_peaks
 
 from ..base.arrays import Bool, Float
 from .path import SPACING
-from .profiles import ACROSS, STRETCH, Grid, Profiles, SurfacePoints
+from .profiles import ACROSS, STRETCH, Grid, Profiles, SurfacePoints, row_gaps
 from .smoothing import hidden_std, mean_with_std, smooth
 
 WAVELENGTH = 40.0
@@ -166,7 +166,7 @@ def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line |
     if (weights > 0.0).sum() < 4:
         return None
     width, width_std = mean_with_std(cover[inside][np.nan_to_num(share[inside]) > 0.5])
-    apart = np.zeros(len(grid))
+    apart = row_gaps(profiles, measured)
     if profiles.points is not None:
         on = np.where(inside & np.isfinite(share), share, 0.0) > 0.5
         measured, widths, apart = _between_points(profiles, profiles.points, measured, on)

@@ -26,6 +26,7 @@ _RURAL_EDGE_LINE, _RURAL_LINE = 0.25, 0.12  # on other roads (RMS)
 _LINE_TOLERANCE = 0.05  # m: a measured width so near to a usual one is that
 _WIDEST_STRIP = 1.25  # m: pavement beyond the outermost lane that is wider has a hard shoulder
 _USUAL_STRIP = 0.5
+_PAINT_STD, _EDGE_STD = 0.04, 0.08  # m that lines and edges found by brightness are off all along a road
 _FEWEST_EDGES = 0.2  # of the stretches must show an edge
 _AROUND, _SOLID = 7, 0.8  # stretches around one, and their share of paint: along a dashed line it is less
 _FEWEST_STRETCHES = 6
@@ -57,6 +58,10 @@ class Estimate:
     def __sub__(self, other: Self) -> Self:
         """Return the difference of two numbers whose errors are independent."""
         return type(self)(self.value - other.value, float(np.hypot(self.std, other.std)))
+
+    def widened(self, std: float) -> Self:
+        """Return the number with one more independent error of a standard deviation."""
+        return type(self)(self.value, float(np.hypot(self.std, std)))
 
     def to_dict(self, digits: int = 4) -> dict[str, float | None]:
         """Return value and standard deviation, rounded, as JSON data; null where not finite."""
@@ -356,17 +361,18 @@ def _summarise_side(
         outside_of_lanes = np.where(part.band.usual, outside_of_lanes, np.nan)
     usual = _usual_stretches(outside_of_lanes, lines[-1])
     where = usual if usual.sum() >= _FEWEST_STRETCHES else np.ones(len(usual), dtype=bool)
-    places = [boundary.place(where) for boundary in boundaries]
+    places = [boundary.place(where).widened(0.0 if part.marked else _PAINT_STD) for boundary in boundaries]
+    edge_std = 0.0 if part.profiles.paved is not None else _EDGE_STD
     if part.layout.kind == "single":  # its lanes begin at the axis
         places[0] = replace(places[0], std=part.axis_std)
     outside = Estimate(_USUAL_STRIP, np.inf)
     if edge_seen:
         edge = Estimate.of(np.where(usual if usual.any() else True, outer.offsets, np.nan), outer.apart)
-        outside = edge - places[-1]
+        outside = edge.widened(edge_std) - places[-1]
     outside = Estimate(float(np.clip(outside.value, 0.0, 2.0 + _WIDEST)), outside.std)
     strip, shoulder = _share_pavement(outside)
-    inner_offset, inner_strip = _inner_widths(places[0], inner, where)
-    inner_offset = replace(inner_offset, std=float(np.hypot(inner_offset.std, part.axis_std)))
+    inner_offset, inner_strip = _inner_widths(places[0], inner, where, edge_std)
+    inner_offset = inner_offset.widened(part.axis_std)
     return SideSection(
         side=part.side,
         lines=lines,
@@ -384,10 +390,10 @@ def _summarise_side(
     )
 
 
-def _inner_widths(first: Estimate, inner: Edge, where: Bool) -> tuple[Estimate, Estimate]:
+def _inner_widths(first: Estimate, inner: Edge, where: Bool, edge_std: float) -> tuple[Estimate, Estimate]:
     """Return the distance of the pavement's inner edge from the axis, and the inner edge strip's width, m."""
     if _is_visible(inner):
-        offset = Estimate.of(np.where(where, inner.offsets, np.nan), inner.apart)
+        offset = Estimate.of(np.where(where, inner.offsets, np.nan), inner.apart).widened(edge_std)
         strip = first - offset
     else:
         offset = Estimate(first.value - _USUAL_STRIP, np.inf)

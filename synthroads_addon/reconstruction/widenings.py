@@ -28,7 +28,7 @@ _AROUND = 40.0  # m before and behind a run that its shape is fitted to
 _NEAREST = 10.0  # m from a bay to where the road's edge is first or last seen
 _MISFIT = 0.25  # m rms that a bay's shape may keep from its edge
 _NARROWEST, _WIDEST = 0.6 * EMERGENCY_BAY_WIDTH, 5.0  # m: of a bay
-_SHORTEST_BAY = 0.4 * EMERGENCY_BAY_LENGTH
+_SHORTEST_BAY, _LONGEST_BAY = 0.4 * EMERGENCY_BAY_LENGTH, 3.0 * EMERGENCY_BAY_LENGTH
 _PAINTED = 0.6  # of a bay's length must be beside the edge line's paint, where that is seen
 _LEAST_TAPER = 5.0  # m
 _LEAST_SCATTER = 0.02  # m: of an edge's offset in one stretch
@@ -116,14 +116,14 @@ def _runs(side: SideSection, stations: Float) -> Iterator[slice]:
 def _whole(run: slice, beside: Float, scatter: float) -> slice:
     """Return a run with the stretches before and behind it over which the edge comes back to the usual one.
 
-    Two stretches in which it is there, or isn't seen, end it.
+    And one more to either side, as it does so within a stretch.
     """
     away = np.isfinite(beside) & (np.abs(beside) > max(_BACK, 3.0 * scatter))
-    away = ndimage.binary_closing(np.pad(away, 1), np.ones(2))[1:-1]
+    away = ndimage.binary_closing(np.pad(away, _CLOSING), np.ones(_CLOSING))[_CLOSING:-_CLOSING]
     away[run] = True
     label, _ = ndimage.label(away)
-    (found,) = ndimage.find_objects(label == label[run.start])
-    return slice(found[0].start, found[0].stop)
+    ((found,),) = ndimage.find_objects(label == label[run.start])
+    return slice(max(0, found.start - 1), min(len(beside), found.stop + 1))
 
 
 def _bay(side: SideSection, stations: Float, run: slice) -> Bay | None:
@@ -138,7 +138,7 @@ def _bay(side: SideSection, stations: Float, run: slice) -> Bay | None:
     shape, residual, unit = _fit_trapezoid(stations[near], beside[near], first, last)
     start, low, length, high, width = shape.tolist()
     fits = robust_scale(residual) < _MISFIT and float(np.sqrt(np.mean(residual**2))) < 2.0 * _MISFIT
-    if not fits or not _NARROWEST <= width <= _WIDEST or length < _SHORTEST_BAY:
+    if not fits or not _NARROWEST <= width <= _WIDEST or not _SHORTEST_BAY <= length <= _LONGEST_BAY:
         return None
     scatter = max(robust_scale(residual), _LEAST_SCATTER)
     covariance = scatter**2 * correlation_factor(residual) * unit
