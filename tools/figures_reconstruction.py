@@ -251,8 +251,8 @@ def _width(one: WidthErrors) -> dict[str, Any]:
 def measured_roads(arguments: argparse.Namespace) -> Iterator[tuple[Kind, str, dict[str, Any]]]:
     """Yield (kind, name, measurements) of each road, made and measured unless that was done before."""
     what = "-".join(word for word in ("thrown", "without_classes") if getattr(arguments, word))
-    for index, kind in enumerate(KINDS):
-        for number in range(min(arguments.roads, len(kind.roads))):
+    for number in range(min(arguments.roads, max(len(kind.roads) for kind in KINDS))):
+        for index, kind in enumerate(KINDS):
             name = f"{index}-{number}"
             place = arguments.folder / name
             place.mkdir(parents=True, exist_ok=True)

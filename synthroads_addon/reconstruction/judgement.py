@@ -6,6 +6,7 @@ or the ground steps up or down. A single carriageway's axis must lie in the midd
 what lies between two such pavements.
 """
 
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -19,15 +20,18 @@ from .lines import Line
 from .profiles import STRETCH, Profiles
 from .smoothing import difference_figures, robust_scale
 from .views.fusion import APART
-from .views.pavement import pavement_edges
+from .views.pavement import pavement_edges, remove_grade
 
 FARTHEST_MIDDLE = 0.75
 """The middle between the pavement's edges may lie so far beside the axis, m."""
 FARTHEST_LINES = 0.5
 """The lines that make the axis may lie so far beside it, m."""
+RAISED = 0.05
+"""Paint lies flat: lines that stand so far above the ground on either side are rails, kerbs or gutters' edges, m."""
 ROUGHEST = 0.04
 """Pavements are seen smoother than this by any scanner that shows their edges, m."""
 _CORE = 1.5  # m to either side of a carriageway's middle that is pavement if anything is
+_ON_AND_BESIDE = ((-0.05, 0.05), (-0.6, -0.3), (0.3, 0.6))  # m from a line's middle: on it, to the right, to the left
 _FEWEST_STEPS = 50
 _NEAR = 4  # stretches to either side of one whose evidence counts for it
 _SHORTEST_TRUST = 5  # stretches
@@ -106,6 +110,7 @@ def judge(profiles: Profiles, layout: RoadLayout, cores: Sequence[float], rivals
         f"{what} lies more than {FARTHEST_MIDDLE:g} m beside it": np.abs(middles) > FARTHEST_MIDDLE,
         "the ground on its lanes is too rough for a pavement": lane_roughness(profiles, cores) > ROUGHEST,
     }
+    reasons["its lines stand above the ground, as rails do and no paint"] = raised_lines(profiles, layout) > RAISED
     if rivals is not None:
         reasons[f"views of it disagree by more than {APART:g} m"] = rivals
     masks = {reason: _without_short_runs(mask) for reason, mask in reasons.items()}
@@ -153,6 +158,33 @@ def lane_roughness(profiles: Profiles, cores: Sequence[float]) -> Float:
         if len(known) >= _FEWEST_STEPS:
             result[number] = robust_scale(known) / np.sqrt(2.0)
     return result
+
+
+def raised_lines(profiles: Profiles, layout: RoadLayout) -> Float:
+    """Return how far (K,), m, the painted lines stand above the ground to both sides of them; NaN where not seen.
+
+    The middle one of all lines counts: one may lie on a seam, or beside a gutter.
+    """
+    painted = [line for band in layout.bands for line in band.lines if line.width > 0.0]
+    height = remove_grade(profiles.height)
+    result = np.full((max(len(painted), 1), profiles.stretches), np.nan)
+    for row, line in enumerate(painted):
+        for number in np.flatnonzero(np.isfinite(line.measured)):
+            rows = height[max(0, (number - _NEAR) * STRETCH) : (number + _NEAR + 1) * STRETCH]
+            on, *beside = (
+                _mean_height(profiles, rows, float(line.measured[number]), *reach) for reach in _ON_AND_BESIDE
+            )
+            result[row, number] = on - max(beside)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # stretches without lines
+        return np.asarray(np.nanmedian(result, axis=0))
+
+
+def _mean_height(profiles: Profiles, rows: Float, offset: float, low: float, high: float) -> float:
+    """Return the median height, m, of some rows' bins between two distances (m) from an offset; NaN without any."""
+    bins = rows[:, profiles.column(offset + low) : profiles.column(offset + high) + 1]
+    known = bins[np.isfinite(bins)]
+    return float(np.median(known)) if len(known) else np.nan
 
 
 def _is_seen_nearby(seen: Bool) -> Bool:

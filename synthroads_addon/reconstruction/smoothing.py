@@ -13,6 +13,7 @@ ORDER = 3
 _ROUNDS = 6
 _BISQUARE = 4.685  # times the residuals' scale: from here on a value counts nothing
 _LEAST_SCATTER = 0.01  # m: of single offsets, beside the rows that they lie between
+_MOST_SAY = 5.0  # independent values that all together count as: soft ends would shrink with each more
 _GRID = 0.002  # m
 _FAULTY = 0.02  # likelihood of a value whose interval misses the mean, relative to one whose interval holds it
 _FLOOR = 1e-9  # of the mean weight: what holds the solution where nothing was measured
@@ -131,7 +132,7 @@ def interval_mean(values: Float, apart: Float) -> tuple[float, float]:
     place = np.arange(np.percentile(low, 1) - scatter, np.percentile(high, 99) + scatter + _GRID, _GRID)
     shares = ndtr((place - low[:, None]) / scatter) - ndtr((place - high[:, None]) / scatter)
     likely = np.log(np.maximum(shares / np.maximum(shares.max(axis=1, keepdims=True), 1e-12), _FAULTY)).sum(axis=0)
-    likely /= correlation_factor(values - middle)
+    likely *= min(1.0 / correlation_factor(values - middle), _MOST_SAY / len(values))
     weight = np.exp(likely - likely.max())
     weight /= weight.sum()
     mean = float(weight @ place)

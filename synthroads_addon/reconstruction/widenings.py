@@ -122,7 +122,7 @@ def _whole(run: slice, beside: Float, scatter: float) -> slice:
     away = ndimage.binary_closing(np.pad(away, _CLOSING), np.ones(_CLOSING))[_CLOSING:-_CLOSING]
     away[run] = True
     label, _ = ndimage.label(away)
-    ((found,),) = ndimage.find_objects(label == label[run.start])
+    ((found,),) = ndimage.find_objects((label == label[run.start]).astype(np.int8))
     return slice(max(0, found.start - 1), min(len(beside), found.stop + 1))
 
 
