@@ -160,7 +160,8 @@ class _Part:
             if place is None:
                 continue
             other = np.isfinite(edge) & (np.abs(sign * edge - place) > _OTHER_EDGE)
-            other = ndimage.binary_opening(ndimage.binary_closing(other, np.ones(3)), np.ones(_OTHER_STRETCHES))
+            closed = ndimage.binary_closing(np.pad(other, 3, mode="edge"), np.ones(3))[3:-3]
+            other = ndimage.binary_opening(closed, np.ones(_OTHER_STRETCHES))
             if other.any():
                 usual &= ~other
                 span[side] = sign * place
