@@ -94,7 +94,9 @@ KINDS = (
     Kind("dual, hard shoulder", _roads(["RQ31", "RQ28", "RQ36", "RQ31.5", "RQ43.5"], 400.0)),
     Kind(
         "emergency bays",
-        _roads(["RQ31", "RQ36", "RQ31", "RQ28", "RQ43.5"], 450.0, turnouts=LIMITS["turnouts"] | {"emergency_bays": 1.0}),
+        _roads(
+            ["RQ31", "RQ36", "RQ31", "RQ28", "RQ43.5"], 450.0, turnouts=LIMITS["turnouts"] | {"emergency_bays": 1.0}
+        ),
     ),
     Kind(
         "exits and entries",
@@ -103,7 +105,9 @@ KINDS = (
             for number, limits in enumerate(_roads(["RQ31", "RQ36", "RQ28", "RQ31", "RQ43.5"], 600.0))
         ),
     ),
-    Kind("lanes begin or end", _roads(["RQ36", "RQ43.5", "RQ36", "RQ36", "RQ43.5"], 500.0, lane_changes={"share": 1.0})),
+    Kind(
+        "lanes begin or end", _roads(["RQ36", "RQ43.5", "RQ36", "RQ36", "RQ43.5"], 500.0, lane_changes={"share": 1.0})
+    ),
     Kind("winding", _roads(["RQ25", "RQ31.5", "RQ25", "RQ31.5", "RQ25"], 500.0, radius=TIGHT)),
     Kind(
         "narrow, without shoulder",
@@ -131,18 +135,28 @@ UNEVEN = SURVEY | {
     "scan.lines_per_second": 195,
     "scan.mirror_clock": "free",
     "scan.motion": {
-        **{"shortest_period": 0.05, "longest_period": 20, "period_exponent": 0.5},
-        **{"position_sigma": 0.4, "attitude_sigma_deg": 0.3, "heading_sigma_deg": 2},
+        "shortest_period": 0.05,
+        "longest_period": 20,
+        "period_exponent": 0.5,
+        "position_sigma": 0.4,
+        "attitude_sigma_deg": 0.3,
+        "heading_sigma_deg": 2,
     },
     "scan.noise.range_sigma": 0.023,
     "scan.noise.speckle": 0.1,
     "scan.noise.angle_sigma_mrad": 0.02,
     "scan.receiver": {
-        **{"echo_separation": "waveform", "threshold_to_noise": 5, "faint_range_sigma": 0.06},
-        **{"range_walk": 0.003, "range_delay": 0.45},
+        "echo_separation": "waveform",
+        "threshold_to_noise": 5,
+        "faint_range_sigma": 0.06,
+        "range_walk": 0.003,
+        "range_delay": 0.45,
     },
     "scan.strip_errors": {
-        **{"boresight_sigma_deg": 0.001, "drift_sigma": 0.01, "gain_sigma_db": 0.2, "gain_step_db": 1.0},
+        "boresight_sigma_deg": 0.001,
+        "drift_sigma": 0.01,
+        "gain_sigma_db": 0.2,
+        "gain_step_db": 1.0,
     },
 }
 """Settings of one with uneven strips, noise and speckle, as in the recipe centerline-airborne; every second road's."""
@@ -184,7 +198,15 @@ def scan(parameters: Path, settings: dict[str, Any], folder: Path) -> Path:
     cloud = folder / "cloud.laz"
     if not cloud.exists():
         words = [word for path, value in settings.items() for word in ("--set", f"{path}={json.dumps(value)}")]
-        words += ["--scenario", "airborne-1000m", "--parameters", str(parameters), "--output", str(folder), "--overwrite"]
+        words += [
+            "--scenario",
+            "airborne-1000m",
+            "--parameters",
+            str(parameters),
+            "--output",
+            str(folder),
+            "--overwrite",
+        ]
         subprocess.run([sys.executable, "-m", "headless.generate", *words, "--quiet"], check=True, cwd=ROOT)
     return cloud
 

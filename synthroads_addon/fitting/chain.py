@@ -314,7 +314,7 @@ class ChainFit:
 
     @property
     def noise(self) -> float:
-        """Return the standard deviation of the data, m, that the residuals tell: parameters take their share of them."""
+        """Return the data's standard deviation, m, that the residuals tell, of which parameters take their share."""
         spare = float(self.data.weights.sum()) - self.chain.freedom()
         return float(np.sqrt(self.sum_of_squares / max(spare, 1.0)))
 

@@ -40,7 +40,9 @@ _CHORD_WEIGHT = 1e-3
 _MARGIN = 0.98  # of the tolerance that the search aims at: it may see thinned points only
 _NEGLIGIBLE = 0.3  # of the tolerance: residuals below it are worth no element
 _FINER_HELPS = 0.8  # of the noise at most must be left by knots half as far apart: else the rest is noise
-_SCATTER = 1.2  # times the noise is what fewer elements may leave where the tolerance asks for less: the data scatter so
+_SCATTER = (
+    1.2  # times the noise is what fewer elements may leave where the tolerance asks for less: the data scatter so
+)
 _RELAXED = 1.5  # times what dense knots reach is aimed at where the tolerance cannot be had: less would fit noise
 _FLATTEST = 1e7  # m: a rounding of a larger radius bends by less than 1 mm over 100 m, and is written as a kink
 REFUSED_BEYOND = 40.0

@@ -68,7 +68,9 @@ def _between_points(points: SurfacePoints, stretch: int, edge: float, sign: int)
     if len(offset) < _FEWEST_POINTS:
         return edge, 0.0
     gain = np.append(0, np.cumsum(np.where(paved, 1, -1)))
-    best = np.flatnonzero(gain == gain.max())  # where points of both lie mingled there are several: the first is no edge
+    best = np.flatnonzero(
+        gain == gain.max()
+    )  # where points of both lie mingled there are several: the first is no edge
     first, last = int(best[0]), int(best[-1])
     if first == 0 or last == len(offset):
         return edge, 0.0

@@ -403,9 +403,9 @@ def axis_guides(layout: RoadLayout) -> tuple[Line, ...]:
     (band,) = layout.bands
     if band.middle is not None:
         return (band.middle,)
-    right, left = band.guide(-1), band.guide(1)
+    guides = band.guide(-1), band.guide(1)
     # A line on one side and the pavement's edge on the other have nothing between them that is the middle of both.
-    return (right, left) if (right.width > 0.0) == (left.width > 0.0) else band.edges
+    return guides if (guides[0].width > 0.0) == (guides[1].width > 0.0) else band.edges
 
 
 def _vote_axis(lines: list[Line], axis: Float) -> Float:

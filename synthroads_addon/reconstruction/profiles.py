@@ -101,7 +101,7 @@ class Profiles:
 
 
 def row_gaps(profiles: Profiles, offsets: Float) -> Float:
-    """Return the distance (K,), m, of the rows of points that lie about an offset in each stretch; 0 where they lie densely.
+    """Return the distance (K,), m, of the rows of points about an offset in each stretch; 0 where they lie densely.
 
     A scanner that follows the road leaves bins empty between rows: what is found there is found no better than that.
     """

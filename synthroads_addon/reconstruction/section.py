@@ -49,7 +49,7 @@ class Estimate:
     def of(cls, values: Float, apart: Float | None = None) -> Self:
         """Return the robust mean of values (K,), in order along the road, with its standard deviation.
 
-        Values that lie midway between rows of points, ``apart`` (K,) from each other, m, have theirs by `interval_mean`.
+        Of values midway between rows of points, ``apart`` (K,) from each other, m, it is that of `interval_mean`.
         """
         if apart is None or not (apart[np.isfinite(values)] > 0.0).any():
             return cls(*mean_with_std(values))
@@ -151,9 +151,7 @@ class MeasuredSection:
         return Estimate(left.value + right.value, float(np.hypot(left.std, right.std)))
 
 
-def measure_section(
-    profiles: Profiles, layout: RoadLayout, marked: bool, axis_std: float = 0.0
-) -> MeasuredSection:
+def measure_section(profiles: Profiles, layout: RoadLayout, marked: bool, axis_std: float = 0.0) -> MeasuredSection:
     """Return the cross-section, with standard deviations, that profiles along the alignment show.
 
     Args:

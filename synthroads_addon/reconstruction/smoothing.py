@@ -88,14 +88,13 @@ def correlation_factor(residual: Float) -> float:
     return (1.0 + lag) / (1.0 - lag)
 
 
-def mean_with_std(values: Float, apart: Float | None = None) -> tuple[float, float]:
+def mean_with_std(values: Float) -> tuple[float, float]:
     """Return the robust mean (bisquare) of values (N,) along the road, and its standard deviation.
 
-    Bisquare about the median; the deviation counts as many values as are independent of their neighbours, and what
-    `hidden_std` tells of the distances ``apart`` (N,) of the points they lie between. NaN and infinity for no values.
+    Bisquare about the median; the deviation counts as many values as are independent of their neighbours. NaN and
+    infinity for no values.
     """
-    known = np.isfinite(values)
-    values = values[known]
+    values = values[np.isfinite(values)]
     if not len(values):
         return float("nan"), float("inf")
     middle = float(np.median(values))
@@ -108,8 +107,7 @@ def mean_with_std(values: Float, apart: Float | None = None) -> tuple[float, flo
     kept = bisquare(values - middle, max(robust_scale(values - middle), 1e-9)) > 0.0
     spread = float(np.sqrt(np.mean((values[kept] - middle) ** 2))) if kept.any() else 0.0
     independent = max(1.0, kept.sum() / correlation_factor(values[kept] - middle))
-    std = spread / float(np.sqrt(independent))
-    return middle, float(np.hypot(std, hidden_std(apart[known], spread))) if apart is not None else std
+    return middle, spread / float(np.sqrt(independent))
 
 
 def interval_mean(values: Float, apart: Float) -> tuple[float, float]:

@@ -169,7 +169,10 @@ def _trapezoid_jacobian(stations: Float, shape: Float) -> Float:
     steps = np.diag([0.5 * STRETCH * SPACING] * 4 + [0.01])
     steps[[1, 3], [1, 3]] = 1.0
     return np.column_stack(
-        [(_trapezoid(stations, shape + step) - _trapezoid(stations, shape - step)) / (2.0 * step.sum()) for step in steps]
+        [
+            (_trapezoid(stations, shape + step) - _trapezoid(stations, shape - step)) / (2.0 * step.sum())
+            for step in steps
+        ]
     )
 
 

@@ -41,7 +41,7 @@ def test_a_lane_that_ends_moves_the_axis_nowhere(begin: float) -> None:
 def part_of(offset: float, start: float, end: float) -> Line:
     """Return a line that is there between two stations, m."""
     whole = line(offset)
-    inside = (STATIONS > start) & (STATIONS < end)
+    inside = (start < STATIONS) & (end > STATIONS)
     measured = np.where(inside, whole.measured, np.nan)
     return Line(STATIONS, measured, measured, whole.std, whole.apart, whole.cover, start, end, 0.15)
 

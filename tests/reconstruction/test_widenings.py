@@ -68,7 +68,7 @@ def test_whatever_else_is_wider_is_marked(wider: Float, solid: bool, by: float) 
     inside = np.abs(wider) > 0.1  # with its tapers, and a stretch more to either side
     assert other.start == pytest.approx(max(STATIONS[inside][0] - 7.5, 0.0), abs=7.5)
     assert other.end == pytest.approx(min(STATIONS[inside][-1] + 7.5, 400.0), abs=7.5)
-    assert np.isin(np.flatnonzero(inside), np.flatnonzero((STATIONS > other.start) & (STATIONS < other.end))).all()
+    assert np.isin(np.flatnonzero(inside), np.flatnonzero((other.start < STATIONS) & (other.end > STATIONS))).all()
 
 
 def test_an_entrys_lane_is_no_bay_however_solid_the_line_beside_it() -> None:
