@@ -380,7 +380,9 @@ def axis_from_lines(layout: RoadLayout) -> FoundAxis:
     if not any(np.isfinite(line.measured).any() for line in lines):
         raise InputError("road", None, "neither lines nor edges of a carriageway can be made out in the cloud")
     if not np.isfinite(given).any():
-        start = np.nanmean(np.array([line.measured for line in lines]), axis=0)
+        measured = np.array([line.measured for line in lines])
+        known = np.isfinite(measured).sum(axis=0)
+        start = np.where(known > 0, np.nansum(measured, axis=0) / np.maximum(known, 1), np.nan)
     axis = fill_gaps(start)
     for _ in range(_ROUNDS):
         raw = _vote_axis(lines, axis)
