@@ -93,7 +93,8 @@ def judge(profiles: Profiles, layout: RoadLayout, cores: Sequence[float], rivals
     """
     guides = axis_guides(layout)
     lines = np.mean([guide.measured for guide in guides], axis=0)
-    lines = np.where(np.isfinite(lines), lines, _carried(layout))
+    if np.isfinite(lines).any():  # else nothing tells how far the others are from the axis
+        lines = np.where(np.isfinite(lines), lines, _carried(layout))
     middles = np.mean(pavement_edges(profiles, cores, layout.kind == "dual"), axis=0)
     if profiles.paved is not None:  # where neither brightness nor height tells the edge the classes do
         middles = np.where(np.isfinite(middles), middles, _middles_by_class(profiles, layout))

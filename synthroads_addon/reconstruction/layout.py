@@ -22,6 +22,7 @@ _SEEN = 0.5  # of the road's length: what is seen on less belongs to a turnout o
 _SEEN_RURAL = 0.3
 _OTHER_EDGE, _OTHER_STRETCHES = 0.75, 5  # m that an edge lies off the usual place, and stretches, on another part
 _FEWEST_USUAL = 0.25  # of the road: a part that is less isn't the usual one
+_TOGETHER = 0.2  # of the stretches with both edges: lines that are less often seen together give way to these
 _COMMON = 0.35  # of the most common place: others so common may be the usual one
 _NARROWEST_BAND, _NARROWEST_MEDIAN, _WIDEST_MEDIAN = 3.0, 0.8, 30.0  # m
 _UNMARKED_CARRIAGEWAY = 7.0  # m: so wide a strip of pavement is a carriageway even if its lines aren't seen
@@ -407,7 +408,13 @@ def axis_guides(layout: RoadLayout) -> tuple[Line, ...]:
         return (band.middle,)
     guides = band.guide(-1), band.guide(1)
     # A line on one side and the pavement's edge on the other have nothing between them that is the middle of both.
-    return guides if (guides[0].width > 0.0) == (guides[1].width > 0.0) else band.edges
+    alike = (guides[0].width > 0.0) == (guides[1].width > 0.0)
+    return guides if alike and _seen_together(guides) >= _TOGETHER * _seen_together(band.edges) else band.edges
+
+
+def _seen_together(pair: tuple[Line, Line]) -> int:
+    """Return in how many stretches both of two lines are seen."""
+    return int((np.isfinite(pair[0].measured) & np.isfinite(pair[1].measured)).sum())
 
 
 def _vote_axis(lines: list[Line], axis: Float) -> Float:

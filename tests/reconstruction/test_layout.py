@@ -71,3 +71,5 @@ def test_a_line_on_one_side_and_the_pavements_edge_on_the_other_make_no_middle()
     assert axis_guides(RoadLayout("single", (one_sided,), np.zeros((300, 200)), ())) == edges
     both = Band(-3.75, 3.75, [line(-3.2), line(3.2)], edges)
     assert axis_guides(RoadLayout("single", (both,), np.zeros((300, 200)), ())) == tuple(both.lines)
+    apart = Band(-3.75, 3.75, [part_of(-3.2, 0.0, 140.0), part_of(3.2, 150.0, 300.0)], edges)
+    assert axis_guides(RoadLayout("single", (apart,), np.zeros((300, 200)), ())) == edges  # never seen together
