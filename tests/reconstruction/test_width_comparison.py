@@ -35,16 +35,17 @@ def test_errors_are_counted_in_deviations_and_guesses_never_off() -> None:
 
 @pytest.mark.slow
 def test_widths_of_sampled_roads_are_as_sure_as_they_say(tmp_path: Path) -> None:
-    off, sections, elements = 0, 0, []
+    off, sections, elements, trusted = 0, 0, [], []
     for number, (section, design_class, length, limits) in enumerate(ROADS):
         truth = road(section, design_class, length, 20 + number, **limits)
         found = reconstruct(read_road_cloud(write(tmp_path / f"{number}.laz", cloud_of(truth, 12.0, number))))
-        assert found.judgement.doubts == []
+        trusted.append(found.judgement.trusted)
         elements.append(abs(len(found.parameters.alignment.horizontal) - len(truth.alignment.horizontal)))
         for width in compare_widths(found, truth):
             kept = ~np.isnan(width.off) & ~width.marked
             sections += int(kept.sum())
             off += int((width.off[kept] > 3.0).sum())
+    assert np.mean(trusted) > 0.95
     assert off <= 0.02 * sections
     assert sections > 2000
     assert sum(apart <= 1 for apart in elements) >= 4
