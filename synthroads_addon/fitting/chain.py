@@ -313,6 +313,12 @@ class ChainFit:
         return float(np.sqrt(self.sum_of_squares / len(self.residuals)))
 
     @property
+    def noise(self) -> float:
+        """Return the data's standard deviation, m, that the residuals tell, of which parameters take their share."""
+        spare = float(self.data.weights.sum()) - self.chain.freedom()
+        return float(np.sqrt(self.sum_of_squares / max(spare, 1.0)))
+
+    @property
     def p95(self) -> float:
         return float(np.percentile(np.abs(self.residuals), 95))
 

@@ -6,6 +6,7 @@ another alignment, give its elements back. Long axes are fitted in overlapping w
 curvature at which the one before was left, so time and memory stay proportional to the length.
 """
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
@@ -22,13 +23,15 @@ from ..road.centerline import read_axis
 from ..road.parameters import AlignmentObject, HorizontalElement, VerticalPoint
 from ..road.profile import IntersectionPoint, Profile
 from ..scenario.road import RoadScenario
-from .chain import FREE, NEAR, AxisData, Chain, ChainFit, Heights, Plan, Start, elevations
+from .chain import EQUAL, FREE, NEAR, ZERO, AxisData, Chain, ChainFit, Heights, Plan, Start, elevations, refine
 from .search import Goal, descent, improve_fit, independent_count
 
 _WINDOW = 1200.0  # m
 _TAIL = 300.0  # m at a window's end that only steady what lies before
 _MOST_POINTS = 3000  # in a window; denser data are thinned for the search, not for the figures reported
 _HEIGHT_SHARE = 0.6  # of the tolerance that the heights' rms may use
+_END_ELEMENT = 20.0  # m: of a line or an arc at an end, to begin with
+_SPARED = 1.0  # twice the logarithm of likelihood that such an end may cost
 _EXACT = 1e-6  # m: rms up to which data lie on a chain of elements (no smooth curve comes so near with few of them),
 _ROUNDED = 3.5e-4  # m: or on one whose coordinates were rounded to 1 mm, where residuals are random
 _RANDOM = 0.5  # correlation of neighbouring residuals that still passes for random
@@ -36,7 +39,10 @@ _GAP = 100.0  # m between points from which the chord between them is given some
 _CHORD_WEIGHT = 1e-3
 _MARGIN = 0.98  # of the tolerance that the search aims at: it may see thinned points only
 _NEGLIGIBLE = 0.3  # of the tolerance: residuals below it are worth no element
-_FINER_HELPS = 0.8  # of the rms at most must be left by knots half as far apart: else the rest is noise
+_FINER_HELPS = 0.8  # of the noise at most must be left by knots half as far apart: else the rest is noise
+_SCATTER = (
+    1.2  # times the noise is what fewer elements may leave where the tolerance asks for less: the data scatter so
+)
 _RELAXED = 1.5  # times what dense knots reach is aimed at where the tolerance cannot be had: less would fit noise
 _FLATTEST = 1e7  # m: a rounding of a larger radius bends by less than 1 mm over 100 m, and is written as a kink
 REFUSED_BEYOND = 40.0
@@ -197,7 +203,7 @@ def _written_radius(radius: float) -> float:
     return radius * (1.0 - _PLAY) if radius < _FLATTEST else 0.0
 
 
-def fit_axis(points: ArrayLike, tolerance: float = 0.05) -> AxisFit:
+def fit_axis(points: ArrayLike, tolerance: float = 0.05, design_ends: bool = False) -> AxisFit:
     """Return the alignment and profile fitted to the points of an axis, with the points' deviations.
 
     Args:
@@ -205,6 +211,8 @@ def fit_axis(points: ArrayLike, tolerance: float = 0.05) -> AxisFit:
         tolerance: m; the fit aims at an rms of the lateral distances up to it and 95 % within twice it (heights: 0.6
             of both) with as few elements as that takes. What is reached is reported: axes that no alignment of
             elements of a few metres follows (corners, jumps) are refused by `AxisFit.check` only.
+        design_ends: let the alignment begin and end on a line or an arc, as roads are designed, wherever the points
+            allow one as well as the clothoid that they end in. Too short a one is seen in no points.
 
     Raises:
         InputError: wrong shape, a value that isn't finite, fewer than two distinct points, a tolerance not above 0.
@@ -214,7 +222,7 @@ def fit_axis(points: ArrayLike, tolerance: float = 0.05) -> AxisFit:
         raise InputError("tolerance", tolerance, "a finite length above 0 m is needed")
     origin = np.append(np.round(given[:, :2].mean(axis=0)), 0.0)
     local, weights = _bridge_gaps(given - origin)
-    alignment, near = _fit_plan(local[:, :2], weights, _MARGIN * tolerance)
+    alignment, near = _fit_plan(local[:, :2], weights, _MARGIN * tolerance, design_ends)
     reach = max(NEAR, 5.0 * float(np.median(np.diff(near))))
     station, offset = alignment.project_near(local[:, :2], near, reach)
     across = np.hypot(*(local[:, :2] - alignment.position(station)).T)
@@ -259,10 +267,10 @@ def _bridge_gaps(points: Float) -> tuple[Float, Float]:
     return np.vstack((dense, points[-1:])), np.append(np.where(nth == 0, 1.0, _CHORD_WEIGHT), 1.0)
 
 
-def _fit_plan(points: Float, weights: Float, tolerance: float) -> tuple[Alignment, Float]:
+def _fit_plan(points: Float, weights: Float, tolerance: float, design_ends: bool) -> tuple[Alignment, Float]:
     """Return the alignment from the first point's foot to the last one's, and the points' approximate stations (N,)."""
     run = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
-    chain, station = _fit_windows(Plan(points, weights), run, tolerance)
+    chain, station = _fit_windows(Plan(points, weights), run, tolerance, design_ends)
     return _trim_ends(chain, float(station[0]), float(station[-1])), station - station[0]
 
 
@@ -272,10 +280,14 @@ def _fit_heights(station: Float, heights: Float, weights: Float, length: float, 
     return _profile(_fit_windows(Heights(heights[order], weights[order], station), station, tolerance)[0])
 
 
-def _fit_windows(data: AxisData, run: Float, tolerance: float) -> tuple[Chain, Float]:
+def _fit_windows(data: AxisData, run: Float, tolerance: float, design_ends: bool = False) -> tuple[Chain, Float]:
     """Fit window after window; return the whole chain and the approximate stations (N,) of all points on it, m.
 
-    `run` (N) tells how far along the points are, roughly as well.
+    Args:
+        data: points of the axis, or heights.
+        run: (N,) how far along they are, roughly as well, m.
+        tolerance: m.
+        design_ends: see `fit_axis`.
     """
     step = float(np.median(np.diff(run)))
     window, tail = max(_WINDOW, 60.0 * step), max(_TAIL, 15.0 * step)
@@ -290,6 +302,9 @@ def _fit_windows(data: AxisData, run: Float, tolerance: float) -> tuple[Chain, F
         every = -(-(end - first) // _MOST_POINTS)
         chosen = np.unique(np.append(np.arange(first, end, every), end - 1))
         fit = _fit_window(data, chosen, start, origin, float(run[end - 1] - run[first]), tolerance)
+        if design_ends:
+            ends = (["first"] if start is None else []) + (["last"] if end == len(run) else [])
+            fit = _end_on_design(fit, ends, tolerance)
         station[first:end] = origin + np.interp(np.arange(first, end), chosen, fit.stations)
         if end == len(run):
             return _join_pieces([*pieces, fit.chain]), station
@@ -317,12 +332,43 @@ def _fit_window(
     while not goal.is_met(rich) and 0.5 * spacing >= max(data.spacings.finest, scale):
         spacing *= 0.5
         finer = data.fit_window(chosen, spacing, start, origin)
-        if finer.rms > _FINER_HELPS * rich.rms:
+        if finer.noise > _FINER_HELPS * rich.noise:
             break
         rich = finer
-    if not goal.is_met(rich):
-        goal = replace(goal, rms=max(goal.rms, _RELAXED * rich.rms), p95=max(goal.p95, _RELAXED * rich.p95))
+    room = _SCATTER if goal.is_met(rich) else _RELAXED
+    goal = replace(goal, rms=max(goal.rms, room * rich.noise), p95=max(goal.p95, room * rich.p95))
     return improve_fit(min(descent(rich, goal), key=goal.rank), goal)
+
+
+def _end_on_design(fit: ChainFit, ends: Iterable[str], tolerance: float) -> ChainFit:
+    """Return a fit whose first and last elements (by ``ends``) are lines or arcs as far as its data allow it.
+
+    An arc in place of a clothoid's last metres bends the axis by millimetres: the data can't tell it from noise, and
+    by their number of parameters alone every road would begin and end in a clothoid.
+    """
+    floor = _NEGLIGIBLE * tolerance
+    for end in ends:
+        if fit.chain.kinds[0 if end == "first" else -1] != FREE or _is_exact(fit):
+            continue
+        count = independent_count(float(fit.chain.knots[-1]), len(fit.residuals))
+        worst = (fit.sum_of_squares / len(fit.residuals) + floor**2) * np.exp(_SPARED / count)
+        trials = [refine(fit.data, chain, fit.stations, True, 20) for chain in _end_chains(fit.chain, end)]
+        allowed = [one for one in trials if one.sum_of_squares / len(one.residuals) + floor**2 <= worst]
+        fit = min(allowed, key=lambda one: (one.chain.freedom(), one.sum_of_squares), default=fit)
+    return fit
+
+
+def _end_chains(chain: Chain, end: str) -> Iterator[Chain]:
+    """Yield the chain with the outer part of its first or last element made a line, and an arc."""
+    length = chain.knots[1] if end == "first" else chain.knots[-1] - chain.knots[-2]
+    part = min(_END_ELEMENT, 0.25 * length)
+    knot = part if end == "first" else chain.knots[-1] - part
+    at = int(np.searchsorted(chain.knots, knot))
+    knots = np.insert(chain.knots, at, knot)
+    values = np.insert(chain.values, at, np.interp(knot, chain.knots, chain.values))
+    for kind in (ZERO, EQUAL):
+        kinds = np.insert(chain.kinds, 0 if end == "first" else chain.size, kind)
+        yield replace(chain, knots=knots, values=values, kinds=kinds).tie_values()
 
 
 def _is_exact(fit: ChainFit) -> bool:

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..base.arrays import Float
 from .path import SPACING
-from .profiles import ACROSS, STRETCH, Grid, Profiles, SurfacePoints
+from .profiles import ACROSS, STRETCH, Grid, Profiles, SurfacePoints, row_gaps
 from .smoothing import bisquare, fill_gaps, robust_scale
 
 FARTHEST = 8.0
@@ -58,7 +58,7 @@ def paved_edge(profiles: Profiles, paved: Grid, begin: Float, sign: int, farthes
         edges[number] = _find_edge(share, float(profiles.offsets[column]), sign)
         if profiles.points is not None and np.isfinite(edges[number]):
             edges[number], apart[number] = _between_points(profiles.points, number, edges[number], sign)
-    return Edge(edges, apart)
+    return Edge(edges, apart if profiles.points is not None else row_gaps(profiles, edges))
 
 
 def _between_points(points: SurfacePoints, stretch: int, edge: float, sign: int) -> tuple[float, float]:
@@ -67,10 +67,16 @@ def _between_points(points: SurfacePoints, stretch: int, edge: float, sign: int)
     offset, paved = points.offset[near][::sign], points.paved[near][::sign]
     if len(offset) < _FEWEST_POINTS:
         return edge, 0.0
-    at = int(np.append(0, np.cumsum(np.where(paved, 1, -1))).argmax())
-    if at in (0, len(offset)):
+    gain = np.append(0, np.cumsum(np.where(paved, 1, -1)))
+    best = np.flatnonzero(
+        gain == gain.max()
+    )  # where points of both lie mingled there are several: the first is no edge
+    first, last = int(best[0]), int(best[-1])
+    if first == 0 or last == len(offset):
         return edge, 0.0
-    return 0.5 * float(offset[at - 1] + offset[at]), abs(float(offset[at] - offset[at - 1]))
+    gaps = [abs(float(offset[at] - offset[at - 1])) for at in (first, last)]
+    places = [0.5 * float(offset[at - 1] + offset[at]) for at in (first, last)]
+    return 0.5 * (places[0] + places[1]), max(*gaps, abs(places[1] - places[0]))
 
 
 def _find_edge(share: Float, begin: float, sign: int) -> float:

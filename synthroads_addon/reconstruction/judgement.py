@@ -6,6 +6,7 @@ or the ground steps up or down. A single carriageway's axis must lie in the midd
 what lies between two such pavements.
 """
 
+import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,19 +15,23 @@ import numpy as np
 from scipy import ndimage
 
 from ..base.arrays import Bool, Float
-from .layout import RoadLayout, axis_guides
+from .layout import Band, RoadLayout, axis_from_lines, axis_guides
+from .lines import Line
 from .profiles import STRETCH, Profiles
 from .smoothing import difference_figures, robust_scale
 from .views.fusion import APART
-from .views.pavement import pavement_edges
+from .views.pavement import pavement_edges, remove_grade
 
 FARTHEST_MIDDLE = 0.75
 """The middle between the pavement's edges may lie so far beside the axis, m."""
 FARTHEST_LINES = 0.5
 """The lines that make the axis may lie so far beside it, m."""
+RAISED = 0.05
+"""Paint lies flat: lines that stand so far above the ground on either side are rails, kerbs or gutters' edges, m."""
 ROUGHEST = 0.04
 """Pavements are seen smoother than this by any scanner that shows their edges, m."""
 _CORE = 1.5  # m to either side of a carriageway's middle that is pavement if anything is
+_ON_AND_BESIDE = ((-0.05, 0.05), (-0.6, -0.3), (0.3, 0.6))  # m from a line's middle: on it, to the right, to the left
 _FEWEST_STEPS = 50
 _NEAR = 4  # stretches to either side of one whose evidence counts for it
 _SHORTEST_TRUST = 5  # stretches
@@ -88,12 +93,16 @@ def judge(profiles: Profiles, layout: RoadLayout, cores: Sequence[float], rivals
     """
     guides = axis_guides(layout)
     lines = np.mean([guide.measured for guide in guides], axis=0)
+    if np.isfinite(lines).any():  # else nothing tells how far the others are from the axis
+        lines = np.where(np.isfinite(lines), lines, _carried(layout))
     middles = np.mean(pavement_edges(profiles, cores, layout.kind == "dual"), axis=0)
+    if profiles.paved is not None:  # where neither brightness nor height tells the edge the classes do
+        middles = np.where(np.isfinite(middles), middles, _middles_by_class(profiles, layout))
     what, edges = "the pavement's middle", "the pavement's edges aren't seen on both sides"
     unseen = np.isnan(middles)
     if layout.kind == "dual":
         what, edges = "the median's middle", "neither the median's edges nor lines on both sides of it are seen"
-        painted = np.all([np.isfinite(guide.measured) & (guide.width > 0.0) for guide in guides], axis=0)
+        painted = np.all([_is_painted(band, guide) for band, guide in zip(layout.bands, guides, strict=True)], axis=0)
         unseen &= ~_is_seen_nearby(painted)
     reasons = {
         "neither lines nor edges are seen": ~_is_seen_nearby(np.isfinite(lines)),
@@ -102,6 +111,7 @@ def judge(profiles: Profiles, layout: RoadLayout, cores: Sequence[float], rivals
         f"{what} lies more than {FARTHEST_MIDDLE:g} m beside it": np.abs(middles) > FARTHEST_MIDDLE,
         "the ground on its lanes is too rough for a pavement": lane_roughness(profiles, cores) > ROUGHEST,
     }
+    reasons["its lines stand above the ground, as rails do and no paint"] = raised_lines(profiles, layout) > RAISED
     if rivals is not None:
         reasons[f"views of it disagree by more than {APART:g} m"] = rivals
     masks = {reason: _without_short_runs(mask) for reason, mask in reasons.items()}
@@ -110,6 +120,28 @@ def judge(profiles: Profiles, layout: RoadLayout, cores: Sequence[float], rivals
         doubtful = ~ndimage.binary_opening(~doubtful, np.ones(_SHORTEST_TRUST))
     doubts = list(_doubts(profiles, doubtful, masks))
     return Judgement(doubts, float(1.0 - doubtful.mean()), lines, middles)
+
+
+def _middles_by_class(profiles: Profiles, layout: RoadLayout) -> Float:
+    """Return the middle (K,), m, of what the classes call the pavement, or of what lies between two; NaN if unseen."""
+    (right, left) = (layout.bands[0], layout.bands[-1])
+    if layout.kind == "dual":
+        return 0.5 * (right.edges[1].measured + left.edges[0].measured)
+    return 0.5 * (right.edges[0].measured + right.edges[1].measured)
+
+
+def _carried(layout: RoadLayout) -> Float:
+    """Return how far to the left of the axis (K,), m, all lines together say that it is; NaN where there are none."""
+    return axis_from_lines(layout).raw if any(band.lines for band in layout.bands) else np.array(np.nan)
+
+
+def _is_painted(band: Band, guide: Line) -> Bool:
+    """Return in which stretches (K,) a carriageway's paint is seen: the line beside the median, or one parallel to it.
+
+    A line narrower than the distance of two rows of points may lie between them for long.
+    """
+    parallel = [line for line in band.lines if line.width > 0.0] if guide.width > 0.0 else []
+    return np.any([np.isfinite(line.measured) for line in [*parallel]] or [np.zeros(len(guide.measured), bool)], axis=0)
 
 
 def lane_roughness(profiles: Profiles, cores: Sequence[float]) -> Float:
@@ -127,6 +159,33 @@ def lane_roughness(profiles: Profiles, cores: Sequence[float]) -> Float:
         if len(known) >= _FEWEST_STEPS:
             result[number] = robust_scale(known) / np.sqrt(2.0)
     return result
+
+
+def raised_lines(profiles: Profiles, layout: RoadLayout) -> Float:
+    """Return how far (K,), m, the painted lines stand above the ground to both sides of them; NaN where not seen.
+
+    The middle one of all lines counts: one may lie on a seam, or beside a gutter.
+    """
+    painted = [line for band in layout.bands for line in band.lines if line.width > 0.0]
+    height = remove_grade(profiles.height)
+    result = np.full((max(len(painted), 1), profiles.stretches), np.nan)
+    for row, line in enumerate(painted):
+        for number in np.flatnonzero(np.isfinite(line.measured)):
+            rows = height[max(0, (number - _NEAR) * STRETCH) : (number + _NEAR + 1) * STRETCH]
+            on, *beside = (
+                _mean_height(profiles, rows, float(line.measured[number]), *reach) for reach in _ON_AND_BESIDE
+            )
+            result[row, number] = on - max(beside)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # stretches without lines
+        return np.asarray(np.nanmedian(result, axis=0))
+
+
+def _mean_height(profiles: Profiles, rows: Float, offset: float, low: float, high: float) -> float:
+    """Return the median height, m, of some rows' bins between two distances (m) from an offset; NaN without any."""
+    bins = rows[:, profiles.column(offset + low) : profiles.column(offset + high) + 1]
+    known = bins[np.isfinite(bins)]
+    return float(np.median(known)) if len(known) else np.nan
 
 
 def _is_seen_nearby(seen: Bool) -> Bool:

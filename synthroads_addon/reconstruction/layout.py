@@ -2,14 +2,15 @@
 
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from scipy import ndimage
+from scipy.signal import find_peaks
 
 from ..base.arrays import Bool, Float, otsu_threshold
 from ..base.errors import InputError
-from .edges import paved_edge
+from .edges import FARTHEST, paved_edge
 from .lines import STANDARD_DASHES, USUAL, WAVELENGTH, Line
 from .path import SPACING
 from .profiles import ACROSS, STRETCH, Grid, Profiles
@@ -19,6 +20,10 @@ RoadKind = Literal["dual", "single"]
 
 _SEEN = 0.5  # of the road's length: what is seen on less belongs to a turnout or is a fault
 _SEEN_RURAL = 0.3
+_OTHER_EDGE, _OTHER_STRETCHES = 0.75, 5  # m that an edge lies off the usual place, and stretches, on another part
+_FEWEST_USUAL = 0.25  # of the road: a part that is less isn't the usual one
+_TOGETHER = 0.2  # of the stretches with both edges: lines that are less often seen together give way to these
+_COMMON = 0.35  # of the most common place: others so common may be the usual one
 _NARROWEST_BAND, _NARROWEST_MEDIAN, _WIDEST_MEDIAN = 3.0, 0.8, 30.0  # m
 _UNMARKED_CARRIAGEWAY = 7.0  # m: so wide a strip of pavement is a carriageway even if its lines aren't seen
 _IN_THE_MIDDLE = 0.15  # of a carriageway's width from its middle
@@ -43,6 +48,7 @@ class Band:
         lines: its lines from right to left.
         edges: its pavement's right and left edge as if they were lines, for want of lines.
         missing: offsets of lines that must be between its lines but aren't seen, m.
+        usual: (K,) the stretches in which it is as wide as usual; all if not given.
     """
 
     low: float
@@ -50,6 +56,11 @@ class Band:
     lines: list[Line]
     edges: tuple[Line, Line]
     missing: list[float] = field(default_factory=list)
+    usual: Bool | None = None
+
+    def place(self, line: Line) -> float:
+        """Return the median offset, m, of a line where the pavement is as wide as usual."""
+        return _place_in(line, self.usual)
 
     @property
     def width(self) -> float:
@@ -100,15 +111,15 @@ def find_layout(profiles: Profiles, lines: list[Line], wanted: RoadKind | None =
         InputError: no carriageway can be made out.
     """
     paved = profiles.paved if profiles.paved is not None else paved_by_brightness(profiles, lines)
-    seen = covered_length(profiles)
-    main = [line for line in lines if line.length >= _SEEN * seen]
     notes = []
     spans = paved_bands(profiles, paved)
-    if len(spans) == 1 or wanted == "single":  # rural roads have gaps in their lines, and no turnouts
-        main = [line for line in lines if line.length >= _SEEN_RURAL * seen]
-    if len(main) < len(lines):
-        notes.append(f"{len(lines) - len(main)} lines were seen on a small part of the road and left out")
-    bands = [_band(profiles, paved, span, main) for span in spans]
+    # Rural roads have gaps in their lines, and no turnouts.
+    least = _SEEN_RURAL if len(spans) == 1 or wanted == "single" else _SEEN
+    parts = [_Part.of(profiles, paved, spans, number) for number in range(len(spans))]
+    bands = [_band(profiles, paved, part, part.main(lines, least)) for part in parts]
+    left_out = sum(all(line not in part.main(lines, least) for part in parts) for line in lines)
+    if left_out:
+        notes.append(f"{left_out} lines were seen on a small part of the road and left out")
     if not bands:
         raise InputError("road", None, "no carriageway can be made out in the cloud")
     pair = None if wanted == "single" else _carriageway_pair(bands)
@@ -118,6 +129,70 @@ def find_layout(profiles: Profiles, lines: list[Line], wanted: RoadKind | None =
     if len(bands) > len(chosen):
         notes.append(f"{len(bands) - len(chosen)} other strips of pavement were left out")
     return RoadLayout("dual" if pair else "single", chosen, paved, tuple(notes))
+
+
+@dataclass(frozen=True)
+class _Part:
+    """The part of the road on which a strip of pavement is as wide as usual.
+
+    Attributes:
+        span: offsets of its edges there, m.
+        usual: (K,) the stretches of the part.
+        seen: its share of the road's length.
+        length: of the road that the cloud shows, m.
+    """
+
+    span: tuple[float, float]
+    usual: Bool
+    seen: float
+    length: float
+
+    @classmethod
+    def of(cls, profiles: Profiles, paved: Grid, spans: list[tuple[float, float]], number: int) -> Self:
+        """Return the part of one of the strips: where lanes begin or end, or beside a turnout, another one begins."""
+        low, high = spans[number]
+        begin = np.full(profiles.stretches, 0.5 * (low + high))
+        usual, span = np.ones(profiles.stretches, dtype=bool), [low, high]
+        for side, sign in enumerate((-1, 1)):
+            next_to = number + sign
+            room = abs(spans[next_to][1 - side] - span[side]) if 0 <= next_to < len(spans) else 2.0 * FARTHEST
+            edge = paved_edge(profiles, paved, begin, sign, 0.5 * (high - low) + min(FARTHEST, 0.5 * room)).offsets
+            place = usual_place(sign * edge)
+            if place is None:
+                continue
+            other = np.isfinite(edge) & (np.abs(sign * edge - place) > _OTHER_EDGE)
+            closed = ndimage.binary_closing(np.pad(other, 3, mode="edge"), np.ones(3))[3:-3]
+            other = ndimage.binary_opening(closed, np.ones(_OTHER_STRETCHES))
+            if other.any():
+                usual &= ~other
+                span[side] = sign * place
+        if usual.sum() < _FEWEST_USUAL * len(usual):
+            return cls((low, high), np.ones(len(usual), dtype=bool), 1.0, covered_length(profiles))
+        return cls((span[0], span[1]), usual, float(usual.mean()), covered_length(profiles))
+
+    def main(self, lines: list[Line], least: float) -> list[Line]:
+        """Return the lines that are seen along at least a share of the part."""
+        return [line for line in lines if self._along(line) >= least * self.seen * self.length]
+
+    def _along(self, line: Line) -> float:
+        inside = self.usual & (line.stations > line.start) & (line.stations < line.end)
+        return min(line.length, STRETCH * SPACING * float(inside.sum()))
+
+
+def usual_place(distance: Float) -> float | None:
+    """Return where an edge lies usually, m, of its distances (K,) along the road: the innermost of common places.
+
+    Turnouts and lanes that begin make the pavement wider, and on a short road may be longer than what lies between
+    them. None where it isn't seen.
+    """
+    known = distance[np.isfinite(distance)]
+    if not len(known):
+        return None
+    edges = np.arange(known.min() - 0.25, known.max() + 0.36, 0.1)
+    count = ndimage.uniform_filter1d(np.histogram(known, edges)[0].astype(np.float64), 3)
+    peak = int(find_peaks(np.pad(count, 1), height=_COMMON * count.max())[0][0]) - 1
+    near = known[np.abs(known - edges[peak] - 0.05) < 0.4]
+    return float(np.median(near))
 
 
 def covered_length(profiles: Profiles) -> float:
@@ -210,22 +285,29 @@ def _blur(values: Grid) -> Grid:
         return np.where(weight > 0.05, mean / weight, np.nan)
 
 
-def _band(profiles: Profiles, paved: Grid, span: tuple[float, float], lines: list[Line]) -> Band:
+def _place_in(line: Line, usual: Bool | None) -> float:
+    """Return a line's median offset, m, in the stretches of a mask (K,), or in all where it is seen in none of them."""
+    inside = line.offsets[usual] if usual is not None else line.offsets
+    return float(np.nanmedian(inside)) if np.isfinite(inside).any() else line.offset
+
+
+def _band(profiles: Profiles, paved: Grid, part: _Part, lines: list[Line]) -> Band:
     """Return a strip of pavement with its lines; of two nearer than a lane the longer, more painted one is kept."""
-    low, high = span
-    inside = [line for line in lines if low - _BAND_MARGIN < line.offset < high + _BAND_MARGIN]
+    low, high = part.span
+    place = {id(line): _place_in(line, part.usual) for line in lines}
+    inside = [line for line in lines if low - _BAND_MARGIN < place[id(line)] < high + _BAND_MARGIN]
     kept: list[Line] = []
     for line in sorted(inside, key=lambda item: -item.length * (0.2 + item.width)):
-        if all(abs(line.offset - other.offset) >= _NARROWEST_LANE for other in kept):
+        if all(abs(place[id(line)] - place[id(other)]) >= _NARROWEST_LANE for other in kept):
             kept.append(line)
-    kept.sort(key=lambda line: line.offset)
+    kept.sort(key=lambda line: place[id(line)])
     missing = []
-    for right, left in pairwise(kept):
-        apart = left.offset - right.offset
-        if apart > _WIDEST_LANE:
-            count = round(apart / _USUAL_LANE)
-            missing += [right.offset + apart * (i + 1) / count for i in range(count - 1)]
-    return Band(low, high, kept, (_edge_line(profiles, paved, span, -1), _edge_line(profiles, paved, span, 1)), missing)
+    for right, left in pairwise(place[id(line)] for line in kept):
+        if left - right > _WIDEST_LANE:
+            count = round((left - right) / _USUAL_LANE)
+            missing += [right + (left - right) * (i + 1) / count for i in range(count - 1)]
+    edges = _edge_line(profiles, paved, part.span, -1), _edge_line(profiles, paved, part.span, 1)
+    return Band(low, high, kept, edges, missing, part.usual)
 
 
 def _edge_line(profiles: Profiles, paved: Grid, span: tuple[float, float], sign: int) -> Line:
@@ -299,7 +381,9 @@ def axis_from_lines(layout: RoadLayout) -> FoundAxis:
     if not any(np.isfinite(line.measured).any() for line in lines):
         raise InputError("road", None, "neither lines nor edges of a carriageway can be made out in the cloud")
     if not np.isfinite(given).any():
-        start = np.nanmean(np.array([line.measured for line in lines]), axis=0)
+        measured = np.array([line.measured for line in lines])
+        known = np.isfinite(measured).sum(axis=0)
+        start = np.where(known > 0, np.nansum(measured, axis=0) / np.maximum(known, 1), np.nan)
     axis = fill_gaps(start)
     for _ in range(_ROUNDS):
         raw = _vote_axis(lines, axis)
@@ -320,7 +404,17 @@ def axis_guides(layout: RoadLayout) -> tuple[Line, ...]:
         right, left = layout.bands
         return right.guide(1), left.guide(-1)
     (band,) = layout.bands
-    return (band.middle,) if band.middle is not None else (band.guide(-1), band.guide(1))
+    if band.middle is not None:
+        return (band.middle,)
+    guides = band.guide(-1), band.guide(1)
+    # A line on one side and the pavement's edge on the other have nothing between them that is the middle of both.
+    alike = (guides[0].width > 0.0) == (guides[1].width > 0.0)
+    return guides if alike and _seen_together(guides) >= _TOGETHER * _seen_together(band.edges) else band.edges
+
+
+def _seen_together(pair: tuple[Line, Line]) -> int:
+    """Return in how many stretches both of two lines are seen."""
+    return int((np.isfinite(pair[0].measured) & np.isfinite(pair[1].measured)).sum())
 
 
 def _vote_axis(lines: list[Line], axis: Float) -> Float:

@@ -8,7 +8,7 @@ from scipy.signal import find_peaks
 
 from ..base.arrays import Bool, Float
 from .path import SPACING
-from .profiles import ACROSS, STRETCH, Grid, Profiles, SurfacePoints
+from .profiles import ACROSS, STRETCH, Grid, Profiles, SurfacePoints, row_gaps
 from .smoothing import hidden_std, mean_with_std, smooth
 
 WAVELENGTH = 40.0
@@ -24,6 +24,7 @@ _NEAR = 0.35  # m to either side of a line that its paint lies within
 _FEWEST = 0.3  # of a row must be painted to count
 _AROUND = 41  # rows around one, in which there is a dash
 _FULL = 0.3  # of a line's usual width: less is no paint
+_ROW = 0.04  # m across that points of one row wobble over
 _FEWEST_POINTS = 4  # on a line in a stretch
 _SOLID = 0.65  # of its length: a line painted there is solid
 _Track = list[tuple[float, float]]
@@ -165,7 +166,7 @@ def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line |
     if (weights > 0.0).sum() < 4:
         return None
     width, width_std = mean_with_std(cover[inside][np.nan_to_num(share[inside]) > 0.5])
-    apart = np.zeros(len(grid))
+    apart = row_gaps(profiles, measured)
     if profiles.points is not None:
         on = np.where(inside & np.isfinite(share), share, 0.0) > 0.5
         measured, widths, apart = _between_points(profiles, profiles.points, measured, on)
@@ -280,7 +281,21 @@ def _between_points(profiles: Profiles, points: SurfacePoints, measured: Float, 
         middle[number], width[number] = 0.5 * (left + right), left - right
         gaps = offset[low] - offset[low - 1], offset[high] - offset[high - 1]
         apart[number] = 0.5 * float(np.hypot(*gaps))
+        if offset[high - 1] - offset[low] < _ROW and min(gaps) < _ROW:
+            middle[number], apart[number] = _on_a_row(offset, low, high)
     return middle, width, apart
+
+
+def _on_a_row(offset: Float, low: int, high: int) -> tuple[float, float]:
+    """Return middle and gap, m, of a line of which one row of points (``low`` to ``high``) is partly on it.
+
+    One of its edges runs along the row, but which of both no order of points tells that lie within a row's wobble.
+    """
+    row = float(offset[low:high].mean())
+    before, beyond = offset[offset < row - _ROW], offset[offset > row + _ROW]
+    if not len(before) or not len(beyond):
+        return row, 2.0 * _NEAR
+    return row, 0.5 * float(beyond[0] - before[-1])
 
 
 def _best_span(marked: Bool) -> tuple[int, int]:

@@ -100,6 +100,22 @@ class Profiles:
         return int(np.clip(round((offset - self.offsets[0]) / ACROSS), 0, len(self.offsets) - 1))
 
 
+def row_gaps(profiles: Profiles, offsets: Float) -> Float:
+    """Return the distance (K,), m, of the rows of points about an offset in each stretch; 0 where they lie densely.
+
+    A scanner that follows the road leaves bins empty between rows: what is found there is found no better than that.
+    """
+    gaps = np.zeros(profiles.stretches)
+    for number in np.flatnonzero(np.isfinite(offsets)):
+        rows = slice(number * STRETCH, (number + 1) * STRETCH)
+        filled = np.flatnonzero((profiles.count[rows] > 0).any(axis=0))
+        column = profiles.column(float(offsets[number]))
+        before, beyond = filled[filled < column], filled[filled > column]
+        if len(before) and len(beyond):
+            gaps[number] = 0.5 * ACROSS * float(beyond[0] - before[-1])
+    return np.where(gaps > 1.5 * ACROSS, gaps, 0.0)
+
+
 def make_profiles(cloud: RoadCloud, path: CloudPath, half_width: float, exact: bool = False) -> Profiles:
     """Return the cross profiles of a cloud's surface along a path, up to ``half_width`` (m) to either side.
 

@@ -40,6 +40,7 @@ class Reconstruction:
         profiles, layout: along the alignment.
         surfaces: by side, along the alignment.
         judgement: where its axis isn't to be trusted.
+        unlike: stretches whose pavement isn't as wide as the cross-section.
         notes: what a reader must know.
     """
 
@@ -51,6 +52,7 @@ class Reconstruction:
     layout: RoadLayout
     surfaces: dict[Side, Surface]
     judgement: Judgement
+    unlike: list[Unlike] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
 
@@ -73,7 +75,7 @@ def reconstruct(cloud: RoadCloud, options: Options | None = None, progress: Prog
     along = alignment_path(fit.alignment)
     profiles = make_profiles(cloud, along, half, exact=True)
     layout = find_layout(profiles, find_lines(profiles), layout.kind)
-    section = measure_section(profiles, layout, cloud.marked)
+    section = measure_section(profiles, layout, cloud.marked, _axis_std(road.axis))
     if options.snap:
         section = snap_to_standard(section)
     surfaces = {side: _surface(profiles, section, side, rotation) for side in SIDES}
@@ -99,7 +101,12 @@ def reconstruct(cloud: RoadCloud, options: Options | None = None, progress: Prog
     notes = [*layout.notes, *_notes(cloud, section, measured)]
     judgement = judge(profiles, layout, carriageway_middles(section), _rivals_along(road, along, profiles))
     judgement = replace(judgement, sections=tuple(map(_section_doubt, others)))
-    return Reconstruction(parameters, measured, road.axis, path, profiles, layout, surfaces, judgement, notes)
+    return Reconstruction(parameters, measured, road.axis, path, profiles, layout, surfaces, judgement, others, notes)
+
+
+def _axis_std(axis: FusedAxis) -> float:
+    """Return the standard deviation, m, of where the axis lies along the whole road."""
+    return float(np.median(axis.std[np.isfinite(axis.raw)]))
 
 
 def _section_doubt(other: Unlike) -> Doubt:
@@ -138,7 +145,7 @@ def fit_axis_and_profile(
     smoothed = smooth(height, np.isfinite(height).astype(np.float64), STRETCH * SPACING, 30.0)
     offset = _replace_faults(centre.raw, centre.offsets)[kept]
     plan = profiles.path.place(centre.stations[kept], offset)
-    return fit_axis(np.column_stack([plan, _replace_faults(height, smoothed.values)[kept]]), tolerance), rotation
+    return fit_axis(np.column_stack([plan, _replace_faults(height, smoothed.values)[kept]]), tolerance, True), rotation
 
 
 def _ground_heights(profiles: Profiles, centre: FusedAxis) -> Float:

@@ -13,6 +13,7 @@ from .cloud import PointKind, RoadCloud
 from .reconstruct import Reconstruction
 from .section import MeasuredSection, Side, SideSection, standard_section
 from .smoothing import difference_figures
+from .widenings import Bay
 
 _MOST_POINTS = 400_000
 _FROM_EDGES = 0.1  # m: nearer to an edge of the pavement than this a point may lie beside it
@@ -35,7 +36,7 @@ def report(found: Reconstruction, cloud: RoadCloud) -> dict[str, Any]:
         "edges": {name: _edges(side, found, geometry) for name, side in section.sides.items()},
         "lines": _lines(found, geometry),
         "crossfall": {name: _figures(100.0 * _excess_fall(found, geometry, name)) for name in section.sides},
-        "emergency_bays": [_rounded(asdict(bay)) for bay in found.measured.bays],
+        "emergency_bays": [_bay(bay) for bay in found.measured.bays],
         "objects": _objects(found),
         "rules_broken": [asdict(violation) for violation in violations],
         "notes": found.notes,
@@ -138,7 +139,8 @@ def _excess_fall(found: Reconstruction, geometry: RoadGeometry, side: Side) -> F
     return found.surfaces[side].fall - modelled
 
 
-def _rounded(values: dict[str, Any]) -> dict[str, Any]:
+def _bay(bay: Bay) -> dict[str, Any]:
+    values = {name: value for name, value in asdict(bay).items() if name != "covariance"}
     return {name: round(value, 3) if isinstance(value, float) else value for name, value in values.items()}
 
 

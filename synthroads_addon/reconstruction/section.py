@@ -1,6 +1,7 @@
 """The cross-section in numbers, each with its standard deviation: lanes, strips, shoulders, median."""
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -13,7 +14,7 @@ from .edges import FARTHEST, Edge, paved_edge
 from .layout import Band, RoadKind, RoadLayout
 from .lines import Line
 from .profiles import Profiles
-from .smoothing import mean_with_std
+from .smoothing import interval_mean, mean_with_std
 
 Side = Literal["left", "right"]
 SIDES: tuple[Side, ...] = ("right", "left")
@@ -25,6 +26,7 @@ _RURAL_EDGE_LINE, _RURAL_LINE = 0.25, 0.12  # on other roads (RMS)
 _LINE_TOLERANCE = 0.05  # m: a measured width so near to a usual one is that
 _WIDEST_STRIP = 1.25  # m: pavement beyond the outermost lane that is wider has a hard shoulder
 _USUAL_STRIP = 0.5
+_PAINT_STD, _EDGE_STD = 0.04, 0.08  # m that lines and edges found by brightness are off all along a road
 _FEWEST_EDGES = 0.2  # of the stretches must show an edge
 _AROUND, _SOLID = 7, 0.8  # stretches around one, and their share of paint: along a dashed line it is less
 _FEWEST_STRETCHES = 6
@@ -45,8 +47,21 @@ class Estimate:
 
     @classmethod
     def of(cls, values: Float, apart: Float | None = None) -> Self:
-        """Return the robust mean of values (K,), in order along the road, with its standard deviation."""
-        return cls(*mean_with_std(values, apart))
+        """Return the robust mean of values (K,), in order along the road, with its standard deviation.
+
+        Of values midway between rows of points, ``apart`` (K,) from each other, m, it is that of `interval_mean`.
+        """
+        if apart is None or not (apart[np.isfinite(values)] > 0.0).any():
+            return cls(*mean_with_std(values))
+        return cls(*interval_mean(values, apart))
+
+    def __sub__(self, other: Self) -> Self:
+        """Return the difference of two numbers whose errors are independent."""
+        return type(self)(self.value - other.value, float(np.hypot(self.std, other.std)))
+
+    def widened(self, std: float) -> Self:
+        """Return the number with one more independent error of a standard deviation."""
+        return type(self)(self.value, float(np.hypot(self.std, std)))
 
     def to_dict(self, digits: int = 4) -> dict[str, float | None]:
         """Return value and standard deviation, rounded, as JSON data; null where not finite."""
@@ -96,10 +111,10 @@ class SideSection:
     @property
     def paved_width(self) -> Estimate:
         """Return the width of the pavement from edge to edge, m; from its parts where an edge isn't seen."""
-        ends = (self.inner_edge.apart, self.outer_edge.apart)
         width = np.where(self.usual, self.outer_edge.offsets - self.inner_edge.offsets, np.nan)
         if self.edge_seen and np.isfinite(width).any():
-            return Estimate.of(width, np.hypot(*ends))
+            inner, outer = (np.where(self.usual, edge.offsets, np.nan) for edge in (self.inner_edge, self.outer_edge))
+            return Estimate.of(outer, self.outer_edge.apart) - Estimate.of(inner, self.inner_edge.apart)
         parts = [self.inner_strip, *self.lanes, self.outer_width]
         return Estimate(sum(p.value for p in parts), float(np.sqrt(sum(p.std**2 for p in parts))))
 
@@ -136,16 +151,17 @@ class MeasuredSection:
         return Estimate(left.value + right.value, float(np.hypot(left.std, right.std)))
 
 
-def measure_section(profiles: Profiles, layout: RoadLayout, marked: bool) -> MeasuredSection:
+def measure_section(profiles: Profiles, layout: RoadLayout, marked: bool, axis_std: float = 0.0) -> MeasuredSection:
     """Return the cross-section, with standard deviations, that profiles along the alignment show.
 
     Args:
         profiles: along the alignment, so that offset 0 is the axis.
         layout: of these profiles.
         marked: whether paint is known by class; if not, lines look wider than they are and get the usual widths.
+        axis_std: standard deviation of where the axis lies, m, from which all is measured.
     """
     bands = zip(SIDES, layout.bands * (2 if layout.kind == "single" else 1), strict=True)
-    parts = [_SidePart(profiles, layout, band, side, marked) for side, band in bands]
+    parts = [_SidePart(profiles, layout, band, side, marked, axis_std) for side, band in bands]
     if layout.kind == "single":
         return MeasuredSection("single", {part.side: _half_section(part) for part in parts}, layout.bands[0].middle)
     sides = {part.side: _carriageway(part) if len(part.band.lines) > 1 else _assumed_section(part) for part in parts}
@@ -165,7 +181,7 @@ class _SidePart:
     """Inputs for measuring one side of the road.
 
     Attributes:
-        profiles, layout, marked: as in `measure_section`.
+        profiles, layout, marked, axis_std: as in `measure_section`.
         band: the pavement that is its own, or that it has a half of.
         side: of the axis.
     """
@@ -175,6 +191,7 @@ class _SidePart:
     band: Band
     side: Side
     marked: bool
+    axis_std: float
 
     @property
     def sign(self) -> int:
@@ -184,6 +201,17 @@ class _SidePart:
     def everywhere(self, value: float) -> Float:
         """Return an array (K,) with the same value for each stretch."""
         return np.full(self.profiles.stretches, value)
+
+    def outer_edge(self, first: Float, last: Float) -> Edge:
+        """Return the pavement's outer edge, m from the axis, beyond a last line, or before it where it is narrower.
+
+        Args:
+            first, last: (K,) distances of the innermost and the outermost line, m.
+        """
+        edge = self.edge(last)
+        nearer = self.edge(first, reach=last - first + FARTHEST)
+        unseen = ~np.isfinite(edge.offsets)
+        return Edge(np.where(unseen, nearer.offsets, edge.offsets), np.where(unseen, nearer.apart, edge.apart))
 
     def edge(self, begin: Float, outwards: bool = True, reach: float | Float = FARTHEST) -> Edge:
         """Return the pavement's edge beyond distances (K,), m, from the axis, as distances from the axis."""
@@ -205,15 +233,48 @@ def line_width(line: Line | None, kind: LineKind, road: RoadKind, marked: bool) 
     return near if abs(near - line.width) <= _LINE_TOLERANCE else float(np.clip(round(line.width, 2), 0.05, 1.0))
 
 
+@dataclass(frozen=True)
+class _Boundary:
+    """A boundary of a lane as distances from the axis, m.
+
+    Attributes:
+        smoothed: (K,) along the road; NaN where it isn't there.
+        measured: (K,) in single stretches; NaN where nothing was seen.
+        apart: (K,) distance of the rows of points that each lies midway between, 0 where it is a mean.
+        seen: whether it was: else it is put evenly between its neighbours.
+    """
+
+    smoothed: Float
+    measured: Float
+    apart: Float
+    seen: bool = True
+
+    @classmethod
+    def of(cls, line: Line, sign: int) -> Self:
+        """Return a line's middle as a boundary on the side of a sign."""
+        return cls(sign * line.offsets, sign * line.measured, line.apart)
+
+    def shift(self, by: float) -> Self:
+        """Return the boundary so much (m) farther outside."""
+        return replace(self, smoothed=self.smoothed + by, measured=self.measured + by)
+
+    def place(self, where: Bool) -> Estimate:
+        """Return the mean distance from the axis in the stretches of a mask (K,), m."""
+        values = np.where(where, self.measured, np.nan)
+        estimate = Estimate.of(values if np.isfinite(values).any() else self.measured, self.apart)
+        return estimate if self.seen else replace(estimate, std=np.inf)
+
+
 def _carriageway(part: _SidePart) -> SideSection:
     """Return the measured cross-section of one carriageway of a dual one."""
-    lines, distances, apart = _order_lines(part.band, part.sign)
-    distances[:, 0] += 0.5 * line_width(lines[0], "inner_edge", "dual", part.marked)
-    outer = part.edge(_fill_with_median(distances[:, -1]))
+    lines, boundaries = _order_lines(part.band, part.sign)
+    boundaries[0] = boundaries[0].shift(0.5 * line_width(lines[0], "inner_edge", "dual", part.marked))
+    first, last = boundaries[0].smoothed, boundaries[-1].smoothed
+    outer = part.outer_edge(_fill_with_median(first), _fill_with_median(last))
     if not _lacks_outer_lane(lines[-1], outer):
-        distances[:, -1] -= 0.5 * line_width(lines[-1], "outer_edge", "dual", part.marked)
-    first = _fill_with_median(distances[:, 0])
-    return _summarise_side(part.side, lines, (distances, apart), part.edge(first, False, first), outer)
+        boundaries[-1] = boundaries[-1].shift(-0.5 * line_width(lines[-1], "outer_edge", "dual", part.marked))
+    first = _fill_with_median(first)
+    return _summarise_side(part, lines, boundaries, part.edge(first, False, first), outer)
 
 
 def _half_section(part: _SidePart) -> SideSection:
@@ -221,22 +282,22 @@ def _half_section(part: _SidePart) -> SideSection:
     nowhere = part.everywhere(0.0)
     beside = {s: _half_lines(part.band, s, part.marked) for s in (1, -1)}
     lines: list[Line | None] = [part.band.middle, *beside[part.sign]]
-    columns = [nowhere, *(part.sign * line.offsets for line in beside[part.sign])]
-    apart = [nowhere, *(line.apart for line in beside[part.sign])]
+    columns = [_Boundary(nowhere, nowhere, nowhere), *(_Boundary.of(line, part.sign) for line in beside[part.sign])]
     outer = part.edge(part.everywhere(_NARROWEST), reach=_WIDEST_HALF)
     mirrored = len(lines) == 1 and bool(beside[-part.sign])
     if len(lines) > 1:
-        columns[-1] = columns[-1] - 0.5 * line_width(lines[-1], "outer_edge", "single", part.marked)
+        columns[-1] = columns[-1].shift(-0.5 * line_width(lines[-1], "outer_edge", "single", part.marked))
     elif mirrored:
         other = min(abs(line.offset) for line in beside[-part.sign])
-        columns.append(part.everywhere(other - 0.5 * line_width(None, "outer_edge", "single", part.marked)))
-        apart.append(nowhere)
+        place = part.everywhere(other - 0.5 * line_width(None, "outer_edge", "single", part.marked))
+        columns.append(_Boundary(place, place, nowhere, False))
     else:  # no edge line at all: the lane reaches to the pavement's edge
-        columns.append(outer.offsets if np.isfinite(outer.offsets).any() else part.everywhere(0.5 * part.band.width))
-        apart.append(outer.apart)
+        visible = bool(np.isfinite(outer.offsets).any())
+        place = outer.offsets if visible else part.everywhere(0.5 * part.band.width)
+        columns.append(_Boundary(place, place, outer.apart, visible))
     lines += [None] * (len(columns) - len(lines))
     inner = Edge(nowhere, nowhere)
-    half = _summarise_side(part.side, lines, (np.column_stack(columns), np.column_stack(apart)), inner, outer)
+    half = _summarise_side(part, lines, columns, inner, outer)
     nothing = Estimate(0.0, 0.0)
     return replace(half, inner_offset=nothing, inner_strip=nothing, mirrored=mirrored)
 
@@ -265,10 +326,10 @@ def _assumed_section(part: _SidePart) -> SideSection:
     name = min(STANDARD_CROSS_SECTIONS, key=lambda key: abs(STANDARD_CROSS_SECTIONS[key].paved_width - width))
     row = STANDARD_CROSS_SECTIONS[name]
     first = inner.offsets + row.inner_edge_strip
-    columns = [first + sum(row.lanes[::-1][:i]) for i in range(len(row.lanes) + 1)]
+    places = [first + sum(row.lanes[::-1][:i]) for i in range(len(row.lanes) + 1)]
+    columns = [_Boundary(place, place, inner.apart, False) for place in places]
     lines: list[Line | None] = [None] * len(columns)
-    apart = np.tile(inner.apart[:, None], len(columns))
-    measured_side = _summarise_side(part.side, lines, (np.column_stack(columns), apart), inner, outer)
+    measured_side = _summarise_side(part, lines, columns, inner, outer)
     lanes = [Estimate(lane, np.inf) for lane in reversed(row.lanes)]
     return replace(measured_side, lanes=lanes, inner_strip=Estimate(row.inner_edge_strip, np.inf), assumed=name)
 
@@ -288,32 +349,37 @@ def _fill_with_median(distance: Float) -> Float:
 
 
 def _summarise_side(
-    name: Side, lines: list[Line | None], boundaries: tuple[Float, Float], inner: Edge, outer: Edge
+    part: _SidePart, lines: list[Line | None], boundaries: list[_Boundary], inner: Edge, outer: Edge
 ) -> SideSection:
     """Return a side's widths, with standard deviations, from lines and edges measured in each stretch."""
-    distance, apart = boundaries
-    lanes = [
-        Estimate.of(distance[:, i + 1] - distance[:, i], np.hypot(apart[:, i], apart[:, i + 1]))
-        for i in range(distance.shape[1] - 1)
-    ]
+    last = boundaries[-1]
     edge_seen = _is_visible(outer)
-    usual = _usual_stretches(outer.offsets - distance[:, -1], lines[-1])
+    outside_of_lanes = outer.offsets - _fill_with_median(last.smoothed)
+    if part.band.usual is not None:
+        outside_of_lanes = np.where(part.band.usual, outside_of_lanes, np.nan)
+    usual = _usual_stretches(outside_of_lanes, lines[-1])
+    where = usual if usual.sum() >= _FEWEST_STRETCHES else np.ones(len(usual), dtype=bool)
+    places = [boundary.place(where).widened(0.0 if part.marked else _PAINT_STD) for boundary in boundaries]
+    edge_std = 0.0 if part.profiles.paved is not None else _EDGE_STD
+    if part.layout.kind == "single":  # its lanes begin at the axis
+        places[0] = replace(places[0], std=part.axis_std)
     outside = Estimate(_USUAL_STRIP, np.inf)
     if edge_seen:
-        width = np.where(usual, outer.offsets - distance[:, -1], np.nan)
-        outside = Estimate.of(width, np.hypot(outer.apart, apart[:, -1]))
+        edge = Estimate.of(np.where(usual if usual.any() else True, outer.offsets, np.nan), outer.apart)
+        outside = edge.widened(edge_std) - places[-1]
     outside = Estimate(float(np.clip(outside.value, 0.0, 2.0 + _WIDEST)), outside.std)
     strip, shoulder = _share_pavement(outside)
-    inner_offset, inner_strip = _inner_widths(distance[:, 0], apart[:, 0], inner)
+    inner_offset, inner_strip = _inner_widths(places[0], inner, where, edge_std)
+    inner_offset = inner_offset.widened(part.axis_std)
     return SideSection(
-        side=name,
+        side=part.side,
         lines=lines,
         inner_edge=inner,
         outer_edge=outer,
         usual=usual,
         inner_offset=inner_offset,
         inner_strip=inner_strip,
-        lanes=lanes,
+        lanes=[after - before for before, after in pairwise(places)],
         outer_width=outside,
         strip=strip,
         shoulder=shoulder,
@@ -322,13 +388,13 @@ def _summarise_side(
     )
 
 
-def _inner_widths(first: Float, apart: Float, inner: Edge) -> tuple[Estimate, Estimate]:
+def _inner_widths(first: Estimate, inner: Edge, where: Bool, edge_std: float) -> tuple[Estimate, Estimate]:
     """Return the distance of the pavement's inner edge from the axis, and the inner edge strip's width, m."""
     if _is_visible(inner):
-        offset = Estimate.of(inner.offsets, inner.apart)
-        strip = Estimate.of(first - inner.offsets, np.hypot(apart, inner.apart))
+        offset = Estimate.of(np.where(where, inner.offsets, np.nan), inner.apart).widened(edge_std)
+        strip = first - offset
     else:
-        offset = Estimate(Estimate.of(first).value - _USUAL_STRIP, np.inf)
+        offset = Estimate(first.value - _USUAL_STRIP, np.inf)
         strip = Estimate(_USUAL_STRIP, np.inf)
     return (Estimate(max(0.0, offset.value), offset.std), Estimate(float(np.clip(strip.value, 0.0, 2.0)), strip.std))
 
@@ -352,23 +418,23 @@ def _usual_stretches(outside: Float, line: Line | None) -> Bool:
     return usual & (np.abs(outside - edges[peak] - 0.05) < _MODE)
 
 
-def _order_lines(band: Band, sign: int) -> tuple[list[Line | None], Float, Float]:
-    """Return lines outwards (None: unseen), their distances from the axis (K, lines), m, and their points' gaps, m."""
-    seen: list[tuple[float, Line | None]] = [(sign * line.offset, line) for line in band.lines]
+def _order_lines(band: Band, sign: int) -> tuple[list[Line | None], list[_Boundary]]:
+    """Return lines outwards (None: unseen), and where they lie; unseen ones evenly between their neighbours."""
+    seen: list[tuple[float, Line | None]] = [(sign * band.place(line), line) for line in band.lines]
     seen += [(sign * offset, None) for offset in band.missing]
     seen.sort(key=lambda item: item[0])
     lines = [line for _, line in seen]
-    count = len(band.lines[0].offsets)
-    nowhere, together = np.full(count, np.nan), np.zeros(count)
-    distances = np.column_stack([sign * line.offsets if line is not None else nowhere for line in lines])
-    apart = np.column_stack([line.apart if line is not None else together for line in lines])
-    for number, line in enumerate(lines):
-        if line is None:  # evenly between its neighbours
-            before = max(i for i in range(number) if lines[i] is not None)
-            after = min(i for i in range(number, len(lines)) if lines[i] is not None)
-            share = (number - before) / (after - before)
-            distances[:, number] = (1.0 - share) * distances[:, before] + share * distances[:, after]
-    return lines, distances, apart
+    known = {number: _Boundary.of(line, sign) for number, line in enumerate(lines) if line is not None}
+    boundaries = []
+    for number in range(len(lines)):
+        if number in known:
+            boundaries.append(known[number])
+            continue
+        before, after = max(i for i in known if i < number), min(i for i in known if i > number)
+        share = (number - before) / (after - before)
+        place = (1.0 - share) * known[before].smoothed + share * known[after].smoothed
+        boundaries.append(_Boundary(place, place, known[before].apart, False))
+    return lines, boundaries
 
 
 def _share_pavement(outside: Estimate) -> tuple[Estimate, Estimate]:

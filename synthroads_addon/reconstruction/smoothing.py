@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.special import ndtr
 
 from ..base.arrays import Float
 
@@ -11,6 +12,10 @@ ORDER = 3
 """Order of the differences that are held small: a curvature that changes linearly costs nothing."""
 _ROUNDS = 6
 _BISQUARE = 4.685  # times the residuals' scale: from here on a value counts nothing
+_LEAST_SCATTER = 0.01  # m: of single offsets, beside the rows that they lie between
+_MOST_SAY = 5.0  # independent values that all together count as: soft ends would shrink with each more
+_GRID = 0.002  # m
+_FAULTY = 0.02  # likelihood of a value whose interval misses the mean, relative to one whose interval holds it
 _FLOOR = 1e-9  # of the mean weight: what holds the solution where nothing was measured
 
 
@@ -83,14 +88,13 @@ def correlation_factor(residual: Float) -> float:
     return (1.0 + lag) / (1.0 - lag)
 
 
-def mean_with_std(values: Float, apart: Float | None = None) -> tuple[float, float]:
+def mean_with_std(values: Float) -> tuple[float, float]:
     """Return the robust mean (bisquare) of values (N,) along the road, and its standard deviation.
 
-    Bisquare about the median; the deviation counts as many values as are independent of their neighbours, and what
-    `hidden_std` tells of the distances ``apart`` (N,) of the points they lie between. NaN and infinity for no values.
+    Bisquare about the median; the deviation counts as many values as are independent of their neighbours. NaN and
+    infinity for no values.
     """
-    known = np.isfinite(values)
-    values = values[known]
+    values = values[np.isfinite(values)]
     if not len(values):
         return float("nan"), float("inf")
     middle = float(np.median(values))
@@ -103,8 +107,34 @@ def mean_with_std(values: Float, apart: Float | None = None) -> tuple[float, flo
     kept = bisquare(values - middle, max(robust_scale(values - middle), 1e-9)) > 0.0
     spread = float(np.sqrt(np.mean((values[kept] - middle) ** 2))) if kept.any() else 0.0
     independent = max(1.0, kept.sum() / correlation_factor(values[kept] - middle))
-    std = spread / float(np.sqrt(independent))
-    return middle, float(np.hypot(std, hidden_std(apart[known], spread))) if apart is not None else std
+    return middle, spread / float(np.sqrt(independent))
+
+
+def interval_mean(values: Float, apart: Float) -> tuple[float, float]:
+    """Return the mean of values (K,) along the road that each lie midway between two rows of points, and its deviation.
+
+    A value is evenly likely everywhere between its rows, ``apart`` (K,) from each other, m, and so are all of them at
+    once where the rows run beside the road: however many there are, they say no more than one. Where the rows wander
+    only the places count that all intervals have in common. Intervals end softly, by how much values scatter beyond
+    them, and weigh as `correlation_factor` says. Values that are means of many points have no interval.
+    """
+    known = np.isfinite(values) & np.isfinite(apart)
+    values, half = values[known], 0.5 * apart[known]
+    if not len(values):
+        return float("nan"), float("inf")
+    middle = mean_with_std(values)[0]
+    beyond = np.maximum(np.abs(values - middle) - half, 0.0)
+    jump = robust_scale(np.diff(values)) / np.sqrt(2.0) if len(values) > 1 else 0.0
+    scatter = max(_LEAST_SCATTER, robust_scale(beyond), min(jump, float(np.median(half)) + _LEAST_SCATTER))
+    low, high = values - np.maximum(half, 0.5 * _LEAST_SCATTER), values + np.maximum(half, 0.5 * _LEAST_SCATTER)
+    place = np.arange(np.percentile(low, 1) - scatter, np.percentile(high, 99) + scatter + _GRID, _GRID)
+    shares = ndtr((place - low[:, None]) / scatter) - ndtr((place - high[:, None]) / scatter)
+    likely = np.log(np.maximum(shares / np.maximum(shares.max(axis=1, keepdims=True), 1e-12), _FAULTY)).sum(axis=0)
+    likely *= min(1.0 / correlation_factor(values - middle), _MOST_SAY / len(values))
+    weight = np.exp(likely - likely.max())
+    weight /= weight.sum()
+    mean = float(weight @ place)
+    return mean, float(np.hypot(np.sqrt(weight @ (place - mean) ** 2), _GRID))
 
 
 def hidden_std(apart: Float, scatter: float) -> float:

@@ -16,20 +16,22 @@ from ..road.guidelines import EMERGENCY_BAY_LENGTH, EMERGENCY_BAY_TAPER, EMERGEN
 from .path import SPACING
 from .profiles import STRETCH
 from .section import MeasuredSection, Side, SideSection
-from .smoothing import robust_scale
+from .smoothing import correlation_factor, robust_scale
 
 APART = 0.75
 """An edge of the pavement so far, m, from the usual one is another cross-section's."""
 SHORTEST = 25.0
 """A shorter stretch, m, is a fault in the picture."""
+_BACK = 0.1  # m: an edge so near to the usual one is back
 _CLOSING = 3  # stretches that an edge may not be seen within a run
 _AROUND = 40.0  # m before and behind a run that its shape is fitted to
 _NEAREST = 10.0  # m from a bay to where the road's edge is first or last seen
 _MISFIT = 0.25  # m rms that a bay's shape may keep from its edge
 _NARROWEST, _WIDEST = 0.6 * EMERGENCY_BAY_WIDTH, 5.0  # m: of a bay
-_SHORTEST_BAY = 0.4 * EMERGENCY_BAY_LENGTH
+_SHORTEST_BAY, _LONGEST_BAY = 0.4 * EMERGENCY_BAY_LENGTH, 3.0 * EMERGENCY_BAY_LENGTH
 _PAINTED = 0.6  # of a bay's length must be beside the edge line's paint, where that is seen
 _LEAST_TAPER = 5.0  # m
+_LEAST_SCATTER = 0.02  # m: of an edge's offset in one stretch
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,7 @@ class Bay:
         start, end: stations between which the pavement is wider, m.
         low_taper, high_taper: lengths over which it opens and closes, at the lower and the higher station, m.
         width: m, and its standard deviation.
+        covariance: (5, 5) of start, low taper, length at full width, high taper and width, m2.
     """
 
     side: Side
@@ -50,6 +53,18 @@ class Bay:
     high_taper: float
     width: float
     width_std: float
+    covariance: Float
+
+    def std_at(self, stations: Float) -> Float:
+        """Return the standard deviation (K,), m, of how much wider the pavement is at stations (K,)."""
+        shape = np.array(
+            [self.start, self.low_taper, self.end - self.start - self.low_taper - self.high_taper, self.high_taper]
+        )
+        shape = np.append(shape, self.width)
+        change = _trapezoid_jacobian(stations, shape)
+        bent = np.abs(change[:, :4]).max(axis=1) > 0.0  # near its tapers: no bay is quite a trapezoid
+        known = np.maximum(np.einsum("ki,ij,kj->k", change, self.covariance, change), 0.0)
+        return np.sqrt(known + np.where(bent, _LEAST_SCATTER, 0.0) ** 2)
 
 
 @dataclass(frozen=True)
@@ -98,6 +113,19 @@ def _runs(side: SideSection, stations: Float) -> Iterator[slice]:
             yield run
 
 
+def _whole(run: slice, beside: Float, scatter: float) -> slice:
+    """Return a run with the stretches before and behind it over which the edge comes back to the usual one.
+
+    And one more to either side, as it does so within a stretch.
+    """
+    away = np.isfinite(beside) & (np.abs(beside) > max(_BACK, 3.0 * scatter))
+    away = ndimage.binary_closing(np.pad(away, _CLOSING), np.ones(_CLOSING))[_CLOSING:-_CLOSING]
+    away[run] = True
+    label, _ = ndimage.label(away)
+    ((found,),) = ndimage.find_objects((label == label[run.start]).astype(np.int8))
+    return slice(max(0, found.start - 1), min(len(beside), found.stop + 1))
+
+
 def _bay(side: SideSection, stations: Float, run: slice) -> Bay | None:
     """Return the emergency bay that a run of wider pavement is; None if it is none."""
     beside = excess(side)
@@ -107,14 +135,15 @@ def _bay(side: SideSection, stations: Float, run: slice) -> Bay | None:
     if not inside or np.nanmedian(beside[run]) < _NARROWEST or not _beside_line(side, run):
         return None
     near = np.isfinite(beside) & (stations > first - _AROUND) & (stations < last + _AROUND)
-    shape, residual = _fit_trapezoid(stations[near], beside[near], first, last)
-    start, low, length, high, width = shape
+    shape, residual, unit = _fit_trapezoid(stations[near], beside[near], first, last)
+    start, low, length, high, width = shape.tolist()
     fits = robust_scale(residual) < _MISFIT and float(np.sqrt(np.mean(residual**2))) < 2.0 * _MISFIT
-    if not fits or not _NARROWEST <= width <= _WIDEST or length < _SHORTEST_BAY:
+    if not fits or not _NARROWEST <= width <= _WIDEST or not _SHORTEST_BAY <= length <= _LONGEST_BAY:
         return None
-    top = (stations[near] > start + low) & (stations[near] < start + low + length)
-    std = max(robust_scale(residual[top]) if top.sum() > 2 else np.inf, 0.02) / np.sqrt(max(int(top.sum()), 1))
-    return Bay(side.side, float(start), float(start + low + length + high), float(low), float(high), float(width), std)
+    scatter = max(robust_scale(residual), _LEAST_SCATTER)
+    covariance = scatter**2 * correlation_factor(residual) * unit
+    std = float(np.sqrt(covariance[-1, -1]))
+    return Bay(side.side, start, start + low + length + high, low, high, width, std, covariance)
 
 
 def _beside_line(side: SideSection, run: slice) -> bool:
@@ -127,14 +156,31 @@ def _beside_line(side: SideSection, run: slice) -> bool:
     return line.solid and len(known) > 0 and float(known.mean()) > _PAINTED
 
 
-def _fit_trapezoid(stations: Float, beside: Float, first: float, last: float) -> tuple[Float, Float]:
-    """Return start, low taper, length, high taper and width (5,), m, of the best trapezoid, and the residuals (N,)."""
+def _trapezoid(stations: Float, shape: Float) -> Float:
+    """Return how much wider (K,), m, the pavement is by start, low taper, length, high taper and width (5,), m."""
+    start, low, length, high, width = shape
+    rising = (stations - start) / low
+    falling = (start + low + length + high - stations) / high
+    return np.asarray(width * np.clip(np.minimum(rising, falling), 0.0, 1.0))
+
+
+def _trapezoid_jacobian(stations: Float, shape: Float) -> Float:
+    """Return the derivatives (K, 5) of `_trapezoid` by its shape, over half a stretch to either side of its corners."""
+    steps = np.diag([0.5 * STRETCH * SPACING] * 4 + [0.01])
+    steps[[1, 3], [1, 3]] = 1.0
+    return np.column_stack(
+        [
+            (_trapezoid(stations, shape + step) - _trapezoid(stations, shape - step)) / (2.0 * step.sum())
+            for step in steps
+        ]
+    )
+
+
+def _fit_trapezoid(stations: Float, beside: Float, first: float, last: float) -> tuple[Float, Float, Float]:
+    """Return the shape (5,), m, of the best trapezoid, the residuals (N,), and its covariance for unit noise (5, 5)."""
 
     def residual(shape: Float) -> Float:
-        start, low, length, high, width = shape
-        rising = (stations - start) / low
-        falling = (start + low + length + high - stations) / high
-        return np.asarray(width * np.clip(np.minimum(rising, falling), 0.0, 1.0) - beside)
+        return _trapezoid(stations, shape) - beside
 
     width = float(np.percentile(beside[(stations >= first) & (stations <= last)], 70))
     taper = min(EMERGENCY_BAY_TAPER, 0.3 * (last - first) + _LEAST_TAPER)
@@ -144,12 +190,14 @@ def _fit_trapezoid(stations: Float, beside: Float, first: float, last: float) ->
     found = least_squares(
         residual, np.clip(begin, low + 1e-6, high - 1e-6), bounds=(low, high), loss="soft_l1", f_scale=0.2
     )
-    return np.asarray(found.x), residual(found.x)
+    normal = found.jac.T @ found.jac
+    return np.asarray(found.x), residual(found.x), np.linalg.pinv(normal, hermitian=True)
 
 
 def _unlike(side: SideSection, stations: Float, run: slice) -> Unlike:
-    half = 0.5 * STRETCH * SPACING
-    by = float(np.nanmedian(excess(side)[run]))
+    half, beside = 0.5 * STRETCH * SPACING, excess(side)
+    by = float(np.nanmedian(beside[run]))
+    run = _whole(run, beside, robust_scale(beside[side.usual & np.isfinite(beside)]))
     return Unlike(
         side.side, round(stations[run.start] - half, 1), round(stations[run.stop - 1] + half, 1), round(by, 2)
     )

@@ -618,3 +618,36 @@ def test_a_fit_that_leaves_its_points_is_refused(tmp_path: Path) -> None:
 def test_real_axes_are_far_from_being_refused(path: Path) -> None:
     _, _, report = fitted_axis(path, RoadScenario())
     assert max(report["horizontal"]["worst"], report["height"]["worst"]) < 0.2 * REFUSED_BEYOND * 0.05
+
+
+def offset_points(alignment: Alignment, sigma: float, seed: int) -> np.ndarray:
+    """Return points each 5 m along an alignment, beside it by noise, m."""
+    station = np.arange(2.5, alignment.length, 5.0)
+    position, heading, _ = alignment.frame(station)
+    beside = np.random.default_rng(seed).normal(0.0, sigma, len(station))
+    return position + beside[:, None] * np.column_stack([-np.sin(heading), np.cos(heading)])
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_noise_as_large_as_the_tolerance_is_worth_no_element(seed: int) -> None:
+    arc = Alignment([Element(400.0, 1.0 / 800.0, 1.0 / 800.0)])
+    fit = fit_axis(offset_points(arc, 0.032, seed), 0.03)
+    assert len(fit.alignment.elements) == 1
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_an_alignment_that_is_designed_ends_on_arcs_or_lines(seed: int) -> None:
+    elements = [Element(25.0, 0.0, 0.0), Element(180.0, 0.0, 1.0 / 900.0), Element(30.0, 1.0 / 900.0, 1.0 / 900.0)]
+    points = offset_points(Alignment(elements), 0.004, seed)
+    designed = fit_axis(points, 0.03, design_ends=True).alignment.elements
+    bends = [(e.curvature_start, e.curvature_end) for e in designed]
+    assert len(designed) == 3
+    assert all(bends[i][0] == bends[i][1] for i in (0, -1))
+    assert len(fit_axis(points, 0.03).alignment.elements) < 3  # millimetres are worth no element by themselves
+
+
+def test_an_alignment_that_bends_on_to_its_ends_is_left_there() -> None:
+    tight = Alignment([Element(120.0, -1.0 / 60.0, 1.0 / 60.0)])
+    found = fit_axis(offset_points(tight, 0.004, 1), 0.03, design_ends=True).alignment.elements
+    assert len(found) <= 3
+    assert max(abs(e.curvature_end - e.curvature_start) for e in found) > 0.9 / 30.0

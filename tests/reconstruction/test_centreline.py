@@ -62,12 +62,7 @@ def test_where_no_road_is_nothing_is_trusted(tmp_path: Path, across: Across) -> 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("across", [*FOREIGN, *DAMAGED, *SOUND], ids=lambda one: one.__name__)
-def test_no_confident_answer_is_wrong(
-    tmp_path: Path, across: Across, seed: int, request: pytest.FixtureRequest
-) -> None:
-    if (across, seed) == (foreign_clouds.railway, 2):
-        reason = "rails pass for lines, ballast for pavement: see what docs/reconstruction.md misses"
-        request.applymarker(pytest.mark.xfail(reason=reason, strict=True))
+def test_no_confident_answer_is_wrong(tmp_path: Path, across: Across, seed: int) -> None:
     found, cloud = found_in(tmp_path, across, seed)
     if across in FOREIGN:
         assert found is None or found.judgement.trusted < 0.05

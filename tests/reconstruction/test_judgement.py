@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -124,6 +125,31 @@ def test_where_the_median_is_paved_the_lines_beside_it_must_do() -> None:
     ground = profiles([(-12.0, 12.0)])
     assert judged(ground, line(-2.5), line(2.5)).doubts == []
     assert reasons(judged(ground, line(-2.5), line(2.5, 0.0))) == {"neither the median'"}
+
+
+def test_where_the_innermost_line_lies_between_rows_of_points_those_beside_it_carry_the_axis() -> None:
+    ground, hidden = profiles([(-12.0, 12.0)]), np.full(ROWS // 5, -2.5)
+    hidden[10:30] = np.nan
+    inner, beside = line(hidden), line(-6.25)
+    assert reasons(judged(ground, inner, line(2.5))) == {"neither the median'"}
+    edges = line(-12.0, 0.0), line(-2.0, 0.0)
+    right = Band(-12.0, -2.0, [beside, inner], edges)
+    left = Band(2.0, 12.0, [line(2.5)], (line(2.0, 0.0), line(12.0, 0.0)))
+    assert judge(ground, RoadLayout("dual", (right, left), ground.count, ()), [-7.0, 7.0]).doubts == []
+
+
+def test_where_brightness_tells_no_edge_the_classes_do() -> None:
+    ground = profiles([(-3.5, 3.5)], grass=0.2)
+    assert reasons(judged(ground, line(0.0))) == {"the pavement's edge"}
+    paved = np.broadcast_to(np.abs(ground.offsets) < 3.5, ground.count.shape).astype(np.float32)
+    assert judged(replace(ground, paved=paved), line(0.0)).doubts == []
+
+
+@pytest.mark.parametrize(("height", "doubts"), [(0.004, set()), (0.15, {"its lines stand abo"})])
+def test_lines_that_stand_above_the_ground_are_rails(height: float, doubts: set[str]) -> None:
+    ground = profiles([(-12.0, -2.0), (2.0, 12.0)])
+    ground.height[:, np.abs(np.abs(ground.offsets) - 2.5) < 0.1] += height
+    assert reasons(judged(ground, line(-2.5), line(2.5))) == doubts
 
 
 def test_ground_that_is_too_rough_is_no_pavement() -> None:

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.arrays import Float
-from synthroads_addon.reconstruction.layout import Band, RoadLayout, axis_from_lines
+from synthroads_addon.reconstruction.layout import Band, RoadLayout, axis_from_lines, axis_guides, find_layout
 from synthroads_addon.reconstruction.lines import Line
+from synthroads_addon.reconstruction.path import CloudPath
+from synthroads_addon.reconstruction.profiles import Profiles
 
 STATIONS: Float = 5.0 * np.arange(60) + 2.5
 
@@ -34,3 +36,40 @@ def test_a_lane_that_ends_moves_the_axis_nowhere(begin: float) -> None:
     axis = axis_from_lines(RoadLayout("dual", (right, left), np.zeros((300, 200)), ()))
     assert np.abs(axis.offsets).max() < 0.05
     assert np.isfinite(axis.raw).all()
+
+
+def part_of(offset: float, start: float, end: float) -> Line:
+    """Return a line that is there between two stations, m."""
+    whole = line(offset)
+    inside = (start < STATIONS) & (end > STATIONS)
+    measured = np.where(inside, whole.measured, np.nan)
+    return Line(STATIONS, measured, measured, whole.std, whole.apart, whole.cover, start, end, 0.15)
+
+
+def test_a_lane_that_begins_in_the_middle_leaves_the_section_of_the_longer_part() -> None:
+    rows, offsets = 300, 0.1 * (np.arange(400) + 0.5) - 20.0
+    path = CloudPath(np.column_stack([np.arange(rows + 1.0), np.zeros(rows + 1)]), np.zeros(rows + 1))
+    station = np.arange(rows) + 0.5
+    outer = -9.5 - 3.5 * np.clip((station - 135.0) / 30.0, 0.0, 1.0)
+    paved = (offsets > outer[:, None]) & (offsets < -2.0) | (offsets > 2.0) & (offsets < 9.5)
+    ones = np.ones(paved.shape, np.float32)
+    profiles = Profiles(path, station, offsets, ones, 0.0 * ones, paved.astype(np.float32), 0.0 * ones, ones)
+    lasting = [line(-6.0), line(-2.5), line(2.5), line(6.0), line(9.25)]
+    right, left = find_layout(profiles, [part_of(-9.25, 0.0, 135.0), part_of(-12.75, 165.0, 300.0), *lasting]).bands
+    assert [right.place(one) for one in right.lines] == pytest.approx([-9.25, -6.0, -2.5], abs=0.02)
+    assert (right.low, right.high) == (pytest.approx(-9.5, abs=0.1), pytest.approx(-2.0, abs=0.1))
+    assert right.usual is not None
+    assert left.usual is not None
+    assert np.array_equal(right.usual, STATIONS < 142.0)
+    assert left.usual.all()
+    assert [left.place(one) for one in left.lines] == pytest.approx([2.5, 6.0, 9.25], abs=0.02)
+
+
+def test_a_line_on_one_side_and_the_pavements_edge_on_the_other_make_no_middle() -> None:
+    edges = line(-3.75, 0.0), line(3.75, 0.0)
+    one_sided = Band(-3.75, 3.75, [line(3.2)], edges)
+    assert axis_guides(RoadLayout("single", (one_sided,), np.zeros((300, 200)), ())) == edges
+    both = Band(-3.75, 3.75, [line(-3.2), line(3.2)], edges)
+    assert axis_guides(RoadLayout("single", (both,), np.zeros((300, 200)), ())) == tuple(both.lines)
+    apart = Band(-3.75, 3.75, [part_of(-3.2, 0.0, 140.0), part_of(3.2, 150.0, 300.0)], edges)
+    assert axis_guides(RoadLayout("single", (apart,), np.zeros((300, 200)), ())) == edges  # never seen together

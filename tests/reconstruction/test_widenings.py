@@ -14,7 +14,7 @@ from synthroads_addon.reconstruction.cloud import read_road_cloud
 from synthroads_addon.reconstruction.comparison import compare
 from synthroads_addon.reconstruction.reconstruct import reconstruct
 from synthroads_addon.reconstruction.section import _usual_stretches
-from synthroads_addon.reconstruction.widenings import find_widenings
+from synthroads_addon.reconstruction.widenings import Bay, find_widenings
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.objects import width_at
 from synthroads_addon.road.parameters import RoadParameters
@@ -65,9 +65,32 @@ def test_whatever_else_is_wider_is_marked(wider: Float, solid: bool, by: float) 
     bays, (other,) = find_widenings(section(wider, solid), STATIONS)
     assert bays == []
     assert other.wider_by == pytest.approx(by, abs=0.6)
-    inside = np.abs(wider) > 1.0
-    assert other.start == pytest.approx(STATIONS[inside][0] - 2.5, abs=7.5)
-    assert other.end == pytest.approx(STATIONS[inside][-1] + 2.5, abs=7.5)
+    inside = np.abs(wider) > 0.1  # with its tapers, and a stretch more to either side
+    assert other.start == pytest.approx(max(STATIONS[inside][0] - 7.5, 0.0), abs=7.5)
+    assert other.end == pytest.approx(min(STATIONS[inside][-1] + 7.5, 400.0), abs=7.5)
+    assert np.isin(np.flatnonzero(inside), np.flatnonzero((other.start < STATIONS) & (other.end > STATIONS))).all()
+
+
+def test_an_entrys_lane_is_no_bay_however_solid_the_line_beside_it() -> None:
+    bays, (other,) = find_widenings(section(trapezoid(60.0, 30.0, 250.0, 30.0, 3.0)), STATIONS)
+    assert bays == []
+    assert other.wider_by == pytest.approx(3.0, abs=0.1)
+
+
+def test_a_bays_width_is_surest_where_it_is_full_and_its_tapers_are_as_unsure_as_their_stations() -> None:
+    ((bay,), _) = find_widenings(section(trapezoid(150.0, 20.0, 45.0, 30.0, 3.0)), STATIONS)
+    std = bay.std_at(np.array([100.0, 160.0, 190.0, 230.0]))
+    assert std[0] == 0.0
+    assert std[2] == pytest.approx(bay.width_std, abs=1e-6)
+    assert min(std[1], std[3]) > 2.0 * std[2]
+    off = bay_error(bay, trapezoid(150.0, 20.0, 45.0, 30.0, 3.0))
+    assert np.mean(off < 3.0 * np.maximum(bay.std_at(STATIONS), 1e-9)) > 0.98
+
+
+def bay_error(bay: Bay, true: Float) -> Float:
+    """Return how far a bay's width is from the true one at the stations, m."""
+    found = trapezoid(bay.start, bay.low_taper, bay.end - bay.start - bay.low_taper - bay.high_taper, bay.high_taper, 1)
+    return np.abs(bay.width * found - true)
 
 
 def test_a_short_fault_or_a_slight_one_is_nothing() -> None:

@@ -112,7 +112,7 @@ def slab(offset: Float, station: Float, rng: np.random.Generator) -> tuple[Float
 SOUND: tuple[Across, ...] = (rural, unmarked)
 """Roads, their axis along the cloud's east axis."""
 FOREIGN: tuple[Across, ...] = (field, noise, car_park, canal, ploughed, slab, railway)
-"""No roads. A railway at times passes for one all the same: rails for lines, ballast for pavement."""
+"""No roads."""
 DAMAGED: tuple[Across, ...] = (village, half_road, hidden_middle)
 """Roads along the same axis that are hard to tell."""
 
