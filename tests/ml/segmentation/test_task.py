@@ -510,11 +510,11 @@ def test_files_have_no_splits(tmp_path: Path) -> None:
 def test_balanced_crops_of_two_domains_keep_the_stated_share(data: Path, share: float) -> None:
     """And within each domain they are balanced: shrubs are rare, and are in the middle of a fifth of the crops."""
     settings = toy(data, set_up="mixed", synthetic_share=share, balanced=True, crops_per_tile=250, crop_points=64)
-    batches = CropBatches(settings, read_domains(settings).values())
+    batches = CropBatches(settings, read_domains(settings).values(), torch.device("cpu"))
     draws = plan([len(tiles) for tiles in batches.domains], 250, share, settings.seed, 0)
     own = len(batches.domains[0])
     random = np.random.default_rng(1)
-    found = [batches.seeds.draw(draw.tile, random) for draw in draws]
+    found = [batches.seeds[0].draw(draw.tile, random) for draw in draws]
     assert sum(tile < own for tile, _ in found) == round(share * len(draws))
     for domain in (range(own), range(own, len(batches.tiles))):
         labels = [batches.tiles[tile].segment[point] for tile, point in found if tile in domain]
