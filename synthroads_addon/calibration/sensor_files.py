@@ -70,8 +70,8 @@ _SWAY = {
     "uav": {"shortest_period": 0.5, "longest_period": 10.0, "period_exponent": 1.0},
 }
 _RATIO, _DENSITY, _TEXTURE, _ASLANT = "spacing ratio", "density", "texture", "aslant"
-"""What is fitted besides settings of the scenario: pulses' spacing over lines', points, the materials' spread, and the
-angle at which the second strip sees the road, deg."""
+"""Names of the values that are fitted besides settings of the scenario: pulses' spacing over lines', points, the
+materials' spread, and the angle at which the second strip sees the road, deg."""
 _FROM_ABOVE, _USUAL_ASLANT = -3.0, 18.0
 """Angles at which one strip sees the road, and at which the search for the other one's begins, deg."""
 _USUAL_RATIO, _USUAL_NORMAL = 1.2, 0.7

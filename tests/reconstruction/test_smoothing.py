@@ -1,4 +1,4 @@
-"""What lies between two rows of points is known no better than that, however long they run beside it."""
+"""Places between two rows of points are known no better than that, however long the rows run beside them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is held between a long road's sections doesn't grow, where materials' nodes give the colours as well."""
+"""Memory between the sections of a long road stays the same, where materials' nodes give the colours as well."""
 
 from __future__ import annotations
 
