@@ -250,9 +250,13 @@ def _marked(found: Reconstruction, widths: list[WidthErrors]) -> float:
 
 
 def _width(one: WidthErrors) -> dict[str, Any]:
-    """Return as JSON data one width's errors in the sections that aren't marked: number, share off, medians."""
-    known = np.isfinite(one.off) | np.isinf(one.off)
-    kept = known & ~one.marked
+    """Return as JSON data one width's errors in the sections that aren't marked: number, how many are off, medians.
+
+    What is said to be a guess is counted by itself, unless the number of lanes is another than the true one.
+    """
+    known = ~np.isnan(one.off) & ~one.marked
+    guess = np.isinf(one.std) & np.isfinite(one.error)
+    kept = known & ~guess
     finite = np.where(np.isfinite(one.error) & kept, one.error, np.nan)
     return {
         "side": one.side,
@@ -261,12 +265,9 @@ def _width(one: WidthErrors) -> dict[str, Any]:
         "off": int((one.off[kept] > 3.0).sum()),
         "in_68": int((one.off[kept] <= 1.0).sum()),
         "in_95": int((one.off[kept] <= 1.96).sum()),
-        "guess": int(np.isinf(one.std[kept]).sum()),
+        "guesses": int((known & guess).sum()),
         "error": float(np.nanmedian(finite)) if np.isfinite(finite).any() else None,
-        "largest": float(np.nanmax(np.abs(finite))) if np.isfinite(finite).any() else None,
         "std": float(np.median(one.std[kept])) if kept.any() and np.isfinite(one.std[kept]).all() else None,
-        "marked_sections": int((known & one.marked).sum()),
-        "marked_off": int((one.off[known & one.marked] > 3.0).sum()),
     }
 
 
@@ -322,6 +323,7 @@ HEAD = (
     "widths off by more than 3 deviations (%)",
     "in 68 % (%)",
     "in 95 % (%)",
+    "guesses (%)",
     "sections marked (%)",
     "elements within one",
     "axis: mean, largest (m)",
@@ -340,12 +342,25 @@ def row(name: str, results: list[dict[str, Any]]) -> tuple[str, ...]:
     def share(what: str) -> str:
         return f"{100.0 * sum(width[what] for width in widths) / total:.1f}"
 
+    def guessed() -> str:
+        number = sum(width["guesses"] for width in widths)
+        return f"{100.0 * number / max(total + number, 1):.1f}"
+
     def mean(what: str) -> str:
         return f"{100.0 * float(np.mean([one[what] for one in found])):.1f}" if found else "–"
 
     axis = f"{np.mean([one['mae'] for one in axes]):.3f}, {max(one['largest'] for one in axes):.3f}" if axes else "–"
     doubted = f"{100.0 * float(np.mean([1.0 - one['trusted'] for one in found])):.1f}" if found else "–"
-    cells = (share("off"), share("in_68"), share("in_95"), mean("marked"), f"{near} of {len(results)}", axis, doubted)
+    cells = (
+        share("off"),
+        share("in_68"),
+        share("in_95"),
+        guessed(),
+        mean("marked"),
+        f"{near} of {len(results)}",
+        axis,
+        doubted,
+    )
     return (name, str(len(results)), *cells)
 
 

@@ -42,6 +42,8 @@ _STEP, _LARGEST_MOVE = 0.25, 0.6
 _ROUNDS, _MOVES = 3, 3
 """How often the derivatives are measured, and moves with their updates."""
 _LEAST_SCATTER = 0.01
+_LEAST_LOGARITHM = 1e-6
+"""Coarse numbers and lattices have statistics of 0."""
 
 Simulate = Callable[[Mapping[str, float], int], RealClass]
 """Gives the points of a level pavement about the origin, scanned with settings and a seed."""
@@ -118,6 +120,10 @@ def refine_settings(road: RealClass, settings: Sequence[Setting], simulate: Simu
         return np.array([_moments(window.cut(simulate(values, number)))[1] for number, window in enumerate(windows)])
 
     first = moments(np.zeros(len(settings)))
+    if not np.isfinite(first).all(axis=1).any():
+        raise InputError(
+            "--real", None, "has no window of pavement in which a simulated scan fills patches; see --formulas"
+        )
     scatter = np.maximum(np.nanstd(first, axis=0) / np.sqrt(len(windows)), _LEAST_SCATTER)
 
     def miss(x: Float) -> Float:
@@ -141,7 +147,8 @@ def _search(miss: Callable[[Float], Float], start: Float, limits: Float) -> tupl
     low, high = limits
     x, missed = np.zeros(len(low)), start
     for _ in range(_ROUNDS):
-        steps = np.where(x + _STEP <= high, _STEP, -_STEP)
+        # No farther than the limits, beyond which a setting stays what it is.
+        steps = np.where(high - x >= x - low, np.minimum(_STEP, high - x), -np.minimum(_STEP, x - low))
         slope = np.column_stack([(miss(x + step) - missed) / step.sum() for step in np.diag(steps)])
         damping = 1.0
         for _ in range(_MOVES):
@@ -223,10 +230,11 @@ def _moments(road: RealClass) -> tuple[list[str], Float]:
     names = [*_USED, "density", "faint_share"]
     try:
         patches = make_patches(road, "--real")
-    except (InputError, ValueError):
+    except InputError:
         return names, np.full(len(names), np.nan)
     middle = dict(zip(FEATURES, np.median(patches.values, axis=0), strict=True))
-    values = [float(np.log(middle[name])) if name in _LOGARITHMIC else float(middle[name]) for name in _USED]
+    middle |= {name: float(np.log(max(middle[name], _LEAST_LOGARITHM))) for name in _LOGARITHMIC}
+    values = [float(middle[name]) for name in _USED]
     return names, np.array([*values, float(np.log(np.median(patches.density))), _faint_share(road)])
 
 

@@ -64,7 +64,8 @@ USUAL: dict[str, dict[str, tuple[float, float]]] = {
         "scan.strip_errors.drift_sigma": (0.01, 0.05),
     },
 }
-"""Ranges that the shipped recipes draw from: how it sways, and how strips disagree. A search begins at their middle."""
+"""Ranges of how platforms sway and how strips disagree, in which searches begin at the middle; a recipe draws from them
+what isn't fitted. Those of aircraft are of four airborne scans of roads, whose strips are adjusted to each other."""
 _SWAY = {
     "airborne": {"shortest_period": 0.2, "longest_period": 20.0, "period_exponent": 0.8},
     "uav": {"shortest_period": 0.5, "longest_period": 10.0, "period_exponent": 1.0},
@@ -152,14 +153,18 @@ def fit_sensor(result: Calibration, simulated: bool = True) -> FittedSensor:
         scenario, spacing = _standing(estimate, device, setting)
         return FittedSensor(estimate, None, device, _FREE | spacing, drawn, {}, scenario, surfaces)
     material = surfaces[first.target.material]
-    moving = _MovingSensor(estimate, device, setting, material, first.target.material, job.attenuation)
+    # What isn't corrected by the device is by each point's range, where that is known.
+    corrected = receiver.range_corrected or len(distance) > 1
+    moving = _MovingSensor(estimate, device, setting, material, first.target.material, job.attenuation, corrected)
     begin, refined = moving.settings(), None
     values = {one.path: one.begin for one in begin}
     if simulated:
         refined = refine_settings(replace(real, intensity=linear), begin, moving.simulate)
         values = refined.values
     spacing, device = moving.scanner(values)
-    drawn = _drawn_values({path: value for path, value in values.items() if path.startswith("scan.")})
+    # Without simulated scans the others are what a search would begin with, and no estimates.
+    told = values if simulated else (*_noise_of(estimate, device), _OF_STRIPS[0])
+    drawn = _drawn_values({path: value for path, value in values.items() if path.startswith("scan.") and path in told})
     usual = {path: limits for path, limits in moving.usual.items() if path not in drawn}
     spread = {"spread_below": round(moving.spreads(values)[0], 4), "spread_above": round(moving.spreads(values)[1], 4)}
     surfaces |= {first.target.material: surfaces[first.target.material].model_copy(update=spread)}
@@ -192,6 +197,7 @@ class _MovingSensor:
         material: of the pavement, with the spread that the sensor doesn't explain.
         name: of the material in the table.
         attenuation: of the air, 1/m of range.
+        range_corrected: whether the real brightness has no fall-off with the range.
     """
 
     estimate: SensorEstimate
@@ -200,6 +206,7 @@ class _MovingSensor:
     material: Material
     name: str
     attenuation: float
+    range_corrected: bool
 
     @property
     def distance(self) -> float:
@@ -213,7 +220,7 @@ class _MovingSensor:
 
     @property
     def usual(self) -> dict[str, tuple[float, float]]:
-        """The ranges that the shipped recipes draw from for this kind of platform."""
+        """The ranges of `USUAL` for this kind of platform."""
         return USUAL[self.kind]
 
     @property
@@ -258,7 +265,9 @@ class _MovingSensor:
 
     def _unseen_step(self, aslant: float) -> float:
         """Return what of the gain's step between strips isn't the angles' doing, dB, with the second one's, deg."""
-        near, far = (30.0 * np.log10(np.cos(np.deg2rad(angle))) for angle in (_FROM_ABOVE, aslant))
+        # By the angle of incidence once, and twice by the range, which grows with it.
+        power = 10.0 if self.range_corrected else 30.0
+        near, far = (power * np.log10(np.cos(np.deg2rad(angle))) for angle in (_FROM_ABOVE, aslant))
         return max(self.estimate.gain_step_db - float(near - far), 0.0)
 
     def spreads(self, values: Mapping[str, float]) -> tuple[float, float]:
@@ -308,9 +317,9 @@ class _MovingSensor:
         pavement = LevelPavement(
             edge, edge, self.material.model_copy(update={"spread_below": below, "spread_above": above})
         )
-        return simulate_pavement(
-            scan, self._narrowed(device, scan, spacing["scan.platform"], edge), pavement, self.name, seed
-        )
+        setting = self._narrowed(device, scan, spacing["scan.platform"], edge)
+        found = simulate_pavement(scan, setting, pavement, self.name, seed)
+        return replace(found, intensity=found.intensity * found.distance**2) if self.range_corrected else found
 
     def _narrowed(self, device: Device, scan: ScanScenario, platform: Mapping[str, Any], edge: float) -> ScannerSetting:
         """Return the scanner's setting with a view of the pavement alone where its optics can have one."""

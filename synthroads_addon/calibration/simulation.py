@@ -18,7 +18,9 @@ from ..cloud.points import concatenate
 from ..cloud.selection.classes import RealClass
 from ..materials.surfaces import surfaces_of
 from ..materials.table import Material
+from ..scanning.colour.colour import MaterialLayers, surface_constants
 from ..scanning.devices.device import ScannerSetting
+from ..scanning.finish import Finish
 from ..scanning.plan import ScanPlan
 from ..scanning.platforms.polyline import PolylineGuide
 from ..scanning.relief.micro_relief import micro_relief
@@ -117,22 +119,21 @@ def simulate_pavement(
         relief=micro_relief([name], [pavement.material]) if scan.relief else None,
         relief_strength=scan.relief,
     )
-    stages = BlockScan(plan)
-    blocks = [stages.scan_block(*block).points for block in plan.blocks()]
+    stages, finish = BlockScan(plan), Finish(plan, MaterialLayers(surface_constants([pavement.material])))
+    blocks = [finish.finish_block(stages.scan_block(*block)).points for block in plan.blocks()]
     recorded = [block for block in blocks if len(block)]
     if not recorded:
         raise InputError("--real", None, "has no pavement that the fitted scanner would see")
     points = concatenate(recorded)
     lit = np.flatnonzero(points.intensity > 0.0)
     zeros, points = len(points) - len(lit), points.select(lit)
-    unknown = np.full(len(points), np.nan)
     return RealClass(
         selection="simulated",
         place=points.xyz,
         intensity=points.intensity.astype(np.float64),
         zeros=zeros,
-        distance=unknown,
-        incidence=unknown,
+        distance=points.range.astype(np.float64),
+        incidence=np.full(len(points), np.nan),
         returns=points.number_of_returns,
         time=points.gps_time,
     )

@@ -365,7 +365,7 @@ def _summarise_side(
         places[0] = replace(places[0], std=part.axis_std)
     outside = Estimate(_USUAL_STRIP, np.inf)
     if edge_seen:
-        edge = Estimate.of(np.where(usual if usual.any() else True, outer.offsets, np.nan), outer.apart)
+        edge = Estimate.of(np.where(where, outer.offsets, np.nan), outer.apart)  # of the same part as the lines
         outside = edge.widened(edge_std) - places[-1]
     outside = Estimate(float(np.clip(outside.value, 0.0, 2.0 + _WIDEST)), outside.std)
     strip, shoulder = _share_pavement(outside)

@@ -41,7 +41,10 @@ class WidthErrors:
 
     @property
     def off(self) -> Float:
-        """Return by how many of its deviations (K,) the width is off; 0 for a guess, NaN beyond the true road."""
+        """Return by how many of its deviations (K,) the width is off; 0 for a guess, NaN beyond the true road.
+
+        Where the numbers of lanes differ it is infinite.
+        """
         off = np.full(len(self.error), np.inf)
         finite = ~np.isinf(self.error)
         off[finite] = np.abs(self.error[finite]) / self.std[finite]

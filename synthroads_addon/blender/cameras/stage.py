@@ -7,7 +7,7 @@ import os
 import shutil
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -125,7 +125,8 @@ class RenderStage:
             if item != self.camera:
                 scene.collection.objects.unlink(item)
         render.resolution_x = render.resolution_y = _SMALLEST
-        with _silence(), stderr_if_it_succeeds():
+        # After a rendering that failed this one may fail as well: that fault is the one to be told.
+        with _silence(), stderr_if_it_succeeds(), suppress(RuntimeError):
             bpy.ops.render.render(scene=scene.name)
 
     def forget(self) -> None:

@@ -80,6 +80,8 @@ def make_patches(road: RealClass, name: str) -> Patches:
     Raises:
         InputError: no square of `EDGE` has enough points in all of its parts.
     """
+    if len(road.place) <= _NEIGHBOURS:
+        raise InputError(name, len(road.place), f"has no {EDGE:g} m of pavement with {FEWEST} points or more")
     points = _Neighbourhood.of(road)
     cell = np.floor(road.place[:, :2] / EDGE).astype(np.int64)
     corners, owner, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)

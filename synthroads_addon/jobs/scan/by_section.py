@@ -78,6 +78,7 @@ class SectionScan:
     def plans(self, timer: StageTimer) -> Generator[ScanPlan, None, None]:
         """Build each section in turn and yield its plan; the section is removed when the next one is asked for."""
         done, total = 0, self.cut.count()
+        gc.collect()  # or what is garbage by now would stay
         gc.freeze()  # what is there before needn't be looked through after each section
         try:
             for section in self.sections():
