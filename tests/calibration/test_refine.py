@@ -143,3 +143,21 @@ def test_a_pavement_that_nobody_sees_is_refused() -> None:
     dark = materials()["asphalt"].model_copy(update={"base_color": (0.0, 0.0, 0.0), "specular": 0.0})
     with pytest.raises(InputError, match="no pavement that the fitted scanner would see"):
         simulate_pavement(scenario, scanner_setting(scenario), LevelPavement(10.0, 10.0, dark), "asphalt", 1)
+
+
+def test_simulated_pavement_has_the_relief_that_the_scan_asks_for() -> None:
+    """Noise of ranges that are fitted would else hold the surface's own roughness, which a scan adds once more."""
+    still = {"scan.noise.range_sigma": 1e-4, "scan.receiver.faint_range_sigma": 0.0, "scan.receiver.range_walk": 0.0}
+    plane, rough = (
+        scan(TRUTH | still | {"scan.relief": strength, "scan.strip_errors.drift_sigma": 0.0}, 1, 12.0)
+        for strength in (0.0, 4.0)
+    )
+    assert np.ptp(rough.place[:, 2]) > 3.0 * np.ptp(plane.place[:, 2])
+
+
+def test_pavement_that_fills_no_patch_is_told() -> None:
+    road = scan(TRUTH, 1)
+    with pytest.raises(InputError, match="--real"):
+        refine_settings(select_points(road, np.arange(4)), BEGIN, scan)
+    with pytest.raises(InputError, match="no window of pavement"):
+        refine_settings(road, BEGIN, lambda _, seed: select_points(scan(TRUTH, seed), np.arange(4)))
