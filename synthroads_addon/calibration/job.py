@@ -14,6 +14,7 @@ from ..base.arrays import Float
 from ..base.errors import InputError, nearest_name
 from ..base.progress import exhaust
 from ..cloud.selection.classes import RealClass, RealCloud, class_by_label, ranges_and_incidences, read_real_cloud
+from ..cloud.selection.patches import with_points_beside
 from ..cloud.selection.pavement import RoadClasses, road_classes
 from ..materials.surfaces import Reflection
 from ..materials.table import Material, materials, read_material_table, write_material_table
@@ -386,8 +387,11 @@ def _real_classes(job: CalibrationJob) -> list[RealClass | None]:
     cloud: RealCloud = read_real_cloud(job.real, job.class_field)
     if job.road is not None:
         classes = road_classes(cloud, job.road)
-        return [classes[str(target.real_class)] for target in job.targets]
-    return [class_by_label(cloud, str(target.real_class)) for target in job.targets]
+        found = [classes[str(target.real_class)] for target in job.targets]
+    else:
+        found = [class_by_label(cloud, str(target.real_class)) for target in job.targets]
+    # A sensor is fitted to the first one's patches.
+    return [with_points_beside(cloud, found[0]), *found[1:]]
 
 
 def _fit_input(job: CalibrationJob, target: MaterialTarget, before: Material, real: RealClass | None) -> _FitInput:

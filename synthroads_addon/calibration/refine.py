@@ -188,7 +188,8 @@ class _Window:
 
     def cut(self, scan: RealClass) -> RealClass:
         """Return the simulated points that lie on the window's pavement."""
-        return select_points(scan, self.holds(scan.place[:, :2]))
+        held = self.holds(scan.place[:, :2])
+        return replace(select_points(scan, held), beside=scan.place[~held, :2])
 
     def holds(self, place: Float) -> Bool:
         """Return a mask (N,) of the places that are pavement."""

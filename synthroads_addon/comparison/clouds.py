@@ -14,6 +14,7 @@ from ..base.errors import InputError, nearest_name
 from ..base.schema import ClosedModel, Finite, quantity, read_yaml
 from ..cloud.formats.registry import ENDINGS
 from ..cloud.selection.classes import RealClass, RealCloud, class_by_label, read_real_cloud
+from ..cloud.selection.patches import with_points_beside
 from ..cloud.selection.pavement import CLEAR, RoadClasses, road_classes
 
 LISTS = (".yaml", ".yml", ".json")
@@ -102,6 +103,7 @@ def read_compared(path: Path, row: ListedCloud) -> ComparedCloud:
         found |= _other_classes(cloud, row, path.name)
         if "marking" in found:
             found[ROAD] = _clear_of(found[ROAD], found["marking"])
+    found[ROAD] = with_points_beside(cloud, found[ROAD])
     return ComparedCloud(path.stem, {name: _with_view(points, row) for name, points in found.items()})
 
 

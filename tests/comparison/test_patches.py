@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.cloud.selection.patches import EDGE, FEATURES, make_patches, match_density
+from synthroads_addon.cloud.selection.classes import RealCloud
+from synthroads_addon.cloud.selection.patches import (
+    EDGE,
+    FEATURES,
+    GROUPS,
+    make_patches,
+    match_density,
+    with_points_beside,
+)
 from tests.helpers.clouds.pavement_points import pavement
+
+PER_POINT = ("place", "intensity", "distance", "incidence", "returns")
 
 RANDOM, LATTICE = "random", "lattice"
 
@@ -65,3 +77,25 @@ def test_patches_are_matched_by_density() -> None:
     assert np.median(one.density) > 1.2 * np.median(other.density)
     assert np.median(first.density) == pytest.approx(np.median(second.density), rel=0.05)
     assert len(match_density(one, other, 1, 10)[0]) == 10
+
+
+def test_points_are_spread_alike_wherever_the_pavement_ends() -> None:
+    """A strip of it, cut out between markings, has the spacing of the whole; without the points beside it hasn't."""
+    whole = pavement(density=20.0)
+    inside = (whole.place[:, 1] >= 0.0) & (whole.place[:, 1] < EDGE)
+    strip = replace(whole, **{name: getattr(whole, name)[inside] for name in PER_POINT})
+    others = whole.place[~inside]
+    above = whole.place + [0.0, 0.0, 2.0]  # a vehicle's, of no surface of ours
+    nothing = np.zeros(0)
+    places = np.concatenate([strip.place, others, above])
+    cloud = RealCloud(places, nothing, nothing.astype(int), None, nothing, nothing, nothing.astype(np.uint8))
+    beside = with_points_beside(cloud, strip)
+    assert beside.beside is not None
+    assert 0 < len(beside.beside) < len(others)
+    pattern = [FEATURES.index(name) for name in GROUPS["pattern"]]
+    wanted, found = make_patches(whole, "x"), make_patches(beside, "x")
+    row = wanted.place[:, 1] == 0.0
+    np.testing.assert_allclose(found.place, wanted.place[row])
+    np.testing.assert_allclose(found.values[:, pattern], wanted.values[row][:, pattern], rtol=1e-9)
+    last = FEATURES.index("eighth_neighbour")
+    assert np.median(make_patches(strip, "x").values[:, last]) > 1.05 * np.median(found.values[:, last])

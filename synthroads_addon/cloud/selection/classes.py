@@ -52,6 +52,7 @@ class RealClass:
         distance, incidence: (N,) m and rad; NaN where unknown.
         returns: (N,) how many returns the pulse of each has.
         time: (N,) GPS time, s; None where unknown.
+        beside: (M, 2) plan places of the surface's other points around these, m; None where not looked for.
     """
 
     selection: str
@@ -62,6 +63,7 @@ class RealClass:
     incidence: Float
     returns: UInt8
     time: Float | None = None
+    beside: Float | None = None
 
 
 def read_real_cloud(path: Path, attribute: str | None = None) -> RealCloud:

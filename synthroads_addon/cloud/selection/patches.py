@@ -6,14 +6,14 @@ described by how they are spread, how they lie about their plane, and how their 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ...base.arrays import AnyArray, Float, Index
 from ...base.errors import InputError
-from .classes import RealClass
+from .classes import RealClass, RealCloud
 
 EDGE = 1.5
 """Edge of a patch, m."""
@@ -25,6 +25,10 @@ _STEP = 0.1
 """Width of the bins within which densities count as equal, of their logarithm."""
 _NEIGHBOURS = 8
 _SECTORS = 12
+_BESIDE = 1.0
+"""Points beside the pavement are looked for so far from it, m: farther than the eighth neighbour is."""
+_RISE = 0.3
+"""What stands higher above it, or lies lower, m, isn't its surface."""
 
 GROUPS: dict[str, tuple[str, ...]] = {
     "pattern": ("clark_evans", "spacing_variation", "direction_entropy", "second_neighbour", "eighth_neighbour"),
@@ -61,6 +65,19 @@ class Patches:
         """Return the chosen patches."""
         points = tuple(self.points[row] for row in rows) if self.points else ()
         return Patches(self.place[rows], self.density[rows], self.values[rows], points)
+
+
+def with_points_beside(cloud: RealCloud, points: RealClass) -> RealClass:
+    """Return a class with all other points of its cloud that lie near it in plan and on the same surface.
+
+    How points are spread then doesn't depend on where the class ends, at a marking or an edge.
+    """
+    low, high = points.place.min(axis=0) - _BESIDE, points.place.max(axis=0) + _BESIDE
+    near = cloud.xyz[((cloud.xyz > low) & (cloud.xyz < high)).all(axis=1)]
+    apart, own = cKDTree(points.place[:, :2]).query(near[:, :2], distance_upper_bound=_BESIDE)
+    others = np.isfinite(apart) & (apart > 0.0)
+    rise = near[others, 2] - points.place[own[others], 2]
+    return replace(points, beside=near[others, :2][np.abs(rise) < _RISE])
 
 
 def join_patches(parts: list[Patches]) -> Patches:
@@ -115,9 +132,9 @@ class _Neighbourhood:
     Attributes:
         place: (N, 3) from the first point, m.
         level: (N,) intensity from the cloud's median, dB.
-        distance: (N, K) of the neighbours, m.
-        neighbour: (N, K) rows of these.
-        sector: (N,) of the direction to the nearest, which has no sign.
+        distance: (N, K) of the nearest points of the surface, m, beside the pavement as well.
+        neighbour: (N, K) rows of the nearest of the pavement.
+        sector: (N,) of the direction to the nearest of the surface, which has no sign.
     """
 
     place: Float
@@ -131,7 +148,11 @@ class _Neighbourhood:
         """Return the pavement points with their nearest neighbours in plan and intensities in dB."""
         place = road.place - road.place[0]
         distance, neighbour = cKDTree(place[:, :2]).query(place[:, :2], k=_NEIGHBOURS + 1)
-        away = place[neighbour[:, 1], :2] - place[:, :2]
+        surface, nearest = place[:, :2], neighbour
+        if road.beside is not None:
+            surface = np.concatenate([surface, road.beside - road.place[0, :2]])
+            distance, nearest = cKDTree(surface).query(place[:, :2], k=_NEIGHBOURS + 1)
+        away = surface[nearest[:, 1]] - place[:, :2]
         angle = np.arctan2(away[:, 1], away[:, 0]) % np.pi
         sector = np.minimum((angle / np.pi * _SECTORS).astype(np.int64), _SECTORS - 1)
         level = 10.0 * np.log10(road.intensity)
