@@ -175,7 +175,7 @@ def raised_lines(profiles: Profiles, layout: RoadLayout) -> Float:
             on, *beside = (
                 _mean_height(profiles, rows, float(line.measured[number]), *reach) for reach in _ON_AND_BESIDE
             )
-            result[row, number] = on - np.maximum(*beside)  # unseen where either side is
+            result[row, number] = on - np.maximum(beside[0], beside[1])  # unseen where either side is
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # stretches without lines
         return np.asarray(np.nanmedian(result, axis=0))

@@ -28,7 +28,7 @@ _SECTORS = 12
 _BESIDE = 1.0
 """Points beside the pavement are looked for so far from it, m: farther than the eighth neighbour is."""
 _RISE = 0.3
-"""What stands higher above it, or lies lower, m, isn't its surface."""
+"""Height, m, above the pavement or below it up to which points are of its surface."""
 
 GROUPS: dict[str, tuple[str, ...]] = {
     "pattern": ("clark_evans", "spacing_variation", "direction_entropy", "second_neighbour", "eighth_neighbour"),
