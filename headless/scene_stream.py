@@ -28,6 +28,7 @@ from synthroads_addon.base.machine import available_cores
 from synthroads_addon.base.scratch.locks import LockHeldError, exclusive
 from synthroads_addon.dataset.manifest import SceneEntry
 from synthroads_addon.dataset.scene_stream import (
+    LOCK,
     WORK,
     Failure,
     StreamPlan,
@@ -38,7 +39,6 @@ from synthroads_addon.dataset.scene_stream import (
     write_failure,
 )
 
-LOCK = ".lock"
 _TICK = 0.1
 """Seconds between two looks at what is wanted."""
 _PATIENCE = 30.0

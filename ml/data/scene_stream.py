@@ -25,6 +25,7 @@ from synthroads_addon.dataset.manifest import write_atomically
 from synthroads_addon.dataset.recipe import Layout, load_recipe
 from synthroads_addon.dataset.scene_stream import (
     FAILURE,
+    LOCK,
     PLAN,
     WANTED,
     WORK,
@@ -180,7 +181,7 @@ class SceneStream:
         for number in scene_numbers(self.folder):
             remove_scene(self.folder, number)
         shutil.rmtree(self.folder / WORK, ignore_errors=True)
-        for name in (PLAN, WANTED, FAILURE, LOG, ".lock"):
+        for name in (PLAN, WANTED, FAILURE, LOG, LOCK):
             (self.folder / name).unlink(missing_ok=True)
         if not any(self.folder.iterdir()):
             self.folder.rmdir()

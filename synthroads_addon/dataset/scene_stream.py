@@ -22,6 +22,8 @@ from .manifest import SceneEntry, faults, write_atomically
 from .recipe import LARGEST_SEED, Recipe, SceneJob, scene_job, scene_places
 
 PLAN, WANTED, FAILURE, ENTRY, WORK = "stream.json", "wanted.json", "failure.json", "scene.json", ".work"
+LOCK = ".lock"
+"""File that the producer at work holds locked."""
 _REMOVED = ".removed-"
 
 

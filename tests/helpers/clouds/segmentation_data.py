@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 
 from ml.data.tiles import CloudTile
 from ml.segmentation.recipes import SegmentationConfiguration
@@ -109,3 +110,14 @@ def toy(data: Path, **changes: Any) -> SegmentationConfiguration:
         "data": {**sources, "tests": tests},
     }
     return SegmentationConfiguration.from_dict({**base, **changes})
+
+
+def weights(folder: Path) -> dict[str, torch.Tensor]:
+    """Return the weights of a run."""
+    state: dict[str, torch.Tensor] = torch.load(folder / "checkpoint.pt", weights_only=True)["model"]
+    return state
+
+
+def same(one: dict[str, torch.Tensor], other: dict[str, torch.Tensor]) -> bool:
+    """Return whether all weights are the same to the bit."""
+    return all(torch.equal(one[name], other[name]) for name in one)

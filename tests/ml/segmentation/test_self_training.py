@@ -23,7 +23,15 @@ from ml.segmentation.self_training import believed_labels, target_tiles
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError
 from synthroads_addon.base.files import write_file
-from tests.helpers.clouds.segmentation_data import road_block, road_tile, toy, write_cloud, write_pointcept
+from tests.helpers.clouds.segmentation_data import (
+    road_block,
+    road_tile,
+    same,
+    toy,
+    weights,
+    write_cloud,
+    write_pointcept,
+)
 
 torch.set_num_threads(1)
 CPU = torch.device("cpu")
@@ -58,17 +66,6 @@ def self_trained(data: Path, /, **changes: Any) -> SegmentationConfiguration:
         },
     }
     return SegmentationConfiguration.from_dict({**toy(data).to_dict(), **given, **changes})
-
-
-def weights(folder: Path) -> dict[str, torch.Tensor]:
-    """Return the weights of a run."""
-    state: dict[str, torch.Tensor] = torch.load(folder / "checkpoint.pt", weights_only=True)["model"]
-    return state
-
-
-def same(one: dict[str, torch.Tensor], other: dict[str, torch.Tensor]) -> bool:
-    """Return whether all weights are the same to the bit."""
-    return all(torch.equal(one[name], other[name]) for name in one)
 
 
 def test_a_clouds_labels_are_not_looked_at(data: Path, tmp_path: Path) -> None:

@@ -35,7 +35,15 @@ from ml.tasks import Evaluation
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError
 from synthroads_addon.base.progress import silent
-from tests.helpers.clouds.segmentation_data import road_block, road_tile, toy, write_cloud, write_pointcept
+from tests.helpers.clouds.segmentation_data import (
+    road_block,
+    road_tile,
+    same,
+    toy,
+    weights,
+    write_cloud,
+    write_pointcept,
+)
 
 torch.set_num_threads(1)
 Trained = Callable[..., Path]
@@ -76,17 +84,6 @@ def trained(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Trained:
 def small(data: Path, **changes: Any) -> SegmentationConfiguration:
     """Return the toy with few small crops."""
     return toy(data, **{"crop_points": 300, "crops_per_tile": 2, **changes})
-
-
-def weights(folder: Path) -> dict[str, torch.Tensor]:
-    """Return the weights of a run."""
-    state: dict[str, torch.Tensor] = torch.load(folder / "checkpoint.pt", weights_only=True)["model"]
-    return state
-
-
-def same(one: dict[str, torch.Tensor], other: dict[str, torch.Tensor]) -> bool:
-    """Return whether all weights are the same to the bit."""
-    return all(torch.equal(one[name], other[name]) for name in one)
 
 
 def test_smoothed_loss_is_cross_entropy_weighed_by_the_points_own_classes() -> None:
