@@ -2,7 +2,7 @@
 
 Points of one line follow each other at one distance in one direction, those of neighbouring lines are shifted at random
 along it. So among the differences of pairs of points, those within a narrow band along the lines have a peak at the
-pulses' distance, in no other direction so high. Within blocks of `_BLOCK` the direction of that band is sought first,
+pulses' distance, in no other direction so high. Within blocks the direction of that band is sought first,
 and the peak then; the median of the blocks that show one counts.
 """
 
@@ -14,7 +14,9 @@ from scipy.spatial import cKDTree
 from ..base.arrays import AnyArray, Float
 
 _BLOCK = 15.0
-"""Edge of a block, m: within it lines are straight and parallel."""
+"""Longest edge of a block, m: within it lines are straight and parallel."""
+_MOST_POINTS = 5000
+"""Of a block: denser clouds have smaller blocks, as memory follows the pairs of points in one."""
 _FEWEST, _MOST_BLOCKS, _FEWEST_BLOCKS = 300, 60, 3
 _BAND = 0.08
 """Half width of the band along the lines, of the points' usual distance."""
@@ -34,7 +36,8 @@ def pulse_step(place: Float, density: float, strips: int) -> float | None:
         strips: that overlap.
     """
     usual = float(np.sqrt(strips / density))
-    cell = np.floor(place[:, :2] / _BLOCK).astype(np.int64)
+    edge = min(_BLOCK, float(np.sqrt(_MOST_POINTS / density)))
+    cell = np.floor(place[:, :2] / edge).astype(np.int64)
     _, owner, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
     order = np.argsort(owner.ravel(), kind="stable")
     blocks = [rows for rows in np.split(order, np.cumsum(count)[:-1]) if len(rows) >= _FEWEST]

@@ -6,6 +6,7 @@ search begins a third to a half away from them.
 
 from __future__ import annotations
 
+import tracemalloc
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -110,6 +111,20 @@ def test_lines_tell_how_far_pulses_lie_apart(lines: float) -> None:
     assert pulse_step(found.place, 20.0, 2) == pytest.approx(step, rel=0.05)
     random = np.random.default_rng(1).uniform(0.0, 60.0, (len(found.place), 2))
     assert pulse_step(random, 20.0, 2) is None
+
+
+def test_lines_of_a_dense_cloud_take_little_memory() -> None:
+    """1,500 points per square metre, as of a vehicle's scanner: blocks are smaller, and tell the same."""
+    rng, step = np.random.default_rng(1), 1.0 / np.sqrt(1500.0)
+    along, line = np.meshgrid(np.arange(0.0, 30.0, step), np.arange(0.0, 30.0, step))
+    along = along + rng.uniform(0.0, step, (len(line), 1))
+    place = np.column_stack([along.ravel(), line.ravel()]) + rng.normal(0.0, 0.02 * step, (line.size, 2))
+    tracemalloc.start()
+    found = pulse_step(place, 1500.0, 1)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert found == pytest.approx(step, rel=0.05)
+    assert peak < 400e6
 
 
 def test_statistics_come_nearer(refined: Refined) -> None:
