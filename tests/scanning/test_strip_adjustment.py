@@ -1,4 +1,4 @@
-"""Errors of strips found again in the delivered points alone, by a strip adjustment that matches neighbouring strips."""
+"""Errors of strips found again in the delivered points alone, by an adjustment that matches neighbouring strips."""
 
 from dataclasses import replace
 
