@@ -4,7 +4,7 @@ import pytest
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.scenario.scan import scanner_setting
-from synthroads_addon.scenario.scenario import Scenario
+from synthroads_addon.scenario.scenario import Scenario, load_scenario
 from synthroads_addon.scenario.without import EFFECTS, scenario_without
 
 EVERYTHING = Scenario.from_dict(
