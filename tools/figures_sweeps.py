@@ -34,7 +34,14 @@ sys.path.insert(0, str(ROOT))
 from synthroads_addon.base.arrays import Float  # noqa: E402
 from synthroads_addon.base.errors import InputError  # noqa: E402
 from synthroads_addon.cloud.selection.classes import RealClass, class_by_label, read_real_cloud  # noqa: E402
-from synthroads_addon.comparison.clouds import CLASSES, ROAD, ListedCloud, find_clouds  # noqa: E402
+from synthroads_addon.comparison.clouds import (  # noqa: E402
+    CLASSES,
+    ROAD,
+    ListedCloud,
+    between_azimuths,
+    find_clouds,
+    name_of,
+)
 
 RINGS = (4.0, 6.0, 10.0, 15.0, 20.0, 30.0, 50.0)
 """Edges of the rings of range, m."""
@@ -85,7 +92,7 @@ def sweep_figures(path: Path, row: ListedCloud) -> SweepFigures:
     Raises:
         InputError: it can't be read, has too little road, or nobody says from where it was seen.
     """
-    cloud = read_real_cloud(path, row.class_field)
+    cloud = between_azimuths(read_real_cloud(path, row.class_field), row)
     found: dict[str, RealClass] = {}
     for name in CLASSES:
         code = getattr(row, name)
@@ -122,7 +129,7 @@ def sweep_figures(path: Path, row: ListedCloud) -> SweepFigures:
     for name in CLASSES[1:]:
         values[f"threshold: road or {name}"] = best_accuracy(numbers[ROAD], numbers.get(name))
     return SweepFigures(
-        path.parent.name if path.stem == "cloud" else path.stem, np.array(density), np.array(level), values
+        path.parent.name if path.stem == "cloud" else name_of(path, row), np.array(density), np.array(level), values
     )
 
 
@@ -204,6 +211,20 @@ def best_accuracy(one: Float, other: Float | None) -> float:
     levels = np.quantile(np.concatenate([one, other]), np.linspace(0.0, 1.0, _LEVELS))
     below = [np.searchsorted(np.sort(values), levels, side="right") / len(values) for values in (one, other)]
     return float(0.5 + 0.5 * np.abs(below[0] - below[1]).max())
+
+
+def named_figures(figures: SweepFigures) -> dict[str, float]:
+    """Return figures of a sweep by name; NaN where it has too few points.
+
+    Densities are those from `NEAR` on: nearer the car hides the road in part.
+    """
+    result = {}
+    for (low, high), density, level in zip(pairwise(RINGS), figures.density, figures.level, strict=True):
+        ring = f"{low:g} to {high:g} m"
+        if low >= NEAR[0]:
+            result[f"road points/m², {ring}"] = float(density)
+        result[f"median road number, {ring}, dB"] = float(level)
+    return result | figures.values
 
 
 def misses(figures: SweepFigures, real: SweepFigures) -> list[str]:

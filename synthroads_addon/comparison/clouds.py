@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -21,6 +21,7 @@ LISTS = (".yaml", ".yml", ".json")
 ROAD = "road"
 CLASSES = (ROAD, "marking", "vegetation")
 """Classes that are compared; the first is needed."""
+_Azimuth = Annotated[float, Field(ge=-180.0, le=180.0)]
 
 
 class ListedCloud(ClosedModel):
@@ -37,11 +38,22 @@ class ListedCloud(ClosedModel):
     line_width: float = quantity(0.15, "m", "Width of the markings.", (0.05, 1.0))
     decibels: float | None = quantity(None, "dB", "The 16 bits of the intensity span this; they are linear.", (1, 200))
     scanner: tuple[Finite, Finite, Finite] | None = Field(None, description="Where all was seen from, map, m.")
+    azimuth_deg: tuple[_Azimuth, _Azimuth] | None = Field(
+        None,
+        description="Azimuths about the scanner, from the x axis to the left, between which points count, deg; all if "
+        "not given. The second may be the smaller one: then those around 180 count.",
+    )
 
     @model_validator(mode="after")
     def _offsets_need_an_axis(self) -> ListedCloud:
         if (self.axis is None) != (not self.paved):
             raise ValueError("axis and paved tell the pavement together: one of them is missing")
+        return self
+
+    @model_validator(mode="after")
+    def _azimuths_need_a_scanner(self) -> ListedCloud:
+        if self.azimuth_deg is not None and self.scanner is None:
+            raise ValueError("azimuth_deg counts about scanner, which is missing")
         return self
 
 
@@ -94,7 +106,8 @@ def read_compared(path: Path, row: ListedCloud) -> ComparedCloud:
     Raises:
         InputError: the file can't be read, has too few points of the road, or a list names a class that it has none of.
     """
-    cloud = read_real_cloud(path, row.class_field)
+    everything = read_real_cloud(path, row.class_field)
+    cloud = between_azimuths(everything, row)
     if row.axis is not None:
         beside = road_classes(cloud, RoadClasses(path.parent / row.axis, row.paved, row.lines, row.line_width))
         found = {ROAD: beside["paved"]} | ({"marking": beside["line"]} if "line" in beside else {})
@@ -103,8 +116,27 @@ def read_compared(path: Path, row: ListedCloud) -> ComparedCloud:
         found |= _other_classes(cloud, row, path.name)
         if "marking" in found:
             found[ROAD] = _clear_of(found[ROAD], found["marking"])
-    found[ROAD] = with_points_beside(cloud, found[ROAD])
-    return ComparedCloud(path.stem, {name: _with_view(points, row) for name, points in found.items()})
+    found[ROAD] = with_points_beside(everything, found[ROAD])
+    return ComparedCloud(name_of(path, row), {name: _with_view(points, row) for name, points in found.items()})
+
+
+def name_of(path: Path, row: ListedCloud) -> str:
+    """Return the name of a listed cloud: its file's, and which part of it counts."""
+    if row.azimuth_deg is None:
+        return path.stem
+    return "{} ({:g} to {:g} deg)".format(path.stem, *row.azimuth_deg)
+
+
+def between_azimuths(cloud: RealCloud, row: ListedCloud) -> RealCloud:
+    """Return the points of a cloud that lie between a row's azimuths about the scanner; all without azimuths."""
+    if row.azimuth_deg is None or row.scanner is None:
+        return cloud
+    east, north, _ = (cloud.xyz - np.asarray(row.scanner)).T
+    low, high = row.azimuth_deg
+    azimuth = np.rad2deg(np.arctan2(north, east))
+    inside = (azimuth >= low) & (azimuth <= high) if low <= high else (azimuth >= low) | (azimuth <= high)
+    arrays = {name: value for name, value in vars(cloud).items() if isinstance(value, np.ndarray)}
+    return replace(cloud, **{name: value[inside] for name, value in arrays.items()})
 
 
 def _clear_of(road: RealClass, marking: RealClass) -> RealClass:

@@ -58,10 +58,13 @@ def scenario_without(scenario: Scenario, effects: Iterable[str]) -> Scenario:
         InputError: there is no such effect.
     """
     changes: list[str] = []
+    effects = list(effects)
+    # Without weather there is nothing whose echoes could be left out.
+    echoes = getattr(scenario.scan.weather, "echoes", False) and "weather" not in effects
     for effect in effects:
         if effect not in EFFECTS:
             allowed = f"must be one of {', '.join(EFFECTS)}{nearest_name(effect, EFFECTS)}"
             raise InputError("--without", effect, allowed)
-        if effect != "weather-echoes" or getattr(scenario.scan.weather, "echoes", False):
+        if effect != "weather-echoes" or echoes:
             changes += EFFECTS[effect]
     return Scenario.from_dict(with_changes(scenario.to_dict(), map(parse_change, changes))) if changes else scenario

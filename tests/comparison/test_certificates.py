@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
 import pytest
 
+from synthroads_addon.base.errors import InputError
 from synthroads_addon.comparison.job import CloudComparison
-from tools.certify_recipes import certificate, table
+from synthroads_addon.dataset.recipe import recipe_names
+from tests.comparison.test_sweeps import made_up
+from tools.certify_recipes import WITHOUT, certificate, pages, sweep_certificate, table
 
 
 @dataclass(frozen=True)
@@ -46,3 +51,28 @@ def test_the_table_has_a_row_for_each_recipe() -> None:
     text = table([made(25.0), made(99.0) | {"recipe": "standin"}], "certificates")
     assert "| [`sweeps`](certificates/sweeps.json) | 1 | 0.90 (0.50) | 1 of 1 | residual_mm 0.80, level_db 0.60" in text
     assert "| [`standin`](certificates/standin.json) | 1 | 0.90 (0.50) | 0 of 1 |" in text
+
+
+def test_sweeps_are_certified_by_the_figures_that_all_have() -> None:
+    real = [made_up(noise=0.2, zeros=0.1), made_up(noise=0.3, zeros=np.nan)]
+    # Within 0.175 and 0.325, half as much again as the real range.
+    ours = [made_up(noise=noise) for noise in (0.17, 0.18, 0.32, 0.33)]
+    data = sweep_certificate("sweeps", ours, real, "halves")
+    assert data["statistics"]["noise"] == {"synthetic": [0.17, 0.25, 0.33], "real": [0.2, 0.25, 0.3], "within": 2}
+    assert "zeros" not in data["statistics"]
+    assert "road points/m², 4 to 6 m" not in data["statistics"]
+    with pytest.raises(InputError, match="two real sweeps or parts of one"):
+        sweep_certificate("sweeps", ours, real[:1], "one")
+    text = pages([made(25.0), data | {"recipe": "centerline-airborne"}], "certificates")
+    total = 4 * len(data["statistics"])
+    assert f"| [`centerline-airborne`](certificates/centerline-airborne.json) | 4 | {total - 2} of {total} |  |" in text
+    assert "- `reference`: no real cloud of a road by a UAV was at hand.\n" in text
+
+
+def test_every_shipped_recipe_has_a_certificate_or_a_reason() -> None:
+    folder = Path(__file__).parents[2] / "docs" / "certificates"
+    certified = {path.stem for path in folder.glob("*.json")}
+    assert certified.isdisjoint(WITHOUT)
+    assert certified | set(WITHOUT) == set(recipe_names())
+    page = folder.with_suffix(".md").read_text(encoding="utf-8")
+    assert all(f"`{name}`" in page for name in recipe_names())

@@ -79,8 +79,22 @@ def test_figures_of_a_made_up_sweep(tmp_path: Path) -> None:
     assert found.values["marking over road"] == pytest.approx(2.0, rel=0.02)
     assert found.values["vegetation over road"] == pytest.approx(1.5, rel=0.02)
     assert found.values["zeros"] == pytest.approx(0.1, abs=0.01)
+    ahead, behind = (row.model_copy(update={"azimuth_deg": ends}) for ends in ((-80.0, 80.0), (100.0, -100.0)))
+    dim = number * np.where(xy[:, 0] > 0.0, 0.5, 1.0)
+    write_las(path, place, dim, label)
+    halves = [sweep_figures(path, half) for half in (ahead, behind)]
+    assert halves[1].level[1] - halves[0].level[1] == pytest.approx(10.0 * np.log10(2.0), abs=0.1)
+    assert [half.values["zeros"] for half in halves] == pytest.approx([0.1, 0.1], abs=0.01)
+    assert halves[0].name == "sweep (-80 to 80 deg)"
     with pytest.raises(InputError, match="has no ranges"):
         sweep_figures(path, row.model_copy(update={"scanner": None}))
+
+
+def test_azimuths_need_a_scanner() -> None:
+    with pytest.raises(InputError, match="scanner, which is missing"):
+        ListedCloud.from_dict({"cloud": "sweep.las", "azimuth_deg": [-80, 80]})
+    with pytest.raises(InputError, match="180"):
+        ListedCloud.from_dict({"cloud": "sweep.las", "scanner": [0, 0, 0], "azimuth_deg": [0, 190]})
 
 
 def made_up(**changes: float) -> SweepFigures:

@@ -4,7 +4,7 @@ import pytest
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.scenario.scan import scanner_setting
-from synthroads_addon.scenario.scenario import Scenario
+from synthroads_addon.scenario.scenario import Scenario, load_scenario
 from synthroads_addon.scenario.without import EFFECTS, scenario_without
 
 EVERYTHING = Scenario.from_dict(
@@ -89,3 +89,9 @@ def test_what_is_no_effect_is_refused_by_name_and_what_is_off_stays_off() -> Non
     with pytest.raises(InputError, match=r"--without.*mixed-point.*mixed-points"):
         scenario_without(EVERYTHING, ["mixed-point"])
     assert scenario_without(Scenario(), ["weather-echoes"]) == Scenario()
+
+
+@pytest.mark.parametrize("effects", [["weather", "weather-echoes"], ["weather-echoes", "weather"]])
+def test_weather_and_its_echoes_can_be_left_out_together(effects: list[str]) -> None:
+    rainy = load_scenario("rq31-600m", ["scan.weather.condition=rain", "scan.weather.echoes=true"])
+    assert scenario_without(rainy, effects) == scenario_without(rainy, ["weather"])

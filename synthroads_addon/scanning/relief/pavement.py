@@ -79,7 +79,8 @@ class PavementRelief:
         for number, kind in enumerate(_KINDS):
             rows = known[self._kind[block[known]] == number]
             if len(rows):
-                local = place[rows, :2] - self._origin
+                # By columns: choosing rows of three numbers takes several times as long.
+                local = np.column_stack([np.take(place[:, axis], rows) for axis in (0, 1)]) - self._origin
                 result[rows] = self._height[block[rows]] + self._kind_heights(kind, local)
         return result
 
