@@ -1,7 +1,7 @@
 """The road found in a cloud: a path parallel to it, the lines beside it, and the axis that all views agree on."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -83,15 +83,21 @@ def find_axis(cloud: RoadCloud, path: CloudPath, half: float, options: Options) 
     Along the path that is given, and again along the axis that was found beside it until it lies still, as a straight
     line is smoothed and followed better than a bent one, and as a path that has slipped by a lane comes back.
     """
-    for number in range(_PASSES):
-        profiles = make_profiles(cloud, path, half, exact=True)
-        layout = find_layout(profiles, find_lines(profiles), options.road)
-        axis = find_fused_axis(profiles, layout)
-        if number == _PASSES - 1 or (number > 0 and float(np.abs(axis.offsets).max()) <= _STILL):
+    found = _look_along(cloud, path, half, options)
+    for number in range(1, _PASSES):
+        if number > 1 and float(np.abs(found.axis.offsets).max()) <= _STILL:
             break
-        path = path.shift_by(np.interp(path.stations, axis.stations, axis.offsets))
-    learned = _learned_view(cloud, profiles, options)
-    return FoundRoad(path, profiles, layout, find_fused_axis(profiles, layout, learned) if learned else axis)
+        beside = np.interp(found.path.stations, found.axis.stations, found.axis.offsets)
+        found = _look_along(cloud, found.path.shift_by(beside), half, options)
+    learned = _learned_view(cloud, found.profiles, options)
+    return replace(found, axis=find_fused_axis(found.profiles, found.layout, learned)) if learned else found
+
+
+def _look_along(cloud: RoadCloud, path: CloudPath, half: float, options: Options) -> FoundRoad:
+    """Return what a path shows: profiles, layout, and the axis by the views that learn nothing."""
+    profiles = make_profiles(cloud, path, half, exact=True)
+    layout = find_layout(profiles, find_lines(profiles), options.road)
+    return FoundRoad(path, profiles, layout, find_fused_axis(profiles, layout))
 
 
 def _learned_view(cloud: RoadCloud, profiles: Profiles, options: Options) -> list[View]:

@@ -203,6 +203,7 @@ def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line |
         measured, widths, apart = _between_points(profiles, profiles.points, measured, on)
         weights = np.where(np.isfinite(measured), weights, 0.0)
         width, width_std = mean_with_std(widths)
+        width_std = float(np.hypot(width_std, hidden_std(2.0 * apart, width_std)))  # both edges lie between rows
     if (weights > 0.0).sum() < 4:
         return None
     smoothed = smooth(measured, weights, STRETCH * SPACING, WAVELENGTH, usual=USUAL)

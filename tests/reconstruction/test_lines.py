@@ -14,7 +14,7 @@ HIDDEN = slice(165, 365)
 
 
 def profiles(apart: int, dash: float = 0.0, hidden: tuple[slice, ...] = (HIDDEN,)) -> Profiles:
-    """Return 500 m of profiles with points in every n-th bin across, and a line 2 m to the left, hidden in some rows."""
+    """Return 500 m of profiles with points in every n-th bin across, and a line 2 m to the left, hidden in places."""
     offsets = 0.1 * (np.arange(120) + 0.5) - 6.0
     there = np.zeros((ROWS, len(offsets)), dtype=bool)
     there[:, ::apart] = True

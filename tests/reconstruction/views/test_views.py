@@ -94,8 +94,8 @@ def test_where_one_carriageway_is_wider_symmetry_says_little(outer: float, uneve
     )
     layout = RoadLayout("dual", bands, road.count, ())
     views = {view.name: view for view in rule_views(road, layout, axis_from_lines(layout))}
-    for name, own, share in (("cross-profile", view_symmetry(road), 1.0), ("skeleton", None, 0.5)):
-        own = own or view_skeleton(road, [0.5 * (outer - 2.0), 6.5])
+    alone = {"cross-profile": view_symmetry(road), "skeleton": view_skeleton(road, [0.5 * (outer - 2.0), 6.5])}
+    for (name, own), share in zip(alone.items(), (1.0, 0.5), strict=True):
         assert views[name].std == pytest.approx(np.hypot(own.std, share * uneven))
     assert views["brightness"].std == pytest.approx(view_brightness(road, [0.5 * (outer - 2.0), 6.5], True).std)
 
