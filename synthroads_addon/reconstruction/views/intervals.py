@@ -36,12 +36,17 @@ def half_width(axis: FusedAxis, share: float, factor: float, more: float = 0.0) 
         return own
     density = ndimage.gaussian_filter1d(_density(axis), max(more, 1e-3) / _STEP, axis=1, mode="constant")
     density /= density.sum(axis=1, keepdims=True)
+    return np.where(seen, np.maximum(own, _quantile(density, share)), own)
+
+
+def _quantile(density: Float, share: float) -> Float:
+    """Return how far (K,), m, to both sides of the middle a share of densities (K, P) lies."""
     middle = density.shape[1] // 2
-    within = np.cumsum(
-        np.column_stack([density[:, middle], density[:, middle + 1 :] + density[:, middle - 1 :: -1]]), axis=1
-    )
-    first = (within < share).argmin(axis=1)
-    return np.where(seen, np.maximum(own, _STEP * (first + 0.5)), own)
+    pairs = density[:, middle + 1 :] + density[:, middle - 1 :: -1]
+    within = np.cumsum(np.column_stack([np.zeros(len(density)), density[:, middle], pairs]), axis=1)
+    behind = np.maximum((within < share).argmin(axis=1), 1)[:, None]  # the first place by which it is reached
+    low, high = (np.take_along_axis(within, behind - step, axis=1)[:, 0] for step in (1, 0))
+    return np.maximum(_STEP * (behind[:, 0] - 1.5 + (share - low) / (high - low)), 0.0)
 
 
 def _density(axis: FusedAxis) -> Float:

@@ -14,7 +14,7 @@ STATIONS: Float = 5.0 * np.arange(40) + 2.5
 
 
 def interval(share: float, *views: tuple[str, float, float], more: float = 0.0) -> float:
-    """Return the half-width, m, of the interval about the axis of views (name, offset, deviation), all alike along it."""
+    """Return the half-width, m, of the interval about the axis of views (name, offset, deviation), everywhere alike."""
     factor = {0.68: 1.0, 0.95: 1.96}[share]
     everywhere = np.ones(len(STATIONS))
     axis = fuse(STATIONS, [View(name, offset * everywhere, std * everywhere) for name, offset, std in views])
@@ -31,6 +31,13 @@ def test_a_rival_widens_the_interval_until_it_reaches_there() -> None:
     rival = ("lines", 0.0, 0.1), ("brightness", 2.0, 0.25), ("extent", 2.0, 0.6)
     assert interval(0.95, *rival) > 1.9
     assert interval(0.95, *rival[:1], ("brightness", 0.1, 0.25), ("extent", 0.1, 0.6)) < 0.35
+
+
+@pytest.mark.parametrize(("share", "factor"), [(0.68, 0.994), (0.95, 1.96)])
+def test_of_sure_views_the_intervals_are_those_of_a_normal_distribution(share: float, factor: float) -> None:
+    kinds = "lines", "brightness", "extent", "network"
+    found = interval(share, *((kind, 0.0, 0.4) for kind in kinds), more=0.3)
+    assert found == pytest.approx(factor * np.hypot(0.2, 0.3), rel=0.02)
 
 
 def test_a_view_alone_may_have_slipped() -> None:
