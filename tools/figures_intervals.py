@@ -40,7 +40,7 @@ _SLIPPED = 3.0  # deviations
 
 @dataclass(frozen=True)
 class Figures:
-    """What was measured on one road: shares of views' offsets that slipped, and of centres in intervals; errors, m."""
+    """Figures of one road: shares of the offsets of views that slipped, and of centres in intervals; mean error, m."""
 
     slipped: float
     in_68: float
