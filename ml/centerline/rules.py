@@ -8,15 +8,17 @@ from synthroads_addon.base.arrays import Float, UInt8
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.reconstruction.axis import FoundRoad, Options, find_axis, straighten_path
 from synthroads_addon.reconstruction.axis import Predictor as AxisPredictor
+from synthroads_addon.reconstruction.centreline import INTERVALS
 from synthroads_addon.reconstruction.cloud import KIND_OF_CLASS, PointKind, RoadCloud
 from synthroads_addon.reconstruction.path import CloudPath
 from synthroads_addon.reconstruction.views.fusion import DEFINITION
+from synthroads_addon.reconstruction.views.intervals import half_width
 
 from ..data.axis import MeasuredAxis
 from ..data.frames import Frames
 from ..data.points import UNSORTED_CLASSES
 from ..data.roads import LearningRoad
-from ..scores.evaluation import Predictor
+from ..scores.evaluation import CORRIDOR_COLUMNS, Predictor
 
 _LABELLED_SHARE, _MARKED_SHARE = 0.01, 0.001
 _FEWEST = 2000
@@ -39,7 +41,7 @@ def road_cloud(road: LearningRoad) -> RoadCloud:
 
 
 def views_predictor(network: Predictor | None = None) -> Predictor:
-    """Return a predictor of centres and deviations (M, 2), m, by all views that learn nothing, and a network's.
+    """Return a predictor of centres with deviations and intervals, m, by all views that learn nothing, and a network's.
 
     Where no road can be made out nothing is predicted.
     """
@@ -54,7 +56,7 @@ def views_predictor(network: Predictor | None = None) -> Predictor:
             path, half = straighten_path(cloud, options)
             found = find_axis(cloud, path, half, options)
         except InputError:
-            return np.full((len(frames), 2), np.nan)
+            return np.full((len(frames), len(CORRIDOR_COLUMNS)), np.nan)
         return _in_frames(found, frames)
 
     return predict
@@ -79,11 +81,17 @@ def _network_view(network: Predictor, road: LearningRoad, frames: Frames) -> Axi
 
 
 def _in_frames(found: FoundRoad, frames: Frames) -> Float:
-    """Return y (m) at which a found axis crosses each of M frames, and its deviation there, (M, 2)."""
+    """Return y (m) at which a found axis crosses each of M frames, its deviation and intervals there, and no corridor.
+
+    In the columns `CORRIDOR_COLUMNS`; what isn't known is NaN.
+    """
     axis = found.axis
     along = found.path.stations
     points = found.path.place(along, np.interp(along, axis.stations, axis.offsets))
     y, _ = MeasuredAxis(points).crossing(frames.position, frames.direction)
     station, _ = found.path.project(frames.position)
-    std = np.hypot(DEFINITION, np.interp(station, axis.stations, axis.std))
-    return np.column_stack([y, np.where(np.isfinite(y), std, np.nan)])
+    halves = [half_width(axis, share, factor, DEFINITION) for share, factor in INTERVALS.values()]
+    spread = [np.hypot(DEFINITION, axis.std), *halves]
+    columns = [np.where(np.isfinite(y), np.interp(station, axis.stations, values), np.nan) for values in spread]
+    known = dict(zip(("center_std", "center_68", "center_95"), columns, strict=True)) | {"center": y}
+    return np.column_stack([known.get(name, np.full(len(y), np.nan)) for name in CORRIDOR_COLUMNS])

@@ -1,7 +1,7 @@
 """The road found in a cloud: a path parallel to it, the lines beside it, and the axis that all views agree on."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +23,7 @@ Predictor = Callable[[RoadCloud, CloudPath], tuple[Float, Float]]
 _HALF_WIDTHS = (12.0, 45.0)  # m: least and largest reach of profiles
 _MARGIN = 8.0  # m of it outside of the surface that the first path was made from
 _REGISTRATIONS = 2
+_PASSES, _STILL = 4, 0.15  # times that the axis is looked for at most, and m that it may still move by
 
 
 @dataclass(frozen=True)
@@ -79,16 +80,24 @@ def straighten_path(cloud: RoadCloud, options: Options) -> tuple[CloudPath, floa
 def find_axis(cloud: RoadCloud, path: CloudPath, half: float, options: Options) -> FoundRoad:
     """Return profiles along the road, the layout of lines that they show, and the axis that all views agree on.
 
-    Twice: along the path that is given, and along the axis that was found beside it, as a straight line is smoothed
-    better than a bent one, and as a path that has slipped by a lane comes back.
+    Along the path that is given, and again along the axis that was found beside it until it lies still, as a straight
+    line is smoothed and followed better than a bent one, and as a path that has slipped by a lane comes back.
     """
+    found = _look_along(cloud, path, half, options)
+    for number in range(1, _PASSES):
+        if number > 1 and float(np.abs(found.axis.offsets).max()) <= _STILL:
+            break
+        beside = np.interp(found.path.stations, found.axis.stations, found.axis.offsets)
+        found = _look_along(cloud, found.path.shift_by(beside), half, options)
+    learned = _learned_view(cloud, found.profiles, options)
+    return replace(found, axis=find_fused_axis(found.profiles, found.layout, learned)) if learned else found
+
+
+def _look_along(cloud: RoadCloud, path: CloudPath, half: float, options: Options) -> FoundRoad:
+    """Return what a path shows: profiles, layout, and the axis by the views that learn nothing."""
     profiles = make_profiles(cloud, path, half, exact=True)
     layout = find_layout(profiles, find_lines(profiles), options.road)
-    first = find_fused_axis(profiles, layout)
-    path = path.shift_by(np.interp(path.stations, first.stations, first.offsets))
-    profiles = make_profiles(cloud, path, half, exact=True)
-    layout = find_layout(profiles, find_lines(profiles), options.road)
-    return FoundRoad(path, profiles, layout, find_fused_axis(profiles, layout, _learned_view(cloud, profiles, options)))
+    return FoundRoad(path, profiles, layout, find_fused_axis(profiles, layout))
 
 
 def _learned_view(cloud: RoadCloud, profiles: Profiles, options: Options) -> list[View]:

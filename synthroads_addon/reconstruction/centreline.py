@@ -16,9 +16,10 @@ from .path import CloudPath
 from .profiles import Profiles, make_profiles
 from .smoothing import difference_figures, fill_gaps, smooth
 from .views.fusion import DEFINITION, FusedAxis
+from .views.intervals import half_width
 
-INTERVALS = {"interval_68": 1.0, "interval_95": 1.96}
-"""Half-widths of the intervals that cover 68 % and 95 %, in standard deviations."""
+INTERVALS = {"interval_68": (0.68, 1.0), "interval_95": (0.95, 1.96)}
+"""Intervals' probabilities, and the standard deviations that hold these of a normal distribution."""
 _AT_AXIS = 0.5  # m to either side whose ground gives the height
 _WAVELENGTH = 20.0  # m: shorter waves of the ground's height are smoothed away
 _DIGITS = 4
@@ -33,6 +34,7 @@ class Centreline:
         path: the line, M vertices.
         height: (M,) of the ground at it, m.
         std: (M,) standard deviation across the road, m.
+        half_widths: by `INTERVALS` (M,) half-widths of the intervals that the road's centreline lies in, m.
         axis: the views that it was made from, along another path.
         judgement: where it isn't to be trusted; stations are those of the path.
         notes: what a reader must know.
@@ -42,6 +44,7 @@ class Centreline:
     path: CloudPath
     height: Float
     std: Float
+    half_widths: dict[str, Float]
     axis: FusedAxis
     judgement: Judgement
     notes: tuple[str, ...]
@@ -68,8 +71,12 @@ def find_centreline(cloud: RoadCloud, options: Options | None = None, progress: 
     beside, _ = line.project(road.path.place(road.axis.stations, road.axis.offsets))
     rivals = np.interp(profiles.middles, beside, road.axis.open.astype(np.float64)) > 0.5
     std = np.hypot(DEFINITION, np.interp(line.stations, beside, road.axis.std))
+    halves = {
+        name: np.interp(line.stations, beside, half_width(road.axis, share, factor, DEFINITION))
+        for name, (share, factor) in INTERVALS.items()
+    }
     judgement = judge(profiles, layout, cores, rivals)
-    return Centreline(layout.kind, line, _heights(profiles), std, road.axis, judgement, layout.notes)
+    return Centreline(layout.kind, line, _heights(profiles), std, halves, road.axis, judgement, layout.notes)
 
 
 def _seen_part(path: CloudPath, axis: FusedAxis) -> CloudPath:
@@ -108,7 +115,7 @@ def centreline_geojson(found: Centreline, cloud: RoadCloud, name: str) -> dict[s
         "feature": "centerline",
         "stations": _rounded(found.path.stations - found.path.start),
         "std": _rounded(found.std),
-        **{key: _rounded(factor * found.std) for key, factor in INTERVALS.items()},
+        **{name: _rounded(half) for name, half in found.half_widths.items()},
         "doubtful": _from_start(found),
     }
     geometry = {"type": "LineString", "coordinates": np.round(points, _DIGITS).tolist()}

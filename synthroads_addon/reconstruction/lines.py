@@ -1,6 +1,7 @@
 """Line markings: found in cross profiles, followed along the path, and described: offset, width, dashes."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy import ndimage
@@ -20,6 +21,7 @@ _HEIGHT, _PROMINENCE = 0.10, 0.07  # of a line's peak in a mean profile
 _WIDEST = 1.2  # m: broader peaks are no lines
 _LINK = 0.35  # m that a line may move from one window to the next
 _LOST = 60.0  # m that a line may not be seen
+_SAME = 0.2  # m: pieces of a line that lies hidden in between begin so near beside where the last one ended
 _NEAR = 0.35  # m to either side of a line that its paint lies within
 _FEWEST = 0.3  # of a row must be painted to count
 _AROUND = 41  # rows around one, in which there is a dash
@@ -31,6 +33,7 @@ _Track = list[tuple[float, float]]
 STANDARD_DASHES = ((6.0, 12.0), (4.0, 8.0), (3.0, 6.0), (6.0, 6.0), (3.0, 3.0))
 """Usual lengths of dash and gap, m (RMS)."""
 _DASH_TOLERANCE = 0.6  # m
+_LONGEST_GAP = 16  # rows: where a line isn't painted for longer it isn't seen, or isn't there
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +53,7 @@ class Line:
         painted: share of its length that is painted.
         dash, gap: m; 0 for a solid line.
         first_dash: station at which a dash begins, m.
+        hidden: length between its pieces in which it wasn't seen, m.
     """
 
     stations: Float
@@ -66,6 +70,7 @@ class Line:
     dash: float = 0.0
     gap: float = 0.0
     first_dash: float = 0.0
+    hidden: float = 0.0
 
     @property
     def solid(self) -> bool:
@@ -80,7 +85,7 @@ class Line:
     @property
     def length(self) -> float:
         """Return the length along which the line was seen, m."""
-        return self.end - self.start
+        return self.end - self.start - self.hidden
 
 
 def find_lines(profiles: Profiles) -> list[Line]:
@@ -99,8 +104,34 @@ def _tracks(profiles: Profiles) -> list[tuple[Float, Float]]:
         peaks = _peaks(profiles, profiles.paint[row : row + _WINDOW])
         running, ended = _link_peaks(running, peaks, station)
         closed += ended
-    tracks = [np.array(track) for track in closed + running if len(track) >= 2]
+    long = [track for track in closed + running if len(track) >= 2]
+    tracks = [np.array(track) for track in _joined(profiles, long)]
     return [(track[:, 0], track[:, 1]) for track in tracks]
+
+
+def _joined(profiles: Profiles, tracks: list[_Track]) -> list[_Track]:
+    """Return the tracks with those made one that go on where another ended, if the line may lie hidden in between.
+
+    A line that is narrower than the distance of two rows of points may lie between them for long. A piece goes on with
+    the one that ended nearest beside it. Where points lie anywhere a line that isn't seen isn't there.
+    """
+    result: list[_Track] = []
+    for track in sorted(tracks, key=lambda item: item[0][0]):
+        station, place = track[0]
+        before = [other for other in result if other[-1][0] < station and abs(other[-1][1] - place) <= _SAME]
+        nearest = min(before, key=lambda other: abs(other[-1][1] - place), default=None)
+        if nearest is not None and _in_rows(profiles, nearest[-1][0], station, place):
+            nearest.extend(track)
+        else:
+            result.append(list(track))
+    return result
+
+
+def _in_rows(profiles: Profiles, first: float, last: float, offset: float) -> bool:
+    """Return whether points lie in rows about an offset along most of the way between two stations, m."""
+    between = (profiles.middles >= first) & (profiles.middles <= last)
+    gaps = row_gaps(profiles, np.where(between, offset, np.nan))
+    return 2 * int((gaps > 0.0).sum()) > int(between.sum())
 
 
 def _peaks(profiles: Profiles, paint: Grid) -> list[float]:
@@ -156,7 +187,7 @@ def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line |
     start = max(profiles.stations[0], stations[0] - half)
     end = min(profiles.stations[-1], stations[-1] + half)
     middle, cover = _paint_by_row(profiles, stations, offsets)
-    inside = (profiles.stations >= start) & (profiles.stations <= end)
+    inside = _shown(profiles.stations, stations, half)
     usual = float(np.nanpercentile(cover[inside], 90)) if np.isfinite(cover[inside]).any() else 0.0
     if usual < 0.03:
         return None
@@ -172,6 +203,7 @@ def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line |
         measured, widths, apart = _between_points(profiles, profiles.points, measured, on)
         weights = np.where(np.isfinite(measured), weights, 0.0)
         width, width_std = mean_with_std(widths)
+        width_std = float(np.hypot(width_std, hidden_std(2.0 * apart, width_std)))  # both edges lie between rows
     if (weights > 0.0).sum() < 4:
         return None
     smoothed = smooth(measured, weights, STRETCH * SPACING, WAVELENGTH, usual=USUAL)
@@ -194,7 +226,17 @@ def _measure_line(profiles: Profiles, stations: Float, offsets: Float) -> Line |
         dash=dash,
         gap=gap,
         first_dash=first,
+        hidden=SPACING * float((~inside & (profiles.stations >= start) & (profiles.stations <= end)).sum()),
     )
+
+
+def _shown(rows: Float, stations: Float, half: float) -> Bool:
+    """Return a mask of the rows (S,), m, along a track's stations (m), less where it was lost for longer than usual."""
+    inside = (rows >= stations[0] - half) & (rows <= stations[-1] + half)
+    for before, behind in pairwise(stations):
+        if behind - before > _LOST:
+            inside &= (rows <= before + half) | (rows >= behind - half)
+    return np.asarray(inside)
 
 
 def _paint_by_row(profiles: Profiles, stations: Float, offsets: Float) -> tuple[Float, Float]:
@@ -319,6 +361,7 @@ def _cover_by_stretch(share: Float) -> Float:
 def _dashes(stations: Float, cover: Float) -> tuple[float, float, float, float]:
     """Return painted share, dash and gap (m; 0 if solid) and the station of a dash, from rows' painted shares (R,).
 
+    What isn't painted for longer than any gap doesn't count: there the line lies hidden between rows of points.
     The period is the one whose wave the paint follows best; a common pattern is taken where it is that, within 0.6 m.
     """
     known = np.isfinite(cover)
@@ -326,6 +369,9 @@ def _dashes(stations: Float, cover: Float) -> tuple[float, float, float, float]:
         return 1.0, 0.0, 0.0, float(stations[0])
     filled = np.interp(stations, stations[known], cover[known])
     on = ndimage.median_filter(filled, size=3, mode="nearest") > 0.5
+    known &= on | ~ndimage.binary_opening(~on, np.ones(_LONGEST_GAP))
+    if not known.any():
+        return 0.0, 0.0, 0.0, float(stations[0])
     share = float(on[known].mean())
     if share > _SOLID:
         return share, 0.0, 0.0, float(stations[0])

@@ -46,14 +46,15 @@ class Estimate:
     std: float
 
     @classmethod
-    def of(cls, values: Float, apart: Float | None = None) -> Self:
+    def of(cls, values: Float, apart: Float | None = None, axis_std: float = 0.0) -> Self:
         """Return the robust mean of values (K,), in order along the road, with its standard deviation.
 
-        Of values midway between rows of points, ``apart`` (K,) from each other, m, it is that of `interval_mean`.
+        Of values midway between rows of points, ``apart`` (K,) from each other, m, it is that of `interval_mean`, which
+        asks for the deviation of the axis that they are measured from, m.
         """
         if apart is None or not (apart[np.isfinite(values)] > 0.0).any():
             return cls(*mean_with_std(values))
-        return cls(*interval_mean(values, apart))
+        return cls(*interval_mean(values, apart, axis_std))
 
     def __sub__(self, other: Self) -> Self:
         """Return the difference of two numbers whose errors are independent."""
@@ -85,6 +86,8 @@ class SideSection:
         closed: whether the outermost line is an edge line: else there may be further lanes outside.
         assumed: name of the standard cross-section that the lanes were taken from, as their lines weren't seen.
         mirrored: whether the edge line was only seen on the other side of a single carriageway.
+        axis_std: standard deviation of where the axis lies, m, from which all is measured.
+        edge_stds: of the inner and the outer edge, m, what they share all along the road.
     """
 
     side: Side
@@ -102,6 +105,8 @@ class SideSection:
     closed: bool
     assumed: str | None = None
     mirrored: bool = False
+    axis_std: float = 0.0
+    edge_stds: tuple[float, float] = (0.0, 0.0)
 
     @property
     def sign(self) -> int:
@@ -114,7 +119,8 @@ class SideSection:
         width = np.where(self.usual, self.outer_edge.offsets - self.inner_edge.offsets, np.nan)
         if self.edge_seen and np.isfinite(width).any():
             inner, outer = (np.where(self.usual, edge.offsets, np.nan) for edge in (self.inner_edge, self.outer_edge))
-            return Estimate.of(outer, self.outer_edge.apart) - Estimate.of(inner, self.inner_edge.apart)
+            low = Estimate.of(inner, self.inner_edge.apart, self.axis_std).widened(self.edge_stds[0])
+            return Estimate.of(outer, self.outer_edge.apart, self.axis_std).widened(self.edge_stds[1]) - low
         parts = [self.inner_strip, *self.lanes, self.outer_width]
         return Estimate(sum(p.value for p in parts), float(np.sqrt(sum(p.std**2 for p in parts))))
 
@@ -233,6 +239,12 @@ def line_width(line: Line | None, kind: LineKind, road: RoadKind, marked: bool) 
     return near if abs(near - line.width) <= _LINE_TOLERANCE else float(np.clip(round(line.width, 2), 0.05, 1.0))
 
 
+def half_width(line: Line | None, kind: LineKind, road: RoadKind, marked: bool) -> tuple[float, float]:
+    """Return half of the width, m, to write for a line, and its standard deviation as far as the line was measured."""
+    std = 0.5 * line.width_std if line is not None and marked else 0.0
+    return 0.5 * line_width(line, kind, road, marked), std
+
+
 @dataclass(frozen=True)
 class _Boundary:
     """A boundary of a lane as distances from the axis, m.
@@ -242,37 +254,42 @@ class _Boundary:
         measured: (K,) in single stretches; NaN where nothing was seen.
         apart: (K,) distance of the rows of points that each lies midway between, 0 where it is a mean.
         seen: whether it was: else it is put evenly between its neighbours.
+        std: of what all places share, m.
     """
 
     smoothed: Float
     measured: Float
     apart: Float
     seen: bool = True
+    std: float = 0.0
 
     @classmethod
     def of(cls, line: Line, sign: int) -> Self:
         """Return a line's middle as a boundary on the side of a sign."""
         return cls(sign * line.offsets, sign * line.measured, line.apart)
 
-    def shift(self, by: float) -> Self:
-        """Return the boundary so much (m) farther outside."""
-        return replace(self, smoothed=self.smoothed + by, measured=self.measured + by)
+    def shift(self, by: float, std: float) -> Self:
+        """Return the boundary so much (m) farther outside, known no better than by a standard deviation, m."""
+        std = float(np.hypot(self.std, std))
+        return replace(self, smoothed=self.smoothed + by, measured=self.measured + by, std=std)
 
-    def place(self, where: Bool) -> Estimate:
-        """Return the mean distance from the axis in the stretches of a mask (K,), m."""
+    def place(self, where: Bool, axis_std: float) -> Estimate:
+        """Return the mean distance from the axis, of a standard deviation (m), in the stretches of a mask (K,), m."""
         values = np.where(where, self.measured, np.nan)
-        estimate = Estimate.of(values if np.isfinite(values).any() else self.measured, self.apart)
+        estimate = Estimate.of(values if np.isfinite(values).any() else self.measured, self.apart, axis_std)
+        estimate = estimate.widened(self.std)
         return estimate if self.seen else replace(estimate, std=np.inf)
 
 
 def _carriageway(part: _SidePart) -> SideSection:
     """Return the measured cross-section of one carriageway of a dual one."""
     lines, boundaries = _order_lines(part.band, part.sign)
-    boundaries[0] = boundaries[0].shift(0.5 * line_width(lines[0], "inner_edge", "dual", part.marked))
+    boundaries[0] = boundaries[0].shift(*half_width(lines[0], "inner_edge", "dual", part.marked))
     first, last = boundaries[0].smoothed, boundaries[-1].smoothed
     outer = part.outer_edge(_fill_with_median(first), _fill_with_median(last))
     if not _lacks_outer_lane(lines[-1], outer):
-        boundaries[-1] = boundaries[-1].shift(-0.5 * line_width(lines[-1], "outer_edge", "dual", part.marked))
+        half, std = half_width(lines[-1], "outer_edge", "dual", part.marked)
+        boundaries[-1] = boundaries[-1].shift(-half, std)
     first = _fill_with_median(first)
     return _summarise_side(part, lines, boundaries, part.edge(first, False, first), outer)
 
@@ -286,7 +303,8 @@ def _half_section(part: _SidePart) -> SideSection:
     outer = part.edge(part.everywhere(_NARROWEST), reach=_WIDEST_HALF)
     mirrored = len(lines) == 1 and bool(beside[-part.sign])
     if len(lines) > 1:
-        columns[-1] = columns[-1].shift(-0.5 * line_width(lines[-1], "outer_edge", "single", part.marked))
+        half_line, std = half_width(lines[-1], "outer_edge", "single", part.marked)
+        columns[-1] = columns[-1].shift(-half_line, std)
     elif mirrored:
         other = min(abs(line.offset) for line in beside[-part.sign])
         place = part.everywhere(other - 0.5 * line_width(None, "outer_edge", "single", part.marked))
@@ -359,17 +377,18 @@ def _summarise_side(
         outside_of_lanes = np.where(part.band.usual, outside_of_lanes, np.nan)
     usual = _usual_stretches(outside_of_lanes, lines[-1])
     where = usual if usual.sum() >= _FEWEST_STRETCHES else np.ones(len(usual), dtype=bool)
-    places = [boundary.place(where).widened(0.0 if part.marked else _PAINT_STD) for boundary in boundaries]
+    paint_std = 0.0 if part.marked else _PAINT_STD
+    places = [boundary.place(where, part.axis_std).widened(paint_std) for boundary in boundaries]
     edge_std = 0.0 if part.profiles.paved is not None else _EDGE_STD
     if part.layout.kind == "single":  # its lanes begin at the axis
         places[0] = replace(places[0], std=part.axis_std)
     outside = Estimate(_USUAL_STRIP, np.inf)
     if edge_seen:
-        edge = Estimate.of(np.where(where, outer.offsets, np.nan), outer.apart)  # of the same part as the lines
+        edge = Estimate.of(np.where(where, outer.offsets, np.nan), outer.apart, part.axis_std)  # as the lines
         outside = edge.widened(edge_std) - places[-1]
     outside = Estimate(float(np.clip(outside.value, 0.0, 2.0 + _WIDEST)), outside.std)
     strip, shoulder = _share_pavement(outside)
-    inner_offset, inner_strip = _inner_widths(places[0], inner, where, edge_std)
+    inner_offset, inner_strip = _inner_widths(places[0], inner, where, edge_std, part.axis_std)
     inner_offset = inner_offset.widened(part.axis_std)
     return SideSection(
         side=part.side,
@@ -385,13 +404,17 @@ def _summarise_side(
         shoulder=shoulder,
         edge_seen=edge_seen,
         closed=not _lacks_outer_lane(lines[-1], outer),
+        axis_std=part.axis_std,
+        edge_stds=(edge_std if part.layout.kind == "dual" else part.axis_std, edge_std),
     )
 
 
-def _inner_widths(first: Estimate, inner: Edge, where: Bool, edge_std: float) -> tuple[Estimate, Estimate]:
+def _inner_widths(
+    first: Estimate, inner: Edge, where: Bool, edge_std: float, axis_std: float
+) -> tuple[Estimate, Estimate]:
     """Return the distance of the pavement's inner edge from the axis, and the inner edge strip's width, m."""
     if _is_visible(inner):
-        offset = Estimate.of(np.where(where, inner.offsets, np.nan), inner.apart).widened(edge_std)
+        offset = Estimate.of(np.where(where, inner.offsets, np.nan), inner.apart, axis_std).widened(edge_std)
         strip = first - offset
     else:
         offset = Estimate(first.value - _USUAL_STRIP, np.inf)

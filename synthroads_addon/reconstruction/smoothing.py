@@ -110,13 +110,14 @@ def mean_with_std(values: Float) -> tuple[float, float]:
     return middle, spread / float(np.sqrt(independent))
 
 
-def interval_mean(values: Float, apart: Float) -> tuple[float, float]:
+def interval_mean(values: Float, apart: Float, axis_std: float = 0.0) -> tuple[float, float]:
     """Return the mean of values (K,) along the road that each lie midway between two rows of points, and its deviation.
 
     A value is evenly likely everywhere between its rows, ``apart`` (K,) from each other, m, and so are all of them at
     once where the rows run beside the road: however many there are, they say no more than one. Where the rows wander
     only the places count that all intervals have in common. Intervals end softly, by how much values scatter beyond
-    them, and weigh as `correlation_factor` says. Values that are means of many points have no interval.
+    them, and weigh as `correlation_factor` says. Values that are means of many points have no interval. Where the axis
+    that all is measured from wanders by its deviation ``axis_std``, m, the rows only seem to.
     """
     known = np.isfinite(values) & np.isfinite(apart)
     values, half = values[known], 0.5 * apart[known]
@@ -125,7 +126,7 @@ def interval_mean(values: Float, apart: Float) -> tuple[float, float]:
     middle = mean_with_std(values)[0]
     beyond = np.maximum(np.abs(values - middle) - half, 0.0)
     jump = robust_scale(np.diff(values)) / np.sqrt(2.0) if len(values) > 1 else 0.0
-    scatter = max(_LEAST_SCATTER, robust_scale(beyond), min(jump, float(np.median(half)) + _LEAST_SCATTER))
+    scatter = max(_LEAST_SCATTER, axis_std, robust_scale(beyond), min(jump, float(np.median(half)) + _LEAST_SCATTER))
     low, high = values - np.maximum(half, 0.5 * _LEAST_SCATTER), values + np.maximum(half, 0.5 * _LEAST_SCATTER)
     place = np.arange(np.percentile(low, 1) - scatter, np.percentile(high, 99) + scatter + _GRID, _GRID)
     shares = ndtr((place - low[:, None]) / scatter) - ndtr((place - high[:, None]) / scatter)

@@ -84,14 +84,17 @@ def find_widenings(section: MeasuredSection, stations: Float) -> tuple[list[Bay]
         section: measured.
         stations: (K,) of its stretches, m.
     """
-    bays, others = [], []
+    bays: list[Bay] = []
+    others: list[Unlike] = []
     for side in section.sides.values():
+        runs = []
         for run in _runs(side, stations):
             bay = _bay(side, stations, run) if section.kind == "dual" else None
             if bay is not None:
                 bays.append(bay)
             else:
-                others.append(_unlike(side, stations, run))
+                runs.append(run)
+        others += _unlike_stretches(side, stations, runs)
     return bays, others
 
 
@@ -194,13 +197,23 @@ def _fit_trapezoid(stations: Float, beside: Float, first: float, last: float) ->
     return np.asarray(found.x), residual(found.x), np.linalg.pinv(normal, hermitian=True)
 
 
-def _unlike(side: SideSection, stations: Float, run: slice) -> Unlike:
+def _unlike_stretches(side: SideSection, stations: Float, runs: list[slice]) -> list[Unlike]:
+    """Return the stretches of runs of wider or narrower pavement; those between which it never closes are one."""
     half, beside = 0.5 * STRETCH * SPACING, excess(side)
-    by = float(np.nanmedian(beside[run]))
-    run = _whole(run, beside, robust_scale(beside[side.usual & np.isfinite(beside)]))
-    return Unlike(
-        side.side, round(stations[run.start] - half, 1), round(stations[run.stop - 1] + half, 1), round(by, 2)
-    )
+    scatter = robust_scale(beside[side.usual & np.isfinite(beside)])
+    found: dict[tuple[int, int], list[slice]] = {}
+    for run in runs:
+        whole = _whole(run, beside, scatter)
+        found.setdefault((whole.start, whole.stop), []).append(run)
+    return [
+        Unlike(
+            side=side.side,
+            start=round(stations[first] - half, 1),
+            end=round(stations[behind - 1] + half, 1),
+            wider_by=round(float(np.nanmedian(np.concatenate([beside[run] for run in parts]))), 2),
+        )
+        for (first, behind), parts in found.items()
+    ]
 
 
 def unlike_mask(others: list[Unlike], stations: Float) -> Bool:

@@ -45,3 +45,12 @@ def test_a_line_that_one_row_is_partly_on_lies_anywhere_about_that_row() -> None
     middle, apart = _on_a_row(offset, 31, 40)  # its outer half is marked, by a wobble
     assert middle == pytest.approx(2.755, abs=0.01)
     assert apart == pytest.approx(0.25)
+
+
+def test_rows_that_only_seem_to_wander_as_the_axis_does_say_no_more_than_rows_beside_it() -> None:
+    axis = 0.07 * np.sin(np.linspace(0.0, 12.0, 90))
+    seen = between_rows(np.full(90, 0.05), 0.25) + axis  # rows and edge keep their distance
+    mean, std = interval_mean(seen, np.full(90, 0.25), 0.05)
+    assert std > 0.05
+    assert abs(mean - TRUE) < 2.5 * std
+    assert interval_mean(seen, np.full(90, 0.25))[1] < 0.8 * std

@@ -40,6 +40,17 @@ def section(wider: Float, solid: bool = True, side: str = "right", noise: float 
     return SimpleNamespace(kind="dual", sides={side: one})
 
 
+def test_two_widenings_between_which_the_pavement_never_closes_are_one() -> None:
+    edge = trapezoid(100.0, 40.0, 40.0, 20.0, 3.5) + trapezoid(205.0, 20.0, 40.0, 40.0, 3.5)
+    edge = np.where((STATIONS > 140.0) & (STATIONS < 260.0), np.maximum(edge, 0.4), edge)
+    bays, (one,) = find_widenings(section(edge, solid=False), STATIONS)
+    assert bays == []
+    assert (one.start, one.end) == pytest.approx((100.0, 305.0), abs=10.0)
+    assert one.wider_by > 2.5
+    apart = np.where((STATIONS > 195.0) & (STATIONS < 210.0), 0.0, edge)
+    assert len(find_widenings(section(apart, solid=False), STATIONS)[1]) == 2
+
+
 @pytest.mark.parametrize("side", ["right", "left"])
 def test_a_bay_is_measured(side: str) -> None:
     ((bay,), others) = find_widenings(section(trapezoid(150.0, 20.0, 45.0, 30.0, 3.0), side=side), STATIONS)

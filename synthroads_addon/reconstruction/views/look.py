@@ -4,8 +4,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...base.arrays import Float
 from ..layout import FoundAxis, RoadLayout, axis_from_lines
 from ..profiles import Profiles
+from ..smoothing import fill_gaps
 from .extent import view_extent
 from .fusion import FusedAxis, fuse
 from .markings import view_lines
@@ -33,11 +35,25 @@ def rule_views(profiles: Profiles, layout: RoadLayout, lines: FoundAxis) -> list
     dual = layout.kind == "dual"
     cores = [0.5 * (band.low + band.high) for band in layout.bands]
     level = float(np.median(lines.offsets))
+    uneven = _unevenness(layout)
     return [
         view_lines(profiles, layout, lines),
         view_period(profiles, dual, level),
         view_brightness(profiles, cores, dual),
-        view_skeleton(profiles, cores),
-        view_symmetry(profiles),
+        view_skeleton(profiles, cores).less_sure(0.5 * uneven),
+        view_symmetry(profiles).less_sure(uneven),
         view_extent(profiles),
     ]
+
+
+def _unevenness(layout: RoadLayout) -> Float:
+    """Return how far (K,), m, the middle of all pavement lies beside the middle between two carriageways.
+
+    Where one has more lanes than the other, what is the same to both sides is not the road's axis. 0 where not all
+    edges are seen, and of a single carriageway.
+    """
+    if layout.kind == "single":
+        return np.zeros(len(layout.bands[0].edges[0].measured))
+    right, left = (edges[1].measured - edges[0].measured for edges in (band.edges for band in layout.bands))
+    known = np.isfinite(right) & np.isfinite(left)
+    return np.asarray(np.abs(0.5 * (fill_gaps(left) - fill_gaps(right)))) if known.any() else np.zeros(len(known))

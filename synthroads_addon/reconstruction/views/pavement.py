@@ -20,6 +20,7 @@ _CORE = 1.5  # m to either side of a carriageway's middle that is pavement if an
 _PAINT = 11  # bins: brighter strips of up to this width are paint
 _KERB, _KERB_REACH = 0.05, 3  # m that a kerb rises, and bins to either side of it
 _CRACK = 9  # bins: narrower gaps in the pavement, or in the median, are cracks and seams
+_PATCH = 5  # stretches: what differs from the ground before and behind it for less is a patch, a stain, an entrance
 _FEWEST_ROWS = 3
 _BEYOND = 6  # bins beyond an edge, half of which must be known: else the cloud ends there, not the pavement
 _LIKE = 4.0  # times the pavement's own spread of brightness, at least, that other ground is off
@@ -53,7 +54,7 @@ def pavement_edges(profiles: Profiles, cores: Sequence[float], dual: bool, at: f
     levels = np.array([np.percentile(row[core], 30) if np.isfinite(row).all() else np.nan for row in smooth])
     apart = np.abs(smooth - levels[:, None])
     alike = known & ~(apart > _brightness_threshold(apart[known], apart[:, core]))
-    inside = _close_cracks(alike) & ~steps
+    inside = _without_patches(_close_cracks(alike) & ~steps)
     if dual:
         inside = _close_cracks(known & ~inside)
     return np.array([_run_at(profiles, row, seen, at) for row, seen in zip(inside, known, strict=True)]).T
@@ -101,6 +102,16 @@ def _close_cracks(inside: Bool) -> Bool:
     """Return a mask (K, U) with gaps that are narrow across the road closed."""
     across = np.ones((1, _CRACK))
     return ndimage.binary_erosion(ndimage.binary_dilation(inside, across), across, border_value=1)
+
+
+def _without_patches(inside: Bool) -> Bool:
+    """Return a mask (K, U) without gaps and spots that are shorter along the road than any change of its width.
+
+    Repairs and oil make pavement look like a verge, and entrances a verge like pavement, but for a few metres.
+    """
+    along, ends = np.ones((_PATCH, 1)), ((_PATCH, _PATCH), (0, 0))
+    closed = ndimage.binary_closing(np.pad(inside, ends, mode="edge"), along)
+    return np.asarray(ndimage.binary_opening(closed, along)[_PATCH:-_PATCH])
 
 
 def _run_at(profiles: Profiles, inside: Bool, known: Bool, at: float) -> tuple[float, float]:

@@ -1,6 +1,6 @@
 """One view of the axis: offsets along the road from one kind of evidence alone, with standard deviations."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
@@ -47,6 +47,10 @@ class View:
         residual = np.where(known, np.abs(offsets - smoothed.values), 0.0)
         sized = np.sqrt(floor**2 + smoothed.std**2 + np.square(residual) + np.square(std))
         return cls(name, np.where(known, offsets, np.nan), np.where(known, sized, np.inf))
+
+    def less_sure(self, std: Float) -> Self:
+        """Return the view with one more independent error (K,), m, in each stretch."""
+        return replace(self, std=np.hypot(self.std, std))
 
     @property
     def seen(self) -> float:

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.arrays import Float
+from synthroads_addon.reconstruction.layout import Band, RoadLayout, axis_from_lines
+from synthroads_addon.reconstruction.lines import Line
 from synthroads_addon.reconstruction.path import CloudPath
 from synthroads_addon.reconstruction.profiles import Profiles
 from synthroads_addon.reconstruction.views.extent import view_extent
-from synthroads_addon.reconstruction.views.pavement import view_brightness
+from synthroads_addon.reconstruction.views.look import rule_views
+from synthroads_addon.reconstruction.views.pavement import pavement_edges, view_brightness
 from synthroads_addon.reconstruction.views.period import view_period
 from synthroads_addon.reconstruction.views.skeleton import view_skeleton
 from synthroads_addon.reconstruction.views.symmetry import view_symmetry
@@ -61,6 +64,40 @@ def test_of_two_carriageways_what_lies_between_them_is_seen() -> None:
     road = profiles([(-10.0, -1.0), (2.0, 11.0)])
     assert middle(view_brightness(road, [-5.5, 6.5], True)) == pytest.approx(0.5, abs=0.1)
     assert middle(view_skeleton(road, [-5.5, 6.5])) == pytest.approx(0.5, abs=0.15)
+
+
+def test_a_repair_or_an_entrance_of_some_metres_is_no_edge() -> None:
+    road, axis = profiles([(-3.5, 3.5)]), np.zeros(ROWS // 5)
+    repair = np.ix_(np.arange(60, 75), np.flatnonzero((road.offsets > -3.5) & (road.offsets < -0.5)))
+    entrance = np.ix_(np.arange(100, 115), np.flatnonzero((road.offsets > 3.0) & (road.offsets < 8.0)))
+    road.brightness[repair] += 0.3
+    road.brightness[entrance] = 0.2
+    assert pavement_edges(road, [0.0], False) == pytest.approx(np.array([axis - 3.5, axis + 3.5]), abs=0.15)
+    long = np.ix_(np.arange(60, 120), np.flatnonzero((road.offsets > 3.0) & (road.offsets < 8.0)))
+    road.brightness[long] = 0.2
+    assert pavement_edges(road, [0.0], False)[1, 14:22] == pytest.approx(8.0, abs=0.15)
+
+
+def edges_of(place: float) -> Line:
+    """Return an edge of the pavement at an offset, m, as a line without paint."""
+    measured = np.full(ROWS // 5, place)
+    zeros = np.zeros(len(measured))
+    return Line(5.0 * np.arange(len(measured)) + 2.5, measured, measured, zeros, zeros, zeros, 0.0, float(ROWS))
+
+
+@pytest.mark.parametrize(("outer", "uneven"), [(-11.0, 0.0), (-14.5, 1.75)])
+def test_where_one_carriageway_is_wider_symmetry_says_little(outer: float, uneven: float) -> None:
+    road = profiles([(max(outer, -11.5), -2.0), (2.0, 11.0)])
+    bands = (
+        Band(outer, -2.0, [], (edges_of(outer), edges_of(-2.0))),
+        Band(2.0, 11.0, [], (edges_of(2.0), edges_of(11.0))),
+    )
+    layout = RoadLayout("dual", bands, road.count, ())
+    views = {view.name: view for view in rule_views(road, layout, axis_from_lines(layout))}
+    alone = {"cross-profile": view_symmetry(road), "skeleton": view_skeleton(road, [0.5 * (outer - 2.0), 6.5])}
+    for (name, own), share in zip(alone.items(), (1.0, 0.5), strict=True):
+        assert views[name].std == pytest.approx(np.hypot(own.std, share * uneven))
+    assert views["brightness"].std == pytest.approx(view_brightness(road, [0.5 * (outer - 2.0), 6.5], True).std)
 
 
 def test_a_road_that_is_cut_off_within_its_pavement_pulls_no_view_but_the_extent() -> None:
