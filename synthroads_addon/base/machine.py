@@ -7,8 +7,10 @@ import platform
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from threading import Lock
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 LEAST_MEMORY = 128 << 20
 """Bytes of memory without which no command is begun."""
@@ -70,6 +72,45 @@ def release_memory() -> None:
     """
     with suppress(OSError, AttributeError, TypeError):  # none but glibc has it
         ctypes.CDLL(None).malloc_trim(0)
+
+
+class _OneThread:
+    """Limit of linear algebra to one thread that several may hold at a time; it is the whole process's."""
+
+    def __init__(self) -> None:
+        self._lock, self._holders = Lock(), 0
+        self._limit: threadpool_limits | None = None
+
+    def take(self) -> None:
+        """Set the limit, if nobody holds it yet."""
+        with self._lock:
+            self._holders += 1
+            if self._holders == 1:
+                self._limit = threadpool_limits(1, user_api="blas")
+
+    def give_back(self) -> None:
+        """Restore the threads that there were, if nobody else holds the limit."""
+        with self._lock:
+            self._holders -= 1
+            if self._holders == 0 and self._limit is not None:
+                self._limit.restore_original_limits()
+
+
+_one_thread = _OneThread()
+
+
+@contextmanager
+def linear_algebra_on_one_thread() -> Iterator[None]:
+    """Context in which NumPy's linear algebra begins no threads of its own, for work that is shared out to threads.
+
+    After each product OpenBLAS's threads keep a core busy for a while, waiting for the next. Threads may hold it side
+    by side. Other linear algebra in the process, but for PyTorch's, is limited meanwhile as well.
+    """
+    _one_thread.take()
+    try:
+        yield
+    finally:
+        _one_thread.give_back()
 
 
 def _processor() -> str:
