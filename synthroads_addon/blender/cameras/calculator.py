@@ -24,6 +24,8 @@ from .stage import Passes, RenderStage, new_stage
 WIDTH = 1024
 """Width of the largest plane, px."""
 _NARROWEST = 64
+_STEP = 64
+"""Heights of images of inputs are multiples of this, px, so that those that are there mostly fit once more."""
 _LOWEST = 4
 """Least height of an image, px: Blender renders none that is lower."""
 _FIRST_FRAME = -1_000_000
@@ -88,8 +90,9 @@ class Calculator:
             for start, row, count in zip(starts.tolist(), begins[:-1].tolist(), counts.tolist(), strict=True)
         ]
         height = max(int(begins[-1]), _LOWEST)
-        self._fill(values, spans, width, height)
-        with self._plane(numbers.tolist(), begins, width, height):
+        self._fit_images(width, height)
+        self._fill(values, spans)
+        with self._plane(numbers.tolist(), begins):
             camera = self.stage.camera
             camera.data.type, camera.data.ortho_scale = "ORTHO", float(max(width, height))
             camera.location = (width / 2.0, height / 2.0, _ABOVE)
@@ -100,30 +103,43 @@ class Calculator:
             result[name] = np.concatenate([flat[pixels] for _, pixels in spans])
         return result
 
-    def _fill(self, values: dict[SurfaceInput, Float32], spans: _Spans, width: int, height: int) -> None:
-        """Write the inputs' values into the images that the materials read, made anew if the size changes."""
-        if self._size != (width, height):
+    def _fit_images(self, width: int, height: int) -> None:
+        """Remove the input images if they aren't of this width, or too low, or more than twice as high as need be.
+
+        Making and removing them looks through all materials of the file.
+        """
+        fitting = -(-height // _STEP) * _STEP
+        if self._size[0] != width or not fitting <= self._size[1] <= 2 * fitting:
             self.close()
-            self._size = width, height
+            self._size = width, fitting
+
+    def _fill(self, values: dict[SurfaceInput, Float32], spans: _Spans) -> None:
+        """Write the inputs' values into the images that the materials read; what lies between the spans is any."""
+        flat = np.zeros((self._size[0] * self._size[1], 4), np.float32)
         for what, entry in values.items():
             if what not in self._images:
-                self._images[what] = _new_image(width, height)
-            flat = np.zeros((width * height, 4), np.float32)
+                self._add_image(what)
             for places, pixels in spans:
                 flat[pixels] = entry[places]
             image = self._images[what]
             image.pixels.foreach_set(flat.ravel())
             image.update()
+
+    def _add_image(self, what: SurfaceInput) -> None:
+        """Add an image of an input, and have the materials read it."""
+        self._images[what] = _new_image(*self._size)
         for copy in self._copies.values():
-            for what, node in copy.readers:
-                node.image = self._images.get(what)
+            for read, node in copy.readers:
+                if read == what:
+                    node.image = self._images[what]
 
     @contextmanager
-    def _plane(self, numbers: list[int], begins: np.ndarray, width: int, height: int) -> Iterator[None]:
+    def _plane(self, numbers: list[int], begins: np.ndarray) -> Iterator[None]:
         """Context in which the stage shows a plane with one face per material, of rows `begins` to the next.
 
-        The images that the materials read are `width` and `height` pixels large.
+        What the materials read are the lowest rows of the input images.
         """
+        width, height = self._size
         corners: list[tuple[float, float, float]] = []
         faces: list[tuple[int, ...]] = []
         maps: list[float] = []
