@@ -66,6 +66,7 @@ class Calculator:
         self.stage, self.layers, self._copies = stage, tuple(layers), copies
         self._images: dict[SurfaceInput, bpy.types.Image] = {}
         self._size = 0, 0
+        self._item: bpy.types.Object | None = None
 
     def inputs_of(self, material: int) -> frozenset[SurfaceInput]:
         """Return the inputs that the nodes of the material with this index read."""
@@ -92,11 +93,11 @@ class Calculator:
         height = max(int(begins[-1]), _LOWEST)
         self._fit_images(width, height)
         self._fill(values, spans)
-        with self._plane(numbers.tolist(), begins):
-            camera = self.stage.camera
-            camera.data.type, camera.data.ortho_scale = "ORTHO", float(max(width, height))
-            camera.location = (width / 2.0, height / 2.0, _ABOVE)
-            rendered = self.stage.render(width, height)
+        self._lay_out(numbers.tolist(), begins)
+        camera = self.stage.camera
+        camera.data.type, camera.data.ortho_scale = "ORTHO", float(max(width, height))
+        camera.location = (width / 2.0, height / 2.0, _ABOVE)
+        rendered = self.stage.render(width, height)
         result = {}
         for name, image in rendered.layers.items():
             flat = image[::-1].reshape(-1, image.shape[2])
@@ -106,11 +107,11 @@ class Calculator:
     def _fit_images(self, width: int, height: int) -> None:
         """Remove the input images if they aren't of this width, or too low, or more than twice as high as need be.
 
-        Making and removing them looks through all materials of the file.
+        Making and removing them looks through all of the file, so that both are done as seldom as can be.
         """
         fitting = -(-height // _STEP) * _STEP
         if self._size[0] != width or not fitting <= self._size[1] <= 2 * fitting:
-            self.close()
+            self._remove_images()
             self._size = width, fitting
 
     def _fill(self, values: dict[SurfaceInput, Float32], spans: _Spans) -> None:
@@ -133,9 +134,8 @@ class Calculator:
                 if read == what:
                     node.image = self._images[what]
 
-    @contextmanager
-    def _plane(self, numbers: list[int], begins: np.ndarray) -> Iterator[None]:
-        """Context in which the stage shows a plane with one face per material, of rows `begins` to the next.
+    def _lay_out(self, numbers: list[int], begins: np.ndarray) -> None:
+        """Have the stage show a plane with one face per material, of rows `begins` to the next.
 
         What the materials read are the lowest rows of the input images.
         """
@@ -148,23 +148,33 @@ class Calculator:
             corners += [(0.0, low, 0.0), (width, low, 0.0), (width, high, 0.0), (0.0, high, 0.0)]
             faces.append((first, first + 1, first + 2, first + 3))
             maps += [0.0, low / height, 1.0, low / height, 1.0, high / height, 0.0, high / height]
-        mesh = bpy.data.meshes.new("SR Calculator")
-        try:
-            mesh.from_pydata(corners, [], faces)
-            mesh.uv_layers.new(name="SR Pixels").data.foreach_set("uv", maps)
-            for number in numbers:
-                mesh.materials.append(self._copies[number].item)
-            mesh.polygons.foreach_set("material_index", np.arange(len(faces), dtype=np.int32))
-            item = bpy.data.objects.new("SR Calculator", mesh)
-            self.stage.scene.collection.objects.link(item)
-            try:
-                yield
-            finally:
-                bpy.data.objects.remove(item)
-        finally:
-            bpy.data.meshes.remove(mesh)
+        mesh = self._empty_mesh()
+        mesh.from_pydata(corners, [], faces)
+        mesh.uv_layers.new(name="SR Pixels").data.foreach_set("uv", maps)
+        for number in numbers:
+            mesh.materials.append(self._copies[number].item)
+        mesh.polygons.foreach_set("material_index", np.arange(len(faces), dtype=np.int32))
+
+    def _empty_mesh(self) -> bpy.types.Mesh:
+        """Return the mesh of the object that the stage shows, without faces and materials."""
+        if self._item is None:
+            mesh = bpy.data.meshes.new("SR Calculator")
+            self._item = bpy.data.objects.new("SR Calculator", mesh)
+            self.stage.scene.collection.objects.link(self._item)
+        mesh = self._item.data
+        mesh.clear_geometry()
+        mesh.materials.clear()
+        return mesh
 
     def close(self) -> None:
+        """Remove the plane and the input images from the file."""
+        self._remove_images()
+        if self._item is not None:
+            mesh, item, self._item = self._item.data, self._item, None
+            bpy.data.objects.remove(item)
+            bpy.data.meshes.remove(mesh)
+
+    def _remove_images(self) -> None:
         """Remove the input images from the file."""
         for copy in self._copies.values():
             for _, node in copy.readers:
