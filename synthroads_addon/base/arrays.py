@@ -36,7 +36,7 @@ class ArrayRows:
         return cls(*(joined([getattr(part, field.name) for part in parts]) for field in fields(cls)))
 
 
-def take_rows(array: AnyArray, rows: Bool | Index | slice) -> AnyArray:
+def take_rows(array: AnyArray, rows: Bool | NDArray[np.integer] | slice) -> AnyArray:
     """Return the rows of an array that are chosen by a mask, indices or a slice, as ``array[rows]`` does."""
     if isinstance(rows, slice):
         return array[rows]
