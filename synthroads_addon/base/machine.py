@@ -21,7 +21,7 @@ needed, and size from which a block is a mapping of its own."""
 _LARGEST_THRESHOLD = 32 << 20
 _KEEPING = {_MMAP_THRESHOLD: _LARGEST_THRESHOLD, _TRIM_THRESHOLD: 1 << 30, _TOP_PAD: 64 << 20}
 _USUAL = {_MMAP_THRESHOLD: _LARGEST_THRESHOLD, _TRIM_THRESHOLD: 2 * _LARGEST_THRESHOLD, _TOP_PAD: 128 << 10}
-"""What glibc comes to by itself where large blocks are freed: it no longer adapts once anything has been set."""
+"""Values that glibc comes to by itself where large blocks are freed: once any is set it no longer adapts them."""
 
 
 def machine(versions: Mapping[str, str]) -> str:

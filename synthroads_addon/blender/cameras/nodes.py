@@ -193,6 +193,8 @@ class NodeLayers:
 
         view = take_rows(points.towards_scanner, rows)
         color, roughness, metallic, specular = map(layer, ("base_color", "roughness", "metallic", "specular"))
-        shares = reflected_sunlight(color, roughness, metallic, specular, take_rows(normal, rows), view, light.direction)
+        shares = reflected_sunlight(
+            color, roughness, metallic, specular, take_rows(normal, rows), view, light.direction
+        )
         result[rows] = shares * light.sun.astype(np.float32)
         return result
