@@ -24,7 +24,7 @@ class ArrayRows:
     def select(self, rows: Bool | Index | slice) -> Self:
         """Return a record of the rows chosen by a mask, indices or a slice."""
         arrays = (getattr(self, field.name) for field in fields(self))
-        return type(self)(*(None if array is None else array[rows] for array in arrays))
+        return type(self)(*(None if array is None else take_rows(array, rows) for array in arrays))
 
     @classmethod
     def join(cls, parts: Sequence[Any]) -> Self:
@@ -34,6 +34,14 @@ class ArrayRows:
             return None if arrays[0] is None else np.concatenate(arrays)
 
         return cls(*(joined([getattr(part, field.name) for part in parts]) for field in fields(cls)))
+
+
+def take_rows(array: AnyArray, rows: Bool | NDArray[np.integer] | slice) -> AnyArray:
+    """Return the rows of an array that are chosen by a mask, indices or a slice, as ``array[rows]`` does."""
+    if isinstance(rows, slice):
+        return array[rows]
+    # For rows of several numbers this is several times as fast.
+    return np.take(array, np.flatnonzero(rows) if rows.dtype == np.bool_ else rows, axis=0)
 
 
 def without_repeats(values: Float) -> tuple[Float, Index]:

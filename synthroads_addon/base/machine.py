@@ -4,14 +4,24 @@ import ctypes
 import mmap
 import os
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from threading import Lock
+from typing import cast
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 LEAST_MEMORY = 128 << 20
 """Bytes of memory without which no command is begun."""
+_TRIM_THRESHOLD, _TOP_PAD, _MMAP_THRESHOLD = -1, -2, -3
+"""Numbers of malloc's parameters (malloc.h): free bytes at the top that are given back, bytes asked for beyond what is
+needed, and size from which a block is a mapping of its own."""
+_LARGEST_THRESHOLD = 32 << 20
+_KEEPING = {_MMAP_THRESHOLD: _LARGEST_THRESHOLD, _TRIM_THRESHOLD: 1 << 30, _TOP_PAD: 64 << 20}
+_USUAL = {_MMAP_THRESHOLD: _LARGEST_THRESHOLD, _TRIM_THRESHOLD: 2 * _LARGEST_THRESHOLD, _TOP_PAD: 128 << 10}
+"""Values that glibc comes to by itself where large blocks are freed: once any is set it no longer adapts them."""
 
 
 def machine(versions: Mapping[str, str]) -> str:
@@ -70,6 +80,87 @@ def release_memory() -> None:
     """
     with suppress(OSError, AttributeError, TypeError):  # none but glibc has it
         ctypes.CDLL(None).malloc_trim(0)
+
+
+class _Shared:
+    """Setting of the whole process that several may hold at a time: the first makes it, the last undoes it.
+
+    Args:
+        make: makes the setting; returns what undoes it.
+    """
+
+    def __init__(self, make: Callable[[], Callable[[], None]]) -> None:
+        self._make, self._undo = make, _nothing
+        self._lock, self._holders = Lock(), 0
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Context in which the setting is made."""
+        with self._lock:
+            if self._holders == 0:
+                self._undo = self._make()
+            self._holders += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._holders -= 1
+                if self._holders == 0:
+                    self._undo()
+
+
+def _nothing() -> None:
+    """Do nothing."""
+
+
+def _limit_linear_algebra() -> Callable[[], None]:
+    """Have linear algebra take one thread; return what gives it those back that it had."""
+    limit = threadpool_limits(1, user_api="blas")
+    return cast(Callable[[], None], limit.restore_original_limits)
+
+
+def _keep_freed_memory() -> Callable[[], None]:
+    """Have the C library keep freed memory, where it can; return what has it given back, now and from now on."""
+    _set_malloc(_KEEPING)
+
+    def give_back() -> None:
+        _set_malloc(_USUAL)
+        release_memory()
+
+    return give_back
+
+
+def _set_malloc(values: Mapping[int, int]) -> None:
+    """Set parameters of glibc's malloc, by their numbers; do nothing where there is another C library."""
+    with suppress(OSError, AttributeError, TypeError):
+        mallopt = ctypes.CDLL(None).mallopt
+        for parameter, value in values.items():
+            mallopt(parameter, value)
+
+
+_one_thread, _kept_memory = _Shared(_limit_linear_algebra), _Shared(_keep_freed_memory)
+
+
+@contextmanager
+def linear_algebra_on_one_thread() -> Iterator[None]:
+    """Context in which NumPy's linear algebra begins no threads of its own, for work that is shared out to threads.
+
+    After each product OpenBLAS's threads keep a core busy for a while, waiting for the next. Threads may hold it side
+    by side. Other linear algebra in the process, but for PyTorch's, is limited meanwhile as well.
+    """
+    with _one_thread.held():
+        yield
+
+
+@contextmanager
+def freed_memory_kept() -> Iterator[None]:
+    """Context in which freed memory is kept for what comes next, for work that takes and frees large arrays in turns.
+
+    The system clears each page that it hands out, and page faults are dear. In the end all that is free is given back.
+    Threads may hold it side by side. It does something where the C library is glibc.
+    """
+    with _kept_memory.held():
+        yield
 
 
 def _processor() -> str:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.arrays import AnyArray, Bool, Float, Float32, Index, UInt8, UInt16
+from ..base.arrays import AnyArray, Bool, Float, Float32, Index, UInt8, UInt16, take_rows
 
 NO_MATERIAL = 65535
 """`PointBlock.material` of points in the air, which lie on no surface."""
@@ -72,7 +72,7 @@ class PointBlock:
 
     def select(self, keep: Bool | Index | slice) -> PointBlock:
         """Return the points chosen by a mask, indices or a slice."""
-        return make_block(**{name: array[keep] for name, array in self.attributes().items()})
+        return make_block(**{name: take_rows(array, keep) for name, array in self.attributes().items()})
 
     def attributes(self) -> dict[str, AnyArray]:
         """Return the block's arrays by name, without those that are None."""

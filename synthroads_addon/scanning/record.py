@@ -8,7 +8,7 @@ from itertools import islice
 from threading import current_thread, main_thread
 from typing import Any, Protocol, TypeAlias, TypeVar
 
-from ..base.machine import available_cores
+from ..base.machine import available_cores, freed_memory_kept, linear_algebra_on_one_thread
 from ..base.progress import StageTimer
 from .blocks import Block
 from .colour.colour import LayerSource
@@ -105,6 +105,12 @@ def scan_blocks(plan: ScanPlan, source: LayerSource | None = None) -> Generator[
         source: of colours and layers; what it renders, the main thread renders. Without it the blocks are as they were
             measured.
     """
+    with linear_algebra_on_one_thread(), freed_memory_kept():
+        yield from _results(plan, source)
+
+
+def _results(plan: ScanPlan, source: LayerSource | None) -> Iterator[BlockResult]:
+    """Yield the results of a plan's blocks, see `scan_blocks`."""
     workers, block_scan = plan.threads or available_cores(), BlockScan(plan)
 
     def scan(block: Block) -> BlockResult:

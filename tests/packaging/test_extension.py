@@ -179,9 +179,10 @@ MODULE = "bl_ext.user_default.synthroads"
 for archive in sys.argv[2:]:
     bpy.ops.extensions.package_install_files(filepath=archive, repo="user_default", enable_on_install=True)
 enabled = MODULE in bpy.context.preferences.addons
-import embreex.rtcore_scene, ifcopenshell, importlib, laspy, lazrs, numpy, PIL.Image, pydantic, rasterio, tqdm
+import embreex.rtcore_scene, ifcopenshell, importlib, laspy, lazrs, numpy, PIL.Image, pydantic, rasterio
+import threadpoolctl, tqdm
 importlib.import_module(MODULE + ".scenario.scenario")
-bundled = (embreex, ifcopenshell, laspy, lazrs, PIL, pydantic, rasterio, tqdm)
+bundled = (embreex, ifcopenshell, laspy, lazrs, PIL, pydantic, rasterio, threadpoolctl, tqdm)
 bpy.ops.preferences.addon_disable(module=MODULE)
 disabled = MODULE not in bpy.context.preferences.addons
 bpy.ops.preferences.addon_enable(module=MODULE)

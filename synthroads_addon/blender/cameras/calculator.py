@@ -24,6 +24,8 @@ from .stage import Passes, RenderStage, new_stage
 WIDTH = 1024
 """Width of the largest plane, px."""
 _NARROWEST = 64
+_STEP = 64
+"""Heights of images of inputs are multiples of this, px, so that those that are there mostly fit once more."""
 _LOWEST = 4
 """Least height of an image, px: Blender renders none that is lower."""
 _FIRST_FRAME = -1_000_000
@@ -64,6 +66,7 @@ class Calculator:
         self.stage, self.layers, self._copies = stage, tuple(layers), copies
         self._images: dict[SurfaceInput, bpy.types.Image] = {}
         self._size = 0, 0
+        self._item: bpy.types.Object | None = None
 
     def inputs_of(self, material: int) -> frozenset[SurfaceInput]:
         """Return the inputs that the nodes of the material with this index read."""
@@ -88,42 +91,55 @@ class Calculator:
             for start, row, count in zip(starts.tolist(), begins[:-1].tolist(), counts.tolist(), strict=True)
         ]
         height = max(int(begins[-1]), _LOWEST)
-        self._fill(values, spans, width, height)
-        with self._plane(numbers.tolist(), begins, width, height):
-            camera = self.stage.camera
-            camera.data.type, camera.data.ortho_scale = "ORTHO", float(max(width, height))
-            camera.location = (width / 2.0, height / 2.0, _ABOVE)
-            rendered = self.stage.render(width, height)
+        self._fit_images(width, height)
+        self._fill(values, spans)
+        self._lay_out(numbers.tolist(), begins)
+        camera = self.stage.camera
+        camera.data.type, camera.data.ortho_scale = "ORTHO", float(max(width, height))
+        camera.location = (width / 2.0, height / 2.0, _ABOVE)
+        rendered = self.stage.render(width, height)
         result = {}
         for name, image in rendered.layers.items():
             flat = image[::-1].reshape(-1, image.shape[2])
             result[name] = np.concatenate([flat[pixels] for _, pixels in spans])
         return result
 
-    def _fill(self, values: dict[SurfaceInput, Float32], spans: _Spans, width: int, height: int) -> None:
-        """Write the inputs' values into the images that the materials read, made anew if the size changes."""
-        if self._size != (width, height):
-            self.close()
-            self._size = width, height
+    def _fit_images(self, width: int, height: int) -> None:
+        """Remove the input images if they aren't of this width, or too low, or more than twice as high as need be.
+
+        Making and removing them looks through all of the file, so that both are done as seldom as can be.
+        """
+        fitting = -(-height // _STEP) * _STEP
+        if self._size[0] != width or not fitting <= self._size[1] <= 2 * fitting:
+            self._remove_images()
+            self._size = width, fitting
+
+    def _fill(self, values: dict[SurfaceInput, Float32], spans: _Spans) -> None:
+        """Write the inputs' values into the images that the materials read; what lies between the spans is any."""
+        flat = np.zeros((self._size[0] * self._size[1], 4), np.float32)
         for what, entry in values.items():
             if what not in self._images:
-                self._images[what] = _new_image(width, height)
-            flat = np.zeros((width * height, 4), np.float32)
+                self._add_image(what)
             for places, pixels in spans:
                 flat[pixels] = entry[places]
             image = self._images[what]
             image.pixels.foreach_set(flat.ravel())
             image.update()
+
+    def _add_image(self, what: SurfaceInput) -> None:
+        """Add an image of an input, and have the materials read it."""
+        self._images[what] = _new_image(*self._size)
         for copy in self._copies.values():
-            for what, node in copy.readers:
-                node.image = self._images.get(what)
+            for read, node in copy.readers:
+                if read == what:
+                    node.image = self._images[what]
 
-    @contextmanager
-    def _plane(self, numbers: list[int], begins: np.ndarray, width: int, height: int) -> Iterator[None]:
-        """Context in which the stage shows a plane with one face per material, of rows `begins` to the next.
+    def _lay_out(self, numbers: list[int], begins: np.ndarray) -> None:
+        """Have the stage show a plane with one face per material, of rows `begins` to the next.
 
-        The images that the materials read are `width` and `height` pixels large.
+        What the materials read are the lowest rows of the input images.
         """
+        width, height = self._size
         corners: list[tuple[float, float, float]] = []
         faces: list[tuple[int, ...]] = []
         maps: list[float] = []
@@ -132,23 +148,33 @@ class Calculator:
             corners += [(0.0, low, 0.0), (width, low, 0.0), (width, high, 0.0), (0.0, high, 0.0)]
             faces.append((first, first + 1, first + 2, first + 3))
             maps += [0.0, low / height, 1.0, low / height, 1.0, high / height, 0.0, high / height]
-        mesh = bpy.data.meshes.new("SR Calculator")
-        try:
-            mesh.from_pydata(corners, [], faces)
-            mesh.uv_layers.new(name="SR Pixels").data.foreach_set("uv", maps)
-            for number in numbers:
-                mesh.materials.append(self._copies[number].item)
-            mesh.polygons.foreach_set("material_index", np.arange(len(faces), dtype=np.int32))
-            item = bpy.data.objects.new("SR Calculator", mesh)
-            self.stage.scene.collection.objects.link(item)
-            try:
-                yield
-            finally:
-                bpy.data.objects.remove(item)
-        finally:
-            bpy.data.meshes.remove(mesh)
+        mesh = self._empty_mesh()
+        mesh.from_pydata(corners, [], faces)
+        mesh.uv_layers.new(name="SR Pixels").data.foreach_set("uv", maps)
+        for number in numbers:
+            mesh.materials.append(self._copies[number].item)
+        mesh.polygons.foreach_set("material_index", np.arange(len(faces), dtype=np.int32))
+
+    def _empty_mesh(self) -> bpy.types.Mesh:
+        """Return the mesh of the object that the stage shows, without faces and materials."""
+        if self._item is None:
+            mesh = bpy.data.meshes.new("SR Calculator")
+            self._item = bpy.data.objects.new("SR Calculator", mesh)
+            self.stage.scene.collection.objects.link(self._item)
+        mesh = self._item.data
+        mesh.clear_geometry()
+        mesh.materials.clear()
+        return mesh
 
     def close(self) -> None:
+        """Remove the plane and the input images from the file."""
+        self._remove_images()
+        if self._item is not None:
+            mesh, item, self._item = self._item.data, self._item, None
+            bpy.data.objects.remove(item)
+            bpy.data.meshes.remove(mesh)
+
+    def _remove_images(self) -> None:
         """Remove the input images from the file."""
         for copy in self._copies.values():
             for _, node in copy.readers:

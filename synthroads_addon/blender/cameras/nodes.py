@@ -8,7 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ...base.arrays import AnyArray, Bool, Float32, Index, UInt16
+from ...base.arrays import AnyArray, Bool, Float32, Index, UInt16, take_rows
 from ...base.turns.main_thread import MainThreadCalls
 from ...scanning.colour.colour import (
     FROM_NODES,
@@ -23,8 +23,8 @@ from ...scanning.scene.surface_values import SurfaceInput
 from ..materials.inputs import INCOMING, POSITION, TRUE_NORMAL
 
 _OF_POINT: dict[SurfaceInput, Callable[[SeenPoints, Index], AnyArray]] = {
-    TRUE_NORMAL: lambda points, rows: points.normal[rows],
-    INCOMING: lambda points, rows: points.select(rows).towards_scanner,
+    TRUE_NORMAL: lambda points, rows: take_rows(points.normal, rows),
+    INCOMING: lambda points, rows: take_rows(points.towards_scanner, rows),
 }
 
 
@@ -126,7 +126,7 @@ class NodeLayers:
         source = np.full(len(points), FROM_NODES, np.uint8)
         channels: dict[str, Float32] = {}
         if self._calculator is not None:
-            varying = np.flatnonzero(self._varying[points.material])
+            varying = np.flatnonzero(np.take(self._varying, points.material))
             parts = {name: (len(points), 3 if name == "base_color" else 1) for name in self._calculator.layers}
             channels = {name: np.zeros(shape, np.float32) for name, shape in parts.items()}
             most = self._calculator.at_once
@@ -161,7 +161,7 @@ class NodeLayers:
         together: dict[tuple[int, ...], list[SurfaceInput]] = {}
         for what, numbers in asked.items():
             if what == POSITION:
-                values[what][:, :3] = points.position[rows] + self._frame
+                values[what][:, :3] = take_rows(points.position, rows) + self._frame
             elif what in _OF_POINT:
                 values[what][:, :3] = _OF_POINT[what](points, rows)
             else:
@@ -185,15 +185,16 @@ class NodeLayers:
 
         def layer(name: str) -> Float32:
             """Return a layer's values at the lit points: evaluated where it varies, else the material's constant."""
-            values = self.material.constants.values[name][material]
+            values = take_rows(self.material.constants.values[name], material)
             if name in channels:
-                use = np.flatnonzero(self.material.constants.varies[name][material])
-                values[use] = channels[name][rows[use]].reshape(values[use].shape)
+                use = np.flatnonzero(np.take(self.material.constants.varies[name], material))
+                values[use] = take_rows(channels[name], rows[use]).reshape(len(use), *values.shape[1:])
             return values
 
-        view = (points.scanner[rows] - points.position[rows]).astype(np.float32)
-        view /= np.maximum(np.sqrt(np.einsum("ij,ij->i", view, view)), 1e-9)[:, None]
+        view = take_rows(points.towards_scanner, rows)
         color, roughness, metallic, specular = map(layer, ("base_color", "roughness", "metallic", "specular"))
-        shares = reflected_sunlight(color, roughness, metallic, specular, normal[rows], view, light.direction)
+        shares = reflected_sunlight(
+            color, roughness, metallic, specular, take_rows(normal, rows), view, light.direction
+        )
         result[rows] = shares * light.sun.astype(np.float32)
         return result

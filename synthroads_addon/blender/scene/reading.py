@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ...base.class_mapping import NameClasses
 from ...base.classes import UNLABELLED
 from ...base.errors import InputError
+from ...base.machine import linear_algebra_on_one_thread
 from ...materials.table import entry_of
 from ...scanning.scene.mesh import SceneMesh, empty_scene_mesh
 from ...scanning.scene.surface_values import MeshValues, PartValues, SurfaceInput, ValuesBuilder
@@ -244,6 +245,7 @@ def _face_values(mesh: bpy.types.Mesh, name: str) -> NDArray[Any] | None:
     return values
 
 
+@linear_algebra_on_one_thread()  # thousands of small products
 def join_parts(pairs: list[tuple[MeshPart, Places]], tables: SceneTables, frame: Float | None = None) -> SceneMesh:
     """Return all placed parts as one mesh, without triangles of no area; empties `pairs`.
 

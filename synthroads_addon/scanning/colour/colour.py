@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.arrays import AnyArray, ArrayRows, Bool, Float, Float32, Index, UInt8, UInt16
+from ...base.arrays import AnyArray, ArrayRows, Bool, Float, Float32, Index, UInt8, UInt16, take_rows
 from ...base.turns.main_thread import MainThreadCalls
 from ...cloud.points import NO_MATERIAL
 from ...materials.table import Material
@@ -117,7 +118,7 @@ class SeenPoints(ArrayRows):
     def __len__(self) -> int:
         return len(self.position)
 
-    @property
+    @cached_property  # several ask for it
     def towards_scanner(self) -> Float32:
         """Return the unit vectors (N, 3) from the points to the scanner."""
         towards = (self.scanner - self.position).astype(np.float32)
@@ -252,9 +253,9 @@ class MaterialLayers:
         found = source != FROM_MATERIAL
         layers: dict[str, Float32] = {}
         for name in sorted(needed_layers(wanted, self.mode)):
-            layers[name] = self.constants.values[name][points.material]
+            layers[name] = take_rows(self.constants.values[name], points.material)
             if name in channels:
-                use = found & self.constants.varies[name][points.material]
+                use = found & np.take(self.constants.varies[name], points.material)
                 shape = layers[name].shape
                 np.copyto(layers[name], channels[name].reshape(shape), where=use.reshape(-1, *(1,) * (len(shape) - 1)))
         arrays: dict[str, NDArray[np.generic]] = {name: layers[name] for name in layers.keys() & wanted}

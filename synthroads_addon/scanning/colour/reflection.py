@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 from threading import Lock
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,9 +45,12 @@ def reflected_sunlight(
     across, between = np.einsum("ij,ij->i", normal, half), np.einsum("ij,ij->i", view, half)
     rough = np.maximum(roughness, _SMOOTHEST)
     gloss = _gloss(rough, towards_sun, towards_view, np.clip(across, 0.0, 1.0))
-    bounced = _one_bounce_albedo(rough, towards_view)
+    tables = _tables()
+    place = tables.place(rough, towards_view)
+    bounced = tables.once(place), tables.average(place)
     level = np.minimum(_MATT_F0 * specular, 0.999)
-    albedo, average = _layer_albedo(rough, towards_view, level)
+    root = np.sqrt(level)
+    albedo, average = tables.albedo(place, root), _mean_fresnel(level, root)
     again = _compensation(average, bounced)
     share = (1.0 - metallic) * gloss * _dielectric(level, between) * again
     matt = ((1.0 - metallic) * (1.0 - albedo) * towards_sun)[:, None]
@@ -103,18 +107,28 @@ def _compensation(mean: NDArray[np.floating], bounced: _Bounced) -> NDArray[np.f
     return np.asarray(1.0 + missing * mean * mean * average / (1.0 - mean * (1.0 - average)))
 
 
-def _one_bounce_albedo(rough: Float32, view: Float32) -> _Bounced:
-    """Return the directional albedo of GGX mirrors after one bounce (N,), and its mean over all directions (N,)."""
-    tables = _tables()
-    return tables.once(rough, view), tables.average(rough)
-
-
-def _layer_albedo(rough: Float32, view: Float32, level: Float32) -> tuple[Float32, Float32]:
-    """Return a gloss's directional albedo relative to a mirror's (N,), and its mean Fresnel reflectance (N,)."""
-    root = np.sqrt(level)
+def _mean_fresnel(level: Float32, root: Float32) -> Float32:
+    """Return a dielectric's mean Fresnel reflectance (N,), by that at a right angle and its root."""
     eta = (1.0 + root) / (1.0 - root)
     average = np.where(level > 0.0, (eta - 1.0) / (4.08567 + 1.00071 * eta), 0.0)
-    return _tables().albedo(rough, view, root), np.asarray(average, np.float32)
+    return np.asarray(average, np.float32)
+
+
+_GridStep = tuple[NDArray[np.intp], Float32]
+"""Index of the grid step below each of N values, and the fraction of the way to the next."""
+
+
+class _Place(NamedTuple):
+    """Places (N,) in the tables.
+
+    Attributes:
+        rough, view: steps of roughness and of the cosine of the view.
+        entry: indices of both in a table of as many rows and columns.
+    """
+
+    rough: _GridStep
+    view: _GridStep
+    entry: NDArray[np.intp]
 
 
 class _AlbedoTables:
@@ -139,21 +153,28 @@ class _AlbedoTables:
             (axis[0], (len(axis) - 1) / (axis[-1] - axis[0]), len(axis) - 1) for axis in (cosine, rough, root)
         )
 
-    def once(self, rough: Float32, view: Float32) -> Float32:
+    def place(self, rough: Float32, view: Float32) -> _Place:
+        """Return where roughnesses and cosines of the view (N,) lie in the tables."""
+        steps = _grid_step(rough, self._rough), _grid_step(view, self._cosine)
+        return _Place(*steps, steps[0][0] * _COSINES + steps[1][0])
+
+    def once(self, place: _Place) -> Float32:
         """Return the directional albedo (N,) of GGX mirrors after one bounce, interpolated."""
-        return _bilinear(self._once, _grid_position(rough, self._rough), _grid_position(view, self._cosine))
+        return _bilinear(self._once, place, place.entry)
 
-    def average(self, rough: Float32) -> Float32:
+    def average(self, place: _Place) -> Float32:
         """Return the one-bounce albedo's cosine-weighted mean over all directions (N,), interpolated."""
-        low, share = _grid_position(rough, self._rough)
-        return np.asarray(self._average[low] * (1.0 - share) + self._average[low + 1] * share, np.float32)
+        low, share = place.rough
+        below, above = np.take(self._average, low), np.take(self._average, low + 1)
+        return np.asarray(below * (1.0 - share) + above * share, np.float32)
 
-    def albedo(self, rough: Float32, view: Float32, root: Float32) -> Float32:
+    def albedo(self, place: _Place, root: Float32) -> Float32:
         """Return a dielectric gloss's albedo relative to a mirror's (N,); `root` squared is its normal reflectance."""
-        low, share = _grid_position(root, self._root)
-        places = _grid_position(rough, self._rough), _grid_position(view, self._cosine)
-        below = _bilinear(self._albedo, *places, low)
-        above = _bilinear(self._albedo, *places, low + 1)
+        low, share = _grid_step(root, self._root)
+        entry = place.entry * _LEVELS + low
+        below = _bilinear(self._albedo, place, entry, _LEVELS)
+        entry += 1
+        above = _bilinear(self._albedo, place, entry, _LEVELS)
         return np.asarray(below * (1.0 - share) + above * share, np.float32)
 
 
@@ -174,7 +195,7 @@ def _built_tables() -> _AlbedoTables:
 _Axis = tuple[float, float, int]
 
 
-def _grid_position(values: Float32, axis: _Axis) -> tuple[NDArray[np.intp], Float32]:
+def _grid_step(values: Float32, axis: _Axis) -> _GridStep:
     """Return the index of the grid step below each value (N,), and the fraction of the way to the next (N,)."""
     first, scale, last = axis
     scaled = np.clip((values - np.float32(first)) * np.float32(scale), 0.0, last)
@@ -182,15 +203,19 @@ def _grid_position(values: Float32, axis: _Axis) -> tuple[NDArray[np.intp], Floa
     return low, np.asarray(scaled - low, np.float32)
 
 
-def _bilinear(
-    table: Float32,
-    rows: tuple[NDArray[np.intp], Float32],
-    columns: tuple[NDArray[np.intp], Float32],
-    *layer: NDArray[np.intp],
-) -> Float32:
-    (i, u), (j, v) = rows, columns
-    low = table[(i, j, *layer)] * (1.0 - v) + table[(i, j + 1, *layer)] * v
-    high = table[(i + 1, j, *layer)] * (1.0 - v) + table[(i + 1, j + 1, *layer)] * v
+def _bilinear(table: Float32, place: _Place, entry: NDArray[np.intp], levels: int = 1) -> Float32:
+    """Return values (N,) of a table interpolated over roughness and view.
+
+    Args:
+        table: of as many numbers for each roughness and cosine as there are levels.
+        place: where.
+        entry: indices (N,) of the numbers at the steps below, in the flat table.
+        levels: of the table.
+    """
+    u, v = place.rough[1], place.view[1]
+    flat, row = table.ravel(), _COSINES * levels
+    low = np.take(flat, entry) * (1.0 - v) + np.take(flat, entry + levels) * v
+    high = np.take(flat, entry + row) * (1.0 - v) + np.take(flat, entry + (row + levels)) * v
     return np.asarray(low * (1.0 - u) + high * u, np.float32)
 
 

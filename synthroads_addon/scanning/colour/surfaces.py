@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from ...base.arrays import Float, Float32, Index
+from ...base.arrays import Float, Float32, Index, take_rows
 from ..scene.mesh import SceneMesh
 from ..scene.motion import MovingMesh
 from ..scene.surface_values import SurfaceInput, corner_shares
@@ -46,8 +46,11 @@ class SceneSurfaces:
         assert points.face is not None
         faces = points.face - self._firsts[number]
         rotation, begin = self._poses[number]
-        place, normal = (points.position - begin) @ rotation, np.asarray(points.normal, np.float64) @ rotation
-        shares = corner_shares(mesh.vertices[mesh.triangles[faces]].astype(np.float64), place)
+        place, normal = points.position, np.asarray(points.normal, np.float64)
+        if number:  # what stands is in the scene's own frame
+            place, normal = (place - begin) @ rotation, normal @ rotation
+        corners = take_rows(mesh.vertices, take_rows(mesh.triangles, faces))
+        shares = corner_shares(corners.astype(np.float64), place)
         for what, values in result.items():
             found = np.zeros(len(rows), bool)
             if mesh.surface is not None:

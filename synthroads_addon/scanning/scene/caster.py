@@ -84,8 +84,10 @@ class FacePlanes:
         return height, along
 
     def normals(self, faces: Index, along: Float) -> Float:
-        """Return (3, H) unit normals of faces, turned towards rays with n . d = ``along`` (H,)."""
-        result = np.take(self.planes[:3], faces, axis=1)
+        """Return (3, H) unit normals of faces, turned towards rays with n . d = ``along`` (H,); of -1 any."""
+        result = np.empty((3, len(faces)))
+        for plane, row in zip(self.planes, result, strict=False):
+            np.take(plane, faces, mode="clip", out=row)
         result *= np.where(along > 0.0, -1.0, 1.0)
         return result
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...base.arrays import AnyArray, Bool, Float, Float32, Index
+from ...base.arrays import AnyArray, Bool, Float, Float32, Index, take_rows
 
 
 class SurfaceInput(NamedTuple):
@@ -99,7 +99,7 @@ class SurfaceValues:
             if what.kind == "object":
                 values = _in_frame(part, use, place[mine])
             else:
-                values = _interpolate(part, what, use, triangle, shares[mine])
+                values = _interpolate(part, what, use, triangle, take_rows(shares, mine))
                 if values is not None and what.kind in _NORMALS:
                     values[:, :3] = _oriented_normals(part, use, values[:, :3], normal[mine], what.kind == "normal")
             if values is not None:
@@ -141,16 +141,16 @@ def _interpolate(part: PartValues, what: SurfaceInput, use: Index, triangle: Ind
     if entry is None:
         return None
     if entry.domain in ("object", "face"):
-        return np.asarray(entry.values[use if entry.domain == "object" else triangle])
-    numbers = (part.corners if entry.domain == "corner" else part.points)[triangle]
+        return take_rows(entry.values, use if entry.domain == "object" else triangle)
+    numbers = take_rows(part.corners if entry.domain == "corner" else part.points, triangle)
     turned = part.mirrored[use]
     if turned.any():
         shares = np.where(turned[:, None], shares[:, ::-1], shares)
     # From the first corner on: what all three have alike stays exactly that.
-    first = entry.values[numbers[:, 0]].astype(np.float64)
+    first = take_rows(entry.values, numbers[:, 0]).astype(np.float64)
     result = first.copy()
     for corner in (1, 2):
-        result += shares[:, corner, None] * (entry.values[numbers[:, corner]] - first)
+        result += shares[:, corner, None] * (take_rows(entry.values, numbers[:, corner]) - first)
     return result.astype(np.float32)
 
 

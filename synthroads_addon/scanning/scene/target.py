@@ -264,7 +264,12 @@ class Target:
         return np.take(self._parts[0].planes.planes[:3], faces, axis=1)
 
     def normals(self, faces: Index, along: Float, times: Float, motions: list[Track]) -> Float:
-        """Return the local unit normals (3, H) of faces at times (H,), turned towards the rays that met them."""
+        """Return the local unit normals (3, H) of faces at times (H,), turned towards the rays that met them.
+
+        Those of no face, -1, are any.
+        """
+        if not self.moving and self.triangles:
+            return self._parts[0].planes.normals(faces, along)
         result = np.empty((3, len(faces)))
         for number, part in enumerate(self._parts):
             mine = np.flatnonzero((faces >= part.first) & (faces < part.first + part.count))
@@ -327,10 +332,20 @@ def _as_rays(origins: Float, directions: Float) -> tuple[Float32, Float32]:
         origins: of the directions' shape, or one that spreads to it.
         directions: (3, ...).
     """
-    shape = (*directions.shape[:0:-1], 3)
-    rows = (as_rows(np.moveaxis(vectors.T, -1, 0)) for vectors in (origins, directions))
-    begin, towards = (np.broadcast_to(array, shape).reshape(-1, 3) for array in rows)
-    return begin, towards
+    return _as_rows(origins, directions.shape), _as_rows(directions, directions.shape)
+
+
+def _as_rows(vectors: Float, shape: tuple[int, ...]) -> Float32:
+    """Return vectors that spread to a shape, (3, N) or (3, K, P), as float32 rows, see `_as_rays`."""
+    if len(shape) == 2:
+        return as_rows(np.broadcast_to(vectors, shape))
+    _, rays, pulses = shape
+    if vectors.shape[1] == 1:
+        return np.repeat(as_rows(vectors[:, 0]), rays, axis=0)
+    result = np.empty((pulses, rays, 3), dtype=np.float32)
+    for i, ray in np.ndindex(3, rays):  # long rows one by one, which is several times as fast as all at once
+        result[:, ray, i] = vectors[i, ray]
+    return result.reshape(-1, 3)
 
 
 def _cast_moving(part: _TargetPart, track: Track, rays: Bundles, maximum_range: float, nearest: FirstHits) -> None:

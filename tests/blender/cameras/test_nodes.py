@@ -69,6 +69,24 @@ def test_vertex_colours_and_mixed_shaders(mixed: bool) -> None:
     np.testing.assert_allclose(values.arrays["base_color"], expected, atol=2e-6)
 
 
+def test_what_is_worked_out_later_is_read_from_the_same_images_where_it_fits_them() -> None:
+    add_vertex_colored(0, mixed=False)
+    bpy.context.view_layer.update()
+    mesh = scene_mesh()
+    made, others = [], set(bpy.data.images)
+    with layer_source(job(mesh, set(BASE), source="nodes")) as layers:
+        for count in (140_000, 135_000, 180_000, 300_000, 3_000, 140_000):
+            points = points_of(mesh, count)
+            colour = layers.sample(points, BASE).arrays["base_color"]
+            x, y = points.position[:, 0], points.position[:, 1]
+            np.testing.assert_allclose(colour, np.stack([0.5 + x / 10.0, 0.5 + y / 10.0, 0.25 + 0.0 * x], 1), atol=2e-6)
+            made.append({(image.name, *image.size) for image in bpy.data.images if image not in others})
+    assert made[0]
+    assert made[0] == made[1] == made[2]
+    heights = [max(height for _, _, height in images) for images in made]
+    assert heights[3] > heights[0] > heights[4]
+
+
 def test_groups_are_gone_into() -> None:
     """The shader is in a group, and so is the place that it asks for; another board has the same group."""
     item, _ = new_material("Outer")
