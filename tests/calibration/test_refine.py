@@ -94,6 +94,7 @@ def refined() -> Refined:
     return refine_settings(road(), BEGIN, scan)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", TOLERANCE)
 def test_settings_are_found_again(refined: Refined, path: str) -> None:
     """Noise of ranges and its delay, noise of the brightness, step between strips, texture; its shape isn't told."""
@@ -127,6 +128,7 @@ def test_lines_of_a_dense_cloud_take_little_memory() -> None:
     assert peak < 400e6
 
 
+@pytest.mark.slow
 def test_statistics_come_nearer(refined: Refined) -> None:
     apart = [
         sum(abs(part[name] - refined.real[name]) for name in refined.real) for part in (refined.before, refined.after)

@@ -97,6 +97,7 @@ class Stop:
             raise Cancelled
 
 
+@pytest.mark.slow
 def test_the_same_weights_however_the_scenes_come_and_after_an_interruption(
     data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, log: Path
 ) -> None:
@@ -135,6 +136,7 @@ def test_the_same_weights_however_the_scenes_come_and_after_an_interruption(
     assert not (resumed.folder / SCENES).exists()
 
 
+@pytest.mark.slow
 def test_another_seed_has_other_scenes_and_another_order(data: Path, tmp_path: Path, log: Path) -> None:
     seeds = []
     for seed in (1, 2):
@@ -189,6 +191,7 @@ def test_mixed_crops_keep_their_share_and_an_epoch_its_length(data: Path, tmp_pa
     assert plan([3, 2], 3, None, 1, 0) == plan([3, 2], 30, None, 1, 0, total=15)
 
 
+@pytest.mark.slow
 def test_scores_are_shifted_by_the_last_epochs_scenes_and_real_data_may_follow(data: Path, tmp_path: Path) -> None:
     tuning = {"epochs": 1, "learning_rate": 0.001}
     for name, changes in (
@@ -246,6 +249,7 @@ def test_what_does_not_fit_is_refused(data: Path, tmp_path: Path) -> None:
     assert [path.name for path in (tmp_path / "mine").iterdir()] == ["letter.txt"]
 
 
+@pytest.mark.slow
 def test_scenes_of_another_plan_and_damaged_ones_are_made_anew(tmp_path: Path, log: Path) -> None:
     def flow(seed: int) -> None:
         with SceneStream(StreamOptions.from_dict(STREAM), seed, tmp_path, 1, ("pointcept",)) as stream:
