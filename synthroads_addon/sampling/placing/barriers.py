@@ -153,7 +153,7 @@ def plan_noise_barrier(layout: Layout, roadside: Roadside, rng: np.random.Genera
         instance=1,
         start_station=round_value(start),
         end_station=round_value(start + length),
-        offset=round_value(roadside.sign * (base + FAR_ZONE + NOISE_POST_WIDTH / 2.0)),
+        offset=round_value(roadside.sign * (base + FAR_ZONE + max(thickness, NOISE_POST_WIDTH) / 2.0)),
         height=draw(rng, limits.noise_barrier_height),
         panel=panel,
         thickness=thickness,

@@ -11,7 +11,7 @@ from ...road.section import Carriageway
 from ...road.things.gutter import Gutter
 from ...road.things.shaft import Shaft
 from .draw import draw
-from .layout import SMALL_ZONE, Layout, PlacementRequest, Roadside
+from .layout import FAR_ZONE, SMALL_ZONE, Layout, PlacementRequest, Roadside
 from .ranges import Range, nearest_free
 from .registry import small_thing
 
@@ -48,6 +48,9 @@ def _shaft(layout: Layout, roadside: Roadside, station: float, size: float, swal
     verge = width_at(layout.site.carriageways[roadside.side].verge_width, station)
     # To the middle of the swale, or behind a barrier that stands where that would be.
     shift = max(0.0, float(verge) + swale / 2.0 - SMALL_ZONE - room / 2.0) if swale else 0.0
+    if not roadside.far.is_free(station - _HALF, station + _HALF):
+        # A noise barrier stands in the swale's far part.
+        shift = min(shift, max(0.0, FAR_ZONE - SMALL_ZONE - room))
     fields = {"kind": shaft.kind, "size": size}
     return PlacementRequest("shaft", Shaft, station, _HALF, room, fields, shift)
 

@@ -8,11 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from synthroads_addon.checking.checker import check
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.things.gutter import Gutter
+from synthroads_addon.road.things.noise_barrier import NoiseBarrier
 from synthroads_addon.road.things.shaft import Shaft
 from synthroads_addon.sampling.placing.drainage import GUTTER
+from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scenario.road import RoadScenario
 from tests.helpers.roads.twin_roads import road
 
 CURVED = {"length": 3000.0, "half_width": 60.0}
@@ -62,6 +66,16 @@ def test_shafts_stand_at_even_distances_in_swale_or_verge(limits: Any, kind: str
             assert np.median(beyond) == pytest.approx(terrain.swale_width / 2.0)
         else:
             assert (beyond + section.carriageway.verge_width > 1.0).all()
+
+
+@pytest.mark.parametrize(("design_class", "length", "seed"), [("EKA1A", 600.0, 12), ("EKA1B", 3000.0, 30005)])
+def test_shafts_in_a_swale_stand_clear_of_a_noise_barrier(design_class: str, length: float, seed: int) -> None:
+    """Two of the roads on which shafts reached 5 and 56 mm into one."""
+    scenario = RoadScenario(design_class=design_class, cross_section="RQ43.5", length=length)
+    parameters = sample_road(scenario, seed)
+    assert parameters.of_type(NoiseBarrier)
+    assert parameters.of_type(Shaft)
+    assert check(parameters) == []
 
 
 def test_there_are_none_where_none_are_wanted() -> None:
