@@ -165,15 +165,14 @@ def aircraft() -> _MovingSensor:
 
 
 def test_an_aircrafts_lines_are_straight_and_parallel_at_uneven_distances() -> None:
-    """As in real surveys: off a line by 3 mm, which is their rounding, parallel within 0.1 deg, a quarter apart.
+    """Real ones are parallel within 0.1 deg, at distances that differ by a quarter, and single points hardly leave them.
 
-    A search that may bend lines instead finds the same medians, but not the same clouds.
+    A search that may bend lines and scatter points instead finds the same medians, but not the same clouds.
     """
     sensor = aircraft()
     begin = {setting.path: setting.begin for setting in sensor.settings()}
     assert not {"scan.motion.heading_sigma_deg", "scan.noise.angle_sigma_mrad"} & set(begin)
     assert {"scan.motion.heading_sigma_deg", "scan.noise.angle_sigma_mrad"} < set(sensor.usual)
-
     found = sensor.simulate(begin, 4)
     assert found.time is not None
     order = np.argsort(found.time)

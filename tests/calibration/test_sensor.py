@@ -25,8 +25,8 @@ from synthroads_addon.materials.surfaces import surfaces_of
 from synthroads_addon.materials.table import materials, read_material_table
 from synthroads_addon.scanning.devices.device import load_device
 from synthroads_addon.scanning.plan import ScanPlan
-from synthroads_addon.scanning.receiving.response import read_power
 from synthroads_addon.scanning.platforms.polyline import PolylineGuide
+from synthroads_addon.scanning.receiving.response import read_power
 from synthroads_addon.scanning.scan import BlockScan
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.motion import ScannedScene
@@ -204,8 +204,8 @@ def test_numbers_that_are_compensated_for_the_range_come_from_a_device_that_comp
     compensated = points.intensity * points.range.astype(np.float64) ** 2
     numbers = stored(compensated, 100.0, 30.0)
     cloud = write_las(tmp_path / "cloud.las", points.xyz, numbers, points.instance_id, points.gps_time)
-    words = ("--device", "riegl-vq-780i", "--range", "800", "--hold", "asphalt", "--range-corrected", "--decibels", "30")
-    calibrated(capsys, cloud, tmp_path, *words)
+    words = ("--device", "riegl-vq-780i", "--range", "800", "--hold", "asphalt")
+    calibrated(capsys, cloud, tmp_path, *words, "--range-corrected", "--decibels", "30")
     scan = scene_jobs(load_recipe(str(tmp_path / "recipe.yaml")))[0].scenario.scan
     setting, distance = scanner_setting(scan), np.array([800.0, 850.0])
     asphalt = materials()["asphalt"].reflectivity / distance**2
