@@ -87,8 +87,8 @@ _FITTED_SWAY = {
         "scan.noise.angle_sigma_mrad": (1e-4, 20.0),
     },
 }
-"""Limits of what is fitted of the sway and the mirror's angles. Statistics of patches hardly tell apart what moves single
-pulses and what moves lines: of aircraft, whose lines are straight, only how strongly they tremble is fitted."""
+"""Limits of what is fitted of the sway and the mirror's angles. Statistics of patches hardly tell apart what moves
+single pulses and what moves lines: of aircraft, whose lines are straight, only how strongly they tremble is fitted."""
 _OF_STRIPS = tuple(f"scan.strip_errors.{name}" for name in ("gain_step_db", "drift_sigma"))
 _SHARES = ("scan.noise.speckle_normal", "scan.receiver.range_delay", "scan.receiver.compression")
 _VIEW_MARGIN = 1.1

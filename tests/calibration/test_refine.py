@@ -165,7 +165,7 @@ def aircraft() -> _MovingSensor:
 
 
 def test_an_aircrafts_lines_are_straight_and_parallel_at_uneven_distances() -> None:
-    """Real ones are parallel within 0.1 deg, at distances that differ by a quarter, and single points hardly leave them.
+    """Real ones are parallel within 0.1 deg, their distances differ by a quarter, and single points hardly leave them.
 
     A search that may bend lines and scatter points instead finds the same medians, but not the same clouds.
     """
