@@ -48,9 +48,9 @@ _LEAST_SPREAD, _MOST_NOISE = 0.02, 0.95
 USUAL: dict[str, dict[str, tuple[float, float]]] = {
     "airborne": {
         "scan.motion.position_sigma": (0.2, 0.8),
-        "scan.motion.attitude_sigma_deg": (0.2, 0.4),
-        "scan.motion.heading_sigma_deg": (1.0, 3.0),
-        "scan.noise.angle_sigma_mrad": (0.01, 0.03),
+        "scan.motion.attitude_sigma_deg": (0.1, 0.3),
+        "scan.motion.heading_sigma_deg": (0.05, 0.15),
+        "scan.noise.angle_sigma_mrad": (0.01, 0.015),
         "scan.strip_errors.boresight_sigma_deg": (0.0001, 0.0003),
         "scan.strip_errors.drift_sigma": (0.001, 0.003),
     },
@@ -65,9 +65,10 @@ USUAL: dict[str, dict[str, tuple[float, float]]] = {
     },
 }
 """Ranges of how platforms sway and how strips disagree, in which searches begin at the middle; a recipe draws from them
-what isn't fitted. Those of aircraft are of four airborne scans of roads, whose strips are adjusted to each other."""
+what isn't fitted. Those of aircraft are of four airborne scans of roads, whose strips are adjusted to each other, and
+whose lines are straight within 3 mm, parallel within 0.1 deg, and at distances that differ by a quarter."""
 _SWAY = {
-    "airborne": {"shortest_period": 0.2, "longest_period": 20.0, "period_exponent": 0.8},
+    "airborne": {"shortest_period": 0.02, "longest_period": 20.0, "period_exponent": 0.65},
     "uav": {"shortest_period": 0.5, "longest_period": 10.0, "period_exponent": 1.0},
 }
 _RATIO, _DENSITY, _TEXTURE, _ASLANT = "spacing ratio", "density", "texture", "aslant"
@@ -77,6 +78,17 @@ _FROM_ABOVE, _USUAL_ASLANT = -3.0, 18.0
 """Angles at which one strip sees the road, and at which the search for the other one's begins, deg."""
 _USUAL_RATIO, _USUAL_NORMAL = 1.2, 0.7
 _PERIOD = "scan.motion.shortest_period"
+_FITTED_SWAY = {
+    "airborne": {"scan.motion.attitude_sigma_deg": (1e-3, 10.0)},
+    "uav": {
+        "scan.motion.attitude_sigma_deg": (1e-3, 10.0),
+        "scan.motion.heading_sigma_deg": (1e-3, 10.0),
+        _PERIOD: (0.02, 5.0),
+        "scan.noise.angle_sigma_mrad": (1e-4, 20.0),
+    },
+}
+"""Limits of what is fitted of the sway and the mirror's angles. Statistics of patches hardly tell apart what moves
+single pulses and what moves lines: of aircraft, whose lines are straight, only how strongly they tremble is fitted."""
 _OF_STRIPS = tuple(f"scan.strip_errors.{name}" for name in ("gain_step_db", "drift_sigma"))
 _SHARES = ("scan.noise.speckle_normal", "scan.receiver.range_delay", "scan.receiver.compression")
 _VIEW_MARGIN = 1.1
@@ -90,6 +102,8 @@ _MOST_SPREAD = 1.0
 _POWER = {"scan.receiver.response": "power", "scan.receiver.bits": None}
 """Simulated scans give the received power, as what they are compared with is led back to it."""
 _DIGITS = 4
+_MOST_BITS, _MOST_FULL_SCALE = 16, 1e4
+"""Limits of a receiver's numbers."""
 
 
 @dataclass(frozen=True)
@@ -242,11 +256,8 @@ class _MovingSensor:
             Setting(_DENSITY, 1.0, 0.5, 2.0),
             Setting(_TEXTURE, 1.0, 0.1, 10.0),
         ]
-        for name, high in (("motion.attitude_sigma_deg", 10.0), ("motion.heading_sigma_deg", 10.0)):
-            rows.append(Setting(f"scan.{name}", middle[f"scan.{name}"], 1e-3, high))
-        fastest, slowest = (_SWAY[self.kind][name] for name in ("shortest_period", "longest_period"))
-        rows.append(Setting(_PERIOD, fastest, 0.02, 0.5 * slowest))
-        rows.append(Setting("scan.noise.angle_sigma_mrad", middle["scan.noise.angle_sigma_mrad"], 1e-4, 20.0))
+        middle |= {_PERIOD: _SWAY[self.kind]["shortest_period"]}
+        rows += [Setting(path, middle[path], *limits) for path, limits in _FITTED_SWAY[self.kind].items()]
         for name, high in (("noise.range_sigma", 1.0), ("receiver.faint_range_sigma", 10.0), ("noise.speckle", 1.0)):
             rows.append(Setting(f"scan.{name}", max(noise[f"scan.{name}"], 1e-4), 1e-4, high))
         rows.append(Setting("scan.noise.speckle_normal", _USUAL_NORMAL, 0.0, 1.0, False, 0.5))
@@ -380,10 +391,15 @@ def _fitted_device(result: Calibration, setting: ScannerSetting, estimate: Senso
     if estimate.bits is not None:
         receiver["bits"] = estimate.bits
     model = job.receiver
-    if model.range_corrected and model.decibels is None and job.real is not None:
-        receiver |= {"response": "range_compensated", "full_scale": _short(FULL_SCALE / result.gain)}
-        receiver["compression"] = _short(model.compression)
-        receiver["lost_numbers"] = _short(estimate.zeros)
+    if model.range_corrected and job.real is not None:
+        brightest = float(model.to_linear(np.array(FULL_SCALE))) / result.gain
+        receiver |= {"response": "range_compensated", "full_scale": min(_short(brightest), _MOST_FULL_SCALE)}
+        if model.decibels is None:
+            receiver["compression"] = _short(model.compression)
+            receiver["lost_numbers"] = _short(estimate.zeros)
+        else:
+            # Numbers in proportion need all bits to be as fine as steps of decibels are.
+            receiver["bits"] = _MOST_BITS
     if estimate.laser_gain_db is not None and device.channels > 1:
         receiver["gain_sigma_db"] = _short(min(estimate.laser_gain_db, 10.0))
     cloud = "" if job.real is None else job.real.name

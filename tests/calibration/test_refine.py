@@ -17,6 +17,8 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.calibration import refine
 from synthroads_addon.calibration.pulse_lines import pulse_step
 from synthroads_addon.calibration.refine import Refined, Setting, refine_settings, select_points
+from synthroads_addon.calibration.sensor import SensorEstimate
+from synthroads_addon.calibration.sensor_files import _MovingSensor
 from synthroads_addon.calibration.simulation import LevelPavement, simulate_pavement
 from synthroads_addon.cloud.selection.classes import RealClass
 from synthroads_addon.materials.table import materials
@@ -152,6 +154,39 @@ def test_a_settings_place_in_the_search_keeps_its_limits() -> None:
     assert setting.value(0.0) == 2.0
     assert setting.value(10.0) == 3.0
     assert Setting("y", 0.5, 0.0, 1.0, False, 0.2).value(-1.0) == pytest.approx(0.3)
+
+
+def aircraft() -> _MovingSensor:
+    """Return a scanner that flies 800 m above asphalt, of which 20 points/m2 are known and no more."""
+    none = SensorEstimate(1, 0.02, 0.02, 0.003, 0.5, 0.15, 1.5, None, None, 0.0, 20.0, 2, 800.0, 0.0, None)
+    scenario = ScanScenario.from_dict(apply_values(load_scenario("airborne-1000m").to_dict(), FIXED)["scan"])
+    setting = scanner_setting(scenario)
+    return _MovingSensor(none, setting.device, setting, materials()["asphalt"], "asphalt", 0.0, True)
+
+
+def test_an_aircrafts_lines_are_straight_and_parallel_at_uneven_distances() -> None:
+    """Real ones are parallel within 0.1 deg, their distances differ by a quarter, and single points hardly leave them.
+
+    A search that may bend lines and scatter points instead finds the same medians, but not the same clouds.
+    """
+    sensor = aircraft()
+    begin = {setting.path: setting.begin for setting in sensor.settings()}
+    assert not {"scan.motion.heading_sigma_deg", "scan.noise.angle_sigma_mrad"} & set(begin)
+    assert {"scan.motion.heading_sigma_deg", "scan.noise.angle_sigma_mrad"} < set(sensor.usual)
+    found = sensor.simulate(begin, 4)
+    assert found.time is not None
+    order = np.argsort(found.time)
+    place, time = found.place[order, :2], found.time[order]
+    lines = np.split(place, np.flatnonzero(np.diff(time) > 1e-3) + 1)
+    fits = [(*np.polyfit(line[:, 1], line[:, 0], 1), line) for line in lines if np.ptp(line[:, 1]) > 20.0]
+    assert len(fits) > 100
+    off = np.concatenate([line[:, 0] - slope * line[:, 1] - at for slope, at, line in fits])
+    assert off.std() < 0.015
+    slopes, places = np.array([fit[:2] for fit in fits]).T
+    gap = np.abs(np.diff(places))
+    same = gap < 1.0
+    assert np.rad2deg(np.diff(slopes)[same].std()) < 0.1
+    assert 0.15 < gap[same].std() / gap[same].mean() < 0.4
 
 
 def test_a_pavement_that_nobody_sees_is_refused() -> None:

@@ -26,6 +26,7 @@ from synthroads_addon.materials.table import materials, read_material_table
 from synthroads_addon.scanning.devices.device import load_device
 from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scanning.platforms.polyline import PolylineGuide
+from synthroads_addon.scanning.receiving.response import read_power
 from synthroads_addon.scanning.scan import BlockScan
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.motion import ScannedScene
@@ -34,7 +35,7 @@ from synthroads_addon.scanning.strip_errors import strip_gain
 from synthroads_addon.scanning.sway import with_motion
 from synthroads_addon.scenario.scan import scanner_setting
 from synthroads_addon.scenario.scenario import load_scenario
-from tests.helpers.clouds.calibration_cloud import write_las
+from tests.helpers.clouds.calibration_cloud import stored, write_las
 from tests.helpers.scenes.scan_scenes import ORIGIN, BruteForce, mesh_of
 from tests.helpers.scenes.scanners import preset
 
@@ -193,6 +194,26 @@ def test_the_written_device_and_recipe_scan_as_the_cloud_was_measured(
     speckles = {job.scenario.scan.noise.speckle for job in scene_jobs(recipe)}
     assert len(speckles) == 8
     assert all(abs(value / found["speckle"] - 1.0) < 0.06 for value in speckles)
+
+
+def test_numbers_that_are_compensated_for_the_range_come_from_a_device_that_compensates_them(
+    airborne: tuple[Path, ScanPlan], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A strip that is seen aslant is farther away: its numbers would else be lower than the search had them."""
+    points, _ = measured("airborne-1000m", AIRBORNE)
+    compensated = points.intensity * points.range.astype(np.float64) ** 2
+    numbers = stored(compensated, 100.0, 30.0)
+    cloud = write_las(tmp_path / "cloud.las", points.xyz, numbers, points.instance_id, points.gps_time)
+    words = ("--device", "riegl-vq-780i", "--range", "800", "--hold", "asphalt")
+    calibrated(capsys, cloud, tmp_path, *words, "--range-corrected", "--decibels", "30")
+    scan = scene_jobs(load_recipe(str(tmp_path / "recipe.yaml")))[0].scenario.scan
+    setting, distance = scanner_setting(scan), np.array([800.0, 850.0])
+    asphalt = materials()["asphalt"].reflectivity / distance**2
+    near, far = read_power(asphalt, distance, None, np.ones(256), setting)[0]
+    assert far == pytest.approx(near, rel=1e-3)
+    # What fills 30 dB is ten times as bright as a white target here, and no number is rounded by more than 0.01 dB.
+    assert near * setting.receiver.full_scale == pytest.approx(materials()["asphalt"].reflectivity, rel=2e-3)
+    assert setting.receiver.full_scale == pytest.approx(10.0, rel=0.15)
 
 
 STANDING = {"kind": "tripod", "stations": [20], "turn_seconds": 0.1, "turn_deg": 0, "height": 1.73}
