@@ -22,7 +22,7 @@ Predictor = Callable[[RoadCloud, CloudPath], tuple[Float, Float]]
 
 _HALF_WIDTHS = (12.0, 45.0)  # m: least and largest reach of profiles
 _MARGIN = 8.0  # m of it outside of the surface that the first path was made from
-_REGISTRATIONS, _PARALLEL = 6, 0.1  # times that a path is laid beside lines at most, and m that it may still move by
+_REGISTRATIONS, _PARALLEL = 6, 0.3  # times that a path is laid beside lines at most, and m that it may still move by
 _PASSES, _STILL = 4, 0.15  # times that the axis is looked for at most, and m that it may still move by
 
 
