@@ -22,7 +22,7 @@ Predictor = Callable[[RoadCloud, CloudPath], tuple[Float, Float]]
 
 _HALF_WIDTHS = (12.0, 45.0)  # m: least and largest reach of profiles
 _MARGIN = 8.0  # m of it outside of the surface that the first path was made from
-_REGISTRATIONS = 2
+_REGISTRATIONS, _PARALLEL = 6, 0.3  # times that a path is laid beside lines at most, and m that it may still move by
 _PASSES, _STILL = 4, 0.15  # times that the axis is looked for at most, and m that it may still move by
 
 
@@ -72,8 +72,11 @@ def straighten_path(cloud: RoadCloud, options: Options) -> tuple[CloudPath, floa
     if not len(near):
         raise InputError("--path", None, "no point of the road lies within 45 m of it")
     half = float(np.clip(np.percentile(near, 99) + _MARGIN, *_HALF_WIDTHS))
+    # Until it lies still: where a kink is left in it, the lines beside it bend by more than they can be followed.
     for _ in range(_REGISTRATIONS):
-        path = register_path(path, make_profiles(cloud, path, half))
+        before, path = path, register_path(path, make_profiles(cloud, path, half))
+        if float(np.abs(before.project(path.points)[1]).max()) <= _PARALLEL:
+            break
     return path, half
 
 
