@@ -183,13 +183,14 @@ class NodeLayers:
         rows = np.flatnonzero(lit)
         material = points.material[rows]
 
+        constants = self.material.constants
+
         def layer(name: str) -> Float32:
             """Return a layer's values at the lit points: evaluated where it varies, else the material's constant."""
-            values = take_rows(self.material.constants.values[name], material)
-            if name in channels:
-                use = np.flatnonzero(np.take(self.material.constants.varies[name], material))
-                values[use] = take_rows(channels[name], rows[use]).reshape(len(use), *values.shape[1:])
-            return values
+            if name not in channels:
+                return take_rows(constants.values[name], material)
+            use = np.take(constants.varies[name], material)
+            return constants.complete(name, take_rows(channels[name], rows), use, material)
 
         view = take_rows(points.towards_scanner, rows)
         color, roughness, metallic, specular = map(layer, ("base_color", "roughness", "metallic", "specular"))

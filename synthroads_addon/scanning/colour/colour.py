@@ -162,6 +162,22 @@ class SurfaceConstants:
     values: dict[str, Float32]
     varies: dict[str, Bool]
 
+    def complete(self, name: str, values: Float32, rendered: Bool, material: UInt16) -> Float32:
+        """Return the values of a layer at N points, filled in, in place, with means where they weren't rendered.
+
+        Args:
+            name: of the layer.
+            values: (N, C) rendered; any elsewhere.
+            rendered: (N,) which they are: mostly nearly all.
+            material: (N,) indices.
+        """
+        means = self.values[name]
+        result = values.reshape(-1, *means.shape[1:])
+        rest = np.flatnonzero(~rendered)
+        if len(rest):
+            result[rest] = take_rows(means, np.take(material, rest))
+        return result
+
     def varying_layers(self, wanted: frozenset[str]) -> tuple[str, ...]:
         """Return the names of the wanted layers that vary in some material, in the order of `MATERIAL_LAYERS`."""
         return tuple(name for name in MATERIAL_LAYERS if name in wanted and bool(self.varies[name].any()))
@@ -253,11 +269,11 @@ class MaterialLayers:
         found = source != FROM_MATERIAL
         layers: dict[str, Float32] = {}
         for name in sorted(needed_layers(wanted, self.mode)):
-            layers[name] = take_rows(self.constants.values[name], points.material)
             if name in channels:
                 use = found & np.take(self.constants.varies[name], points.material)
-                shape = layers[name].shape
-                np.copyto(layers[name], channels[name].reshape(shape), where=use.reshape(-1, *(1,) * (len(shape) - 1)))
+                layers[name] = self.constants.complete(name, channels[name].copy(), use, points.material)
+            else:
+                layers[name] = take_rows(self.constants.values[name], points.material)
         arrays: dict[str, NDArray[np.generic]] = {name: layers[name] for name in layers.keys() & wanted}
         if "rgb" in wanted:
             arrays["rgb"] = self._rgb(points, layers, channels, found)

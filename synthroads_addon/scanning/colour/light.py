@@ -58,8 +58,12 @@ class SunAndSky:
 
         A surface sees a share (1 + n_z) / 2 of an even sky.
         """
-        share = ((1.0 + np.asarray(normal, np.float32)[:, 2]) / 2.0)[:, None]
-        return share * self.above.astype(np.float32) + (1.0 - share) * self.below.astype(np.float32)
+        share = (1.0 + np.asarray(normal, np.float32)[:, 2]) / 2.0
+        rest, result = 1.0 - share, np.empty((len(share), 3), np.float32)
+        colours = zip(self.above.astype(np.float32), self.below.astype(np.float32), strict=True)
+        for column, (above, below) in enumerate(colours):  # long rows are several times as fast
+            np.add(share * above, rest * below, out=result[:, column])
+        return result
 
 
 def expose_light(direction: Float, sun: Float, sky: Float) -> tuple[SunAndSky, float]:

@@ -15,6 +15,7 @@ from synthroads_addon.materials.table import materials
 from synthroads_addon.road.surroundings import Environment
 from synthroads_addon.scanning.colour.colour import (
     FROM_MATERIAL,
+    FROM_NODES,
     MATERIAL_LAYERS,
     MaterialLayers,
     SeenPoints,
@@ -61,6 +62,30 @@ def test_materials_give_their_means_under_a_usual_sun_and_sky() -> None:
     expected = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055) * 65535.0
     assert np.abs(values.arrays["rgb"].astype(float) - expected).max() <= 2.0
     assert (values.source == FROM_MATERIAL).all()
+
+
+def test_means_stand_where_nothing_was_rendered_and_what_was_rendered_stays() -> None:
+    points, random = SeenPoints(**_points()), np.random.default_rng(2)
+    constants = surface_constants(ROWS, {name: np.array([True, False, True]) for name in MATERIAL_LAYERS})
+    source = np.where(random.random(len(points)) < 0.7, FROM_NODES, FROM_MATERIAL).astype(np.uint8)
+    channels = {name: random.random((len(points), parts)).astype(np.float32) for name, parts in MATERIAL_LAYERS.items()}
+    before = {name: array.copy() for name, array in channels.items()}
+    values = MaterialLayers(constants).layer_values(points, channels, source, frozenset(MATERIAL_LAYERS))
+    rendered = (source == FROM_NODES) & (points.material != 1)
+    assert 0 < np.count_nonzero(rendered) < len(points)
+    for name, array in values.arrays.items():
+        means = constants.values[name][points.material]
+        np.testing.assert_array_equal(array[rendered], channels[name].reshape(means.shape)[rendered])
+        np.testing.assert_array_equal(array[~rendered], means[~rendered])
+        np.testing.assert_array_equal(channels[name], before[name])
+
+
+def test_the_sky_is_that_above_and_below_by_the_share_of_each_to_the_last_digit() -> None:
+    light = SunAndSky(above=np.array([0.3, 0.4, 0.55]), below=np.array([0.21, 0.2, 0.17]))
+    normal = _points()["normal"].astype(np.float32)
+    share = (np.float32(1.0) + normal[:, 2:]) / np.float32(2.0)
+    above, below = light.above.astype(np.float32), light.below.astype(np.float32)
+    np.testing.assert_array_equal(light.sky(normal), share * above + (np.float32(1.0) - share) * below)
 
 
 def test_shares_name_every_source() -> None:
