@@ -287,6 +287,7 @@ def test_producers_end_with_whoever_wanted_the_scenes(tmp_path: Path, monkeypatc
     assert not (folder / ".work").exists()
 
 
+@pytest.mark.slow
 def test_centrelines_are_learned_from_a_stream_with_the_same_bits(tmp_path: Path, log: Path) -> None:
     data = write_data_set(tmp_path / "roads")
     plain = {

@@ -12,7 +12,7 @@ from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import load_scenario
 
-CHECKSUM = "865f85e1a576ecf17c7e95722609eb909c570d6c450bba3070d4d206101a15d3"
+CHECKSUM = "b8ac17a7e29799cedfb1252078a3c3f31e785f851cca9dbab0c78850d8ccb1bb"
 EVERYTHING = ["exits=1", "entries=1", "emergency_bays=1"]
 
 

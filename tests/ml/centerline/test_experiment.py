@@ -78,6 +78,7 @@ def words(data: Path, tmp_path: Path) -> list[str]:
     return ["experiment", str(tmp_path / "own.yaml"), *folders, "--output", str(tmp_path / "out"), "--quiet"]
 
 
+@pytest.mark.slow
 def test_each_variant_is_tested_on_roads_that_it_has_not_learned_from(
     words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
