@@ -1,6 +1,6 @@
 """Which lines belong together: carriageways, their lanes, and the median, and the axis that all of them agree on."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Literal, Self
 
@@ -10,6 +10,7 @@ from scipy.signal import find_peaks
 
 from ..base.arrays import Bool, Float, otsu_threshold
 from ..base.errors import InputError
+from .branches import find_branch
 from .edges import FARTHEST, paved_edge
 from .lines import STANDARD_DASHES, USUAL, WAVELENGTH, Line
 from .path import SPACING
@@ -49,6 +50,8 @@ class Band:
         edges: its pavement's right and left edge as if they were lines, for want of lines.
         missing: offsets of lines that must be between its lines but aren't seen, m.
         usual: (K,) the stretches in which it is as wide as usual; all if not given.
+        branch: (K,) m beside its middle line, positive to the left, where another branch of that runs (`find_branch`);
+            nowhere if not given.
     """
 
     low: float
@@ -57,10 +60,20 @@ class Band:
     edges: tuple[Line, Line]
     missing: list[float] = field(default_factory=list)
     usual: Bool | None = None
+    branch: Float | None = None
 
     def place(self, line: Line) -> float:
         """Return the median offset, m, of a line where the pavement is as wide as usual."""
         return _place_in(line, self.usual)
+
+    @property
+    def axis_line(self) -> Line | None:
+        """Return the middle line, midway between both branches where it parts into two; None if there is none."""
+        middle = self.middle
+        if middle is None or self.branch is None or not np.any(self.branch):
+            return middle
+        measured, offsets = (values + 0.5 * self.branch for values in (middle.measured, middle.offsets))
+        return replace(middle, measured=measured, offsets=offsets)
 
     @property
     def width(self) -> float:
@@ -128,6 +141,8 @@ def find_layout(profiles: Profiles, lines: list[Line], wanted: RoadKind | None =
     chosen = pair or (max(bands, key=lambda band: (len(band.lines), band.width)),)
     if len(bands) > len(chosen):
         notes.append(f"{len(bands) - len(chosen)} other strips of pavement were left out")
+    if pair is None and (middle := chosen[0].middle) is not None:
+        chosen = (replace(chosen[0], branch=find_branch(profiles, middle)),)
     return RoadLayout("dual" if pair else "single", chosen, paved, tuple(notes))
 
 
@@ -365,8 +380,8 @@ class FoundAxis:
 def axis_from_lines(layout: RoadLayout) -> FoundAxis:
     """Return the axis of a layout, on whose movement along the road all lines vote.
 
-    Of a dual carriageway it is the middle between its two innermost lines, of a single one the line in its middle; for
-    want of lines the pavement's edges take their place. All lines vote for how it moves along the road: each tells the
+    Of a dual carriageway it is the middle between its two innermost lines, of a single one the line in its middle, or
+    what lies midway between both branches of that; for want of lines the pavement's edges take their place. All lines vote for how it moves along the road: each tells the
     axis from its own mean distance to it, and counts by how steady that is. Where the lines in the middle are missing
     the others carry on.
 
@@ -374,7 +389,8 @@ def axis_from_lines(layout: RoadLayout) -> FoundAxis:
         InputError: no line and no edge was seen anywhere.
     """
     guides = axis_guides(layout)
-    lines = list(guides) + [line for band in layout.bands for line in band.lines if line not in guides]
+    own = [band.middle for band in layout.bands] if layout.kind == "single" and len(guides) == 1 else list(guides)
+    lines = list(guides) + [line for band in layout.bands for line in band.lines if line not in own]
     stations = lines[0].stations
     given = np.mean([line.measured for line in guides], axis=0)
     raw, start = given, given
@@ -404,8 +420,8 @@ def axis_guides(layout: RoadLayout) -> tuple[Line, ...]:
         right, left = layout.bands
         return right.guide(1), left.guide(-1)
     (band,) = layout.bands
-    if band.middle is not None:
-        return (band.middle,)
+    if band.axis_line is not None:
+        return (band.axis_line,)
     guides = band.guide(-1), band.guide(1)
     # A line on one side and the pavement's edge on the other have nothing between them that is the middle of both.
     alike = (guides[0].width > 0.0) == (guides[1].width > 0.0)

@@ -1,0 +1,133 @@
+"""A middle line that parts into two, around a turn lane or a traffic island: where its other branch runs.
+
+A branch begins or ends at the line and is painted on the way, unlike the lines that run beside it. It is followed
+through the paint, row by row, as the path of most paint (Viterbi 1967).
+"""
+
+import numpy as np
+from scipy import ndimage
+
+from ..base.arrays import Bool, Float
+from .lines import Line
+from .profiles import ACROSS, STRETCH, Profiles
+
+_FARTHEST = 4.2  # m from one branch to the other: a turn lane with its lines
+_FIRST = 4  # bins from the line to where a branch begins
+_APART = 0.8  # m: what is nearer may be the line itself, and speaks for no branch
+_NEAR = -0.1  # gain there
+_MEAN = (5, 3)  # rows and bins whose mean is a place's paint
+_SIDE = 0.4  # m beside a line that isn't painted
+_KNOWN = 0.25  # of them that must hold points
+_PAINTED = 0.4  # of the line's own paint: more speaks for a branch, less against it
+_STEPS = 2  # bins across from one row to the next, at most: 1 in 5
+_TURNING = 0.1  # of a row's paint that a branch must bring more for each of them
+_ENTRY = 6.0  # rows' paint that a branch must bring
+_GAPS = 1.6, 3.0  # rows' paint that may be wanting on the way, where branches are less than a lane apart, and beyond
+_LANE = 2.3  # m
+_OPEN, _LONG = 1.0, 20  # m that branches come apart at least, and rows that they do
+_BACK = 8  # stretches in which a road that was wider becomes as wide as usual
+
+
+def find_branch(profiles: Profiles, line: Line) -> Float:
+    """Return how far beside a line (K,), m, positive to the left, another branch of it runs; 0 where there is none.
+
+    NaN where a branch has ended beside the line and its paint says no more how both come together.
+    """
+    place = np.interp(profiles.stations, line.stations, line.offsets)
+    shown = (profiles.stations >= line.start) & (profiles.stations <= line.end) & np.isfinite(place)
+    beside = np.zeros(len(place))
+    if shown.sum() >= _LONG:
+        found = [_branch_beside(_gains(profiles, place, sign)[shown]) for sign in (-1, 1)]
+        beside[shown] = np.where(found[0] > found[1], -found[0], found[1])
+    padded = np.zeros(profiles.stretches * STRETCH)
+    padded[: len(beside)] = beside
+    stretches = np.median(padded.reshape(-1, STRETCH), axis=1)
+    return np.where((stretches == 0.0) & _behind_ends(stretches), np.nan, stretches)
+
+
+def _branch_beside(gain: Float) -> Float:
+    """Return the distance (R,), m, of the branch that leaves a line or comes to it, the farther one of two."""
+    return ACROSS * np.maximum(_follow(gain), _follow(gain[::-1])[::-1])
+
+
+def _behind_ends(beside: Float) -> Bool:
+    """Return the stretches (K,) that follow where a branch ends away from the line, on either side of it."""
+    result = np.zeros(len(beside), dtype=bool)
+    for (run,) in ndimage.find_objects(ndimage.label(beside)[0]):
+        if abs(beside[run.start]) > _OPEN:
+            result[max(0, run.start - _BACK) : run.start] = True
+        if abs(beside[run.stop - 1]) > _OPEN:
+            result[run.stop : run.stop + _BACK] = True
+    return result
+
+
+def _gains(profiles: Profiles, place: Float, sign: int) -> Float:
+    """Return how much more paint than must be is at bins to one side of a line (S, B), in the line's own paint.
+
+    Args:
+        profiles: S rows.
+        place: (S,) of the line, m.
+        sign: 1 for bins to its left, -1 to its right.
+    """
+    reach, side = round(_FARTHEST / ACROSS), round(_SIDE / ACROSS)
+    begin = np.rint((np.nan_to_num(place) - profiles.offsets[0]) / ACROSS).astype(np.int64)
+    columns = begin[:, None] + sign * np.arange(reach + 1 + side)
+    inside = (columns >= 0) & (columns < len(profiles.offsets))
+    paint = np.take_along_axis(profiles.paint, np.clip(columns, 0, len(profiles.offsets) - 1), axis=1)
+    known = inside & np.isfinite(paint)
+    share = ndimage.uniform_filter(known.astype(np.float64), _MEAN)
+    total = ndimage.uniform_filter(np.where(known, np.clip(paint, 0.0, 1.0), 0.0).astype(np.float64), _MEAN)
+    mean = np.where(share > _KNOWN, total / np.maximum(share, 1e-9), np.nan)
+    above = mean[:, :-side] - mean[:, side:]  # an island may be as bright as its line, a lane isn't
+    own = above[np.isfinite(above[:, 0]), 0]
+    level = float(np.percentile(own, 80)) if len(own) else 0.0  # of what is painted, if the line is dashed
+    if level <= 0.0:
+        return np.full(above.shape, -1.0)
+    gain = np.where(np.isfinite(above), np.clip(above / level, 0.0, 1.0), 0.0) - _PAINTED
+    near = np.arange(gain.shape[1]) * ACROSS < _APART
+    return np.where(near, _NEAR, gain)
+
+
+def _follow(gain: Float) -> Float:
+    """Return by row how many bins (R,) off the line a branch is that leaves it in an earlier row; 0 without one.
+
+    Args:
+        gain: (R, B) by row and bin.
+    """
+    rows, bins = gain.shape
+    score = np.full(bins, -np.inf)
+    score[0] = 0.0  # on the line
+    peak = score.copy()
+    before = np.zeros((rows, bins), dtype=np.int64)  # each place's bin in the row before
+    steps = np.arange(-_STEPS, _STEPS + 1)
+    gaps = np.where(np.arange(bins) * ACROSS < _LANE, *_GAPS)
+    for row in range(rows):
+        beside = np.pad(np.where(np.arange(bins) < _FIRST, -np.inf, score), _STEPS, constant_values=-np.inf)
+        reached = np.lib.stride_tricks.sliding_window_view(beside, len(steps)) - _TURNING * np.abs(steps)
+        step = reached.argmax(axis=1)
+        before[row] = np.clip(np.arange(bins) + steps[step], 0, bins - 1)
+        ahead, top = reached[np.arange(bins), step], peak[before[row]]
+        enters = np.zeros(bins, dtype=bool)
+        enters[_FIRST : _FIRST + _STEPS] = ahead[_FIRST : _FIRST + _STEPS] < score[0] - _ENTRY
+        before[row, enters] = 0
+        ahead = np.where(enters, score[0] - _ENTRY, ahead) + gain[row]
+        top = np.maximum(np.where(enters, score[0] - _ENTRY, top), ahead)
+        before[row, 0] = int(score.argmax())  # a branch may end anywhere
+        ahead[0], top[0] = score.max(), score.max()
+        ahead[1:_FIRST] = -np.inf
+        kept = ahead >= top - gaps
+        score, peak = np.where(kept, ahead, -np.inf), np.where(kept, top, -np.inf)
+    return _traced(before, int(score.argmax()))
+
+
+def _traced(before: Float, last: int) -> Float:
+    """Return the bins (R,) of the path that ends in a bin, less what isn't open or long enough for a branch."""
+    bins = np.zeros(len(before))
+    for row in range(len(before) - 1, -1, -1):
+        bins[row] = last
+        last = int(before[row, last])
+    runs, _ = ndimage.label(bins > 0)
+    for number, (run,) in enumerate(ndimage.find_objects(runs), start=1):
+        if ACROSS * bins[run].max() < _OPEN or run.stop - run.start < _LONG:
+            bins[runs == number] = 0
+    return bins
