@@ -8,7 +8,7 @@ import numpy as np
 from ..base.arrays import Float
 from ..base.errors import InputError
 from .cloud import PointKind, RoadCloud
-from .layout import RoadKind, RoadLayout, find_layout
+from .layout import RoadKind, RoadLayout, find_layout, with_branch
 from .lines import find_lines
 from .path import CloudPath, first_path, path_through
 from .profiles import Profiles, make_profiles, register_path
@@ -84,7 +84,8 @@ def find_axis(cloud: RoadCloud, path: CloudPath, half: float, options: Options) 
     """Return profiles along the road, the layout of lines that they show, and the axis that all views agree on.
 
     Along the path that is given, and again along the axis that was found beside it until it lies still, as a straight
-    line is smoothed and followed better than a bent one, and as a path that has slipped by a lane comes back.
+    line is smoothed and followed better than a bent one, and as a path that has slipped by a lane comes back. Where the
+    middle line parts in two that path follows one branch; the axis then goes between both.
     """
     found = _look_along(cloud, path, half, options)
     for number in range(1, _PASSES):
@@ -92,8 +93,9 @@ def find_axis(cloud: RoadCloud, path: CloudPath, half: float, options: Options) 
             break
         beside = np.interp(found.path.stations, found.axis.stations, found.axis.offsets)
         found = _look_along(cloud, found.path.shift_by(beside), half, options)
-    learned = _learned_view(cloud, found.profiles, options)
-    return replace(found, axis=find_fused_axis(found.profiles, found.layout, learned)) if learned else found
+    layout = with_branch(found.layout, found.profiles)
+    axis = find_fused_axis(found.profiles, layout, _learned_view(cloud, found.profiles, options))
+    return replace(found, layout=layout, axis=axis)
 
 
 def _look_along(cloud: RoadCloud, path: CloudPath, half: float, options: Options) -> FoundRoad:

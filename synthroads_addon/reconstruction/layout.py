@@ -141,9 +141,20 @@ def find_layout(profiles: Profiles, lines: list[Line], wanted: RoadKind | None =
     chosen = pair or (max(bands, key=lambda band: (len(band.lines), band.width)),)
     if len(bands) > len(chosen):
         notes.append(f"{len(bands) - len(chosen)} other strips of pavement were left out")
-    if pair is None and (middle := chosen[0].middle) is not None:
-        chosen = (replace(chosen[0], branch=find_branch(profiles, middle)),)
     return RoadLayout("dual" if pair else "single", chosen, paved, tuple(notes))
+
+
+def with_branch(layout: RoadLayout, profiles: Profiles) -> RoadLayout:
+    """Return a layout that tells where the middle line of a single carriageway parts into two.
+
+    Args:
+        layout: that the profiles show.
+        profiles: along the middle line; along an axis that lies midway between two branches neither is easily followed.
+    """
+    band = layout.bands[0]
+    if layout.kind == "dual" or band.middle is None:
+        return layout
+    return replace(layout, bands=(replace(band, branch=find_branch(profiles, band.middle)),))
 
 
 @dataclass(frozen=True)
@@ -381,9 +392,9 @@ def axis_from_lines(layout: RoadLayout) -> FoundAxis:
     """Return the axis of a layout, on whose movement along the road all lines vote.
 
     Of a dual carriageway it is the middle between its two innermost lines, of a single one the line in its middle, or
-    what lies midway between both branches of that; for want of lines the pavement's edges take their place. All lines vote for how it moves along the road: each tells the
-    axis from its own mean distance to it, and counts by how steady that is. Where the lines in the middle are missing
-    the others carry on.
+    what lies midway between both branches of that; for want of lines the pavement's edges take their place. All lines
+    vote for how it moves along the road: each tells the axis from its own mean distance to it, and counts by how steady
+    that is. Where the lines in the middle are missing the others carry on.
 
     Raises:
         InputError: no line and no edge was seen anywhere.
