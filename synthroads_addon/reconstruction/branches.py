@@ -7,7 +7,7 @@ through the paint, row by row, as the path of most paint (Viterbi 1967).
 import numpy as np
 from scipy import ndimage
 
-from ..base.arrays import Bool, Float
+from ..base.arrays import Float
 from .lines import Line
 from .profiles import ACROSS, STRETCH, Profiles
 
@@ -41,8 +41,7 @@ def find_branch(profiles: Profiles, line: Line) -> Float:
         beside[shown] = np.where(found[0] > found[1], -found[0], found[1])
     padded = np.zeros(profiles.stretches * STRETCH)
     padded[: len(beside)] = beside
-    stretches = np.median(padded.reshape(-1, STRETCH), axis=1)
-    return np.where((stretches == 0.0) & _behind_ends(stretches), np.nan, stretches)
+    return _with_ends(np.median(padded.reshape(-1, STRETCH), axis=1))
 
 
 def _branch_beside(gain: Float) -> Float:
@@ -50,14 +49,15 @@ def _branch_beside(gain: Float) -> Float:
     return ACROSS * np.maximum(_follow(gain), _follow(gain[::-1])[::-1])
 
 
-def _behind_ends(beside: Float) -> Bool:
-    """Return the stretches (K,) that follow where a branch ends away from the line, on either side of it."""
-    result = np.zeros(len(beside), dtype=bool)
+def _with_ends(beside: Float) -> Float:
+    """Return a branch (K,), m, with NaN behind its ends away from the line, or held to the road's end if that is near."""
+    result, last = beside.copy(), len(beside) - 1
     for (run,) in ndimage.find_objects(ndimage.label(beside)[0]):
-        if abs(beside[run.start]) > _OPEN:
-            result[max(0, run.start - _BACK) : run.start] = True
-        if abs(beside[run.stop - 1]) > _OPEN:
-            result[run.stop : run.stop + _BACK] = True
+        for end, sign in ((run.start, -1), (run.stop - 1, 1)):
+            if abs(beside[end]) > _OPEN:
+                beyond = np.clip(end + sign * np.arange(1, _BACK + 1), 0, last)
+                near = beyond[-1] in (0, last)
+                result[beyond] = np.where(beside[beyond] == 0.0, beside[end] if near else np.nan, beside[beyond])
     return result
 
 

@@ -42,30 +42,6 @@ def unmarked(offset: Float, station: Float, rng: np.random.Generator) -> tuple[F
     return _paved(np.abs(offset) < 2.75, np.zeros(len(offset), dtype=bool), rng)
 
 
-def turn_lane(offset: Float, station: Float, rng: np.random.Generator) -> tuple[Float, Float]:
-    """The sound road, widened to both sides for a turn lane from 45 m on, whose line is dashed from 95 m on: sound."""
-    apart = np.interp(station, [45.0, 95.0], [0.0, 3.4])
-    right, left = np.abs(offset + 0.5 * apart) < 0.07, np.abs(offset - 0.5 * apart) < 0.07
-    opening = np.abs(offset - np.interp(station, [85.0, 105.0], [-1.4, 1.7])) < 0.07
-    hatched = (np.abs(offset) < 0.5 * apart) & (station < 85.0) & ((station + 2.0 * offset) % 4.0 < 0.4)
-    middle = right & ((station > 20.0) | (station % 12.0 < 4.0)) | left & ((station < 95.0) | (station % 6.0 < 3.0))
-    middle &= (station > 20.0) | (station % 12.0 < 4.0)
-    opening &= (station > 85.0) & (station < 105.0)
-    away = np.abs(offset) - 0.5 * apart
-    return _paved(away < 3.5, middle | opening | hatched | (np.abs(away - 3.2) < 0.07), rng)
-
-
-def traffic_island(offset: Float, station: Float, rng: np.random.Generator) -> tuple[Float, Float]:
-    """The sound road, which parts around an island of 2 by 10 m with lines on both sides of it: sound."""
-    apart = np.interp(station, [50.0, 75.0, 90.0, 115.0], [0.0, 2.6, 2.6, 0.0])
-    solid = (station > 35.0) & (station < 130.0)
-    middle = (np.abs(np.abs(offset) - 0.5 * apart) < 0.07) & (solid | (station % 12.0 < 4.0))
-    away = np.abs(offset) - 0.5 * apart
-    height, bright = _paved(away < 3.5, middle | (np.abs(away - 3.2) < 0.07), rng)
-    island = (np.abs(offset) < 1.0) & (np.abs(station - 82.5) < 5.0)
-    return np.where(island, 0.12, height), np.where(island, 0.4, bright)
-
-
 def field(offset: Float, station: Float, rng: np.random.Generator) -> tuple[Float, Float]:
     """Grass."""
     return _grass(len(offset), rng)
@@ -133,7 +109,7 @@ def slab(offset: Float, station: Float, rng: np.random.Generator) -> tuple[Float
     return rng.normal(0.0, 0.005, len(offset)), 0.3 + rng.normal(0.0, 0.01, len(offset))
 
 
-SOUND: tuple[Across, ...] = (rural, unmarked, turn_lane, traffic_island)
+SOUND: tuple[Across, ...] = (rural, unmarked)
 """Roads, their axis along the cloud's east axis."""
 FOREIGN: tuple[Across, ...] = (field, noise, car_park, canal, ploughed, slab, railway)
 """No roads."""
