@@ -7,7 +7,7 @@ through the paint, row by row, as the path of most paint (Viterbi 1967).
 import numpy as np
 from scipy import ndimage
 
-from ..base.arrays import Float
+from ..base.arrays import Float, Int
 from .lines import Line
 from .profiles import ACROSS, STRETCH, Profiles
 
@@ -50,7 +50,7 @@ def _branch_beside(gain: Float) -> Float:
 
 
 def _with_ends(beside: Float) -> Float:
-    """Return a branch (K,), m, with NaN behind its ends away from the line, or held to the road's end if that is near."""
+    """Return a branch (K,), m, with NaN behind its ends beside the line, or held to the road's end if that is near."""
     result, last = beside.copy(), len(beside) - 1
     for (run,) in ndimage.find_objects(ndimage.label(beside)[0]):
         for end, sign in ((run.start, -1), (run.stop - 1, 1)):
@@ -121,7 +121,7 @@ def _follow(gain: Float) -> Float:
     return _traced(before, int(score.argmax()))
 
 
-def _traced(before: Float, last: int) -> Float:
+def _traced(before: Int, last: int) -> Float:
     """Return the bins (R,) of the path that ends in a bin, less what isn't open or long enough for a branch."""
     bins = np.zeros(len(before))
     for row in range(len(before) - 1, -1, -1):

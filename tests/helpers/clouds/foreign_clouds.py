@@ -21,7 +21,7 @@ def _grass(count: int, rng: np.random.Generator) -> tuple[Float, Float]:
     return rng.normal(0.0, 0.05, count), 0.45 + rng.normal(0.0, 0.07, count)
 
 
-def _paved(
+def paved(
     inside: Bool, paint: Bool, rng: np.random.Generator, kerb: float = 0.08, level: float = 0.18
 ) -> tuple[Float, Float]:
     """Return heights and intensities of pavement inside of a mask, with paint, and of grass outside, a kerb higher."""
@@ -34,12 +34,12 @@ def rural(offset: Float, station: Float, rng: np.random.Generator) -> tuple[Floa
     """A road of 7 m with edge lines and a dashed line in its middle, between grass: sound."""
     away = np.abs(offset)
     paint = ((away < 0.07) & (station % 12.0 < 4.0)) | (np.abs(away - 3.2) < 0.07)
-    return _paved(away < 3.5, paint, rng)
+    return paved(away < 3.5, paint, rng)
 
 
 def unmarked(offset: Float, station: Float, rng: np.random.Generator) -> tuple[Float, Float]:
     """A road of 5.5 m without any marking, between grass: sound."""
-    return _paved(np.abs(offset) < 2.75, np.zeros(len(offset), dtype=bool), rng)
+    return paved(np.abs(offset) < 2.75, np.zeros(len(offset), dtype=bool), rng)
 
 
 def field(offset: Float, station: Float, rng: np.random.Generator) -> tuple[Float, Float]:
@@ -57,7 +57,7 @@ def car_park(offset: Float, station: Float, rng: np.random.Generator) -> tuple[F
     within = (offset + HALF) % 16.0
     bays = (within < 5.0) | (within > 11.0)
     paint = (bays & (station % 2.5 < 0.12)) | (np.abs(within - 0.06) < 0.06)
-    return _paved(np.ones(len(offset), dtype=bool), paint, rng)
+    return paved(np.ones(len(offset), dtype=bool), paint, rng)
 
 
 def village(offset: Float, station: Float, rng: np.random.Generator) -> tuple[Float, Float]:
@@ -117,19 +117,19 @@ DAMAGED: tuple[Across, ...] = (village, half_road, hidden_middle)
 """Roads along the same axis that are hard to tell."""
 
 
-def throw(path: Path, across: Across, seed: int, slant: float = 0.0) -> Path:
+def throw(path: Path, across: Across, seed: int, slant: float = 0.0, length: float = LENGTH) -> Path:
     """Write a cloud of ground points along the map's east axis, 12 points/m2, bent by a slant (m at its ends)."""
     rng = np.random.default_rng([seed, sum(map(ord, across.__name__))])
-    count = int(DENSITY * LENGTH * 2.0 * HALF)
-    station, offset = rng.uniform(0.0, LENGTH, count), rng.uniform(-HALF, HALF, count)
+    count = int(DENSITY * length * 2.0 * HALF)
+    station, offset = rng.uniform(0.0, length, count), rng.uniform(-HALF, HALF, count)
     height, brightness = across(offset, station, rng)
     seen = np.isfinite(height)
-    north = NORTH + offset + axis_north(station, slant)
+    north = NORTH + offset + axis_north(station, slant, length)
     xyz = np.column_stack([EAST + station, north, UP + height + rng.normal(0.0, 0.01, count)])[seen]
     bright = np.clip(brightness + rng.normal(0.0, 0.02, count), 0.0, 1.0)[seen]
     return write(path, block_of(xyz, bright, np.full(len(xyz), class_id("ground"), np.uint8)))
 
 
-def axis_north(station: Float, slant: float) -> Float:
+def axis_north(station: Float, slant: float, length: float = LENGTH) -> Float:
     """Return how far north of the east axis a cloud's axis lies at stations, m: a parabola."""
-    return slant * (2.0 * station / LENGTH - 1.0) ** 2
+    return slant * (2.0 * station / length - 1.0) ** 2
