@@ -145,9 +145,11 @@ def few_labels(halves: tuple[Path, Path], arguments: argparse.Namespace) -> list
     for learned, test in (halves, halves[::-1]):
         real = sources("real", {"path": str(learned), "mapping": "semantickitti", "tile": 1000})
         alone = ("set_up=real", "crops_per_tile=60", "balanced=false", epochs, real)
+        both = (*LEARNING, epochs, real, synthetic)
         trainings = {
             "and one half of a sweep": (ANY_SCANNER, (*SWEEPS, *LEARNING, *alone)),
-            "and one half, with synthetic sweeps": (FEW_LABELS, (*LEARNING, epochs, real, synthetic)),
+            "and one half, with synthetic sweeps": (FEW_LABELS, both),
+            "and the same without offsets": (FEW_LABELS, (*both, "fitted_offsets=false")),
         }
         tested = ("segmentation-sweeps", "", (), test, "semantickitti", arguments.seeds[0])
         cases += [
