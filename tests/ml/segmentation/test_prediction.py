@@ -270,7 +270,7 @@ def by_side(batch: Item) -> torch.Tensor:
 
 
 def test_votes_are_the_mean_of_turned_views() -> None:
-    """What a classifier says of one direction evens out; what every view says stays."""
+    """Scores that go by direction even out; those that every view gives stay."""
     tile = road_tile(6_000)
     votes = CropSettings(voxel=0.3, votes=16)
     labels = label_tile(tile, Scaling(), by_brightness, votes)
