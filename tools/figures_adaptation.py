@@ -3,8 +3,9 @@
     python tools/figures_adaptation.py --real FOLDER --synthetic FOLDER --output out/adaptation
 
 Few labels: one half of a labelled sweep, by azimuth about the scanner, is learned from and the other half is the test,
-both ways; ten degrees between them are left out. Self-training: whole clouds are learned from without their labels, and
-scored with them. All trainings begin with a model of the package. What is done is kept; the same command goes on.
+both ways; ten degrees between them are left out. With synthetic sweeps it is the configuration
+`segmentation-few-labels`. Self-training: whole clouds are learned from without their labels, and scored with them. All
+trainings begin with a model of the package. What is done is kept; the same command goes on.
 """
 
 from __future__ import annotations
@@ -27,7 +28,9 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from headless.marked_documents import put_tables  # noqa: E402
-from ml.runs import METRICS  # noqa: E402
+from ml.configuration import load_configuration  # noqa: E402
+from ml.runs import METRICS, Run  # noqa: E402
+from ml.shipped import open_run  # noqa: E402
 from synthroads_addon.base.errors import SynthRoadsError  # noqa: E402
 from synthroads_addon.base.schema import read_json  # noqa: E402
 
@@ -43,6 +46,9 @@ LEARNING = (
 """Changes of the configuration that all trainings share: they begin with weights that are learned already."""
 SWEEPS = ("crop_points=12000", "batch=6", "class_weights=0", "fitted_offsets=true")
 """Changes with which `segmentation-sweeps` was trained."""
+TABLES = ("few-labels", "self-training")
+ANY_SCANNER = "segmentation-any-scanner"
+FEW_LABELS = "segmentation-few-labels"
 
 
 @dataclass(frozen=True)
@@ -53,19 +59,23 @@ class Case:
         table: which table it belongs to.
         title: of its row.
         model: of the package, that it begins with.
-        changes: of the configuration; none where the model is only tested.
+        configuration: of the training; empty where the model is only tested.
+        changes: of the configuration.
         test: cloud that it is scored on.
         mapping: of the test's classes.
         seed: of the training.
+        votes: views by which a model labels that is only tested.
     """
 
     table: str
     title: str
     model: str
+    configuration: str
     changes: tuple[str, ...]
     test: Path
     mapping: str
     seed: int
+    votes: int = 1
 
     @property
     def name(self) -> str:
@@ -81,8 +91,9 @@ def main() -> None:
     parser.add_argument("--synthetic", type=Path, required=True, help="data set, or packed file, of synthetic sweeps")
     parser.add_argument("--overhead", type=Path, help="the same of roads from above; without it the street is left out")
     parser.add_argument("--output", type=Path, required=True, help="folder for halves, runs and scores")
+    parser.add_argument("--tables", nargs="+", choices=TABLES, default=TABLES, help=f"of {', '.join(TABLES)} (all)")
     parser.add_argument("--seeds", type=int, nargs="+", default=[1, 2, 3], help="of the trainings (1 2 3)")
-    parser.add_argument("--epochs", type=int, default=16, help="epochs of synthetic sweeps (16)")
+    parser.add_argument("--epochs", type=int, default=16, help="epochs of few labels; twice those of a round (16)")
     parser.add_argument("--jobs", type=int, default=1, help="trainings side by side (1)")
     parser.add_argument("--document", type=Path, help="page whose tables are replaced")
     arguments = parser.parse_args()
@@ -95,6 +106,7 @@ def main() -> None:
     if arguments.overhead:
         street = arguments.real / "ign_lidarhd_street.laz"
         cases += self_training("segmentation-overhead", ("batch=8",), street, "ign", arguments.overhead, arguments)
+    cases = [case for case in cases if case.table in arguments.tables]
     names = list(dict.fromkeys(case.table for case in cases))
 
     def tables() -> dict[str, str]:
@@ -127,20 +139,27 @@ def write_halves(cloud: Path, folder: Path) -> tuple[Path, Path]:
 def few_labels(halves: tuple[Path, Path], arguments: argparse.Namespace) -> list[Case]:
     """Return the cases that learn from one half of the sweep and are tested on the other."""
     cases = []
+    votes = load_configuration(FEW_LABELS).votes
+    epochs = f"schedule.epochs={arguments.epochs}"
+    synthetic = sources("synthetic", {"path": str(arguments.synthetic)})
     for learned, test in (halves, halves[::-1]):
         real = sources("real", {"path": str(learned), "mapping": "semantickitti", "tile": 1000})
-        synthetic = sources("synthetic", {"path": str(arguments.synthetic)})
-        alone = ("set_up=real", "crops_per_tile=60", f"schedule.epochs={arguments.epochs}", real)
-        both = ("set_up=mixed", "synthetic_share=0.5", "balanced=false", "crops_per_tile=3", real, synthetic)
-        variants = {
-            "the model as it comes": (),
-            "and one half of a sweep": (*SWEEPS, *LEARNING, "balanced=false", *alone),
-            "and one half, with synthetic sweeps": (*SWEEPS, *LEARNING, *both, f"schedule.epochs={arguments.epochs}"),
+        alone = ("set_up=real", "crops_per_tile=60", "balanced=false", epochs, real)
+        both = (*LEARNING, epochs, real, synthetic)
+        trainings = {
+            "and one half of a sweep": (ANY_SCANNER, (*SWEEPS, *LEARNING, *alone)),
+            "and one half, with synthetic sweeps": (FEW_LABELS, both),
+            "and the same without offsets": (FEW_LABELS, (*both, "fitted_offsets=false")),
         }
+        tested = ("segmentation-sweeps", "", (), test, "semantickitti", arguments.seeds[0])
         cases += [
-            Case("few-labels", title, "segmentation-sweeps", changes, test, "semantickitti", seed)
-            for title, changes in variants.items()
-            for seed in (arguments.seeds if changes else arguments.seeds[:1])
+            Case("few-labels", "the model as it comes", *tested),
+            Case("few-labels", f"the same, by {votes} views", *tested, votes=votes),
+            *(
+                Case("few-labels", title, "segmentation-sweeps", *training, test, "semantickitti", seed)
+                for title, training in trainings.items()
+                for seed in arguments.seeds
+            ),
         ]
     return cases
 
@@ -158,8 +177,8 @@ def self_training(
     rounds = ("set_up=self_trained", "crops_per_tile=3", f"fine_tuning.epochs={arguments.epochs // 2}")
     learned = (*changes, *LEARNING, *rounds, target, sources("synthetic", {"path": str(synthetic)}))
     return [
-        Case("self-training", f"{model}{words}", model, told, cloud, mapping, seed)
-        for words, told in (("", ()), (", self-trained", learned))
+        Case("self-training", f"{model}{words}", model, configuration, told, cloud, mapping, seed)
+        for words, configuration, told in (("", "", ()), (", self-trained", ANY_SCANNER, learned))
         for seed in (arguments.seeds if told else arguments.seeds[:1])
     ]
 
@@ -173,12 +192,14 @@ def score(case: Case, output: Path) -> dict[str, float]:
     """Train a case unless it is trained, and return its IoUs by class and their mean, %."""
     folder, scores = output / "runs" / case.name, output / "scores" / case.name
     run = case.model
-    if case.changes:
+    if case.votes > 1:
+        run = str(write_with_votes(case.model, case.votes, folder))
+    if case.configuration:
         run = str(folder)
         if not (folder / METRICS).is_file():
             changes = (*case.changes, f"start={case.model}", f"seed={case.seed}")
             options = [word for change in changes for word in ("--set", change)]
-            command("train", "segmentation-any-scanner", "--output", str(folder), "--resume", "--quiet", *options)
+            command("train", case.configuration, "--output", str(folder), "--resume", "--quiet", *options)
     kept = scores / "told.json"
     if not kept.is_file():
         words = ("--mapping", case.mapping, "--output", str(scores), "--json", "--quiet")
@@ -187,6 +208,14 @@ def score(case: Case, output: Path) -> dict[str, float]:
     ((_, found),) = read_json(kept)["tests"].items()
     ious = {name: 100.0 * row["iou"] for name, row in found["classes"].items() if row["iou"] is not None}
     return {"mean": 100.0 * found["mean_iou"], **ious}
+
+
+def write_with_votes(model: str, votes: int, folder: Path) -> Path:
+    """Write a model of the package as a run that labels by so many views; return the run's folder."""
+    given = open_run(Path(model))
+    run = Run.start(folder, given.configuration.model_copy(update={"votes": votes}), overwrite=True)
+    run.save(given.last_checkpoint() or {})
+    return folder
 
 
 def command(name: str, *words: str) -> str:

@@ -45,11 +45,13 @@ class CropSettings:
         points: largest number of points of a crop.
         voxel: edge of the cells of ``grid_coord``, m.
         features: columns of ``feat``, in this order.
+        votes: views, turned and mirrored, whose mean probability is a point's when it is labelled.
     """
 
     points: int = 24_000
     voxel: float = 0.1
     features: tuple[Feature, ...] = FEATURES
+    votes: int = 1
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ none, and one that learned with weights finds them where none are. The best thre
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -34,10 +35,13 @@ def fit_offsets(tiles: Sequence[CloudTile], classifier: Classifier, configuratio
     every = -(-sum(map(len, tiles)) // MOST_POINTS)
     chosen = tiles[::every]
     scaling = scalings(tiles, configuration.intensity)
+    settings = replace(
+        configuration.crop_settings(), votes=1
+    )  # thresholds hardly differ, and it takes a part of the time
     scores: list[Float32] = []
     truth: list[Int] = []
     for tile in chosen:
-        for inside, found in piece_scores(tile, scaling[tile.scene], classifier, configuration.crop_settings()):
+        for inside, found in piece_scores(tile, scaling[tile.scene], classifier, settings):
             known = tile.segment[inside] != IGNORED
             scores.append(found.float().cpu().numpy()[known])
             truth.append(tile.segment[inside][known].astype(np.int64))

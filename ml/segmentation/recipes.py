@@ -100,6 +100,9 @@ class SegmentationConfiguration(Configuration):
     fitted_offsets: bool = Field(
         False, description="Add to each class's score what makes the mean IoU of the training tiles largest."
     )
+    votes: int = quantity(
+        1, ge=1, le=64, unit="1", description="Views, turned and mirrored, whose mean probability labels a point."
+    )
     fine_tuning: Schedule = Field(
         Schedule(epochs=30, learning_rate=0.001), description="Second part of fine_tuned; each round of self_trained."
     )
@@ -109,6 +112,9 @@ class SegmentationConfiguration(Configuration):
         description="Where batches are prepared: by the GPU where there is one and the network can, or workers.",
     )
     start: str = Field("", description="Run's folder or shipped model whose weights are begun with; random if empty.")
+    start_share: float = quantity(
+        0.0, ge=0, lt=1, unit="1", description="Share of the start's weights in the mean that the training ends with."
+    )
     data: Data = Field(Data(), description="Where points come from.")
 
     @field_validator("class_weights", mode="before")
@@ -128,6 +134,8 @@ class SegmentationConfiguration(Configuration):
     def _check_data(self) -> SegmentationConfiguration:
         if self.synthetic_share is not None and not self.set_up.startswith("mixed"):
             raise ValueError(f"synthetic_share is for mixed set-ups, not for {self.set_up}")
+        if self.start_share and not self.start:
+            raise ValueError("start_share needs a start, whose weights are kept in part")
         if self.data.stream is not None and self.set_up == "self_trained":
             raise ValueError("data.stream is not for self_trained, whose rounds learn from the same scenes")
         if self.data.stream is not None and self.crops_per_epoch is None:
@@ -139,8 +147,8 @@ class SegmentationConfiguration(Configuration):
         return class_scheme(self.classes)
 
     def crop_settings(self) -> CropSettings:
-        """Return the size, voxel and features of crops."""
-        return CropSettings(self.crop_points, self.voxel, self.features)
+        """Return the size, voxel, features and votes of crops."""
+        return CropSettings(self.crop_points, self.voxel, self.features, self.votes)
 
     def needed_sources(self) -> dict[str, tuple[Source, ...]]:
         """Return the training sources of the set-up by domain; the synthetic ones may be none where there is a stream.

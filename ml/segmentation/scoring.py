@@ -37,6 +37,8 @@ MARGIN = 4.0
 LARGEST = 100_000
 """Points of a piece, margin included; what has more is cut in four, down to `_SMALLEST_EDGE`."""
 _SMALLEST_EDGE = 1.5
+_GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
+"""Angle from one view to the next, rad: however many there are, they point to all sides."""
 
 Classifier = Callable[[Item], torch.Tensor]
 """Turns a batch of one item into the scores of its points."""
@@ -116,15 +118,52 @@ def piece_scores(
 ) -> Iterator[tuple[Index, Tensor]]:
     """Yield the class scores (n, C) of a thinned tile's points, piece by piece, with the points' indices (n,).
 
+    With several votes they are logarithms of the views' mean probabilities, of all points at once.
+
     Args:
         tile: N points, one per voxel; its labels aren't looked at.
         scaling, classifier, settings, seed: see `label_tile`.
         own: (N,) which points' scores are wanted; all if not given.
     """
     tile = replace(tile, segment=np.full(len(tile), IGNORED, dtype=np.int16))
+    if settings.votes == 1:
+        yield from _view_scores(tile, scaling, classifier, settings, own, seed)
+        return
+    total: Tensor | None = None
+    for view in range(settings.votes):
+        for inside, scores in _view_scores(_turned(tile, view), scaling, classifier, settings, own, seed):
+            if total is None:
+                total = scores.new_zeros(len(tile), scores.shape[1], dtype=torch.float32)
+            total[torch.from_numpy(inside)] += scores.float().softmax(dim=1)
+    if total is not None:
+        wanted = np.arange(len(tile)) if own is None else np.flatnonzero(own)
+        yield wanted, (total[torch.from_numpy(wanted)] / settings.votes).clamp_min(1e-9).log()
+
+
+def _view_scores(
+    tile: CloudTile, scaling: Scaling, classifier: Classifier, settings: CropSettings, own: Bool | None, seed: int
+) -> Iterator[tuple[Index, Tensor]]:
+    """Yield the scores of a tile's points in one view, piece by piece, with the points' indices; see `piece_scores`."""
     for number, (inside, seen) in enumerate(overlapping_pieces(tile.coord[:, :2], own)):
         batch = make_item(crop_of(tile.select(seen), scaling), settings, stream(seed, "missing features", number))
         yield inside, classifier(batch)[torch.from_numpy(np.searchsorted(seen, inside))]
+
+
+def _turned(tile: CloudTile, view: int) -> CloudTile:
+    """Return a tile as a view sees it: the first as it is, each further one turned on, every second one mirrored.
+
+    Pieces are cut where it is turned to, so that each view has other borders.
+    """
+    if view == 0:
+        return tile
+    cosine, sine = np.cos(view * _GOLDEN_ANGLE), np.sin(view * _GOLDEN_ANGLE)
+    turn = np.array([[cosine, sine], [-sine, cosine]], dtype=np.float32)
+    if view % 2:
+        turn[:, 0] *= -1.0
+    coord = tile.coord.copy()
+    middle = coord[:, :2].mean(axis=0)
+    coord[:, :2] = (coord[:, :2] - middle) @ turn + middle
+    return replace(tile, coord=coord)
 
 
 def _needed_points(small: Float32, full: Float32, core: Bool | None, voxel: float) -> Bool:

@@ -1,7 +1,8 @@
 """Segmentation as one of the learning tasks: train, evaluate, predict."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext, suppress
+from copy import deepcopy
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -42,6 +43,8 @@ from .self_training import believed_labels, target_tiles
 
 OFFSETS = "offsets"
 """Key of the checkpoint's offsets that were added to the network's scores, (C,)."""
+MIXED = "start_share"
+"""Key of the share of the start's weights that those of the checkpoint were mixed with."""
 _ONE_TILE = 5_000_000
 """Points of a cloud up to which it is scored as one tile."""
 SegmentationRun = Run[SegmentationConfiguration]
@@ -183,6 +186,7 @@ def train_network(run: Run[SegmentationConfiguration], progress: Progress = sile
     model = build(configuration).to(device)
     if configuration.start:
         _begin_with(model, configuration)
+    begun = deepcopy(model.state_dict())
     with _scene_stream(run, progress) as stream:
         if configuration.set_up == "self_trained":
             _self_train(model, run, domains, validation, progress)
@@ -192,6 +196,8 @@ def train_network(run: Run[SegmentationConfiguration], progress: Progress = sile
             _fit(model, replace(run, configuration=second), {"real": domains["real"]}, validation, progress)
         else:
             _fit(model, run, domains, validation, progress, stream)
+        if configuration.start_share:
+            _mix_with_start(model, run, begun)
         if configuration.fitted_offsets:
             _shift_scores(model, run, domains, stream)
     if stream is not None:
@@ -209,6 +215,20 @@ def _scene_stream(
         return nullcontext()
     epochs = configuration.schedule.epochs
     return SceneStream(options, configuration.seed, run.folder, epochs, ("pointcept",), progress)
+
+
+def _mix_with_start(model: nn.Module, run: Run[SegmentationConfiguration], begun: Mapping[str, Tensor]) -> None:
+    """Set the weights to a mean of those that the training began and ended with, in place, and save them; once.
+
+    Wortsman et al., "Robust fine-tuning of zero-shot models" (2022): what few labels say nothing of isn't forgotten.
+    """
+    state, share = run.last_checkpoint(next(model.parameters()).device), run.configuration.start_share
+    if process_number() or state is None or MIXED in state:
+        return
+    for name, value in model.state_dict().items():
+        if value.is_floating_point():
+            value.lerp_(begun[name], share)
+    run.save({**state, "model": model.state_dict(), MIXED: share})
 
 
 def _shift_scores(

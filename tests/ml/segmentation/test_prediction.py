@@ -14,7 +14,7 @@ from ml.data.tiles import Scaling
 from ml.scores.confusion import Confusion
 from ml.segmentation import prediction
 from ml.segmentation.prediction import PREDICTED, Labelling, predict_file
-from ml.segmentation.scoring import label_tile, nearest_labels, overlapping_pieces
+from ml.segmentation.scoring import label_tile, nearest_labels, overlapping_pieces, piece_scores
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
 from tests.helpers.clouds.segmentation_data import road_block, road_tile, write_cloud
@@ -261,3 +261,29 @@ def test_bad_input_is_told_and_leaves_nothing(tmp_path: Path, labelling: Labelli
         predict_file(cloud, tmp_path / "out.laz", Labelling(broken, SETTINGS, class_scheme("5"), "share"))
     found = sorted(path.name for path in tmp_path.iterdir())
     assert found == ["cut.laz", "in.laz", "old-out.las", "old.las", "there.laz"]
+
+
+def by_side(batch: Item) -> torch.Tensor:
+    """Score class 1 where a point lies east of its piece's middle, else class 0."""
+    east = batch["coord"][:, 0] > 0.0
+    return torch.stack([~east, east], dim=1).float() * 4.0
+
+
+def test_votes_are_the_mean_of_turned_views() -> None:
+    """Scores that go by direction even out; those that every view gives stay."""
+    tile = road_tile(6_000)
+    votes = CropSettings(voxel=0.3, votes=16)
+    labels = label_tile(tile, Scaling(), by_brightness, votes)
+    assert (labels == label_tile(tile, Scaling(), by_brightness, CropSettings(voxel=0.3))).all()
+    small = tile.select(np.unique(np.floor(tile.coord / 1.0), axis=0, return_index=True)[1])
+    own = small.coord[:, 0] < 30.0
+    told = {}
+    for count in (1, 16):
+        settings = CropSettings(voxel=0.3, votes=count)
+        pairs = list(piece_scores(small, Scaling(), by_side, settings, own))
+        inside = np.concatenate([place for place, _ in pairs])
+        assert sorted(inside) == np.flatnonzero(own).tolist()
+        told[count] = torch.cat([scores for _, scores in pairs]).softmax(dim=1)[:, 1]
+    assert told[1].std() > 0.45
+    assert told[16].std() < 0.2
+    assert abs(told[16].mean() - 0.5) < 0.1
