@@ -343,7 +343,7 @@ def test_draws_reach_all_of_their_intervals() -> None:
 
 
 def test_a_road_has_the_alignment_that_is_drawn_for_it() -> None:
-    """So where many alignments are looked at they are drawn alone, which takes a hundredth of the time."""
+    """So where many alignments are looked at they are drawn alone, which takes far less time."""
     for limits in (scenario(length=700.0), scenario(design_class="EKA3", cross_section="RQ25", length=3000.0)):
         drawn, road = sample_alignment(limits, 5), sample_road(limits, 5)
         assert road.alignment == drawn.model_copy(update={"instance": road.alignment.instance})
