@@ -35,6 +35,9 @@ sys.modules["rfc3987_syntax"] = None  # type: ignore[assignment]
 BLENDER_FOLDER = Path(tempfile.mkdtemp(prefix="synthroads-blender-"))
 os.environ["BLENDER_USER_RESOURCES"] = str(BLENDER_FOLDER)
 
+# The first process, which starts the others that test, says where; theirs alone is of that run, and so of one source.
+KEPT_GROUPS = Path(os.environ.setdefault("SYNTHROADS_KEPT_GROUPS", str(BLENDER_FOLDER / "kept_groups")))
+
 HAS_TORCH = importlib.util.find_spec("torch") is not None
 LEARNING = ("ml", "fuzz/test_configurations.py", "fuzz/test_learning_data.py", "jobs/test_documented_classes.py")
 collect_ignore = [*(() if HAS_BPY else BLENDER_TESTS), *(() if HAS_TORCH else LEARNING)]
@@ -119,7 +122,8 @@ def _kept_groups() -> KeptGroups:
     """Return the node groups that tests have made so far."""
     from tests.helpers.scenes.kept_groups import KeptGroups
 
-    return KeptGroups(BLENDER_FOLDER)
+    KEPT_GROUPS.mkdir(exist_ok=True)
+    return KeptGroups(KEPT_GROUPS)
 
 
 @pytest.fixture(scope="session")

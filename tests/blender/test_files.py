@@ -22,8 +22,8 @@ def test_relative_names_are_of_the_working_folder(tmp_path: Path, monkeypatch: p
 
 @pytest.mark.any_blender
 def test_the_file_of_a_road_is_small(tmp_path: Path) -> None:
-    """It holds what modifiers make the surfaces of, and not these: 600 m would be hundreds of megabytes."""
-    build_road(sample_road(RoadScenario(length=600.0), 1), 0.005)
+    """It holds what modifiers make the surfaces of, and not these: a kilometre would be hundreds of megabytes."""
+    build_road(sample_road(RoadScenario(length=150.0), 1), 0.005)
     save_scene(tmp_path / "scene.blend")
     megabytes = (tmp_path / "scene.blend").stat().st_size / 1e6
     print(f"{megabytes:.2f} MB")

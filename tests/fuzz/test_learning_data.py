@@ -23,7 +23,8 @@ from ml.segmentation.recipes import SegmentationConfiguration
 from synthroads_addon.base.classes import class_scheme
 from tests.fuzz.test_bytes import every_cloud
 from tests.helpers.clouds.road_data_sets import write_data_set
-from tests.helpers.clouds.segmentation_data import road_block, road_tile, write_cloud, write_pointcept
+from tests.helpers.clouds.road_tiles import road_tile
+from tests.helpers.clouds.segmentation_data import road_block, write_cloud, write_pointcept
 from tests.helpers.files.mutations import TOKENS, accepted, damaged, for_all, fuzz
 
 SHORT = [token for token in TOKENS if len(token) < 100]

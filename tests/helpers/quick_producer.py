@@ -22,7 +22,7 @@ from headless.scene_stream import SceneFailedError, Stop, serve
 from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.dataset.manifest import SceneEntry, file_entries
 from synthroads_addon.dataset.scene_stream import WORK, Failure, StreamPlan, publish, scene_numbers
-from tests.helpers.clouds.segmentation_data import road_tile
+from tests.helpers.clouds.road_tiles import road_tile
 
 
 def make(folder: Path, plan: StreamPlan, number: int, stopping: Stop) -> None:

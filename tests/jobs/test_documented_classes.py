@@ -12,8 +12,6 @@ import laspy
 import numpy as np
 import pytest
 
-from ml.runs import HISTORY
-from ml.segmentation.prediction import PREDICTED
 from tests.helpers.page_modules import ROOT, block_of_page
 from tests.packaging.docs_pages import commands
 
@@ -25,6 +23,10 @@ NEW = {"bench": (17, 80), "truck": (18, 81), "concrete_pavement": (19, 82)}
 @pytest.mark.slow
 @pytest.mark.any_blender
 def test_the_page_leads_from_a_scheme_to_a_network(tmp_path: Path) -> None:
+    # Here, as PyTorch takes seconds to import, in each process that collects tests of Blender.
+    from ml.runs import HISTORY
+    from ml.segmentation.prediction import PREDICTED
+
     (tmp_path / "seats").mkdir()
     blocks = {
         "paved.json": block_of_page(PAGE, "json"),

@@ -55,7 +55,9 @@ def unfitting_objects(schema: jsonschema_rs.Draft7Validator, data: dict[str, Any
     if schema.is_valid(data):
         return []
     objects = data["CityObjects"].items()
-    return [name for name, item in objects if not schema.is_valid(data | {"CityObjects": {name: item}})] or ["the file"]
+    # An object points to vertices by numbers that no schema can follow: to ask of each object for all would take long.
+    rest = data | {"vertices": []}
+    return [name for name, item in objects if not schema.is_valid(rest | {"CityObjects": {name: item}})] or ["the file"]
 
 
 def with_wrong_semantics(samples: Samples) -> Samples:

@@ -19,7 +19,8 @@ from ml.training_loop import optimizer_of, train_step
 from synthroads_addon.base.errors import InputError
 from tests.helpers.clouds.centerline_batches import MODELS, batch, small
 from tests.helpers.clouds.road_data_sets import write_data_set
-from tests.helpers.clouds.segmentation_data import road_tile, toy, write_pointcept
+from tests.helpers.clouds.road_tiles import road_tile
+from tests.helpers.clouds.segmentation_data import toy, write_pointcept
 
 torch.set_num_threads(1)
 

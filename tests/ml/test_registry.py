@@ -28,7 +28,8 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import read_yaml
 from tests.helpers.clouds.centerline_batches import SETTINGS
 from tests.helpers.clouds.centerline_batches import batch as slices
-from tests.helpers.clouds.segmentation_data import road_tile, toy, write_pointcept
+from tests.helpers.clouds.road_tiles import road_tile
+from tests.helpers.clouds.segmentation_data import toy, write_pointcept
 from tests.helpers.page_modules import module_of_page
 from tests.helpers.roads.analytic_roads import roads
 

@@ -37,7 +37,8 @@ from synthroads_addon.dataset.scene_stream import (
     write_wanted,
 )
 from tests.helpers.clouds.road_data_sets import write_data_set
-from tests.helpers.clouds.segmentation_data import road_tile, toy, write_pointcept
+from tests.helpers.clouds.road_tiles import road_tile
+from tests.helpers.clouds.segmentation_data import toy, write_pointcept
 
 torch.set_num_threads(1)
 QUICK = (sys.executable, str(Path(__file__).resolve().parents[1] / "helpers" / "quick_producer.py"))

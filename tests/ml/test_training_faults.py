@@ -19,7 +19,8 @@ import pytest
 import torch
 
 from tests.helpers.clouds.road_data_sets import write_data_set
-from tests.helpers.clouds.segmentation_data import road_tile, write_pointcept
+from tests.helpers.clouds.road_tiles import road_tile
+from tests.helpers.clouds.segmentation_data import write_pointcept
 
 pytestmark = [
     pytest.mark.slow,

@@ -30,7 +30,7 @@ from synthroads_addon.road.section import LineMarking
 from synthroads_addon.road.tessellation import sample_stations
 from synthroads_addon.road.things.delineator import Delineator
 from synthroads_addon.road.things.guardrail import Guardrail
-from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.sampling.road import sample_alignment, sample_road
 from synthroads_addon.scenario.scenario import RoadScenario, load_scenario
 from tests.helpers.files.mutations import cases
 
@@ -172,7 +172,7 @@ def test_roads_keep_the_limits_of_their_class(section: str, length: int, count: 
 def test_every_kind_of_joint_occurs_and_both_directions_alike(count: int) -> None:
     chains, turns = set(), []
     for seed in range(count):
-        elements = sample_road(RoadScenario(length=3000), seed).alignment.horizontal
+        elements = sample_alignment(RoadScenario(length=3000), seed).horizontal
         signs = [np.sign(e.curvature_start + e.curvature_end) for e in elements]
         turns += [sign for sign, e in zip(signs, elements, strict=True) if e.kind == "arc"]
         kinds = "".join(e.kind[0] for e in elements)
@@ -191,7 +191,7 @@ def test_long_roads_do_not_spiral(count: int) -> None:
     for design_class, section in (("EKA1A", "RQ31"), ("EKA3", "RQ25")):
         for seed in range(count):
             scenario = RoadScenario(design_class=design_class, cross_section=section, length=5000)
-            elements = sample_road(scenario, seed).alignment.horizontal
+            elements = sample_alignment(scenario, seed).horizontal
             heading = np.cumsum([e.length * (e.curvature_start + e.curvature_end) / 2 for e in elements])
             assert np.ptp(np.append(heading, 0.0)) < np.pi * 1.5
 

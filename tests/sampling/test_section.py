@@ -20,7 +20,7 @@ from synthroads_addon.road.guidelines import (
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.section import ASPHALTS, CONCRETES, Carriageway, LineMarking, Median, Turnout
 from synthroads_addon.sampling.conflicts import conflicts
-from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.sampling.road import sample_alignment, sample_road
 from synthroads_addon.sampling.section import cross_section_of
 from synthroads_addon.scenario.road import RoadScenario
 from tests.helpers.files.mutations import cases
@@ -342,20 +342,27 @@ def test_draws_reach_all_of_their_intervals() -> None:
         assert np.ptp(values) >= 0.9 * (high - low), name
 
 
+def test_a_road_has_the_alignment_that_is_drawn_for_it() -> None:
+    """So where many alignments are looked at they are drawn alone, which takes far less time."""
+    for limits in (scenario(length=700.0), scenario(design_class="EKA3", cross_section="RQ25", length=3000.0)):
+        drawn, road = sample_alignment(limits, 5), sample_road(limits, 5)
+        assert road.alignment == drawn.model_copy(update={"instance": road.alignment.instance})
+
+
 @pytest.mark.parametrize("length", [600.0, 3000.0])
 @cases(60, 300)
 def test_short_and_long_roads_have_curves_of_all_radii(length: float, count: int) -> None:
     radii = []
     for seed in range(count):
-        elements = sample_road(scenario(length=length), seed).alignment.horizontal
+        elements = sample_alignment(scenario(length=length), seed).horizontal
         radii += [1 / abs(element.curvature_start) for element in elements if element.kind == "arc"]
     assert np.ptp(radii) >= (0.9 if count >= 300 else 0.8) * (5000.0 - 900.0)
 
 
 def test_wide_curves_fit_into_short_roads() -> None:
     for seed in range(30):
-        elements = sample_road(scenario(length=700.0, radius={"minimum": 4000.0, "maximum": 5000.0}), seed)
-        assert any(element.kind == "clothoid" for element in elements.alignment.horizontal)
+        axis = sample_alignment(scenario(length=700.0, radius={"minimum": 4000.0, "maximum": 5000.0}), seed)
+        assert any(element.kind == "clothoid" for element in axis.horizontal)
         road = sample_road(scenario(length=3000.0, radius={"minimum": 3e4, "maximum": 5e4}), seed)
         assert broken(road) == []  # no straight is too long, though there is no room for a clothoid
 
@@ -364,5 +371,5 @@ def test_wide_curves_fit_into_short_roads() -> None:
 def test_long_roads_do_not_climb_for_ever(low: float, high: float) -> None:
     grades = {"grade_percent": {"minimum": low, "maximum": high}}
     for seed in range(1):
-        road = sample_road(scenario(design_class="EKA3", cross_section="RQ25", length=50_000.0, **grades), seed)
-        assert np.ptp([point.elevation for point in road.alignment.vertical]) < 500.0
+        axis = sample_alignment(scenario(design_class="EKA3", cross_section="RQ25", length=50_000.0, **grades), seed)
+        assert np.ptp([point.elevation for point in axis.vertical]) < 500.0

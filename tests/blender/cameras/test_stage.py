@@ -12,7 +12,7 @@ from synthroads_addon.base.machine import release_memory
 from synthroads_addon.blender.cameras.stage import Passes, new_stage
 from tests.helpers.process_memory import memory_mb
 
-SIDE = 1024
+SIDE = 512
 PICTURE = SIDE * SIDE * (4 + 3 + 1) * 4 / 1e6
 """MB of a picture with a colour and a number beside the light."""
 

@@ -17,7 +17,7 @@ from synthroads_addon.blender.model.build import RoadModel, build_road
 from synthroads_addon.blender.model.library import user_groups
 from synthroads_addon.blender.nodes.strip import strip_group
 from synthroads_addon.blender.scene.evaluated import scene_mesh
-from synthroads_addon.blender.things.guardrail import guardrail_group
+from synthroads_addon.blender.things.sign.sign import sign_group
 from synthroads_addon.road.parameters import RoadParameters
 from tests.blender.nodes.test_axis import arc, corners, empty, give, meshes_of
 from tests.blender.nodes.test_nodes import WRITE, all_groups
@@ -40,7 +40,7 @@ def text_again(group: bpy.types.NodeTree) -> tuple[str, str]:
     return text, second
 
 
-@pytest.mark.parametrize("make", [strip_group, guardrail_group])
+@pytest.mark.parametrize("make", [strip_group, sign_group])
 def test_a_group_is_made_again_from_its_text(make: Any) -> None:
     """The same text, and the same mesh to the bit."""
     group = make()

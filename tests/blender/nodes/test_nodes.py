@@ -207,9 +207,21 @@ class TestKeptGroups:
         assert not bpy.data.libraries
 
 
-class TestGroups:
-    def test_inputs_are_described_and_limited(self) -> None:
-        for group in all_groups():
+class TestEveryGroup:
+    """They are made once and only read: to make them takes far longer than to look at them."""
+
+    pytestmark = pytest.mark.keep_scene
+
+    @pytest.fixture(scope="class")
+    def groups(self) -> list[bpy.types.NodeTree]:
+        """Return every group of the road model."""
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        groups = all_groups()
+        assert len(groups) > 50
+        return groups
+
+    def test_inputs_are_described_and_limited(self, groups: list[bpy.types.NodeTree]) -> None:
+        for group in groups:
             assert group.description, group.name
             sockets = [item for item in group.interface.items_tree if item.item_type == "SOCKET"]
             names = [item.name for item in sockets]
@@ -223,8 +235,8 @@ class TestGroups:
                     assert item.subtype in ("DISTANCE", "FACTOR"), where
             assert len(set(names)) == len(names), group.name
 
-    def test_nodes_stand_in_named_frames_and_do_not_overlap(self) -> None:
-        for group in all_groups():
+    def test_nodes_stand_in_named_frames_and_do_not_overlap(self, groups: list[bpy.types.NodeTree]) -> None:
+        for group in groups:
             nodes = [node for node in group.nodes if node.type not in ("FRAME", "GROUP_OUTPUT")]
             framed = [node for node in nodes if node.parent is not None and node.parent.label]
             assert len(framed) > 0.8 * len(nodes), group.name
@@ -234,13 +246,15 @@ class TestGroups:
                 if link.from_node.parent == link.to_node.parent and link.to_node.parent is not None:
                     assert link.from_node.location_absolute.x < link.to_node.location_absolute.x, group.name
 
-    def test_groups_are_valid(self) -> None:
-        for group in all_groups():
+    def test_groups_are_valid(self, groups: list[bpy.types.NodeTree]) -> None:
+        for group in groups:
             assert all(link.is_valid for link in group.links), group.name
             makes = next(item for item in group.interface.items_tree if item.in_out == "OUTPUT").socket_type
             assert group.is_modifier == (makes == "NodeSocketGeometry"), group.name
             assert group.color_tag != "NONE", group.name
 
+
+class TestGroups:
     @pytest.mark.parametrize("make", [strip_group, height_group, carriageway_marking_group])
     def test_a_group_is_as_its_snapshot(self, make: Callable[[], bpy.types.NodeTree]) -> None:
         group = make()

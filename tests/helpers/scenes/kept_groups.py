@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sys
+from hashlib import sha256
 from importlib import import_module
 from pathlib import Path
 from pkgutil import walk_packages
@@ -19,6 +21,8 @@ class KeptGroups:
 
     Nothing comes into the open file before it is asked for: a test finds what it would find if the group were made.
 
+    Processes that test side by side share the folder: what one has made the others take.
+
     Attributes:
         on: whether it does so; if not, groups are made as ever.
     """
@@ -27,7 +31,6 @@ class KeptGroups:
         self.on = True
         self._folder = folder
         self._make = builder.node_group
-        self._keys: dict[tuple[object, ...], str] = {}
         for package in (nodes, things):
             for module in walk_packages(package.__path__, f"{package.__name__}."):
                 import_module(module.name)
@@ -38,15 +41,23 @@ class KeptGroups:
     def _node_group(
         self, name: str, build: Any, *arguments: object, description: str = "", kind: str = "GeometryNodeTree"
     ) -> bpy.types.NodeTree:
-        wanted = (builder._sources_digest(), name, repr(arguments))
-        key = self._keys.get(wanted) if self.on else None
+        wanted = repr((builder._sources_digest(), name, arguments))
+        about = self._folder / f"{sha256(wanted.encode()).hexdigest()}.txt"
+        key = about.read_text() if self.on and about.exists() else None
         if key is not None and all(group.get(builder.KEY) != key for group in bpy.data.node_groups):
             return self._take(key, name)
         group = self._make(name, build, *arguments, description=description, kind=kind)
         if self.on and key is None:
-            self._keys[wanted] = group[builder.KEY]
-            bpy.data.libraries.write(str(self._file(group[builder.KEY])), {group}, fake_user=True)
+            self._keep(group, about)
         return group
+
+    def _keep(self, group: bpy.types.NodeTree, about: Path) -> None:
+        """Write a group to its file, and then that it is there: another process may make the same meanwhile."""
+        part = self._folder / f"part-{os.getpid()}"
+        bpy.data.libraries.write(str(part), {group}, fake_user=True)
+        part.replace(self._file(group[builder.KEY]))
+        part.write_text(group[builder.KEY])
+        part.replace(about)
 
     def _file(self, key: str) -> Path:
         return self._folder / f"{key}.blend"

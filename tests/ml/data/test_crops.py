@@ -37,7 +37,7 @@ from ml.segmentation.recipes import (
     plan,
 )
 from synthroads_addon.base.errors import InputError
-from tests.helpers.clouds.segmentation_data import road_tile
+from tests.helpers.clouds.road_tiles import road_tile
 
 SETTINGS = CropSettings(points=900)
 

@@ -12,7 +12,8 @@ from headless.cli import main
 from ml.data import pack
 from ml.data.packed import pack_tile
 from synthroads_addon.base.classes import class_scheme
-from tests.helpers.clouds.segmentation_data import road_block, road_tile, write_cloud, write_pointcept
+from tests.helpers.clouds.road_tiles import road_tile
+from tests.helpers.clouds.segmentation_data import road_block, write_cloud, write_pointcept
 
 
 def test_limit_takes_tiles_of_every_scene_alike() -> None:

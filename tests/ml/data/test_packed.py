@@ -13,7 +13,7 @@ from ml.data.packed import PackReader, pack_tile, unpack_tile, write_pack
 from ml.data.sources import Source, read_tiles
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError
-from tests.helpers.clouds.segmentation_data import road_tile
+from tests.helpers.clouds.road_tiles import road_tile
 
 
 def test_packing_keeps_points_within_half_a_step() -> None:

@@ -16,14 +16,8 @@ from ml.data.sources import Source, read_tiles
 from ml.data.tiles import CloudTile, robust_scaling, scalings
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError
-from tests.helpers.clouds.segmentation_data import (
-    NAMES,
-    road_block,
-    road_points,
-    road_tile,
-    write_cloud,
-    write_pointcept,
-)
+from tests.helpers.clouds.road_tiles import road_points, road_tile
+from tests.helpers.clouds.segmentation_data import NAMES, road_block, write_cloud, write_pointcept
 
 
 def test_thinning_keeps_one_point_per_cell_whatever_the_order() -> None:

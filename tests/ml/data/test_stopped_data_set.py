@@ -25,7 +25,8 @@ from synthroads_addon.base.schema import canonical_json
 from synthroads_addon.dataset.manifest import file_entries, read_manifest
 from synthroads_addon.dataset.recipe import Recipe
 from tests.helpers.clouds.road_data_sets import write_cloud
-from tests.helpers.clouds.segmentation_data import road_tile, toy
+from tests.helpers.clouds.road_tiles import road_tile
+from tests.helpers.clouds.segmentation_data import toy
 from tests.helpers.roads import analytic_roads
 
 RECIPE: dict[str, Any] = {

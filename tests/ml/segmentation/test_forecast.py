@@ -12,7 +12,8 @@ from headless.cli import main
 from ml.segmentation import forecast
 from ml.segmentation.recipes import SegmentationConfiguration
 from synthroads_addon.base.errors import InputError
-from tests.helpers.clouds.segmentation_data import road_tile, toy, write_pointcept
+from tests.helpers.clouds.road_tiles import road_tile
+from tests.helpers.clouds.segmentation_data import toy, write_pointcept
 
 torch.set_num_threads(1)
 

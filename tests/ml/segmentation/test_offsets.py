@@ -19,7 +19,8 @@ from ml.segmentation import task
 from ml.segmentation.offsets import best_offsets, fit_offsets
 from ml.segmentation.scoring import classifier, label_tile
 from synthroads_addon.base.errors import InputError
-from tests.helpers.clouds.segmentation_data import road_tile, toy, write_pointcept
+from tests.helpers.clouds.road_tiles import road_tile
+from tests.helpers.clouds.segmentation_data import toy, write_pointcept
 
 torch.set_num_threads(1)
 

@@ -17,7 +17,8 @@ from ml.segmentation.prediction import PREDICTED, Labelling, predict_file
 from ml.segmentation.scoring import label_tile, nearest_labels, overlapping_pieces, piece_scores
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
-from tests.helpers.clouds.segmentation_data import road_block, road_tile, write_cloud
+from tests.helpers.clouds.road_tiles import road_tile
+from tests.helpers.clouds.segmentation_data import road_block, write_cloud
 
 SETTINGS = CropSettings(voxel=0.1)
 

@@ -23,15 +23,8 @@ from ml.segmentation.self_training import believed_labels, target_tiles
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError
 from synthroads_addon.base.files import write_file
-from tests.helpers.clouds.segmentation_data import (
-    road_block,
-    road_tile,
-    same,
-    toy,
-    weights,
-    write_cloud,
-    write_pointcept,
-)
+from tests.helpers.clouds.road_tiles import road_tile
+from tests.helpers.clouds.segmentation_data import road_block, same, toy, weights, write_cloud, write_pointcept
 
 torch.set_num_threads(1)
 CPU = torch.device("cpu")

@@ -35,15 +35,8 @@ from ml.tasks import Evaluation
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError
 from synthroads_addon.base.progress import silent
-from tests.helpers.clouds.segmentation_data import (
-    road_block,
-    road_tile,
-    same,
-    toy,
-    weights,
-    write_cloud,
-    write_pointcept,
-)
+from tests.helpers.clouds.road_tiles import road_tile
+from tests.helpers.clouds.segmentation_data import road_block, same, toy, weights, write_cloud, write_pointcept
 
 torch.set_num_threads(1)
 Trained = Callable[..., Path]

@@ -15,7 +15,8 @@ from ml.segmentation import task
 from ml.segmentation.network import build
 from ml.shipped import ship
 from ml.tasks import Prediction
-from tests.helpers.clouds.segmentation_data import road_block, road_tile, toy, write_cloud, write_pointcept
+from tests.helpers.clouds.road_tiles import road_tile
+from tests.helpers.clouds.segmentation_data import road_block, toy, write_cloud, write_pointcept
 
 torch.set_num_threads(1)
 NETWORK = {"name": "point-transformer", "cell": 0.4, "channels": [12, 24, 24], "blocks": [1, 1, 2], "patch": 32}

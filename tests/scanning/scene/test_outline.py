@@ -71,7 +71,7 @@ def test_a_large_scene_has_wider_boxes_and_not_more() -> None:
 
 
 def test_where_nearly_all_beams_meet_something_few_are_asked() -> None:
-    outline = Outline(plane(100.0), BruteForce, RADIUS)
+    outline = Outline(plane(30.0), BruteForce, RADIUS)
     asked: list[int] = []
     cast = outline._caster
 

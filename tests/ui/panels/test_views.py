@@ -24,7 +24,8 @@ def panel() -> Iterator[Any]:
     """Register the add-on for one test; return the panel's settings of a small road in haze."""
     synthroads_addon.register()
     settings = bpy.context.scene.synthroads
-    choose(settings, **{"road.length": 60.0, "seed": 3, "road.half_width": 30.0})
+    quick = {"fidelity": "draft", "own_vegetation_detail": True, "vegetation_detail": 0.1}
+    choose(settings, **{"road.length": 60.0, "seed": 3, "road.half_width": 30.0, **quick})
     yield settings
     synthroads_addon.unregister()
 

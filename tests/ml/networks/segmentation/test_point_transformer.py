@@ -20,7 +20,7 @@ from ml.networks.segmentation.point_transformer import (
 )
 from ml.segmentation.network import adapt_norms, overlay_clouds
 from synthroads_addon.base.errors import InputError
-from tests.helpers.clouds.segmentation_data import road_points
+from tests.helpers.clouds.road_tiles import road_points
 
 INPUTS, CLASSES = 4, 5
 torch.set_num_threads(1)
