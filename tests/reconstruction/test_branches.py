@@ -120,7 +120,8 @@ def test_the_axis_of_a_cloud_goes_between_the_branches(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_axes_of_clouds_go_between_the_branches(tmp_path: Path) -> None:
-    errors = [axis_error(tmp_path, road) for road in PARTED]
-    assert np.mean(errors) < 0.11
-    assert np.median(errors) < 0.06
+@pytest.mark.parametrize("more", [0, 3])  # its settings were chosen on the first; the others are cut elsewhere
+def test_axes_of_clouds_go_between_the_branches(tmp_path: Path, more: int) -> None:
+    errors = [axis_error(tmp_path, replace(road, seed=road.seed + more)) for road in PARTED]
+    assert np.mean(errors) < 0.11  # 0.29 and 0.20 along one of the branches
+    assert np.median(errors) < 0.07
