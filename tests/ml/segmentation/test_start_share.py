@@ -10,7 +10,8 @@ import torch
 from ml.runs import Run
 from ml.segmentation import task
 from synthroads_addon.base.errors import InputError
-from tests.helpers.clouds.segmentation_data import road_tile, same, toy, weights, write_pointcept
+from tests.helpers.clouds.road_tiles import road_tile
+from tests.helpers.clouds.segmentation_data import same, toy, weights, write_pointcept
 
 torch.set_num_threads(1)
 
