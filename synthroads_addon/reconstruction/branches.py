@@ -103,20 +103,23 @@ def _follow(gain: Float) -> Float:
     steps = np.arange(-_STEPS, _STEPS + 1)
     gaps = np.where(np.arange(bins) * ACROSS < _LANE, *_GAPS)
     for row in range(rows):
+        # Go on from a bin nearby, whichever is best ...
         beside = np.pad(np.where(np.arange(bins) < _FIRST, -np.inf, score), _STEPS, constant_values=-np.inf)
         reached = np.lib.stride_tricks.sliding_window_view(beside, len(steps)) - _TURNING * np.abs(steps)
         step = reached.argmax(axis=1)
         before[row] = np.clip(np.arange(bins) + steps[step], 0, bins - 1)
         ahead, top = reached[np.arange(bins), step], peak[before[row]]
+        # ... or leave the line here, which must pay off ...
         enters = np.zeros(bins, dtype=bool)
         enters[_FIRST : _FIRST + _STEPS] = ahead[_FIRST : _FIRST + _STEPS] < score[0] - _ENTRY
         before[row, enters] = 0
         ahead = np.where(enters, score[0] - _ENTRY, ahead) + gain[row]
         top = np.maximum(np.where(enters, score[0] - _ENTRY, top), ahead)
-        before[row, 0] = int(score.argmax())  # a branch may end anywhere
+        # ... or be on the line, to which a branch may return or beside which it may end anywhere.
+        before[row, 0] = int(score.argmax())
         ahead[0], top[0] = score.max(), score.max()
         ahead[1:_FIRST] = -np.inf
-        kept = ahead >= top - gaps
+        kept = ahead >= top - gaps  # too little paint for too long
         score, peak = np.where(kept, ahead, -np.inf), np.where(kept, top, -np.inf)
     return _traced(before, int(score.argmax()))
 
