@@ -8,10 +8,10 @@ import numpy as np
 from ..base.arrays import Float
 from ..base.errors import InputError
 from .cloud import PointKind, RoadCloud
-from .layout import RoadKind, RoadLayout, find_layout, with_branch
+from .layout import RoadKind, RoadLayout, axis_guides, find_layout, with_branch
 from .lines import find_lines
 from .path import CloudPath, first_path, path_through
-from .profiles import Profiles, make_profiles, register_path
+from .profiles import STRETCH, Profiles, make_profiles, register_path
 from .views.fusion import FusedAxis
 from .views.look import find_fused_axis
 from .views.view import View
@@ -61,6 +61,26 @@ class FoundRoad:
     profiles: Profiles
     layout: RoadLayout
     axis: FusedAxis
+
+    def parted_line(self, line: CloudPath, stations: Float) -> Float | None:
+        """Return the offsets (K,), m, from a line of what lies midway between a parted middle line's branches.
+
+        NaN where the middle line isn't seen; None where it doesn't part. Along an axis that goes between the branches
+        neither is easily followed, so that they are those that were followed here.
+
+        Args:
+            line: near the axis.
+            stations: (K,) along it, m.
+        """
+        branch = self.layout.bands[0].branch
+        if branch is None or not np.any(branch):
+            return None
+        (guide,) = axis_guides(self.layout)
+        known = np.isfinite(guide.measured)
+        station, beside = line.project(self.path.place(guide.stations[known], guide.measured[known]))
+        order = np.argsort(station, kind="stable")
+        apart = np.abs(stations[:, None] - station[None]).min(axis=1)
+        return np.where(apart <= STRETCH, np.interp(stations, station[order], beside[order]), np.nan)
 
 
 def straighten_path(cloud: RoadCloud, options: Options) -> tuple[CloudPath, float]:

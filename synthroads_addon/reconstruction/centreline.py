@@ -75,7 +75,7 @@ def find_centreline(cloud: RoadCloud, options: Options | None = None, progress: 
         name: np.interp(line.stations, beside, half_width(road.axis, share, factor, DEFINITION))
         for name, (share, factor) in INTERVALS.items()
     }
-    judgement = judge(profiles, layout, cores, rivals)
+    judgement = judge(profiles, layout, cores, rivals, road.parted_line(line, profiles.middles))
     return Centreline(layout.kind, line, _heights(profiles), std, halves, road.axis, judgement, layout.notes)
 
 

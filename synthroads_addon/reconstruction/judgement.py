@@ -82,7 +82,13 @@ class Judgement:
         }
 
 
-def judge(profiles: Profiles, layout: RoadLayout, cores: Sequence[float], rivals: Bool | None = None) -> Judgement:
+def judge(
+    profiles: Profiles,
+    layout: RoadLayout,
+    cores: Sequence[float],
+    rivals: Bool | None = None,
+    parted: Float | None = None,
+) -> Judgement:
     """Assess where an axis, offset 0 of its profiles, isn't to be trusted, and why.
 
     Args:
@@ -90,10 +96,11 @@ def judge(profiles: Profiles, layout: RoadLayout, cores: Sequence[float], rivals
         layout: that these profiles show.
         cores: offsets of the carriageways' middles, m, about which is pavement for sure.
         rivals: (K,) where views of the axis disagree; nowhere if not given.
+        parted: (K,) m, the middle between both branches of the middle line, where that parts (`FoundRoad.parted_line`).
     """
     guides = axis_guides(layout)
-    lines = np.mean([guide.measured for guide in guides], axis=0)
-    if np.isfinite(lines).any():  # else nothing tells how far the others are from the axis
+    lines = np.mean([guide.measured for guide in guides], axis=0) if parted is None else parted
+    if parted is None and np.isfinite(lines).any():  # else nothing tells how far the others are from the axis
         lines = np.where(np.isfinite(lines), lines, _carried(layout))
     middles = np.mean(pavement_edges(profiles, cores, layout.kind == "dual"), axis=0)
     if profiles.paved is not None:  # where neither brightness nor height tells the edge the classes do

@@ -99,7 +99,8 @@ def reconstruct(cloud: RoadCloud, options: Options | None = None, progress: Prog
     )
     parameters = assemble_parameters(measured)
     notes = [*layout.notes, *_notes(cloud, section, measured)]
-    judgement = judge(profiles, layout, carriageway_middles(section), _rivals_along(road, along, profiles))
+    parted = road.parted_line(along, profiles.middles)
+    judgement = judge(profiles, layout, carriageway_middles(section), _rivals_along(road, along, profiles), parted)
     judgement = replace(judgement, sections=tuple(map(_section_doubt, others)))
     return Reconstruction(parameters, measured, road.axis, path, profiles, layout, surfaces, judgement, others, notes)
 
