@@ -215,7 +215,6 @@ def edge_distance(mesh, face: int, origin: np.ndarray, direction: np.ndarray) ->
 
 
 @pytest.mark.any_blender
-@pytest.mark.first_python  # one long thing
 @pytest.mark.skipif(not REAL_AXIS.exists(), reason="needs the real axis beside the checkout")
 def test_a_real_axis_is_met_and_scanned(tmp_path: Path) -> None:
     fast = ("vegetation_detail=0", "scan.platform.speed=40", "scan.lines_per_second=20")

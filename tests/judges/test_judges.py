@@ -28,16 +28,12 @@ ELSEWHERE = ("ifcopenshell", "pyxodr")
 """Judges that quick tests of the twin ask the same, of other roads."""
 
 
-LONG = ("pyproj",)
-"""Judges that are asked about every file of the road: to write them all takes long."""
-
-
 def each(judges: list[Judge]) -> pytest.MarkDecorator:
     """Parametrize over judges, the slow ones marked so."""
     marked = []
     for item in judges:
         marks = [pytest.mark.slow] if item.slow or item.name in ELSEWHERE else []
-        marks += [] if item.comes_with_pip() and item.name not in LONG else [pytest.mark.first_python]
+        marks += [] if item.comes_with_pip() else [pytest.mark.first_python]
         marked.append(pytest.param(item, marks=marks, id=item.name))
     return pytest.mark.parametrize("judge", marked)
 

@@ -313,7 +313,6 @@ def test_overpass_keeps_its_clearance(full_city: City) -> None:
     assert underside - heights.max() == pytest.approx(bridge.clearance, abs=0.02)
 
 
-@pytest.mark.first_python  # one long thing
 def test_same_bytes_twice(cities: Callable[[int], City], folder_of: Callable[[int], Path], tmp_path: Path) -> None:
     cities(2)
     write_cityjson(one_of_many(2), tmp_path / "again", TOLERANCE)

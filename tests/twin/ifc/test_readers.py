@@ -101,7 +101,6 @@ def axis(tmp_path_factory: pytest.TempPathFactory) -> str:
     return str(file.to_string())
 
 
-@pytest.mark.first_python  # one long thing
 def test_consecutive_segments_meet(full_file, axis: str) -> None:
     found = gaps(full_file), gaps(ifcopenshell.file.from_string(axis))
     assert len(found[1]) == 8

@@ -94,7 +94,6 @@ def steps_until_cancelled(number: int, begin: Callable[[], Generator[Any, None, 
 
 
 @pytest.mark.any_blender
-@pytest.mark.first_python  # one long thing
 @pytest.mark.parametrize("before", ["nothing", "a road and the user's own"])
 def test_cancelling_at_any_step_leaves_the_file_as_it_was(
     before: str,
