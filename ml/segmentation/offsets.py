@@ -35,9 +35,8 @@ def fit_offsets(tiles: Sequence[CloudTile], classifier: Classifier, configuratio
     every = -(-sum(map(len, tiles)) // MOST_POINTS)
     chosen = tiles[::every]
     scaling = scalings(tiles, configuration.intensity)
-    settings = replace(
-        configuration.crop_settings(), votes=1
-    )  # thresholds hardly differ, and it takes a part of the time
+    # By one view thresholds hardly differ, and it takes a part of the time.
+    settings = replace(configuration.crop_settings(), votes=1)
     scores: list[Float32] = []
     truth: list[Int] = []
     for tile in chosen:

@@ -44,10 +44,10 @@ def drawn(*lines: tuple[Float, np.ndarray], tracks: float = 0.0, seed: int = 1) 
     return Profiles(path, ROW, offsets, *grids)  # type: ignore[arg-type]
 
 
-def middle_line(start: float = 0.0, end: float = float(ROWS)) -> Line:
+def middle_line() -> Line:
     """Return the line at offset 0."""
     zeros = np.zeros(len(STATIONS))
-    return Line(STATIONS, zeros, zeros, zeros + 0.01, zeros, zeros, start, end, 0.15, painted=1.0)
+    return Line(STATIONS, zeros, zeros, zeros + 0.01, zeros, zeros, 0.0, float(ROWS), 0.15, painted=1.0)
 
 
 def beside(branch: Float) -> Float:

@@ -14,7 +14,7 @@ from ml.segmentation.recipes import SegmentationConfiguration
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.cloud.formats.registry import open_writer
 from synthroads_addon.cloud.points import PointBlock
-from tests.helpers.clouds.road_tiles import road_points
+from tests.helpers.clouds.road_tiles import road_points, road_tile
 
 NAMES = tuple(row.name for row in class_scheme("5").rows)
 
@@ -93,3 +93,11 @@ def weights(folder: Path) -> dict[str, torch.Tensor]:
 def same(one: dict[str, torch.Tensor], other: dict[str, torch.Tensor]) -> bool:
     """Return whether all weights are the same to the bit."""
     return all(torch.equal(one[name], other[name]) for name in one)
+
+
+def write_two_domains(root: Path) -> Path:
+    """Write small data sets `real` and `synthetic`, a road each to learn from and to test on; return their folder."""
+    for name in ("real", "synthetic"):
+        for split, seed in (("train", 1), ("test", 3)):
+            write_pointcept(root / name, split, [road_tile(500, seed, f"{name}0", 1.0, 20.0)])
+    return root

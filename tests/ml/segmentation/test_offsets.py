@@ -19,8 +19,7 @@ from ml.segmentation import task
 from ml.segmentation.offsets import best_offsets, fit_offsets
 from ml.segmentation.scoring import classifier, label_tile
 from synthroads_addon.base.errors import InputError
-from tests.helpers.clouds.road_tiles import road_tile
-from tests.helpers.clouds.segmentation_data import toy, write_pointcept
+from tests.helpers.clouds.segmentation_data import toy, write_two_domains
 
 torch.set_num_threads(1)
 
@@ -59,11 +58,7 @@ def test_good_scores_and_classes_without_points_get_no_offsets() -> None:
 
 @pytest.fixture(scope="module")
 def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("data")
-    for name in ("real", "synthetic"):
-        for split, seed in (("train", 1), ("test", 3)):
-            write_pointcept(folder / name, split, [road_tile(500, seed, f"{name}0", 1.0, 20.0)])
-    return folder
+    return write_two_domains(tmp_path_factory.mktemp("data"))
 
 
 def test_a_run_has_its_offsets_once(data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,19 +10,14 @@ import torch
 from ml.runs import Run
 from ml.segmentation import task
 from synthroads_addon.base.errors import InputError
-from tests.helpers.clouds.road_tiles import road_tile
-from tests.helpers.clouds.segmentation_data import same, toy, weights, write_pointcept
+from tests.helpers.clouds.segmentation_data import same, toy, weights, write_two_domains
 
 torch.set_num_threads(1)
 
 
 @pytest.fixture(scope="module")
 def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("data")
-    for name in ("real", "synthetic"):
-        for split, seed in (("train", 1), ("test", 3)):
-            write_pointcept(folder / name, split, [road_tile(500, seed, f"{name}0", 1.0, 20.0)])
-    return folder
+    return write_two_domains(tmp_path_factory.mktemp("data"))
 
 
 def test_weights_are_mixed_with_the_starts_once(data: Path, tmp_path: Path) -> None:
