@@ -1,0 +1,74 @@
+"""Image Texture nodes: an image's pixels as Cycles keeps them, and how they are looked up."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ....scanning.kernels.program import Op, Picture
+from ..image import is_missing
+from .numbers import Number, each
+from .tree import NodeReader, Pixels, UnknownNodeError, Value, reads
+
+_INTERPOLATIONS = {"Closest": 0, "Linear": 1, "Cubic": 2, "Smart": 2}
+_EXTENSIONS = {"REPEAT": 0, "EXTEND": 1, "CLIP": 2, "MIRROR": 3}
+_LINEAR = ("Linear Rec.709", "Linear", "Non-Color", "Raw")
+"""Spaces of colours whose numbers are taken as they are."""
+
+
+@reads("TexImage")
+def _image(node: NodeReader) -> Value:
+    own, image = node.node, node.node.image
+    if own.projection != "FLAT":
+        raise node.refuse(own.projection)
+    if image is None or is_missing(image):
+        raise node.refuse("no image")
+    if image.source not in ("FILE", "GENERATED") or image.is_multiview or image.type not in ("IMAGE", "UV_TEST"):
+        raise node.refuse(image.source)
+    encoded = _is_encoded(node, image)
+    pixels = node.tree.pixels_of(image, lambda: _pixels(image))
+    opaque = 255 if pixels.dtype == np.uint8 else 1.0
+    if image.alpha_mode not in ("NONE", "CHANNEL_PACKED") and (pixels[:, :, 3] != opaque).any():
+        raise node.refuse("transparent image")
+    number = node.builder.picture(Picture(pixels, _INTERPOLATIONS[own.interpolation], _EXTENSIONS[own.extension]))
+    u, v, _ = node.place()
+    first = node.builder.add(Op.IMAGE, u.value, v.value, settings=(number,), results=4)
+    red, green, blue, alpha = (Number(node.builder, first + part) for part in range(4))
+    if node.socket.identifier == "Alpha":
+        return alpha
+    color = red, green, blue
+    return each(lambda part: part.apply(Op.TO_LINEAR), color) if encoded else color
+
+
+def _is_encoded(node: NodeReader, image: bpy.types.Image) -> bool:
+    """Return whether an image's numbers are those of sRGB, of which Cycles works out the linear ones afterwards."""
+    space = image.colorspace_settings.name
+    if space in _LINEAR:
+        return False
+    if space == "sRGB" and not image.is_float:
+        return True
+    raise node.refuse(f"colours of {space}")
+
+
+def _pixels(image: bpy.types.Image) -> Pixels:
+    """Return an image's pixels (height, width, 4), with the numbers that it holds; its alpha is 1 where it has none.
+
+    Raises:
+        UnknownNodeError: it can't be read.
+    """
+    width, height = image.size
+    count = image.channels
+    if not width * height or count not in (1, 3, 4):
+        raise UnknownNodeError(f"Image Texture: {count} channels")
+    flat = np.empty(width * height * count, np.float32)
+    image.pixels.foreach_get(flat)
+    own = flat.reshape(height, width, count)
+    kept = count if image.alpha_mode != "NONE" else min(count, 3)
+    if image.is_float:
+        result: Pixels = np.ones((height, width, 4), np.float32)
+    else:  # a quarter of the memory
+        result, own = np.full((height, width, 4), 255, np.uint8), np.rint(own * np.float32(255.0))
+    result[:, :, :3] = own[:, :, : min(count, 3)]
+    if kept == 4:
+        result[:, :, 3] = own[:, :, 3]
+    return result

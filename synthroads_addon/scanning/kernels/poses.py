@@ -1,0 +1,65 @@
+"""Vectors turned by a platform's poses in a compiled loop, beside `poses.c`: the bytes of `pulses.turned_vectors`."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+
+from ...base.arrays import Float
+from ..knots import Track
+from .library import NoKernelError, load_kernel
+
+MOST_SETS = 3
+"""Sets of vectors that are turned at once; as MOST in poses.c."""
+_POINTER, _INT64, _DOUBLE = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
+
+
+class CompiledPoses:
+    """Poses of tracks at times between their knots, compiled; any threads may use it side by side.
+
+    Raises:
+        NoKernelError: this machine has none.
+    """
+
+    def __init__(self) -> None:
+        self._turn = load_kernel("poses").synthroads_turn
+        self._turn.restype = None
+        self._turn.argtypes = [
+            *(_INT64, _POINTER, _DOUBLE, _DOUBLE, _INT64, _POINTER, _POINTER),
+            *(_INT64, _POINTER, _POINTER, _POINTER),
+        ]
+
+    def turned_vectors(self, track: Track, times: Float, vectors: Sequence[Float]) -> tuple[Float, list[Float]]:
+        """Return a track's positions (3, N), m, at times (N,), s, and sets of vectors (3, N) turned by its rotations.
+
+        Args:
+            track: two knots or more.
+            times: within the track.
+            vectors: `MOST_SETS` at most.
+        """
+        count, sets = len(times), [np.ascontiguousarray(one, np.float64) for one in vectors]
+        times, rotation, position = (
+            np.ascontiguousarray(array, np.float64) for array in (times, track.rotation, track.position)
+        )
+        knots = position.shape[1]
+        if len(sets) > MOST_SETS or any(one.shape != (3, count) for one in sets) or rotation.shape != (9, knots):
+            raise ValueError(f"vectors {[one.shape for one in sets]}: {MOST_SETS} sets of (3, {count}) at most")
+        place, turned = np.empty((3, count)), [np.empty((3, count)) for _ in sets]
+        addresses = [(_POINTER * MOST_SETS)(*(one.ctypes.data for one in arrays)) for arrays in (sets, turned)]
+        self._turn(
+            *(count, times.ctypes.data, track.begin, track.spacing, knots, rotation.ctypes.data, position.ctypes.data),
+            *(len(sets), *addresses, place.ctypes.data),
+        )
+        return place, turned
+
+
+@cache
+def usable_poses() -> CompiledPoses | NoKernelError:
+    """Return the compiled loop, or why this machine has none; found out once."""
+    try:
+        return CompiledPoses()
+    except NoKernelError as error:
+        return error
