@@ -1,0 +1,179 @@
+"""The axis of a parameter set from a line of a file: where it lies, and what became of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from ..base.arrays import Float
+from ..base.errors import InputError
+from ..base.maps.crs import LONGITUDE_LATITUDE, MapSystem, moved
+from ..base.maps.places import check_heights
+from ..base.remarks import assume, warn
+from ..road.alignment import Alignment
+from ..road.parameters import AlignmentObject
+from ..scenario.road import RoadScenario
+from .line import ExactAxis, RoadLine, alignment_object, exact_axis
+from .read import choose_line, read_lines
+
+_ARM = 50.0
+"""Half the distance over which a map's direction and scale are measured, m."""
+_NORTHERN, _SOUTHERN = 32600, 32700
+"""EPSG codes of the zones of UTM on WGS 84, less the zone's number."""
+
+
+def road_axis(
+    path: Path, scenario: RoadScenario, name: str | None = None
+) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
+    """Return the axis of a road or alignment of a file, the scenario for it, and a report.
+
+    Args:
+        path: OpenDRIVE, LandXML or IFC, told by its content.
+        scenario: whose coordinate system the road is to have, if it names one; else the file's is taken.
+        name: of the line; None: the longest that belongs to no junction.
+
+    Returns:
+        the alignment in local coordinates; if the file has no heights its only vertical point is at 0 m, and the
+        report's ``heights`` is None. The scenario has the length, the map origin and the systems that follow from the
+        file. The report says what was read, approximated and left out.
+
+    Raises:
+        MissingFileError, InputError: the file can't be read or has no such line, it can't be followed exactly, or it
+            lies outside of the coordinate system.
+    """
+    lines = read_lines(path)
+    line = choose_line(lines, name, path.name)
+    if name is None and len(lines) > 1:
+        assume("%s has %d roads: the longest, %r, is taken", path.name, len(lines), line.name)
+    axis = exact_axis(line)
+    system, axis, placing = _placed(path, line, axis, scenario)
+    middle = axis.alignment.position(0.5 * axis.alignment.length)
+    height = axis.heights.points[0].elevation if axis.heights else 0.0
+    origin = np.round([*middle, height])
+    check_heights(path.name, np.array([[*middle, height]]))
+    alignment = _checked_object(path, axis, origin)
+    update: dict[str, Any] = {"length": alignment.length, "map_origin": tuple(origin.tolist())}
+    if system is not None and system.epsg:
+        update |= {"epsg": system.epsg, "height_epsg": scenario.height_epsg or system.height_epsg}
+    road = scenario.model_copy(update=update)
+    return alignment, road, report_of(path, line, axis) | {"placed": placing}
+
+
+def _checked_object(path: Path, axis: ExactAxis, origin: Float) -> AlignmentObject:
+    """Return an axis as the alignment of a parameter set; raise `InputError` for one beyond the limits of roads."""
+    try:
+        return alignment_object(axis, origin)
+    except ValidationError as error:
+        fault = error.errors(include_url=False)[0]
+        field = ".".join(str(part) for part in fault["loc"]) or "axis"
+        wrong = str(fault["msg"]).lower()
+        raise InputError(f"{path.name}: {field}", fault.get("input"), f"no road may run so ({wrong})") from None
+
+
+def report_of(path: Path, line: RoadLine, axis: ExactAxis) -> dict[str, Any]:
+    """Return what was read of a line, approximated and left out, as JSON data."""
+    kinds: dict[str, int] = {}
+    for piece in line.pieces:
+        kinds[piece.kind] = kinds.get(piece.kind, 0) + 1
+    heights = axis.heights
+    return {
+        "file": path.name,
+        "source": line.source,
+        "name": line.name,
+        "length": round(axis.alignment.length, 6),
+        "elements": len(axis.alignment.elements),
+        "kinds": kinds,
+        "first_station": round(line.first_station, 6),
+        "equations": [{"station": e.station, "back": e.back, "ahead": e.ahead} for e in line.equations],
+        "heights": None if heights is None else {"points": len(heights.points), **_worst(heights)},
+        "joints": {
+            "gap": round(axis.gap, 6),
+            "gap_station": round(axis.gap_station, 3),
+            "kink": round(axis.kink, 9),
+            "kink_station": round(axis.kink_station, 3),
+            "drift": round(axis.drift, 6),
+            "drift_station": round(axis.drift_station, 3),
+        },
+        "approximated": [
+            {"kind": kind, "station": round(station, 3), "elements": count, "deviation": round(worst, 6)}
+            for kind, station, count, worst in axis.approximated
+        ],
+        "left_out": list(line.left_out),
+    }
+
+
+def _worst(heights: Any) -> dict[str, Any]:
+    steps = [{"station": round(station, 3), "step": round(step, 6)} for station, step in heights.jumps]
+    found: dict[str, Any] = {"deviation": round(heights.deviation, 6), "deviation_station": round(heights.station, 3)}
+    return found | ({"steps_left_out": steps} if steps else {})
+
+
+def _placed(
+    path: Path, line: RoadLine, axis: ExactAxis, scenario: RoadScenario
+) -> tuple[MapSystem | None, ExactAxis, str]:
+    """Return the system that the axis lies in, the axis there, and how it came there."""
+    given = "epsg" in scenario.model_fields_set
+    wanted = MapSystem.of(scenario.epsg, scenario.height_epsg) if given else None
+    declared = line.system
+    if declared is not None and declared.local:
+        declared = None
+    if declared is None:
+        name = MapSystem.of(scenario.epsg).label
+        remedy = "" if given else "; --set road.epsg=CODE names another"
+        assume("%s names no coordinate system: its coordinates are taken for %s%s", path.name, name, remedy)
+        return None, axis, f"as the file has it, taken for {name}"
+    if declared.unit is None:
+        raise InputError(f"{path.name}: coordinate system", declared.label, "must have metres: these are degrees")
+    if not declared.in_metres:
+        declared = declared.metric()  # readers give metres, whatever the file's unit is
+    middle = axis.alignment.position(np.array([0.5 * axis.alignment.length]))
+    if declared.outside(middle).max() > 0.0:
+        warn("%s lies outside of the area that %s is meant for (%s)", path.name, declared.label, declared.area)
+    if wanted is not None and declared.same_as(wanted):
+        return wanted, axis, "as the file has it"
+    if wanted is None and declared.epsg:
+        return declared, axis, f"as the file has it, in {declared.label}"
+    target = wanted or _utm(declared, middle)
+    return target, *_moved_rigidly(path, axis, declared, target)
+
+
+def _utm(system: MapSystem, place: Float) -> MapSystem:
+    """Return the zone of UTM (WGS 84) that a place (1, 2) of a system lies in."""
+    there, _ = moved(np.column_stack([place, [0.0]]), system, MapSystem.read(LONGITUDE_LATITUDE))
+    return utm_zone(*there[0, :2].tolist())
+
+
+def utm_zone(longitude: float, latitude: float) -> MapSystem:
+    """Return the zone of UTM (WGS 84) of a place, degrees."""
+    zone = int(np.clip(math.floor((longitude + 180.0) / 6.0) + 1, 1, 60))
+    return MapSystem.of((_NORTHERN if latitude >= 0.0 else _SOUTHERN) + zone)
+
+
+def _moved_rigidly(path: Path, axis: ExactAxis, source: MapSystem, target: MapSystem) -> tuple[ExactAxis, str]:
+    """Return an axis moved and turned about its middle into another system, lengths as they are.
+
+    A projection's elements are none of another's: what the axis' ends are off is told.
+    """
+    alignment = axis.alignment
+    middle = alignment.position(0.5 * alignment.length)
+    arms = middle + _ARM * np.array([[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+    ends = alignment.position(np.array([0.0, alignment.length]))
+    flat = np.vstack([middle, arms, ends])
+    there = moved(np.column_stack([flat, np.zeros(len(flat))]), source, target)[0][:, :2]
+    east, north = there[1] - there[2], there[3] - there[4]
+    turn = math.atan2(east[1] - north[0], east[0] + north[1])
+    cos, sin = math.cos(turn), math.sin(turn)
+    rotation = np.array([[cos, -sin], [sin, cos]])
+    start = there[0] + rotation @ (np.array([alignment.x, alignment.y]) - middle)
+    placed = Alignment(alignment.elements, float(start[0]), float(start[1]), alignment.start_heading + turn)
+    off = float(np.hypot(*(placed.position(np.array([0.0, alignment.length])) - there[5:]).T).max())
+    name = source.label if source.epsg else "the file's own projection"
+    text = f"moved from {name} to {target.label} about its middle, lengths as they are: its ends are off by"
+    text += f" {off:.3f} m"
+    warn("%s is %s", path.name, text)
+    return replace(axis, alignment=placed), text

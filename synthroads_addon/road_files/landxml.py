@@ -1,0 +1,366 @@
+"""Alignments of LandXML 1.0 to 1.2, and of national dialects of it.
+
+Plan and heights come from points, centres, lengths and senses of rotation alone: directions are written in degrees,
+gon, radians or mirrored, and aren't read. LandXML 1.2 schema: `Alignment`, `CoordGeom`, `ProfAlign`, `StaEquation`.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import Counter
+from pathlib import Path
+from xml.etree.ElementTree import Element  # nosec B405 (its type alone)
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..base.maps.crs import MapSystem
+from ..base.remarks import warn
+from .curves import TRANSITIONS, Curve, transition
+from .heights import HeightPiece, circle
+from .line import SHORTEST, Equation, LineNames, PlanPiece, RoadLine
+from .xml_text import child, children, finite, local_name, number, read_xml
+
+_UNITS = {
+    "meter": 1.0, "metre": 1.0, "millimeter": 1e-3, "centimeter": 1e-2, "kilometer": 1e3,
+    "foot": 0.3048, "inch": 0.0254, "mile": 1609.344, "ussurveyfoot": 1200.0 / 3937.0,
+}  # fmt: skip
+"""Metres of the linear units that LandXML names (`metLinear`, `impLinear`)."""
+_SPIRALS = {
+    "clothoid": "clothoid", "bloss": "bloss", "cosine": "cosine", "sinusoid": "sine", "biquadratic": "helmert",
+}  # fmt: skip
+"""Kinds of transition curves by LandXML's names for them."""
+
+
+def read_landxml(path: Path) -> list[RoadLine]:
+    """Return the alignments of a LandXML file.
+
+    Raises:
+        MissingFileError, InputError: it can't be read, isn't LandXML, or holds what isn't understood.
+    """
+    root = read_xml(path)
+    unit = _unit(root)
+    system = _system(root)
+    names, lines = LineNames(), list[RoadLine]()
+    for group in children(root, "Alignments"):
+        for number_of, alignment in enumerate(children(group, "Alignment")):
+            unique = names.unique(alignment.get("name"), f"alignment {number_of + 1}")
+            try:
+                if line := _alignment(alignment, unique, unit, system):
+                    lines.append(line)
+            except InputError as error:
+                lines.append(RoadLine(unique, "LandXML alignment", (), system=system, fault=error))
+    return lines
+
+
+def _unit(root: Element) -> float:
+    """Return metres per unit of length."""
+    units = child(root, "Units")
+    stated = None if units is None else next(iter(children(units, "Metric", "Imperial")), None)
+    if stated is None:
+        raise InputError("Units", None, "is missing: Metric or Imperial is needed, coordinates could be metres or feet")
+    name = stated.get("linearUnit", "")
+    if name.lower() not in _UNITS:
+        raise InputError("Units linearUnit", name, f"one of {', '.join(_UNITS)} is needed")
+    return _UNITS[name.lower()]
+
+
+def _system(root: Element) -> MapSystem | None:
+    """Return the coordinate system that the file names by its code or its WKT; None without."""
+    named = child(root, "CoordinateSystem")
+    if named is None:
+        return None
+    code = named.get("epsgCode", "").strip()
+    text = f"EPSG:{code}" if code.isdigit() and int(code) else named.get("ogcWktCode", "").strip()
+    if not text:
+        return None
+    try:
+        return MapSystem.read(text)
+    except InputError as error:
+        warn("the file's coordinate system %r isn't known (%s)", text, error)
+        return None
+
+
+def _alignment(alignment: Element, name: str, unit: float, system: MapSystem | None) -> RoadLine | None:
+    geometry = child(alignment, "CoordGeom")
+    if geometry is None:
+        return None
+    start = number(alignment, "staStart", 0.0) * unit
+    pieces: list[PlanPiece] = []
+    run = 0.0
+    for element in geometry:
+        kind = local_name(element)
+        if kind in ("Feature", ""):
+            continue
+        if kind not in _ELEMENTS:
+            raise InputError(f"CoordGeom at station {run:.3f} m", kind, f"one of {', '.join(_ELEMENTS)} is needed")
+        for piece in _ELEMENTS[kind](element, run, unit):
+            if piece.length > SHORTEST:
+                pieces.append(piece)
+                run += piece.length
+    if not pieces:
+        return None
+    equations = tuple(_equations(alignment, unit, start))
+    heights, left_out = _profile(alignment, unit, start, equations)
+    return RoadLine(
+        name=name,
+        source="LandXML alignment",
+        pieces=tuple(pieces),
+        heights=tuple(heights),
+        first_station=start,
+        equations=equations,
+        system=system,
+        left_out=tuple(left_out + _others(alignment)),
+    )
+
+
+def _point(element: Element, name: str, unit: float) -> complex:
+    """Return a point x + iy, m, of a child that says north before east, perhaps a height behind."""
+    found = child(element, name)
+    words = (found.text or "").split() if found is not None else []
+    place = f"{local_name(element)} {name}"
+    if found is not None and not words and found.get("pntRef"):
+        raise InputError(place, found.get("pntRef"), "a point of its own is needed, not a reference to another")
+    if len(words) < 2:
+        raise InputError(place, " ".join(words) or None, "northing and easting are needed")
+    north, east = (finite(place, word) * unit for word in words[:2])
+    return complex(east, north)
+
+
+def _rotation(element: Element) -> float:
+    """Return 1 for an element that turns left, -1 for one that turns right."""
+    name = element.get("rot", "")
+    if name not in ("cw", "ccw"):
+        raise InputError(f"{local_name(element)} rot", name or None, "cw or ccw is needed")
+    return 1.0 if name == "ccw" else -1.0
+
+
+def _line(element: Element, run: float, unit: float) -> list[PlanPiece]:
+    start, end = (_point(element, name, unit) for name in ("Start", "End"))
+    return [_straight("line", run, start, end)]
+
+
+def _straight(kind: str, run: float, start: complex, end: complex) -> PlanPiece:
+    way = end - start
+    return PlanPiece(kind, run, abs(way), start.real, start.imag, math.atan2(way.imag, way.real), (0.0, 0.0))
+
+
+def _points(element: Element, run: float, unit: float) -> list[PlanPiece]:
+    """Return the straight pieces of an irregular line, which is what its points are joined by."""
+    inner = next(iter(children(element, "PntList2D", "PntList3D")), None)
+    words = [] if inner is None else (inner.text or "").split()
+    step = 2 if inner is not None and local_name(inner) == "PntList2D" else 3
+    values = [finite("IrregularLine", word) * unit for word in words]
+    line = [complex(values[n + 1], values[n]) for n in range(0, len(values) - step + 1, step)]
+    line = [_point(element, "Start", unit), *line, _point(element, "End", unit)]
+    pieces = []
+    for start, end in itertools.pairwise(line):
+        if abs(end - start) > SHORTEST:
+            pieces.append(_straight("irregular line", run, start, end))
+            run += pieces[-1].length
+    return pieces
+
+
+def _curve(element: Element, run: float, unit: float) -> list[PlanPiece]:
+    start, centre, end = (_point(element, name, unit) for name in ("Start", "Center", "End"))
+    sense = _rotation(element)
+    spokes = start - centre, end - centre
+    radius = abs(spokes[0])
+    if radius < SHORTEST or abs(abs(spokes[1]) - radius) > max(1e-3, 1e-5 * radius):
+        raise InputError(
+            f"Curve at station {run:.3f} m", abs(spokes[1]), f"its end must lie {radius:.6g} m from Center"
+        )
+    turn = sense * (math.atan2((spokes[1] / spokes[0]).imag, (spokes[1] / spokes[0]).real)) % (2.0 * math.pi)
+    if turn < 1e-9 and abs(end - start) > SHORTEST:
+        turn = 2.0 * math.pi
+    heading = math.atan2(spokes[0].imag, spokes[0].real) + sense * 0.5 * math.pi
+    curvature = sense / radius
+    return [PlanPiece("arc", run, turn * radius, start.real, start.imag, heading, (curvature, curvature))]
+
+
+def _radius(element: Element, name: str, unit: float) -> float:
+    """Return the curvature (1/m, not signed) of a radius that may be a word for infinity, or 0."""
+    text = element.get(name, "").strip()
+    if text.lower() in ("inf", "infinity", "infinite", "-inf", "+inf"):
+        return 0.0
+    value = abs(finite(f"{local_name(element)} {name}", text or None)) * unit
+    return 1.0 / value if value > 1e-9 else 0.0
+
+
+def _spiral(element: Element, run: float, unit: float) -> list[PlanPiece]:
+    start, end = (_point(element, name, unit) for name in ("Start", "End"))
+    name = element.get("spiType", "clothoid")
+    length = number(element, "length") * unit
+    sense = _rotation(element)
+    ends = sense * _radius(element, "radiusStart", unit), sense * _radius(element, "radiusEnd", unit)
+    place = f"Spiral at station {run:.3f} m"
+    if name.lower() not in _SPIRALS:
+        raise InputError(f"{place}: spiType", name, f"one of {', '.join(_SPIRALS)} is understood")
+    if length <= SHORTEST:
+        return []
+    kind = _SPIRALS[name.lower()]
+    shape: tuple[float, float] | Curve = ends if kind == "clothoid" else transition(kind, length, *ends)
+    curve = transition(kind, length, *ends)
+    # Its chord says how it lies: no direction has to be believed.
+    chord = complex(*curve.positions(np.array([length]))[0].tolist())
+    away = abs(abs(end - start) - abs(chord))
+    if away > max(2e-3, 1e-5 * length):
+        wanted = f"its ends must lie {abs(chord):.6f} m apart as its length and radii have it"
+        raise InputError(place, round(abs(end - start), 6), wanted)
+    heading = math.atan2((end - start).imag, (end - start).real) - math.atan2(chord.imag, chord.real)
+    return [PlanPiece(name.lower(), run, length, start.real, start.imag, heading, shape)]
+
+
+_ELEMENTS = {"Line": _line, "Curve": _curve, "Spiral": _spiral, "IrregularLine": _points}
+assert set(_SPIRALS.values()) <= set(TRANSITIONS)
+
+
+def _equations(alignment: Element, unit: float, start: float) -> list[Equation]:
+    found = []
+    for row in children(alignment, "StaEquation"):
+        internal = number(row, "staInternal") * unit - start
+        ahead = number(row, "staAhead") * unit
+        back = number(row, "staBack", number(row, "staInternal")) * unit
+        found.append(Equation(internal, back, ahead))
+    return sorted(found, key=lambda each: each.station)
+
+
+def _profile(
+    alignment: Element, unit: float, start: float, equations: tuple[Equation, ...]
+) -> tuple[list[HeightPiece], list[str]]:
+    """Return the pieces of the first design profile of an alignment, and what is left out of the others."""
+    designs = [each for profile in children(alignment, "Profile") for each in children(profile, "ProfAlign")]
+    ground = [each for profile in children(alignment, "Profile") for each in children(profile, "ProfSurf")]
+    left_out = [f"{len(designs) - 1} more design profiles"] if len(designs) > 1 else []
+    left_out += [f"{len(ground)} profiles of the ground"] if ground else []
+    if not designs:
+        return [], left_out
+    rows = [_intersection(row, unit) for row in designs[0] if local_name(row) in _CURVES]
+    if not rows:
+        return [], left_out
+    shift = _profile_shift(rows, start, _plan_length(alignment, unit), equations)
+    rows = [(station - shift, *rest) for station, *rest in rows]  # type: ignore[misc]
+    return _height_pieces(rows), left_out
+
+
+_Row = tuple[float, float, float, float, float]  # station, height, tangents before and behind, radius
+
+
+def _intersection(row: Element, unit: float) -> _Row:
+    """Return station and height (m), lengths of the tangents on both sides (m), and the radius of a circle or 0."""
+    kind = local_name(row)
+    words = (row.text or "").split()
+    if len(words) < 2:
+        raise InputError(kind, " ".join(words) or None, "station and elevation are needed")
+    station, height = (finite(kind, word) * unit for word in words[:2])
+    before = behind = radius = 0.0
+    if kind == "ParaCurve":
+        before = behind = 0.5 * number(row, "length") * unit
+    elif kind == "UnsymParaCurve":
+        before, behind = number(row, "lengthIn") * unit, number(row, "lengthOut") * unit
+    elif kind == "CircCurve":
+        before = behind = 0.5 * number(row, "length") * unit
+        radius = abs(number(row, "radius", 0.0)) * unit
+    if min(before, behind) < 0.0 or (min(before, behind) <= SHORTEST < max(before, behind)):
+        raise InputError(f"{kind} at station {station:.3f} m", min(before, behind), "two lengths above 0 m are needed")
+    return station, height, before, behind, radius
+
+
+_CURVES = ("PVI", "ParaCurve", "UnsymParaCurve", "CircCurve")
+
+
+def _plan_length(alignment: Element, unit: float) -> float:
+    return number(alignment, "length", 0.0) * unit
+
+
+def _profile_shift(rows: list[_Row], start: float, length: float, equations: tuple[Equation, ...]) -> float:
+    """Return what the profile's stations are larger by than the distance from the line's begin, m.
+
+    They may include the alignment's first station, or begin with 0: what covers more of the plan is taken, and told
+    where both would do.
+    """
+    low, high = rows[0][0], rows[-1][0]
+    if abs(start) < SHORTEST or length <= 0.0:
+        return start
+
+    def covered(shift: float) -> float:
+        return max(0.0, min(high - shift, length) - max(low - shift, 0.0))
+
+    with_start, without = covered(start), covered(0.0)
+    if without > with_start + 1e-6:
+        text = "stations of the profile begin with %.3f m and not with the alignment's %.3f m: taken from its begin"
+        warn(text, low, start)
+        return 0.0
+    return start
+
+
+def _height_pieces(rows: list[_Row]) -> list[HeightPiece]:
+    """Return grades and curves between intersections, in order of their stations.
+
+    Raises:
+        InputError: stations don't grow, or the curves of neighbours overlap.
+    """
+    station = [row[0] for row in rows]
+    for before, after in itertools.pairwise(station):
+        if after - before <= SHORTEST:
+            raise InputError("ProfAlign", after, f"stations must grow: more than {before:g} m is needed")
+    if len(rows) == 1:
+        return [HeightPiece(station[0], station[0] + 1.0, rows[0][1], 0.0)]
+    grades = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in itertools.pairwise(rows)]
+    pieces: list[HeightPiece] = []
+    at, height = station[0], rows[0][1]
+    for n, row in enumerate(rows):
+        inner = 0 < n < len(rows) - 1
+        before, behind = _tangents(row, grades[n - 1], grades[n]) if inner else (0.0, 0.0)
+        if n:
+            reach = row[0] - before
+            if reach < at - 1e-3:
+                allowed = f"curves overlap: this one needs {before:.3f} m before it and has {row[0] - at:.3f} m"
+                raise InputError(f"ProfAlign at station {row[0]:.3f} m", before, allowed)
+            if reach - at > SHORTEST:
+                pieces.append(HeightPiece(at, reach, height, grades[n - 1]))
+                height += grades[n - 1] * (reach - at)
+                at = reach
+        if inner and before + behind > SHORTEST:
+            pieces += _rounding(row, (before, behind), height, (grades[n - 1], grades[n]))
+            at = row[0] + behind
+            height = row[1] + grades[n] * behind
+    return pieces
+
+
+def _tangents(row: _Row, rise: float, fall: float) -> tuple[float, float]:
+    """Return how far (m) a curve reaches before and behind its intersection, between two grades.
+
+    A circle's tangents are R tan(angle / 2) long along the slope, so that they differ in plan.
+    """
+    if not row[4]:
+        return row[2], row[3]
+    low, high = math.atan(rise), math.atan(fall)
+    tangent = row[4] * math.tan(0.5 * abs(high - low))
+    return tangent * math.cos(low), tangent * math.cos(high)
+
+
+def _rounding(
+    row: _Row, tangents: tuple[float, float], height: float, grades: tuple[float, float]
+) -> list[HeightPiece]:
+    """Return the pieces of a curve at an intersection, from the height (m) at its begin."""
+    station, (first, second), (before, behind) = row[0], tangents, grades
+    start, end = station - first, station + second
+    if row[4] and abs(behind - before) > 1e-12:
+        return circle(start, end, height, before, behind)
+    if abs(first - second) < SHORTEST:
+        return [HeightPiece(start, end, height, before, 0.5 * (behind - before) / (end - start))]
+    # Two parabolas that meet at the intersection's station, with the chord's grade there.
+    middle = (before * first + behind * second) / (first + second)
+    rise = 0.5 * (before + middle) * first
+    return [
+        HeightPiece(start, station, height, before, 0.5 * (middle - before) / first),
+        HeightPiece(station, end, height + rise, middle, 0.5 * (behind - middle) / second),
+    ]
+
+
+def _others(alignment: Element) -> list[str]:
+    counts = Counter(local_name(row) for row in alignment)
+    known = ("CoordGeom", "Profile", "StaEquation", "Feature", "")
+    return [f"{count} {name}" for name, count in sorted(counts.items()) if name not in known]

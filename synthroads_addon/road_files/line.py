@@ -1,0 +1,279 @@
+"""A line of a file: the elements of its plan, its heights and its stations, as the file has them."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..base.arrays import Float
+from ..base.errors import InputError
+from ..base.maps.crs import MapSystem
+from ..road.alignment import Alignment, Element
+from ..road.parameters import LONGEST_ROAD, AlignmentObject, HorizontalElement, VerticalPoint
+from ..road.profile import IntersectionPoint
+from .curves import Curve, as_elements
+from .heights import HeightPiece, Heights, as_parabolas
+
+GAP, KINK = 1e-3, 1e-4
+"""Gaps (m) and changes of direction (rad) between elements up to which they are joined without a word."""
+SHARPEST = 0.1
+"""Largest curvature of a road, 1/m, as in a parameter set."""
+_SAMPLES = 1025
+"""Places of a curve at which its curvature is looked at."""
+_LONGEST_NAME = 200
+SHORTEST = 1e-6
+"""Elements shorter than this, m, are none."""
+
+
+class LineNames:
+    """Names of a file's lines as they are shown: at most 200 characters, and a number behind those that come again."""
+
+    def __init__(self) -> None:
+        self._used: Counter[str] = Counter()
+
+    def unique(self, name: str | None, otherwise: str) -> str:
+        """Return the name for a line of a name; of one without any, what is said otherwise."""
+        shown = (name or "").strip()[:_LONGEST_NAME] or otherwise
+        self._used[shown] += 1
+        return shown if self._used[shown] == 1 else f"{shown} ({self._used[shown]})"
+
+
+@dataclass(frozen=True)
+class PlanPiece:
+    """An element of a file's plan.
+
+    Attributes:
+        kind: as the file calls it, e.g. ``arc`` or ``bloss``.
+        station: in the file at its start, m, counted from the line's begin whatever the file adds.
+        length: that the file gives it, m.
+        x, y, heading: of its start, m and rad counter-clockwise from east.
+        shape: curvatures at its ends, 1/m, between which it is linear; or a curve of another kind.
+    """
+
+    kind: str
+    station: float
+    length: float
+    x: float
+    y: float
+    heading: float
+    shape: tuple[float, float] | Curve
+
+
+@dataclass(frozen=True)
+class Equation:
+    """A station equation: at a station the count jumps.
+
+    Attributes:
+        station: counted from the line's begin, m.
+        back, ahead: stations that the file gives the place, before it and behind it, m.
+    """
+
+    station: float
+    back: float
+    ahead: float
+
+
+@dataclass(frozen=True)
+class RoadLine:
+    """A road or alignment of a file.
+
+    Attributes:
+        name: as the file has it, unique in the file.
+        source: format and kind, e.g. ``OpenDRIVE road``.
+        pieces: elements of the plan in order.
+        heights: pieces of the profile, stations counted from the line's begin; empty without any.
+        first_station: station that the file gives the begin, m.
+        equations: station equations.
+        system: coordinate system that the file declares; None without.
+        lanes: number of lanes at its middle; None where the file knows none.
+        junction: whether it belongs to a junction.
+        left_out: what the file says of it and isn't read, as text with numbers.
+        fault: why it can't be used, where it can't; it has no pieces then.
+    """
+
+    name: str
+    source: str
+    pieces: tuple[PlanPiece, ...]
+    heights: tuple[HeightPiece, ...] = ()
+    first_station: float = 0.0
+    equations: tuple[Equation, ...] = ()
+    system: MapSystem | None = None
+    lanes: int | None = None
+    junction: bool = False
+    left_out: tuple[str, ...] = ()
+    fault: InputError | None = None
+
+    @property
+    def length(self) -> float:
+        """Return the length, m."""
+        return math.fsum(piece.length for piece in self.pieces)
+
+
+@dataclass(frozen=True)
+class ExactAxis:
+    """The alignment that a file's line became.
+
+    Attributes:
+        alignment: in the file's coordinates, m.
+        heights: None where the file has none.
+        approximated: for each piece that is neither line, arc nor clothoid, its kind, station, number of elements and
+            their largest distance from it, m.
+        gap, gap_station: largest distance (m) between a piece's end and the next one's start, and where.
+        kink, kink_station: largest change of direction there (rad), and where.
+        drift, drift_station: largest distance (m) of the chained elements from the starts that the file gives them.
+    """
+
+    alignment: Alignment
+    heights: Heights | None
+    approximated: tuple[tuple[str, float, int, float], ...]
+    gap: float
+    gap_station: float
+    kink: float
+    kink_station: float
+    drift: float
+    drift_station: float
+
+
+@dataclass
+class _Chain:
+    elements: list[Element] = field(default_factory=list)
+    starts: list[float] = field(default_factory=list)  # exact stations of the pieces
+    approximated: list[tuple[str, float, int, float]] = field(default_factory=list)
+
+
+def exact_axis(line: RoadLine) -> ExactAxis:
+    """Return a line's alignment, chained from its first element's start, and its heights.
+
+    Raises:
+        InputError: elements don't join (`GAP`, `KINK`), or there are none.
+    """
+    chain = _Chain()
+    run = 0.0
+    for piece in line.pieces:
+        chain.starts.append(run)
+        _refuse_unfit(line, piece, run)
+        if isinstance(piece.shape, Curve):
+            elements, worst = as_elements(piece.shape)
+            chain.approximated.append((piece.kind, piece.station, len(elements), worst))
+        else:
+            elements = [Element(piece.length, *piece.shape)]
+        chain.elements += elements
+        run += math.fsum(element.length for element in elements)
+    if not chain.elements:
+        raise InputError(line.name, None, "has no element of any length")
+    first = line.pieces[0]
+    alignment = Alignment(chain.elements, first.x, first.y, first.heading)
+    gaps, kinks = _joints(line.pieces)
+    drift = _drift(alignment, line.pieces, chain.starts)
+    at = [piece.station for piece in line.pieces]
+    worst_gap, worst_kink, worst_drift = (int(np.argmax(values)) for values in (gaps, kinks, drift))
+    axis = ExactAxis(
+        alignment,
+        as_parabolas(_moved(line, chain.starts, run)) if line.heights else None,
+        tuple(chain.approximated),
+        *(gaps[worst_gap], at[worst_gap], kinks[worst_kink], at[worst_kink], drift[worst_drift], at[worst_drift]),
+    )
+    _refuse_broken(line, axis)
+    return axis
+
+
+def _refuse_unfit(line: RoadLine, piece: PlanPiece, run: float) -> None:
+    """Raise `InputError` for a piece that no road has, from a station (m) on: too long, or too sharp a bend."""
+    curve = piece.shape if isinstance(piece.shape, Curve) else None
+    length = curve.length if curve else piece.length
+    place = f"{line.name}: {piece.kind} at station {piece.station:.3f} m"
+    if run + length > LONGEST_ROAD:
+        raise InputError(f"{place}: its end, m", run + length, f"a road of at most {LONGEST_ROAD:g} m is needed")
+    bends = curve.curvature(np.linspace(0.0, length, _SAMPLES)) if curve else np.array(piece.shape)
+    sharpest = float(np.abs(bends).max())
+    if not sharpest <= SHARPEST:
+        raise InputError(f"{place}: curvature, 1/m", sharpest, f"at most {SHARPEST:g} is needed: no road bends more")
+
+
+def _joints(pieces: Sequence[PlanPiece]) -> tuple[list[float], list[float]]:
+    """Return the gap (m) and the kink (rad) before each piece, 0 before the first."""
+    gaps, kinks = [0.0], [0.0]
+    for piece, after in itertools.pairwise(pieces):
+        x, y, heading = end_pose(piece)
+        gaps.append(math.hypot(after.x - x, after.y - y))
+        kinks.append(abs(math.remainder(after.heading - heading, 2.0 * math.pi)))
+    return gaps, kinks
+
+
+def end_pose(piece: PlanPiece) -> tuple[float, float, float]:
+    """Return where a piece ends: x, y (m) and heading (rad)."""
+    if isinstance(piece.shape, Curve):
+        end = np.array([piece.shape.length])
+        along, across = piece.shape.positions(end)[0].tolist()
+        cos, sin = math.cos(piece.heading), math.sin(piece.heading)
+        turned = piece.heading + float(piece.shape.heading(end)[0])
+        return piece.x + along * cos - across * sin, piece.y + along * sin + across * cos, turned
+    alone = Alignment([Element(piece.length, *piece.shape)], piece.x, piece.y, piece.heading)
+    position, heading, _ = alone.frame(alone.length)
+    return float(position[0]), float(position[1]), float(heading)
+
+
+def _drift(alignment: Alignment, pieces: Sequence[PlanPiece], starts: Sequence[float]) -> list[float]:
+    """Return how far (m) the chained elements are from the start of each piece."""
+    given = np.array([(piece.x, piece.y) for piece in pieces])
+    found: list[float] = np.hypot(*(alignment.position(np.array(starts)) - given).T).tolist()
+    return found
+
+
+def _moved(line: RoadLine, starts: Sequence[float], length: float) -> list[HeightPiece]:
+    """Return the pieces of the profile with stations along the alignment, whose curves may be longer than said."""
+    given = np.array([*(piece.station for piece in line.pieces), line.length])
+    exact = np.array([*starts, length])
+    if np.abs(given - exact).max() < 1e-9:
+        return list(line.heights)
+    borders = np.array([[piece.start, piece.end] for piece in line.heights])
+    there = np.interp(borders, given, exact) + np.where(borders > given[-1], borders - given[-1], 0.0)
+    there += np.where(borders < 0.0, borders, 0.0)
+    return [
+        HeightPiece(float(a), float(b), piece.elevation, piece.grade, piece.square, piece.cube)
+        for piece, (a, b) in zip(line.heights, there, strict=True)
+    ]
+
+
+def _refuse_broken(line: RoadLine, axis: ExactAxis) -> None:
+    """Raise `InputError` where elements don't join, or a curve isn't followed as near as that."""
+    name = f"{line.source} {line.name!r}"
+    for kind, station, _, worst in axis.approximated:
+        if worst > GAP:
+            allowed = f"clothoids must follow it within {1000 * GAP:g} mm, and don't: it bends too much"
+            raise InputError(f"{name}: {kind} at station {station:.3f} m: distance, m", round(worst, 6), allowed)
+    if axis.gap > GAP:
+        allowed = f"elements must join within {1000 * GAP:g} mm, those at station {axis.gap_station:.3f} m don't"
+        raise InputError(f"{name}: gap, m", round(axis.gap, 6), allowed)
+    if axis.kink > KINK:
+        allowed = f"elements must join within {KINK:g} rad, those at station {axis.kink_station:.3f} m are a kink"
+        raise InputError(f"{name}: change of direction, rad", round(axis.kink, 6), allowed)
+
+
+def alignment_object(axis: ExactAxis, origin: Float) -> AlignmentObject:
+    """Return an axis as the alignment of a parameter set about an origin (3,), m, with the instance number 1."""
+    alignment = axis.alignment
+    elements = tuple(
+        HorizontalElement.between(element.length, element.curvature_start, element.curvature_end)
+        for element in alignment.elements
+    )
+    level = (IntersectionPoint(0.0, float(origin[2])),)
+    points = level if axis.heights is None else axis.heights.points
+    heading = math.degrees(math.remainder(alignment.start_heading, 2.0 * math.pi))
+    # Raises pydantic's ValidationError beyond the limits of roads.
+    return AlignmentObject(
+        instance=1,
+        start_x=alignment.x - float(origin[0]),
+        start_y=alignment.y - float(origin[1]),
+        start_heading_deg=heading,
+        horizontal=elements,
+        vertical=tuple(
+            VerticalPoint(station=point.station, elevation=point.elevation - float(origin[2]), radius=point.radius)
+            for point in points
+        ),
+    )

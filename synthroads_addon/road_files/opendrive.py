@@ -1,0 +1,209 @@
+"""Roads of OpenDRIVE 1.4 to 1.8: the reference line of each, and its elevation.
+
+ASAM OpenDRIVE 1.8.1, chapters 8 (geometry), 9 (reference line) and 10.5 (elevation): `line`, `spiral`, `arc`, `poly3`
+and `paramPoly3`, each from a start of its own, and cubics of the height.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+from xml.etree.ElementTree import Element  # nosec B405 (its type alone)
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..base.maps.crs import MapSystem, UnknownSystemError
+from ..base.maps.proj_strings import is_proj_string, read_proj_string
+from ..base.remarks import warn
+from .curves import Curve, cubic_curve, cubic_up_to
+from .heights import HeightPiece
+from .line import SHORTEST, LineNames, PlanPiece, RoadLine
+from .xml_text import child, children, local_name, number, read_xml
+
+_LENGTHS = 1e-3
+"""Share by which a cubic's arc length may differ from the length that the file gives it before that is told."""
+_OBJECTS = {"objects": "objects", "signals": "signals"}
+
+
+def read_opendrive(path: Path) -> list[RoadLine]:
+    """Return the roads of an OpenDRIVE file, those of junctions among them.
+
+    Raises:
+        MissingFileError, InputError: it can't be read, isn't OpenDRIVE, or a number in it is none.
+    """
+    root = read_xml(path)
+    header = child(root, "header")
+    system = _system(path, header)
+    shift = _shift(header)
+    names, lines = LineNames(), list[RoadLine]()
+    for number_of, road in enumerate(children(root, "road")):
+        unique = names.unique(road.get("name"), f"road {road.get('id', number_of)}")
+        try:
+            if line := _road(road, unique, system, shift):
+                lines.append(line)
+        except InputError as error:
+            lines.append(RoadLine(unique, "OpenDRIVE road", (), system=system, fault=error))
+    return lines
+
+
+def _system(path: Path, header: Element | None) -> MapSystem | None:
+    """Return the system that the header names; None without a word on it, and where nobody knows it (warned)."""
+    named = None if header is None else child(header, "geoReference")
+    text = "" if named is None else "".join(named.itertext()).strip()
+    if not text:
+        return None
+    try:
+        return read_proj_string(text) if is_proj_string(text) else MapSystem.read(text)
+    except InputError as error:
+        reason = error.allowed if isinstance(error, UnknownSystemError) else str(error)
+        warn("%s: its coordinate system %r isn't used: it %s", path.name, text, reason)
+        return None
+
+
+def _shift(header: Element | None) -> tuple[float, float, float, float]:
+    """Return the header's offset x, y, z (m) and its turn (rad): what is added to the file's coordinates."""
+    offset = None if header is None else child(header, "offset")
+    if offset is None:
+        return 0.0, 0.0, 0.0, 0.0
+    return (
+        number(offset, "x", 0.0),
+        number(offset, "y", 0.0),
+        number(offset, "z", 0.0),
+        number(offset, "hdg", 0.0),
+    )
+
+
+def _road(
+    road: Element, name: str, system: MapSystem | None, shift: tuple[float, float, float, float]
+) -> RoadLine | None:
+    plan = child(road, "planView")
+    pieces = [] if plan is None else [_piece(geometry) for geometry in children(plan, "geometry")]
+    pieces = [piece for piece in pieces if piece.length > SHORTEST]
+    if not pieces:
+        return None
+    x, y, z, turn = shift
+    cos, sin = math.cos(turn), math.sin(turn)
+    placed = tuple(
+        replace(
+            piece,
+            x=x + piece.x * cos - piece.y * sin,
+            y=y + piece.x * sin + piece.y * cos,
+            heading=piece.heading + turn,
+        )
+        for piece in pieces
+    )
+    end = placed[-1].station + placed[-1].length
+    return RoadLine(
+        name=name,
+        source="OpenDRIVE road",
+        pieces=placed,
+        heights=tuple(_heights(road, end, z)),
+        system=system,
+        lanes=_lane_count(road, 0.5 * end),
+        junction=road.get("junction", "-1").strip() not in ("-1", ""),
+        left_out=tuple(_left_out(road)),
+    )
+
+
+def _piece(geometry: Element) -> PlanPiece:
+    station, length = number(geometry, "s"), number(geometry, "length")
+    x, y, heading = (number(geometry, name) for name in ("x", "y", "hdg"))
+    shapes = [each for each in geometry if local_name(each) in _SHAPES]
+    place = f"geometry at s = {station:g}"
+    if len(shapes) != 1:
+        names = ", ".join(sorted(_SHAPES))
+        raise InputError(place, [local_name(each) for each in geometry], f"needs one of {names}")
+    kind = local_name(shapes[0])
+    if length <= SHORTEST:
+        return PlanPiece(kind, station, 0.0, x, y, heading, (0.0, 0.0))
+    try:
+        shape, turn, start = _SHAPES[kind](shapes[0], length)
+    except ValueError as error:
+        raise InputError(place, kind, f"a curve is needed, and {error}") from None
+    cos, sin = math.cos(heading), math.sin(heading)
+    x, y = x + start[0] * cos - start[1] * sin, y + start[0] * sin + start[1] * cos
+    if isinstance(shape, Curve) and abs(shape.length - length) > _LENGTHS * length:
+        text = "the curve at s = %.3f m is %.3f m long, where the file says %.3f m: the curve counts"
+        warn(text, station, shape.length, length)
+    return PlanPiece(kind, station, length, x, y, heading + turn, shape)
+
+
+_Shape = tuple[tuple[float, float] | Curve, float, tuple[float, float]]
+_AT_START = (0.0, 0.0)
+
+
+def _line(_: Element, __: float) -> _Shape:
+    return (0.0, 0.0), 0.0, _AT_START
+
+
+def _arc(element: Element, _: float) -> _Shape:
+    curvature = number(element, "curvature")
+    return (curvature, curvature), 0.0, _AT_START
+
+
+def _spiral(element: Element, _: float) -> _Shape:
+    return (number(element, "curvStart"), number(element, "curvEnd")), 0.0, _AT_START
+
+
+def _poly3(element: Element, length: float) -> _Shape:
+    v = np.array([number(element, name) for name in "abcd"])
+    curve, turn, start = cubic_up_to(v, length)
+    return curve, turn, (float(start[0]), float(start[1]))
+
+
+def _param_poly3(element: Element, length: float) -> _Shape:
+    u, v = (np.array([number(element, f"{power}{axis}") for power in "abcd"]) for axis in "UV")
+    last = 1.0 if element.get("pRange", "normalized") == "normalized" else length
+    curve, turn, start = cubic_curve(u, v, last)
+    return curve, turn, (float(start[0]), float(start[1]))
+
+
+_SHAPES = {"line": _line, "arc": _arc, "spiral": _spiral, "poly3": _poly3, "paramPoly3": _param_poly3}
+
+
+def _heights(road: Element, end: float, up: float) -> list[HeightPiece]:
+    """Return the pieces of a road's elevation up to its end, m; empty where it has none."""
+    profile = child(road, "elevationProfile")
+    rows = [] if profile is None else children(profile, "elevation")
+    records = sorted([number(row, name) for name in ("s", "a", "b", "c", "d")] for row in rows)
+    records = [row for n, row in enumerate(records) if n + 1 == len(records) or records[n + 1][0] > row[0] + SHORTEST]
+    records = [row for row in records if row[0] < end - SHORTEST]
+    if not records:
+        return []
+    ends = [row[0] for row in records[1:]] + [end]
+    pieces = [HeightPiece(s, e, a + up, b, c, d) for (s, a, b, c, d), e in zip(records, ends, strict=True)]
+    first = pieces[0]
+    if first.start > SHORTEST:  # heights begin with 0 before the first record
+        pieces.insert(0, HeightPiece(0.0, first.start, up, 0.0))
+    return pieces
+
+
+def _lane_count(road: Element, station: float) -> int | None:
+    """Return the number of lanes of all kinds at a station, m."""
+    lanes = child(road, "lanes")
+    sections = [] if lanes is None else children(lanes, "laneSection")
+    if not sections:
+        return None
+    before = [section for section in sections if number(section, "s") <= station] or sections[:1]
+    sides = [side for name in ("left", "right") for side in children(before[-1], name)]
+    return sum(len(children(side, "lane")) for side in sides)
+
+
+def _left_out(road: Element) -> list[str]:
+    """Return what is on a road beside its line, as texts with numbers."""
+    found = []
+    lanes = child(road, "lanes")
+    if lanes is not None and (sections := children(lanes, "laneSection")):
+        found.append(f"lanes of {len(sections)} lane sections")
+    lateral = child(road, "lateralProfile")
+    if lateral is not None and len(lateral):
+        counts = Counter(local_name(row) for row in lateral)
+        found.append("lateral profile: " + ", ".join(f"{count} {name}" for name, count in sorted(counts.items())))
+    for group, text in _OBJECTS.items():
+        things = child(road, group)
+        if things is not None and len(things):
+            found.append(f"{len(things)} {text}")
+    return found

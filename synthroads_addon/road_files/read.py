@@ -1,0 +1,96 @@
+"""Roads and alignments of a file, found by its content."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TypeVar
+
+from ..base.errors import InputError, MissingFileError
+from .ifc import read_ifc
+from .landxml import read_landxml
+from .line import RoadLine
+from .opendrive import read_opendrive
+from .points import PointLine
+
+Named = TypeVar("Named", RoadLine, PointLine)
+_HEAD = 1 << 16
+_MARKS: tuple[tuple[bytes, str], ...] = (
+    (b"<OpenDRIVE", "OpenDRIVE"),
+    (b"<LandXML", "LandXML"),
+    (b"ISO-10303-21;", "IFC"),
+    (b"<kml", "KML"),
+    (b"<gpx", "GPX"),
+)
+"""Bytes that the head of a file of a format holds, whatever the file is called."""
+READERS: dict[str, Callable[[Path], list[RoadLine]]] = {
+    "OpenDRIVE": read_opendrive,
+    "LandXML": read_landxml,
+    "IFC": read_ifc,
+}
+"""Readers of files with lines of elements, by format."""
+OF_POINTS = ("KML", "GPX")
+"""Formats of files with lines of points, which `points.read_point_lines` reads."""
+
+
+def format_of(path: Path) -> str | None:
+    """Return the format of a file by its content, a key of `READERS` or one of `OF_POINTS`; None for any other.
+
+    Raises:
+        MissingFileError: it can't be read.
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(_HEAD)
+    except OSError as error:
+        raise MissingFileError(str(path), None, f"an axis file is needed here ({error.strerror})") from None
+    head = head.replace(b"\0", b"")  # UTF-16
+    return next((name for mark, name in _MARKS if mark in head), None)
+
+
+def read_lines(path: Path) -> list[RoadLine]:
+    """Return the roads and alignments of an OpenDRIVE, LandXML or IFC file.
+
+    Raises:
+        MissingFileError: it can't be read.
+        InputError: it is of another format, isn't understood, or has none.
+    """
+    name = format_of(path)
+    if name not in READERS:
+        raise InputError(path.name, name, f"one of {', '.join(READERS)} is needed")
+    lines = READERS[name](path)
+    if not lines:
+        raise InputError(path.name, None, "the file has no road or alignment with elements in plan")
+    return lines
+
+
+def named_line(lines: Sequence[Named], wanted: str, file: str) -> Named:
+    """Return the line of a name; raise `InputError` where a file has none of it."""
+    for line in lines:
+        if line.name == wanted:
+            return line
+    names = ", ".join(repr(line.name) for line in lines[:20])
+    more = f" and {len(lines) - 20} more" if len(lines) > 20 else ""
+    raise InputError(f"{file}: road", wanted, f"it has {names}{more}")
+
+
+def choose_line(lines: Sequence[RoadLine], wanted: str | None, file: str) -> RoadLine:
+    """Return the line of a name, or without one the longest that belongs to no junction.
+
+    Args:
+        lines: of the file, at least one.
+        wanted: name of the line, None for the longest.
+        file: name for messages.
+
+    Raises:
+        InputError: there is none of that name; or it, or each of the lines, can't be used.
+    """
+    if wanted is not None:
+        found = named_line(lines, wanted, file)
+    else:
+        usable = [line for line in lines if line.fault is None] or list(lines)
+        found = max([line for line in usable if not line.junction] or usable, key=lambda line: line.length)
+    if found.fault is not None:
+        fault = found.fault
+        raise InputError(f"{file}: {found.name}: {fault.field}", fault.value, fault.allowed)
+    return found

@@ -1,0 +1,81 @@
+"""XML of other people: read without its document type, by local names, with numbers that are told by their place."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser  # nosec B405 (no document type)
+
+from ..base.errors import InputError, MissingFileError
+
+LARGEST = 512 << 20
+"""Largest file, bytes."""
+
+
+class _Builder(TreeBuilder):
+    def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
+        """Refuse a document type: it may define entities, and no format of roads has one."""
+        raise InputError("document type", name, "must not be there: entities aren't read")
+
+
+def read_xml(path: Path) -> Element:
+    """Return the root of an XML file.
+
+    Raises:
+        MissingFileError: it can't be read.
+        InputError: it is no XML, has a document type, or is larger than `LARGEST`.
+    """
+    parser = XMLParser(target=_Builder())  # nosec B314 (a document type is refused, so there are no entities)
+    try:
+        size = path.stat().st_size
+        if size > LARGEST:
+            raise InputError(str(path), f"{size / 1e6:,.0f} MB", f"at most {LARGEST / 1e6:,.0f} MB are read")
+        with path.open("rb") as file:
+            while part := file.read(1 << 20):
+                parser.feed(part)
+        return parser.close()
+    except OSError as error:
+        raise MissingFileError(str(path), None, f"cannot be read ({error.strerror})") from None
+    except (ParseError, ValueError, LookupError) as error:
+        raise InputError(str(path), None, f"valid XML is needed ({error})") from None
+
+
+def local_name(element: Element) -> str:
+    """Return an element's name without its namespace."""
+    return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
+
+
+def children(element: Element, *names: str) -> list[Element]:
+    """Return an element's children of some names, whatever their namespace, in the file's order."""
+    return [child for child in element if local_name(child) in names]
+
+
+def child(element: Element, name: str) -> Element | None:
+    """Return an element's first child of a name, None without one."""
+    return next(iter(children(element, name)), None)
+
+
+def number(element: Element, name: str, default: float | None = None) -> float:
+    """Return an attribute that is a finite number; `default` where there is none.
+
+    Raises:
+        InputError: it is missing, or no finite number.
+    """
+    text = element.get(name)
+    if text is None:
+        if default is not None:
+            return default
+        raise InputError(f"{local_name(element)} {name}", None, "is missing: a number is needed")
+    return finite(f"{local_name(element)} {name}", text)
+
+
+def finite(place: str, text: Any) -> float:
+    """Return the finite number that a text is; raise `InputError` for any other."""
+    try:
+        value = float(text)
+    except (TypeError, ValueError, OverflowError):
+        value = math.nan
+    if not abs(value) <= 1e12:
+        raise InputError(place, text, "a finite number is needed")
+    return value
