@@ -15,7 +15,7 @@ NOX = $(RUNNER)/bin/python -m nox
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test test-slow test-cluster fuzz lint judges docs weights extension clean distclean
+.PHONY: help demo test doors test-slow test-cluster fuzz lint judges docs weights extension clean distclean
 
 help: ## say what there is
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{ printf "%-18s %s\n", $$1, $$2 }'
@@ -30,11 +30,14 @@ test: $(RUNNER)/made ## check the source and run the tests on both Blender LTS r
 test-slow: $(RUNNER)/made ## the tests that take long, and the documentation's own
 	@TEST_MARKERS=slow $(NOX) -s tests docs summary
 
-fuzz: $(RUNNER)/made ## tens of thousands of files made wrong by chance (SEED=N: others than usual)
-	@TEST_MARKERS=fuzz FUZZ_SEED=$(SEED) $(NOX) -s tests summary
+fuzz: $(RUNNER)/made ## readers and commands on files made wrong by chance (SEED=N: others; CASES=N: of commands, 10,000)
+	@TEST_MARKERS=fuzz FUZZ_SEED=$(SEED) FUZZ_CASES=$(CASES) $(NOX) -s tests summary
 
 test-cluster: $(RUNNER)/made ## data sets made by a Slurm on this machine (as root; slurmctld, slurmd, munge)
 	@TEST_MARKERS=cluster PYTHON=here $(NOX) -s tests summary
+
+doors: $(RUNNER)/made ## run all that users are shown, in environments as they make them
+	@$(NOX) -s doors summary
 
 lint docs judges: $(RUNNER)/made
 	@$(NOX) -s $@

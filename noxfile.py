@@ -6,8 +6,11 @@ processes test side by side, TEST_MARKERS which tests, PYTHON that only the Pyth
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
+import re
+import shutil
 import sys
 import time
 from pathlib import Path
@@ -32,7 +35,7 @@ PARTS = {"blender": [*BLENDER_TESTS], "others": ["tests", *(f"--ignore={folder}"
 """The tests in two processes: once ifcopenshell has worked in one, Blender 5.2's OBJ exporter aborts there."""
 ALONE = ["-n", "0", "-m", "alone", *BLENDER_TESTS]
 """Arguments for the tests that measure the clock, which run after the others: slow ones, all of Blender."""
-QUICK = "not slow and not fuzz and not cluster"
+QUICK = "not slow and not fuzz and not cluster and not doors"
 """Marker expression of the tests of `make test`."""
 SLOW = "slow"
 """That of `make test-slow`."""
@@ -41,13 +44,19 @@ ONLY = {("3.13", "blender"): "smoke or not any_blender", ("3.13", "others"): "sm
 LATER = {("3.13", "blender"): f"any_blender and not smoke and {QUICK}"}
 """Those of tests that `make test` leaves out on that Python, and `make test-slow` runs with the slow ones."""
 
+KERNELS = "synthroads_addon/scanning/kernels/**/*.[ch]"
+"""Sources that are compiled where the package is installed."""
+
+DOOR_EXTRAS = {"3.11": ("ml", "twin", "e57", "cluster", "onnx"), "3.13": ()}
+"""Extras that users add to what `make demo` makes, each tried alone: on one Python, as they don't depend on Blender."""
+
 nox.needs_version = ">=2026.10"
-nox.options.sessions = ["lint", "tests", "summary"]
+nox.options.sessions = ["lint", "doors", "tests", "summary"]
 nox.options.reuse_venv = "yes"
 nox.options.download_python = "never"
 
 outcomes: dict[str, str] = {}
-"""Outcome of the tests by Python."""
+"""Outcome of the tests by Python, and of the doors."""
 
 
 def pyenv_folders(root: Path) -> list[str]:
@@ -71,7 +80,9 @@ def made_from(extras: str, root: Path) -> str:
     chosen = {extra: offered[extra] for extra in extras.split(",")}
     manifest = (root / "blender_manifest.toml").read_text(encoding="utf-8")
     package = [settings["build-system"], settings["project"], settings["tool"]["hatch"]]
-    return json.dumps([str(root), chosen, package, manifest])
+    compiled = sorted([*root.glob("tools/build_kernels.py"), *root.glob(KERNELS)])
+    kernels = [path.read_text(encoding="utf-8") for path in compiled]
+    return json.dumps([str(root), chosen, package, manifest, kernels])
 
 
 def install(session: nox.Session, name: str) -> None:
@@ -81,10 +92,12 @@ def install(session: nox.Session, name: str) -> None:
     if stamp.exists() and stamp.read_text(encoding="utf-8") == wanted:
         return
     stamp.unlink(missing_ok=True)
-    session.log("The first time this downloads some 400 MB, for the tests more.")
+    session.log("The first time this downloads some 500 MB, for the tests more.")
     # Most of it is never compiled, as it is never imported. PyTorch isn't in the lock: the second call brings it.
     session.install("--no-compile", "--require-hashes", "--requirement", str(lock))
-    session.install("--no-compile", "--no-build-isolation", "--editable", f".[{EXTRAS[name]}]")
+    # Where all is in the lock nothing else is brought: what the lock lacks the tests miss, before users do.
+    others = [] if "ml" in EXTRAS[name].split(",") else ["--no-deps"]
+    session.install("--no-compile", "--no-build-isolation", *others, "--editable", f".[{EXTRAS[name]}]")
     if "blender" in EXTRAS[name]:
         session.run_install("python", "tools/check_bpy.py")
     stamp.write_text(wanted, encoding="utf-8")
@@ -176,12 +189,70 @@ def tests(session: nox.Session) -> None:
         raise CommandFailed(f"pytest ended with {codes}")
 
 
+@nox.session(python=[HERE] if os.environ.get("PYTHON") else list(BLENDER))
+def doors(session: nox.Session) -> None:
+    """Run what users are shown, in environments as they make them; arguments are pytest's."""
+    version = str(session.python)
+    outcomes[f"{version} doors"] = "FAILED, the environments could not be made"
+    install(session, "demo")
+    places: dict[str, str | dict[str, str]] = {"demo": str(Path(session.bin, "python").absolute())}
+    (bpy,) = re.findall(r"^bpy==[\w.]+", Path(lock_of("demo", version)).read_text(encoding="utf-8"), re.MULTILINE)
+    places["bare"] = _door(session, "bare", bpy)
+    places["extras"] = {
+        extra: _door(session, extra, "--editable", f".[{extra}]", upon="") for extra in DOOR_EXTRAS[version]
+    }
+    shutil.rmtree("build/wheel", ignore_errors=True)
+    session.run("python", "-m", "pip", "wheel", "-q", "--no-deps", "--wheel-dir", "build/wheel", ".")
+    (wheel,) = Path("build/wheel").glob("*.whl")  # its name tells the version
+    brought = "blender,ml" if "ml" in DOOR_EXTRAS[version] else "blender"
+    places["wheel"] = _door(session, "wheel", f"{wheel.absolute()}[{brought}]", upon="bare")
+    release = BLENDER[version].split()[1]
+    session.run("python", "tools/build_extension.py", "--blender", release, "--output-dir", f"build/doors/{version}")
+    places["zips"] = str(Path("build/doors", version).absolute())
+    environment = {"SYNTHROADS_DOORS": json.dumps(places), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    runner = python_of(session, f"tests-{HERE}")  # pytest stays outside of what users have
+    start = time.perf_counter()
+    outcomes[f"{version} doors"] = "FAILED"
+    words = ["-q", "-n", "2", "--dist", "loadfile", "-m", "doors", *(session.posargs or ["tests/doors"])]
+    session.run(runner, "-m", "pytest", *words, env=environment, external=True, interrupt_timeout=10)
+    outcomes[f"{version} doors"] = f"passed, {time.perf_counter() - start:.0f} s"
+
+
+def _door(session: nox.Session, name: str, *requirements: str, upon: str | None = None) -> str:
+    """Return the interpreter of an environment of `doors`, made anew where its requirements have changed.
+
+    Args:
+        session: that it is for.
+        name: of the environment.
+        requirements: arguments of pip's; a wheel by its path.
+        upon: environment whose packages it has as well ("" is the session's own), so that Blender is installed twice
+            and not ten times.
+    """
+    own = Path(session.bin).parent.absolute()
+    folder = own.with_name(f"{own.name}-{name}")
+    python, stamp = folder / Path(session.bin).name / "python", folder / "synthroads-stamp"
+    hashes = [hashlib.sha256(path.read_bytes()).hexdigest() for path in Path("build/wheel").glob("*.whl")]
+    extras = f"blender,{name}" if name in DOOR_EXTRAS[str(session.python)] else "blender"
+    wanted = json.dumps([requirements, made_from(extras, Path.cwd()), hashes if name == "wheel" else []])
+    if stamp.exists() and stamp.read_text(encoding="utf-8") == wanted:
+        return str(python)
+    session.run("python", "-m", "venv", "--clear", str(folder))
+    if upon is not None:
+        (packages,) = folder.glob("lib/python*/site-packages")
+        below = own.with_name(f"{own.name}-{upon}" if upon else own.name) / packages.relative_to(folder)
+        (packages / "upon.pth").write_text(f"import site; site.addsitedir({str(below)!r})\n", encoding="utf-8")
+    session.run(str(python), "-m", "pip", "install", "-q", "--no-compile", *requirements, external=True)
+    stamp.write_text(wanted, encoding="utf-8")
+    return str(python)
+
+
 @nox.session(python=HERE)
 def docs(session: nox.Session) -> None:
     """Build the documentation: build/site/index.html."""
     install(session, "docs")
     # Whatever the generator complains of is a failure: a link that leads nowhere, a page that is missing or in no menu.
     strict = ["--jobs", "auto", "--fresh-env", "--fail-on-warning", "--quiet"]
+    shutil.rmtree("docs/reference/api", ignore_errors=True)  # pages of modules that are no more, left by a run cut off
     session.run("python", "-m", "sphinx", *strict, "--doctree-dir", "build/doctrees", "docs", "build/site")
     session.log("built build/site/index.html")
 
@@ -198,5 +269,7 @@ def summary(session: nox.Session) -> None:
     """Say what the tests came to; it is a failure if nothing was tested."""
     for version, blender in BLENDER.items():
         session.log(f"Python {version} ({blender}): {outcomes.get(version, 'NOT RUN')}")
+        if f"{version} doors" in outcomes:
+            session.log(f"Python {version}, as users have it: {outcomes[f'{version} doors']}")
     if not outcomes:
         session.error("nothing was tested: install Python 3.11 or 3.13")

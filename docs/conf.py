@@ -1,21 +1,16 @@
-"""How Sphinx makes the site that `make docs` builds in build/site: pages from docs/, the reference from the code."""
+"""How Sphinx makes the site that `make docs` builds in build/site: pages from docs/, the library's from the code."""
 
 from __future__ import annotations
 
 import re
-import sys
 import tomllib
 from pathlib import Path
 from typing import Any
 
 import astroid
 from astroid.brain.brain_dataclasses import dataclass_transform, is_decorated_with_dataclass
-from sphinx.ext.autodoc.mock import mock
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
-
-from tools.reference_pages import filled  # noqa: E402
 
 project = "SynthRoads"
 copyright = "SynthRoads developers; GPL-3.0-or-later"  # noqa: A001 (Sphinx's name for it)
@@ -59,7 +54,7 @@ MODULE_LIST = re.compile(r"^\.\. toctree::\n(?: +:\w+:.*\n)*\n((?:\s*/reference/
 MODULE_TITLE = re.compile(r"^(\w+(?:\.\w+)*)\.\w+\n=+\n", re.MULTILINE)
 
 
-def link_modules(docname: str, content: list[str]) -> None:
+def link_modules(app: Any, docname: str, content: list[str]) -> None:
     """Have the page of a package link to its modules, and theirs to it, instead of all being in every page's menu.
 
     A menu of five hundred pages, made anew for each of them, took longer than all else together.
@@ -75,14 +70,7 @@ def link_modules(docname: str, content: list[str]) -> None:
     content[0] = f":orphan:\n\n{text}"
 
 
-def fill(app: Any, docname: str, content: list[str]) -> None:
-    """Put generated text in the place of a page's marks; PyTorch, which configurations' modules import, is mocked."""
-    with mock(["matplotlib", "scipy", "skimage", "torch"]):
-        content[0] = filled(content[0])
-    link_modules(docname, content)
-
-
 def setup(app: Any) -> dict[str, bool]:
     """Connect to Sphinx; pages can be read side by side."""
-    app.connect("source-read", fill)
+    app.connect("source-read", link_modules)
     return {"parallel_read_safe": True}

@@ -31,16 +31,16 @@ _WAVES = (
     "colour.source=material", 'cloud.formats=["las"]', 'outputs=["cloud"]',
 )  # fmt: skip
 _QUICK_CELLS = 60
+_QUICK_WAVES = ("scan.platform.speed=100",)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads benchmark` to its parser."""
-    available = available_cores()
-    cores = sorted({1, min(2, available)})
+    cores = sorted({1, min(2, available_cores())})
     parser.add_argument("--output", type=Path, metavar="DIR", help=f"folder for {' and '.join(_FILES)}")
     parser.add_argument("--document", type=Path, metavar="FILE", help="fill the tables of this Markdown file as well")
-    usual = " ".join(map(str, cores))
-    parser.add_argument("--cores", nargs="+", type=int, default=cores, metavar="N", help=f"numbers of cores ({usual})")
+    text = "numbers of cores (1, and 2 where there are so many)"
+    parser.add_argument("--cores", nargs="+", type=int, default=cores, metavar="N", help=text)
     text = "scene to measure on (%(default)s)"
     parser.add_argument("--scenario", default="rq31-600m", metavar="NAME_OR_FILE", help=text)
     add_changes_argument(parser)
@@ -119,30 +119,30 @@ def _measure_part(part: dict[str, Any]) -> dict[str, Any]:
         result = measure_demo(_scenario(part["scenario"], part["changes"], part["quick"]))
     else:
         rays = int(part["part"].removeprefix("waves_"))
-        result = {"lines": _measure_waves(rays, Path(part["scene"]), part["triangles"])}
+        result = {"lines": _measure_waves(rays, part)}
     return result | {"blender": sys.modules["bpy"].app.version_string}
 
 
-def _measure_waves(rays: int, scene: Path, triangles: int) -> dict[str, float]:
+def _measure_waves(rays: int, part: dict[str, Any]) -> dict[str, float]:
     """Scan the waves scene; return pulses or rays per second (millions), bytes per triangle and seconds to open it."""
+    from synthroads_addon.base.changes import apply_change
     from synthroads_addon.base.progress import peak_memory_mb
     from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
-    from synthroads_addon.scenario.scenario import apply_change
 
     data: Any = Scenario().to_dict()
-    for change in (*_WAVES, f"scan.rays_per_pulse={rays}"):
-        data = apply_change(data, change)
+    for change in (*_WAVES, *(_QUICK_WAVES if part["quick"] else ()), f"scan.rays_per_pulse={rays}"):
+        data = apply_change(data, change, Scenario)
     with tempfile.TemporaryDirectory(prefix="synthroads-") as text:
         output = Path(text) / "out"
         before = peak_memory_mb() or 0.0
-        report = scan_scene(SceneScan(Scenario.from_dict(data), output, scene, up="z"))
+        report = scan_scene(SceneScan(Scenario.from_dict(data), output, Path(part["scene"]), up="z"))
     stages, counts = report["stages"], report["counts"]
     seconds = stages["scan"]["seconds"]
     if rays > 1:
         # As HELIOS++ counts them: all that the pulses have, also where these are known to meet nothing.
         return {"waves_rays": counts["pulses"] * rays / seconds / 1e6}
     opening = sum(stages[name]["seconds"] for name in ("scene", "scene mesh", "caster"))
-    memory = 1e6 * ((stages["caster"]["peak_memory_mb"] or 0.0) - before) / triangles
+    memory = 1e6 * ((stages["caster"]["peak_memory_mb"] or 0.0) - before) / part["triangles"]
     return {"waves_pulses": counts["pulses"] / seconds / 1e6, "waves_memory": memory, "waves_opening": opening}
 
 

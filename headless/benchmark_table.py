@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from synthroads_addon.base.text_table import markdown_table
+from synthroads_addon.base.text.table import markdown_table
 
 TABLE = "benchmark"
 """Name of the tables in a document."""
@@ -53,12 +53,12 @@ LIMITS = {
     "panel_edit": Limit("panel edit to updated view", "s", 0.2, True, 3),
     "casting": Limit("casting and radiometry, of the bare caster's rate", "%", 60.0, False, 0),
     "writing": Limit("writing LAZ", "million points/s", 3.0, False),
-    "waves_pulses": Limit("waves, 1 ray per pulse: 5 times HELIOS++", "million pulses/s", 1.6, False),
-    "waves_rays": Limit("waves, 19 rays per pulse: 3 times HELIOS++", "million rays/s", 2.55, False),
-    "waves_memory": Limit("waves, memory: a quarter of HELIOS++", "B/triangle", 500.0, True, 0),
-    "waves_opening": Limit("waves, opening: a fifth of HELIOS++", "s", 4.2, True),
+    "waves_pulses": Limit("waves, 1 ray per pulse", "million pulses/s", 1.6, False),
+    "waves_rays": Limit("waves, 19 rays per pulse", "million rays/s", 2.55, False),
+    "waves_memory": Limit("waves, memory", "B/triangle", 500.0, True, 0),
+    "waves_opening": Limit("waves, opening", "s", 4.2, True),
 }
-"""Lines by name. HELIOS++ did 0.32 million pulses/s, 0.85 million rays/s, 2 kB per triangle and 21 s on two cores."""
+"""Lines by name."""
 
 
 def markdown(result: dict[str, Any]) -> str:

@@ -17,6 +17,7 @@ if __name__ == "__main__":
 from headless.commands import Outcome, entry, numbers
 from headless.messages import progress_bar
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.files import check_file_target
 from synthroads_addon.base.progress import exhaust
 from synthroads_addon.calibration.job import (
     PARTS,
@@ -100,7 +101,6 @@ def _fit_arguments(group: argparse._ArgumentGroup) -> None:
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads calibrate`; return exit code, result as JSON data and printed text."""
     job = job_of(arguments)
-    check_job(job)
     files = {
         "--save": (arguments.save, ".json"),
         "--save-device": (arguments.save_device, ".json"),
@@ -108,13 +108,17 @@ def run(arguments: argparse.Namespace) -> Outcome:
         "--plot": (arguments.plot, ".png"),
     }
     for field, (path, ending) in files.items():
-        check_target(field, path, ending, arguments.overwrite)
+        if path:
+            check_file_target(path, field, arguments.overwrite, ending)
         if path and field.startswith("--save") and (job.real is None or not job.fit):
             raise InputError(field, str(path), "needs a cloud that materials are fitted to")
     if arguments.save_recipe and not arguments.save_device:
         raise InputError("--save-recipe", str(arguments.save_recipe), "needs --save-device, which it scans with")
+    check_job(job)
     progress = progress_bar(arguments)
     result = exhaust(calibration_steps(job), lambda share: progress("calibrate", share))
+    if arguments.save_device:
+        progress("sensor", 0.0)
     sensor = fit_sensor(result, not arguments.formulas) if arguments.save_device else None
     if arguments.save:
         # Scans by the recipe have the sensor's noise beside the materials' own spread.
@@ -134,16 +138,6 @@ def run(arguments: argparse.Namespace) -> Outcome:
         lines += [f"{name}: {value}" for name, value in data["sensor"]["estimate"].items() if value is not None]
     written = [str(path) for path, _ in files.values() if path]
     return 0, data, "\n".join([*lines, *(f"written: {path}" for path in written)])
-
-
-def check_target(field: str, path: Path | None, ending: str, overwrite: bool) -> None:
-    """Raise an InputError if a file to write has the wrong ending, or exists and may not be overwritten."""
-    if path is None:
-        return
-    if path.suffix.lower() != ending:
-        raise InputError(field, str(path), f"must end in {ending}")
-    if path.exists() and not overwrite:
-        raise InputError(field, str(path), "is there already; --overwrite replaces it")
 
 
 def job_of(arguments: argparse.Namespace) -> CalibrationJob:

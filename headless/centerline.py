@@ -12,9 +12,9 @@ if __name__ == "__main__":
 
 from headless.commands import Outcome, entry
 from headless.messages import progress_bar
-from headless.reconstruct import reservations
-from synthroads_addon.base.errors import InputError, OutputError
-from synthroads_addon.base.files import write_file
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.files import check_file_target, path_beside, write_file
+from synthroads_addon.base.remarks import remarks_so_far
 from synthroads_addon.base.schema import canonical_json
 
 if TYPE_CHECKING:
@@ -25,8 +25,10 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `synthroads centerline` to its parser."""
     parser.add_argument("cloud", type=Path, metavar="CLOUD", help="cloud to read (.laz, .las, .ply, .e57, .npz)")
-    text = "centreline (.geojson); a report (.json) is written beside it (centerline.geojson)"
-    parser.add_argument("--output", type=Path, default=Path("centerline.geojson"), metavar="FILE", help=text)
+    text = "centreline (.geojson); a report (.json) is written beside it (beside the cloud: of cloud.laz "
+    text += "cloud.laz-centerline.geojson)"
+    parser.add_argument("--output", type=Path, metavar="FILE", help=text)
+    parser.set_defaults(writes=True)
     text = "kind of road, where it is known (auto: found out)"
     parser.add_argument("--road", choices=("auto", "dual", "single"), default="auto", help=text)
     text = "course of the road, roughly: CSV or GeoJSON in the cloud's coordinates (found in the cloud)"
@@ -41,24 +43,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads centerline`; return exit code (3 if doubtful), report as JSON data and printed text."""
-    lines, table = arguments.output, arguments.output.with_suffix(".json")
-    if lines.suffix.lower() != ".geojson":
-        raise InputError("--output", str(lines), "must end in .geojson")
-    for path in (lines, table):
-        if path.exists() and not arguments.overwrite:
-            raise OutputError("--output", str(path), "is there already; --overwrite replaces it")
+    cloud_file: Path = arguments.cloud
+    lines: Path = arguments.output or path_beside(cloud_file, f"{cloud_file.name}-centerline.geojson", "CLOUD")
+    option = "--output" if arguments.output else ""
+    check_file_target(lines, option, arguments.overwrite, ending=".geojson")
+    table = lines.with_suffix(".json")
+    check_file_target(table, option, arguments.overwrite)
     from synthroads_addon.reconstruction.centreline import centreline_geojson, centreline_report, find_centreline
     from synthroads_addon.reconstruction.cloud import read_road_cloud
     from synthroads_addon.reconstruction.comparison import compare_line
-    from synthroads_addon.road.centerline import read_axis
+    from synthroads_addon.road.axes.centerline import check_axis_file, read_axis
 
-    axis = read_axis(arguments.truth) if arguments.truth else None
+    if arguments.truth is not None:
+        check_axis_file(arguments.truth)
     cloud = read_road_cloud(arguments.cloud)
+    axis = read_axis(arguments.truth, cloud.place) if arguments.truth else None
     network, why = _network(arguments)
     found = find_centreline(cloud, _options(arguments, cloud, network), progress_bar(arguments))
     result = centreline_report(found, cloud) | {"network": why}
     if axis is not None:
         result["comparison"] = compare_line(found.path, axis[:, :2] - cloud.origin[:2])
+    result["remarks"] = remarks_so_far()
     text = canonical_json(centreline_geojson(found, cloud, arguments.cloud.stem))
     write_file(lines, text.encode(), overwrite=arguments.overwrite)
     write_file(table, canonical_json(result).encode(), overwrite=arguments.overwrite)
@@ -77,28 +82,30 @@ def _network(arguments: argparse.Namespace) -> tuple[Predictor | None, dict[str,
         if given is not None or error.name != "torch":
             raise
         return None, {"model": None, "why": "no network: PyTorch isn't installed"}
-    folder = arguments.output.absolute().parent
     if given is not None:
-        return learned_axis(Path(given), arguments.cloud, folder), {"model": given, "why": f"{given}, as asked"}
+        return learned_axis(Path(given), arguments.cloud), {"model": given, "why": f"{given}, as asked"}
     try:
         choice = choose_model(arguments.cloud, "centerline")
     except InputError as error:
         return None, {"model": None, "why": f"no network: {error}"}
     if choice.doubtful:
         return None, choice.to_dict() | {"model": None, "why": f"no network: {choice.why()}"}
-    return learned_axis(Path(choice.card.name), arguments.cloud, folder), choice.to_dict()
+    return learned_axis(Path(choice.card.name), arguments.cloud), choice.to_dict()
 
 
 def _options(arguments: argparse.Namespace, cloud: RoadCloud, network: Predictor | None) -> Options:
     from synthroads_addon.reconstruction.axis import Options
-    from synthroads_addon.road.centerline import read_axis
+    from synthroads_addon.road.axes.centerline import read_axis
 
-    course = read_axis(arguments.path)[:, :2] - cloud.origin[:2] if arguments.path else None
+    course = read_axis(arguments.path, cloud.place)[:, :2] - cloud.origin[:2] if arguments.path else None
     return Options(road=None if arguments.road == "auto" else arguments.road, path=course, predictor=network)
 
 
 def summary(result: dict[str, Any], output: Path) -> str:
     """Return a centreline's report as text: length, views, doubts, comparison with the truth."""
+
+    from synthroads_addon.reconstruction.report import reservation_lines
+
     std = result["std"]
     lines = [f"{result['road']} carriageway, centreline of {result['length']:.0f} m (std {std['mean']:.2f} m)"]
     for view in result["views"]:
@@ -106,7 +113,7 @@ def summary(result: dict[str, Any], output: Path) -> str:
         apart = "" if beside is None else f", {beside:.2f} m rms from it"
         lines.append(f"  {view['name']}: seen on {view['seen']:.0%}, agrees on {view['used']:.0%}{apart}")
     lines.append(f"  network: {result['network']['why']}")
-    lines += reservations(result)
+    lines += [f"  {line}" for line in reservation_lines(result)]
     return "\n".join([*lines, f"written to {output}"])
 
 

@@ -12,7 +12,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.commands import entry
-from synthroads_addon.base.text_table import text_table
+from synthroads_addon.base.text.table import text_table
 
 if TYPE_CHECKING:
     from synthroads_addon.checking.checker import Violation

@@ -1,10 +1,11 @@
 """The console command `synthroads` with all of its sub-commands."""
 
 import argparse
-from collections.abc import Sequence
+import sys
+from collections.abc import Collection, Sequence
 from typing import Any
 
-from headless.commands import Parser, add_shared_options, leave, module_of, run
+from headless.commands import Parser, add_arguments, add_shared_options, leave, missing_package, module_of, run
 from synthroads_addon.base.version import generator
 
 COMMANDS = {
@@ -29,6 +30,7 @@ COMMANDS = {
     "forecast": "forecast how long a training of a segmentation takes on this machine",
     "centerline": "find the centreline of the road in a cloud, and where it is to be trusted",
     "reconstruct": "turn a cloud into the parameters of its road",
+    "road": "turn a road of an OpenDRIVE, LandXML or IFC file into a parameter set",
     "list": "list what comes under a name, and the fields that --set takes",
 }
 
@@ -42,30 +44,35 @@ class _PrintCompletion(argparse.Action):
         try:
             from headless.completion import completion_script
 
-            print(completion_script(parser, values))
+            print(completion_script(build_parser(), values))
         except ModuleNotFoundError as error:
-            if error.name != "shtab":
-                raise
-            parser.error(f"argument {option}: needs the package shtab: pip install shtab")
+            parser.exit(2, f"{missing_package(error)}\n")
         parser.exit()
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the sub-command named in `argv` (the process's own arguments if None); return its exit code."""
-    arguments = build_parser().parse_args(argv)
+    words = sys.argv[1:] if argv is None else argv
+    arguments = build_parser([word for word in words if word in COMMANDS][:1]).parse_args(words)
     return run(module_of(arguments.command).run, arguments)
 
 
-def build_parser() -> argparse.ArgumentParser:
-    """Return the argument parser of `synthroads` with all sub-commands in `COMMANDS`."""
+def build_parser(commands: Collection[str] = COMMANDS) -> argparse.ArgumentParser:
+    """Return the argument parser of `synthroads`; only the given sub-commands, all by default, have their arguments.
+
+    The others are listed with their summaries, so that a command loads nothing but its own modules.
+    """
     parser = Parser(prog="synthroads", description="Synthetic motorways, scanned and labelled.")
     parser.add_argument("--version", action="version", version=generator())
     text = "print what makes a shell complete commands, options, names and files"
     parser.add_argument("--print-completion", action=_PrintCompletion, choices=("bash", "fish", "zsh"), help=text)
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    parsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, summary in COMMANDS.items():
-        module = module_of(name)
-        module.add_arguments(commands.add_parser(name, help=summary, description=module.__doc__))
+        its_parser = parsers.add_parser(name, help=summary)
+        if name in commands:
+            module = module_of(name)
+            its_parser.description = module.__doc__
+            add_arguments(module, its_parser)
     add_shared_options(parser)
     return parser
 

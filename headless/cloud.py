@@ -10,7 +10,7 @@ if __name__ == "__main__":
 
 from headless.commands import Outcome, entry, whole_number
 from headless.messages import progress_bar
-from synthroads_addon.base.text_table import text_table
+from synthroads_addon.base.text.table import text_table
 
 _COLUMNS = (
     ("points", "points", "{:,}"),
@@ -63,7 +63,10 @@ def run(arguments: argparse.Namespace) -> Outcome:
 def table(figures: dict[str, Any]) -> str:
     """Return a cloud's statistics as text: extent, attributes, and a table of figures by class."""
     lines = [f"{figures['file']}: {figures['kind']}, {figures['points']:,} points"]
-    lines.append(f"coordinate system {'EPSG:' + str(figures['epsg']) if figures['epsg'] else 'not named'}")
+    named = figures["coordinate_system"]
+    lines.append(f"coordinate system {named or 'not named: coordinates are taken for metres'}")
+    if named and figures["height_epsg"] is None:
+        lines.append("what heights are counted from isn't named")
     if figures["bounds"]:
         low, high = figures["bounds"]["low"], figures["bounds"]["high"]
         spans = " x ".join(f"{b - a:.1f}" for a, b in zip(low, high, strict=True))
@@ -76,7 +79,27 @@ def table(figures: dict[str, Any]) -> str:
         if values:
             shown = (form.format(values[key]) if values[key] is not None else "-" for key, _, form in _COLUMNS)
             rows.append((name, *shown))
-    return "\n".join([*lines, *text_table(rows[0], rows[1:], range(1, len(rows[0])))])
+    lines += text_table(rows[0], rows[1:], range(1, len(rows[0])))
+    return "\n".join([*lines, *_predicted_lines(figures)])
+
+
+def _predicted_lines(figures: dict[str, Any]) -> list[str]:
+    """Return the lines on a cloud's predicted classes, and how they agree with its own; none where there are none."""
+    if "predicted_classes" not in figures:
+        return []
+    agreement = figures["agreement"]
+    ious = agreement["iou"] if agreement else {}
+    rows = [
+        (name, f"{row['points']:,}", f"{row['share']:.1%}", f"{ious[name]:.3f}" if name in ious else "-")
+        for name, row in figures["predicted_classes"].items()
+    ]
+    titles = ("predicted_class", "points", "share", f"IoU with {figures['class_field']}")
+    kept = len(titles) if agreement else len(titles) - 1
+    lines = ["", *text_table(titles[:kept], [row[:kept] for row in rows], range(1, kept))]
+    if agreement and agreement["share"] is not None:
+        own = f"{figures['class_field']}: the same class for {agreement['share']:.1%} of {agreement['points']:,} points"
+        lines.append(f"beside the cloud's own {own}")
+    return lines
 
 
 def _file_arguments(parser: argparse.ArgumentParser) -> None:
@@ -95,7 +118,11 @@ def _info_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _preview_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", type=Path, metavar="FILE", help="cloud (.laz, .las, .ply, .e57, .npz)")
-    parser.add_argument("--output", required=True, type=Path, metavar="DIR", help="folder for the pictures")
+    text = "folder for the pictures; with --picture a .png file"
+    parser.add_argument("--output", required=True, type=Path, metavar="DIR_OR_FILE", help=text)
+    kinds = ("class", "predicted", "intensity", "rgb", "section")
+    text = f"draw only this one: {', '.join(kinds)} (all that the cloud has)"
+    parser.add_argument("--picture", choices=kinds, metavar="KIND", help=text)
     parser.add_argument("--station", type=float, metavar="M", help="where to cut, m along the line (the middle)")
     parser.add_argument("--centerline", type=Path, metavar="FILE", help="GeoJSON line of the stations (the long axis)")
     parser.add_argument("--line", type=float, nargs=4, metavar=("X1", "Y1", "X2", "Y2"), help="cut along this line")
@@ -190,18 +217,26 @@ def _convert(arguments: argparse.Namespace) -> Outcome:
 
 
 def _preview(arguments: argparse.Namespace) -> Outcome:
+    from synthroads_addon.cloud.formats.registry import open_cloud
     from synthroads_addon.cloud.tools.convert import draw_previews, read_centerline
 
+    line = None
+    if arguments.centerline:
+        with open_cloud(arguments.file) as cloud:
+            line = read_centerline(arguments.centerline, cloud.header.place)
     done = draw_previews(
         arguments.file,
         arguments.output,
         line=tuple(arguments.line) if arguments.line else None,
         station=arguments.station,
-        centerline=read_centerline(arguments.centerline) if arguments.centerline else None,
+        centerline=line,
         depth=arguments.depth,
         overwrite=arguments.overwrite,
+        only=arguments.picture,
     )
-    return 0, done, f"{', '.join(done['pictures'])} written to {arguments.output}"
+    folder = arguments.output.parent if arguments.output.name in done["pictures"] else arguments.output
+    lines = [f"{name} shows {field}" for name, field in done["fields"].items()]
+    return 0, done, "\n".join([*lines, f"written to {folder}"])
 
 
 def _positive(text: str) -> float:

@@ -9,44 +9,53 @@ import errno
 import io
 import json
 import os
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from headless import INTERRUPTED, MAPPING_FAILED, ignore_end_signals, was_stopped
 from headless.messages import messages
-from synthroads_addon.base.errors import InputError
-from synthroads_addon.base.machine import prepare_memory
+from synthroads_addon.base.errors import InputError, nearest_name
+from synthroads_addon.base.remarks import collected_remarks
 from synthroads_addon.base.scratch.folders import remove_scratch_folders, temporary_files_in_scratch
 
+EXTRAS = {
+    **dict.fromkeys(("matplotlib", "skimage", "sklearn", "torch"), "ml"),
+    "ifcopenshell": "twin",
+    "pye57": "e57",
+    **dict.fromkeys(("cryptography", "dask", "dask_jobqueue", "distributed"), "cluster"),
+    **dict.fromkeys(("ml_dtypes", "onnx", "onnxruntime", "onnxscript"), "onnx"),
+    **dict.fromkeys(("bpy", "mathutils", "shtab", "yaml"), "blender"),
+}
+"""Name by which a package is imported -> extra of ours that brings it; all others come with SynthRoads itself."""
+_NEEDED = ("numpy", "pydantic")
+"""Packages that stand for all that SynthRoads depends on: where one is missing it wasn't installed at all."""
 
-def _missing_package(error: ModuleNotFoundError) -> str:
+
+def missing_package(error: ModuleNotFoundError) -> str:
     """Return the error line for a package that isn't installed; re-raises the error of a module of our own."""
     name = (error.name or "").partition(".")[0]
     if name in ("", "headless", "ml", "synthroads_addon"):
         raise error
-    extra = "ml" if name in ("torch", "scipy", "skimage", "sklearn", "matplotlib") else "blender"
-    return (
-        f"error: the package {name} is missing: in Blender install and enable the SynthRoads extension, "
-        f"elsewhere run pip install 'synthroads[{extra}]'"
-    )
+    wanted = f"synthroads[{EXTRAS[name]}]" if name in EXTRAS else "synthroads"
+    within = "install and enable the SynthRoads extension in Blender, or " if name not in EXTRAS else ""
+    return f"error: the package {name} is missing: {within}run pip install '{wanted}'"
 
 
-try:
-    from synthroads_addon.base.schema import canonical_json
-    from synthroads_addon.scenario.scan import MOST_POSSIBLE
-    from synthroads_addon.scenario.scenario import apply_change
-    from synthroads_addon.scenario.tolerance import KINDS, TIMES, error_text, parse_tolerance, with_unit
-    from synthroads_addon.twin.formats import TWIN_FORMATS
-except ModuleNotFoundError as error:  # Blender itself has none of the packages that the extension brings
-    print(_missing_package(error), file=sys.stderr)
-    raise SystemExit(2) from None
+if lacking := [name for name in _NEEDED if find_spec(name) is None]:  # Blender itself has none but NumPy
+    print(missing_package(ModuleNotFoundError(name=lacking[0])), file=sys.stderr)
+    raise SystemExit(2)
 
 Outcome = tuple[int, dict[str, Any], str | Iterator[str]]
 """Outcome of a sub-command: exit code, result as JSON data, result as text or lines of it."""
+
+AXIS_FILES = "centreline: OpenDRIVE, LandXML, IFC, KML, GPX, CSV (x, y, z in order) or GeoJSON"
+"""Files that an axis is read from, for the help of commands."""
 
 SHORT_OPTIONS = {
     "--count": "-n",
@@ -62,6 +71,10 @@ SHORT_OPTIONS = {
 """Letters that stand for options, the same for all commands."""
 
 
+_NEGATIVE_NUMBERS = re.compile(r"-(\.?\d|inf(inity)?$|nan$)", re.IGNORECASE)
+"""Beginning of values that are no options though they begin with a dash: argparse knows neither -1e3 nor -1,2."""
+
+
 class Parser(argparse.ArgumentParser):
     """Argument parser that reports errors in one line, without usage.
 
@@ -71,13 +84,36 @@ class Parser(argparse.ArgumentParser):
 
     words: str | None = None
 
+    def __init__(self, *args: Any, **settings: Any) -> None:
+        super().__init__(*args, **settings)
+        self._negative_number_matcher = _NEGATIVE_NUMBERS
+
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Return the namespace and unknown arguments; words after options go to the argument named by `words`."""
+        self._refuse_unknown_option(sys.argv[1:] if args is None else args)
         parsed, rest = super().parse_known_args(args, namespace)
         if self.words and not any(word.startswith("-") for word in rest):
             setattr(parsed, self.words, [*(getattr(parsed, self.words) or ()), *rest])
             rest = []
         return parsed, rest
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """Refuse a value that is none of an argument's choices, and name the one most like it."""
+        if action.choices is not None and value not in action.choices:
+            known = [str(choice) for choice in action.choices]
+            message = f"invalid choice: {value!r} (choose from {', '.join(known)}){nearest_name(str(value), known)}"
+            raise argparse.ArgumentError(action, message)
+
+    def _refuse_unknown_option(self, words: Sequence[str]) -> None:
+        """End the command where a word is no option of it, before it misses others, and name the one most like it."""
+        if self._subparsers is not None or "--" in words:  # its sub-commands have the options; or what follows is none
+            return
+        known = [name for action in self._actions if action.help != argparse.SUPPRESS for name in action.option_strings]
+        for word in words:
+            name = word.partition("=")[0]
+            is_option = name.startswith("--") and " " not in name
+            if is_option and not any(one.startswith(name) for one in self._option_string_actions):
+                self.error(f"unrecognized arguments: {word}{nearest_name(name, known)}")
 
     def error(self, message: str) -> Any:
         self.exit(2, f"{self.prog}: {message}\n")
@@ -97,15 +133,28 @@ def add_shared_options(parser: argparse.ArgumentParser) -> None:
 
 
 def module_of(name: str) -> Any:
-    """Import and return the module `headless.NAME` of a sub-command."""
-    return import_module(f"headless.{name}")
+    """Import and return the module `headless.NAME` of a sub-command; ends the process where a package is missing."""
+    try:
+        return import_module(f"headless.{name}")
+    except ModuleNotFoundError as error:
+        print(missing_package(error), file=sys.stderr)
+        raise SystemExit(2) from None
+
+
+def add_arguments(module: Any, parser: argparse.ArgumentParser) -> None:
+    """Add a sub-command's arguments to its parser; ends the process where a package is missing."""
+    try:
+        module.add_arguments(parser)
+    except ModuleNotFoundError as error:
+        print(missing_package(error), file=sys.stderr)
+        raise SystemExit(2) from None
 
 
 def command(name: str, argv: Sequence[str] | None = None) -> int:
     """Run one sub-command with its own parser, as ``python -m headless.NAME`` does; return its exit code."""
     module = module_of(name)
     parser = Parser(prog=f"synthroads {name}", description=module.__doc__)
-    module.add_arguments(parser)
+    add_arguments(module, parser)
     add_shared_options(parser)
     return run(module.run, parser.parse_args(argv))
 
@@ -134,9 +183,12 @@ def all_changes(arguments: argparse.Namespace, short: Mapping[str, str]) -> list
     Raises:
         InputError: an option and ``--set`` contradict each other.
     """
+    from synthroads_addon.base.changes import apply_change
+    from synthroads_addon.scenario.scenario import Scenario
+
     given: Any = {}
     for change in arguments.changes:
-        given = apply_change(given, change)
+        given = apply_change(given, change, Scenario)
     changes = list(arguments.changes)
     for name, path in short.items():
         value = getattr(arguments, name)
@@ -154,12 +206,16 @@ def all_changes(arguments: argparse.Namespace, short: Mapping[str, str]) -> list
 
 def add_allow_large_argument(parser: argparse.ArgumentParser) -> None:
     """Add the flag ``--allow-large``, which lifts the scenario's limit ``scan.most_pulses``."""
+    from synthroads_addon.scenario.scan import MOST_POSSIBLE
+
     text = "do a scan of any size: without it one of more pulses than scan.most_pulses is refused"
     parser.add_argument("--allow-large", action="store_const", const=MOST_POSSIBLE, help=text)
 
 
 def add_choice_arguments(parser: argparse.ArgumentParser) -> None:
     """Add ``--tolerance`` and ``--time-budget``, by which the job chooses its settings itself."""
+    from synthroads_addon.scenario.tolerance import KINDS
+
     kinds = ", ".join(KINDS)
     parser.add_argument(
         "--tolerance",
@@ -176,6 +232,8 @@ def add_choice_arguments(parser: argparse.ArgumentParser) -> None:
 
 def choice_changes(arguments: argparse.Namespace) -> list[str]:
     """Return the scenario changes (``path=value``) that ``--tolerance`` and ``--time-budget`` stand for."""
+    from synthroads_addon.scenario.tolerance import TIMES, parse_tolerance, with_unit
+
     changes = []
     if arguments.tolerance is not None:
         changes.append(f"tolerance={json.dumps(parse_tolerance(arguments.tolerance))}")
@@ -190,6 +248,8 @@ def choice_summary(report: dict[str, Any]) -> list[str]:
     """Return lines of text on settings chosen and errors expected; empty if the report has no choice."""
     if "choice" not in report:
         return []
+    from synthroads_addon.scenario.tolerance import error_text
+
     choice = report["choice"]
     chosen = ", ".join(f"{path}={value}" for path, value in choice["chosen"].items())
     errors = ", ".join(f"{name} {error_text(name, value)}" for name, value in choice["expected"]["errors"].items())
@@ -236,8 +296,16 @@ def add_renamed_argument(parser: argparse.ArgumentParser, former: str, name: str
     parser.add_argument(former, action=Renamed, nargs="?", help=argparse.SUPPRESS)
 
 
+def add_axis_name_argument(parser: argparse.ArgumentParser) -> None:
+    """Declare ``--axis-name``, which chooses one of a file's roads."""
+    text = "road or alignment of the file, by its name (the longest); `synthroads road FILE --list` lists them"
+    parser.add_argument("--axis-name", metavar="NAME", help=text)
+
+
 def add_twin_argument(parser: argparse.ArgumentParser, default: Sequence[str] = ()) -> None:
     """Add the option ``--twin FORMATS``: names of formats separated by commas, as a list in ``twin``."""
+    from synthroads_addon.twin.formats import TWIN_FORMATS
+
     text = f"geometric-semantic models, with commas: {', '.join(TWIN_FORMATS)} ({','.join(default) or 'none'})"
     parser.add_argument("--twin", type=_split_names, default=list(default), metavar="FORMATS", help=text)
 
@@ -258,17 +326,22 @@ def _add_common_arguments(parser: argparse.ArgumentParser) -> None:
 
 def _writes_files(arguments: argparse.Namespace) -> bool:
     """Return whether a command's result goes to files, so that ``--quiet`` may drop what it prints."""
-    named = ("output", "save", "plot", "document")
+    named = ("output", "save", "plot", "document", "writes")
     return any(getattr(arguments, name, None) for name in named) and not getattr(arguments, "verify", False)
 
 
 def run(action: Callable[[argparse.Namespace], Outcome], arguments: argparse.Namespace) -> int:
     """Run a sub-command and print its result as text or JSON; return the exit code; bad input becomes one line."""
+    _interrupt_notes.clear()
     try:
-        with _silent_standard_output(), messages(arguments):
+        with _silent_standard_output(), messages(arguments), collected_remarks():
+            from synthroads_addon.base.machine import prepare_memory
+
             prepare_memory()
             code, result, text = action(arguments)
         if arguments.json:
+            from synthroads_addon.base.schema import canonical_json
+
             print(canonical_json(result), end="")
         elif not arguments.quiet or not _writes_files(arguments):
             for line in [text] if isinstance(text, str) else text:
@@ -296,9 +369,18 @@ def _error_line(error: Exception) -> str | None:
     if isinstance(error, InputError):
         return f"error: {error}"
     if isinstance(error, ModuleNotFoundError):
-        return _missing_package(error)
-    reason = _shortage_reason(error)
+        return missing_package(error)
+    reason = _name_fault(error) or _shortage_reason(error)
     return reason and f"error: {reason}"
+
+
+def _name_fault(error: Exception) -> str | None:
+    """Return the reason if an error means that the system takes no name as long as one that was given, else None."""
+    if not isinstance(error, OSError) or error.errno != errno.ENAMETOOLONG:
+        return None
+    name = str(error.filename or "a file")
+    shown = name if len(name) <= _SHOWN else f"{name[:_SHOWN]}..."
+    return f"{shown!r} is no name of a file: the system takes none as long ({len(name):,} characters)"
 
 
 def _shortage_reason(error: Exception) -> str | None:
@@ -320,13 +402,24 @@ _MEMORY_SIGNS = (
     MAPPING_FAILED,
 )
 """Parts of the errors by which libraries in other languages tell that memory is short."""
+_SHOWN = 80
+"""Characters that are shown of a name that is too long."""
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
 
 
+_interrupt_notes: list[Callable[[], str]] = []
+"""Sentences that the command adds when it is interrupted."""
+
+
+def note_at_interrupt(note: Callable[[], str]) -> None:
+    """Have the rest of this command say a line when it is interrupted: what is kept, and how to go on."""
+    _interrupt_notes[:] = [note]
+
+
 def report_interrupt() -> int:
-    """Print that the command was interrupted, and return exit code 130."""
+    """Print that the command was interrupted, what it says of that itself, and return exit code 130."""
     with suppress(OSError):  # the terminal is gone
-        print(INTERRUPTED, file=sys.stderr, flush=True)
+        print(INTERRUPTED, *(note() for note in _interrupt_notes), sep="\n", file=sys.stderr, flush=True)
     return 130
 
 

@@ -14,13 +14,19 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.commands import Outcome, entry
-from headless.messages import progress_bar
+from headless.messages import logger, progress_bar
+from headless.pictures import can_draw
 from synthroads_addon.base.files import output_folder
 from synthroads_addon.base.progress import exhaust
+from synthroads_addon.base.remarks import remarks_so_far
 from synthroads_addon.base.schema import canonical_json
 
 REPORT, PICTURE = "comparison.json", "comparison.png"
 _GIVEAWAYS = 5
+_NO_CLASSIFIER = (
+    "clouds are compared by their statistics alone: the classifier, which says how surely they are told apart, "
+    "needs the package scikit-learn: pip install 'synthroads[ml]'"
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,16 +44,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads compare`; return exit code, result as JSON data and printed text."""
+    from synthroads_addon.comparison.classifier import has_classifier
     from synthroads_addon.comparison.job import compare_steps
-    from synthroads_addon.comparison.picture import save_picture
 
+    drawn = can_draw(PICTURE)
+    if not has_classifier():
+        logger.info(_NO_CLASSIFIER)
     with output_folder(arguments.output, [REPORT, PICTURE], arguments.overwrite) as folder:
         progress = progress_bar(arguments)
         steps = compare_steps(arguments.synthetic, arguments.real, arguments.seed)
         result = exhaust(steps, lambda share: progress("compare", share))
-        data = result.to_dict()
+        data = result.to_dict() | {"remarks": remarks_so_far()}
         (folder / REPORT).write_text(canonical_json(data), encoding="utf-8")
-        save_picture(result, folder / PICTURE, overwrite=True)
+        if drawn:
+            from synthroads_addon.comparison.picture import save_picture
+
+            save_picture(result, folder / PICTURE, overwrite=True)
     return 0, data, summary(data, arguments.output)
 
 
@@ -56,12 +68,11 @@ def summary(data: dict[str, Any], output: Path) -> str:
     lines = []
     for side in ("synthetic", "real"):
         for row in data[side]:
-            auc = ", ".join(f"{group} {value:.2f}" for group, value in row["auc"].items())
-            lines.append(
-                f"{side} {row['cloud']}: told from {'the' if side == 'synthetic' else 'the other'} real ones by {auc}"
-            )
-    shares = ", ".join(f"{group} {value:.2f}" for group, value in data["realism"].items())
-    lines.append(f"realism, 1 where a real cloud is told apart as surely: {shares}")
+            told = f"told from {'the' if side == 'synthetic' else 'the other'} real ones by "
+            told += ", ".join(f"{group} {value:.2f}" for group, value in row["auc"].items())
+            lines.append(f"{side} {row['cloud']}: {told if row['auc'] else str(row['patches']) + ' patches'}")
+    if shares := ", ".join(f"{group} {value:.2f}" for group, value in data["realism"].items()):
+        lines.append(f"realism, 1 where a real cloud is told apart as surely: {shares}")
     lines.append(f"density-aware Chamfer distance of patches, over that of real ones: {data['chamfer']:.2f}")
     for name, (told, real) in list(data["giveaways"].items())[:_GIVEAWAYS]:
         medians = [", ".join(f"{row['medians'][name]:.3g}" for row in data[side]) for side in ("synthetic", "real")]

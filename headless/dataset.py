@@ -12,7 +12,7 @@ from headless.messages import detail, progress_bar
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.dataset.manifest import Manifest, faults, read_manifest
 from synthroads_addon.dataset.recipe import Recipe, load_recipe, path_within, recipe_names
-from synthroads_addon.scenario.scenario import parse_change
+from synthroads_addon.scenario.scenario import scenario_changes
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -68,7 +68,7 @@ def change_recipe(recipe: Recipe, changes: list[str]) -> Recipe:
     """Return a copy of a recipe with further changes (``path=value``) to the scenarios of all its groups."""
     if not changes:
         return recipe
-    values = dict(parse_change(change) for change in changes)
+    values = dict(scenario_changes(changes))
     groups = []
     for group in recipe.groups:
         draw = {

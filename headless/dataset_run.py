@@ -16,7 +16,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator, Set
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -26,9 +26,11 @@ from typing import Any, Protocol, cast
 from headless.dataset_scene import DONE, FAILED, FILES
 from headless.messages import logger
 from synthroads_addon.base.errors import InputError, OutputError
+from synthroads_addon.base.files import folder_at_work
 from synthroads_addon.base.machine import available_cores
+from synthroads_addon.base.named_paths import path_inside
 from synthroads_addon.base.progress import Progress, silent
-from synthroads_addon.base.scratch.locks import LockHeldError, exclusive
+from synthroads_addon.base.schema import read_json
 from synthroads_addon.base.version import generator
 from synthroads_addon.dataset.data_card import data_card
 from synthroads_addon.dataset.layouts import layout_descriptions
@@ -45,6 +47,7 @@ from synthroads_addon.dataset.manifest import (
     fold_records,
     make_manifest,
     paths_of_set,
+    published_name,
     read_manifest,
     remove,
     write_atomically,
@@ -237,7 +240,7 @@ class DatasetRun:
             InputError: what is there was made from another recipe.
         """
         try:
-            with self._lock_folder():
+            with folder_at_work(self.folder, LOCK):
                 self._open_folder()
                 try:
                     self._prepare()
@@ -261,19 +264,10 @@ class DatasetRun:
             self._publish(outcome)
             self.progress("scenes", (done + number) / len(chosen))
 
-    @contextmanager
-    def _lock_folder(self) -> Iterator[None]:
-        """Context that holds the folder's lock, and raises an OutputError if another run holds it."""
-        with ExitStack() as stack:
-            try:
-                self.folder.mkdir(parents=True, exist_ok=True)
-                stack.enter_context(exclusive(self.folder / LOCK))
-            except LockHeldError as taken:
-                raise OutputError("--output", str(self.folder), _lock_text(taken, self.folder / LOCK)) from None
-            yield
-
     def _open_folder(self) -> None:
         """Check that the folder is empty, or take over or remove the data set in it as requested."""
+        for name in ("logs", *dict.fromkeys(pattern.partition("/")[0] for pattern in PUBLISHED)):
+            path_inside(self.folder, name, self.folder, follow=True)  # before hours of work
         if (self.folder / MANIFEST).exists():
             self._reopen()
         elif {path.name for path in self.folder.iterdir()} - {LOCK, f".{MANIFEST}.part"}:
@@ -283,8 +277,7 @@ class DatasetRun:
         """Remove unfinished remains of an earlier run, and create manifest, recipe and folders of this one."""
         write_manifest(self.folder, self._manifest())  # first: a folder without one could never be resumed
         shutil.rmtree(self.folder / WORK, ignore_errors=True)
-        for path in self._unrecorded_folders():
-            remove(path)
+        self._remove_unrecorded()
         (self.folder / WORK).mkdir()
         (self.folder / "logs").mkdir(exist_ok=True)
         write_atomically(self.folder / "recipe.json", self._recipe_text)
@@ -311,15 +304,33 @@ class DatasetRun:
         finish_removal(self.folder)
 
     def _published_folders(self) -> list[str]:
-        """Return the folders of scenes that a killed run had published, or was about to, unrecorded."""
-        tasks = [json.loads(path.read_text(encoding="utf-8")) for path in (self.folder / WORK).glob(f"*/*/{DONE}")]
-        return [name for task in tasks for name in task["folders"]]
+        """Return the folders of scenes that a killed run had published, or was about to, unrecorded.
+
+        Raises:
+            InputError: a file that it left names something else.
+        """
+        names: list[str] = []
+        for path in (self.folder / WORK).glob(f"*/*/{DONE}"):
+            try:
+                names += map(published_name, read_json(path)["folders"])
+            except (KeyError, TypeError, ValueError) as error:
+                raise InputError(str(path), None, f"isn't as a run leaves it ({error}); remove {WORK}") from None
+        return names
 
     def _unrecorded_folders(self, known: Set[str] = frozenset()) -> list[Path]:
         """Return existing folders named as scenes of the recipe that are neither recorded nor in ``known``."""
         there = {name for entry in self.entries.values() for name in entry.folders or ()} | known
         paths = [path for pattern in PUBLISHED for path in sorted(self.folder.glob(pattern)) if self._is_scenes(path)]
         return [path for path in paths if path.relative_to(self.folder).as_posix() not in there]
+
+    def _remove_unrecorded(self) -> None:
+        """Remove what an interrupted run has published and not recorded."""
+        for path in self._unrecorded_folders():
+            remove(self.folder, path.relative_to(self.folder), self.folder)
+
+    def _place(self, name: str) -> Path:
+        """Return a place in the folder that something is moved to; InputError if a link leads out of it."""
+        return path_inside(self.folder, name, self.folder)
 
     def _is_scenes(self, path: Path) -> bool:
         """Return whether a folder's name is that of a scene of the recipe."""
@@ -345,19 +356,19 @@ class DatasetRun:
         if outcome.error is None:
             done = json.loads((outcome.folder / DONE).read_text(encoding="utf-8"))
             for name in done["folders"]:
-                target = self.folder / name
+                target = self._place(published_name(name))
                 target.parent.mkdir(parents=True, exist_ok=True)
                 (outcome.folder / FILES / name).rename(target)
             self._describe_layouts()  # before it is recorded: a set that is stopped now can be learned from
             entry = SceneEntry.from_dict({**about, "status": "done", **done}, "scene")
-            (outcome.folder / "report.json").replace(self.folder / "logs" / f"{job.name}.json")
+            (outcome.folder / "report.json").replace(self._place(f"logs/{job.name}.json"))
             if not entry.points:
                 logger.warning("warning: %s: not one pulse came back", job.name)
             logger.debug("%s is done: %s points", job.name, f"{entry.points:,}")
         else:
             entry = SceneEntry.from_dict({**about, "status": "failed", "error": outcome.error}, "scene")
             with suppress(FileNotFoundError):  # of a lost worker there is none
-                (outcome.folder / "log.txt").replace(self.folder / "logs" / f"{job.name}.txt")
+                (outcome.folder / "log.txt").replace(self._place(f"logs/{job.name}.txt"))
             logger.error("failed: %s: %s", job.name, outcome.error)
         self.entries[job.name] = entry  # first: where the run is stopped before the next line, `_abandon` keeps it
         try:
@@ -376,9 +387,8 @@ class DatasetRun:
 
     def _abandon(self) -> None:
         """Remove everything unfinished and write the manifest, after a failure; ignores errors of the disk."""
-        with suppress(OSError):
-            for path in self._unrecorded_folders():
-                remove(path)
+        with suppress(OSError, InputError):  # InputError: a link leads out of the folder, which is told already
+            self._remove_unrecorded()
             shutil.rmtree(self.folder / WORK, ignore_errors=True)
             write_manifest(self.folder, self._manifest())
 
@@ -395,7 +405,7 @@ class DatasetRun:
         """Write the description of each layout that has a scene by now, unless this run has written it already."""
         for name, text in self._layout_texts.items():
             if name not in self._described and (self.folder / name).parent.is_dir():
-                write_atomically(self.folder / name, text)
+                write_atomically(self._place(name), text)
                 self._described.add(name)
 
     @cached_property
@@ -526,11 +536,3 @@ class WorkerAbsence:
             logger.warning(
                 "warning: %s has no worker; waiting for one, up to %g s in all", self._address, self._patience
             )
-
-
-def _lock_text(taken: LockHeldError, lock: Path) -> str:
-    """Return the error text for a folder whose lock another run holds, or may hold."""
-    owner = f": process {taken.owner.pid} of {taken.owner.host}" if taken.owner else ""
-    if taken.certain:
-        return f"another run is at work in it{owner}"
-    return f"another run may be at work in it{owner} (its disk knows no locks); if that has ended, remove {lock}"

@@ -9,6 +9,7 @@ if __name__ == "__main__":
 
 from headless.commands import Outcome, entry
 from headless.messages import progress_bar
+from synthroads_addon.base.files import check_folder_target
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,6 +31,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     from ml.shipped import open_run
     from ml.tasks import Evaluation, task
 
+    check_folder_target(arguments.output)
     trained = open_run(arguments.run)
     evaluation = Evaluation(arguments.data, arguments.split, arguments.output, arguments.mapping, arguments.yardstick)
     scores, tables = task(trained.configuration.task).evaluate(trained, evaluation, progress_bar(arguments))

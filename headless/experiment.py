@@ -10,7 +10,7 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, add_changes_argument, entry
+from headless.commands import Outcome, add_changes_argument, entry, note_at_interrupt
 from headless.messages import progress_bar
 from ml.configuration import EXPERIMENTS, names_in
 from synthroads_addon.base.errors import InputError
@@ -53,6 +53,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     for seed in seeds:
         if not 0 <= seed < 2**63:
             raise InputError("--seeds", seed, "must be whole numbers from 0")
+    note_at_interrupt(lambda: f"what is trained and tested is kept in {arguments.output}; the same command goes on")
     results = work.run_experiment(experiment, configured, arguments.output, seeds, progress_bar(arguments))
     shown = work.table(experiment.title, results, list(configured))
     text = f"{shown}\nwritten to {arguments.output}: {TABLE}, {RESULTS} and the runs"

@@ -9,7 +9,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.commands import Outcome, entry
-from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.files import check_file_target
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -17,14 +17,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("run", type=Path, metavar="RUN", help="folder of a trained run, or name of a shipped model")
     text = "ONNX file to write (RUN.onnx in the folder that the command runs in)"
     parser.add_argument("--output", type=Path, metavar="FILE", help=text)
+    parser.set_defaults(writes=True)
     parser.add_argument("--overwrite", action="store_true", help="replace a file that is already there")
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads export`; return exit code, inputs and outputs as JSON data and printed text."""
     target = arguments.output or Path(f"{arguments.run.name}.onnx")
-    if target.suffix.lower() != ".onnx":
-        raise InputError("--output", str(target), "must end in .onnx")
+    check_file_target(target, overwrite=arguments.overwrite, ending=".onnx")
     from ml.onnx_export import write_onnx
     from ml.shipped import open_run
     from ml.tasks import task

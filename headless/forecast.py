@@ -14,7 +14,7 @@ if __name__ == "__main__":
 from headless.commands import Outcome, add_changes_argument, entry
 from ml.configuration import load_configuration
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.base.files import write_file
+from synthroads_addon.base.files import check_file_target, write_file
 from synthroads_addon.base.schema import canonical_json
 
 
@@ -32,6 +32,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads forecast`; return exit code, figures as JSON data and printed text."""
     if arguments.steps < 1:
         raise InputError("--steps", arguments.steps, "must be 1 or more")
+    if arguments.output:
+        check_file_target(arguments.output, overwrite=True)
     from ml.segmentation.forecast import forecast
 
     configuration = load_configuration(arguments.configuration, arguments.changes, ["segmentation"])

@@ -8,7 +8,10 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.commands import Outcome, entry
-from headless.messages import logger
+from headless.messages import logger, progress_bar
+from headless.prompt_end import ended_promptly
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.files import check_folder_target
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,10 +24,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads gallery`; return exit code, paths of the pictures as JSON data and printed text."""
-    from synthroads_addon.blender.views.gallery import Quality, make_gallery
+    from synthroads_addon.blender.views.gallery import Quality, make_gallery, planned_pictures
 
+    check_folder_target(arguments.output)
     quality = Quality((arguments.width, arguments.width * 9 // 16), arguments.samples)
-    made = make_gallery(arguments.output, quality, arguments.only, logger.info)
+    planned, progress = planned_pictures(arguments.only), progress_bar(arguments)
+    if not planned:
+        raise InputError("--only", arguments.only, "is part of no picture's name, e.g. scene-, object-tree, materials-")
+    done = 0
+
+    def say(path: str) -> None:
+        nonlocal done
+        done += 1
+        logger.info(path)
+        progress("pictures", min(1.0, done / planned))
+
+    progress("pictures", 0.0)
+    with ended_promptly():
+        made = make_gallery(arguments.output, quality, arguments.only, say)
     return 0, {"pictures": [str(path) for path in made]}, f"{len(made)} pictures in {arguments.output}"
 
 

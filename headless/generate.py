@@ -10,8 +10,10 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.commands import (
+    AXIS_FILES,
     Outcome,
     add_allow_large_argument,
+    add_axis_name_argument,
     add_changes_argument,
     add_choice_arguments,
     add_device_argument,
@@ -23,7 +25,9 @@ from headless.commands import (
     whole_number,
 )
 from headless.messages import detail, progress_bar
-from synthroads_addon.scenario.scenario import load_scenario, scenario_names
+from synthroads_addon.base.changes import parse_change
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.scenario.scenario import Scenario, load_scenario, scenario_names
 from synthroads_addon.scenario.without import EFFECTS, scenario_without
 
 _FIELDS = {
@@ -48,7 +52,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "point on the trade-off (the scenario's own)"
     parser.add_argument("--fidelity", choices=("draft", "standard", "high"), help=text)
     parser.add_argument("--parameters", type=Path, metavar="FILE", help="take this road instead of sampling one")
-    parser.add_argument("--axis", type=Path, metavar="FILE", help="centreline, CSV (x, y, z in order) or GeoJSON")
+    parser.add_argument("--axis", type=Path, metavar="FILE", help=AXIS_FILES)
+    add_axis_name_argument(parser)
     add_choice_arguments(parser)
     add_allow_large_argument(parser)
     add_twin_argument(parser)
@@ -66,15 +71,40 @@ def add_without_argument(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads generate`; return exit code, the job's report as JSON data and printed text."""
     begun = time.perf_counter()
+    _check_road_changes(arguments)
     scenario = load_scenario(arguments.scenario, [*choice_changes(arguments), *all_changes(arguments, _FIELDS)])
     scenario = scenario_without(scenario, arguments.without)
     detail("scenario", scenario.to_dict())
     from synthroads_addon.jobs.generate import Job, generate
 
-    files = (arguments.output, arguments.parameters, arguments.axis)
+    files = (arguments.output, arguments.parameters, arguments.axis, arguments.axis_name)
     job = Job(scenario, *files, arguments.overwrite, new_file=True, begun=begun)
     report = generate(job, progress_bar(arguments))
     return 0, report, summary(report, arguments.output)
+
+
+def _check_road_changes(arguments: argparse.Namespace) -> None:
+    """Raise an InputError if ``--set`` changes what of the road the given axis or parameters say themselves."""
+    if not arguments.parameters and not arguments.axis:
+        return
+    from synthroads_addon.jobs.generate import FROM_AXIS
+
+    option = "--parameters" if arguments.parameters else "--axis"
+    for change in arguments.changes:
+        for name in _road_fields(change):
+            if arguments.parameters or name in FROM_AXIS:
+                what = "the whole road" if arguments.parameters else "course and place of the road"
+                text = f"road.{name} has no effect with {option}, whose file says {what}; leave one of the two out"
+                raise InputError("--set", change, text)
+
+
+def _road_fields(change: str) -> list[str]:
+    """Return the names of the road's fields that ``path=value`` sets."""
+    path, value = parse_change(change, Scenario)
+    first, _, rest = path.partition(".")
+    if first != "road":
+        return []
+    return [rest.partition(".")[0]] if rest else list(value) if isinstance(value, dict) else []
 
 
 def summary(report: dict[str, Any], output: Path) -> str:
@@ -82,11 +112,9 @@ def summary(report: dict[str, Any], output: Path) -> str:
     counts = report.get("counts", {})
     lines = [*(f"warning: {text}" for text in report.get("warnings", [])), *choice_summary(report)]
     if "axis" in report:
-        fit = report["axis"]["horizontal"]
-        lines.append(
-            f"axis: {report['axis']['elements']} elements, rms {fit['rms'] * 100:.1f} cm, 95 % within "
-            f"{fit['p95'] * 100:.1f} cm, worst {fit['worst'] * 100:.1f} cm at station {fit['worst_station']:.0f} m"
-        )
+        from synthroads_addon.jobs.axis_source import axis_summary
+
+        lines.append(axis_summary(report["axis"]))
     if "points" in counts:
         lines.append(f"{counts['points']:,} points from {counts['pulses']:,} pulses, {counts['triangles']:,} triangles")
         if counts["below_threshold"] > counts["points"]:

@@ -18,7 +18,7 @@ from ml.configuration import configuration_kind
 from synthroads_addon.base.catalogue import Kind, entries
 from synthroads_addon.base.errors import InputError, nearest_name
 from synthroads_addon.base.field_list import FieldEntry, fields_of
-from synthroads_addon.base.text_table import text_table
+from synthroads_addon.base.text.table import text_table
 from synthroads_addon.scenario.scenario import Scenario
 
 _FIELDS = "fields"

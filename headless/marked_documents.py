@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.base.files import write_file
+from synthroads_addon.base.files import check_file_target, write_file
 
 BEGIN, END = "<!-- table: {} -->", "<!-- end of table -->"
 
@@ -43,6 +43,7 @@ def put_tables(document: Path | None, names: Iterable[str], make: Callable[[], M
     if document is None:
         return make()
     replace_tables(_read_document(document), dict.fromkeys(names, ""))
+    check_file_target(document, FIELD, overwrite=True)
     tables = make()
     write_file(document, replace_tables(_read_document(document), tables).encode(), FIELD, overwrite=True)
     return tables

@@ -12,7 +12,8 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.commands import Outcome, entry
-from synthroads_addon.base.errors import InputError, OutputError
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.files import check_file_target
 
 _LIMITS = {"voxel": (0.02, 10.0), "corridor": (5.0, 1000.0), "limit_mb": (0.5, 1e5)}
 
@@ -50,11 +51,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
 
 def _check(arguments: argparse.Namespace) -> None:
-    """Raise an InputError or OutputError if an option is out of range or the file exists, before hours of work."""
-    if arguments.output.suffix != ".npz":
-        raise InputError("--output", str(arguments.output), "must end in .npz")
-    if arguments.output.exists() and not arguments.overwrite:
-        raise OutputError("--output", str(arguments.output), "is there already; --overwrite replaces it")
+    """Raise an InputError if an option is out of range or the file can't be written, before hours of work."""
+    check_file_target(arguments.output, overwrite=arguments.overwrite, ending=".npz")
     if not 0 <= arguments.seed < 2**63:
         raise InputError("--seed", arguments.seed, "must be a whole number from 0")
     for name, (low, high) in _LIMITS.items():

@@ -9,11 +9,12 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.commands import Outcome, add_changes_argument, all_changes, entry
+from synthroads_addon.base.changes import apply_change
 from synthroads_addon.road.guidelines import STANDARD_CROSS_SECTIONS, USUAL_SECTION
 from synthroads_addon.road.parameters import DESIGN_CLASSES, RoadParameters
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
-from synthroads_addon.scenario.scenario import Scenario, apply_change
+from synthroads_addon.scenario.scenario import Scenario
 
 _FIELDS = {
     "design_class": "road.design_class",
@@ -42,7 +43,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads parameters`; return exit code, parameters as JSON data, and text or an iterator of lines."""
     data: Any = {}
     for change in all_changes(arguments, _FIELDS):
-        data = apply_change(data, change)
+        data = apply_change(data, change, Scenario)
     scenario = Scenario.from_dict(data)
     first = sample_road(scenario.road, scenario.seed)
     if arguments.count is None:

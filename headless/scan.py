@@ -24,7 +24,7 @@ from headless.commands import (
 )
 from headless.messages import detail, progress_bar
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.scenario.scenario import Scenario, load_scenario, parse_change, scenario_names, with_changes
+from synthroads_addon.scenario.scenario import Scenario, load_scenario, scenario_changes, scenario_names, with_changes
 from synthroads_addon.scenario.without import scenario_without
 
 _FIELDS = {
@@ -37,7 +37,7 @@ _FIELDS = {
     "allow_large": "scan.most_pulses",
 }
 """Arguments that are short for fields of the scenario."""
-_SAME = ("output", "scene", "path", "classes", "road", "epsg", "origin", "up", "overwrite")
+_SAME = ("output", "scene", "path", "classes", "road", "epsg", "origin", "up", "visible", "overwrite")
 """Arguments that the scan of a scene has under the same name."""
 
 
@@ -71,10 +71,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_choice_arguments(parser)
     add_allow_large_argument(parser)
     parser.add_argument("--epsg", type=int, metavar="N", help="coordinate system of the map (that of the scene's road)")
-    text = "map coordinates of the scene's origin (0,0,0)"
-    parser.add_argument("--origin", type=numbers((3,), "X,Y,Z"), metavar="X,Y,Z", help=text)
+    text = "map coordinates of the scene's origin (0,0,0); auto: the scene's own are the map's"
+    parser.add_argument("--origin", type=_origin, metavar="X,Y,Z", help=text)
     parser.add_argument("--up", choices=("y", "z"), help="what points up in .obj (y), .ply and .stl (z)")
+    text = "whose state of the scene: that of renders, or of the viewport (render)"
+    parser.add_argument("--visible", choices=("render", "viewport"), default="render", help=text)
+    text = "further folder with pictures and parts that a scene other than a .blend names (its own; can be repeated)"
+    parser.add_argument("--also-from", type=Path, action="append", default=[], metavar="DIR", help=text)
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
+
+
+def _origin(text: str) -> tuple[float, ...] | str:
+    return text if text == "auto" else numbers((3,), "X,Y,Z, or auto,")(text)
 
 
 def run(arguments: argparse.Namespace) -> Outcome:
@@ -85,7 +93,9 @@ def run(arguments: argparse.Namespace) -> Outcome:
     from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
 
     same = {name: getattr(arguments, name) for name in _SAME}
-    job = SceneScan(scenario=scenario, tripods=tuple(arguments.tripod), begun=begun, **same)
+    job = SceneScan(
+        scenario=scenario, tripods=tuple(arguments.tripod), also_from=tuple(arguments.also_from), begun=begun, **same
+    )
     report = scan_scene(job, progress_bar(arguments))
     return 0, report, summary(report, arguments.output)
 
@@ -104,7 +114,7 @@ def scenario_of(arguments: argparse.Namespace) -> Scenario:
         changes.append('scan.platform.kind="tripod"')
     if arguments.scenario:
         return load_scenario(arguments.scenario, changes)
-    return Scenario.from_dict(with_changes(Scenario().to_dict(), map(parse_change, changes)))
+    return Scenario.from_dict(with_changes(Scenario().to_dict(), scenario_changes(changes)))
 
 
 def summary(report: dict[str, Any], output: Path) -> str:

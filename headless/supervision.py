@@ -19,7 +19,9 @@ from functools import partial
 from typing import NoReturn
 
 from headless import ENDS
+from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.scratch.folders import record_folders_in, remove_recorded_folders
+from synthroads_addon.base.scratch.opened_file import note_opened_file_in, noted_file
 
 LOSSES = (
     *("bad_alloc", "alloc returns null", "annot allocate memory", "emory allocation"),
@@ -32,6 +34,7 @@ _BEGINNINGS = (
     *("lost sys.stderr", "Traceback (most recent call last)", "MemoryError"),
 )
 """Parts of the first line of what they write before they end the process."""
+_CRASHES = (signal.SIGSEGV, signal.SIGABRT, signal.SIGBUS, signal.SIGFPE, signal.SIGILL)
 _DEATH_SIGNAL = 1
 """Linux's PR_SET_PDEATHSIG."""
 
@@ -44,16 +47,17 @@ def supervise() -> None:
     """
     if "bpy" in sys.modules or threading.active_count() > 1:
         return
-    journal = os.memfd_create("synthroads")
+    journal, opened = os.memfd_create("synthroads"), os.memfd_create("synthroads-opened")
     spoken = _ErrorPipe()
     handlers = {number: signal.getsignal(number) for number in ENDS}
     signal.pthread_sigmask(signal.SIG_BLOCK, ENDS)
     child = os.fork()
     if child:
-        _wait_and_exit(child, spoken, journal)
+        _wait_and_exit(child, spoken, journal, opened)
     _die_with_parent(os.getppid())
     spoken.redirect()
     record_folders_in(journal)
+    note_opened_file_in(opened)
     for number, handler in handlers.items():
         signal.signal(number, handler)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDS)
@@ -66,7 +70,7 @@ def _die_with_parent(parent: int) -> None:
         os._exit(130)
 
 
-def _wait_and_exit(child: int, spoken: _ErrorPipe, journal: int) -> NoReturn:
+def _wait_and_exit(child: int, spoken: _ErrorPipe, journal: int, opened: int) -> NoReturn:
     """Wait for the child, passing on signals and errors, and end this process with the child's exit code."""
 
     def hand_on(number: int, _: object) -> None:
@@ -85,8 +89,9 @@ def _wait_and_exit(child: int, spoken: _ErrorPipe, journal: int) -> NoReturn:
     short = code < 0 and _memory_is_short(-code, spoken.held)
     remove_recorded_folders(journal)  # those that are still there
     if code < 0:
-        _say(_line(-code, short))
-        code = 2 if short else 1
+        told = None if short else crash_line(-code, noted_file(opened))
+        _say(told or _line(-code, short))
+        code = 2 if short or told else 1
     elif code != 2:  # else a line says it all
         _say(spoken.held)
     os._exit(code)
@@ -97,6 +102,15 @@ def _memory_is_short(number: int, said: str) -> bool:
     limits = [resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_AS, resource.RLIMIT_DATA)]
     limited = any(limit != resource.RLIM_INFINITY for limit in limits)
     return number == signal.SIGKILL or limited or any(sign in said for sign in LOSSES)
+
+
+def crash_line(number: int, file: str) -> str | None:
+    """Return the line on a file that Blender crashed on, by the signal and the file's name; None if it wasn't one."""
+    if not file or number not in _CRASHES:
+        return None
+    what = f"Blender crashed as it opened it ({signal.Signals(number).name})"
+    remedy = "the file is damaged, or of another Blender: save it anew"
+    return f"error: {InputError(file, None, f'{what}; {remedy}')}; nothing was left half-written\n"
 
 
 def _line(number: int, short: bool) -> str:

@@ -15,10 +15,10 @@ if __name__ == "__main__":
 from headless.commands import Outcome, entry
 from headless.marked_documents import put_tables
 from headless.messages import progress_bar
-from headless.tradeoff_plot import plot
-from headless.tradeoff_table import TABLES, table_texts
+from headless.pictures import can_draw, check_drawable
+from headless.tradeoff_table import TABLES, row_fault, table_texts
 from synthroads_addon.base.errors import InputError, OutputError, nearest_name
-from synthroads_addon.base.files import write_file
+from synthroads_addon.base.files import check_folder_target, write_file
 from synthroads_addon.base.progress import Progress
 from synthroads_addon.base.schema import canonical_json, read_json
 from synthroads_addon.base.version import generator
@@ -61,7 +61,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     scenes = list(dict.fromkeys(arguments.scenario or SCENES))
     titles = _check_request(arguments, scenes)
     filled = _filled_tables(arguments)
-    progress = progress_bar(arguments)
+    progress, drawn = progress_bar(arguments), can_draw("the plot")
     results = {}
 
     def measure() -> dict[str, str]:
@@ -70,7 +70,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
             results[title] = _measure_all(arguments, scene, title, _part(progress, number, len(titles)))
             texts = table_texts(results[title], scene)
             tables |= {_TABLE.format(title, table): text for table, text in texts.items()}
-            _write(arguments, title, results[title], "\n".join(texts.values()))
+            _write(arguments, title, results[title], "\n".join(texts.values()), drawn=drawn)
         printed.update(tables)
         return {name: text for name, text in tables.items() if name in names}
 
@@ -90,6 +90,8 @@ def _check_request(arguments: argparse.Namespace, scenes: Sequence[str]) -> dict
     for knob in arguments.knobs:
         if knob not in KNOBS:
             raise InputError("--knobs", knob, f"must be any of {', '.join(KNOBS)}{nearest_name(knob, KNOBS)}")
+    if arguments.pictures:
+        check_drawable("--pictures", arguments.pictures)
     if arguments.resume and arguments.overwrite:
         raise InputError("--resume", None, "can't be given with --overwrite, which keeps nothing")
     there = [name for title in titles.values() for name in (_ROWS + "/" + title, f"{title}.json")]
@@ -97,6 +99,9 @@ def _check_request(arguments: argparse.Namespace, scenes: Sequence[str]) -> dict
     if present and not arguments.overwrite and not arguments.resume:
         target = str(arguments.output)
         raise OutputError("--output", target, f"already holds {present}; --resume keeps it, --overwrite replaces it")
+    check_folder_target(arguments.output)
+    if arguments.pictures:
+        check_folder_target(arguments.pictures, "--pictures")
     return titles
 
 
@@ -133,7 +138,7 @@ def _measure_all(arguments: argparse.Namespace, scene: str, title: str, progress
         progress(f"{title} {knob} {value}", number / len(list(knob_rows(KNOBS))))
         path = arguments.output / _ROWS / title / f"{knob}-{_file_name(value)}.json"
         job = _fingerprint(scene, knob, value)
-        result = _read_kept_row(path, job) if arguments.resume else None
+        result = _read_kept_row(path, job, knob, value) if arguments.resume else None
         if result is None and (knob, value) in chosen:
             result = _measure_row(scene, knob, value)
             write_file(path, canonical_json({"job": job, "row": result}).encode(), overwrite=True)
@@ -152,14 +157,22 @@ def _fingerprint(scene: str, knob: str, value: Any) -> str:
     return hashlib.sha256(f"{generator()} {changed}".encode()).hexdigest()
 
 
-def _read_kept_row(path: Path, job: str) -> dict[str, Any] | None:
-    """Return a row measured earlier for the same job, or None if there is none or it couldn't be measured."""
+def _read_kept_row(path: Path, job: str, knob: str, value: Any) -> dict[str, Any] | None:
+    """Return a row measured earlier for the same job, or None if there is none or it couldn't be measured.
+
+    Raises:
+        InputError: the file is damaged.
+    """
     if not path.exists():
         return None
     data = read_json(path)
-    if not isinstance(data, dict) or data.get("job") != job or "left_out" in data["row"]:
+    if isinstance(data, dict) and data.get("job") != job:
         return None
-    row: dict[str, Any] = data["row"]
+    row = data.get("row") if isinstance(data, dict) else None
+    if isinstance(row, dict) and "left_out" in row:
+        return None
+    if fault := row_fault(row, knob, value):
+        raise InputError(f"{path}: row", None, f"{fault}: it is damaged; without the file it is measured again")
     return row
 
 
@@ -181,14 +194,20 @@ def _measured_once(scene: str, knob: str, value: Any) -> dict[str, Any]:
     return result
 
 
-def _write(arguments: argparse.Namespace, title: str, results: Sequence[dict[str, Any]], table: str) -> None:
+def _write(
+    arguments: argparse.Namespace, title: str, results: Sequence[dict[str, Any]], table: str, *, drawn: bool
+) -> None:
     folder: Path = arguments.output
     write_file(folder / f"{title}.json", canonical_json({"rows": results}).encode(), overwrite=True)
     write_file(folder / f"{title}.md", table.encode(), overwrite=True)
-    drawn = folder / f"{title}.png"
-    plot(results, drawn)
+    if not drawn:
+        return
+    from headless.tradeoff_plot import plot
+
+    picture = folder / f"{title}.png"
+    plot(results, picture)
     if arguments.pictures:
-        write_file(arguments.pictures / f"tradeoff-{title}.png", drawn.read_bytes(), "--pictures", overwrite=True)
+        write_file(arguments.pictures / f"tradeoff-{title}.png", picture.read_bytes(), "--pictures", overwrite=True)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from headless.tradeoff_table import ROW_TITLES, measured_rows
-from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.text.literal import literal_texts, shown_text
 from synthroads_addon.jobs.measure.tradeoff import KNOBS
 
 Row = Mapping[str, Any]
@@ -14,16 +14,11 @@ _DECADES = 30.0
 """An error that spans more than this is drawn on a logarithmic axis."""
 
 
+@literal_texts()
 def plot(results: Sequence[Row], path: Path) -> None:
-    """Draw rows as errors against seconds into an image file, one panel per kind of error; presets are stars.
+    """Draw rows as errors against seconds into an image file, one panel per kind of error; presets are stars."""
+    import matplotlib as mpl
 
-    Raises:
-        InputError: matplotlib is missing.
-    """
-    try:
-        import matplotlib as mpl
-    except ImportError:
-        raise InputError("tradeoff", None, "needs matplotlib for its plot: pip install matplotlib") from None
     mpl.use("Agg")
     from matplotlib import pyplot
 
@@ -108,5 +103,5 @@ def _draw_knob(axis: Any, rows_of_knob: Sequence[Row], knob: str, name: str) -> 
     for row, a, b in zip(rows_of_knob, x, y, strict=True):
         place = (7, 7) if preset else (4, 4 if b > 0.0 else -11)
         look: dict[str, Any] = {"fontsize": 8, "color": colour, "weight": "bold" if preset else "normal"}
-        axis.annotate(str(row["value"]), (a, b), textcoords="offset points", xytext=place, **look)
+        axis.annotate(shown_text(str(row["value"])), (a, b), textcoords="offset points", xytext=place, **look)
     return handle

@@ -3,7 +3,8 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from synthroads_addon.base.text_table import markdown_table
+from synthroads_addon.base.schema import is_number
+from synthroads_addon.base.text.table import markdown_table
 from synthroads_addon.jobs.measure.tradeoff import ALIKE, KNOBS
 from synthroads_addon.scenario.colour import USUAL_RANGE, image_scale
 from synthroads_addon.scenario.scenario import load_scenario
@@ -43,6 +44,32 @@ TABLES: dict[str, tuple[str, ...]] = {
 """Table -> the columns of costs that it has, before those of the errors."""
 
 
+def row_fault(row: Any, knob: str, value: Any) -> str | None:
+    """Return what keeps a row that was read from a file out of the tables, or None if it is one of this knob and value.
+
+    Args:
+        row: as JSON data; one of `jobs.measure.rows.measure_row`, perhaps repeated.
+        knob, value: that it is of.
+    """
+    if not isinstance(row, dict) or (row.get("knob"), row.get("value")) != (knob, value):
+        return f"must be an object with the knob {knob} and the value {value}"
+    numbers = {name: form.endswith("d") for name, (_, form) in _COSTS.items() if name in TABLES[KNOBS[knob].table]}
+    for name, whole in numbers.items():
+        cost = row.get(name, "")
+        unknown = cost is None and name != "seconds"
+        if not unknown and not (is_number(cost) and cost >= 0.0 and not (whole and isinstance(cost, float))):
+            return f"{name} must be a {'whole ' if whole else ''}number from 0"
+    for name, known in (("errors", tuple(ROW_TITLES)), ("shares", _SHARES)):
+        part = row.get(name, {} if name == "shares" else None)
+        if not isinstance(part, dict) or not all(key in known and is_number(part[key]) for key in part):
+            return f"{name} must be numbers by name: {', '.join(known)}"
+    several = row.get("all_seconds", [1.0])
+    if not isinstance(several, list) or not all(is_number(one) and one > 0.0 for one in several):
+        return "all_seconds must be a list of numbers above 0"
+    wrong = next((name for name in ("machine", "colour_truth") if not isinstance(row.get(name, ""), str)), None)
+    return wrong and f"{wrong} must be a text"
+
+
 def measured_rows(results: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     """Return the rows without those that couldn't be measured in this Blender."""
     return [row for row in results if "left_out" not in row]
@@ -64,7 +91,10 @@ def better_row(row: Mapping[str, Any], others: Iterable[Mapping[str, Any]], nois
     """
 
     def as_accurate(other: Mapping[str, Any]) -> bool:
-        return all(abs(other["errors"][name]) <= (1.0 + ALIKE) * abs(error) for name, error in row["errors"].items())
+        found = other["errors"]
+        return all(
+            name in found and abs(found[name]) <= (1.0 + ALIKE) * abs(error) for name, error in row["errors"].items()
+        )
 
     faster = [other for other in others if other["seconds"] < row["seconds"] * (1.0 - noise) and as_accurate(other)]
     return min(faster, key=lambda other: other["seconds"], default=None)

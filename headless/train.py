@@ -1,15 +1,22 @@
 """Train a model: a network for segmentation, or one of the centreline models, as a configuration says."""
 
+from __future__ import annotations
+
 import argparse
+import shlex
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.commands import Outcome, add_changes_argument, entry
+from headless.commands import Outcome, add_changes_argument, entry, note_at_interrupt
 from headless.messages import detail, progress_bar
 from ml.configuration import SHIPPED, load_configuration, names_in
+
+if TYPE_CHECKING:
+    from ml.runs import Run
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,8 +37,24 @@ def run(arguments: argparse.Namespace) -> Outcome:
     configuration = load_configuration(arguments.configuration, arguments.changes)
     detail("configuration", configuration.to_dict())
     begun = Run.start(arguments.output, configuration, resume=arguments.resume, overwrite=arguments.overwrite)
+    note_at_interrupt(lambda: _kept(arguments, begun))
     metrics = task(configuration.task).train(begun, progress_bar(arguments))
     return 0, metrics, f"trained {arguments.output}: {summary(metrics)}"
+
+
+def _kept(arguments: argparse.Namespace, run: Run[Any]) -> str:
+    """Return what is kept of an interrupted training, and the command that goes on with it."""
+    from ml.runs import CHECKPOINT, PRETRAINING
+
+    changes = [word for change in arguments.changes for word in ("--set", change)]
+    given = [arguments.configuration, "--output", str(arguments.output), *changes, "--resume"]
+    if not run.begun and not run.kept:
+        return f"nothing was changed in {arguments.output}: it was still reading data"
+    epochs = run.configuration.schedule.epochs
+    kept = f"epoch {run.kept} of {epochs} is kept" if run.kept else f"no epoch of {epochs} was finished"
+    if not run.kept and (arguments.output / PRETRAINING / CHECKPOINT).is_file():
+        kept = "the pretraining's epochs are kept"
+    return f"{kept} in {arguments.output}; go on with: {shlex.join(['synthroads', 'train', *given])}"
 
 
 def summary(metrics: dict[str, object]) -> str:

@@ -3,6 +3,7 @@
 import argparse
 import sys
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import get_args
 
@@ -10,8 +11,10 @@ if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.commands import Outcome, add_renamed_argument, add_twin_argument, entry
+from headless.messages import logger, progress_bar
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import output_folder
+from synthroads_addon.base.progress import duration
 from synthroads_addon.base.schema import read_json
 from synthroads_addon.road.parameters import read_parameters
 from synthroads_addon.twin.formats import (
@@ -27,6 +30,8 @@ from synthroads_addon.twin.formats import (
 )
 
 _LIMITS = (1e-4, 1.0)
+_LONG = 30.0
+"""Seconds from which it is said beforehand how long the work takes."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,6 +45,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "where IFC's objects stand: along the alignment, or by coordinates for viewers that know none (%(default)s)"
     placements = get_args(IfcPlacement)
     parser.add_argument("--ifc-placement", choices=placements, default=IfcSettings().placement, help=text)
+    text = "OpenDRIVE in a projection about the site without an offset, for readers of lat_0 and lon_0 alone"
+    parser.add_argument("--local-projection", action="store_true", help=text)
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
 
 
@@ -48,17 +55,34 @@ def run(arguments: argparse.Namespace) -> Outcome:
     deviation = arguments.max_deviation
     if not _LIMITS[0] <= deviation <= _LIMITS[1]:
         raise InputError("--max-deviation", deviation, f"must be from {_LIMITS[0]:g} to {_LIMITS[1]:g} m")
-    formats = arguments.twin
+    formats, local = arguments.twin, arguments.local_projection
     check_formats(formats)
+    if local and "opendrive" not in formats:
+        raise InputError("--local-projection", None, f"is for opendrive, which isn't among {', '.join(formats)}")
     parameters = read_parameters(arguments.parameters)
     names = twin_file_names(formats)
     with output_folder(arguments.output, names, arguments.overwrite) as folder:
-        write_twin(parameters, folder, formats, deviation, IfcSettings(placement=arguments.ifc_placement))
+        if told := forecast(parameters.alignment.length, formats):
+            logger.info(told)
+        ifc = IfcSettings(placement=arguments.ifc_placement)
+        write_twin(parameters, folder, formats, deviation, ifc, local, progress_bar(arguments))
     files = {name: arguments.output / FORMATS[name].file for name in formats}
     reports = {name: arguments.output / report_file_name(name) for name in formats}
     lost = {name: _read_losses(path) for name, path in reports.items()}
     result = {"files": _texts(files), "reports": _texts(reports), "lost": lost}
     return 0, result, "\n".join(f"{_written(path)}\n{_line(reports[name], lost[name])}" for name, path in files.items())
+
+
+def forecast(length: float, formats: Sequence[str]) -> str:
+    """Return a line on what models of a road of a length (m) roughly take; empty for less than `_LONG` seconds."""
+    entries = [FORMATS[name] for name in formats]
+    seconds, megabytes = (sum(getattr(one, of) for one in entries) * length / 1e3 for of in ("seconds", "megabytes"))
+    if seconds < _LONG:
+        return ""
+    takes = f"take about {duration(seconds)} and {megabytes:,.0f} MB"
+    return (
+        f"models of {length / 1e3:,.0f} km ({', '.join(formats)}) {takes}, with what stands beside the demo's motorway"
+    )
 
 
 def _texts(paths: dict[str, Path]) -> dict[str, str]:

@@ -133,7 +133,7 @@ def cloud_traits(path: Path) -> CloudTraits:
     brightest, colorful = 0.0, False
     darkest = inf
     with open_cloud(path) as cloud:
-        for block in cloud.blocks(_SAMPLE):
+        for block in cloud.usable_blocks(_SAMPLE):
             if not len(block):
                 continue
             plan = np.floor(block.xyz[:, :2]).astype(np.int64)

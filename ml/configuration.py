@@ -7,9 +7,9 @@ from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, ModelWrapValidatorHandler, model_validator
 
+from synthroads_addon.base.changes import apply_change
 from synthroads_addon.base.errors import InputError, nearest_name
 from synthroads_addon.base.schema import Model, quantity, read_yaml
-from synthroads_addon.scenario.scenario import apply_change
 
 SHIPPED = Path(__file__).parent / "configurations"
 EXPERIMENTS = SHIPPED / "experiments"

@@ -4,18 +4,19 @@
 own: `ml.segmentation.experiment` and `ml.centerline.experiment`.
 """
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any, ClassVar
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
+from synthroads_addon.base.changes import apply_change, apply_values
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import write_file
 from synthroads_addon.base.schema import Model, canonical_json, read_json, read_yaml
 from synthroads_addon.dataset.manifest import checksum
-from synthroads_addon.scenario.scenario import apply_change, apply_values
 
 from .configuration import EXPERIMENTS, TASKS, Configuration, configuration_kind, load_configuration, shipped_file
 from .runs import CHECKPOINT, Run, lasting_data
@@ -23,6 +24,7 @@ from .runs import CHECKPOINT, Run, lasting_data
 RESULTS, TABLE = "results.json", "table.md"
 """Files with the scores of all variants, seeds and tests, in an experiment's folder."""
 _SEGMENTATION = "segmentation"
+_FOLDER_NAME = re.compile(r"[^/\\:.][^/\\:]{0,100}")
 
 
 class Variant(Model):
@@ -43,8 +45,17 @@ class Experiment(Model):
     title: str = Field(min_length=1, description="Title.")
     configuration: str = Field(description="Configuration that all start from.")
     set: dict[str, Any] = Field({}, description="Changes of it, path: value.")
-    variants: dict[str, Variant] = Field(min_length=1, description="What is compared.")
+    variants: dict[str, Variant] = Field(
+        min_length=1, description="What is compared, by name, which is that of a folder in the output."
+    )
     seeds: tuple[int, ...] = Field((1, 2, 3, 4, 5), min_length=1, description="Seeds of each variant.")
+
+    @field_validator("variants")
+    @classmethod
+    def _check_names(cls, variants: dict[str, Variant]) -> dict[str, Variant]:
+        if wrong := next((name for name in variants if not _FOLDER_NAME.fullmatch(name)), None):
+            raise ValueError(f"'{wrong}' must be the name of a folder: no / and no \\ in it, and no dot before it")
+        return variants
 
     def filled_data(self, folders: Mapping[str, str]) -> dict[str, Any]:
         """Return the fields of the configuration's data that the experiment states, {NAME} in all paths filled in.
@@ -116,21 +127,49 @@ def fill_path(path: str, folders: Mapping[str, str]) -> str:
         raise InputError("--data", name, f"must be given: {name}=FOLDER") from None
 
 
-def cached_scores(run: Run[Any], file: Path, score: Callable[[], dict[str, Any]], **more: Any) -> dict[str, Any]:
+def kept_figures(file: Path, name: str, made_from: Any, is_sound: Callable[[Any], bool]) -> dict[str, Any] | None:
+    """Return the figures that an experiment keeps in a file, or None if there are none, or those of something else.
+
+    Args:
+        file: of an object with figures and, unless ``made_from`` is None, with what they were made from.
+        name: of the figures in it.
+        made_from: what they should be made from, as JSON data.
+        is_sound: returns whether they are such figures as a table needs.
+
+    Raises:
+        InputError: the file is damaged.
+    """
+    if not file.is_file():
+        return None
+    kept = read_json(file)
+    if made_from is not None and isinstance(kept, dict) and kept.get("made_from") != made_from:
+        return None
+    if not isinstance(kept, dict) or not is_sound(kept.get(name)):
+        told = "aren't the figures of this experiment: without the file they are made anew"
+        raise InputError(f"{file}: {name}", None, told)
+    figures: dict[str, Any] = kept[name]
+    return figures
+
+
+def cached_scores(
+    run: Run[Any], file: Path, score: Callable[[], dict[str, Any]], is_sound: Callable[[Any], bool], **more: Any
+) -> dict[str, Any]:
     """Return a trained run's scores, from `file` where they were made of the same configuration, weights and `more`.
 
     Args:
         run: with the configuration that it is tested with.
         file: for the scores, which are written.
         score: makes them.
+        is_sound: see `kept_figures`.
         more: what else they depend on, as JSON data.
+
+    Raises:
+        InputError: the file is damaged.
     """
     wanted = lasting_data(run.configuration.to_dict())
     made_from = {"configuration": wanted, "checkpoint_sha256": checksum(run.folder / CHECKPOINT), **more}
-    scores: dict[str, Any]
-    if file.is_file() and (kept := read_json(file)).get("made_from") == made_from:
-        scores = kept["tests"]
-        return scores
+    if (kept := kept_figures(file, "tests", made_from, is_sound)) is not None:
+        return kept
     scores = score()
     write_file(file, canonical_json({"made_from": made_from, "tests": scores}).encode(), overwrite=True)
     return scores

@@ -14,8 +14,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from synthroads_addon.base.errors import InputError, OutputError
-from synthroads_addon.base.files import write_file
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.files import check_file_target, write_file
 
 OPSET = 18
 """Version of ONNX' operators."""
@@ -52,8 +52,7 @@ def write_onnx(network: Exportable, target: Path, *, overwrite: bool = False) ->
         InputError: the package onnx or onnxscript isn't installed, or the difference is more than `TOLERANCE`.
         OutputError: the file is there already or can't be written.
     """
-    if target.exists() and not overwrite:
-        raise OutputError("--output", str(target), "is there already; --overwrite replaces it")
+    check_file_target(target, overwrite=overwrite)
     content = onnx_bytes(network)
     difference = largest_difference(network, content)
     if difference is not None and not difference <= TOLERANCE:
@@ -77,7 +76,8 @@ def onnx_bytes(network: Exportable) -> bytes:
     shapes = tuple(
         {axis: axes[length] for axis, length in network.dynamic.get(name, {}).items()} for name in network.inputs
     )
-    logging.getLogger("onnxscript").setLevel(logging.ERROR)
+    for name in ("onnxscript", "torch.onnx"):  # which tell of packages that no network of ours needs
+        logging.getLogger(name).setLevel(logging.ERROR)
     try:
         with warnings.catch_warnings(), torch.no_grad():
             warnings.simplefilter("ignore")  # of PyTorch's own deprecations

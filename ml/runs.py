@@ -5,21 +5,24 @@ from __future__ import annotations
 import io
 import math
 import shutil
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 import torch
+from torch import nn
 
 from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
-from synthroads_addon.base.files import write_file
+from synthroads_addon.base.files import folder_at_work, write_file
+from synthroads_addon.base.named_paths import path_inside
 from synthroads_addon.base.random_streams import stream
 from synthroads_addon.base.schema import canonical_json, read_json
+from synthroads_addon.base.text.literal import literal_texts, shown_text
 
 from .configuration import Configuration, from_data
-from .processes import process_number
+from .processes import process_number, wait_for_all
 
 CONFIGURATION = "configuration.json"
 CHECKPOINT = "checkpoint.pt"
@@ -29,6 +32,10 @@ CURVES = "curves.png"
 CALIBRATION = "calibration.json"
 PRETRAINING = "pretraining"
 """Folder, within that of a fine-tuned or self-trained run, of what it began with, and of its rounds but the last."""
+LOCK = ".lock"
+"""File that the training at work in the folder holds locked; it is gone at the end."""
+NOT_FINITE = "not all that it says of the cloud is finite: its weights are beyond reason; train it anew"
+"""Fault of a network, as an error says it."""
 FREE_WHEN_RESUMING = ("threads", "device", "workers", "prepare_on")
 """Fields that may change between the parts of one training: they say where it runs, not what it learns."""
 _FREE_IN_STREAM = ("producers", "folder")
@@ -45,38 +52,113 @@ class Run(Generic[C]):
         folder: of its files.
         configuration: all that it depends on.
         history: one dictionary of numbers per epoch that is done.
+        kept: epochs that the checkpoint holds, from which the training can go on.
+        resume, overwrite: whether what is in the folder is gone on with, or replaced.
+        begun: whether its configuration stands in the folder.
+        held: whether this process holds the folder's lock.
     """
 
     folder: Path
     configuration: C
     history: list[dict[str, float]] = field(default_factory=list)
+    kept: int = 0
+    resume: bool = False
+    overwrite: bool = False
+    begun: bool = False
+    held: bool = False
 
     @classmethod
     def start(cls, folder: Path, configuration: C, *, resume: bool = False, overwrite: bool = False) -> Run[C]:
-        """Return a new run whose folder is made, or with `resume` the interrupted run in it.
+        """Return a new run, or with `resume` the interrupted run in a folder; nothing is written before `begin`.
+
+        A configuration beside which no epoch is kept is no run: whatever ended that training, nothing is lost with it.
 
         Raises:
             OutputError: the folder holds a run already and neither ``resume`` nor ``overwrite`` says what to do.
             InputError: the run to resume was made with another configuration.
         """
-        run = cls(folder, configuration)
-        if process_number():
-            return run  # the first process's, which alone writes
-        there = (folder / CONFIGURATION).exists()
-        if there and resume:
-            run._resume(read_json(folder / CONFIGURATION))
-        elif there and not overwrite:
-            raise OutputError("--output", str(folder), "holds a run already; --resume goes on, --overwrite begins anew")
-        else:
-            try:
-                for name in (CHECKPOINT, HISTORY, METRICS, CURVES, CALIBRATION):
-                    (folder / name).unlink(missing_ok=True)
-                if (folder / PRETRAINING).is_dir():
-                    shutil.rmtree(folder / PRETRAINING)
-            except OSError as error:
-                raise OutputError("--output", str(folder), f"cannot be written ({error.strerror})") from None
-        write_file(folder / CONFIGURATION, canonical_json(configuration.to_dict()).encode(), overwrite=True)
+        run = cls(folder, configuration, resume=resume, overwrite=overwrite)
+        if not process_number():  # the first process's, which alone writes
+            run._goes_on()
         return run
+
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Context in which no other training is at work in the run's folder; within it, it does nothing more.
+
+        Where the input is at fault before an epoch is kept, nothing of the run is left.
+
+        Raises:
+            OutputError: another one is, or the folder can't be written.
+        """
+        if self.held or process_number():
+            yield
+            return
+        with folder_at_work(self.folder, LOCK, keep=False):
+            self.held = True
+            try:
+                yield
+            except InputError:
+                self._remove_unless_kept()
+                raise
+            finally:
+                self.held = False
+
+    def begin(self) -> None:
+        """Write the run's configuration, and remove what stands of a run that it replaces; once, when data are read.
+
+        Of several processes that train together all come here, and the first one writes.
+
+        Raises:
+            OutputError, InputError: see `start`; or the folder can't be written.
+        """
+        if self.begun:
+            return
+        if not process_number():
+            if not self._goes_on():
+                self._clear()
+            content = canonical_json(self.configuration.to_dict()).encode()
+            write_file(self.folder / CONFIGURATION, content, overwrite=True)
+        self.begun = True
+        wait_for_all()  # nobody goes on with a checkpoint that is removed until here
+
+    def _goes_on(self) -> bool:
+        """Take over what an interrupted run has kept, and return whether there is one; for errors see `start`."""
+        if not (self.folder / CONFIGURATION).exists() or not self._kept_checkpoints():
+            return False
+        if self.resume:
+            self._resume(read_json(self.folder / CONFIGURATION))
+        elif not self.overwrite:
+            told = "holds a run already; --resume goes on, --overwrite begins anew"
+            raise OutputError("--output", str(self.folder), told)
+        return self.resume
+
+    def _kept_checkpoints(self) -> bool:
+        """Return whether an epoch of the run, or of what it began with, is kept in its folder."""
+        return (self.folder / CHECKPOINT).exists() or any((self.folder / PRETRAINING).rglob(CHECKPOINT))
+
+    def _remove_unless_kept(self) -> None:
+        """Remove what `begin` has written, and the folder if it is empty then, unless an epoch is kept."""
+        if self.begun and not self._kept_checkpoints():
+            with suppress(OSError):  # what ended the training is told
+                self._clear()
+                (self.folder / CONFIGURATION).unlink(missing_ok=True)
+
+    def _clear(self) -> None:
+        """Remove the files of a run from the folder; of links the links alone."""
+        try:
+            for name in (CHECKPOINT, HISTORY, METRICS, CURVES, CALIBRATION):
+                (self.folder / name).unlink(missing_ok=True)
+            if (self.folder / PRETRAINING).is_symlink():
+                (self.folder / PRETRAINING).unlink()
+            elif (self.folder / PRETRAINING).is_dir():
+                shutil.rmtree(self.folder / PRETRAINING)
+        except OSError as error:
+            raise OutputError("--output", str(self.folder), f"cannot be written ({error.strerror})") from None
+
+    def part(self, *names: str) -> Path:
+        """Return the folder of a part of the training within the run's; InputError if a link leads out of that."""
+        return path_inside(self.folder, Path(*names), self.folder, follow=True)
 
     @classmethod
     def open(cls, folder: Path) -> Run[Any]:
@@ -89,14 +171,16 @@ class Run(Generic[C]):
             raise MissingFileError(str(folder), None, "holds no trained run; `synthroads train` makes one")
         run: Run[Any] = cls(folder, from_data(read_json(folder / CONFIGURATION), str(folder / CONFIGURATION)))
         if (folder / HISTORY).is_file():
-            run.history = read_json(folder / HISTORY)
+            run.history = _read_history(folder / HISTORY)
         return run
 
     def save(self, state: Mapping[str, Any]) -> None:
-        """Write `state` as the run's checkpoint, replacing the last one atomically."""
+        """Write `state` as the run's checkpoint, replacing the last one atomically; see also `begin`."""
+        self.begin()
         content = io.BytesIO()
         torch.save(dict(state), content)
         write_file(self.folder / CHECKPOINT, content.getvalue(), overwrite=True)
+        self.kept = int(state.get("epoch", 0))
 
     def last_checkpoint(self, device: torch.device | str = "cpu") -> dict[str, Any] | None:
         """Load the last checkpoint (model, optimizer, epoch) onto a device; None if there is none yet.
@@ -113,6 +197,11 @@ class Run(Generic[C]):
             raise InputError(str(path), None, f"is no checkpoint, or damaged ({type(problem).__name__})") from None
         if not isinstance(state, dict) or not {"model", "epoch"} <= set(state):
             raise InputError(str(path), None, "is no checkpoint of a training of ours")
+        epoch, model = state["epoch"], state["model"]
+        if isinstance(epoch, bool) or not isinstance(epoch, int) or epoch < 0:
+            raise InputError(f"{path}: epoch", _kind(epoch), "a whole number from 0 is needed")
+        if not isinstance(model, Mapping) or not all(isinstance(value, torch.Tensor) for value in model.values()):
+            raise InputError(f"{path}: model", _kind(model), "a dictionary of tensors is needed")
         return state
 
     def calibration(self) -> dict[str, Any] | None:
@@ -143,9 +232,46 @@ class Run(Generic[C]):
             name = different[0]
             raise InputError(f"--resume: {name}", now.get(name), f"the run was begun with {before.get(name)!r}")
         state = self.last_checkpoint()
-        done = 0 if state is None else int(state["epoch"])
+        self.kept = done = 0 if state is None else state["epoch"]
         if done:
-            self.history = read_json(self.folder / HISTORY)[:done]
+            self.history = _read_history(self.folder / HISTORY)[:done]
+
+
+def load_state(module: nn.Module | torch.optim.Optimizer, state: Any, source: str) -> None:
+    """Load the weights of a checkpoint into a network, or an optimiser's state, in place.
+
+    Args:
+        module: of the run's configuration.
+        state: what the checkpoint holds for it.
+        source: run or file that it is of, for the message.
+
+    Raises:
+        InputError: it is of another network, or a weight isn't finite, so that the network would say nothing of worth.
+    """
+    if isinstance(module, nn.Module) and any(value.is_complex() for value in state.values()):
+        raise InputError(source, None, "its checkpoint holds complex numbers, which no network of ours has")
+    try:
+        module.load_state_dict(state)
+    except (RuntimeError, ValueError, TypeError, LookupError, AttributeError):  # whatever doesn't fit
+        raise InputError(source, None, "its checkpoint is of another network than its configuration") from None
+    if isinstance(module, nn.Module):
+        wrong = [name for name, value in module.state_dict().items() if not torch.isfinite(value).all()]
+        if wrong:
+            told = f"not all of its checkpoint's numbers of {wrong[0]} are finite: it is damaged; train anew"
+            raise InputError(source, None, told)
+
+
+def _kind(value: object) -> str:
+    """Return a number or text as it is written, of anything else its type's name: tensors have long texts."""
+    return repr(value) if isinstance(value, (str, int, float)) else type(value).__name__
+
+
+def _read_history(path: Path) -> list[dict[str, float]]:
+    """Return the figures of each epoch of a history's file; InputError if it isn't a list of objects."""
+    history = read_json(path)
+    if not isinstance(history, list) or not all(isinstance(epoch, dict) for epoch in history):
+        raise InputError(str(path), None, "must be a list of an object for each epoch")
+    return history
 
 
 def stream_seed(seed: int, *purpose: str | int) -> int:
@@ -172,6 +298,7 @@ def to_json_data(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+@literal_texts()
 def _curves(history: list[dict[str, float]]) -> bytes:
     """Return a PNG with one small plot per figure of the history, over the epochs."""
     from matplotlib.figure import Figure  # takes half a second, which only pictures need
@@ -181,7 +308,7 @@ def _curves(history: list[dict[str, float]]) -> bytes:
     for place, name in enumerate(names):
         axes = figure.add_subplot(-(-len(names) // 3), min(len(names), 3), place + 1)
         axes.plot([epoch["epoch"] for epoch in history], [epoch.get(name, float("nan")) for epoch in history])
-        axes.set(title=name.replace("_", " "), xlabel="epoch")
+        axes.set(title=shown_text(name.replace("_", " ")), xlabel="epoch")
         axes.grid(alpha=0.3)
     content = io.BytesIO()
     figure.savefig(content, format="png", dpi=110)

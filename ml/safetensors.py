@@ -65,7 +65,10 @@ def read_metadata(path: Path) -> dict[str, str]:
     Raises:
         MissingFileError, InputError: there is no such file, or it is damaged.
     """
-    return dict(_header(path)[0].get(METADATA, {}))
+    told = _header(path)[0].get(METADATA, {})
+    if not isinstance(told, dict) or not all(isinstance(text, str) for text in told.values()):
+        raise InputError(f"{path}: {METADATA}", None, "must be texts by name")
+    return told
 
 
 def read_tensors(path: Path) -> dict[str, Tensor]:
@@ -98,9 +101,11 @@ def _header(path: Path) -> tuple[dict[str, Any], int]:
 def _tensor(path: Path, name: str, told: Any, content: np.ndarray[Any, np.dtype[np.uint8]]) -> Tensor:
     damaged = InputError(f"{path}: {name}", None, "lies outside of the file, or isn't as long as its shape says")
     try:
-        dtype, shape, (first, last) = _TYPES[told["dtype"]], [int(size) for size in told["shape"]], told["data_offsets"]
+        dtype, shape, (first, last) = _TYPES[told["dtype"]], list(told["shape"]), told["data_offsets"]
     except (KeyError, TypeError, ValueError):
         raise damaged from None
+    if any(type(number) is not int for number in (*shape, first, last)):
+        raise InputError(f"{path}: {name}", None, "its shape and data_offsets must be whole numbers")
     size = prod(shape) * dtype.itemsize
     if not 0 <= first <= last <= len(content) or last - first != size or any(count < 0 for count in shape):
         raise damaged

@@ -10,7 +10,7 @@ from typing import Any
 
 import torch
 
-from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.errors import InputError, MissingFileError, nearest_name
 
 from .cards import LARGEST_MB, ModelCard, model_names, read_card
 from .configuration import from_data
@@ -38,7 +38,10 @@ class ShippedRun(Run[Any]):
     def calibration(self) -> dict[str, Any] | None:
         """Return the calibration of its deviations as JSON data, None if it has none."""
         told = read_metadata(self._weights()).get("calibration")
-        return json.loads(told) if told else None
+        try:
+            return json.loads(told) if told else None
+        except ValueError:
+            raise InputError(str(self._weights()), None, "its calibration is no JSON") from None
 
     def _weights(self) -> Path:
         assert self.card is not None
@@ -67,6 +70,8 @@ def open_run(run: Path) -> Run[Any]:
         MissingFileError, InputError: there is neither.
     """
     if run.is_dir() or len(run.parts) > 1 or str(run) not in model_names():
+        if not run.exists() and (hint := nearest_name(str(run), model_names())):
+            raise MissingFileError(str(run), None, f"is no folder of a trained run and no model's name{hint}")
         return Run.open(run)
     return open_shipped(str(run))
 
@@ -81,7 +86,7 @@ def ship(run: Run[Any], weights: Path, *, overwrite: bool = False) -> int:
         OutputError: the file is there already, or can't be written.
     """
     state = run.last_checkpoint()
-    if state is None or int(state["epoch"]) < run.configuration.schedule.epochs:
+    if state is None or state["epoch"] < run.configuration.schedule.epochs:
         raise InputError(str(run.folder), None, "its training isn't finished; `synthroads train --resume` goes on")
     tensors = {name: _halved(value) for name, value in state["model"].items()}
     size = sum(value.numel() * value.element_size() for value in tensors.values())

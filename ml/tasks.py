@@ -40,6 +40,7 @@ class Prediction:
         path: line along the road (CSV or GeoJSON); None: found in the cloud. Of use to centrelines only.
         overwrite: whether files that are there may be replaced.
         classification: write the classes' LAS codes to the standard field too. Of use to segmentation only.
+        output_option: what the user calls the output; empty where they named none, and it is beside the cloud.
     """
 
     cloud: Path
@@ -47,6 +48,7 @@ class Prediction:
     path: Path | None = None
     overwrite: bool = False
     classification: bool = False
+    output_option: str = "--output"
 
 
 class Task(Protocol):

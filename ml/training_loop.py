@@ -10,11 +10,11 @@ from torch import Tensor, nn
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.machine import available_cores
-from synthroads_addon.base.progress import Progress, silent
+from synthroads_addon.base.progress import Progress, Stage, silent
 
 from .configuration import Configuration, Schedule
 from .processes import average, process_count, process_number
-from .runs import Run, stream_seed
+from .runs import Run, load_state, stream_seed
 
 M = TypeVar("M", bound=nn.Module)
 Figures = dict[str, float]
@@ -82,21 +82,25 @@ def fit(
     share = slice(number, min(steps_per_epoch * count * together, batches_per_epoch), count)
     schedule: Schedule = configuration.schedule
     optimizer = optimizer_of(model, schedule)
+    run.begin()
     state = run.last_checkpoint(next(model.parameters()).device)
     first = 0
     if state is not None:
-        model.load_state_dict(state["model"])
-        optimizer.load_state_dict(state["optimizer"])
-        first = int(state["epoch"])
+        load_state(model, state["model"], str(run.folder))
+        load_state(optimizer, state.get("optimizer"), str(run.folder))
+        first = state["epoch"]
     for epoch in range(first, schedule.epochs):
         begin = time.perf_counter()
         torch.manual_seed(stream_seed(configuration.seed, "epoch", epoch, *([number] if number else [])))
         model.train()
         figures: list[Figures] = []
+        loss_sum = 0.0
         for step, several in enumerate(_groups(batches(epoch, share), together), start=epoch * steps_per_epoch):
             rate = learning_rate(schedule, step, schedule.epochs * steps_per_epoch)
             figures.append(train_step(model, optimizer, rate, configuration, loss, *several))
-            progress("training", step / (schedule.epochs * steps_per_epoch))
+            loss_sum += figures[-1]["loss"]
+            detail = f"epoch {epoch + 1} of {schedule.epochs}, loss {loss_sum / len(figures):.3g}"
+            progress(Stage("training", detail), (step + 1) / (schedule.epochs * steps_per_epoch))
         summary = {"epoch": epoch + 1, **_means(figures), "learning_rate": optimizer.param_groups[0]["lr"]}
         average([buffer for buffer in model.buffers() if buffer.is_floating_point()])  # statistics of norms
         if number:

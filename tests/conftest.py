@@ -19,6 +19,7 @@ import hypothesis
 import pytest
 
 from tests.folders import BLENDER_TESTS, LONG_FILES
+from tests.helpers.files.command_figures import FIGURES, figures_table
 
 if TYPE_CHECKING:
     from synthroads_addon.cloud.points import PointBlock
@@ -39,7 +40,11 @@ os.environ["BLENDER_USER_RESOURCES"] = str(BLENDER_FOLDER)
 KEPT_GROUPS = Path(os.environ.setdefault("SYNTHROADS_KEPT_GROUPS", str(BLENDER_FOLDER / "kept_groups")))
 
 HAS_TORCH = importlib.util.find_spec("torch") is not None
-LEARNING = ("ml", "fuzz/test_configurations.py", "fuzz/test_learning_data.py", "jobs/test_documented_classes.py")
+LEARNING = (
+    *("ml", "fuzz/test_configurations.py", "fuzz/test_learning_data.py"),
+    *("fuzz/test_prediction_commands.py", "fuzz/test_training_commands.py"),
+    *("jobs/test_documented_classes.py", "jobs/test_named_files.py"),
+)
 collect_ignore = [*(() if HAS_BPY else BLENDER_TESTS), *(() if HAS_TORCH else LEARNING)]
 
 # The same examples in every run, and no time limit for one: the machine may be busy with something else.
@@ -63,6 +68,9 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     reasons = Counter(str(report.longrepr[-1]).removeprefix("Skipped: ") for report in reports)
     for reason, count in reasons.most_common():
         terminalreporter.write_line(f"skipped {count} times: {reason}")
+    ended = [report for report in terminalreporter.getreports("") if report.when == "teardown"]
+    if rows := [value for report in ended for name, value in report.user_properties if name == FIGURES]:
+        terminalreporter.write_line("\n".join(figures_table(rows)))
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -142,6 +150,14 @@ def _empty_scene_for_module(request: pytest.FixtureRequest) -> Iterator[None]:
     _factory_settings()
     yield
     _empty_scene()
+
+
+@pytest.fixture(autouse=True)
+def _no_lines_of_slow_work(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands tell every ten seconds that they are at work: on a busy machine beside any message that is tested."""
+    messages = sys.modules.get("headless.messages")
+    if messages is not None and request.path.name != "test_messages.py":
+        monkeypatch.setattr(messages, "INTERVAL", 1000.0)
 
 
 @pytest.fixture(autouse=True)

@@ -1,9 +1,11 @@
 """Measure the ray casters on the same rays: rays per second, memory, building, agreement. Prints the tables of docs.
 
     python tools/benchmark_casters.py [--scene demo|waves] [--rays N]
+    python tools/benchmark_casters.py --packets [--scene demo|waves] [--rays N]
 
 Every row is a process of its own, so that its memory is its own. Rates are by the clock and, in brackets, per second
-of processor time of all cores together, which other work on the machine hardly touches.
+of processor time of all cores together, which other work on the machine hardly touches. With --packets only Embree's
+packets and its single rays are measured, in turn in one process, by one thread's time.
 """
 
 from __future__ import annotations
@@ -31,27 +33,43 @@ from synthroads_addon.base.random_streams import stream
 from synthroads_addon.blender.casters.bvhtree import BVHTreeCaster
 from synthroads_addon.blender.casters.embree import EmbreeCaster
 from synthroads_addon.blender.casters.measure import CHUNK, agreement, bare_rate
+from synthroads_addon.blender.casters.packets import PacketCaster
+from synthroads_addon.scanning.kernels.library import NoKernelError
+from synthroads_addon.scanning.kernels.packets import usable_packets
 from synthroads_addon.scanning.scene.caster import Caster
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from tools.raycast_nodes import RaycastNodesCaster
 
-CASTERS: dict[str, Callable[[SceneMesh], Caster]] = {
-    "bvhtree": BVHTreeCaster,
-    "raycast nodes": RaycastNodesCaster,
-    "embree": EmbreeCaster,
-    "embree, not robust": lambda mesh: EmbreeCaster(mesh, robust=False),
-}
 REFERENCE = "bvhtree"
-THREADED = ("embree",)
+THREADED = ("embree", "embree, single rays")
 CHUNKS = (2**12, 2**14, 2**16, 2**18, 2**20)
 RANGE = 200.0
 ANGLE_STEP_DEG, LINE_SPACING, LINES_TOGETHER = 0.18, 0.08, 20
 """miniVUX-3UAV at 200 kHz and 100 lines/s, flown at 8 m/s; groups of lines, each as dense as in a survey."""
 DIVERGENCE_MRAD, RAYS_PER_PULSE = (1.6, 0.5), 7
+PAIRS = 7
+"""Times that packets and single rays are cast in turn."""
+
+
+def packet_caster(mesh: SceneMesh) -> PacketCaster:
+    """Return Embree's caster that casts packets, which has to be usable here."""
+    packets = usable_packets()
+    if isinstance(packets, NoKernelError):
+        raise SystemExit(f"packets can't be measured: {packets}")
+    return PacketCaster(packets, mesh)
 
 
 Flight: TypeAlias = tuple[NDArray[np.float64], float, float]
 """The axis (N, 3) below the path, the height above it (m), and half of the field of view (rad)."""
+
+
+CASTERS: dict[str, Callable[[SceneMesh], Caster]] = {
+    "bvhtree": BVHTreeCaster,
+    "raycast nodes": RaycastNodesCaster,
+    "embree": packet_caster,
+    "embree, single rays": EmbreeCaster,
+    "embree, single rays, not robust": lambda mesh: EmbreeCaster(mesh, robust=False),
+}
 
 
 def demo_scene() -> tuple[SceneMesh, Flight]:
@@ -92,17 +110,19 @@ def bare_mesh(vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> Sc
     return SceneMesh(vertices, triangles, *labels, materials=("unknown",), origin=np.zeros(3))
 
 
-def survey_rays(flight: Flight, count: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return origins and directions (count, 3) of rays in the order of a UAV's survey."""
+def survey_rays(
+    flight: Flight, count: int, per_pulse: int = RAYS_PER_PULSE
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return origins and directions (count, 3) of rays in the order of a UAV's survey, those of a pulse together."""
     axis, height, half_angle = flight
     angle = np.arange(-half_angle, half_angle, np.deg2rad(ANGLE_STEP_DEG))
-    groups = -(-count // (RAYS_PER_PULSE * len(angle) * LINES_TOGETHER))
+    groups = -(-count // (per_pulse * len(angle) * LINES_TOGETHER))
     begin = np.linspace(0, len(axis) - 1 - LINES_TOGETHER, groups).astype(int)
     line = (begin[:, None] + np.arange(LINES_TOGETHER)).ravel()
     ahead = axis[line + 1] - axis[line]
     ahead /= np.linalg.norm(ahead, axis=1)[:, None]
     right = np.cross(ahead, [0.0, 0.0, 1.0])
-    turn = np.linspace(0.0, 2.0 * np.pi, RAYS_PER_PULSE, endpoint=False)[None, None, :]
+    turn = np.linspace(0.0, 2.0 * np.pi, per_pulse, endpoint=False)[None, None, :]
     across = angle[None, :, None] + DIVERGENCE_MRAD[0] / 4e3 * np.cos(turn)
     along = DIVERGENCE_MRAD[1] / 4e3 * np.sin(turn) + 0.0 * across
     down = -np.cos(across)
@@ -203,20 +223,60 @@ def _prepare(scene: str, files: Path, count: int) -> dict[str, Any]:
     return {"triangles": len(mesh)}
 
 
+def compare_packets(scene: str, count: int) -> None:
+    """Print a table of packets beside single rays, cast in turn: millions per second of one thread's processor time."""
+    mesh, flight = SCENES[scene]()
+    spent = [time.process_time()]
+    packed = packet_caster(mesh)
+    spent.append(time.process_time())
+    single = EmbreeCaster(mesh)
+    spent.append(time.process_time())
+    built = [f"{one:.2f}" for one in np.diff(spent)]
+    print(f"\n{scene}, {len(mesh):,} triangles; built in {built[0]} and {built[1]} processor seconds\n")
+    heads = ["rays", packed.kernels, "single rays"]
+    print("| " + " | ".join([*heads, f"ratio of times, {PAIRS} pairs", "other faces"]) + " |")
+    print("|---" * 5 + "|")
+    kinds = {f"{per_pulse} per pulse": survey_rays(flight, count, per_pulse) for per_pulse in (1, 7, 19)}
+    order = stream(0, "order of rays").permutation(count)
+    kinds["shuffled"] = tuple(array[order] for array in kinds["7 per pulse"])
+    for name, (origins, directions) in kinds.items():
+        times, faces = [], []
+        for _ in range(PAIRS):
+            for caster in (packed, single):
+                start = time.thread_time()
+                faces.append(caster.cast(origins, directions, RANGE))
+                times.append(time.thread_time() - start)
+        ours, theirs = np.array(times[::2]), np.array(times[1::2])
+        ratio, found = ours / theirs, agreement(mesh, origins, directions, *faces[:2])
+        rates = [f"{len(origins) / np.median(one) / 1e6:.2f}" for one in (ours, theirs)]
+        spread = f"{np.median(ratio):.2f} ({ratio.min():.2f} to {ratio.max():.2f})"
+        print(
+            f"| {name} | {' | '.join(rates)} | {spread} | {round(count * (1 - found.same))}, {1e3 * found.gap:.3f} mm |"
+        )
+
+
 def main() -> None:
     """Measure all casters on the scenes of the command line and print Markdown tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scene", choices=tuple(SCENES), action="append", help="default: all")
     parser.add_argument("--rays", type=int, default=1_000_000, metavar="N", help="rays to cast (1000000)")
-    for name in ("--prepare", "--measure", "--files"):
+    parser.add_argument("--packets", action="store_true", help="only compare packets with single rays")
+    for name in ("--prepare", "--measure", "--files", "--compare"):
         parser.add_argument(name, help=argparse.SUPPRESS)
     options = parser.parse_args()
+    if options.compare:
+        compare_packets(options.compare, options.rays)
+        sys.stdout.flush()
+        os._exit(0)
     if options.prepare or options.measure:
         files = Path(options.files)
         result = _prepare(options.prepare, files, options.rays) if options.prepare else measure(options.measure, files)
         print(json.dumps(result), flush=True)
         os._exit(0)  # Blender's own way out can crash
     for scene in options.scene or SCENES:
+        if options.packets:
+            subprocess.run([sys.executable, __file__, "--compare", scene, "--rays", str(options.rays)], check=True)
+            continue
         print(f"\n{scene}:\n", flush=True)
         print("\n".join(table(list(_rows(scene, options.rays)))), flush=True)
 

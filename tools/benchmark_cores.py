@@ -35,6 +35,7 @@ from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.scanning.colour.colour import LayerSource, surface_constants
 from synthroads_addon.scanning.colour.request import LayerRequest, material_layers
+from synthroads_addon.scanning.colour.transparency import Transparency
 from synthroads_addon.scanning.relief.normal_images import NormalImage
 from synthroads_addon.scanning.scene.caster import Caster
 from synthroads_addon.scanning.scene.mesh import SceneMesh
@@ -65,7 +66,7 @@ class KeptServices:
     def __init__(self, kept: KeptScene) -> None:
         self._rows = kept.materials
 
-    def caster(self, name: str, mesh: SceneMesh) -> Caster:
+    def caster(self, name: str, mesh: SceneMesh, kernels: str) -> Caster:
         """Return Embree's caster over a mesh, whatever its name."""
         return EmbreeCaster(mesh)
 
@@ -79,6 +80,10 @@ class KeptServices:
 
     def normal_images(self, names: Sequence[str]) -> dict[int, NormalImage]:
         """Return that no material has a normal image."""
+        return {}
+
+    def transparencies(self, names: Sequence[str]) -> dict[int, Transparency]:
+        """Return that no material is clear in places."""
         return {}
 
     def layers(self, request: LayerRequest, progress: Callable[[float], None]) -> AbstractContextManager[LayerSource]:

@@ -23,17 +23,12 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from synthroads_addon.base.changes import apply_values  # noqa: E402
 from synthroads_addon.base.progress import StageTimer, silent  # noqa: E402
 from synthroads_addon.dataset.recipe import load_recipe, scene_jobs  # noqa: E402
 from synthroads_addon.jobs.generate import RoadSource, make_road  # noqa: E402
 from synthroads_addon.jobs.open_scene import RoadScene  # noqa: E402
-from synthroads_addon.scenario.scenario import (  # noqa: E402
-    Scenario,
-    apply_values,
-    load_scenario,
-    parse_change,
-    with_changes,
-)
+from synthroads_addon.scenario.scenario import Scenario, load_scenario, scenario_changes, with_changes  # noqa: E402
 from synthroads_addon.scenario.without import EFFECTS, scenario_without  # noqa: E402
 
 ALL, NONE = "all effects", "none of them"
@@ -119,7 +114,7 @@ def main() -> None:
     scenario = load_scenario(arguments.scenario)
     if arguments.like:
         scenario = with_sensor_of(scenario, arguments.like)
-    data = with_changes(scenario.to_dict(), map(parse_change, arguments.set))
+    data = with_changes(scenario.to_dict(), scenario_changes(arguments.set))
     rows = kinds(Scenario.from_dict(data | {"outputs": ["cloud"]}), arguments.each)
     measure(rows, arguments.repeats)
     print(table(rows), flush=True)

@@ -1,10 +1,11 @@
-"""Build the Blender extensions: the add-on with its wheels, and one each for what elevation models and IFC need.
+"""Build the Blender extensions: the add-on with its wheels, and one with what IFC needs.
 
-    python tools/build_extension.py [--platform linux-x64|windows-x64|macos-arm64|all] [--output-dir dist]
+    python tools/build_extension.py [--platform linux-x64|windows-x64|macos-arm64|all] [--blender 4.5] [--output-dir D]
 
 Its source is copied beside a completed manifest in a folder of its own (no committed file is touched), packed, and
-validated by Blender's own tool, which comes with the `bpy` package. Each platform's zip holds wheels for every Python
-that a supported Blender has. The same source and the same list of wheels give the same bytes.
+validated by Blender's own tool, which comes with the `bpy` package. There is a zip for each platform and each Python
+that a supported Blender has, and an index.json beside them, by which the folder serves Blender as a repository. The
+same source and the same list of wheels give the same bytes.
 """
 
 from __future__ import annotations
@@ -27,6 +28,10 @@ from dataclasses import dataclass
 from email.message import Message
 from itertools import product
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # the root, from where tools see each other
+
+from tools.build_kernels import KERNELS, KernelError, build_kernels
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "synthroads_addon"
@@ -53,19 +58,41 @@ class Extension:
 
 
 _LOCKS = ROOT / "tools" / "locks"
-_ELEVATION = ROOT / "tools" / "elevation_models"
 _IFC = ROOT / "tools" / "ifc_models"
 EXTENSIONS = (
     Extension("synthroads", PACKAGE, MANIFEST, ROOT / "tools" / "extension_wheels.txt", _LOCKS / "extension.txt"),
-    Extension(
-        "synthroads_elevation_models",
-        *(_ELEVATION, _ELEVATION / MANIFEST.name, _ELEVATION / "wheels.txt", _LOCKS / "elevation-models.txt"),
-    ),
     Extension("synthroads_ifc", *(_IFC, _IFC / MANIFEST.name, _IFC / "wheels.txt", _LOCKS / "ifc.txt")),
 )
 
-# Blender 4.5 and 5.0 have Python 3.11, the official 5.1 and 5.2 have 3.13, Debian's 5.2 has 3.14.
-PYTHON_VERSIONS = ("3.11", "3.13", "3.14")
+
+@dataclass(frozen=True)
+class Release:
+    """Releases of Blender that one zip is for: those with one Python.
+
+    Attributes:
+        name: of the first of them, in a zip's name.
+        python: Python that they have.
+        first: oldest release, as a manifest's `blender_version_min`.
+        before: release that is too new, as a manifest's `blender_version_max`; None if there is none yet.
+        platforms: Blender's names of the platforms on which there are such releases.
+    """
+
+    name: str
+    python: str
+    first: str
+    before: str | None
+    platforms: frozenset[str]
+
+
+_ALL_PLATFORMS = frozenset({"linux-x64", "windows-x64", "macos-arm64"})
+RELEASES = (
+    Release("4.5", "3.11", "4.5.0", "5.1.0", _ALL_PLATFORMS),
+    Release("5.2", "3.13", "5.1.0", None, _ALL_PLATFORMS),
+    Release("5.2-debian", "3.14", "5.1.0", None, frozenset({"linux-x64"})),
+)
+"""Blender 4.5 and 5.0 have Python 3.11, the official 5.1 and 5.2 have 3.13, Debian's 5.2 has 3.14."""
+INDEX = "index.json"
+"""Name that Blender's tool gives to a repository's index."""
 
 # Blender's name of a platform -> the wheel tags that run on every machine that its Blender runs on.
 PLATFORM_TAGS = {
@@ -81,7 +108,7 @@ PLATFORM_TAGS = {
     "windows-x64": ("win_amd64",),
     # embreex has none for older systems than 13, rasterio for older ones than 14. On 13 Blender installs rasterio all
     # the same; it doesn't load there, and only elevation models can't be read.
-    "macos-arm64": ("macosx_11_0_arm64", "macosx_13_0_arm64", "macosx_14_0_arm64"),
+    "macos-arm64": ("macosx_11_0_arm64", "macosx_12_0_arm64", "macosx_13_0_arm64", "macosx_14_0_arm64"),
 }
 
 # Dependencies of the wheels that are left out: Blender has NumPy, and tqdm does without colorama.
@@ -91,12 +118,13 @@ NOT_BUNDLED = frozenset({"numpy", "colorama"})
 LICENCES = {
     "OpenEXR": "BSD-3-Clause",
     "embreex": "BSD-2-Clause; holds Intel Embree and oneTBB: Apache-2.0, https://www.apache.org/licenses/LICENSE-2.0",
+    "pyproj": "MIT; holds PROJ: MIT, and free libraries that it uses",
     "rasterio": "BSD-3-Clause; holds GDAL and PROJ: MIT, GEOS: LGPL-2.1-or-later, and free libraries that these use",
 }
 
 LEFT_OUT = shutil.ignore_patterns(
     *("__pycache__", "*.py[co]", ".*", "*.blend[1-9]", "wheels.txt", MANIFEST.name),
-    *("comparison", "reconstruction"),  # need SciPy, and nothing in Blender uses them
+    *("*.so", "*.dll", "*.dylib"),  # of other platforms: the zip's own are compiled into it
 )
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)
 
@@ -139,21 +167,18 @@ def read_wheel_list(path: Path) -> list[str]:
     return [line for line in lines if line]
 
 
-def fetch_wheels(extension: Extension, target: str, cache: Path) -> list[Path]:
-    """Return the paths of an extension's wheels for one platform and all Pythons, downloading what the cache lacks."""
+def fetch_wheels(extension: Extension, target: str, release: Release, cache: Path) -> list[Path]:
+    """Return the paths of an extension's wheels for a platform and a Python, downloading what the cache lacks."""
     lock = extension.lock.read_text(encoding="utf-8")
-    wheels: dict[str, Path] = {}
-    for version in PYTHON_VERSIONS:
-        folder = cache / extension.name / target / f"cp{version.replace('.', '')}"
-        stamp = folder / "complete.json"
-        if not stamp.exists() or json.loads(stamp.read_text(encoding="utf-8")) != lock:
-            part = folder.with_name(f"{folder.name}.part-{os.getpid()}")
-            download(extension.lock, version, target, part)
-            (part / stamp.name).write_text(json.dumps(lock), encoding="utf-8")
-            shutil.rmtree(folder, ignore_errors=True)
-            part.rename(folder)
-        wheels.update({path.name: path for path in folder.glob("*.whl")})
-    return [wheels[name] for name in sorted(wheels)]
+    folder = cache / extension.name / target / f"cp{release.python.replace('.', '')}"
+    stamp = folder / "complete.json"
+    if not stamp.exists() or json.loads(stamp.read_text(encoding="utf-8")) != lock:
+        part = folder.with_name(f"{folder.name}.part-{os.getpid()}")
+        download(extension.lock, release.python, target, part)
+        (part / stamp.name).write_text(json.dumps(lock), encoding="utf-8")
+        shutil.rmtree(folder, ignore_errors=True)
+        part.rename(folder)
+    return sorted(folder.glob("*.whl"))
 
 
 def download(lock: Path, version: str, target: str, folder: Path) -> None:
@@ -246,18 +271,28 @@ def bill_of_materials(extension: Extension, wheels: list[Path]) -> dict[str, obj
 # --- staging ---------------------------------------------------------------------------------------------------------
 
 
-def stage(extension: Extension, target: str, wheels: list[Path], folder: Path) -> None:
+def stage(extension: Extension, target: str, release: Release, wheels: list[Path], folder: Path) -> None:
     """Fill an empty folder with an extension's source, licences, wheels, asset library and completed manifest."""
     shutil.copytree(extension.source, folder, ignore=LEFT_OUT, dirs_exist_ok=True)
     shutil.copy(ROOT / "LICENSE", folder)
     (folder / "THIRD_PARTY.txt").write_text(third_party_notice(wheels), encoding="utf-8", newline="\n")
     if extension.source == PACKAGE:
         shutil.copy(asset_library(ROOT / "build" / "asset_library"), folder / "presets" / "node_groups")
+    if extension.source == PACKAGE:
+        compile_kernels(target, folder / KERNELS.relative_to(PACKAGE))
     (folder / "wheels").mkdir()
     for wheel in wheels:
         shutil.copy(wheel, folder / "wheels")
-    manifest = complete_manifest(extension, target, [f"./wheels/{wheel.name}" for wheel in wheels])
+    manifest = complete_manifest(extension, target, release, [f"./wheels/{wheel.name}" for wheel in wheels])
     (folder / MANIFEST.name).write_text(manifest, encoding="utf-8", newline="\n")
+
+
+def compile_kernels(target: str, folder: Path) -> None:
+    """Compile the scan's kernels for a platform into a folder; raise `BuildError` if that fails."""
+    try:
+        build_kernels(target, folder)
+    except KernelError as error:
+        raise BuildError(str(error)) from error
 
 
 def asset_library(cache: Path) -> Path:
@@ -292,9 +327,15 @@ def project_version() -> str:
     return str(tomllib.loads(MANIFEST.read_text(encoding="utf-8"))["version"])
 
 
-def complete_manifest(extension: Extension, target: str, wheels: list[str]) -> str:
-    """Return the text of an extension's manifest with version, platform and wheels added before its first table."""
+def complete_manifest(extension: Extension, target: str, release: Release, wheels: list[str]) -> str:
+    """Return the text of an extension's manifest with version, releases, platform and wheels before its first table."""
     committed = extension.manifest.read_text(encoding="utf-8")
+    oldest = f'blender_version_min = "{RELEASES[0].first}"'
+    if oldest not in committed:
+        raise BuildError(f"{extension.manifest} must name the oldest release that there is a zip for: {oldest}")
+    span = f'blender_version_min = "{release.first}"'
+    span += f'\nblender_version_max = "{release.before}"' if release.before else ""
+    committed = committed.replace(oldest, span)
     tables = re.search(r"^\[", committed, flags=re.MULTILINE)
     split = tables.start() if tables else len(committed)
     own = "" if extension.manifest == MANIFEST else f"version = {json.dumps(project_version())}\n"
@@ -310,19 +351,42 @@ def toml_list(items: list[str]) -> str:
 # --- building --------------------------------------------------------------------------------------------------------
 
 
-def build(extension: Extension, target: str, output_dir: Path, cache: Path) -> Path:
-    """Build and validate an extension for one platform; return the zip, with its bill of materials beside it."""
-    wheels = fetch_wheels(extension, target, cache)
+def archive_name(extension: Extension, target: str, release: Release) -> str:
+    """Return the name of the zip of an extension for a platform and releases of Blender."""
+    return f"{extension.name}-{project_version()}-blender_{release.name}-{target.replace('-', '_')}.zip"
+
+
+def build(extension: Extension, target: str, release: Release, output_dir: Path, cache: Path) -> Path:
+    """Build and validate an extension's zip; return its path. Its bill of materials is written beside it."""
+    wheels = fetch_wheels(extension, target, release, cache)
     check_complete(extension, wheels)
     output_dir.mkdir(parents=True, exist_ok=True)
-    archive = output_dir / f"{extension.name}-{project_version()}-{target.replace('-', '_')}.zip"
+    archive = output_dir / archive_name(extension, target, release)
     with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
-        stage(extension, target, wheels, Path(folder))
+        stage(extension, target, release, wheels, Path(folder))
         pack(Path(folder), archive)
     run_tool("validate", str(archive))
     materials = json.dumps(bill_of_materials(extension, wheels), indent=2) + "\n"
     archive.with_suffix(".cdx.json").write_text(materials, encoding="utf-8", newline="\n")
     return archive
+
+
+def write_index(output_dir: Path) -> Path:
+    """Write the index by which Blender takes a folder of zips for a repository, by its own tool; return its path.
+
+    Zips of other versions or by other names that lie there are left out, since Blender takes the first that fits.
+    """
+    run_tool("server-generate", "--repo-dir", str(output_dir))
+    path = output_dir / INDEX
+    index = json.loads(path.read_text(encoding="utf-8"))
+    known = {
+        archive_name(extension, target, release)
+        for extension, target, release in product(EXTENSIONS, PLATFORM_TAGS, RELEASES)
+    }
+    listed = [entry for entry in index["data"] if Path(entry["archive_url"]).name in known]
+    index["data"] = sorted(listed, key=lambda entry: str(entry["archive_url"]))
+    path.write_text(json.dumps(index, indent=2) + "\n", encoding="utf-8", newline="\n")
+    return path
 
 
 def pack(folder: Path, archive: Path) -> None:
@@ -355,9 +419,17 @@ def run_tool(*arguments: str) -> None:
 
 def parse_arguments(argv: list[str] | None) -> argparse.Namespace:
     """Return the parsed options of the command line."""
-    parser = argparse.ArgumentParser(description="Build the Blender extensions, a zip of each per platform.")
+    parser = argparse.ArgumentParser(
+        description="Build the Blender extensions, a zip of each for a platform and releases of Blender."
+    )
     parser.add_argument(
         "--platform", choices=[*PLATFORM_TAGS, "all"], default=current_platform(), help="default: the current one"
+    )
+    parser.add_argument(
+        "--blender",
+        choices=[*(release.name for release in RELEASES), "all"],
+        default="all",
+        help="release (all), as each has its own Python",
     )
     parser.add_argument("--output-dir", type=Path, default=ROOT / "dist", metavar="DIR", help="default: dist")
     parser.add_argument(
@@ -367,17 +439,20 @@ def parse_arguments(argv: list[str] | None) -> argparse.Namespace:
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Build all extensions for the chosen platforms; return 0, 1 if a build failed, 2 for an unknown platform."""
+    """Build the chosen extensions; return 0, 1 if a build failed, 2 for an unknown platform."""
     options = parse_arguments(argv)
     if options.platform not in (*PLATFORM_TAGS, "all"):
         print(f"no wheels are known for {options.platform}: choose --platform {'|'.join(PLATFORM_TAGS)}|all")
         return 2
     try:
         targets = PLATFORM_TAGS if options.platform == "all" else [options.platform]
-        for target, extension in product(targets, EXTENSIONS):
-            archive = build(extension, target, options.output_dir, options.wheel_cache)
+        for target, release, extension in product(targets, RELEASES, EXTENSIONS):
+            if options.blender not in (release.name, "all") or target not in release.platforms:
+                continue
+            archive = build(extension, target, release, options.output_dir, options.wheel_cache)
             checksum = hashlib.sha256(archive.read_bytes()).hexdigest()
             print(f"{archive}  {archive.stat().st_size / 1e6:.1f} MB  sha256 {checksum[:16]}")
+        print(write_index(options.output_dir))
     except BuildError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1

@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from synthroads_addon.base.machine import available_cores, cores_of_children, machine  # noqa: E402
-from synthroads_addon.base.text_table import markdown_table  # noqa: E402
+from synthroads_addon.base.text.table import markdown_table  # noqa: E402
 
 TARGET = ROOT / "docs" / "pictures" / "scale.png"
 THIN = {

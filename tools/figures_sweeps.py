@@ -98,7 +98,7 @@ def sweep_figures(path: Path, row: ListedCloud) -> SweepFigures:
         code = getattr(row, name)
         try:
             if code is not None:
-                found[name] = class_by_label(cloud, code)
+                found[name] = class_by_label(cloud, code, f"{path.name}: {name}")
         except InputError:
             if name == ROAD:
                 raise

@@ -179,7 +179,8 @@ import sys, bpy
 from pathlib import Path
 from golden_dump import lines
 bpy.ops.wm.open_mainfile(filepath=sys.argv[1], use_scripts=False)
-kept = (line for line in lines() if "synthroads_key" not in line) # a digest of the sources
+digests = ("synthroads_key", "synthroads_look") # of the sources
+kept = (line for line in lines() if not any(name in line for name in digests))
 Path(sys.argv[2]).write_text("".join(kept), encoding="utf-8")
 """
 

@@ -23,7 +23,7 @@ from packaging.requirements import Requirement
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))  # the root, where noxfile.py is
 
 from noxfile import BLENDER, EXTRAS, lock_of
-from tools.build_extension import EXTENSIONS, PYTHON_VERSIONS, read_wheel_list
+from tools.build_extension import EXTENSIONS, RELEASES, read_wheel_list
 
 ROOT = Path(__file__).resolve().parent.parent
 PYPROJECT = ROOT / "pyproject.toml"
@@ -95,7 +95,7 @@ def all_locks() -> Iterator[tuple[Path, str]]:
             yield path, resolve(environment_inputs(name), python, path)
     for extension in EXTENSIONS:
         pins = read_wheel_list(extension.wheel_list)
-        yield extension.lock, resolve(pins, PYTHON_VERSIONS[0], extension.lock, "--no-deps")
+        yield extension.lock, resolve(pins, RELEASES[0].python, extension.lock, "--no-deps")
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -25,10 +25,11 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from ml.segmentation.prediction import BLOCK, PREDICTED  # noqa: E402
+from ml.segmentation.prediction import BLOCK  # noqa: E402
 from synthroads_addon.base.errors import InputError, MissingFileError, SynthRoadsError  # noqa: E402
 from synthroads_addon.base.files import write_file  # noqa: E402
 from synthroads_addon.base.schema import canonical_json  # noqa: E402
+from synthroads_addon.cloud.layers import PREDICTED  # noqa: E402
 
 RESULT = "prediction.json"
 _GAP = 2.0

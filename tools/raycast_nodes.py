@@ -21,6 +21,7 @@ class RaycastNodesCaster:
 
     name = "raycast nodes"
     main_thread_only = True
+    kernels = "none: rays are cast by nodes"
 
     def __init__(self, mesh: SceneMesh) -> None:
         self._scene = bpy.data.scenes.new("SR Rays")

@@ -1,13 +1,16 @@
-"""The reference of the command line, made from the parsers themselves when the documentation is built."""
+"""The reference of the command line, made from the parsers themselves."""
 
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Iterator
 
 from headless.cli import build_parser
 
 _WIDTH = 82
+_ARGUMENT = re.compile(r"\[(?:[^\[\]]|\[[^\]]*\])*\]|\((?:[^()])*\)|\S+(?: \[\S+ \.\.\.\])?")
+"""An argument in a usage: in brackets, which an argument inside may have too, or a word, with those that may follow."""
 
 
 def commands() -> str:
@@ -47,9 +50,17 @@ def _command(name: str, parser: argparse.ArgumentParser, level: str, summary: st
 
 
 def _usage(parser: argparse.ArgumentParser) -> str:
-    formatter = argparse.HelpFormatter(parser.prog, width=_WIDTH)
+    """Return a command's usage in lines of `_WIDTH`, broken between its arguments: each Python breaks it elsewhere."""
+    formatter = argparse.HelpFormatter(parser.prog, width=100_000)
     formatter.add_usage(parser.usage, parser._actions, parser._mutually_exclusive_groups, prefix="")
-    return formatter.format_help().strip()
+    arguments = formatter.format_help().strip().removeprefix(parser.prog).strip()
+    lines, indent = [parser.prog], " " * (len(parser.prog) + 1)
+    for argument in _ARGUMENT.findall(arguments):
+        if len(lines[-1]) + 1 + len(argument) > _WIDTH:
+            lines.append(indent + argument)
+        else:
+            lines[-1] += f" {argument}"
+    return "\n".join(lines)
 
 
 def _names(action: argparse.Action) -> str:

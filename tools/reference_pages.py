@@ -1,19 +1,26 @@
-"""The parts of the reference that are made from code when the documentation is built: commands, fields, presets.
+"""Write the parts of docs/reference that are made from code: commands, fields, presets.
 
-`docs/conf.py` puts them in the place of ``<!-- generated: NAME -->`` in a page; `GENERATED` holds the names. Fields
-come from the JSON Schemas that pydantic derives from the classes which read the files, so that types, limits, defaults
-and descriptions are those that a file is checked against.
+    python tools/reference_pages.py            # writes them into the pages
+    python tools/reference_pages.py --check    # compares them with what the pages say
+
+Each part stands in its page between ``<!-- generated: NAME -->`` and ``<!-- end: NAME -->``; `GENERATED` holds the
+names. Fields come from the JSON Schemas that pydantic derives from the classes which read the files, so that types,
+limits, defaults and descriptions are those that a file is checked against.
 """
 
 from __future__ import annotations
 
+import argparse
 import json
 import re
+import sys
 from collections.abc import Callable, Sequence
 from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from headless.list import KINDS
 from synthroads_addon.base.catalogue import Entry, Kind, entries
@@ -22,7 +29,8 @@ from synthroads_addon.base.schema import Model
 from tools.reference_commands import commands
 
 ROOT = Path(__file__).resolve().parents[1]
-MARK = re.compile(r"<!-- generated: ([a-z-]+) -->")
+PAGES = ROOT / "docs" / "reference"
+MARK = re.compile(r"<!-- generated: ([a-z-]+) -->\n(?:.*?\n)?<!-- end: \1 -->", re.DOTALL)
 
 FILES = {
     "scenario": ["synthroads_addon.scenario.scenario:Scenario"],
@@ -136,10 +144,33 @@ def generated(name: str) -> str:
 
 
 def filled(page: str) -> str:
-    """Return a page with its marks replaced by generated text, headings one level below the one before each mark."""
+    """Return a page with the text between its marks made anew, headings one level below the one before each mark."""
 
     def text(mark: re.Match[str]) -> str:
         levels = re.findall(r"^(#+) ", page[: mark.start()], re.MULTILINE) or [""]
-        return re.sub("^#", f"{levels[-1]}#", generated(mark[1]), flags=re.MULTILINE)
+        part = re.sub("^#", f"{levels[-1]}#", generated(mark[1]), flags=re.MULTILINE)
+        return f"<!-- generated: {mark[1]} -->\n\n{part}\n\n<!-- end: {mark[1]} -->"
 
     return MARK.sub(text, page)
+
+
+def stale_pages() -> dict[Path, str]:
+    """Return the pages of the reference that aren't what the code says, with the text that they should have."""
+    pages = {path: path.read_text(encoding="utf-8") for path in sorted(PAGES.glob("*.md"))}
+    return {path: new for path, text in pages.items() if (new := filled(text)) != text}
+
+
+def main() -> int:
+    """Write the pages anew, or with ``--check`` name those that would change and return 1."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--check", action="store_true", help="write nothing: fail if a page isn't current")
+    arguments, stale = parser.parse_args(), stale_pages()
+    for path, text in stale.items():
+        print(f"{path.relative_to(ROOT)} is not current" if arguments.check else f"written {path.relative_to(ROOT)}")
+        if not arguments.check:
+            path.write_text(text, encoding="utf-8")
+    return 1 if arguments.check and stale else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

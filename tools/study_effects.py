@@ -53,7 +53,7 @@ from synthroads_addon.comparison.clouds import (  # noqa: E402
 from synthroads_addon.dataset.recipe import load_recipe, scene_jobs  # noqa: E402
 from synthroads_addon.jobs.generate import RoadSource, make_road  # noqa: E402
 from synthroads_addon.jobs.open_scene import RoadScene  # noqa: E402
-from synthroads_addon.scenario.scenario import Scenario, parse_change, with_changes  # noqa: E402
+from synthroads_addon.scenario.scenario import Scenario, scenario_changes, with_changes  # noqa: E402
 from synthroads_addon.scenario.without import EFFECTS, scenario_without  # noqa: E402
 
 mpl.use("Agg")
@@ -257,7 +257,7 @@ def scenario_of(recipe: str, scene: str | None, changes: Sequence[str]) -> Scena
     if scene is not None and scene not in jobs:
         raise InputError("--scene", scene, f"must be a scene of {recipe}, e.g. {next(iter(jobs))}")
     scenario = jobs[scene] if scene is not None else list(jobs.values())[-1]
-    data = with_changes(scenario.to_dict(), map(parse_change, changes))
+    data = with_changes(scenario.to_dict(), scenario_changes(changes))
     return Scenario.from_dict(data | {"outputs": ["cloud"]})
 
 

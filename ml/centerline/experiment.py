@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,15 +13,15 @@ from pydantic import Field
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import write_file
 from synthroads_addon.base.progress import Progress, silent
-from synthroads_addon.base.schema import canonical_json, read_json
+from synthroads_addon.base.schema import canonical_json, is_number
 from synthroads_addon.dataset.manifest import checksum
 
 from ..configuration import Part
 from ..data.batches import MeasuredRoad
 from ..data.roads import LearningRoad, read_measured
 from ..experiments import Experiment as AnyExperiment
-from ..experiments import cached_scores, fill_path, with_seed, write_results
-from ..runs import CONFIGURATION, METRICS, Run, to_json_data
+from ..experiments import cached_scores, fill_path, kept_figures, with_seed, write_results
+from ..runs import METRICS, Run, to_json_data
 from ..scores.baselines import SkeletonSettings
 from ..scores.distances import METRICS as FIGURES
 from ..scores.distances import over_roads
@@ -173,7 +174,7 @@ def _without_name(turn: Sequence[str]) -> str:
 
 
 def _train(configuration: CenterlineConfiguration, folder: Path, progress: Progress) -> None:
-    run = Run.start(folder, configuration, resume=(folder / CONFIGURATION).is_file())
+    run = Run.start(folder, configuration, resume=True)
     if not (folder / METRICS).is_file():
         train(run, progress)
 
@@ -186,7 +187,7 @@ def _test(
     def score() -> dict[str, Any]:
         return _measure({"": load_predictor(run)}, run.configuration, roads, progress)[""]
 
-    return cached_scores(run, file, score, roads=_checksums(roads))
+    return cached_scores(run, file, score, partial(_are_figures, names=set(roads)), roads=_checksums(roads))
 
 
 def _rules(
@@ -199,12 +200,15 @@ def _rules(
     """Return the figures by road of all predictors that learn nothing, cached in the experiment's folder."""
     file = output / "rules" / f"seed-{seed}.json"
     made_from = {"slices": configuration.slices.to_dict(), "roads": _checksums(roads)}
-    rules: dict[str, dict[str, Any]]
-    if file.is_file() and (kept := read_json(file)).get("made_from") == made_from:
-        rules = kept["rules"]
-        return rules
     trivial = {name: one for name, (one,) in trivial_predictors(configuration.slices.half_width).items()}
     predictors = {VIEWS: views_predictor(), "skeleton": skeleton_predictor(SkeletonSettings())} | trivial
+
+    def are_sound(kept: Any) -> bool:
+        there = isinstance(kept, dict) and kept.keys() == predictors.keys()
+        return there and all(_are_figures(one, set(roads)) for one in kept.values())
+
+    if (kept := kept_figures(file, "rules", made_from, are_sound)) is not None:
+        return kept
     rules = _measure(predictors, with_seed(configuration, seed), roads, progress)
     write_file(file, canonical_json({"made_from": made_from, "rules": rules}).encode(), overwrite=True)
     return rules
@@ -226,6 +230,18 @@ def _measure(
         for name, predictor in predictors.items():
             found[name][road] = to_json_data(evaluate(predictor, case))
     return found
+
+
+def _are_figures(kept: Any, names: Set[str]) -> bool:
+    """Return whether JSON data are figures of some roads by name, as `_measure` makes them of each predictor."""
+    if not isinstance(kept, dict) or kept.keys() != names:
+        return False
+    for figures in kept.values():
+        if not isinstance(figures, dict) or not figures.keys() <= FIGURES.keys() or figures.get("slices") is None:
+            return False
+        if not all(value is None or is_number(value) for value in figures.values()):
+            return False
+    return True
 
 
 def _checksums(roads: Mapping[str, tuple[Path, Path]]) -> dict[str, list[str]]:

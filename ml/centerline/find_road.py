@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from synthroads_addon.base.arrays import Float
+from synthroads_addon.base.maps.crs import system_urn
 from synthroads_addon.base.progress import Progress, silent
+from synthroads_addon.road.axes.measured_axis import MeasuredAxis
 
-from ..data.axis import MeasuredAxis
 from ..data.corridor import CORRIDOR
 from ..data.frames import frames_along
 from ..data.strips import find_ground, path_through, strips
@@ -48,7 +49,8 @@ def find_road(
         raw[number], std[number], widths[number] = found.raw_std[own], found.std[own], found.widths[own]
         progress("finding the road", float(number[-1] + 1) / len(frames) if len(number) else 0.0)
     kept = _found_span(value[:, 0])
-    return Regression(frames.select(kept), value[kept], raw[kept], std[kept], widths[kept], ground.header.epsg)
+    codes = (ground.header.epsg, ground.header.height_epsg)
+    return Regression(frames.select(kept), value[kept], raw[kept], std[kept], widths[kept], *codes)
 
 
 def _found_span(center: Float) -> slice:
@@ -96,7 +98,8 @@ def centerline_geojson(found: Regression, name: str, spacing: float) -> dict[str
             features.append({"type": "Feature", "properties": properties, "geometry": geometry})
     collection: dict[str, Any] = {"type": "FeatureCollection", "name": name}
     if found.epsg is not None:
-        collection["crs"] = {"type": "name", "properties": {"name": f"urn:ogc:def:crs:EPSG::{found.epsg}"}}
+        urn = system_urn(found.epsg, found.height_epsg)
+        collection["crs"] = {"type": "name", "properties": {"name": urn}}
     return collection | {"features": features}
 
 
@@ -124,6 +127,7 @@ def corridor_json(found: Regression, calibration: Mapping[str, Any]) -> dict[str
         "type": "Corridor",
         "version": "1.0",
         "epsg": found.epsg,
+        **({"height_epsg": found.height_epsg} if found.height_epsg else {}),
         "units": {name: UNITS.get(name, "m") for name in ("center", *CORRIDOR)},
         "calibration": dict(calibration),
         "slices": columns,

@@ -1,13 +1,13 @@
 """The axis as a trained centreline model tells it, by way of `synthroads predict`."""
 
 from pathlib import Path as FilePath
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from synthroads_addon.base.arrays import Float
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import read_json
+from synthroads_addon.base.scratch.folders import scratch_folder
 from synthroads_addon.reconstruction.axis import Predictor
 from synthroads_addon.reconstruction.cloud import RoadCloud
 from synthroads_addon.reconstruction.path import CloudPath
@@ -19,13 +19,12 @@ _USUAL_STD = 0.1  # m, where the model tells none
 _GAP = 5.0  # m between points of a line across which nothing is told
 
 
-def learned_axis(folder: FilePath, cloud_file: FilePath, scratch: FilePath) -> Predictor:
+def learned_axis(folder: FilePath, cloud_file: FilePath) -> Predictor:
     """Return a function (cloud, path) -> (offset, std) of the axis along the path, m, by a trained centreline model.
 
     Args:
         folder: of the run, or the name of a shipped model.
         cloud_file: the cloud that the axis is wanted of.
-        scratch: folder for what the model writes, which is removed again.
 
     Raises:
         MissingFileError, InputError: it is no run of a centreline model, or its training isn't finished.
@@ -36,8 +35,8 @@ def learned_axis(folder: FilePath, cloud_file: FilePath, scratch: FilePath) -> P
         raise InputError("--run", str(folder), f"is a model for {name}, a centreline model is needed")
 
     def predict(cloud: RoadCloud, path: CloudPath) -> tuple[Float, Float]:
-        with TemporaryDirectory(dir=scratch) as place:
-            course, lines = FilePath(place) / "path.csv", FilePath(place) / "axis.geojson"
+        with scratch_folder() as place:
+            course, lines = place / "path.csv", place / "axis.geojson"
             points = path.points[::5] + cloud.origin[:2]
             np.savetxt(course, points, delimiter=",", header="x,y", comments="", fmt="%.4f")
             task(name).predict(trained, Prediction(cloud_file, lines, course))

@@ -99,7 +99,8 @@ def read_cases(
         if (path / MANIFEST).is_file():
             cache = Path(configuration.data.cache) if configuration.data.cache else None
             for folder in scene_folders(path, evaluation.split):
-                for road in read_scene(folder, settings.truth, cache):
+                # Nothing is written where a run's file says: it may be somebody else's.
+                for road in read_scene(folder, settings.truth, cache, keep=False):
                     shown.append(make_case(road, seed, cropping=None, estimated=False, settings=settings))
         else:
             for cloud in clouds_with_axes(path) if path.is_dir() else [path]:

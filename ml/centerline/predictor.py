@@ -11,6 +11,7 @@ import torch
 from pydantic import Field
 
 from synthroads_addon.base.arrays import Bool, Float, Index
+from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import quantity
 
 from ..configuration import Part
@@ -19,6 +20,7 @@ from ..data.frames import Frames, interleave_count, stretches
 from ..data.roads import LearningRoad
 from ..data.slices import FrameSlices, SliceSettings, collate
 from ..networks.centerline.models import LINES, TARGETS, CenterlineModel, all_targets, both_ways
+from ..runs import NOT_FINITE
 from ..scores.calibration import IntervalCalibration, calibrate_target
 from ..training_loop import move_to_device
 
@@ -47,6 +49,7 @@ class Regression:
         std: (M, T) the same, calibrated.
         widths: (M, T, 2) half-widths of the intervals that cover 68 % and 95 % on roads like the validation's.
         epsg: code of the coordinate system, None if it isn't known.
+        height_epsg: code of the vertical system, None if it isn't known.
     """
 
     frames: Frames
@@ -55,6 +58,7 @@ class Regression:
     std: Float
     widths: Float
     epsg: int | None = None
+    height_epsg: int | None = None
 
     def points(self, name: str) -> Float:
         """Return the points (M, 3) of `center`, `left_edge` or `right_edge`, m; z is always the centre's elevation."""
@@ -164,6 +168,8 @@ class CenterlinePredictor:
                 all_targets(output, kind).flatten(0, 1).cpu().numpy().astype(np.float64) for kind in ("", "_std")
             )
             filled = batch["mask"].any(-1).flatten().cpu().numpy()
+            if not np.isfinite(values[filled]).all() or np.isnan(deviations[filled]).any():
+                raise InputError("network", None, NOT_FINITE)
             yield some.flatten(), batch["frame"][..., 3].flatten().cpu().numpy(), filled, values, deviations
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from synthroads_addon.base.arrays import Float, UInt8
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.maps.places import Placement
 from synthroads_addon.reconstruction.axis import FoundRoad, Options, find_axis, straighten_path
 from synthroads_addon.reconstruction.axis import Predictor as AxisPredictor
 from synthroads_addon.reconstruction.centreline import INTERVALS
@@ -13,8 +14,8 @@ from synthroads_addon.reconstruction.cloud import KIND_OF_CLASS, PointKind, Road
 from synthroads_addon.reconstruction.path import CloudPath
 from synthroads_addon.reconstruction.views.fusion import DEFINITION
 from synthroads_addon.reconstruction.views.intervals import half_width
+from synthroads_addon.road.axes.measured_axis import MeasuredAxis
 
-from ..data.axis import MeasuredAxis
 from ..data.frames import Frames
 from ..data.points import UNSORTED_CLASSES
 from ..data.roads import LearningRoad
@@ -37,7 +38,7 @@ def road_cloud(road: LearningRoad) -> RoadCloud:
     marked = labelled and bool((kind == PointKind.MARKING).sum() > _MARKED_SHARE * paved.sum())
     intensity = np.asarray(road.intensity[own], dtype=np.float32)
     xyz = np.asarray(road.xyz[own], dtype=np.float64)
-    return RoadCloud(xyz, intensity, kind, np.zeros(3), road.epsg, labelled, marked, len(kind), {})
+    return RoadCloud(xyz, intensity, kind, np.zeros(3), Placement(), labelled, marked, len(kind), {})
 
 
 def views_predictor(network: Predictor | None = None) -> Predictor:

@@ -12,10 +12,12 @@ import torch
 from pydantic import Field
 from torch import nn
 
-from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
-from synthroads_addon.base.files import write_file
+from synthroads_addon.base.errors import InputError, MissingFileError
+from synthroads_addon.base.files import check_file_target, write_file
+from synthroads_addon.base.maps.places import Placement
 from synthroads_addon.base.progress import Progress, silent
 from synthroads_addon.base.schema import canonical_json
+from synthroads_addon.cloud.formats.registry import open_cloud
 
 from ..configuration import Configuration
 from ..data.batches import (
@@ -40,7 +42,7 @@ from ..networks.centerline.transformer import TransformerOptions
 from ..onnx_export import Exportable
 from ..processes import helper_processes
 from ..registry import network_union
-from ..runs import CALIBRATION, Run, stream_seed, to_json_data
+from ..runs import CALIBRATION, Run, load_state, stream_seed, to_json_data
 from ..scores.calibration import DEVIATIONS, IntervalCalibration
 from ..scores.evaluation import STRETCHES, make_case
 from ..tasks import Evaluation, Prediction
@@ -80,13 +82,19 @@ CONFIGURATION = CenterlineConfiguration
 
 
 def train(run: Run[CenterlineConfiguration], progress: Progress = silent) -> dict[str, Any]:
-    """Train a model, calibrate its deviations on the validation roads, save both in the run; return the metrics."""
-    with helper_processes(run, train_network, chosen_device(run.configuration)):
-        model, roads = train_network(run, progress)
-    progress("calibrating", 0.0)
-    metrics = calibrate(run, model, roads)
-    run.write_metrics(metrics)
-    return metrics
+    """Train a model, calibrate its deviations on the validation roads, save both in the run; return the metrics.
+
+    Raises:
+        InputError: data are missing, or don't fit the configuration.
+        OutputError: another training is at work in the run's folder, or it can't be written.
+    """
+    with run.alone():
+        with helper_processes(run, train_network, chosen_device(run.configuration)):
+            model, roads = train_network(run, progress)
+        progress("calibrating", 0.0)
+        metrics = calibrate(run, model, roads)
+        run.write_metrics(metrics)
+        return metrics
 
 
 def train_network(run: Run[CenterlineConfiguration], progress: Progress = silent) -> tuple[CenterlineModel, Roads]:
@@ -99,6 +107,7 @@ def train_network(run: Run[CenterlineConfiguration], progress: Progress = silent
     device = chosen_device(configuration)
     roads = read_roads(configuration.data, configuration.slices.truth, progress)
     model = _first_model(configuration).to(device)
+    run.begin()
 
     def batches_of(roads: Roads) -> Batches:
         return Batches(
@@ -154,14 +163,12 @@ def predict(run: Run[CenterlineConfiguration], prediction: Prediction, progress:
         InputError: the run isn't finished, the output isn't a .geojson file, or the cloud has no ground.
         OutputError: an output is already there.
     """
-    lines, corridor = prediction.output, prediction.output.with_suffix(".corridor.json")
-    if lines.suffix.lower() != ".geojson":
-        raise InputError("--output", str(lines), "must end in .geojson for a centreline")
-    for path in (lines, corridor):
-        if path.exists() and not prediction.overwrite:
-            raise OutputError("--output", str(path), "is there already; --overwrite replaces it")
+    lines = prediction.output
+    check_file_target(lines, prediction.output_option, prediction.overwrite, ending=".geojson")
+    corridor = lines.with_suffix(".corridor.json")
+    check_file_target(corridor, prediction.output_option, prediction.overwrite)
     ready = load_predictor(run)
-    line = None if prediction.path is None else read_path(prediction.path)
+    line = None if prediction.path is None else read_path(prediction.path, place=_place_of(prediction.cloud))
     found = find_road(ready, prediction.cloud, line, progress)
     name = prediction.cloud.stem
     text = canonical_json(centerline_geojson(found, name, ready.settings.frame_spacing))
@@ -176,6 +183,11 @@ def predict(run: Run[CenterlineConfiguration], prediction: Prediction, progress:
         "mean_std": float(found.std[there, 0].mean()) if there.any() else None,
         "files": [str(lines), str(corridor)],
     }
+
+
+def _place_of(cloud: Path) -> Placement:
+    with open_cloud(cloud) as reader:
+        return reader.header.place
 
 
 def exportable(run: Run[CenterlineConfiguration]) -> Exportable:
@@ -197,12 +209,24 @@ def load_predictor(run: Run[CenterlineConfiguration]) -> CenterlinePredictor:
     device = chosen_device(configuration)
     told = run.calibration()
     state = run.last_checkpoint(device)
-    if state is None or int(state["epoch"]) < configuration.schedule.epochs or told is None:
+    if state is None or state["epoch"] < configuration.schedule.epochs or told is None:
         raise InputError(str(run.folder), None, "its training isn't finished; `synthroads train --resume` goes on")
     model = _empty_model(configuration).to(device)
-    model.load_state_dict(state["model"])
-    calibration = {name: IntervalCalibration.from_dict(one) for name, one in told.items()}
+    load_state(model, state["model"], str(run.folder))
+    calibration = _calibration_of(told, run.folder)
     return CenterlinePredictor(model, configuration.slices, configuration.use, calibration)
+
+
+def _calibration_of(told: Any, folder: Path) -> dict[str, IntervalCalibration]:
+    """Return the calibration of each target from JSON data; InputError if it isn't one."""
+    try:
+        calibration = {name: IntervalCalibration.from_dict(one) for name, one in told.items()}
+    except (TypeError, ValueError, LookupError, AttributeError, OverflowError):
+        calibration = None
+    if calibration is None or any(not 0.0 < one.factor < np.inf for one in calibration.values()):
+        remedy = "`synthroads train --resume` makes it anew"
+        raise InputError(str(folder), None, f"its calibration isn't that of a model's deviations; {remedy}")
+    return calibration
 
 
 def _empty_model(configuration: CenterlineConfiguration) -> CenterlineModel:
@@ -222,8 +246,8 @@ def _first_model(configuration: CenterlineConfiguration) -> CenterlineModel:
         if state is None:
             raise MissingFileError("begin_with", configuration.begin_with, "holds no weights")
         try:
-            model.load_state_dict(state["model"])
-        except RuntimeError:
+            load_state(model, state["model"], configuration.begin_with)
+        except InputError:
             raise InputError(
                 "begin_with", configuration.begin_with, "holds another model than `network` says"
             ) from None

@@ -14,9 +14,9 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.progress import Progress, silent
 from synthroads_addon.base.random_streams import stream
 from synthroads_addon.base.schema import quantity
+from synthroads_addon.road.axes.measured_axis import MeasuredAxis
 
 from ..configuration import Part
-from .axis import MeasuredAxis
 from .corridor import Learned, Truth
 from .effects import SequenceEffects
 from .effects.slices import SequenceCrop

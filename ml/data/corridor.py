@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike
 
 from synthroads_addon.base.arrays import Float
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.road.axes.measured_axis import MeasuredAxis
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.section_geometry import CarriagewaySection
 from synthroads_addon.road.turnout_geometry import TURNOUT_STRIPS
 
-from .axis import MeasuredAxis
 from .frames import Frames
 
 TruthKind = Literal["road", "carriageway"]

@@ -20,8 +20,8 @@ from scipy.special import ndtr
 
 from synthroads_addon.base.arrays import Bool, Float, Index
 from synthroads_addon.base.errors import InputError
-
-from .axis import MeasuredAxis
+from synthroads_addon.base.maps.places import Placement
+from synthroads_addon.road.axes.measured_axis import MeasuredAxis
 
 SPACING = 1.0
 """Distance of the frames along their path, m."""
@@ -153,7 +153,9 @@ def _own_spacing(frames: Frames, most: float) -> float:
     return min(float(np.median(np.abs(np.diff(frames.station)))), most) if len(frames) > 1 else most
 
 
-def read_path(file: Path, origin: ArrayLike = (0.0, 0.0, 0.0), tolerance: float = 0.3) -> MeasuredAxis:
+def read_path(
+    file: Path, origin: ArrayLike = (0.0, 0.0, 0.0), tolerance: float = 0.3, place: Placement | None = None
+) -> MeasuredAxis:
     """Read a path along the road from CSV or GeoJSON, a drawn line or a trajectory, thinned to `tolerance` (m).
 
     Args:
@@ -161,11 +163,12 @@ def read_path(file: Path, origin: ArrayLike = (0.0, 0.0, 0.0), tolerance: float 
         origin: (3,) map coordinates that were subtracted from the cloud's points.
         tolerance: points are dropped until one lies at least this far from the next, m: a platform that stands still
             has no direction.
+        place: the cloud's coordinate system, see `read_axis`.
 
     Raises:
         MissingFileError, InputError: see `read_axis`.
     """
-    whole = MeasuredAxis.read(file, gap=np.inf).translate(-np.asarray(origin, dtype=np.float64))
+    whole = MeasuredAxis.read(file, np.inf, place).translate(-np.asarray(origin, dtype=np.float64))
     keep, last = [0], 0.0
     for index, station in enumerate(whole.station[1:], 1):
         if station - last >= tolerance:

@@ -16,8 +16,8 @@ from synthroads_addon.cloud.points import PointBlock, concatenate
 from synthroads_addon.cloud.tools.quantile_mapping import steps_per_unit
 from synthroads_addon.cloud.tools.subsample import GridSubsampler
 from synthroads_addon.dataset.manifest import MANIFEST
+from synthroads_addon.road.axes.measured_axis import MeasuredAxis
 
-from .axis import MeasuredAxis
 from .packed import Packed, pack_tile
 from .roads import scene_folders
 from .sources import Source, labelled_blocks, read_tiles, tile_of

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from synthroads_addon.base.arrays import AnyArray, Bool, Float, Float32, Index, Int, UInt8
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.cloud.formats.base import CloudHeader
+from synthroads_addon.base.maps.places import Placement
+from synthroads_addon.cloud.colours import SIXTEEN_BITS
+from synthroads_addon.cloud.formats.header import CloudHeader
 from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.cloud.points import PointBlock
 
@@ -19,8 +21,6 @@ GROUND_CLASSES = ("ground", "road", "road_marking", "roadside", "road_surface")
 UNSORTED_CLASSES = ("never_classified", "unclassified")
 """Names of points that nobody has sorted."""
 ROAD_CLASSES = ("road", "road_marking", "road_surface")
-SIXTEEN_BITS = 65535.0
-_EIGHT_BITS = 255.0
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,7 @@ class Points:
         class_names: name of each class by its id.
         has_color: whether the points have colours; a file whose colours are all 0 has none.
         epsg: code of the map coordinate system, None if the file doesn't say.
+        place: the coordinate system, and that of the file that they are from.
     """
 
     origin: Float
@@ -46,6 +47,7 @@ class Points:
     class_names: Mapping[int, str] = field(default_factory=dict)
     has_color: bool = False
     epsg: int | None = None
+    place: Placement = field(default_factory=Placement)
     per_point: ClassVar[tuple[str, ...]] = ("xyz", "intensity", "rgb", "class_id")
 
     def __len__(self) -> int:
@@ -65,7 +67,7 @@ class Points:
 
 
 def read_points(path: Path, classes: Collection[str] | None = None) -> Points:
-    """Read a cloud of any format into memory, or only its points of some classes.
+    """Read a cloud's points that are neither withheld nor noise into memory, or only those of some classes.
 
     Args:
         path: the cloud.
@@ -79,7 +81,7 @@ def read_points(path: Path, classes: Collection[str] | None = None) -> Points:
         header = cloud.header
         names = header.scheme.names()
         wanted = np.array([classes is None or names.get(number) in classes for number in range(256)])
-        kept = [block.select(wanted[block.class_id]) for block in cloud.blocks()]
+        kept = [block.select(wanted[block.class_id]) for block in cloud.usable_blocks()]
     kept = [block for block in kept if len(block)]
     if not kept:
         what = "no point at all" if classes is None else f"no point of the classes {', '.join(sorted(classes))}"
@@ -103,33 +105,29 @@ def read_ground(path: Path) -> Points:
     raise InputError(str(path), None, f"holds classes, but none of {', '.join(GROUND_CLASSES)}")
 
 
-def full_brightness(largest: int) -> float:
-    """Return the stored value of full brightness, 65535 or 255, from the cloud's largest: some files store 8 bits."""
-    return SIXTEEN_BITS if largest > _EIGHT_BITS else _EIGHT_BITS
-
-
-def points_of(header: CloudHeader, blocks: Sequence[PointBlock], largest: int | None = None) -> Points:
+def points_of(header: CloudHeader, blocks: Sequence[PointBlock], colored: bool | None = None) -> Points:
     """Return blocks of a cloud concatenated as `Points`: shifted to a local origin, intensities and colours as shares.
 
     Args:
         header: of the cloud.
         blocks: at least one.
-        largest: of the cloud's colours; that of the blocks if not given.
+        colored: whether the cloud has any colour that isn't black; looked up in the blocks if not given.
     """
     xyz, intensity, rgb, class_id = (
         np.concatenate([getattr(block, name) for block in blocks]) for name in ("xyz", "intensity", "rgb", "class_id")
     )
     origin = np.floor(xyz.min(axis=0))
-    largest = int(rgb.max()) if largest is None else largest
+    colored = bool(rgb.any()) if colored is None else colored
     return Points(
         origin=origin,
         xyz=xyz - origin,
         intensity=(intensity * ((header.intensity_scale or 1.0) / SIXTEEN_BITS)).astype(np.float32),
-        rgb=(rgb / full_brightness(largest)).astype(np.float32),
+        rgb=(rgb / SIXTEEN_BITS).astype(np.float32),
         class_id=class_id,
         class_names=header.scheme.names(),
-        has_color=header.has_color and largest > 0,
+        has_color=header.has_color and colored,
         epsg=header.epsg,
+        place=header.place,
     )
 
 

@@ -20,9 +20,9 @@ from synthroads_addon.base.scratch.folders import scratch_folder
 from synthroads_addon.cloud.formats.npz import ARCHIVE_FAULTS
 from synthroads_addon.cloud.formats.registry import ENDINGS
 from synthroads_addon.dataset.manifest import checksum, read_manifest
+from synthroads_addon.road.axes.measured_axis import MeasuredAxis
 from synthroads_addon.road.parameters import read_parameters
 
-from .axis import MeasuredAxis
 from .corridor import Learned, Truth, truths
 from .frames import Frames
 from .points import GROUND_CLASSES, Points, read_ground, read_points
@@ -168,7 +168,7 @@ def scene_folders(data_set: Path, split: str | None) -> list[Path]:
     return found
 
 
-def read_scene(folder: Path, kind: Learned, cache: Path | None = None) -> list[LearningRoad]:
+def read_scene(folder: Path, kind: Learned, cache: Path | None = None, keep: bool = True) -> list[LearningRoad]:
     """Read a data set's scene as roads: its ground points, with the truth of each road or carriageway of `kind`.
 
     Args:
@@ -177,6 +177,7 @@ def read_scene(folder: Path, kind: Learned, cache: Path | None = None) -> list[L
             ``carriageway``, perhaps none; with ``either`` the whole road, and each of them that has no shoulders. Names
             of several end with their number.
         cache: folder in which the sorted points are kept, to be mapped into memory the next time; None: nowhere.
+        keep: whether they are written there; else what is there is read, and no more.
 
     Raises:
         MissingFileError, InputError: a file is missing or damaged.
@@ -190,7 +191,7 @@ def read_scene(folder: Path, kind: Learned, cache: Path | None = None) -> list[L
         points = read_points(folder / CLOUD, GROUND_CLASSES)
         reference = truths(parameters, "road", points.origin)[0].axis
         whole = LearningRoad.of_points(folder.name, points, reference)
-        if cache:
+        if cache and keep:
             _write_cache(whole, folder, cache)
     found = truths(parameters, kind, whole.origin)
     names = [folder.name] if len(found) == 1 else [f"{folder.name}-{number + 1}" for number in range(len(found))]
@@ -240,7 +241,7 @@ def read_measured(cloud: Path, axis: Path, kind: Learned, gap: float | None = No
         MissingFileError, InputError: a file is missing or damaged.
     """
     points = read_ground(cloud)
-    line = MeasuredAxis.read(axis, gap).translate(-points.origin)
+    line = MeasuredAxis.read(axis, gap, points.place).translate(-points.origin)
     truth = Truth.of_axis(line, "carriageway" if kind == "carriageway" else "road")
     return LearningRoad.of_points(cloud.stem, points, line, truth)
 

@@ -18,6 +18,7 @@ from typing import Any, Self
 from pydantic import Field, model_validator
 
 from synthroads_addon.base.errors import InputError, OutputError
+from synthroads_addon.base.named_paths import path_inside
 from synthroads_addon.base.progress import Progress, silent
 from synthroads_addon.base.schema import canonical_json, quantity
 from synthroads_addon.base.version import generator
@@ -112,7 +113,7 @@ class SceneStream:
         progress: Progress = silent,
     ) -> None:
         self.options, self.epochs, self.progress = options, epochs, progress
-        self.folder = Path(options.folder or run_folder / SCENES).absolute()
+        self.folder = Path(options.folder or path_inside(run_folder, SCENES, run_folder, follow=True)).absolute()
         recipe = load_recipe(options.recipe).model_copy(update={"layouts": layouts})
         self._plan = StreamPlan(recipe=recipe, split=options.split, seed=seed, generator=generator())
         self._plan.job(0)  # before anything is begun
@@ -188,7 +189,10 @@ class SceneStream:
 
     def _open_folder(self) -> None:
         """Make the folder, or take over its scenes if they are of the same plan; those of another plan are removed."""
-        self.folder.mkdir(parents=True, exist_ok=True)
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError("data.stream", str(self.folder), f"cannot be written ({error.strerror})") from None
         plan, text = self.folder / PLAN, canonical_json(self._plan.to_dict())
         if plan.is_file():
             remove_remains(self.folder)
@@ -203,7 +207,7 @@ class SceneStream:
 
     def _begin(self) -> None:
         """Start the producers, in a session of their own: Ctrl-C is the training's, which then ends them."""
-        with (self.folder / LOG).open("wb") as log:
+        with path_inside(self.folder, LOG, self.folder, follow=True).open("wb") as log:
             self._process = subprocess.Popen(
                 [*PRODUCER, str(self.folder), str(self.options.producers)],
                 stdin=subprocess.PIPE,

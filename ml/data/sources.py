@@ -16,8 +16,9 @@ from synthroads_addon.base.classes import UNLABELLED, ClassScheme
 from synthroads_addon.base.errors import InputError, MissingFileError
 from synthroads_addon.base.files import files_below
 from synthroads_addon.base.schema import quantity, read_json
-from synthroads_addon.cloud.formats.base import BLOCK, CloudReader
+from synthroads_addon.cloud.flags import without_flags
 from synthroads_addon.cloud.formats.npz import ARCHIVE_FAULTS
+from synthroads_addon.cloud.formats.reader import BLOCK, CloudReader
 from synthroads_addon.cloud.formats.registry import ENDINGS, open_cloud
 from synthroads_addon.cloud.points import PointBlock
 from synthroads_addon.cloud.tools.quantile_mapping import levels, steps_per_unit
@@ -246,7 +247,7 @@ def cloud_tiles(
 
 def unlabelled_blocks(cloud: CloudReader) -> Iterator[PointBlock]:
     """Yield a cloud's blocks without labels, whatever they are."""
-    for block in cloud.blocks():
+    for block in cloud.usable_blocks():
         yield _with_places(block, np.full(len(block), IGNORED, dtype=np.int16))
 
 
@@ -293,7 +294,7 @@ def tile_of(points: PointBlock, scene: str, origin: Float, scale: float) -> Clou
         scene,
         origin,
         (points.xyz - origin).astype(np.float32),
-        eight_bits(points.rgb, int(points.rgb.max())) if points.rgb.any() else None,
+        eight_bits(points.rgb) if points.rgb.any() else None,
         strength if strength.any() else None,
         np.where(points.class_id == UNLABELLED, IGNORED, points.class_id.astype(np.int16)),
     )
@@ -307,10 +308,12 @@ def labelled_blocks(cloud: CloudReader, scheme: ClassScheme, source: Source) -> 
             allowed = "has no labels of ours: `mapping` must say which of its numbers is which class"
             raise InputError(str(cloud.header.path), None, allowed)
         table = table_between({row.id: row.name for row in cloud.header.scheme.rows}, scheme, str(cloud.header.path))
-        for block in cloud.blocks():
+        for block in cloud.usable_blocks():
             yield _with_places(block, table[block.class_id])
         return
-    for block, numbers in zip(cloud.blocks(), _numbers(cloud, mapping.field), strict=True):
+    for every, every_number in zip(cloud.blocks(), _numbers(cloud, mapping.field), strict=True):
+        kept = cloud.usable_points(every, noise=True)  # it is for the mapping to say what numbers mean
+        block, numbers = without_flags(every.select(kept)), every_number[kept]
         places = mapping.label(numbers, names)
         if mapping.ignore_zero_intensity:
             places = np.where(block.intensity > 0, places, IGNORED).astype(np.int16)

@@ -10,11 +10,11 @@ import numpy as np
 from synthroads_addon.base.arrays import Bool, Float
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.progress import Progress, silent
-from synthroads_addon.cloud.formats.base import CloudHeader
+from synthroads_addon.cloud.formats.header import CloudHeader
 from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.cloud.tools.subsample import TileFiles
+from synthroads_addon.road.axes.measured_axis import MeasuredAxis
 
-from .axis import MeasuredAxis
 from .frames import Frames, estimated_path
 from .points import GROUND_CLASSES, UNSORTED_CLASSES, points_of
 from .roads import REACH, LearningRoad
@@ -29,18 +29,18 @@ _CELL = 1.0
 
 @dataclass(frozen=True)
 class GroundReading:
-    """Ground classes, largest colour and occupied cells of a cloud, from a first pass through it.
+    """Ground classes, colours and occupied cells of a cloud, from a first pass through it.
 
     Attributes:
         header: of the cloud.
         classes: ids of the classes that its ground has.
-        largest_color: over all points.
+        colored: whether any of its points has a colour that isn't black.
         cells: (C, 2) places in plan of some ground points, one in each square metre, map coordinates.
     """
 
     header: CloudHeader
     classes: Bool
-    largest_color: int
+    colored: bool
     cells: Float
 
 
@@ -54,11 +54,11 @@ def find_ground(cloud: Path, progress: Progress = silent) -> GroundReading:
         header = reader.header
         names = header.scheme.names()
         ground = np.array([names.get(number) in GROUND_CLASSES for number in range(256)])
-        counts, largest, done = np.zeros(256, dtype=np.int64), 0, 0
+        counts, colored, done = np.zeros(256, dtype=np.int64), False, 0
         cells: dict[bool, dict[tuple[int, int], None]] = {True: {}, False: {}}
-        for block in reader.blocks():
+        for block in reader.usable_blocks():
             counts += np.bincount(block.class_id, minlength=256)
-            largest = max(largest, int(block.rgb.max(initial=0)))
+            colored = colored or bool(block.rgb.any())
             own = ground[block.class_id]
             for kind, some in ((True, own), (False, ~own)):
                 places = np.unique(np.floor(block.xyz[some, :2] / _CELL).astype(np.int64), axis=0)
@@ -71,7 +71,7 @@ def find_ground(cloud: Path, progress: Progress = silent) -> GroundReading:
         chosen, found = np.ones(256, dtype=bool), cells[False]
     else:
         raise InputError(str(cloud), None, f"holds no point of the classes {', '.join(GROUND_CLASSES)}")
-    return GroundReading(header, chosen, largest, _CELL * (np.array(list(found), dtype=np.float64) + 0.5))
+    return GroundReading(header, chosen, colored, _CELL * (np.array(list(found), dtype=np.float64) + 0.5))
 
 
 def path_through(ground: GroundReading) -> MeasuredAxis:
@@ -105,7 +105,7 @@ def strips(
             first, last = number * LENGTH - MARGIN, (number + 1) * LENGTH + MARGIN
             seen = (frames.station >= first) & (frames.station < last)
             if number in own:
-                points = points_of(ground.header, [block], ground.largest_color)
+                points = points_of(ground.header, [block], ground.colored)
                 line = _part(path, first - REACH, last + REACH).translate(-points.origin)
                 local = Frames(frames.position - points.origin[:2], frames.direction, frames.station).select(seen)
                 yield LearningRoad.of_points(cloud.stem, points, line), local, own[seen] == number
@@ -115,7 +115,7 @@ def _sort_points(files: TileFiles, cloud: Path, ground: GroundReading, path: Mea
     """Write the cloud's ground points near the path to a file per strip, margins included."""
     done = 0
     with open_cloud(cloud) as reader:
-        for block in reader.blocks():
+        for block in reader.usable_blocks():
             done += len(block)
             some = block.select(ground.classes[block.class_id])
             station, offset = path.project(some.xyz)

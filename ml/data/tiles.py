@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from synthroads_addon.base.arrays import AnyArray, Float, Float32, Int, UInt8
+from synthroads_addon.cloud.colours import EIGHT_BITS, SIXTEEN_BITS
 
 from .classes import IGNORED
-from .points import full_brightness, voxel_sample
+from .points import voxel_sample
 
 
 @dataclass(frozen=True)
@@ -51,14 +52,9 @@ class CloudTile:
         return np.bincount(self.segment[self.segment != IGNORED], minlength=classes)
 
 
-def eight_bits(rgb: AnyArray, largest: int) -> UInt8:
-    """Return LAS colours (N, 3), stored in 8 or 16 bits, as 8 bits each.
-
-    Args:
-        rgb: as they are stored.
-        largest: of all values of the cloud, see `full_brightness`.
-    """
-    return np.rint(rgb * (255.0 / full_brightness(largest))).astype(np.uint8)
+def eight_bits(rgb: AnyArray) -> UInt8:
+    """Return 16-bit colours (N, 3) as 8 bits each."""
+    return np.rint(rgb * (EIGHT_BITS / SIXTEEN_BITS)).astype(np.uint8)
 
 
 @dataclass(frozen=True)

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
+from multiprocessing.util import Finalize, get_temp_dir
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Protocol, TypeVar
 
 from torch.utils.data import DataLoader
 
-from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.errors import InputError, OutputError
+from synthroads_addon.base.scratch.folders import scratch_folder
 
 B = TypeVar("B")
 
@@ -49,6 +54,8 @@ def load_batches(
         worker_init_fn=silence_lost_pipes,
     )
     batches: Iterator[B] = iter(())
+    if workers:
+        shorten_sockets()
     try:
         with defer_interrupt():
             batches = iter(loader)
@@ -59,6 +66,47 @@ def load_batches(
         with suppress(RuntimeError):
             if end_workers := getattr(batches, "_shutdown_workers", None):  # there only where workers are
                 end_workers()
+
+
+def shorten_sockets() -> None:
+    """Have the sockets by which workers hand tensors on lie in a folder whose name is short enough for the system.
+
+    Where it is too long no batch would ever arrive, and PyTorch would wait for it.
+
+    Raises:
+        OutputError: there is no such folder.
+    """
+    place = tempfile.gettempdir()
+    if sys.platform == "win32" or _fits(place) or _socket_folders:
+        return
+    for other in _SHORT_PLACES:
+        with suppress(OSError):
+            stack = ExitStack()
+            folder = str(stack.enter_context(scratch_folder(Path(other))))
+            _socket_folders.append(stack)
+            Finalize(None, stack.close, exitpriority=_AFTER_SOCKETS)
+            before, tempfile.tempdir = tempfile.tempdir, folder
+            try:
+                get_temp_dir()  # once for this process and its workers
+            finally:
+                tempfile.tempdir = before
+            return
+    raise OutputError("temporary folder", place, "has too long a name for data workers; TMPDIR names another")
+
+
+def _fits(folder: str) -> bool:
+    return len(os.fsencode(folder)) + len(_SOCKET) <= _LONGEST_SOCKET
+
+
+_SHORT_PLACES = ("/tmp", "/var/tmp", "/dev/shm")  # nosec B108 # a folder of this user alone is made within
+_SOCKET = "/pymp-12345678/listener-12345678"
+"""Name of a socket of multiprocessing in the folder for temporary files."""
+_LONGEST_SOCKET = 100
+"""Longest name that each system takes."""
+_AFTER_SOCKETS = -200
+"""When the process ends, multiprocessing removes its sockets at -100."""
+_socket_folders: list[ExitStack] = []
+"""The folder for sockets, if it isn't the one for temporary files; removed when the process ends."""
 
 
 @contextmanager

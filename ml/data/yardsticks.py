@@ -4,20 +4,22 @@ Nothing is downloaded, and nothing of these data sets comes with the package. A 
 files are which split, where they keep labels and intensities, and which of their numbers is which class.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Self
 
 import laspy
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from synthroads_addon.base.arrays import AnyArray, Float
 from synthroads_addon.base.errors import InputError, MissingFileError
+from synthroads_addon.base.named_paths import stays_below
+from synthroads_addon.base.remarks import assume, warn
 from synthroads_addon.base.schema import read_json
-from synthroads_addon.cloud.formats.base import BLOCK
 from synthroads_addon.cloud.formats.ply import read_ply_header
+from synthroads_addon.cloud.formats.reader import BLOCK
 from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.cloud.points import PointBlock
 
@@ -43,6 +45,14 @@ class Yardstick(Part):
         "intensity", min_length=1, description="Attribute of the intensities; 0 where there is none."
     )
     names: str = Field("", description="JSON file in the folder, number -> name, where classes are mapped by name.")
+    numbers: dict[str, str] = Field({}, description="Number -> name in arrays (.npy) of a folder without that file.")
+
+    @model_validator(mode="after")
+    def _check_paths(self) -> Self:
+        for name in (*([self.names] if self.names else []), *(one for some in self.splits.values() for one in some)):
+            if not stays_below(name):
+                raise ValueError(f"'{name}' must lie in the data set's folder: a relative path with / and without ..")
+        return self
 
     def files(self, folder: Path, split: str | None) -> list[Path]:
         """Return the files of a split, or of all, in a folder, sorted.
@@ -54,7 +64,7 @@ class Yardstick(Part):
         if split is not None and split not in self.splits:
             raise InputError("split", split, f"must be one of {', '.join(self.splits)}")
         patterns = [one for name, some in self.splits.items() if split in (None, name) for one in some]
-        readable = (".bin", ".ply", ".las", ".laz")
+        readable = (".bin", ".ply", ".las", ".laz", ".npy")
         found = {path for one in patterns for path in folder.glob(one) if path.suffix.lower() in readable}
         if not found:
             raise MissingFileError(str(folder), None, f"holds no file like {' or '.join(patterns[:4])}")
@@ -69,6 +79,10 @@ class Yardstick(Part):
         if not self.names:
             return self.mapping
         path = folder / self.names
+        if not path.is_file() and self.numbers and next(folder.rglob("*.npy"), None):
+            listed = ", ".join(f"{number} {name}" for number, name in self.numbers.items())
+            assume(f"{folder.name} has no {self.names}: the numbers of its classes are taken for {listed}")
+            return self.mapping.model_copy(update={"classes": self._named(self.numbers)})
         if not path.is_file():
             wanted = ", ".join(self.mapping.classes)
             raise MissingFileError(
@@ -79,8 +93,11 @@ class Yardstick(Part):
             raise InputError(
                 str(path), None, 'must be an object of numbers as text and names, e.g. {"1": "RoadSurface"}'
             )
-        classes = {number: self.mapping.classes[name] for number, name in told.items() if name in self.mapping.classes}
-        return self.mapping.model_copy(update={"classes": classes})
+        return self.mapping.model_copy(update={"classes": self._named(told)})
+
+    def _named(self, names: Mapping[str, str]) -> dict[str, str]:
+        """Return number -> class, by the names of the numbers."""
+        return {number: self.mapping.classes[name] for number, name in names.items() if name in self.mapping.classes}
 
 
 def yardstick_names() -> list[str]:
@@ -108,6 +125,8 @@ def numbered_blocks(path: Path, yardstick: Yardstick) -> Iterator[tuple[PointBlo
     form = path.suffix.lower().removeprefix(".") if yardstick.form == "any" else yardstick.form
     if form == "sweeps":
         yield _sweep(path)
+    elif form == "npy":
+        yield from _array(path)
     elif form == "ply":
         yield from _ply(path, yardstick)
     else:
@@ -126,6 +145,28 @@ def _sweep(path: Path) -> tuple[PointBlock, NDArray[np.int64]]:
         raise InputError(str(labels), len(numbers), f"must hold a label for each of the {len(points)} points")
     xyz = _finite(path, points["xyz"].astype(np.float64))
     return _block(xyz, points["remission"].astype(np.float64), None), (numbers & 0xFFFF).astype(np.int64)
+
+
+def _array(path: Path) -> Iterator[tuple[PointBlock, NDArray[np.int64]]]:
+    """Yield the points of an array (N, 4 or more) in a .npy file: x, y, z, number of the class; the rest is left aside.
+
+    Raises:
+        InputError: it is no such array, or a coordinate isn't finite.
+    """
+    try:
+        array = np.load(path, mmap_mode="r", allow_pickle=False)
+    except (ValueError, OSError, EOFError):
+        raise InputError(str(path), None, "is no array that can be read") from None
+    if not isinstance(array, np.ndarray) or array.ndim != 2 or array.shape[1] < 4 or array.dtype.kind not in "fiu":
+        shape = getattr(array, "shape", None)
+        raise InputError(str(path), shape, "must be numbers of shape (N, 4): x, y, z, class")
+    if array.shape[1] > 4:
+        warn(f"{path.name}: its columns after the fourth (x, y, z, class) are left aside")
+    for done in range(0, len(array), BLOCK):
+        rows = np.asarray(array[done : done + BLOCK], dtype=np.float64)
+        xyz = _finite(path, rows[:, :3])
+        label = np.where(np.isfinite(rows[:, 3]), rows[:, 3], -1.0)
+        yield _block(xyz, np.zeros(len(rows)), None), np.rint(label).astype(np.int64)
 
 
 def _ply(path: Path, yardstick: Yardstick) -> Iterator[tuple[PointBlock, NDArray[np.int64]]]:
@@ -150,9 +191,9 @@ def _ply(path: Path, yardstick: Yardstick) -> Iterator[tuple[PointBlock, NDArray
 
 
 def _largest(kind: np.dtype[Any], name: str) -> float:
-    """Return what a full intensity is in an attribute: of integers what they can hold, of floats 16 bits."""
+    """Return what a full intensity is in an attribute: of 8 bits what they can hold, of all wider ones 16 bits."""
     part = kind[name]
-    return float(np.iinfo(part).max) if part.kind in "iu" else _FULL
+    return float(np.iinfo(part).max) if part.itemsize == 1 else _FULL
 
 
 def _las(path: Path, field: str) -> Iterator[tuple[PointBlock, NDArray[np.int64]]]:
@@ -162,10 +203,12 @@ def _las(path: Path, field: str) -> Iterator[tuple[PointBlock, NDArray[np.int64]
         if field not in names:
             raise InputError(f"{path}: attribute", field, f"must be one of {', '.join(names)}")
         scale = cloud.header.intensity_scale or 1.0
-        for block, record in zip(cloud.blocks(), file.chunk_iterator(BLOCK), strict=True):
+        for every, record in zip(cloud.blocks(), file.chunk_iterator(BLOCK), strict=True):
+            kept = cloud.usable_points(every, noise=True)  # the mapping says what the numbers mean
+            block = every.select(kept)
             yield (
                 _block(block.xyz, block.intensity * scale / _FULL, block.rgb),
-                np.asarray(record[field]).astype(np.int64),
+                np.asarray(record[field])[kept].astype(np.int64),
             )
 
 

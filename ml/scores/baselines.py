@@ -22,8 +22,7 @@ from scipy.spatial import cKDTree
 from skimage.morphology import skeletonize
 
 from synthroads_addon.base.arrays import Bool, Float, Index, otsu_threshold
-
-from ..data.axis import MeasuredAxis
+from synthroads_addon.road.axes.measured_axis import MeasuredAxis
 
 Rule = Callable[[Float, Float], float]
 """From the points' y (N,), m, and intensities (N,) of one slice to the centre's y, m."""

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from synthroads_addon.base.arrays import Float, Int
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.base.text_table import text_table
+from synthroads_addon.base.schema import is_number
+from synthroads_addon.base.text.table import text_table
 
 from ..data.classes import IGNORED
 from .metrics import Metric, Spread, finite_values, markdown, nan_to_none
@@ -110,6 +111,19 @@ METRICS = {
 """Metrics of each class (C,) of a `Confusion`; what is here is in its data and in all tables."""
 Scores = Mapping[str, Any]
 """Result of `Confusion.to_dict`."""
+
+
+def are_scores(data: Any, names: Sequence[str]) -> bool:
+    """Return whether JSON data are scores of classes of these names, as `Confusion.to_dict` returns them."""
+    if not isinstance(data, dict) or not isinstance(data.get("classes"), dict) or data["classes"].keys() != {*names}:
+        return False
+    rows = [*data["classes"].values(), {name: data.get(f"mean_{name}", "") for name in METRICS}]
+    counts = [data.get("points"), *(row.get("support") for row in rows[:-1] if isinstance(row, dict))]
+    of_metrics = [row.get(name, "") for row in rows if isinstance(row, dict) for name in METRICS]
+    whole = all(isinstance(row, dict) for row in rows) and all(type(count) is int for count in counts)
+    return whole and all(value is None or is_number(value) for value in of_metrics)
+
+
 NOTE = "mean (standard deviation, ddof = 1) over seeds; - where undefined"
 
 

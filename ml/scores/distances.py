@@ -27,6 +27,7 @@ from scipy.spatial import cKDTree
 from scipy.special import ndtri
 
 from synthroads_addon.base.arrays import Bool, Float, Index
+from synthroads_addon.road.axes.measured_axis import MeasuredAxis
 
 from .calibration import LEVELS
 from .metrics import Metric
@@ -188,25 +189,11 @@ def lateral_errors(points: Float, true: Float, station: Float) -> Float:
     The line runs through the true centres (M, 2) in the order of their stations (M,) and is broken at gaps.
     """
     known = np.flatnonzero(np.isfinite(true).all(axis=1))
-    joined = np.diff(station[known]) <= GAP
-    begin, end = true[known[:-1][joined]], true[known[1:][joined]]
-    length = np.hypot(*(end - begin).T)
-    begin, end, length = begin[length > 1e-9], end[length > 1e-9], length[length > 1e-9]
-    result = np.full(len(points), np.nan)
-    if not len(begin) or not len(points):
-        return result
-    # The nearest of the 16 segments with the nearest middles: exact where segments are of about equal length.
-    _, near = cKDTree((begin + end) / 2.0).query(points, k=min(16, len(begin)))
-    near = near.reshape(len(points), -1)
-    direction = ((end - begin) / length[:, None])[near]
-    apart = points[:, None, :] - begin[near]
-    along = (apart * direction).sum(axis=2)
-    beyond = along - np.clip(along, 0.0, length[near])
-    across = direction[..., 0] * apart[..., 1] - direction[..., 1] * apart[..., 0]
-    best = np.hypot(beyond, across).argmin(axis=1)
-    row = np.arange(len(points))
-    beyond, across = beyond[row, best], across[row, best]
-    return np.where(np.abs(beyond) > _PAST_END, np.nan, across)
+    nothing = np.full(len(points), np.nan)
+    if len(known) < 2 or not len(points) or not np.ptp(true[known], axis=0).any():
+        return nothing
+    line = MeasuredAxis(true[known], np.diff(station[known]) <= GAP)
+    return line.beside(points, np.inf, _PAST_END)[1] if len(line.parts) else nothing
 
 
 def coverage(error: Float, std: Float, level: float) -> float:

@@ -11,8 +11,8 @@ import numpy as np
 
 from synthroads_addon.base.arrays import Float
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.road.axes.measured_axis import MeasuredAxis
 
-from ..data.axis import MeasuredAxis
 from ..data.corridor import Truth
 from ..data.intensity import logarithms
 from ..data.roads import LearningRoad

@@ -14,6 +14,7 @@ from scipy.stats import rankdata
 
 from synthroads_addon.base.arrays import Float, Float32
 from synthroads_addon.base.classes import ClassScheme, class_scheme
+from synthroads_addon.base.text.literal import literal_texts, shown_text
 
 from ..data.classes import IGNORED
 from ..data.corridor import CORRIDOR
@@ -46,7 +47,7 @@ def small_png(figure: Any, dpi: float | None = None) -> bytes:
     """
     drawn, content = io.BytesIO(), io.BytesIO()
     figure.savefig(drawn, format="png", dpi=dpi or figure.dpi)
-    image = Image.open(drawn).convert("RGB").quantize(_PALETTE, dither=Image.Dither.NONE)
+    image = Image.open(drawn, formats=("PNG",)).convert("RGB").quantize(_PALETTE, dither=Image.Dither.NONE)
     image.save(content, format="png", optimize=True)
     return content.getvalue()
 
@@ -59,6 +60,7 @@ class PictureView:
     last: float
 
 
+@literal_texts()
 def lines_picture(
     shown: Case, lines: Mapping[str, Float], view: PictureView, title: str, height: float = 12.0
 ) -> bytes:
@@ -78,7 +80,7 @@ def lines_picture(
     largest = 0.0
     for (name, y), color in zip(lines.items(), COLORS, strict=False):
         station, offset = _beside(shown, shown.frames.at(y), view)
-        panels[0].plot(station, offset, color=color, lw=1.2, label=name)
+        panels[0].plot(station, offset, color=color, lw=1.2, label=shown_text(name))
         panels[1].plot(station, offset, color=color, lw=1.2)
         largest = max(largest, float(np.nanquantile(np.abs(offset), 0.98)) if np.isfinite(offset).any() else 0.0)
     limit = 1.3 * max(largest, _LINEAR)
@@ -90,6 +92,7 @@ def lines_picture(
     return small_png(figure, dpi=110)
 
 
+@literal_texts()
 def corridor_picture(shown: Case, prediction: Float, view: PictureView, title: str, height: float = 16.0) -> bytes:
     """Return a PNG of a corridor: centre and edges with 95 % bands over the cloud, the centre's error, the lanes.
 
@@ -120,7 +123,7 @@ def _panels(title: str, heights: Sequence[float], view: PictureView, height: flo
 
     figure = Figure(figsize=(13.0, 1.6 + 2.0 * sum(heights)), layout="constrained")
     panels = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
-    figure.suptitle(title, fontsize=11)
+    figure.suptitle(shown_text(title), fontsize=11)
     panels[0].set(xlim=(view.first, view.last), ylim=(-height, height), ylabel="offset from the true axis, m")
     panels[-1].set(xlabel="station along the true axis, m")
     for panel in panels[1:]:
@@ -248,6 +251,7 @@ _UNKNOWN = (0.07, 0.07, 0.09)
 _WRONG = np.array([[0.75, 0.75, 0.75], [0.9, 0.1, 0.1]])
 
 
+@literal_texts()
 def comparison(
     tile: CloudTile, predicted: NDArray[np.int16], names: Sequence[str], scheme: ClassScheme | None = None
 ) -> bytes:
@@ -272,7 +276,10 @@ def comparison(
     for axes, view, (_, _, title) in zip(figure.subplots(1, 3), views, shown, strict=True):
         axes.imshow(view, origin="lower", interpolation="nearest")
         axes.set(title=title, xticks=[], yticks=[])
-    patches = [Patch(facecolor=color, edgecolor="0.5", label=name) for name, color in zip(names, colors, strict=True)]
+    patches = [
+        Patch(facecolor=color, edgecolor="0.5", label=shown_text(name))
+        for name, color in zip(names, colors, strict=True)
+    ]
     figure.legend(handles=patches, loc="outside lower center", ncols=min(len(patches), 9), frameon=False)
     return small_png(figure)
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from synthroads_addon.base.files import write_file
 from synthroads_addon.base.schema import canonical_json
-from synthroads_addon.base.text_table import text_table
+from synthroads_addon.base.text.table import text_table
 
 from .distances import METRICS, TARGET_METRICS
 from .metrics import Metric, Spread, in_tables, markdown, nan_to_none

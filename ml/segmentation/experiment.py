@@ -1,22 +1,23 @@
 """Experiments in segmentation: trainings that differ in their data, each with several seeds, and a table of scores."""
 
-import shutil
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import Field
 
+from synthroads_addon.base.files import write_file
 from synthroads_addon.base.progress import Progress, silent
 from synthroads_addon.base.schema import read_json
 
 from ..data.sources import Source
 from ..experiments import Experiment as AnyExperiment
-from ..experiments import cached_scores, fill_path, with_seed, write_results
+from ..experiments import cached_scores, fill_path, kept_figures, with_seed, write_results
 from ..runs import CHECKPOINT, CONFIGURATION, HISTORY, METRICS, PRETRAINING, Run, lasting_data
-from ..scores.confusion import tables_by_test
+from ..scores.confusion import are_scores, tables_by_test
 from .recipes import Data, SegmentationConfiguration
-from .scoring import score_all, trained_model
+from .scoring import score_all, told_apart, trained_model
 from .task import train
 
 
@@ -77,14 +78,23 @@ def _train_variant(
     configuration: SegmentationConfiguration, folder: Path, output: Path, progress: Progress
 ) -> dict[str, Any]:
     """Return a run's test scores by test, training it first unless it is already."""
-    begun = (folder / CONFIGURATION).is_file()
-    run = Run.start(folder, configuration, resume=begun)
-    if not (folder / METRICS).is_file():
-        if configuration.set_up == "fine_tuned":
-            _reuse_pretraining(configuration, folder / PRETRAINING, output)
-        train(run, progress)
-    tests: dict[str, Any] = read_json(folder / METRICS)["tests"]
-    return tests
+    run = Run.start(folder, configuration, resume=True)
+    with run.alone():
+        if not (folder / METRICS).is_file():
+            if configuration.set_up == "fine_tuned":
+                run.begin()
+                _reuse_pretraining(configuration, run.part(PRETRAINING), output)
+            train(run, progress)
+    kept = kept_figures(folder / METRICS, "tests", None, partial(_are_tests, configuration))
+    assert kept is not None, "the training has written it"
+    return kept
+
+
+def _are_tests(configuration: SegmentationConfiguration, kept: Any) -> bool:
+    """Return whether JSON data are scores of a configuration's tests, as `score_all` makes them."""
+    tests, scheme = configuration.data.tests, configuration.scheme()
+    there = isinstance(kept, dict) and kept.keys() == tests.keys()
+    return there and all(are_scores(kept[name], told_apart(sources, scheme)) for name, sources in tests.items())
 
 
 def _reuse_pretraining(configuration: SegmentationConfiguration, target: Path, output: Path) -> None:
@@ -93,10 +103,10 @@ def _reuse_pretraining(configuration: SegmentationConfiguration, target: Path, o
     if (target / CONFIGURATION).is_file():
         return
     for file in sorted(output.glob(f"*/*/{CONFIGURATION}")):
-        if lasting_data(read_json(file)) == wanted and (file.parent / METRICS).is_file():
-            target.mkdir(parents=True, exist_ok=True)
+        told = read_json(file)
+        if isinstance(told, dict) and lasting_data(told) == wanted and (file.parent / METRICS).is_file():
             for name in (CONFIGURATION, CHECKPOINT, HISTORY):
-                shutil.copyfile(file.parent / name, target / name)
+                write_file(target / name, (file.parent / name).read_bytes(), overwrite=True)
             return
 
 
@@ -105,7 +115,8 @@ def _test_variant(
 ) -> dict[str, Any]:
     """Return a trained run's test scores under another configuration, cached in `file` by configuration and weights."""
     run = Run(folder, configuration)
-    return cached_scores(run, file, lambda: score_all(trained_model(run), configuration, progress))
+    are_sound = partial(_are_tests, configuration)
+    return cached_scores(run, file, lambda: score_all(trained_model(run), configuration, progress), are_sound)
 
 
 def table(title: str, results: Mapping[str, Mapping[str, Any]], variants: Sequence[str] = ()) -> str:

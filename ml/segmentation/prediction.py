@@ -1,7 +1,8 @@
 """Classes for a LAS or LAZ file of any size: read twice, labelled tile by tile between, written with all it held.
 
-First pass: points go into square tiles on disk. Then each tile is labelled, seeing what lies around it. Second pass:
-the file is copied record by record, with the class as one more attribute. Memory holds a tile and its surroundings.
+First pass: points go into square tiles on disk, but for those that are withheld or noise. Then each tile is labelled,
+seeing what lies around it. Second pass: the file is copied record by record, with the class as one more attribute.
+Memory holds a tile and its surroundings.
 """
 
 import time
@@ -16,14 +17,16 @@ import laspy
 import numpy as np
 
 from synthroads_addon.base.arrays import AnyArray, Bool, Float, Int, UInt8
-from synthroads_addon.base.classes import ClassScheme
+from synthroads_addon.base.classes import UNLABELLED, ClassScheme
 from synthroads_addon.base.errors import InputError, OutputError
-from synthroads_addon.base.files import sync_file
+from synthroads_addon.base.files import check_file_target, sync_file, writable_folder
 from synthroads_addon.base.progress import Progress, silent
+from synthroads_addon.base.schema import compact_json
 from synthroads_addon.base.scratch.folders import scratch_folder
-from synthroads_addon.cloud.formats.base import damage_error
-from synthroads_addon.cloud.formats.las import open_to_copy
+from synthroads_addon.cloud.formats.las import OWN, PREDICTED_CLASSES, open_to_copy
+from synthroads_addon.cloud.formats.reader import damage_error
 from synthroads_addon.cloud.formats.registry import open_cloud
+from synthroads_addon.cloud.layers import PREDICTED
 from synthroads_addon.cloud.tools.quantile_mapping import LEVELS
 
 from ..data.classes import IGNORED
@@ -35,8 +38,6 @@ from .scoring import Classifier, label_tile
 
 HEADER_TEXTS = range(26, 90)
 """Bytes of a LAS file that hold the system identifier and the generating software, of 32 each."""
-PREDICTED = "predicted_class"
-"""Attribute that the classes are written to."""
 BLOCK = 500_000
 TILE = 48.0
 """Edge of the tiles, m."""
@@ -74,10 +75,11 @@ def predict_file(
     overwrite: bool = False,
     progress: Progress = silent,
 ) -> dict[str, Any]:
-    """Write a copy of a LAS or LAZ file with a class for every point; return counts, seconds and points per second.
+    """Write a copy of a LAS or LAZ file with a class for its points; return counts, seconds and points per second.
 
     Every attribute, record and header entry stays as it is. The class's id of the scheme is written to the attribute
-    ``predicted_class``, which is added unless the file has it from an earlier run.
+    ``predicted_class``, which is added unless the file has it from an earlier run; it is 255 of points that are
+    withheld or noise, which aren't labelled.
 
     Args:
         source, target: ending in .las or .laz; the target appears when it is whole.
@@ -88,50 +90,49 @@ def predict_file(
 
     Raises:
         MissingFileError: there is no such file.
-        InputError: it is no LAS file, damaged or empty.
+        InputError: it is no LAS file, damaged, empty, or all of its points are withheld or noise.
         OutputError: the target is there already or can't be written.
     """
-    _check(source, target, overwrite, classification)
+    _check(source, target, overwrite, labelling.scheme, classification)
     begin = time.perf_counter()
-    with scratch_folder(target.parent) as folder:
+    with writable_folder(target.parent, shown=target), scratch_folder(target.parent) as folder:
         store = TileStore(folder)
         count = store.fill(source, progress)
-        labels = np.memmap(folder / "labels", dtype=np.uint8, mode="w+", shape=(max(count, 1),))
+        if not store.count:
+            raise InputError(str(source), None, "has no points to be labelled: all are withheld or noise")
+        labels = np.memmap(folder / "labels", dtype=np.uint8, mode="w+", shape=(count,))
+        labels[:] = UNLABELLED
         scaling = store.scaling(labelling.intensity, labelling.settings.voxel)
         done = 0
         for tile, core, index in store.tiles():
             labels[index] = label_tile(tile, scaling, labelling.classifier, labelling.settings, core)
             done += len(index)
-            progress("labelling", done / count)
-        ids = np.array([row.id for row in labelling.scheme.rows], dtype=np.uint8)
-        counts = write_copy(source, target, labels, ids, labelling.scheme if classification else None, progress)
+            progress("labelling", done / store.count)
+        counts = write_copy(source, target, labels, labelling.scheme, classification, progress)
         del labels
     seconds = time.perf_counter() - begin
     names = [row.name for row in labelling.scheme.rows]
     return {
+        "attribute": PREDICTED,
         "points": count,
+        "left_out": count - store.count,
         "seconds": round(seconds, 3),
         "points_per_second": round(count / seconds),
         "classes": dict(zip(names, counts.tolist(), strict=True)),
     }
 
 
-def _check(source: Path, target: Path, overwrite: bool, classification: bool) -> None:
-    """Raise `InputError` or `OutputError` if source or target can't be used; make the target's folder."""
+def _check(source: Path, target: Path, overwrite: bool, scheme: ClassScheme, classification: bool) -> None:
+    """Raise `InputError` or `OutputError` if source or target can't be used."""
     for path, what in ((source, "cloud"), (target, "--output")):
         if path.suffix.lower() not in (".las", ".laz"):
             raise InputError(what, str(path), "must end in .las or .laz")
+    check_file_target(target, overwrite=overwrite)
     with open_cloud(source) as cloud:
         if cloud.header.count == 0:
             raise InputError(str(source), None, "has no points")
     with open_to_copy(source) as reader:
-        extended_header(reader.header, classification)
-    if target.exists() and not overwrite:
-        raise OutputError("--output", str(target), "is there already; --overwrite replaces it")
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError("--output", str(target), f"cannot be written ({error.strerror})") from None
+        extended_header(reader.header, scheme, classification)
 
 
 class TileStore:
@@ -140,35 +141,45 @@ class TileStore:
     Args:
         folder: for the tiles' files.
         edge: of a tile, m.
+
+    Attributes:
+        count: number of points in the tiles.
     """
 
     def __init__(self, folder: Path, edge: float = TILE) -> None:
         self._folder, self._edge = folder / "tiles", edge
         self._folder.mkdir()
+        self.count = 0
         self._known: set[tuple[int, int]] = set()
         self._has_intensity = False
-        self._largest = 0
+        self._colored = False
 
     def fill(self, source: Path, progress: Progress) -> int:
-        """Sort a cloud's points into the tiles' files; return the number of points."""
+        """Sort a cloud's points that may be worked with into the tiles' files; return how many points it has in all."""
         done = 0
         with open_cloud(source) as cloud:
             self._origin = np.floor(np.asarray(cloud.header.offset, dtype=np.float64))
             scale = cloud.header.intensity_scale or 1.0
-            for block in cloud.blocks(BLOCK):
-                if done == 0:
+            for whole in cloud.blocks(BLOCK):
+                kept = cloud.usable_points(whole)
+                index = done + np.flatnonzero(kept)
+                done += len(whole)
+                progress("reading", done / cloud.header.count)
+                if not len(index):
+                    continue
+                block = whole.select(kept)
+                if self.count == 0:
                     self._origin = np.floor(block.xyz.min(axis=0))
                 record = np.empty(len(block), dtype=_RECORD)
                 tile = np.floor((block.xyz[:, :2] - self._origin[:2]) / self._edge).astype(np.int64)
                 record["place"] = block.xyz - self._corner(tile)
                 record["rgb"] = block.rgb
                 record["intensity"] = np.clip(np.rint(block.intensity * scale), 0, LEVELS - 1)
-                record["index"] = np.arange(done, done + len(block))
+                record["index"] = index
                 self._has_intensity |= bool(record["intensity"].any())
-                self._largest = max(self._largest, int(block.rgb.max(initial=0)))
+                self._colored |= bool(block.rgb.any())
                 self._append(tile, record)
-                done += len(block)
-                progress("reading", done / cloud.header.count)
+                self.count += len(block)
         return done
 
     def scaling(self, kind: str, voxel: float) -> Scaling:
@@ -198,7 +209,7 @@ class TileStore:
                 "",
                 self._corner(np.array([[column, row]]))[0],
                 np.ascontiguousarray(record["place"]),
-                eight_bits(record["rgb"], self._largest) if self._largest else None,
+                eight_bits(record["rgb"]) if self._colored else None,
                 strength if self._has_intensity else None,
                 np.full(len(record), IGNORED, dtype=np.int16),
             )
@@ -234,30 +245,33 @@ class TileStore:
 
 
 def write_copy(
-    source: Path, target: Path, labels: UInt8, ids: UInt8, codes: ClassScheme | None, progress: Progress
+    source: Path, target: Path, labels: UInt8, scheme: ClassScheme, classification: bool, progress: Progress
 ) -> Int:
     """Copy a LAS file with the predicted classes as one more attribute; return the number of points per class (C,).
 
     Args:
         source, target: files.
-        labels: (N,) places of the classes, in the file's order.
-        ids: (C,) ids of the classes.
-        codes: whose LAS codes are written to ``classification`` too; None for none.
+        labels: (N,) places of the classes, in the file's order; `UNLABELLED` of points that keep what they have.
+        scheme: the C classes.
+        classification: write their LAS codes to ``classification`` too.
         progress: told the share that is written.
     """
-    counts = np.zeros(len(ids), dtype=np.int64)
+    ids = np.full(256, UNLABELLED, dtype=np.uint8)
+    ids[: len(scheme.rows)] = [row.id for row in scheme.rows]
+    codes = scheme if classification else None
+    counts = np.zeros(256, dtype=np.int64)
     try:
         with ExitStack() as stack:
             temporary = stack.enter_context(scratch_folder(target.parent)) / target.name
             reader = stack.enter_context(open_to_copy(source))
-            header = extended_header(reader.header, codes is not None)
+            header = extended_header(reader.header, scheme, classification)
             compress = target.suffix.lower() == ".laz"
             with laspy.open(temporary, "w", header=header, do_compress=compress) as writer:
                 done = 0
                 for old in reader.chunk_iterator(BLOCK):
                     found = np.asarray(labels[done : done + len(old)])
                     writer.write_points(extended_record(old, header, ids[found], codes))
-                    counts += np.bincount(found, minlength=len(ids))
+                    counts += np.bincount(found, minlength=256)
                     done += len(old)
                     progress("writing", done / reader.header.point_count)
                 if done != len(labels):
@@ -271,7 +285,7 @@ def write_copy(
         raise InputError(str(source), None, "has records whose names aren't ASCII, which LAS doesn't allow") from None
     except OSError as error:
         raise OutputError("--output", str(target), f"cannot be written ({error.strerror})") from None
-    return counts
+    return counts[: len(scheme.rows)]
 
 
 def copy_header_texts(source: Path, target: Path) -> None:
@@ -282,15 +296,21 @@ def copy_header_texts(source: Path, target: Path) -> None:
         new.write(old.read(len(HEADER_TEXTS)))
 
 
-def extended_header(old: laspy.LasHeader, needs_codes: bool) -> laspy.LasHeader:
+def extended_header(old: laspy.LasHeader, scheme: ClassScheme, needs_codes: bool) -> laspy.LasHeader:
     """Return a copy of a LAS header with the predicted-class attribute, without COPC records and identifier texts.
+
+    A record of ours names the scheme's classes, in place of one from an earlier run.
 
     Raises:
         InputError: LAS codes are wanted, and the file's point format holds those up to 31 only.
     """
     header = deepcopy(old)
     # An index of the points as they were ordered and compressed in a COPC file; the copy is a plain LAZ file.
-    header.vlrs = type(header.vlrs)(record for record in header.vlrs if record.user_id != _COPC)
+    dropped = (_COPC, None), (OWN, PREDICTED_CLASSES)
+    kept = (v for v in header.vlrs if not {(v.user_id, None), (v.user_id, v.record_id)} & set(dropped))
+    header.vlrs = type(header.vlrs)(kept)
+    names = compact_json(scheme.to_dict()).encode()
+    header.vlrs.append(laspy.VLR(OWN, PREDICTED_CLASSES, "predicted classes", names))
     # laspy gives bytes where they aren't ASCII, and doesn't take them back.
     header.system_identifier = header.generating_software = ""
     if needs_codes and header.point_format.id < 6:
@@ -305,11 +325,15 @@ def extended_header(old: laspy.LasHeader, needs_codes: bool) -> laspy.LasHeader:
 def extended_record(
     old: Any, header: laspy.LasHeader, ids: UInt8, codes: ClassScheme | None
 ) -> laspy.ScaleAwarePointRecord:
-    """Return a copy of LAS points with predicted class ids (and LAS codes if given), all else bit for bit."""
+    """Return a copy of LAS points with predicted class ids, all else bit for bit.
+
+    With `codes`, points that aren't `UNLABELLED` have the LAS codes of these classes too.
+    """
     record = laspy.ScaleAwarePointRecord.zeros(len(old), header=header)
     for name in old.array.dtype.names:
         record.array[name] = old.array[name]
     record.array[PREDICTED] = ids
     if codes is not None:
-        record.array["classification"] = codes.las_codes()[ids]
+        labelled = ids != UNLABELLED
+        record.array["classification"][labelled] = codes.las_codes()[ids[labelled]]
     return record

@@ -23,7 +23,7 @@ from ..data.points import voxel_sample
 from ..data.sources import Source, read_tiles
 from ..data.tiles import CloudTile, Scaling, scalings
 from ..data.workers import report_lost_workers
-from ..runs import Run
+from ..runs import NOT_FINITE, Run, load_state
 from ..scores.confusion import Confusion
 from ..training_loop import chosen_device, move_to_device
 from .loading import adaptation_batches, thin_tiles
@@ -146,7 +146,10 @@ def _view_scores(
     """Yield the scores of a tile's points in one view, piece by piece, with the points' indices; see `piece_scores`."""
     for number, (inside, seen) in enumerate(overlapping_pieces(tile.coord[:, :2], own)):
         batch = make_item(crop_of(tile.select(seen), scaling), settings, stream(seed, "missing features", number))
-        yield inside, classifier(batch)[torch.from_numpy(np.searchsorted(seen, inside))]
+        scores = classifier(batch)
+        if not torch.isfinite(scores).all():
+            raise InputError("network", None, NOT_FINITE)
+        yield inside, scores[torch.from_numpy(np.searchsorted(seen, inside))]
 
 
 def _turned(tile: CloudTile, view: int) -> CloudTile:
@@ -208,10 +211,7 @@ def load_weights(model: nn.Module, run: Run[SegmentationConfiguration]) -> None:
     state = run.last_checkpoint(next(model.parameters()).device)
     if state is None:
         raise InputError(str(run.folder), None, "holds no checkpoint")
-    try:
-        model.load_state_dict(state["model"])
-    except (KeyError, RuntimeError):
-        raise InputError(str(run.folder), None, "its checkpoint is of another network than its configuration") from None
+    load_state(model, state["model"], str(run.folder))
 
 
 def classifier(model: nn.Module, configuration: SegmentationConfiguration) -> Classifier:
@@ -236,7 +236,7 @@ def check_tests(configuration: SegmentationConfiguration) -> None:
     """
     scheme = configuration.scheme()
     for sources in configuration.data.tests.values():
-        _targets(sources, scheme)
+        told_apart(sources, scheme)
         for source in sources:
             _groups(source, scheme)
             if next(read_tiles(source, scheme, None), None) is None:
@@ -265,7 +265,7 @@ def score(
         InputError: the sources tell different classes apart, or a mapping's groups leave out a class.
     """
     scheme = configuration.scheme()
-    confusion = Confusion(_targets(sources, scheme))
+    confusion = Confusion(told_apart(sources, scheme))
     if configuration.adaptation.adabn:
         tiles = list(thin_tiles(sources, configuration, "test"))
         with report_lost_workers(configuration.workers):
@@ -287,7 +287,12 @@ def score(
     return confusion, shown
 
 
-def _targets(sources: Sequence[Source], scheme: ClassScheme) -> tuple[str, ...]:
+def told_apart(sources: Sequence[Source], scheme: ClassScheme) -> tuple[str, ...]:
+    """Return the names of the classes, or groups, that the sources of one test tell apart.
+
+    Raises:
+        InputError: they differ in this.
+    """
     names = {source.targets(scheme) for source in sources}
     if len(names) != 1:
         raise InputError("data.tests", len(names), "sources of one test must tell the same classes apart")

@@ -14,7 +14,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.base.files import write_file
+from synthroads_addon.base.files import check_file_target, write_file
 from synthroads_addon.base.progress import Progress, peak_memory_mb, silent
 from synthroads_addon.cloud.formats.registry import ENDINGS, open_cloud
 
@@ -58,7 +58,13 @@ def train(run: SegmentationRun, progress: Progress = silent) -> dict[str, Any]:
 
     Raises:
         InputError: data are missing, or don't fit the configuration.
+        OutputError: another training is at work in the run's folder, or it can't be written.
     """
+    with run.alone():
+        return _train_alone(run, progress)
+
+
+def _train_alone(run: SegmentationRun, progress: Progress) -> dict[str, Any]:
     configuration = run.configuration
     check_tests(configuration)
     device = chosen_device(configuration)
@@ -126,7 +132,7 @@ def _names(evaluation: Evaluation) -> list[str]:
         InputError: data are given twice.
     """
     places = [
-        path.with_name(f"{path.name}-{evaluation.split}") if path.is_dir() else path.with_suffix("")
+        path.parent / f"{path.name}-{evaluation.split}" if path.is_dir() else path.with_suffix("")
         for path in (given.absolute() for given in evaluation.data)
     ]
     given = zip(evaluation.data, places, strict=True)
@@ -151,6 +157,7 @@ def _test_source(path: Path, evaluation: Evaluation) -> Source:
 
 def predict(run: SegmentationRun, prediction: Prediction, progress: Progress = silent) -> dict[str, Any]:
     """Write a copy of a LAS or LAZ file with each point's predicted class; return counts, speed and peak memory."""
+    check_file_target(prediction.output, prediction.output_option, prediction.overwrite)
     configuration = run.configuration
     labelling = Labelling(
         classifier(trained_model(run), configuration),
@@ -187,9 +194,11 @@ def train_network(run: Run[SegmentationConfiguration], progress: Progress = sile
     if configuration.start:
         _begin_with(model, configuration)
     begun = deepcopy(model.state_dict())
+    target = target_tiles(configuration) if configuration.set_up == "self_trained" else []
+    run.begin()
     with _scene_stream(run, progress) as stream:
         if configuration.set_up == "self_trained":
-            _self_train(model, run, domains, validation, progress)
+            _self_train(model, run, domains, target, validation, progress)
         elif configuration.set_up == "fine_tuned":
             _fit(model, _pretraining(run), {"synthetic": domains["synthetic"]}, validation, progress, stream)
             second = configuration.model_copy(update={"schedule": configuration.fine_tuning})
@@ -269,17 +278,17 @@ def _self_train(
     model: nn.Module,
     run: Run[SegmentationConfiguration],
     domains: Domains,
+    target: list[CloudTile],
     validation: list[CloudTile],
     progress: Progress,
 ) -> None:
     """Train on synthetic tiles unless the training has a start, then round by round on the target's tiles as well."""
     configuration, rounds = run.configuration, run.configuration.self_training.rounds
-    target = target_tiles(configuration)  # before hours of training, so that faults are told first
     if not configuration.start:
         _fit(model, _pretraining(run), domains, validation, progress)
     part = configuration.model_copy(update={"schedule": configuration.fine_tuning})
     for number in range(1, rounds + 1):
-        folder = run.folder / PRETRAINING / f"round-{number}"
+        folder = run.part(PRETRAINING, f"round-{number}")
         last = number == rounds
         round_run = replace(run, configuration=part) if last else Run.start(folder, part, resume=True)
         labelled = believed_labels(target, classifier(model, configuration), configuration)
@@ -289,7 +298,7 @@ def _self_train(
 def _pretraining(run: Run[SegmentationConfiguration]) -> Run[SegmentationConfiguration]:
     """Start or resume the run of a training's first part, on synthetic data, in the run's folder; return it."""
     configuration = run.configuration.model_copy(update={"set_up": "synthetic"})
-    return Run.start(run.folder / PRETRAINING, configuration, resume=True)
+    return Run.start(run.part(PRETRAINING), configuration, resume=True)
 
 
 def _fit(

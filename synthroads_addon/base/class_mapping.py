@@ -27,6 +27,8 @@ class ClassMapping(Model):
     5. that of a collection that its object is in, the innermost first,
     6. the class that a collection of its object is named after,
     7. else none: unlabelled.
+
+    A pattern whose class is left empty, as in a file that is still to be filled in, gives none.
     """
 
     objects: dict[str, str] = Field({}, description="Pattern of objects' names -> class.")
@@ -46,7 +48,7 @@ class ClassMapping(Model):
         known = tuple(known)
         for kind in KINDS:
             for pattern, name in getattr(self, kind).items():
-                if name not in known:
+                if name and name not in known:
                     hint = nearest_name(name, known)
                     raise InputError(f"{source}: {kind}.{pattern}", name, f"must be one of {', '.join(known)}{hint}")
 
@@ -67,7 +69,7 @@ class NameClasses:
     def __init__(self, mapping: ClassMapping | None, ids: Mapping[str, int] | None = None) -> None:
         ids = {row.name: row.id for row in classes()} if ids is None else ids
         rows: Mapping[str, dict[str, str]] = {kind: getattr(mapping, kind) if mapping else {} for kind in KINDS}
-        self._rows = {kind: [(pattern, ids[name]) for pattern, name in rows[kind].items()] for kind in KINDS}
+        self._rows = {kind: [(pattern, ids[name]) for pattern, name in rows[kind].items() if name] for kind in KINDS}
         self._found: dict[tuple[str, str], int | None] = {}
         self._used: set[tuple[str, str]] = set()
 

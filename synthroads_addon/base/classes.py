@@ -242,6 +242,12 @@ def asprs_scheme(codes: Iterable[int] = ()) -> ClassScheme:
     return ClassScheme("asprs", tuple(rows), np.arange(256, dtype=np.uint8))
 
 
+def numbered_scheme() -> ClassScheme:
+    """Return the class scheme of ids of which nothing is known: each is a class that is called by its number."""
+    rows = (PointClass(number, f"class_{number}", 0, _distinct_color(number)) for number in range(UNLABELLED))
+    return ClassScheme("", tuple(rows), np.arange(256, dtype=np.uint8))
+
+
 @cache
 def _asprs_classes() -> tuple[PointClass, ...]:
     """Return the classes of the LAS codes that have a meaning of their own (ASPRS LAS 1.4 R15, table 17)."""

@@ -37,6 +37,20 @@ class OutputError(InputError):
     """The output cannot be written: no permission, already there, disk full."""
 
 
+class MissingPackageError(InputError):
+    """A Python package that the input needs isn't installed; the message says with which extra it comes.
+
+    Args:
+        field, value: what needs it, see `InputError`.
+        package: its name.
+        extra: of ours, that brings it.
+    """
+
+    def __init__(self, field: str, value: object, package: str, extra: str) -> None:
+        self.package, self.extra = package, extra
+        super().__init__(field, value, f"needs the package {package}: pip install 'synthroads[{extra}]'")
+
+
 class Cancelled(SynthRoadsError):
     """The user stopped the work (Esc or Ctrl-C); nothing is left half-written."""
 

@@ -5,10 +5,12 @@ import os
 import shutil
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from itertools import takewhile
 from pathlib import Path
 
 from .errors import InputError, MissingFileError, OutputError, nearest_name
 from .scratch.folders import ASIDE, NEW, REPORT, names_to_move, record_folder, scratch_folder
+from .scratch.locks import LockHeldError, exclusive
 
 PRESETS = Path(__file__).parents[1] / "presets"
 """Folder of the shipped data: classes, materials, signs, devices, scenarios, recipes, assets."""
@@ -116,16 +118,12 @@ def output_folder(target: Path, names: Iterable[str], overwrite: bool) -> Iterat
     Raises:
         OutputError: a file is already there, or the folder can't be made or written, or the disk is full.
     """
-    made = not target.exists()
     present = [name for name in names if (target / name).exists()]
     if present and not overwrite:
         raise OutputError("--output", str(target), f"already holds {present[0]}; --overwrite replaces it")
     with ExitStack() as stack:
         try:
-            target.mkdir(parents=True, exist_ok=True)
-            if made:
-                stack.callback(_remove_if_empty, target)
-                record_folder(target)
+            stack.enter_context(made_folder(target))
             scratch = stack.enter_context(scratch_folder(target))
             (work := scratch / NEW).mkdir()
         except OSError as error:
@@ -145,9 +143,144 @@ _NO_SYNC = (errno.EINVAL, errno.ENOSYS, errno.ENOTSUP)
 """Errors of file systems that can't be told to write to the disk."""
 
 
-def _remove_if_empty(folder: Path) -> None:
-    with suppress(OSError):
-        folder.rmdir()
+@contextmanager
+def made_folder(folder: Path) -> Iterator[None]:
+    """Context in which a folder is there, and those above it; of those that it makes, empty ones go at the end.
+
+    If the process is killed, its supervisor removes the empty ones.
+
+    Raises:
+        OSError: it can't be made.
+    """
+    missing = list(takewhile(lambda path: not _is_there(path), (folder, *folder.parents)))
+    for path in reversed(missing):
+        record_folder(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        yield
+    finally:
+        for path in missing:
+            with suppress(OSError):
+                path.rmdir()
+
+
+@contextmanager
+def writable_folder(folder: Path, field: str = "--output", shown: Path | None = None) -> Iterator[None]:
+    """Context of `made_folder` in which the folder can be written to.
+
+    Args:
+        folder: for files.
+        field: what the caller calls the path, for the message.
+        shown: the path that the message names; the folder if None.
+
+    Raises:
+        OutputError: it can't be made or written to.
+    """
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(made_folder(folder))
+            with scratch_folder(folder):
+                pass
+        except OSError as error:
+            raise OutputError(field, str(shown or folder), f"cannot be written ({error.strerror})") from None
+        yield
+
+
+@contextmanager
+def folder_at_work(folder: Path, lock: str, *, keep: bool = True) -> Iterator[None]:
+    """Context of `made_folder` in which no other process is at work in the folder, by a lock file in it.
+
+    Args:
+        folder: for a run's files.
+        lock: name of the lock file.
+        keep: whether the lock file stays, empty; else it goes at the end, and the folder too if it holds nothing else.
+
+    Raises:
+        OutputError: another process is at work in it, or it can't be made or written to.
+        InputError: the lock file is a link that leads out of the folder.
+    """
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(made_folder(folder))
+            stack.enter_context(exclusive(folder / lock, keep=keep))
+        except LockHeldError as taken:
+            raise OutputError("--output", str(folder), _lock_text(taken, folder / lock)) from None
+        except OSError as error:
+            raise OutputError("--output", str(folder), f"cannot be written ({error.strerror})") from None
+        yield
+
+
+def _lock_text(taken: LockHeldError, lock: Path) -> str:
+    """Return the error text for a folder whose lock another run holds, or may hold."""
+    owner = f": process {taken.owner.pid} of {taken.owner.host}" if taken.owner else ""
+    if taken.certain:
+        return f"another run is at work in it{owner}"
+    return f"another run may be at work in it{owner} (its disk knows no locks); if that has ended, remove {lock}"
+
+
+def check_file_target(path: Path, field: str = "--output", overwrite: bool = False, ending: str = "") -> None:
+    """Raise an `OutputError` for a file that can't be written, before the work: a temporary folder is made and removed.
+
+    Args:
+        path: of the file; its folder needn't be there, and isn't made.
+        field: what the caller calls the path, for the message; empty where nobody gave it: the file is named then.
+        overwrite: whether a file that is there may be replaced.
+        ending: that its name must have, e.g. ``.geojson``; any if empty.
+    """
+    if ending and path.suffix.lower() != ending:
+        raise OutputError(field, str(path), f"must end in {ending}")
+    if _is_there(path) and path.is_dir():
+        raise OutputError(field, str(path), "is a folder, the name of a file is needed")
+    if _is_there(path) and not overwrite:
+        remedy = "--overwrite replaces it" + ("" if field else ", --output names another file")
+        raise OutputError(*_named(field, path), f"is there already; {remedy}")
+    check_folder_target(path.parent, field, path)
+
+
+def path_beside(file: Path, name: str, field: str) -> Path:
+    """Return the path of a name in the folder of a file.
+
+    Args:
+        file: that somebody named; it needn't be there.
+        name: of the other one.
+        field: what the user calls the file, for the message.
+
+    Raises:
+        InputError: it is the name of a folder as such: empty, a dot or a slash.
+    """
+    if not file.name:
+        raise InputError(field, str(file), "the name of a file is needed")
+    return file.with_name(name)
+
+
+def _is_there(path: Path) -> bool:
+    """Return whether a path exists, as far as this process may know."""
+    try:
+        return path.exists()
+    except OSError:  # a folder above it can't be entered
+        return False
+
+
+def check_folder_target(folder: Path, field: str = "--output", shown: Path | None = None) -> None:
+    """Raise an `OutputError` if nothing can be written to a folder, or to the nearest one above it that is there.
+
+    Args:
+        folder: for files; it needn't be there, and isn't made.
+        field: what the caller calls the path, for the message; empty where nobody gave it.
+        shown: the path that the message names; the folder if None.
+    """
+    there = next(path for path in (folder, *folder.absolute().parents) if _is_there(path))
+    try:
+        with scratch_folder(there):
+            pass
+    except OSError as error:
+        remedy = "" if field else "; --output names another place"
+        raise OutputError(*_named(field, shown or folder), f"cannot be written ({error.strerror}){remedy}") from None
+
+
+def _named(field: str, path: Path) -> tuple[str, str | None]:
+    """Return field and value by which an error names a path: that which nobody gave is the field itself."""
+    return (field, str(path)) if field else (str(path), None)
 
 
 def _move_all(source: Path, target: Path, aside: Path) -> None:
@@ -241,8 +374,7 @@ def write_file(path: Path, content: bytes, field: str = "--output", overwrite: b
     if path.exists() and not overwrite:
         raise OutputError(field, str(path), "is there already; --overwrite replaces it")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with scratch_folder(path.parent) as folder:
+        with made_folder(path.parent), scratch_folder(path.parent) as folder:
             temporary = folder / path.name
             temporary.write_bytes(content)
             sync_file(temporary)

@@ -4,8 +4,10 @@ import ctypes
 import mmap
 import os
 import platform
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from importlib import import_module
 from pathlib import Path
 from threading import Lock
 from typing import cast
@@ -33,6 +35,26 @@ def machine(versions: Mapping[str, str]) -> str:
 def available_cores() -> int:
     """Return the number of processor cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def share_of_core(seconds: float = 0.1) -> float:
+    """Return the share of a core, 0 to 1, that one thread gets now beside what else runs, by working for some time."""
+    wall, own = time.perf_counter(), time.thread_time()
+    while (spent := time.perf_counter() - wall) < seconds:
+        pass
+    return min(1.0, max(0.01, (time.thread_time() - own) / spent))
+
+
+def free_cores(threads: int, share: float) -> float:
+    """Return how many cores' work some threads get done beside what else runs.
+
+    Args:
+        threads: that work.
+        share: of a core that one of them got by itself, see `share_of_core`; from 0.95 on nothing else is assumed.
+    """
+    cores = available_cores()
+    others = cores / share - 1.0 if share < 0.95 else 0.0  # threads that want as much
+    return min(float(min(threads, cores)), cores * threads / (threads + others))
 
 
 @contextmanager
@@ -115,6 +137,7 @@ def _nothing() -> None:
 
 def _limit_linear_algebra() -> Callable[[], None]:
     """Have linear algebra take one thread; return what gives it those back that it had."""
+    import_module("scipy.linalg")  # has a library of its own, which can be limited only when it is loaded
     limit = threadpool_limits(1, user_api="blas")
     return cast(Callable[[], None], limit.restore_original_limits)
 
@@ -143,10 +166,12 @@ _one_thread, _kept_memory = _Shared(_limit_linear_algebra), _Shared(_keep_freed_
 
 @contextmanager
 def linear_algebra_on_one_thread() -> Iterator[None]:
-    """Context in which NumPy's linear algebra begins no threads of its own, for work that is shared out to threads.
+    """Context, also a decorator, in which linear algebra of NumPy and SciPy begins no threads of its own.
 
-    After each product OpenBLAS's threads keep a core busy for a while, waiting for the next. Threads may hold it side
-    by side. Other linear algebra in the process, but for PyTorch's, is limited meanwhile as well.
+    For work whose result is written: sums over several threads have other last bits on machines with other cores. And
+    for work that is shared out to threads: after each product OpenBLAS's threads keep a core busy for a while, waiting
+    for the next. Threads may hold it side by side. Other linear algebra in the process, but for PyTorch's, is limited
+    meanwhile as well.
     """
     with _one_thread.held():
         yield

@@ -10,13 +10,17 @@ plain interpolation would have only an eighth of the variance in a cell's middle
 on surfaces of any tilt and place. The lattice is turned from octave to octave against the axes of road and scanner.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Float, Float32
 from .random_streams import stream
 
-_Hash = NDArray[np.uint32]
+Hash = NDArray[np.uint32]
 
 MAX_OCTAVES = 12
 DECAY = 0.5
@@ -26,6 +30,8 @@ _CORRELATED = 0.58
 """Length, in cells, that an octave's correlation falls to 1/e over."""
 CHUNK = 1 << 15
 """Points worked on at once, so that the arrays stay in a core's own cache. No result depends on it."""
+SPREAD = 2.0 / _CORRELATED**2
+"""Factor on the squares of a patch's deviations, see `mean_deviation`."""
 
 _AXES = tuple(np.uint32(prime) for prime in (0x9E3779B1, 0x85EBCA77, 0xC2B2AE3D))
 _FACTORS = tuple(np.uint32(odd) for odd in (0x7FEB352D, 0x846CA68B))
@@ -34,6 +40,32 @@ _UNIT = np.float32(3.0**0.5 / 2.0**31)
 _TURN = ((15.0, 6.0, -10.0), (6.0, 10.0, 15.0), (10.0, -15.0, 6.0))
 """Rows of length 19 at right angles to one another: a rotation without sines. Applied once to four times, it leaves
 each axis at least 18 degrees off every axis and diagonal of the lattice (the best of all with whole numbers to 60)."""
+
+
+class NoiseKernel(Protocol):
+    """Interface of what works the field out in place of NumPy, to the same bytes: `scanning.kernels.noise`."""
+
+    def fill(
+        self, position: Float, cells: Float, keys: Hash, gains: Float32, patch: tuple[Float, Float] | None
+    ) -> Float:
+        """Return the values (N,) at positions (N, 3), by cells per metre (N,) or (1,), hash keys, gains and patches."""
+        ...
+
+
+_kernels: list[NoiseKernel] = []
+"""Those that are in use, the last one first."""
+
+
+@contextmanager
+def noise_by(kernel: NoiseKernel | None) -> Iterator[None]:
+    """Context in which fields are worked out by a kernel, in all threads; by NumPy with None. Results are the same."""
+    if kernel is not None:
+        _kernels.append(kernel)
+    try:
+        yield
+    finally:
+        if kernel is not None:
+            _kernels.remove(kernel)
 
 
 def noise_field(
@@ -66,8 +98,10 @@ def noise_field(
     keys = stream(seed, "noise field").integers(0, 2**32, MAX_OCTAVES, dtype=np.uint32)
     variance = DECAY ** np.arange(octaves)
     gains = np.sqrt(variance / variance.sum()).astype(np.float32)
-    cells = np.broadcast_to(np.asarray(2.0 / np.asarray(wavelength, dtype=np.float64)), (len(position),))
-    result = np.empty(len(position))
+    cells = np.atleast_1d(2.0 / np.asarray(wavelength, dtype=np.float64))
+    for kernel in _kernels[-1:]:
+        return kernel.fill(position, cells, keys, gains, averaged)
+    cells, result = np.broadcast_to(cells, (len(position),)), np.empty(len(position))
     for first in range(0, len(position), CHUNK):
         part = slice(first, first + CHUNK)
         point = [position[part, axis] * cells[part] for axis in range(3)]
@@ -95,9 +129,8 @@ def mean_deviation(long: Float, short: Float) -> Float32:
     Args:
         long, short: standard deviations a, b (N,) of the patch along its two axes, in cells.
     """
-    scale = 2.0 / _CORRELATED**2
-    spread = 1.0 + scale * long**2
-    spread *= 1.0 + scale * short**2
+    spread = 1.0 + SPREAD * long**2
+    spread *= 1.0 + SPREAD * short**2
     # Two roots are exact to the last digits, as a power is, in a fraction of its time.
     return np.asarray(1.0 / np.sqrt(np.sqrt(spread)), dtype=np.float32)
 
@@ -171,7 +204,7 @@ def _weights(t: Float32) -> Float32:
     return result
 
 
-def _mix_bits(node: _Hash) -> _Hash:
+def _mix_bits(node: Hash) -> Hash:
     """Mix the bits of hashes where they are, and return them."""
     spare = node >> _FIRST
     node ^= spare

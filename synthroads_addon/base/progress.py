@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Protocol, TypeVar
+from typing import Protocol, Self, TypeVar
 
 S = TypeVar("S")
 T = TypeVar("T")
@@ -17,8 +17,50 @@ class Progress(Protocol):
     def __call__(self, stage: str, share: float) -> None: ...
 
 
+class Stage(str):
+    """Name of a stage, with what may be said of it beside its share.
+
+    Attributes:
+        detail: e.g. ``epoch 3 of 20, loss 0.41``; it doesn't tell stages apart.
+    """
+
+    detail: str
+
+    def __new__(cls, name: str, detail: str) -> Self:
+        """Return a stage's name with a detail."""
+        made = super().__new__(cls, name)
+        made.detail = detail
+        return made
+
+
 def silent(stage: str, share: float) -> None:
     """Ignore a report of progress."""
+
+
+def part_of(progress: Progress, first: float, last: float) -> Progress:
+    """Return a callback for a part of some work, whose shares 0 to 1 are those from `first` to `last` of the whole."""
+
+    def report(stage: str, share: float) -> None:
+        progress(stage, first + share * (last - first))
+
+    return report
+
+
+def in_stage(progress: Progress, name: str) -> Progress:
+    """Return a callback for work that is one stage of a job, whose own stages become the details of that one."""
+
+    def report(stage: str, share: float) -> None:
+        progress(Stage(name, stage), share)
+
+    return report
+
+
+def duration(seconds: float) -> str:
+    """Return a time in words, in the largest unit of which it has two: ``90 s``, ``3 min``, ``5 hours``."""
+    for unit, size in (("days", 86_400.0), ("hours", 3600.0), ("min", 60.0)):
+        if seconds >= 2.0 * size:
+            return f"{seconds / size:,.0f} {unit}"
+    return f"{seconds:.0f} s"
 
 
 def exhaust(steps: Generator[S, None, T], report: Callable[[S], object]) -> T:

@@ -18,6 +18,7 @@ from pydantic.fields import FieldInfo
 
 from .errors import InputError, nearest_name
 from .files import read_text
+from .text.typed import nearest_path
 
 VENDOR_PREFIX = "+"
 """Keys that begin with this are a vendor's own: read, kept, written back, never interpreted (CityJSON's habit)."""
@@ -147,7 +148,7 @@ class Model(BaseModel):
         for key in data:
             if key in known or (cls.vendor_keys_allowed and str(key).startswith(VENDOR_PREFIX)):
                 continue
-            raise ValueError(f"unknown key {str(key)!r}{nearest_name(str(key), cls.model_fields)}")
+            raise ValueError(f"unknown key {str(key)!r}{nearest_path(cls, str(key))}")
         data = {key: _unsigned_zeros(value) if key in known else value for key, value in data.items()}
         changed = {key: int(data[key]) for key in whole if isinstance(data.get(key), float) and data[key].is_integer()}
         return data | changed
@@ -158,7 +159,7 @@ class Model(BaseModel):
         try:
             return cls.model_validate(data)
         except ValidationError as error:
-            raise _input_error(error, data, source) from None
+            raise _input_error(error, data, source, cls.__name__.lower()) from None
         except (TypeError, ValueError, RecursionError) as error:
             raise InputError(source or cls.__name__, None, f"must be plain JSON data ({error})") from None
 
@@ -211,6 +212,11 @@ def compact_json(data: object) -> str:
 def round_value(value: float, digits: int = 9) -> float:
     """Return a value rounded to decimals, so that its text is the same on every machine (-0.0 becomes 0.0)."""
     return round(float(value), digits) + 0.0
+
+
+def is_number(value: Any) -> bool:
+    """Return whether JSON data are a number."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def read_json(path: Path | str) -> Any:
@@ -298,8 +304,15 @@ _WORDING = {
 """Type of complaint -> our words, where pydantic's speak of Python."""
 
 
-def _input_error(error: ValidationError, data: object, source: str) -> InputError:
-    """Return pydantic's first complaint as the project's error of one line."""
+def _input_error(error: ValidationError, data: object, source: str, kind_of_data: str) -> InputError:
+    """Return pydantic's first complaint as the project's error of one line.
+
+    Args:
+        error: pydantic's.
+        data: what was read.
+        source: where it comes from; empty: from no file.
+        kind_of_data: what the whole of it is called where it comes from none.
+    """
     first = error.errors(include_url=False)[0]
     kind, value, context = first["type"], first.get("input"), first.get("ctx", {})
     path = _real_path(first["loc"], data, missing=kind == "missing")
@@ -308,9 +321,13 @@ def _input_error(error: ValidationError, data: object, source: str) -> InputErro
         path, value = [*path, str(context["discriminator"]).strip("'")], context["tag"]
         known = re.findall(r"\w+", context["expected_tags"])
         message = f"must be one of {', '.join(known)}{nearest_name(str(value), known)}"
+    elif kind == "literal_error" and isinstance(value, str):
+        message += nearest_name(value, re.findall(r"'([^']*)'", context["expected"]))
     elif kind in ("missing", "value_error"):
         value = None
-    field = ".".join(part if part.isprintable() else repr(part) for part in path) or "the file"
+    field = ".".join(part if part.isprintable() else repr(part) for part in path) or (
+        "the file" if source else kind_of_data
+    )
     return InputError(f"{source}: {field}" if source else field, value, " ".join(message.split()))
 
 

@@ -15,6 +15,7 @@ from PIL import Image
 
 from ..base.arrays import Float
 from ..base.errors import InputError, MissingFileError
+from ..base.pictures import PILLOW_FORMATS
 from ..base.random_streams import stream
 from ..materials.reflectance import reflectivity
 from ..materials.surfaces import Reflection, brightness_of, spread_factors, surfaces_of
@@ -69,15 +70,15 @@ def read_texture(path: Path, width: float, material: Material) -> Texture:
 
     Raises:
         MissingFileError: there is no such file.
-        InputError: it is no image.
+        InputError: it is no image of `PILLOW_FORMATS`.
     """
     try:
-        with Image.open(path) as image:
+        with Image.open(path, formats=PILLOW_FORMATS) as image:
             stored = np.asarray(image.convert("RGB"), dtype=np.float64) / 255.0
     except FileNotFoundError:
         raise MissingFileError(str(path), None, "no such file") from None
     except Exception:  # each of PIL's formats has errors of its own for what is damaged
-        raise InputError(str(path), None, "is no image that can be read") from None
+        raise InputError(str(path), None, f"must be a whole image: {', '.join(PILLOW_FORMATS)}") from None
     return texture_of(decode_srgb(stored), width, material)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..base.arrays import Float
 from ..base.errors import InputError, nearest_name
+from ..base.machine import linear_algebra_on_one_thread
 from ..base.progress import exhaust
 from ..cloud.selection.classes import RealClass, RealCloud, class_by_label, ranges_and_incidences, read_real_cloud
 from ..cloud.selection.patches import with_points_beside
@@ -251,6 +252,11 @@ def calibration_steps(job: CalibrationJob) -> Generator[float, None, Calibration
     Raises:
         InputError: an input is wrong, or the classes can't be explained by materials.
     """
+    with linear_algebra_on_one_thread():
+        return (yield from _calibration_steps(job))
+
+
+def _calibration_steps(job: CalibrationJob) -> Generator[float, None, Calibration]:
     check_job(job)
     table = job.initial_materials()
     yield 0.02
@@ -389,7 +395,9 @@ def _real_classes(job: CalibrationJob) -> list[RealClass | None]:
         classes = road_classes(cloud, job.road)
         found = [classes[str(target.real_class)] for target in job.targets]
     else:
-        found = [class_by_label(cloud, str(target.real_class)) for target in job.targets]
+        found = [
+            class_by_label(cloud, str(target.real_class), f"--material {target.material}") for target in job.targets
+        ]
     # A sensor is fitted to the first one's patches.
     return [with_points_beside(cloud, found[0]), *found[1:]]
 

@@ -14,11 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from ..base.arrays import Float
+from ..base.changes import apply_values
 from ..base.errors import InputError
 from ..base.files import write_file
+from ..base.machine import linear_algebra_on_one_thread
 from ..base.schema import canonical_json
 from ..cloud.selection.classes import RealClass
 from ..materials.surfaces import brightness_of, surfaces_of
@@ -27,7 +28,7 @@ from ..road.section import ASPHALTS, CONCRETES
 from ..road.surroundings import MaterialVariation
 from ..scanning.devices.device import Device, ScannerSetting, setting_of
 from ..scenario.scan import ScanScenario
-from ..scenario.scenario import apply_values, load_scenario
+from ..scenario.scenario import load_scenario
 from .expected import FULL_SCALE
 from .fit import fitted_wavelength
 from .job import Calibration, CalibrationJob, class_views
@@ -137,6 +138,7 @@ class FittedSensor:
         return {"estimate": self.estimate.to_dict(), "refined": refined, **fitted}
 
 
+@linear_algebra_on_one_thread()
 def fit_sensor(result: Calibration, simulated: bool = True) -> FittedSensor:
     """Return the sensor that explains the first class of a calibration, which must be pavement.
 
@@ -491,6 +493,8 @@ def save_recipe(sensor: FittedSensor, path: Path, device: Path, table: Path | No
         "groups": [{"name": "roads", "scenes": 8, "split": {"train": 6, "validation": 1, "test": 1}}],
     }
     text = "# Written by synthroads calibrate; groups and roads are an example to be changed.\n"
+    import yaml  # Blender's Python has none
+
     write_file(path, (text + yaml.safe_dump(data, sort_keys=False)).encode(), "--save-recipe", overwrite)
 
 

@@ -50,6 +50,7 @@ class LevelPavement:
     material: Material
     name: str = "formula"
     main_thread_only: bool = False
+    kernels: str = "none: rays are met by a formula"
 
     def mesh(self, material: str) -> SceneMesh:
         """Return its two triangles, whose material has a name."""

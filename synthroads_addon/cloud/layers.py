@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from ..base.arrays import AnyArray
+from .flags import FLAGS
 from .points import FIELDS, POINT_TYPES, PointBlock, make_block
 
 
@@ -62,6 +63,9 @@ def _vector(names: tuple[str, ...], array: str, dtype: str, scale: float, unit: 
         Column(name, array, i, dtype, scale, local, unit, f"{text} {'xyz'[i]}") for i, name in enumerate(names)
     )
 
+
+PREDICTED = "predicted_class"
+"""Column of LAS files, and array of blocks, with the class that a model gave each point; no scan fills it."""
 
 LayerFiller = Literal["scan", "material", "colour"]
 """Who fills a layer: the scan (`scanning.point_layers`), the materials' layers, or the source of colours."""
@@ -168,6 +172,13 @@ DEFAULT_ATTRIBUTES: tuple[Attribute, ...] = tuple(name for name, layer in LAYERS
 _TYPES = {"class_id": "uint8", "instance_id": "uint32"} | {
     array: kind for layer in LAYERS.values() for array, kind in layer.types.items()
 }
+STORED_TYPES: dict[str, str] = (
+    {name: kind for name, (kind, _) in POINT_TYPES.items()}
+    | {column.name: _TYPES[column.array] for layer in LAYERS.values() for column in layer.columns}
+    | _TYPES
+    | dict.fromkeys(FLAGS, "uint8")
+)
+"""Types of arrays and of columns by their names."""
 
 
 def optional_arrays(*fillers: LayerFiller) -> frozenset[str]:
@@ -199,8 +210,8 @@ def make_points(stored: dict[str, AnyArray], attributes: tuple[Attribute, ...], 
     Arrays that a block always has and the file hasn't are 0; range and incidence are NaN.
 
     Args:
-        stored: columns (N,) by name, of which those of a vector are put together, and the arrays of `POINT_TYPES`,
-            in any type; the block keeps them where it can.
+        stored: columns (N,) by name, of which those of a vector are put together, and the arrays of `POINT_TYPES`
+            and of `FLAGS`, in any type; the block keeps them where it can.
         attributes: that the file holds.
         count: N.
     """
@@ -220,4 +231,5 @@ def make_points(stored: dict[str, AnyArray], attributes: tuple[Attribute, ...], 
         if name not in _TYPES:
             shape = (count, width) if width > 1 else (count,)
             arrays[name] = stored[name].astype(kind, copy=False) if name in stored else np.zeros(shape, dtype=kind)
+    arrays |= {name: stored[name].astype(np.uint8, copy=False) for name in FLAGS if name in stored}
     return make_block(**arrays)

@@ -9,14 +9,12 @@ the AUC of each statistic alone.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 from scipy.spatial.distance import cdist
 from scipy.stats import rankdata
-from sklearn.ensemble import HistGradientBoostingClassifier
-from sklearn.metrics import roc_auc_score
-from sklearn.model_selection import StratifiedGroupKFold
 
 from ..base.arrays import Bool, Float, Index
 from ..base.errors import InputError
@@ -40,7 +38,7 @@ class Distinction:
 
     Attributes:
         patches: of each side.
-        auc: by group of `GROUPS`, and ``all``.
+        auc: by group of `GROUPS`, and ``all``; empty without `has_classifier`.
         features: AUC of each statistic alone, 0.5 to 1.
         mmd: squared maximum mean discrepancy of all statistics.
         chamfer: mean density-aware Chamfer distance of the patches' points, 0 to 1.
@@ -58,6 +56,11 @@ class Distinction:
             name: {key: round(value, 4) for key, value in getattr(self, name).items()} for name in ("auc", "features")
         }
         return {"patches": self.patches, **shown, "mmd": round(self.mmd, 6), "chamfer": round(self.chamfer, 5)}
+
+
+def has_classifier() -> bool:
+    """Return whether scikit-learn is installed, whose trees tell clouds apart; statistics alone need only SciPy."""
+    return find_spec("sklearn") is not None
 
 
 def distinguish(one: Patches, other: Patches, seed: int, name: str) -> Distinction:
@@ -84,7 +87,7 @@ def distinguish(one: Patches, other: Patches, seed: int, name: str) -> Distincti
     truth = np.arange(len(values)) < len(first)
     blocks = np.concatenate([_blocks(first, 0), _blocks(second, 1)])
     columns = {group: [FEATURES.index(feature) for feature in names] for group, names in GROUPS.items()}
-    columns = {"all": list(range(len(FEATURES))), **columns}
+    columns = {"all": list(range(len(FEATURES))), **columns} if has_classifier() else {}
     auc = {group: _auc(values[:, chosen], truth, blocks, seed) for group, chosen in columns.items()}
     features = {name: _auc_alone(values[:, number], truth) for number, name in enumerate(FEATURES)}
     discrepancy = squared_discrepancy(values[truth], values[~truth])
@@ -102,6 +105,10 @@ def _auc(values: Float, truth: Bool, blocks: Index, seed: int) -> float:
 
     The mean over the folds, not that of all answers together: a fold that learned fewer of one kind would answer lower.
     """
+    from sklearn.ensemble import HistGradientBoostingClassifier  # an extra brings it
+    from sklearn.metrics import roc_auc_score
+    from sklearn.model_selection import StratifiedGroupKFold
+
     folds = min(FOLDS, *(len(np.unique(blocks[truth == side])) for side in (True, False)))
     split = StratifiedGroupKFold(max(folds, 2), shuffle=True, random_state=seed)
     answers = []
@@ -114,7 +121,8 @@ def _auc(values: Float, truth: Bool, blocks: Index, seed: int) -> float:
 
 def _auc_alone(values: Float, truth: Bool) -> float:
     """Return the AUC of a single statistic, 0.5 to 1, whichever way it points (Mann and Whitney's U)."""
-    auc = roc_auc_score(truth, values)
+    many, few = np.count_nonzero(truth), np.count_nonzero(~truth)
+    auc = (rankdata(values)[truth].sum() - many * (many + 1) / 2.0) / (many * few)
     return float(max(auc, 1.0 - auc))
 
 

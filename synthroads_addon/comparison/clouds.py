@@ -97,7 +97,8 @@ def find_clouds(path: Path) -> list[tuple[Path, ListedCloud]]:
     files = sorted(file for file in path.rglob("*") if file.suffix.lower() in ENDINGS) if path.is_dir() else [path]
     if not files:
         raise InputError(str(path), None, f"holds no cloud ({', '.join(ENDINGS)})")
-    return [(file, UnlistedCloud(cloud=file.name)) for file in files]
+    # A name that isn't in UTF-8 is shown with its bytes' numbers.
+    return [(file, UnlistedCloud(cloud=file.name.encode("utf-8", "backslashreplace").decode())) for file in files]
 
 
 def read_compared(path: Path, row: ListedCloud) -> ComparedCloud:
@@ -106,13 +107,15 @@ def read_compared(path: Path, row: ListedCloud) -> ComparedCloud:
     Raises:
         InputError: the file can't be read, has too few points of the road, or a list names a class that it has none of.
     """
-    everything = read_real_cloud(path, row.class_field)
+    everything = read_real_cloud(path, row.class_field, f"{path.name}: class_field")
     cloud = between_azimuths(everything, row)
     if row.axis is not None:
-        beside = road_classes(cloud, RoadClasses(path.parent / row.axis, row.paved, row.lines, row.line_width))
+        beside = road_classes(
+            cloud, RoadClasses(path.parent / row.axis, row.paved, row.lines, row.line_width), f"{path.name}: "
+        )
         found = {ROAD: beside["paved"]} | ({"marking": beside["line"]} if "line" in beside else {})
     else:
-        found = {ROAD: class_by_label(cloud, row.road)}
+        found = {ROAD: _road(cloud, row, path.name)}
         found |= _other_classes(cloud, row, path.name)
         if "marking" in found:
             found[ROAD] = _clear_of(found[ROAD], found["marking"])
@@ -151,6 +154,17 @@ def _clear_of(road: RealClass, marking: RealClass) -> RealClass:
     return replace(road, time=time, **{name: getattr(road, name)[kept] for name in names})
 
 
+def _road(cloud: RealCloud, row: ListedCloud, file: str) -> RealClass:
+    """Return the pavement's points; an error says how another class can be named for a cloud without a list."""
+    try:
+        return class_by_label(cloud, row.road, f"{file}: {ROAD}")
+    except InputError as error:
+        if isinstance(row, UnlistedCloud):
+            remedy = "; a list of clouds (.yaml) in its place says which class is the pavement, or where it lies"
+            raise InputError(error.field, error.value, f"{error.allowed}{remedy}") from None
+        raise
+
+
 def _other_classes(cloud: RealCloud, row: ListedCloud, file: str) -> dict[str, RealClass]:
     """Return the marking and vegetation points, by class, as far as the cloud has enough of them."""
     found = {}
@@ -160,7 +174,7 @@ def _other_classes(cloud: RealCloud, row: ListedCloud, file: str) -> dict[str, R
             if not isinstance(row, UnlistedCloud):
                 _check_class(cloud, code, f"{file}: {name}")
             try:
-                found[name] = class_by_label(cloud, code)
+                found[name] = class_by_label(cloud, code, f"{file}: {name}")
             except InputError:  # a cloud may well have none of them
                 continue
     return found

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Float
+from ..base.machine import linear_algebra_on_one_thread
 from ..cloud.selection.classes import RealClass
 from ..cloud.selection.patches import FEATURES, Patches, join_patches, make_patches
 from .classifier import Distinction, distinguish
@@ -117,6 +118,11 @@ def compare_steps(synthetic: Path, real: Path, seed: int = 1) -> Generator[float
     Raises:
         InputError: a cloud can't be read, has too little pavement, or none of the other side's density.
     """
+    with linear_algebra_on_one_thread():
+        return (yield from _compare_steps(synthetic, real, seed))
+
+
+def _compare_steps(synthetic: Path, real: Path, seed: int) -> Generator[float, None, CloudComparison]:
     found = [find_clouds(path) for path in (synthetic, real)]
     total, done = 2 * sum(map(len, found)), 0
     described: list[list[DescribedCloud]] = [[], []]

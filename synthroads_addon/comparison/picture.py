@@ -10,7 +10,8 @@ import numpy as np
 
 from ..base.arrays import Float
 from ..base.files import write_file
-from ..cloud.selection.patches import FEATURES, GROUPS
+from ..base.text.literal import literal_texts
+from ..cloud.selection.patches import FEATURES
 from .job import CloudComparison, DescribedCloud
 
 _COLUMNS = 6
@@ -19,6 +20,7 @@ _SYNTHETIC, _REAL = "#d6681a", "#5b7aa3"
 _INCHES = (15.0, 9.0)
 
 
+@literal_texts()
 def save_picture(result: CloudComparison, path: Path, overwrite: bool = False) -> None:
     """Draw a comparison's result and write it as PNG.
 
@@ -43,7 +45,7 @@ def save_picture(result: CloudComparison, path: Path, overwrite: bool = False) -
 
 def _draw_groups(axes: Any, result: CloudComparison) -> None:
     """Draw bars of the mean AUC of each group, of synthetic clouds and of real ones."""
-    groups = ["all", *GROUPS]
+    groups = list(result.told[0].auc)
     for shift, rows, colour, label in (
         (-0.2, result.told, _SYNTHETIC, "synthetic"),
         (0.2, result.yardstick, _REAL, "real, each from the others"),

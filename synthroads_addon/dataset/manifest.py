@@ -11,13 +11,14 @@ import os
 import shutil
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from pathlib import Path, PurePosixPath
+from pathlib import Path, PurePath, PurePosixPath
 from typing import Any, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from ..base.errors import InputError, OutputError
 from ..base.files import read_text
+from ..base.named_paths import path_inside, stays_below
 from ..base.schema import ClosedModel, canonical_json, quantity, read_json
 
 MANIFEST = "manifest.json"
@@ -53,6 +54,25 @@ class SceneEntry(ClosedModel):
     files: dict[str, FileEntry] | None = Field(None, description="Its files, by path in the data set.")
     folders: tuple[str, ...] | None = Field(None, description="Its folders in the data set.")
 
+    @field_validator("name")
+    @classmethod
+    def _check_name(cls, name: str) -> str:
+        if not stays_below(name) or len(PurePosixPath(name).parts) != 1:
+            raise ValueError(f"'{name}' is no name of a scene")
+        return name
+
+    @field_validator("files")
+    @classmethod
+    def _check_files(cls, files: dict[str, FileEntry] | None) -> dict[str, FileEntry] | None:
+        if outside := next((name for name in files or () if not stays_below(name)), None):
+            raise ValueError(f"'{outside}' is no file in the data set: a relative path with / and without .. is needed")
+        return files
+
+    @field_validator("folders")
+    @classmethod
+    def _check_folders(cls, folders: tuple[str, ...] | None) -> tuple[str, ...] | None:
+        return None if folders is None else tuple(map(published_name, folders))
+
 
 class Manifest(ClosedModel):
     """All scenes that were made or tried, in the recipe's order."""
@@ -84,7 +104,8 @@ def append_record(folder: Path, entry: SceneEntry) -> None:
     """Record one more scene beside the manifest, on the disk, at a cost that doesn't grow with their number."""
     # In ASCII, so that a line that was cut off is text all the same, and no character in it ends a line.
     line = json.dumps(entry.to_dict(), separators=(",", ":"))
-    with (folder / RECORDS).open("a", encoding="utf-8", newline="\n") as file:
+    records = path_inside(folder, RECORDS, folder, follow=True)
+    with records.open("a", encoding="utf-8", newline="\n") as file:
         file.write(f"{line}\n")
         file.flush()
         os.fsync(file.fileno())
@@ -107,11 +128,20 @@ def _read_records(folder: Path) -> Iterator[SceneEntry]:
             return
 
 
+def published_name(name: object) -> str:
+    """Return the name of a folder of a scene that is published whole; ValueError for any other."""
+    place = PurePosixPath(str(name))
+    if not isinstance(name, str) or not stays_below(name) or not any(_fits(place, pattern) for pattern in PUBLISHED):
+        raise ValueError(f"'{name}' is no folder that a data set makes")
+    return name
+
+
 def write_atomically(path: Path, text: str) -> None:
-    """Write a text file so that it is there wholly or not at all, even after a power cut."""
+    """Write a text file so that it is there wholly or not at all, even after a power cut; never through a link."""
     temporary = path.with_name(f".{path.name}.part")
     try:
-        with temporary.open("w", encoding="utf-8", newline="\n") as file:
+        temporary.unlink(missing_ok=True)  # a link would be written through
+        with temporary.open("x", encoding="utf-8", newline="\n") as file:
             file.write(text)
             file.flush()
             os.fsync(file.fileno())
@@ -196,13 +226,10 @@ def paths_of_set(folder: Path, manifest: Manifest) -> list[str]:
         folders of scenes, and single files; some may not be there.
 
     Raises:
-        InputError: the manifest names a place that no data set writes to.
         OutputError: a scene's folder holds a file that the manifest doesn't name.
     """
     paths = ["DATA_CARD.md"]
     for scene in manifest.scenes:
-        if len(PurePosixPath(scene.name).parts) != 1 or scene.name == "..":
-            raise InputError(str(folder / MANIFEST), scene.name, "is no name of a scene")
         paths += [f"logs/{scene.name}{ending}" for ending in (".json", ".txt")]
         paths += _folders(folder, scene)
     roots = dict.fromkeys(PurePosixPath(path).parts[:2] for path in paths)
@@ -213,10 +240,7 @@ def paths_of_set(folder: Path, manifest: Manifest) -> list[str]:
 def _folders(folder: Path, scene: SceneEntry) -> Iterator[str]:
     """Yield the folders of a scene; OutputError where one holds a file that isn't the scene's."""
     for name in scene.folders or ():
-        place = PurePosixPath(name)
-        if ".." in place.parts or not any(_fits(place, pattern) for pattern in PUBLISHED):
-            raise InputError(str(folder / MANIFEST), name, "is no folder that a data set makes")
-        whole = folder / name
+        whole = path_inside(folder, name, folder / MANIFEST)
         inside = () if whole.is_symlink() else sorted(whole.rglob("*"))  # of a link the link alone goes
         for path in inside:
             file = path.relative_to(folder).as_posix()
@@ -235,22 +259,40 @@ def begin_removal(folder: Path, paths: Iterable[str]) -> None:
 
 
 def finish_removal(folder: Path) -> None:
-    """Remove the paths that `begin_removal` recorded, unless the manifest still names them; else do nothing."""
+    """Remove the paths that `begin_removal` recorded, unless the manifest still names them; else do nothing.
+
+    Raises:
+        InputError: the record isn't a list of names, or one of them leads out of the folder: nothing is removed then.
+    """
     if not (folder / REPLACED).is_file():
         return
     named = {name for scene in read_manifest(folder).scenes for name in scene.folders or ()}
-    paths = read_json(folder / REPLACED)
-    if named.isdisjoint(paths):
-        for name in paths:
-            remove(folder / name)
+    names = read_json(folder / REPLACED)
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise InputError(str(folder / REPLACED), None, "must be a list of the paths that are to be removed; remove it")
+    for name in names:
+        path_inside(folder, name, folder / REPLACED)
+    if named.isdisjoint(names):
+        for name in names:
+            remove(folder, name, folder / REPLACED)
             for parent in list(PurePosixPath(name).parents)[:-1]:
                 with suppress(OSError):  # it isn't empty, or a link
                     (folder / parent).rmdir()
     (folder / REPLACED).unlink()
 
 
-def remove(path: Path) -> None:
-    """Remove a file, or a folder with all that is in it; of a link the link alone; nothing if nothing is there."""
+def remove(folder: Path, name: str | PurePath, source: Path) -> None:
+    """Remove a file in a folder, or a folder with all that is in it; of a link the link alone; nothing without any.
+
+    Args:
+        folder: in which it must lie, see `path_inside`.
+        name: relative to it.
+        source: file that names it.
+
+    Raises:
+        InputError: it lies elsewhere.
+    """
+    path = path_inside(folder, name, source)
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
     else:

@@ -17,9 +17,12 @@ from pydantic import ValidationError
 
 from ..base.arrays import Float, Int
 from ..base.errors import InputError
+from ..base.machine import linear_algebra_on_one_thread
+from ..base.maps.crs import MapSystem
+from ..base.maps.places import Placement
 from ..base.schema import round_value
 from ..road.alignment import Alignment, finite_array
-from ..road.centerline import read_axis
+from ..road.axes.centerline import read_declared_axis
 from ..road.parameters import AlignmentObject, HorizontalElement, VerticalPoint
 from ..road.profile import IntersectionPoint, Profile
 from ..scenario.road import RoadScenario
@@ -86,11 +89,11 @@ class AxisFit:
     Attributes:
         alignment: starts at the foot of the first point and ends at that of the last.
         profile: elevation over the alignment's stations.
-        horizontal: of the points' horizontal distances from the alignment.
+        horizontal: of the points' horizontal distances from the alignment, also beyond its ends.
         height: of their heights above the profile.
         points: how many were used, i.e. without consecutive duplicates.
-        stations, across, above: (N,) of the points: station, offset to the left of the alignment, height above the
-            profile, m.
+        stations, across, above: (N,) of the points: station, offset to the left of the alignment (beyond its ends the
+            distance from these as well), height above the profile, m.
         tolerance: that the fit aimed at, m.
     """
 
@@ -148,21 +151,43 @@ def fitted_axis(path: Path, scenario: RoadScenario) -> tuple[AlignmentObject, Ro
     """Return the alignment fitted to the points of a file (CSV, GeoJSON), the scenario for it, and a report.
 
     Returns:
-        the alignment in local coordinates, the scenario with the length and map origin that follow from it, and how
+        the alignment in local coordinates, the scenario with the length and map origin that follow from it, and with
+        the vertical coordinate system that the file names if it names none itself, and how
         well it fits (m): root mean square, 95th percentile and worst distance, horizontally and in height.
 
     Raises:
         AxisRefusedError: no road follows the points (`AxisFit.check`).
-        InputError: the file is missing or not an axis.
+        InputError: the file is missing or not an axis, or doesn't lie where the road's coordinate system is used.
     """
-    points = read_axis(path)
+    place = Placement.of(MapSystem.of(scenario.epsg, scenario.height_epsg))
+    points, declared = read_declared_axis(path, place)
+    return axis_of_points(path.name, points, declared, scenario)
+
+
+def axis_of_points(
+    name: str, points: Float, declared: MapSystem | None, scenario: RoadScenario
+) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
+    """Return the alignment fitted to points (N, 3) of the scenario's coordinate system, m, as `fitted_axis` does.
+
+    Args:
+        name: of their file.
+        points: in their order along the road.
+        declared: system that the file names, whose heights count where the scenario's has none.
+        scenario: limits of the road.
+    """
+    system = MapSystem.of(scenario.epsg, scenario.height_epsg)
+    heights = scenario.height_epsg
+    if declared is not None and system.height_unit is None:
+        heights = declared.height_epsg if declared.unit is None else declared.metric().height_epsg
     origin = np.round(points.mean(axis=0))
     fit = fit_axis(points - origin)
-    fit.check(path.name)
+    fit.check(name)
     alignment = alignment_object(fit)
-    road = scenario.model_copy(update={"length": alignment.length, "map_origin": tuple(origin.tolist())})
+    road = scenario.model_copy(
+        update={"length": alignment.length, "map_origin": tuple(origin.tolist()), "height_epsg": heights}
+    )
     report = {
-        "file": path.name,
+        "file": name,
         "points": fit.points,
         "elements": len(alignment.horizontal),
         "horizontal": fit.horizontal.to_dict(),
@@ -179,7 +204,6 @@ def alignment_object(fit: AxisFit) -> AlignmentObject:
     """
     start, heading, _ = fit.alignment.frame(0.0)
     elements = [(round_value(e.length), e.curvature_start, e.curvature_end) for e in fit.alignment.elements]
-    points = [(round_value(p.station), round_value(p.elevation), p.radius) for p in fit.profile.points]
     try:
         return AlignmentObject(
             instance=1,
@@ -187,10 +211,7 @@ def alignment_object(fit: AxisFit) -> AlignmentObject:
             start_y=round_value(float(start[1])),
             start_heading_deg=round_value(float(np.rad2deg(np.angle(np.exp(1j * heading)))), 12),
             horizontal=tuple(HorizontalElement.between(*element) for element in elements),
-            vertical=tuple(
-                VerticalPoint(station=station, elevation=elevation, radius=_written_radius(radius))
-                for station, elevation, radius in points
-            ),
+            vertical=_vertical_points(fit.profile),
         )
     except ValidationError as error:
         fault = error.errors(include_url=False)[0]
@@ -198,11 +219,29 @@ def alignment_object(fit: AxisFit) -> AlignmentObject:
         raise InputError(f"axis: {field}", fault.get("input"), f"no road runs through its points ({wrong})") from None
 
 
+def fit_heights(station: Float, heights: Float, length: float, tolerance: float) -> tuple[VerticalPoint, ...]:
+    """Return the points of vertical intersection of a profile fitted to heights.
+
+    Args:
+        station, heights: (N,), m.
+        length: of the road, m.
+        tolerance: root mean square of the heights that the fit aims at, m.
+    """
+    profile = _fit_heights(station, heights, np.ones(len(station)), length, tolerance)
+    return _vertical_points(profile)
+
+
+def _vertical_points(profile: Profile) -> tuple[VerticalPoint, ...]:
+    rows = [(round_value(p.station), round_value(p.elevation), p.radius) for p in profile.points]
+    return tuple(VerticalPoint(station=s, elevation=z, radius=_written_radius(radius)) for s, z, radius in rows)
+
+
 def _written_radius(radius: float) -> float:
     """Return a rounding's radius (m) as written: a little less, lest roundings overlap; 0 for one too flat."""
     return radius * (1.0 - _PLAY) if radius < _FLATTEST else 0.0
 
 
+@linear_algebra_on_one_thread()
 def fit_axis(points: ArrayLike, tolerance: float = 0.05, design_ends: bool = False) -> AxisFit:
     """Return the alignment and profile fitted to the points of an axis, with the points' deviations.
 
@@ -226,6 +265,8 @@ def fit_axis(points: ArrayLike, tolerance: float = 0.05, design_ends: bool = Fal
     reach = max(NEAR, 5.0 * float(np.median(np.diff(near))))
     station, offset = alignment.project_near(local[:, :2], near, reach)
     across = np.hypot(*(local[:, :2] - alignment.position(station)).T)
+    # The road ends at its last point's foot: points before its begin or behind its end, out of their order, are off it.
+    across = np.hypot(across, np.maximum(np.maximum(-station, station - alignment.length), 0.0))
     profile = _fit_heights(station, local[:, 2], weights, alignment.length, _HEIGHT_SHARE * tolerance)
     heading = alignment.start_heading
     placed = Alignment(alignment.elements, alignment.x + origin[0], alignment.y + origin[1], heading)

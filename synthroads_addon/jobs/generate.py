@@ -5,20 +5,27 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..base.crs import wkt
+import numpy as np
+
 from ..base.errors import InputError
 from ..base.files import output_folder
+from ..base.maps.crs import MapSystem, metric_system
 from ..base.progress import Progress, StageTimer, silent
-from ..fitting.fit import fitted_axis
+from ..base.remarks import collected_remarks, warn
 from ..fitting.plot import draw_refused_fit
 from ..road.geometry import RoadGeometry
 from ..road.parameters import RoadParameters, read_parameters
 from ..sampling.road import sample_road
 from ..scanning.scene.classify import check_asset_classes
+from ..scenario.road import RoadScenario
 from ..scenario.scenario import OF_POINTS, Scenario
 from ..twin.formats import check_formats
+from .axis_source import axis_from_file
 from .job_files import FILES, JobFiles, empty_scan_warnings
 from .scan.plan import check_scan
+
+FROM_AXIS = frozenset({"length", "radius", "grade_percent", "map_origin"})
+"""Fields of a road's limits that have no effect where an axis is given, which says all of that itself."""
 
 
 @dataclass
@@ -29,7 +36,8 @@ class Job:
         scenario: limits, scan, fidelity and outputs.
         output: folder for the files.
         parameters: take this road instead of sampling one.
-        axis: sample a road along this centreline (CSV or GeoJSON).
+        axis: sample a road along this centreline (CSV, GeoJSON, OpenDRIVE, LandXML, IFC).
+        axis_name: of the road or alignment in that file; None takes the longest.
         overwrite: replace files that are already there.
         new_file: build in a new, empty Blender file instead of the open one, which is lost.
         begun: when the job began, by `time.perf_counter`, for a time budget; when `generate` is called if None.
@@ -39,6 +47,7 @@ class Job:
     output: Path
     parameters: Path | None = None
     axis: Path | None = None
+    axis_name: str | None = None
     overwrite: bool = False
     new_file: bool = False
     begun: float | None = None
@@ -55,6 +64,7 @@ class RoadSource:
     scenario: Scenario
     parameters: Path | None = None
     axis: Path | None = None
+    axis_name: str | None = None
     pictures: Path | None = None
 
     def read(self) -> tuple[RoadParameters, dict[str, Any]]:
@@ -64,11 +74,12 @@ class RoadSource:
             return read_parameters(self.parameters), {}
         if self.axis:
             with draw_refused_fit(self.pictures):
-                axis, limits, fit = fitted_axis(self.axis, scenario.road)
-            return sample_road(limits, scenario.seed, scenario.title, axis), {"axis": fit}
+                axis, limits, report = axis_from_file(self.axis, scenario.road, scenario.seed, self.axis_name)
+            return sample_road(limits, scenario.seed, scenario.title, axis), {"axis": report}
         return sample_road(scenario.road, scenario.seed, scenario.title), {}
 
 
+@collected_remarks()
 def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
     """Run the main job, from scenario to files; return the report, which is also written to ``report.json``.
 
@@ -78,7 +89,7 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
     """
     begun, timer = job.begun or time.perf_counter(), StageTimer(progress)
     check(job)
-    source = RoadSource(job.scenario, job.parameters, job.axis, pictures=job.output)
+    source = RoadSource(job.scenario, job.parameters, job.axis, job.axis_name, pictures=job.output)
     files, scene = JobFiles(job.scenario), None
     with output_folder(job.output, files.names, job.overwrite) as folder:
         road, report = make_road(source, timer)
@@ -100,7 +111,7 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
         report["instances"] = road.numbers.to_dict()
         if scene:
             report["counts"] = scene.write_files(folder, timer)
-            if warnings := empty_scan_warnings(report["counts"]):
+            if warnings := [*scene.warnings, *empty_scan_warnings(report["counts"])]:
                 report["warnings"] = warnings
         return files.write_report(folder, report, timer)
 
@@ -109,12 +120,21 @@ def check(job: Job) -> None:
     """Raise an InputError for a job that can't be done, before any work starts."""
     scenario = job.scenario
     check_scan(scenario)
-    wkt(scenario.road.epsg)
+    system = metric_system(scenario.road.epsg, scenario.road.height_epsg, "road.epsg")
+    if not (job.axis or job.parameters):
+        _tell_odd_place(scenario.road, system)
     check_formats(scenario.twin)
     if job.parameters and job.axis:
         raise InputError("--axis", str(job.axis), "can't be given together with --parameters")
     if not scenario.outputs and not scenario.twin:
         raise InputError("outputs", [], f"must name at least one of {', '.join(FILES)}")
+
+
+def _tell_odd_place(road: RoadScenario, system: MapSystem) -> None:
+    """Warn where a road's map origin lies outside of the area that its coordinate system is meant for."""
+    if system.outside(np.array([road.map_origin[:2]])).max() > 0.0:
+        place, name = list(road.map_origin[:2]), system.label
+        warn("road.map_origin %s lies outside of the area that %s is meant for (%s)", place, name, system.area)
 
 
 def make_road(source: RoadSource, timer: StageTimer) -> tuple[RoadGeometry, dict[str, Any]]:

@@ -11,10 +11,11 @@ import laspy
 import numpy as np
 
 from ..base.machine import available_cores
-from ..base.progress import StageTimer
+from ..base.progress import StageTimer, in_stage
+from ..base.remarks import remarks_so_far
 from ..base.schema import canonical_json
 from ..base.version import generator, version
-from ..road.centerline import centerline_geojson
+from ..road.axes.centerline import centerline_geojson
 from ..road.geometry import RoadGeometry
 from ..road.tessellation import sample_stations
 from ..scenario.scenario import OF_POINTS, Output, Scenario
@@ -64,10 +65,11 @@ class JobFiles:
             (folder / "centerline.geojson").write_text(text, encoding="utf-8")
         if self.scenario.twin:
             with timer.stage("twin"):
-                write_twin(road.parameters, folder, self.scenario.twin, tolerance, self.scenario.ifc)
+                follow = in_stage(timer.progress, "twin")
+                write_twin(road.parameters, folder, self.scenario.twin, tolerance, self.scenario.ifc, progress=follow)
 
     def write_report(self, folder: Path, told: dict[str, Any], timer: StageTimer) -> dict[str, Any]:
-        """Write ``report.json`` and return its content.
+        """Write ``report.json`` and return its content; warnings and assumptions that are being collected are in it.
 
         Args:
             folder: for it.
@@ -81,6 +83,7 @@ class JobFiles:
             {"type": "Report", "generator": generator()}
             | told
             | {
+                "remarks": remarks_so_far(),
                 "seed": self.scenario.seed,
                 "settings": asdict(self.scenario.settings()),
                 "scenario": {name: value for name, value in scenario.items() if self.road or name != "road"},

@@ -60,6 +60,7 @@ class RoadScene:
         model: that was built for it; None before, and in a file that shows the road already.
         scene: of that model, as it was read; None before.
         road_id: of the road in the file; that of the one that is meant in it if empty.
+        warnings: what isn't scanned as the scene, or an asset in it, declares it: known once it is read.
     """
 
     scenario: Scenario
@@ -67,6 +68,7 @@ class RoadScene:
     model: RoadModel | None = None
     scene: ScannedScene | None = None
     road_id: str = ""
+    warnings: tuple[str, ...] = ()
 
     @cached_property
     def site(self) -> Site:
@@ -93,6 +95,7 @@ class RoadScene:
             factor, class_ids = self.scenario.scan.traffic_speed_factor, self.scenario.cloud.scheme().source_ids()
             road = self.model.road_id if self.model else self.road_id
             self.scene = scanned_scene(geometry=self.road, speed_factor=factor, class_ids=class_ids, road=road)
+        self.warnings = self.scene.warnings
         return self.scene
 
     def rebuild(self, changes: Mapping[str, Any]) -> ScannedScene:
@@ -119,7 +122,8 @@ class RoadScene:
         """Build the model unless it is there, scan it and write the files made from it; return the counts."""
         scenario = self.scenario
         if scenario.section_length(self.road.length) is not None:
-            return scan_by_section(self.site, self.road, folder, timer)
+            counts, self.warnings = scan_by_section(self.site, self.road, folder, timer)
+            return counts
         with timer.stage("model"):
             remember((self.model or self.build()).root, self.road.parameters, scenario, "")
         counts = self.scan(folder, timer) if set(scenario.outputs) & set(OF_POINTS) else {}

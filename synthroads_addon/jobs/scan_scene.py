@@ -5,26 +5,33 @@ The scene is only read: nothing is added to it, and its file isn't written.
 
 from __future__ import annotations
 
+import logging
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from ..base.arrays import Float
 from ..base.class_mapping import ClassMapping
-from ..base.crs import wkt
+from ..base.classes import UNLABELLED
 from ..base.errors import InputError
-from ..base.files import output_folder
+from ..base.files import output_folder, write_file
+from ..base.maps.crs import metric_system
+from ..base.maps.places import Placement
 from ..base.progress import Progress, StageTimer, silent
+from ..base.remarks import assume, collected_remarks, warn
 from ..base.schema import read_json
 from ..cloud.tools.previews import TopView
-from ..road.centerline import read_axis
+from ..road.axes.centerline import check_axis_file
 from ..road.geometry import RoadGeometry
 from ..scanning.plan import ScanConditions
 from ..scanning.platforms.over_scene import SceneRoute, as_tripod, path_over
-from ..scanning.platforms.trajectory import RecordedTrajectory, read_trajectory
+from ..scanning.platforms.trajectory import RecordedTrajectory, check_trajectory_file
 from ..scanning.scene.extent import body_bounds, strays_of
+from ..scanning.scene.map_coordinates import rounding_warnings, shift_of, step_at
 from ..scanning.scene.mesh import SceneMesh
 from ..scanning.scene.motion import ScannedScene
 from ..scenario.scenario import OF_POINTS, Scenario
@@ -33,6 +40,12 @@ from .scan.plan import Site, check_scan
 
 if TYPE_CHECKING:
     from ..blender.scene.foreign import UpAxis
+    from ..blender.scene.render_state import Visible
+
+
+CLASSES = "classes.json"
+"""File of classes by name that is written to be filled in, where things of a scene have none."""
+_logger = logging.getLogger("synthroads")
 
 
 @dataclass(frozen=True)
@@ -48,8 +61,11 @@ class SceneScan:
         classes: JSON file with classes by name, see `ClassMapping`.
         road: name of the scene's road, where it has several; the one that is active or was chosen in it if None.
         epsg: of the map; that of the scene's road, or unknown, if None.
-        origin: map coordinates of the scene's own origin, m; those of the scene's road, or 0, if None.
+        origin: map coordinates of the scene's own origin, m; those of the scene's road, or 0, if None; ``auto`` where
+            the scene's own coordinates are those of the map: it is moved near the origin before it is read.
         up: see `blender.scene.foreign.open_scene`.
+        visible: whether a render's or the viewport's state of the scene is scanned.
+        also_from: further folders in which files may lie that a scene of another format than .blend names.
         overwrite: replace files that are already there.
         begun: when the job began, by `time.perf_counter`, for a time budget; when `scan_scene` is called if None.
     """
@@ -62,12 +78,15 @@ class SceneScan:
     classes: Path | None = None
     road: str | None = None
     epsg: int | None = None
-    origin: tuple[float, float, float] | None = None
+    origin: tuple[float, float, float] | Literal["auto"] | None = None
     up: UpAxis | None = None
+    visible: Visible = "render"
+    also_from: tuple[Path, ...] = ()
     overwrite: bool = False
     begun: float | None = None
 
 
+@collected_remarks()
 def scan_scene(job: SceneScan, progress: Progress = silent) -> dict[str, Any]:
     """Scan a scene made elsewhere into files; return the report, which is also written to ``report.json``.
 
@@ -83,10 +102,12 @@ def scan_scene(job: SceneScan, progress: Progress = silent) -> dict[str, Any]:
     with output_folder(job.output, JobFiles(job.scenario, road=False).names, job.overwrite) as folder:
         read, road, warnings = open_and_read(job, mapping, timer, report)
         scene = ForeignScene(scene_site(job, read.static, road), read)
+        if hint := _say_unlabelled(job, mapping, read):
+            report["classes_to_fill_in"] = hint
         if job.scenario.chooses:
             scene, report["choice"] = choose_settings(scene, begun, timer)
         counts = scene.scan(folder, timer)
-        report |= {"counts": counts, "warnings": warnings + warnings_of_counts(counts)}
+        report |= {"counts": counts, "warnings": warnings + warnings_of_counts(counts, hint)}
         return JobFiles(scene.site.scenario, road=False).write_report(folder, report, timer)
 
 
@@ -107,11 +128,11 @@ def check_scene_scan(job: SceneScan) -> ClassMapping | None:
     if job.path and (job.tripods or isinstance(platform, RecordedTrajectory)):
         raise InputError("--path", str(job.path), "can't be given together with a trajectory or a tripod's positions")
     if isinstance(platform, RecordedTrajectory) and platform.file:
-        read_trajectory(platform.file)
-    if job.path:
-        read_axis(job.path)
+        check_trajectory_file(platform.file)
     if job.epsg is not None:
-        wkt(job.epsg)
+        metric_system(job.epsg, field="--epsg")
+    if job.path:
+        check_axis_file(job.path)
     if job.classes is None:
         return None
     mapping = ClassMapping.from_dict(read_json(job.classes), source=str(job.classes))
@@ -131,10 +152,12 @@ def open_and_read(
     from ..blender.model.truth import open_road
     from ..blender.scene.evaluated import scanned_scene
     from ..blender.scene.foreign import open_scene, open_scene_warnings
+    from ..blender.scene.units import scene_unit
 
+    shift = np.zeros(3)
     with timer.stage("scene"):
         if job.scene is not None:
-            open_scene(job.scene, job.up)
+            shift = open_scene(job.scene, job.up, to_origin=job.origin == "auto", also_from=job.also_from)
     with timer.stage("scene mesh"):
         opened = open_road(job.road)
         edited = opened.edited if opened else None
@@ -144,17 +167,22 @@ def open_and_read(
             if edited.stale and not edited.lost:
                 settle(opened.road_id, edited)
         if opened and job.origin is not None:
-            raise InputError("--origin", list(job.origin), "can't be given: the road in the scene has one of its own")
+            raise InputError("--origin", job.origin, "can't be given: the road in the scene has one of its own")
         factor, class_ids = job.scenario.scan.traffic_speed_factor, job.scenario.cloud.scheme().source_ids()
         further: dict[str, Any] = {"class_ids": class_ids, "road": opened.road_id if opened else ""}
         road = RoadGeometry(parameters) if parameters else None
-        scene = scanned_scene(None, None, mapping, road, factor, number_objects=True, **further)
+        if opened and (unit := scene_unit()) != 1.0:
+            warn("the scene's unit scale is %g: roads are built in metres, so that its units are taken for these", unit)
+
+        def read() -> ScannedScene:
+            return scanned_scene(None, mapping, road, factor, number_objects=True, visible=job.visible, **further)
+
+        scene = read()
         if not len(scene.static) and not scene.moving:
             what = "holds nothing visible with faces that could be scanned"
             raise InputError(str(job.scene or "open scene"), None, what)
-        if job.origin is not None:
-            scene = replace(scene, static=replace(scene.static, origin=np.array(job.origin, dtype=np.float64)))
-        warnings = open_scene_warnings()
+        scene, warnings = _placed(job, scene, shift, read)
+        warnings += [*open_scene_warnings(), *scene.warnings]
         warnings += [f"{edit.name} was edited by hand: {edit.reason}" for edit in edited.by_hand] if edited else []
         warnings += [f"{job.classes}: nothing in the scene is named as in {entry}" for entry in scene.unmatched]
         if strays := strays_of(scene.static) if len(scene.static) else None:
@@ -162,17 +190,51 @@ def open_and_read(
     return scene, road, warnings
 
 
+def _placed(
+    job: SceneScan, scene: ScannedScene, shift: Float, read: Callable[[], ScannedScene]
+) -> tuple[ScannedScene, list[str]]:
+    """Return a scene with its place on the map, and what is to be said about the rounding of its coordinates.
+
+    Args:
+        job: says where the scene's origin is.
+        scene: as it was read.
+        shift: (3,) what was subtracted before, m.
+        read: reads the scene again, after it was moved.
+
+    Raises:
+        InputError: its coordinates are too large for single precision.
+    """
+    name, warnings = job.scene.name if job.scene else "open scene", list[str]()
+    if job.origin != "auto":
+        warnings += rounding_warnings(scene.static, name)
+        origin = scene.static.origin if job.origin is None else np.array(job.origin, dtype=np.float64)
+        return replace(scene, static=replace(scene.static, origin=origin)), warnings
+    if len(scene.static) and (further := shift_of(body_bounds(scene.static))).any():
+        from ..blender.scene.foreign import move_scene  # needs Blender, which is loaded late
+
+        unit = scene.static.unit
+        step = unit * step_at(float(np.abs(body_bounds(scene.static)).max()) / unit)
+        warnings.append(f"{name} was read in single precision: its coordinates are rounded to steps of {step:g} m")
+        move_scene(-further / unit)
+        scene, shift = read(), shift + further
+    assume("%s is scanned about the map coordinates %s", name, ", ".join(f"{value:,.0f}" for value in shift.tolist()))
+    return replace(scene, static=replace(scene.static, origin=shift)), warnings
+
+
 def scene_site(job: SceneScan, mesh: SceneMesh, road: RoadGeometry | None) -> Site:
     """Return the site of a scene's scan: path, conditions, preview raster if wanted."""
     conditions = ScanConditions.of(road.parameters if road else None)
     if job.epsg is not None:
-        conditions = replace(conditions, epsg=job.epsg)
-    path = path_over(job.scenario.scan.platform, mesh, road, job.path, job.tripods)
+        conditions = replace(conditions, epsg=job.epsg, height_epsg=None)
+    place = Placement.of(conditions.system)
+    path = path_over(job.scenario.scan.platform, mesh, road, job.path, job.tripods, place)
     return Site(job.scenario, path, conditions, _view_over(job.scenario, mesh, road))
 
 
 def route_site(scenario: Scenario, route: SceneRoute, mesh: SceneMesh) -> Site:
     """Return the site of a scan along a route through a scene without a road."""
+    for text in rounding_warnings(mesh, "the open scene", "move it near the scene's origin"):
+        warn("%s", text)
     path = route.path(scenario.scan.platform, mesh)
     return Site(scenario, path, ScanConditions.of(None), _view_over(scenario, mesh, None))
 
@@ -185,7 +247,33 @@ def _view_over(scenario: Scenario, mesh: SceneMesh, road: RoadGeometry | None) -
     return TopView.over_road(road, scheme) if road else TopView.over_box(low, high, scheme)
 
 
-def warnings_of_counts(counts: dict[str, Any]) -> list[str]:
-    """Return warnings about a scene's scan, as sentences: no points, points without class."""
+def _say_unlabelled(job: SceneScan, mapping: ClassMapping | None, scene: ScannedScene) -> str:
+    """Log, before a scan, what in its scene has no class, and write a file of classes to fill in unless it is there.
+
+    Return the file's path; an empty string where everything has a class.
+    """
+    from ..blender.scene.unlabelled import unlabelled_things  # see `scan_scene`
+
+    meshes = [scene.static, *(body.mesh for body in scene.moving)]
+    if not any(np.any(mesh.class_id == UNLABELLED) for mesh in meshes):
+        return ""
+    things = unlabelled_things(mapping, job.scenario.cloud.scheme().source_ids())
+    if not things.count:
+        return ""
+    file = job.output / CLASSES
+    if not file.exists():
+        write_file(file, things.mapping().to_json().encode())
+    _logger.warning("warning: %s. Fill in %s and scan with --classes %s", things.text(), file, file)
+    return str(file)
+
+
+def warnings_of_counts(counts: dict[str, Any], classes: str = "") -> list[str]:
+    """Return warnings about a scene's scan, as sentences: no points, points without class.
+
+    Args:
+        counts: of the scan.
+        classes: file of classes that can be filled in; empty if there is none.
+    """
     unlabelled = int(counts["points_by_class"].get("unlabelled", 0))
-    return [*empty_scan_warnings(counts), *([f"{unlabelled:,} points have no class"] if unlabelled else [])]
+    remedy = f": fill in {classes} and scan with --classes {classes}" if classes else ""
+    return [*empty_scan_warnings(counts), *([f"{unlabelled:,} points have no class{remedy}"] if unlabelled else [])]

@@ -102,7 +102,12 @@ def _add_retroreflection(result: Float, cosine: Float, retro: Number, inverse_lo
     which = np.flatnonzero(strength)
     if not len(which):
         return
-    angle = np.arccos(np.clip(cosine[which], -1.0, 1.0))
     lobe = np.broadcast_to(np.asarray(inverse_lobe_squared, dtype=np.float64), result.shape)[which]
+    result[which] += retroreflection(cosine[which], strength[which], lobe)
+
+
+def retroreflection(cosine: Float, retro: Float, inverse_lobe_squared: Float) -> Float:
+    """Return the retro-reflective terms (N,) of surfaces' brightness: r exp(-t^2 / l^2), see `returned_share`."""
+    angle = np.arccos(np.clip(cosine, -1.0, 1.0))
     with np.errstate(under="ignore"):
-        result[which] += strength[which] * np.exp(-angle * angle * lobe)
+        return np.asarray(retro * np.exp(-angle * angle * inverse_lobe_squared))

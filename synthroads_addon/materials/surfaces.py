@@ -46,6 +46,7 @@ class Surfaces:
         lobe: angle at which it has fallen to 1/e, rad.
         spread_below, spread_above: one sigma of the brightness's logarithm below and above its median.
         spread_wavelength: longest wavelength of its variation, m.
+        clear: whether the light that goes on through differs from place to place, see `scanning.colour.transparency`.
 
     The rest follows from these: reflectivity R, Oren and Nayar's A and B, the lobe as 1/rad^2, which materials retro-
     reflect (``shining``), let light through (``pervious``), through gaps (``gappy``), or vary (``uneven``), the factor
@@ -64,21 +65,31 @@ class Surfaces:
     spread_below: Float
     spread_above: Float
     spread_wavelength: Float
+    clear: NDArray[np.bool_]
 
     def __post_init__(self) -> None:
         self.reflectivity = reflectivity(self.base_color, self.metallic, self.specular)
         self.facet_a, self.facet_b = facet_terms(self.slope)
         self.inverse_lobe_squared: Float = 1.0 / np.maximum(self.lobe, 1e-3) ** 2
-        self.shining, self.pervious = self.retro > 0.0, self.transmission > 0.0
-        self.gappy = self.pervious & (self.gap_size > 0.0)
+        self.shining, self.pervious = self.retro > 0.0, (self.transmission > 0.0) | self.clear
+        self.gappy = (self.transmission > 0.0) & (self.gap_size > 0.0)
         self.uneven = (self.spread_below > 0.0) | (self.spread_above > 0.0)
         self.spread_scale: Float = 1.0 / mean_over_median(self.spread_below, self.spread_above)
         self.permeable, self.retroreflective = bool(self.pervious.any()), bool(self.shining.any())
         self.rough, self.varying = bool((self.slope > 0.0).any()), bool(self.uneven.any())
 
 
-def surfaces_of(rows: Iterable[Material], reflection: Reflection = "lambert", spread: bool = True) -> Surfaces:
-    """Return the properties of materials as arrays; "lambert" drops the facets, ``spread`` False the variation."""
+def surfaces_of(
+    rows: Iterable[Material], reflection: Reflection = "lambert", spread: bool = True, clear: Iterable[int] = ()
+) -> Surfaces:
+    """Return the properties of materials as arrays.
+
+    Args:
+        rows: M materials.
+        reflection: "lambert" drops the facets.
+        spread: False drops the variation.
+        clear: indices of those whose transparency differs from place to place.
+    """
     rows = list(rows)
 
     def column(name: str) -> Float:
@@ -98,6 +109,7 @@ def surfaces_of(rows: Iterable[Material], reflection: Reflection = "lambert", sp
         spread_below=column("spread_below") * spread,
         spread_above=column("spread_above") * spread,
         spread_wavelength=column("spread_wavelength"),
+        clear=np.isin(np.arange(len(rows)), list(clear)),
     )
 
 

@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ..base.errors import InputError, MissingFileError, nearest_name
+from ..base.pictures import TEXTURE_KINDS, picture_kind
 from ..base.schema import ClosedModel, quantity, read_json
 from ..road.surroundings import MaterialTexture
 from .table import materials
@@ -28,8 +29,6 @@ SUFFIXES = (".png", ".jpg", ".jpeg", ".exr", ".tif", ".tiff")
 SETTINGS = "texture.json"
 """File beside the images of a set, or of all sets of a material, that says how large they are."""
 
-_SIGNATURES = (b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff", b"\x76\x2f\x31\x01", b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
-"""First bytes of files of images: PNG, JPEG, OpenEXR, TIFF and BigTIFF of either byte order."""
 _WANTED = "a folder of textures is needed here"
 _LAYERS_NAMED = f"{', '.join(TEXTURE_LAYERS[:-1])} or {TEXTURE_LAYERS[-1]}"
 
@@ -117,9 +116,8 @@ def _entries(folder: Path) -> list[Path]:
 def _check_image(path: Path) -> None:
     """Raise an error if a file doesn't begin as an image does."""
     try:
-        with path.open("rb") as file:
-            head = file.read(max(map(len, _SIGNATURES)))
+        kind = picture_kind(path)
     except OSError as error:
         raise MissingFileError(str(path), None, f"an image is needed here ({error.strerror})") from None
-    if not head.startswith(_SIGNATURES):
+    if kind not in TEXTURE_KINDS:
         raise InputError(str(path), None, "is no PNG, JPEG, OpenEXR or TIFF image")

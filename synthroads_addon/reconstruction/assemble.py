@@ -7,12 +7,14 @@ from typing import Literal
 import numpy as np
 
 from ..base.arrays import Float
+from ..base.errors import InputError
+from ..base.maps.crs import EPSG_URI
 from ..base.schema import round_value
 from ..base.version import generator
 from ..fitting.fit import AxisFit, alignment_object
 from ..road.guidelines import LIMITS, STANDARD_CROSS_SECTIONS, design_class_of
 from ..road.objects import RoadObject
-from ..road.parameters import EPSG_URI, RoadParameters
+from ..road.parameters import RoadParameters
 from ..road.section import Carriageway, CrossfallPoint, Lane, LineMarking, Median, Turnout
 from ..road.surroundings import Terrain
 from ..road.things.concrete_barrier import ConcreteBarrier
@@ -81,13 +83,29 @@ def assemble_parameters(measured: RoadMeasurements) -> RoadParameters:
     items["terrain"] = _terrain(measured.ground)
     metadata = {"identifier": "reconstructed", "title": measured.title, "generator": generator()}
     data = {
-        "metadata": metadata | {"referenceSystem": EPSG_URI.format(measured.cloud.epsg or UNKNOWN_EPSG)},
+        "metadata": metadata | _systems(measured.cloud),
         "transform": {"translate": measured.cloud.origin.tolist()},
         "design_class": _design_class(measured),
         "objects": {name: item.to_dict() | {"instance": i} for i, (name, item) in enumerate(items.items(), 1)},
     }
     # Once more as a whole: each value within its limits, each name known.
     return RoadParameters.from_dict(data, source="reconstructed road")
+
+
+def _systems(cloud: RoadCloud) -> dict[str, str]:
+    """Return the metadata that name map and vertical system: a cloud's own, of whose map one must have a code.
+
+    Raises:
+        InputError: the cloud names a map system that has no code, by which a parameter set would name it.
+    """
+    system = cloud.place.system
+    if system is not None and system.epsg is None and not system.local:
+        allowed = "has no EPSG code, by which a parameter set names it: convert the cloud to a system that has one"
+        raise InputError("cloud: coordinate system", system.name, allowed)
+    systems = {"referenceSystem": EPSG_URI.format(cloud.epsg or UNKNOWN_EPSG)}
+    if cloud.place.height_epsg:
+        systems["heightReferenceSystem"] = EPSG_URI.format(cloud.place.height_epsg)
+    return systems
 
 
 def _design_class(measured: RoadMeasurements) -> str:

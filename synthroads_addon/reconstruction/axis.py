@@ -7,12 +7,13 @@ import numpy as np
 
 from ..base.arrays import Float
 from ..base.errors import InputError
+from ..base.progress import Progress, silent
 from .cloud import PointKind, RoadCloud
 from .layout import RoadKind, RoadLayout, axis_guides, find_layout, with_branch
 from .lines import find_lines
 from .path import CloudPath, first_path, path_through
-from .profiles import STRETCH, Profiles, make_profiles, register_path
-from .views.fusion import FusedAxis
+from .profiles import ACROSS, STRETCH, Profiles, make_profiles, register_path
+from .views.fusion import FusedAxis, mean_axis
 from .views.look import find_fused_axis
 from .views.view import View
 
@@ -23,6 +24,7 @@ Predictor = Callable[[RoadCloud, CloudPath], tuple[Float, Float]]
 _HALF_WIDTHS = (12.0, 45.0)  # m: least and largest reach of profiles
 _MARGIN = 8.0  # m of it outside of the surface that the first path was made from
 _REGISTRATIONS, _PARALLEL = 6, 0.3  # times that a path is laid beside lines at most, and m that it may still move by
+_GRIDS = (-0.5, -0.25, 0.25)  # bins that further grids lie beside the first
 _PASSES, _STILL = 4, 0.15  # times that the axis is looked for at most, and m that it may still move by
 
 
@@ -83,8 +85,11 @@ class FoundRoad:
         return np.where(apart <= STRETCH, np.interp(stations, station[order], beside[order]), np.nan)
 
 
-def straighten_path(cloud: RoadCloud, options: Options) -> tuple[CloudPath, float]:
-    """Return a path parallel to the road, and the half width (m) beside it within which there is something to see."""
+def straighten_path(cloud: RoadCloud, options: Options, progress: Progress = silent) -> tuple[CloudPath, float]:
+    """Return a path parallel to the road, and the half width (m) beside it within which there is something to see.
+
+    `progress` is told the share of its passes that are done at most.
+    """
     xy = cloud.xyz[cloud.of(PointKind.PAVEMENT, PointKind.MARKING) if cloud.labelled else cloud.surface, :2]
     path = path_through(options.path) if options.path is not None else first_path(xy)
     _, offset = path.project(xy[:: max(1, len(xy) // 200_000)])
@@ -93,29 +98,58 @@ def straighten_path(cloud: RoadCloud, options: Options) -> tuple[CloudPath, floa
         raise InputError("--path", None, "no point of the road lies within 45 m of it")
     half = float(np.clip(np.percentile(near, 99) + _MARGIN, *_HALF_WIDTHS))
     # Until it lies still: where a kink is left in it, the lines beside it bend by more than they can be followed.
-    for _ in range(_REGISTRATIONS):
+    for number in range(_REGISTRATIONS):
+        progress("path", number / _REGISTRATIONS)
         before, path = path, register_path(path, make_profiles(cloud, path, half))
         if float(np.abs(before.project(path.points)[1]).max()) <= _PARALLEL:
             break
     return path, half
 
 
-def find_axis(cloud: RoadCloud, path: CloudPath, half: float, options: Options) -> FoundRoad:
+def find_axis(
+    cloud: RoadCloud, path: CloudPath, half: float, options: Options, progress: Progress = silent
+) -> FoundRoad:
     """Return profiles along the road, the layout of lines that they show, and the axis that all views agree on.
 
     Along the path that is given, and again along the axis that was found beside it until it lies still, as a straight
     line is smoothed and followed better than a bent one, and as a path that has slipped by a lane comes back. Where the
-    middle line parts in two that path follows one branch; the axis then goes between both.
+    middle line parts in two that path follows one branch; the axis then goes between both. `progress` is told the share
+    of its passes that are done at most.
     """
+    progress("lines", 0.0)
     found = _look_along(cloud, path, half, options)
     for number in range(1, _PASSES):
+        progress("lines", number / _PASSES)
         if number > 1 and float(np.abs(found.axis.offsets).max()) <= _STILL:
             break
         beside = np.interp(found.path.stations, found.axis.stations, found.axis.offsets)
         found = _look_along(cloud, found.path.shift_by(beside), half, options)
     layout = with_branch(found.layout, found.profiles)
-    axis = find_fused_axis(found.profiles, layout, _learned_view(cloud, found.profiles, options))
-    return replace(found, layout=layout, axis=axis)
+    learned = _learned_view(cloud, found.profiles, options)
+    first = find_fused_axis(found.profiles, layout, learned)
+    others = [_axis_in_grid(cloud, found, half, learned, share * ACROSS) for share in _GRIDS]
+    return replace(found, layout=layout, axis=mean_axis(first, [axis for axis in others if axis is not None]))
+
+
+def _axis_in_grid(
+    cloud: RoadCloud, found: FoundRoad, half: float, learned: list[View], beside: float
+) -> FusedAxis | None:
+    """Return the axis as another grid of bins shows it, with offsets from the same path; None where it shows no road.
+
+    Args:
+        cloud: the points.
+        found: along the path.
+        half: width beside it, m.
+        learned: views that don't come from a grid.
+        beside: m to the left of the path that the grid lies.
+    """
+    profiles = make_profiles(cloud, found.path.beside(beside), half, exact=True)
+    try:
+        layout = with_branch(find_layout(profiles, find_lines(profiles), found.layout.kind), profiles)
+        axis = find_fused_axis(profiles, layout, [replace(view, offsets=view.offsets - beside) for view in learned])
+    except InputError:
+        return None
+    return replace(axis, offsets=axis.offsets + beside, raw=axis.raw + beside)
 
 
 def _look_along(cloud: RoadCloud, path: CloudPath, half: float, options: Options) -> FoundRoad:

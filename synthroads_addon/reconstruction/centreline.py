@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from ..base.arrays import Float
-from ..base.progress import Progress, silent
+from ..base.machine import linear_algebra_on_one_thread
+from ..base.progress import Progress, part_of, silent
 from .axis import Options, find_axis, straighten_path
 from .cloud import RoadCloud
 from .judgement import Judgement, judge
@@ -50,6 +51,7 @@ class Centreline:
     notes: tuple[str, ...]
 
 
+@linear_algebra_on_one_thread()
 def find_centreline(cloud: RoadCloud, options: Options | None = None, progress: Progress = silent) -> Centreline:
     """Return the centreline of the road that a cloud shows, by all views of it, with its deviations and doubts.
 
@@ -57,10 +59,8 @@ def find_centreline(cloud: RoadCloud, options: Options | None = None, progress: 
         InputError: no road can be made out in it.
     """
     options = options or Options()
-    progress("path", 0.0)
-    path, half = straighten_path(cloud, options)
-    progress("views", 0.4)
-    road = find_axis(cloud.near(path, half), path, half, options)
+    path, half = straighten_path(cloud, options, part_of(progress, 0.0, 0.4))
+    road = find_axis(cloud.near(path, half), path, half, options, part_of(progress, 0.4, 0.8))
     shown = _seen_part(road.path, road.axis)
     offsets = np.interp(shown.stations, road.axis.stations, road.axis.offsets)
     line = shown.shift_by(offsets)
@@ -120,8 +120,8 @@ def centreline_geojson(found: Centreline, cloud: RoadCloud, name: str) -> dict[s
     }
     geometry = {"type": "LineString", "coordinates": np.round(points, _DIGITS).tolist()}
     collection: dict[str, Any] = {"type": "FeatureCollection", "name": name}
-    if cloud.epsg is not None:
-        collection["crs"] = {"type": "name", "properties": {"name": f"urn:ogc:def:crs:EPSG::{cloud.epsg}"}}
+    if cloud.place.system and cloud.place.system.urn:
+        collection["crs"] = {"type": "name", "properties": {"name": cloud.place.system.urn}}
     return collection | {"features": [{"type": "Feature", "properties": properties, "geometry": geometry}]}
 
 

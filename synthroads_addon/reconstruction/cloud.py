@@ -13,6 +13,8 @@ from scipy import ndimage
 from ..base.arrays import Bool, Float, Index
 from ..base.classes import ClassScheme
 from ..base.errors import InputError
+from ..base.maps.places import Placement
+from ..base.progress import Progress, silent
 from ..cloud.formats.registry import open_cloud
 from ..cloud.strays import Strays
 from .path import CloudPath
@@ -82,11 +84,11 @@ class RoadCloud:
         intensity: (N,) float32, in the file's own unit.
         kind: (N,) uint8 of `PointKind`; none is OTHER.
         origin: (3,) map coordinates, m, whole metres.
-        epsg: code of the map system, or None.
+        place: the map system, and that of the file that they are from.
         labelled: whether pavement is told from ground by class.
         marked: whether markings are told from pavement by class.
-        read: points in the file.
-        classes: number of points in the file by class name.
+        read: points in the file that are neither withheld nor noise.
+        classes: number of them by class name.
         strays: points far from all others, which aren't used.
     """
 
@@ -94,12 +96,17 @@ class RoadCloud:
     intensity: NDArray[np.float32]
     kind: NDArray[np.uint8]
     origin: Float
-    epsg: int | None
+    place: Placement
     labelled: bool
     marked: bool
     read: int
     classes: dict[str, int]
     strays: int = 0
+
+    @property
+    def epsg(self) -> int | None:
+        """Return the EPSG code of the map system, None if it isn't named or has none."""
+        return self.place.epsg
 
     @cached_property
     def surface(self) -> Index:
@@ -116,11 +123,12 @@ class RoadCloud:
         return np.isin(self.kind, kinds)
 
 
-def read_road_cloud(path: FilePath) -> RoadCloud:
+def read_road_cloud(path: FilePath, progress: Progress = silent) -> RoadCloud:
     """Read those points of a cloud file that a reconstruction uses, sorted by what they lie on.
 
-    Classes are those that the file itself says: the project's own, in any scheme whose names are known, or the LAS
-    classification. A cloud that is for the most part unclassified is sorted into ground and what stands on it.
+    `progress` is told the share of the file's points that were read, after each block. Classes are those that the file
+    itself says: the project's own, in any scheme whose names are known, or the LAS classification; what is withheld or
+    noise is left out. A cloud that is for the most part unclassified is sorted into ground and what stands on it.
 
     Raises:
         MissingFileError: there is no such file.
@@ -132,11 +140,12 @@ def read_road_cloud(path: FilePath) -> RoadCloud:
         table = _kind_table(header.scheme)
         names = header.scheme.names()
         counts = np.zeros(256, dtype=np.int64)
-        for block in cloud.blocks():
+        for block in cloud.usable_blocks():
             kind = table[block.class_id]
             counts += np.bincount(block.class_id, minlength=256)
             kept = kind != PointKind.OTHER
             parts.append((block.xyz[kept], block.intensity[kept].astype(np.float32), kind[kept]))
+            progress("cloud", min(1.0, float(counts.sum()) / max(header.count, 1)))
     if not sum(len(part[0]) for part in parts):
         known = ", ".join(KIND_OF_CLASS)
         raise InputError(str(path), None, f"holds no points of a class that a road is made from ({known})")
@@ -146,7 +155,7 @@ def read_road_cloud(path: FilePath) -> RoadCloud:
     stay = strays.stay(xyz) if strays.count() else np.ones(len(xyz), dtype=bool)
     points = xyz[stay], intensity[stay], kind[stay]
     classes = {names.get(int(c), f"class_{c}"): int(counts[c]) for c in np.flatnonzero(counts)}
-    return replace(_sort_by_height(path, points, header.epsg, classes), strays=strays.count())
+    return replace(_sort_by_height(path, points, header.place, classes), strays=strays.count())
 
 
 def _kind_table(scheme: ClassScheme) -> NDArray[np.uint8]:
@@ -157,7 +166,7 @@ def _kind_table(scheme: ClassScheme) -> NDArray[np.uint8]:
     return table
 
 
-def _sort_by_height(path: FilePath, points: _Points, epsg: int | None, classes: dict[str, int]) -> RoadCloud:
+def _sort_by_height(path: FilePath, points: _Points, place: Placement, classes: dict[str, int]) -> RoadCloud:
     """Return the cloud, its unclassified points sorted by height above ground if most are such, else left out."""
     xyz, intensity, kind = points
     origin = np.round(np.append(xyz[:, :2].mean(axis=0), xyz[:, 2].min()))
@@ -176,7 +185,7 @@ def _sort_by_height(path: FilePath, points: _Points, epsg: int | None, classes: 
     paved = np.isin(kind, (PointKind.PAVEMENT, PointKind.MARKING))
     labelled = bool(paved.sum() > _LABELLED_SHARE * surface.sum())
     marked = labelled and bool((kind == PointKind.MARKING).sum() > 0.001 * paved.sum())
-    return RoadCloud(xyz, intensity, kind, origin, epsg, labelled, marked, sum(classes.values()), classes)
+    return RoadCloud(xyz, intensity, kind, origin, place, labelled, marked, sum(classes.values()), classes)
 
 
 def above_ground(xyz: Float) -> Float:

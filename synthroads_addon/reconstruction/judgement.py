@@ -66,6 +66,11 @@ class Judgement:
     middles: Float
     sections: tuple[Doubt, ...] = ()
 
+    @property
+    def is_doubtful(self) -> bool:
+        """Return whether any stretch of the axis or of the cross-section isn't to be trusted."""
+        return bool(self.doubts or self.sections)
+
     def to_dict(self) -> dict[str, Any]:
         """Return the assessment as JSON data; lengths and stations in m."""
         stretches, sections = (

@@ -90,6 +90,10 @@ class CloudPath:
         _, nearest = cKDTree(self.points).query(middles)
         return np.asarray(SPACING * nearest[owner].astype(np.float64))
 
+    def beside(self, offset: float) -> CloudPath:
+        """Return the path that lies an offset, m, of a fraction of its spacing to the left, with the same stations."""
+        return CloudPath(self.place(self.stations, np.full(len(self.points), offset)), self.heading, self.start)
+
     def shift_by(self, offset: Float) -> CloudPath:
         """Return a path whose points lie offsets (M,), m, to the left of this one's, spaced anew each metre."""
         return path_through(self.place(self.stations, offset))
@@ -190,7 +194,7 @@ def _march_start(cells: Float, tree: cKDTree) -> tuple[Float, float, float]:
         if np.sqrt(spread[1]) > _LONGISH * np.sqrt(max(spread[0], 1e-9)):
             half = float(np.percentile(np.abs((near - centre) @ axes[:, 0]), 98))
             return centre, float(np.arctan2(axes[1, 1], axes[0, 1])), min(half + _MARGIN, _REACH)
-    raise InputError("road", None, "its surface in the cloud is nowhere longer than wide: --path gives its course")
+    raise InputError("road", None, "its surface in the cloud is nowhere longer than wide: --path says how it runs")
 
 
 def _march(cells: Float, tree: cKDTree, start: Float, direction: float, half: float) -> list[Float]:

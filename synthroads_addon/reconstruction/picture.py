@@ -7,6 +7,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..base.arrays import Float
+from ..base.text.literal import literal_texts, shown_text
 from ..road.geometry import RoadGeometry
 from ..road.objects import LineObject
 from ..road.section import LineMarking
@@ -22,6 +23,7 @@ _STRETCH = 150.0  # m of the road that are shown large
 _BEYOND = 6.0  # m outside of the pavement
 
 
+@literal_texts()
 def draw(found: Reconstruction, cloud: RoadCloud, path: FilePath) -> None:
     """Draw a reconstruction (plan, detail, cross-section, heights) and write the picture as PNG."""
     import matplotlib  # takes half a second, and few ask for the picture
@@ -37,7 +39,7 @@ def draw(found: Reconstruction, cloud: RoadCloud, path: FilePath) -> None:
     plan(figure.add_subplot(grid[1, :]), found, geometry, (middle, min(geometry.length, middle + _STRETCH)))
     across(figure.add_subplot(grid[2, 0]), found, geometry)
     heights(figure.add_subplot(grid[2, 1]), found, geometry)
-    figure.suptitle(f"{found.parameters.metadata.title}: {cloud.read:,} points", fontsize=10)
+    figure.suptitle(f"{shown_text(found.parameters.metadata.title)}: {cloud.read:,} points", fontsize=10)
     figure.savefig(path, metadata={"Software": None})
     plt.close(figure)
 

@@ -7,10 +7,11 @@ import numpy as np
 
 from ..base.arrays import Bool, Float
 from ..base.errors import InputError
-from ..base.progress import Progress, silent
+from ..base.maps.crs import MapSystem
+from ..base.progress import Progress, part_of, silent
 from ..fitting.fit import AxisFit, fit_axis
 from ..road.parameters import RoadParameters
-from .assemble import RoadMeasurements, RotationAxis, assemble_parameters
+from .assemble import UNKNOWN_EPSG, RoadMeasurements, RotationAxis, assemble_parameters
 from .axis import FoundRoad, Options, find_axis, straighten_path
 from .cloud import RoadCloud
 from .edges import Surface, fit_surface, paved_edge
@@ -63,11 +64,9 @@ def reconstruct(cloud: RoadCloud, options: Options | None = None, progress: Prog
         InputError: no road can be made out in it.
     """
     options = options or Options()
-    progress("path", 0.0)
-    path, half = straighten_path(cloud, options)
+    path, half = straighten_path(cloud, options, part_of(progress, 0.0, 0.3))
     whole, cloud = cloud, cloud.near(path, half + _AROUND)
-    progress("lines", 0.3)
-    road = find_axis(cloud, path, half, options)
+    road = find_axis(cloud, path, half, options, part_of(progress, 0.3, 0.5))
     path, profiles, layout = road.path, road.profiles, road.layout
     progress("alignment", 0.5)
     fit, rotation = fit_axis_and_profile(profiles, layout, road.axis, options.tolerance)
@@ -79,8 +78,9 @@ def reconstruct(cloud: RoadCloud, options: Options | None = None, progress: Prog
     if options.snap:
         section = snap_to_standard(section)
     surfaces = {side: _surface(profiles, section, side, rotation) for side in SIDES}
-    progress("objects", 0.8)
+    progress("ground", 0.75)
     ground = measure_ground(whole, along, section, fit.profile.elevation(along.stations))
+    progress("objects", 0.85)
     standing = standing_points(cloud, along, profiles, section)
     barriers, used = find_barriers(standing)
     bays, others = find_widenings(section, profiles.middles)
@@ -221,7 +221,7 @@ def _notes(cloud: RoadCloud, section: MeasuredSection, measured: RoadMeasurement
     single = "a single carriageway: written as two carriageways that meet in the middle line, one per direction"
     remarks = [
         (cloud.strays > 0, f"{cloud.strays:,} points lie far from all others and weren't used"),
-        (cloud.epsg is None, "the cloud doesn't say its map system: EPSG:25832 was written"),
+        (cloud.epsg is None, _assumed_system(cloud)),
         (not cloud.labelled, "pavement was told from ground by brightness, as the cloud has no such classes"),
         (not cloud.marked, "paint was told from pavement by brightness: lines have the usual widths"),
         (section.kind == "single", single),
@@ -229,6 +229,14 @@ def _notes(cloud: RoadCloud, section: MeasuredSection, measured: RoadMeasurement
         *(remark for side in section.sides.values() for remark in _remarks_on(side)),
     ]
     return [text for applies, text in remarks if applies]
+
+
+def _assumed_system(cloud: RoadCloud) -> str:
+    """Return what is said of the map system that was written for want of the cloud's own."""
+    text = f"the cloud doesn't say its map system: EPSG:{UNKNOWN_EPSG} was written"
+    if cloud.epsg is None and MapSystem.of(UNKNOWN_EPSG).outside(cloud.origin[None, :2]).max() > 0.0:
+        text += ", for whose area its coordinates are none: the road's place on the map isn't known"
+    return text
 
 
 def _remarks_on(side: SideSection) -> Iterator[tuple[bool, str]]:

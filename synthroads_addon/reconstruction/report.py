@@ -1,23 +1,98 @@
-"""Content of `reconstruction.json`: where the cloud is from the reconstructed road, and how sure each number is."""
+"""A reconstruction from a cloud's file to its report: how far both are apart, how sure each number is, and in words.
 
-from dataclasses import asdict
+Command line and panel run it in this way; the report is the content of `reconstruction.json`.
+"""
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..base.arrays import Float
+from ..base.machine import linear_algebra_on_one_thread
+from ..base.progress import Progress, part_of, silent
 from ..checking.checker import check
+from ..road.axes.centerline import read_axis
 from ..road.geometry import RoadGeometry
 from ..road.section import LineMarking
-from .cloud import PointKind, RoadCloud
-from .reconstruct import Reconstruction
+from .axis import Options, Predictor
+from .cloud import PointKind, RoadCloud, read_road_cloud
+from .layout import RoadKind
+from .reconstruct import Reconstruction, reconstruct
 from .section import MeasuredSection, Side, SideSection, standard_section
 from .smoothing import difference_figures
 from .widenings import Bay
 
+FIT_TOLERANCE = 0.03
+"""Root mean square, m, that the alignment may keep from the measured axis unless another is given."""
+TOLERANCES = (0.005, 1.0)
+"""Smallest and largest of those, m."""
 _MOST_POINTS = 400_000
 _FROM_EDGES = 0.1  # m: nearer to an edge of the pavement than this a point may lie beside it
 _FAULT = 0.5  # m: a point farther from the surface is none of it
+
+
+@dataclass(frozen=True)
+class ReconstructionJob:
+    """Request for a reconstruction.
+
+    Attributes:
+        cloud: file to read.
+        road: dual or single carriageway, where it is known.
+        course: file with the road's rough course (CSV, GeoJSON), in the cloud's coordinates, where it isn't found.
+        tolerance: root mean square that the alignment may keep from the measured axis, m.
+        snap: take the widths of the standard cross-section that all measured ones are near to.
+        predictor: one more view of the axis, beside those that learn nothing.
+    """
+
+    cloud: Path
+    road: RoadKind | None = None
+    course: Path | None = None
+    tolerance: float = FIT_TOLERANCE
+    snap: bool = False
+    predictor: Predictor | None = None
+
+    def options(self, cloud: RoadCloud) -> Options:
+        """Return the settings for the cloud that was read; InputError if the course can't be read."""
+        return Options(
+            road=self.road,
+            tolerance=self.tolerance,
+            path=None if self.course is None else read_axis(self.course, cloud.place)[:, :2] - cloud.origin[:2],
+            predictor=self.predictor,
+            snap=self.snap,
+            title=f"Reconstructed from {self.cloud.name}",
+        )
+
+
+@dataclass(frozen=True)
+class ReconstructedRoad:
+    """Outcome of a reconstruction.
+
+    Attributes:
+        found: the road, and all that it was made from.
+        cloud: that it was found in.
+        report: as JSON data, see `report`.
+    """
+
+    found: Reconstruction
+    cloud: RoadCloud
+    report: dict[str, Any]
+
+
+@linear_algebra_on_one_thread()
+def run_reconstruction(job: ReconstructionJob, progress: Progress = silent) -> ReconstructedRoad:
+    """Read a cloud, reconstruct the road in it, and report how far both are apart.
+
+    Raises:
+        MissingFileError: a file isn't there.
+        InputError: a file can't be read, or no road can be made out in the cloud.
+    """
+    cloud = read_road_cloud(job.cloud, part_of(progress, 0.0, 0.2))
+    found = reconstruct(cloud, job.options(cloud), part_of(progress, 0.2, 0.95))
+    progress("report", 0.95)
+    return ReconstructedRoad(found, cloud, report(found, cloud))
 
 
 def report(found: Reconstruction, cloud: RoadCloud) -> dict[str, Any]:
@@ -170,3 +245,41 @@ def _objects(found: Reconstruction) -> dict[str, Any]:
 
 def _figures(difference: Float) -> dict[str, float]:
     return difference_figures(difference, "mean", "rms", "p95")
+
+
+def measure_lines(report: dict[str, Any]) -> Iterator[str]:
+    """Yield a reconstruction's alignment, widths with their deviations, and number of objects, a line each."""
+    section, line = report["section"], report["centreline"]
+    elements = "1 element" if line["elements"] == 1 else f"{line['elements']} elements"
+    off, std = 100.0 * line["from_alignment"]["rms"], 100.0 * line["std"]["mean"]
+    yield f"{report['road']} carriageway of {report['length']:.0f} m, alignment of {elements}"
+    yield f"{off:.1f} cm rms from the measured axis (std {std:.1f} cm)"
+    for name, side in section["sides"].items():
+        widths = " + ".join(f"{lane['value']:.2f}" for lane in side["lanes"])
+        paved = side["paved_width"]
+        spread = "not seen to its edge" if paved["std"] is None else f"std {paved['std']:.2f} m"
+        yield f"{name}: lanes {widths} m, pavement {paved['value']:.2f} m ({spread})"
+    standard = section["standard"]
+    if standard and standard["within_tolerance"]:
+        yield f"within {standard['largest_difference']:.2f} m of the standard cross-section {standard['name']}"
+    objects = report["objects"]
+    bays = f", {len(report['emergency_bays'])} emergency bays" if report["emergency_bays"] else ""
+    yield f"{len(objects['barriers'])} barriers, {len(objects['delineators'])} delineators{bays}"
+
+
+def doubt_lines(judgement: dict[str, Any]) -> Iterator[tuple[float, str]]:
+    """Yield (station where it begins, m; text) of each stretch that isn't to be trusted, with the reasons."""
+    for kind, what in (("doubtful", "doubtful"), ("other_sections", "another section")):
+        for doubt in judgement.get(kind, ()):
+            place = f"{what} from {doubt['start']:.0f} to {doubt['end']:.0f} m"
+            yield doubt["start"], f"{place}: {'; '.join(doubt['why'])}"
+
+
+def reservation_lines(report: dict[str, Any]) -> Iterator[str]:
+    """Yield a report's notes, doubtful stretches, and the comparison with the truth, a line each."""
+    yield from (f"note: {note}" for note in report["notes"])
+    yield from (text for _, text in doubt_lines(report["judgement"]))
+    if "comparison" in report:
+        off = report["comparison"]["centreline"]
+        apart = f"{off['mae']:.3f} m on average, {off['largest']:.3f} m at most" if off else "nothing in common"
+        yield f"from the truth: centreline {apart}"

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..base.arrays import Bool, Float, Int
+from ..base.arrays import Float, Int
 from .section import Pavement, Pothole, Rut
 from .section_geometry import CarriagewaySection
 
@@ -12,6 +12,8 @@ _SLIVER = 2e-4
 """Columns of a mesh are at least this share of a strip's width apart: below a millimetre."""
 
 
+_WORTH_SORTING = 20
+"""Ruts and potholes from which on the places near each are looked up among sorted ones."""
 _SHALLOW = 1e-6
 """Depth (m) up to which a place is undamaged: a cosine is never quite 0."""
 
@@ -44,7 +46,7 @@ def damage_numbers(pavement: Pavement) -> list[int]:
 def damage_depth(section: CarriagewaySection, station: Float, offset: Float) -> Float:
     """Return the depth (N,) of ruts and potholes at stations and offsets (N,), m; where both are, the deeper one."""
     depth = np.zeros(station.shape)
-    for near, of_one in _damage_depths(section, station, offset):
+    for _, near, of_one in _damage_depths(section, station, offset):
         depth[near] = np.maximum(depth[near], of_one)
     return depth
 
@@ -55,21 +57,60 @@ def deepest_damage(section: CarriagewaySection, station: Float, offset: Float) -
     Of two that are as deep the first counts.
     """
     deepest, result = np.full(station.shape, _SHALLOW), np.full(station.shape, -1, dtype=np.int64)
-    for number, (near, of_one) in enumerate(_damage_depths(section, station, offset)):
-        deeper = np.flatnonzero(near)[of_one > deepest[near]]
+    for number, near, of_one in _damage_depths(section, station, offset):
+        deeper = near[of_one > deepest[near]]
         result[deeper] = number
         deepest[near] = np.maximum(deepest[near], of_one)
     return result
 
 
-def _damage_depths(section: CarriagewaySection, station: Float, offset: Float) -> Iterator[tuple[Bool, Float]]:
-    """Yield for each rut, then each pothole, a mask (N,) of the places along it and its depth (K,) at these, m."""
-    for rut in section.carriageway.pavement.ruts:
-        near = (station > rut.start_station) & (station < rut.end_station)
-        yield near, _rut_depth(section, rut, station[near], offset[near]) if near.any() else np.empty(0)
-    for pothole in section.carriageway.pavement.potholes:
-        near = np.abs(station - pothole.station) < pothole.length / 2.0
-        yield near, _pothole_depth(pothole, station[near], offset[near])
+def _damage_depths(section: CarriagewaySection, station: Float, offset: Float) -> Iterator[tuple[int, Int, Float]]:
+    """Yield of each rut and pothole that places lie along its number, ruts first, their indices (K,) and depths, m.
+
+    Only damages between the first and the last place (N,) are looked at: a road may have thousands.
+    """
+    pavement = section.carriageway.pavement
+    if not len(station) or not (pavement.ruts or pavement.potholes):
+        return
+    starts, ends = section.damage_ranges
+    candidates = np.flatnonzero((starts <= np.nanmax(station)) & (ends >= np.nanmin(station))).tolist()
+    along = _Along(station, len(candidates))
+    for number in candidates:
+        near = along.between(starts[number], ends[number])
+        if number < len(pavement.ruts):
+            rut = pavement.ruts[number]
+            near = near[(station[near] > rut.start_station) & (station[near] < rut.end_station)]
+            yield number, near, _rut_depth(section, rut, station[near], offset[near]) if len(near) else np.empty(0)
+        else:
+            pothole = pavement.potholes[number - len(pavement.ruts)]
+            near = near[np.abs(station[near] - pothole.station) < pothole.length / 2.0]
+            yield number, near, _pothole_depth(pothole, station[near], offset[near])
+
+
+class _Along:
+    """Places by their stations (N,): those of a stretch are found without a look at the others.
+
+    Args:
+        station: (N,) of the places, m, in any order.
+        times: how many stretches will be asked for; for a few it isn't worth the sorting.
+    """
+
+    def __init__(self, station: Float, times: int) -> None:
+        self._station = station
+        self._order: Int | None = None
+        self._sorted: Float | None = None
+        if times and (station[1:] >= station[:-1]).all():
+            self._sorted = station
+        elif times > _WORTH_SORTING:
+            self._order = np.argsort(station, kind="stable")
+            self._sorted = station[self._order]
+
+    def between(self, start: float, end: float) -> Int:
+        """Return the indices (K,) of the places from a start to an end, m, both included."""
+        if self._sorted is None:
+            return np.flatnonzero((self._station >= start) & (self._station <= end))
+        first, last = np.searchsorted(self._sorted, start), np.searchsorted(self._sorted, end, "right")
+        return np.arange(first, last) if self._order is None else self._order[first:last]
 
 
 def _rut_depth(section: CarriagewaySection, rut: Rut, station: Float, offset: Float) -> Float:

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from ..base.arrays import Bool, Float, Int
 from ..base.errors import InputError, MissingFileError
+from ..base.pictures import picture_kind
 from .alignment import Alignment
 
 if TYPE_CHECKING:
@@ -233,12 +234,12 @@ def read_elevation_model(path: str | os.PathLike[str], epsg: int, corridor: Corr
         from rasterio.errors import CRSError, RasterioError
     except ImportError as error:
         missing = isinstance(error, ModuleNotFoundError)
-        advice = "in Blender install the extension SynthRoads Elevation Models" if missing else "it doesn't load here"
+        advice = "SynthRoads brings it, install that again" if missing else "it doesn't load here"
         raise InputError(name, None, f"an elevation model needs rasterio: {advice} ({error})") from None
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # what it warns of is refused below
-            with rasterio.open(name) as dataset:
+            with rasterio.open(name, driver=_driver_of(name)) as dataset:
                 _check_kind(name, dataset)
                 _check_system(name, dataset, epsg)
                 model = ElevationModel(name, _grid(name, dataset))
@@ -262,10 +263,16 @@ def _reason(error: BaseException) -> str:
     return " ".join(str(error).split())
 
 
+def _driver_of(name: str) -> str:
+    """Return GDAL's name of the one format that it may open a file as.
+
+    It knows others that name further files, or addresses of the network, and tells them by what is in a file.
+    """
+    return "GTiff" if picture_kind(Path(name)) == "TIFF" else "AAIGrid"
+
+
 def _check_kind(name: str, dataset: DatasetReader) -> None:
-    """Raise InputError unless a raster is a GeoTIFF or ASCII grid of one band of heights in metres."""
-    if dataset.driver not in ("GTiff", "AAIGrid"):
-        raise InputError(f"{name}: format", dataset.driver, "a GeoTIFF or ESRI ASCII grid is needed")
+    """Raise InputError unless a raster has one band of heights in metres."""
     if dataset.count != 1:
         raise InputError(f"{name}: bands", dataset.count, "exactly one is needed, of heights")
     if np.dtype(dataset.dtypes[0]).kind not in "iuf":

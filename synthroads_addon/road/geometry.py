@@ -19,6 +19,7 @@ from .parameters import AlignmentObject, RoadParameters
 from .profile import IntersectionPoint, Profile
 from .section import Carriageway, LineMarking, Median, Turnout
 from .section_geometry import CarriagewaySection
+from .surroundings import Terrain
 from .turnout_geometry import TURNOUT_STRIPS
 
 
@@ -72,6 +73,11 @@ class RoadGeometry:
     def length(self) -> float:
         """Return the length of the centreline, m."""
         return self.alignment.length
+
+    @cached_property
+    def terrain(self) -> Terrain | None:
+        """The terrain, or None if the road has none; looked for once."""
+        return self.parameters.terrain
 
     @cached_property
     def numbers(self) -> InstanceNumbers:

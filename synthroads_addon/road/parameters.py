@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union
 from pydantic import Field, model_validator
 
 from ..base.errors import InputError
+from ..base.maps.crs import MapSystem, compound_code, system_urn
 from ..base.schema import Model, quantity, read_json, when
 from .objects import ObjectT, RoadObject, StrictFinite
 from .section import Arrow, Carriageway, Hatching, LineMarking, Median, Turnout
@@ -23,7 +24,7 @@ from .surroundings import Environment, Landscape, MaterialVariation, Terrain, Ve
 from .things.registry import THINGS
 
 SCHEMA_VERSION: Literal["1.0"] = "1.0"
-EPSG_URI = "https://www.opengis.net/def/crs/EPSG/0/{}"
+_EPSG_URI_PATTERN = r"^https://www\.opengis\.net/def/crs/EPSG/0/[0-9]{4,8}$"
 LONGEST_ROAD = 1e6
 """Longest alignment, m: its tables grow with its length, so that a slip in a number would fill the memory."""
 DESIGN_CLASSES = ("EKA1A", "EKA1B", "EKA2", "EKA3")
@@ -37,14 +38,39 @@ class Metadata(Model):
     seed: int = quantity(0, ge=0, le=2**63 - 1, unit="1", description="Seed that the set was sampled from.")
     generator: str = Field(description="Program and version that wrote the set.")
     referenceSystem: str = Field(  # noqa: N815 (CityJSON's spelling)
-        pattern=r"^https://www\.opengis\.net/def/crs/EPSG/0/[0-9]{4,8}$",
+        pattern=_EPSG_URI_PATTERN,
         description="URI of the map coordinate system.",
+    )
+    heightReferenceSystem: str | None = Field(  # noqa: N815
+        None,
+        pattern=_EPSG_URI_PATTERN,
+        description="URI of the vertical system that heights are counted in; not known if not given.",
     )
 
     @property
     def epsg(self) -> int:
         """Return the EPSG code of the map coordinate system."""
         return int(self.referenceSystem.rsplit("/", 1)[1])
+
+    @property
+    def height_epsg(self) -> int | None:
+        """Return the EPSG code of the vertical system; None if it isn't named beside the map's own."""
+        return int(self.heightReferenceSystem.rsplit("/", 1)[1]) if self.heightReferenceSystem else None
+
+    @property
+    def system(self) -> MapSystem:
+        """Return the map coordinate system, with the vertical one if it is named."""
+        return MapSystem.of(self.epsg, self.height_epsg)
+
+    @property
+    def code(self) -> int:
+        """Return the one EPSG code of map and vertical system together, or the map's where the pair has none."""
+        return compound_code(self.epsg, self.height_epsg) or self.epsg
+
+    @property
+    def urn(self) -> str:
+        """Return the URN of map and vertical system, as GeoJSON names them."""
+        return system_urn(self.epsg, self.height_epsg)
 
 
 class Transform(Model):

@@ -1,15 +1,22 @@
 """One carriageway's cross-section at any station: its strips and how far from the centreline their boundaries lie."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Iterator
+from copy import copy
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.arrays import Float, without_repeats
 from .objects import nominal_width, width_at, width_kinks
-from .section import Carriageway, Turnout
+from .section import Carriageway, Pavement, Turnout
 from .turnout_geometry import TURNOUT_STRIPS, RampSurface, TurnoutShape, ramp_width
+
+_ROUNDING = 1e-6
+"""Length (m) by which a place is looked for beyond a damage's end, which rounding may have moved."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +48,7 @@ class CarriagewaySection:
     def __init__(self, carriageway: Carriageway, turnouts: Iterable[Turnout] = ()) -> None:
         self.carriageway = carriageway
         self.turnouts = tuple(TurnoutShape(turnout, carriageway) for turnout in turnouts)
+        self._first, self._last = np.array([shape.range() for shape in self.turnouts]).reshape(-1, 2).T
         widths = [
             ("inner_edge_strip", carriageway.inner_edge_strip_width),
             *(("lane", lane.width) for lane in reversed(carriageway.lanes)),
@@ -53,6 +61,22 @@ class CarriagewaySection:
         self.kinds = tuple(kind for kind, _ in self._widths)
         self._varies = bool(self.turnouts or self.kinks())
         self._constant = None if self._varies else self._distances(np.zeros(1))
+
+    @cached_property
+    def damage_ranges(self) -> tuple[Float, Float]:
+        """The first and the last stations (D,), m, of the pavement's ruts, then its potholes, a micrometre wider."""
+        pavement = self.carriageway.pavement
+        ranges = [(rut.start_station, rut.end_station) for rut in pavement.ruts]
+        ranges += [(hole.station - hole.length / 2.0, hole.station + hole.length / 2.0) for hole in pavement.potholes]
+        starts, ends = np.array(ranges, dtype=np.float64).reshape(-1, 2).T
+        return starts - _ROUNDING, ends + _ROUNDING
+
+    def with_pavement(self, pavement: Pavement) -> CarriagewaySection:
+        """Return a copy with another pavement, on which the strips don't depend."""
+        other = copy(self)
+        other.__dict__.pop("damage_ranges", None)
+        other.carriageway = self.carriageway.model_copy(update={"pavement": pavement})
+        return other
 
     def distances(self, station: ArrayLike) -> Float:
         """Return the (N, B) distances of the strips' boundaries from the centreline at N stations, inner first, m."""
@@ -143,11 +167,19 @@ class CarriagewaySection:
             rise: (N,) how much the plane rises outwards there, m/m. The tilt (N,), m/m, is what the ramp rises more;
                 the lift (N,), m, is that of the verge's outer edge behind the ramp's end.
         """
-        for shape in self.turnouts:
-            ramp, surface = shape.turnout.ramp, shape.ramp_surface(station) if shape.reaches(station) else None
+        for shape in self._turnouts_near(station):
+            ramp, surface = shape.turnout.ramp, shape.ramp_surface(station)
             if ramp is not None and surface is not None:
                 tilt = surface.own * (self.carriageway.sign * (ramp.crossfall_percent or 0.0) / 100.0 - rise)
                 yield surface, tilt, surface.behind * (surface.lift + tilt * ramp_width(ramp))
+
+    def _turnouts_near(self, station: Float) -> list[TurnoutShape]:
+        """Return the turnouts that may change a width at any station (N,); of a long road's many only a few are."""
+        if not self.turnouts or not len(station):
+            return []
+        # Not what lies apart, so that stations that aren't a number are near all.
+        near = ~((self._first > station.max()) | (self._last < station.min()))
+        return [self.turnouts[number] for number in np.flatnonzero(near) if self.turnouts[number].reaches(station)]
 
     @property
     def _beyond_island(self) -> int:
@@ -159,7 +191,7 @@ class CarriagewaySection:
 
         Only behind a ramp's end is it not the pavement's edge.
         """
-        near = [shape.widths(station).verge_extra for shape in self.turnouts if shape.reaches(station)]
+        near = [shape.widths(station).verge_extra for shape in self._turnouts_near(station)]
         return np.asarray(sum(near, distances[:, -2]))
 
     def kinks(self) -> list[float]:
@@ -180,7 +212,7 @@ class CarriagewaySection:
         return sum((shape.bend(station) for shape in self.turnouts), np.zeros(station.shape))
 
     def _distances(self, station: Float) -> Float:
-        shapes = [shape.widths(station) for shape in self.turnouts if shape.reaches(station)]
+        shapes = [shape.widths(station) for shape in self._turnouts_near(station)]
         columns = [width_at(self.carriageway.inner_offset, station)]
         for kind, width in self._widths:
             if kind in TURNOUT_STRIPS:

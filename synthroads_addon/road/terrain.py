@@ -125,7 +125,7 @@ def surface_elevation(geometry: RoadGeometry, station: Float, offset: Float) -> 
     boundaries = geometry.boundaries(station)
     within = np.clip(offset, boundaries[0][:, -1], boundaries[0][:, 0])
     height = geometry.elevation(station, within, boundaries)
-    terrain = geometry.parameters.terrain
+    terrain = geometry.terrain
     beside = np.flatnonzero(within != offset)
     if terrain is not None and len(beside):
         distance, edge = np.abs(offset - within)[beside], height[beside]

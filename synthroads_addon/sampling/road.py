@@ -3,12 +3,13 @@
 from collections.abc import Iterable, Iterator
 from typing import Any
 
+from ..base.maps.crs import EPSG_URI
 from ..base.random_streams import stream
 from ..base.schema import round_value
 from ..base.version import generator
 from ..road.geometry import alignment_of
 from ..road.objects import RoadObject, Side
-from ..road.parameters import EPSG_URI, AlignmentObject, Metadata, RoadParameters, Transform
+from ..road.parameters import AlignmentObject, Metadata, RoadParameters, Transform
 from ..road.section import Carriageway, Median, Turnout
 from ..scenario.road import RoadScenario
 from .alignment import HorizontalSampler, sample_profile
@@ -73,6 +74,7 @@ def sample_road(
             seed=seed,
             generator=generator(),
             referenceSystem=EPSG_URI.format(scenario.epsg),
+            heightReferenceSystem=EPSG_URI.format(scenario.height_epsg) if scenario.height_epsg else None,
         ),
         # A given axis has heights of its own.
         transform=Transform(translate=scenario.map_origin if axis else origin),

@@ -141,10 +141,21 @@ def conical_directions(
     rays = len(pattern)
     if rays == 1:
         return direction[:, None, :]
+    factors = beam_factors(pattern, divergence)
+    return _sum_products(tuple(zip((direction, in_plane, across), factors, strict=True)), rays)
+
+
+def beam_factors(pattern: BeamPattern, divergence: Sequence[float]) -> tuple[Float, Float, Float]:
+    """Return the factors (K,) on a beam's axis and its two axes across whose sum is each ray's direction, of length 1.
+
+    Args:
+        pattern: K rays.
+        divergence: full angles at 1/e^2 along both, rad, 0 to below pi.
+    """
     radius = beam_radii(divergence)
     x, y = pattern.across[:, 0] * radius[0], pattern.across[:, 1] * radius[1]
     length = 1.0 / np.sqrt(1.0 + x * x + y * y)
-    return _sum_products(((direction, length), (in_plane, x * length), (across, y * length)), rays)
+    return length, x * length, y * length
 
 
 def cylindrical_offsets(

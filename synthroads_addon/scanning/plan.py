@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal, Protocol, Self
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from ..base.arrays import Float
 from ..base.classes import UNLABELLED
+from ..base.maps.crs import MapSystem
 from ..materials.surfaces import Surfaces
 from ..materials.table import Material
 from ..road.geometry import RoadGeometry
@@ -20,9 +21,15 @@ from .blocks import Block, Blocks
 from .colour.colour import LayerSource, takes_nodes
 from .colour.light import sun_direction
 from .colour.request import LayerRequest
+from .colour.transparency import SeeThrough, Transparency
 from .devices.device import ScannerSetting
 from .effects import EchoEffect
 from .forecast import ScanForecast, forecast_scan
+from .kernels.library import NoKernelError
+from .kernels.noise import CompiledNoise, usable_noise
+from .kernels.packets import PacketScene
+from .kernels.poses import CompiledPoses, usable_poses
+from .kernels.pulses import PulseKernel
 from .multipath import Multipath
 from .noise import Noise
 from .platforms.path import Path, Strip
@@ -37,6 +44,7 @@ from .scene.mesh import SceneMesh
 from .scene.outline import Outline
 from .scene.target import Target
 from .strip_errors import StripErrors, strip_error_report
+from .trace import Openings
 
 _SPARE = 2
 """Factor on the returns of a pulse that are kept meanwhile: some are lost to the threshold later."""
@@ -45,8 +53,8 @@ _SPARE = 2
 class SceneServices(Protocol):
     """Interface to the program that shows the scene, Blender or a stand-in: casters, materials, rendered layers."""
 
-    def caster(self, name: str, mesh: SceneMesh) -> Caster:
-        """Return a ray caster over a mesh by its name in `ScanScenario.caster`."""
+    def caster(self, name: str, mesh: SceneMesh, kernels: str) -> Caster:
+        """Return a ray caster over a mesh by `ScanScenario.caster` and `ScanScenario.kernels`."""
         ...
 
     def materials(self, names: Sequence[str]) -> list[Material]:
@@ -59,6 +67,10 @@ class SceneServices(Protocol):
 
     def normal_images(self, names: Sequence[str]) -> dict[int, NormalImage]:
         """Return the normal images of these materials, by their index in the names."""
+        ...
+
+    def transparencies(self, names: Sequence[str]) -> dict[int, Transparency]:
+        """Return the light that these materials let through at each place, by their index in the names."""
         ...
 
     def layers(self, request: LayerRequest, progress: Callable[[float], None]) -> AbstractContextManager[LayerSource]:
@@ -75,17 +87,27 @@ class ScanConditions:
         variation: of the road's materials.
         epsg: map coordinate system; None if unknown.
         road: what stands on and beside it, for classes by things; None if there is no road.
+        height_epsg: vertical coordinate system; None if it isn't named.
     """
 
     environment: Environment = field(default_factory=Environment)
     variation: MaterialVariation = field(default_factory=MaterialVariation)
     epsg: int | None = None
     road: RoadParameters | None = None
+    height_epsg: int | None = None
 
     @classmethod
     def of(cls, road: RoadParameters | None) -> Self:
         """Return the conditions that a road's parameters set; the defaults, clear and dry, for None."""
-        return cls() if road is None else cls(road.environment, road.materials, road.metadata.epsg, road)
+        if road is None:
+            return cls()
+        about = road.metadata
+        return cls(road.environment, road.materials, about.epsg, road, about.height_epsg)
+
+    @property
+    def system(self) -> MapSystem | None:
+        """Return the map coordinate system, with the vertical one if it is named; None if it is unknown."""
+        return None if self.epsg is None else MapSystem.of(self.epsg, self.height_epsg)
 
     @cached_property
     def pavement(self) -> PavementRelief | None:
@@ -100,10 +122,12 @@ class ScanPlan:
     Attributes:
         target: the scene with its casters.
         surfaces: means of the scene's materials, as the beam meets them.
+        transparency: of materials that are clear in one place and solid in another; None without any.
         setting: the scanner's.
         path: the scanner's.
         rings: rays on each ring around the beam's axis.
         seed: of everything random.
+        epoch: what the times of points count from, s.
         noise: random errors of the measurement.
         strip_errors: systematic errors of its strips.
         attenuation: of the beam by the air, 1/m of range.
@@ -146,6 +170,7 @@ class ScanPlan:
     path: Path
     rings: tuple[int, ...]
     seed: int
+    epoch: float = 0.0
     noise: Noise = Noise()  # noqa: RUF009 (frozen)
     strip_errors: StripErrors = StripErrors()  # noqa: RUF009 (frozen)
     attenuation: float = 0.0
@@ -154,6 +179,7 @@ class ScanPlan:
     air_class: int = UNLABELLED
     ground: BareGround | None = None
     outline: Outline | None = None
+    transparency: SeeThrough | None = None
     beam: Literal["conical", "cylindrical"] = "conical"
     measured_layers: frozenset[str] = frozenset()
     records_seen_points: bool = False
@@ -196,6 +222,56 @@ class ScanPlan:
         if not self.surfaces.gappy.any():
             return None
         return LeafGaps.of(self.setting, self.seed, self.frame_origin)
+
+    @cached_property
+    def openings(self) -> Openings | None:
+        """Return where the scene's materials are open; None where none is."""
+        clear = self.transparency and replace(self.transparency, frame_origin=self.frame_origin)
+        return None if self.gaps is None and clear is None else Openings(self.gaps, clear)
+
+    @cached_property
+    def pulse_kernel(self) -> PulseKernel | NoKernelError:
+        """Return the compiled loops that follow the scan's pulses, or why NumPy does: what these leave out."""
+        several = self.rays_per_pulse > 1
+        left_out = {
+            "things move": bool(self.target.moving),
+            "materials are clear in places": self.openings is not None and self.openings.clear is not None,
+            "the beam is cylindrical": self.beam == "cylindrical" and several,
+            "footprints are spared": self.spares,
+            "the air sends echoes": bool(self.effects),
+            "surfaces mirror": self.multipath is not None,
+        }
+        for reason, found in left_out.items():
+            if found:
+                return NoKernelError(reason)
+        try:
+            return PulseKernel(self.target, self.surfaces, self.setting, self.pattern, self.gaps, self.attenuation)
+        except NoKernelError as error:
+            return error
+
+    @cached_property
+    def noise_kernel(self) -> CompiledNoise | None:
+        """Return the compiled loop over random fields; None for NumPy, as where rays aren't cast in packets either."""
+        noise = usable_noise()
+        return noise if isinstance(noise, CompiledNoise) and isinstance(self.target.caster, PacketScene) else None
+
+    @cached_property
+    def pose_kernel(self) -> CompiledPoses | None:
+        """Return the compiled loop over the pulses' poses; None for NumPy, likewise."""
+        poses = usable_poses()
+        return poses if isinstance(poses, CompiledPoses) and isinstance(self.target.caster, PacketScene) else None
+
+    @property
+    def _kernels(self) -> str:
+        """Return by what way rays are cast, pulses followed and random fields worked out, for the report."""
+        caster = self.target.caster
+        if not isinstance(caster, PacketScene):
+            return caster.kernels
+        ways = {"pulses": self.pulse_kernel, "noise": usable_noise(), "poses": usable_poses()}
+        parts = [
+            f"{of} {f'by NumPy: {way}' if isinstance(way, NoKernelError) else 'compiled'}" for of, way in ways.items()
+        ]
+        return "; ".join([caster.kernels, *parts])
 
     @property
     def rays_per_pulse(self) -> int:
@@ -241,5 +317,6 @@ class ScanPlan:
             "triangles": self.target.triangles,
             "vertices": self.target.vertices,
             "caster": self.target.caster.name,
+            "kernels": self._kernels,
             "attenuation": self.attenuation,
         } | ({"strip_errors": strip_errors} if strip_errors else {})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -108,6 +109,12 @@ class Pulses:
         if self.measured_origin is self.origin:
             chosen["measured_origin"] = chosen["origin"]
         return Pulses(**chosen)
+
+
+def turned_vectors(track: Track, times: Float, vectors: Sequence[Float]) -> tuple[Float, list[Float]]:
+    """Return a track's positions (3, N), m, at times (N,), s, and sets of vectors (3, N) turned by its rotations."""
+    rotation, position, _ = track.at(times)
+    return position, [turn_vectors(rotation, one) for one in vectors]
 
 
 def turn_vectors(rotation: Float, vectors: Float) -> Float:

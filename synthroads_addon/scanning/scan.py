@@ -15,13 +15,14 @@ from .beam import conical_directions, cylindrical_offsets, outer_radii
 from .colour.colour import SeenPoints
 from .devices.shots import shots
 from .effects import apply_effect
+from .kernels.pulses import PulseKernel
 from .knots import Track
 from .multipath import Multipath
 from .noise import measured_pose, shares, speckle_factors, standard_exponential, standard_normal, trajectory_errors
 from .plan import ScanPlan
 from .platforms.path import Strip
 from .point_layers import MeasuredPoints, fill_layers, place_points
-from .pulses import Errors, Poses, Pulses, may_hit_scene, tilt_vectors, turn_vectors
+from .pulses import Errors, Poses, Pulses, may_hit_scene, tilt_vectors, turned_vectors
 from .receiver import draw_values
 from .receiving.detector import Readout, detect_echoes
 from .receiving.radiometry import received_intensity
@@ -186,7 +187,9 @@ class BlockScan:
             motions: tracks of the target's moving parts.
             key: of random streams.
         """
-        plan, setting = self.plan, self.plan.setting
+        plan, setting, kernel = self.plan, self.plan.setting, self.plan.pulse_kernel
+        if isinstance(kernel, PulseKernel) and len(pulses.time) > 1:
+            return *kernel.trace(pulses), _Tally(len(pulses.time) * plan.rays_per_pulse)
         if not plan.spares:
             traced = self._trace(pulses, motions)
             signals = self.signals(traced)
@@ -215,7 +218,8 @@ class BlockScan:
         """Return what all rays of pulses meet, without casting their axes again where ``axis`` says what these meet."""
         plan, setting = self.plan, self.plan.setting
         limits = (setting.minimum_range, setting.maximum_range)
-        return trace(plan.target, plan.surfaces, self.rays(pulses, motions, axis), motions, *limits, axis, plan.gaps)
+        rays = self.rays(pulses, motions, axis)
+        return trace(plan.target, plan.surfaces, rays, motions, *limits, axis, plan.openings)
 
     @property
     def _in_air(self) -> bool:
@@ -305,10 +309,11 @@ class BlockScan:
         several = self.plan.rays_per_pulse > 1
         shot = shots(self.plan.setting, first, count, several or angle is not None)
         time = shot.time + strip.start_time
-        rotation, origin, _ = poses.true.at(time)
-        direction = turn_vectors(rotation, shot.direction)
-        frame = (shot.in_plane, shot.across)
-        in_plane, across = (None if not several or axis is None else turn_vectors(rotation, axis) for axis in frame)
+        kernel, frame = self.plan.pose_kernel, (shot.in_plane, shot.across)
+        turned = turned_vectors if kernel is None else kernel.turned_vectors
+        beam = [shot.direction, *(axis for axis in frame if several and axis is not None)]
+        origin, (direction, *axes) = turned(poses.true, time, beam)
+        in_plane, across = axes if several else (None, None)
         measured_origin, measured_direction = origin, direction
         if poses.measured is not poses.true or angle is not None:
             believed = shot.direction
@@ -316,8 +321,7 @@ class BlockScan:
                 assert frame[0] is not None
                 assert frame[1] is not None
                 believed = tilt_vectors(believed, frame[0], frame[1], angle)
-            rotation, measured_origin, _ = poses.measured.at(time)
-            measured_direction = turn_vectors(rotation, believed)
+            measured_origin, (measured_direction,) = turned(poses.measured, time, [believed])
         assert shot.beam is not None
         channel = shot.beam.astype(np.uint8)
         return Pulses(
@@ -436,7 +440,7 @@ class BlockScan:
             instance_id=target.instances(face, pulses.time[pulse]),
             return_number=number,
             number_of_returns=returns,
-            gps_time=pulses.time[pulse],
+            gps_time=pulses.time[pulse] + plan.epoch,
             scan_angle_deg=np.rad2deg(pulses.scan_angle[pulse]).astype(np.float32),
             strip=np.full(len(pulse), strip.index, dtype=np.uint16),
             range=distance,

@@ -16,7 +16,7 @@ from ..base.random_streams import stream
 from ..base.schema import ClosedModel, quantity
 from .knots import NODE_ERROR, NODES
 from .noise import measured_pose
-from .platforms.path import KNOT_ERROR, KNOT_RANGE, Path, Strip, knot_spacing_for
+from .platforms.path import KNOT_ERROR, KNOT_RANGE, Path, Strip, epoch_of, knot_spacing_for
 
 _SINES = 24
 _AXES = 6
@@ -66,6 +66,11 @@ class SwayingPath:
     planned: Path
     motion: Motion
     seed: int
+
+    @property
+    def epoch(self) -> float:
+        """Return what the planned path's times count from, s."""
+        return epoch_of(self.planned)
 
     @property
     def strips(self) -> tuple[Strip, ...]:

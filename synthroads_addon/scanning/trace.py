@@ -1,11 +1,16 @@
 """Rays followed through permeable surfaces: all that each of them meets, and the share of light that arrives there."""
 
+from __future__ import annotations
+
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ..base.arrays import AnyArray, ArrayRows, Float, Index
 from ..materials.surfaces import Surfaces
+from .colour.transparency import SeeThrough
 from .knots import Track
 from .scene.gaps import LeafGaps
 from .scene.target import FirstHits, Target
@@ -14,8 +19,12 @@ LAYERS = 32
 """Surfaces that a ray passes at most: a canopy's leaves are many, one behind the other."""
 FAINTEST = 1e-2
 """A ray ends where less than this of its own light is left."""
-_BEYOND = 1e-3
+CLEAR_LAYERS = 256
+"""Surfaces that a ray passes at most where some are clear in places: those take nothing of it."""
+BEYOND = 1e-3
 """A ray goes on this far, m, behind the surface that it has passed: farther than float32 rounds."""
+_BEYOND_CLEAR = 1e-4
+"""Likewise behind one that is clear in places: a sign's or a marking's picture often lies a millimetre above a wall."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +141,7 @@ def trace(
     nearest: float,
     farthest: float,
     axis: FirstHits | None = None,
-    gaps: LeafGaps | None = None,
+    openings: Openings | None = None,
 ) -> TracedRays:
     """Return what rays meet between two ranges (m), through permeable surfaces, and the light that each hit takes.
 
@@ -145,7 +154,7 @@ def trace(
         motions: tracks of the target's moving parts.
         nearest, farthest: ranges, m.
         axis: (P,) what the first ray of each pulse meets, where it has been cast already.
-        gaps: leaves and gaps of materials that have a ``gap_size``; None: they weaken rays as others do, evenly.
+        openings: where materials are open; None: all of a material weakens rays alike.
     """
     met = _first_hits(target, rays, motions, farthest, axis)
     material = np.take(target.material, met.face, mode="clip").astype(np.intp)
@@ -155,59 +164,152 @@ def trace(
     on = np.flatnonzero(np.take(surfaces.pervious, material, mode="clip"))
     on = on[np.take(met.distance, on) < farthest]
     share = np.broadcast_to(rays.share, material.shape).copy()
-    left, start = np.take(share, on), np.take(met.distance, on)
-    through = _transmitted(surfaces, gaps, rays, on, np.take(material, on), start)
+    left = np.take(share, on)
+    onward = _Onward(target, surfaces, openings or Openings(), rays, motions)
+    kind, start = np.take(material, on), np.take(met.distance, on)
+    face, along = (np.take(met.face, on), np.take(met.along, on)) if onward.clear else (None, None)
+    through = onward.transmitted(on, face, kind, along, start)
     share.ravel()[on] = left * (1.0 - through)
     distance = _within(met.distance, nearest, np.inf)
-    if gaps is not None and (through == 1.0).any():
+    if openings is not None and (through == 1.0).any():
         distance = distance.copy()
         distance.ravel()[on[through == 1.0]] = np.inf
     first = Hits(met.face, material, distance, met.along, share)
-    layers, rays_on = [], []
-    left *= through
-    for _ in range(LAYERS - 1):
-        bright = np.flatnonzero(left > FAINTEST * np.take(rays.share, on // material.shape[1]))
-        if not len(bright):
-            break
-        on, left, start = on[bright], left[bright], start[bright] + _BEYOND
-        origin, direction = rays.pick(on)
-        met = target.cast(origin + start * direction, direction, farthest, rays.time[on % material.shape[1]], motions)
-        hit = np.flatnonzero(met.face >= 0)
-        on, left, start = on[hit], left[hit], start[hit] + met.distance[hit]
-        face = met.face[hit]
-        surface = np.take(target.material, face).astype(np.intp)
-        through = _transmitted(surfaces, gaps, rays, on, surface, start)
-        taken = left * (1.0 - through)
-        reached = np.where(taken > 0.0, _within(start, nearest, farthest), np.inf)
-        layers.append(Hits(face, surface, reached, met.along[hit], taken))
-        rays_on.append(on)
-        left = left * through
-    return _gather_hits(rays, first, layers, rays_on)
+    passed = _Passed(on, left * through, start, face, onward.steps(kind))
+    layers = list(onward.follow(passed, nearest, farthest))
+    return _gather_hits(rays, first, [hits for hits, _ in layers], [on for _, on in layers])
 
 
-def _transmitted(
-    surfaces: Surfaces, gaps: LeafGaps | None, rays: Rays, on: Index, material: Index, distance: Float
-) -> Float:
-    """Return the share (N,) of their light that rays keep behind what they meet.
+class Openings(NamedTuple):
+    """Where the permeable materials of a scene are open.
 
-    Args:
-        surfaces: the materials.
-        gaps: leaves and gaps of some of them.
-        rays: of pulses.
-        on: (N,) rays as k * P + p for ray k of pulse p.
-        material: (N,) of what they meet.
-        distance: (N,) where they meet it, m.
+    Attributes:
+        gaps: leaves and gaps of materials that have a ``gap_size``; None: they weaken rays as others do, evenly.
+        clear: materials whose transparency differs from place to place; None where the scene has none.
     """
-    result = np.take(surfaces.transmission, material)
-    leafy = np.flatnonzero(np.take(surfaces.gappy, material)) if gaps is not None else ()
-    if gaps is None or not len(leafy):
+
+    gaps: LeafGaps | None = None
+    clear: SeeThrough | None = None
+
+
+@dataclass(frozen=True)
+class _Passed(ArrayRows):
+    """Rays (N,) that have passed a surface.
+
+    Attributes:
+        on: the rays, as k * P + p for ray k of pulse p.
+        left: light that they keep.
+        start: range of the surface, m.
+        face: that was passed; None where no material is clear in places.
+        step: how far behind it they go on, m; None likewise, for the usual distance.
+    """
+
+    on: Index
+    left: Float
+    start: Float
+    face: Index | None
+    step: Float | None
+
+
+@dataclass(frozen=True)
+class _Onward:
+    """A block's rays behind permeable surfaces.
+
+    Attributes:
+        target: what is scanned.
+        surfaces: the materials.
+        openings: of them.
+        rays: of pulses.
+        motions: tracks of the target's moving parts.
+    """
+
+    target: Target
+    surfaces: Surfaces
+    openings: Openings
+    rays: Rays
+    motions: list[Track]
+
+    @property
+    def clear(self) -> bool:
+        """Return whether some materials are clear in places."""
+        return self.openings.clear is not None
+
+    def follow(self, passed: _Passed, nearest: float, farthest: float) -> Iterator[tuple[Hits, Index]]:
+        """Yield what rays meet next, and which rays; again and again, until they are too faint or meet nothing.
+
+        Args:
+            passed: rays behind what they have met first.
+            nearest, farthest: ranges, m.
+        """
+        pulses = len(self.rays.time)
+        for _ in range((CLEAR_LAYERS if self.clear else LAYERS) - 1):
+            bright = np.flatnonzero(passed.left > FAINTEST * np.take(self.rays.share, passed.on // pulses))
+            if not len(bright):
+                break
+            before = passed.select(bright)
+            step: Float | float = BEYOND if before.step is None else before.step
+            start, (origin, direction) = before.start + step, self.rays.pick(before.on)
+            times = self.rays.time[before.on % pulses]
+            met = self.target.cast(origin + start * direction, direction, farthest, times, self.motions)
+            hit = np.flatnonzero(met.face >= 0)
+            before, start, face, along = (
+                before.select(hit),
+                start[hit] + met.distance[hit],
+                met.face[hit],
+                met.along[hit],
+            )
+            surface = np.take(self.target.material, face).astype(np.intp)
+            through, steps = self.transmitted(before.on, face, surface, along, start), self.steps(surface)
+            if before.face is not None and steps is not None and (again := face == before.face).any():
+                # No ray meets a flat face twice: rounding has put it before the face that it has passed.
+                through[again], steps[again] = 1.0, 4.0 * np.asarray(before.step)[again]
+            taken = before.left * (1.0 - through)
+            reached = np.where(taken > 0.0, _within(start, nearest, farthest), np.inf)
+            yield Hits(face, surface, reached, along, taken), before.on
+            passed = _Passed(before.on, before.left * through, start, None if steps is None else face, steps)
+
+    def steps(self, material: Index) -> Float | None:
+        """Return how far (N,), m, rays go on behind surfaces that they have passed, by material; None: all alike."""
+        if not self.clear:
+            return None
+        return np.where(np.take(self.surfaces.clear, material), _BEYOND_CLEAR, BEYOND)
+
+    def transmitted(
+        self, on: Index, face: Index | None, material: Index, along: Float | None, distance: Float
+    ) -> Float:
+        """Return the share (N,) of their light that rays keep behind what they meet.
+
+        Args:
+            on: (N,) rays as k * P + p for ray k of pulse p.
+            face: (N,) that they meet; None where no material is clear in places.
+            material: (N,) of the faces.
+            along: (N,) n . d of their normals and the rays; None likewise.
+            distance: (N,) where they meet them, m.
+        """
+        result = np.take(self.surfaces.transmission, material)
+        gaps, clear = self.openings
+        if gaps is not None and len(leafy := np.flatnonzero(np.take(self.surfaces.gappy, material))):
+            ray, here = on[leafy], distance[leafy]
+            share = np.take(self.rays.share, ray // self.rays.direction.shape[2])
+            place = self._places(ray, here)
+            result[leafy] = gaps.transmitted(self.surfaces, material[leafy], place, here, share)
+        if (
+            clear is not None
+            and face is not None
+            and along is not None
+            and len(some := np.flatnonzero(np.take(self.surfaces.clear, material)))
+        ):
+            ray, times = on[some], np.take(self.rays.time, on[some] % len(self.rays.time))
+            place = self._places(ray, distance[some])
+            result[some] = clear.transmitted(
+                self.target, material[some], face[some], along[some], place, times, self.motions
+            )
         return result
-    ray, here = on[leafy], distance[leafy]
-    origin, direction = rays.pick(ray)
-    share = np.take(rays.share, ray // rays.direction.shape[2])
-    place = origin + here * direction
-    result[leafy] = gaps.transmitted(surfaces, material[leafy], place, here, share)
-    return result
+
+    def _places(self, ray: Index, distance: Float) -> Float:
+        """Return the places (3, N) on rays at distances (N,), local, m."""
+        origin, direction = self.rays.pick(ray)
+        return np.asarray(origin + distance * direction)
 
 
 def _first_hits(target: Target, rays: Rays, motions: list[Track], farthest: float, axis: FirstHits | None) -> FirstHits:

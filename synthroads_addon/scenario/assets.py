@@ -9,6 +9,7 @@ from pydantic import Field, field_validator, model_validator
 
 from ..base.errors import InputError, MissingFileError
 from ..base.files import PRESETS, change_stamp
+from ..base.named_paths import path_inside
 from ..base.schema import ClosedModel, quantity, read_json
 from ..road.things.asset import AssetTypes
 from ..road.things.limits import Interval, interval
@@ -110,12 +111,13 @@ def read_asset_library(name_or_file: str | os.PathLike[str]) -> AssetLibrary:
 
     Raises:
         MissingFileError: the library, or a file that it names, doesn't exist or cannot be read.
-        InputError: a field is unknown or wrong.
+        InputError: a field is unknown or wrong, or a file lies outside of the library's folder, links resolved.
     """
     name = str(library_file(os.fspath(name_or_file)))
     library = _read_library(name, change_stamp(name, "an asset library (JSON) is needed here"))
     for key, asset in library.assets.items():
-        _check_file(Path(name).parent / asset.file, f"{name}: assets.{key}.file", asset.file)
+        field = f"{name}: assets.{key}.file"
+        _check_file(path_inside(Path(name).parent, asset.file, field, follow=True), field, asset.file)
     return library
 
 

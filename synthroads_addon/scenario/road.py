@@ -279,6 +279,14 @@ class RoadScenario(ClosedModel):
         json_schema_extra=notes(unset="Generated"),
     )
     epsg: int = quantity(25832, "1", "Map coordinate system.", (1024, 99_999_999), title="EPSG Code")
+    height_epsg: int | None = quantity(
+        None,
+        "1",
+        "Vertical coordinate system that heights are counted in; not named if not given.",
+        (1024, 99_999_999),
+        title="EPSG Code of Heights",
+        unset="Not Named",
+    )
     map_origin: tuple[Finite, Finite, Finite] = Field(
         (294_000.0, 5_628_000.0, 180.0),
         title="Map Origin",

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
 from pydantic import Field, field_validator
 
+from ..base.changes import apply_values, parse_change
 from ..base.errors import InputError
 from ..base.files import PRESETS, preset_names, preset_path
-from ..base.schema import ClosedModel, Model, notes, quantity, read_json
-from ..base.typed_text import typed_value
+from ..base.schema import ClosedModel, notes, quantity, read_json
 from ..cloud.layers import optional_arrays
 from ..materials.table import Material, read_material_table
 from ..road.guidelines import SECTIONS_OF_CLASS
@@ -31,8 +31,6 @@ Output = Literal["parameters", "cloud", "centerline", "scene", "previews"]
 OUTPUTS: tuple[Output, ...] = get_args(Output)
 OF_POINTS: tuple[Output, ...] = ("cloud", "previews")
 """Outputs that are made of points: all that a scan of a scene by others writes beside ``report.json``."""
-_DEEPEST = 20
-"""Dots in the path of a change: more fields don't lie in each other."""
 LONGEST_WHOLE, SECTION_LENGTH = 5000.0, 500.0
 """A longer road is built and scanned by sections of this length unless the scenario says otherwise, m."""
 _CLASS_AND_SECTION = ("design_class", "cross_section")
@@ -232,7 +230,12 @@ def load_scenario(name_or_file: str, changes: list[str] | None = None) -> Scenar
     scenario = Scenario.from_dict(read_json(path), source=str(name_or_file))
     if not changes:
         return scenario
-    return Scenario.from_dict(with_changes(scenario.to_dict(), map(parse_change, changes)))
+    return Scenario.from_dict(with_changes(scenario.to_dict(), scenario_changes(changes)))
+
+
+def scenario_changes(changes: Iterable[str]) -> Iterator[tuple[str, Any]]:
+    """Yield path and value of each ``path=value`` of a scenario, see `parse_change`."""
+    return (parse_change(change, Scenario) for change in changes)
 
 
 def with_changes(data: Any, changes: Iterable[tuple[str, Any]]) -> Any:
@@ -245,41 +248,6 @@ def with_changes(data: Any, changes: Iterable[tuple[str, Any]]) -> Any:
         data = apply_values(data, {path: value})
         named.add(path)
     return drop_misfits(data, before, named)
-
-
-def apply_change(data: Any, change: str, model: type[Model] = Scenario) -> Any:
-    """Return JSON data with one ``path=value`` applied, the value being of the type of the model's field."""
-    path, value = parse_change(change, model)
-    return _with_value(data, path, value)
-
-
-def apply_values(data: Any, values: Mapping[str, Any]) -> Any:
-    """Return JSON data with values set by their dotted paths; raise `InputError` where a path is none."""
-    for path, value in values.items():
-        if not _is_path(path):
-            raise InputError("set", path, "must be the path of a field, e.g. road.length")
-        data = _with_value(data, path, value)
-    return data
-
-
-def parse_change(change: str, model: type[Model] = Scenario) -> tuple[str, Any]:
-    """Return path and value of ``path=value``, see `typed_value`; raise `InputError` if it has another form."""
-    path, equals, text = change.partition("=")
-    if not equals or not _is_path(path):
-        raise InputError("--set", change, "must be path=value, e.g. road.length=800")
-    return path, typed_value(model, path, text)
-
-
-def _is_path(text: str) -> bool:
-    return bool(text) and text.count(".") <= _DEEPEST
-
-
-def _with_value(data: Any, path: str, value: Any, above: str = "") -> Any:
-    head, dot, rest = path.partition(".")
-    if not isinstance(data, dict):
-        raise InputError(above or "scenario", data, f"must be a JSON object before its field {head} can be set")
-    here = f"{above}.{head}" if above else head
-    return {**data, head: _with_value(data.get(head, {}), rest, value, here) if dot else value}
 
 
 def drop_misfits(data: dict[str, Any], before: Mapping[str, Any], named: AbstractSet[str]) -> dict[str, Any]:

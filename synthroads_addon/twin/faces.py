@@ -180,6 +180,21 @@ def next_corner(sizes: Int) -> Int:
     return following
 
 
+def polygon_areas(points: Float, corners: Int, sizes: Int) -> Float:
+    """Return the areas (F,) of polygons, in the square of the unit of their points (N, 3)."""
+    if not len(sizes):
+        return np.empty(0)
+    starts = np.cumsum(sizes) - sizes
+    first = points[np.repeat(corners[starts], sizes)]
+    arms = points[corners] - first, points[corners[next_corner(sizes)]] - first
+    return np.asarray(np.linalg.norm(np.add.reduceat(np.cross(*arms), starts), axis=1) / 2.0)
+
+
+def drop_polygons(corners: Int, sizes: Int, kept: NDArray[np.bool_]) -> tuple[Int, Int]:
+    """Return corners and sizes of only those polygons that a mask (F,) keeps."""
+    return corners[np.repeat(kept, sizes)], sizes[kept]
+
+
 def drop_collapsed(corners: Int, sizes: Int) -> tuple[Int, Int, NDArray[np.bool_]]:
     """Merge equal neighbouring corners and drop polygons left with fewer than 3; return corners, sizes, kept (F,)."""
     distinct = corners != corners[next_corner(sizes)]

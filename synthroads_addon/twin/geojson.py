@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.schema import compact_json
-from ..road.centerline import centerline_geojson
+from ..road.axes.centerline import centerline_geojson
 from ..road.geometry import RoadGeometry
 from ..road.objects import LineObject, PointObject, RoadObject
 from ..road.parameters import RoadParameters

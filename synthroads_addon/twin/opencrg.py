@@ -118,6 +118,7 @@ class _Grid:
             f"Pavement of {metadata.identifier}"[:72],
             f"by {generator()}"[:72],
             f"in {metadata.referenceSystem}"[:72],
+            *([f"heights in {metadata.heightReferenceSystem}"[:72]] if metadata.heightReferenceSystem else []),
             *comments,
             "$",
             "$ROAD_CRG",

@@ -42,7 +42,7 @@ class Frame:
 
     def place(self) -> Place:
         """Return the ground and pavement heights around this frame as functions of x and y, and the batters' slope."""
-        terrain = self.geometry.parameters.terrain
+        terrain = self.geometry.terrain
         return Place(self._ground, self._pavement, terrain.batter_slope if terrain else _SLOPE)
 
     def _located(self, x: Float, y: Float) -> tuple[Float, Float]:

@@ -25,6 +25,7 @@ from .panels import (
     road_choice,
     road_files,
     rules,
+    scan_road,
     scene_scan,
     views,
 )
@@ -44,6 +45,7 @@ MODULES = (
         road_files,
         panels,
         rules,
+        scan_road,
         edit,
         cloud_view,
         views,

@@ -2,13 +2,15 @@
 
 import errno
 import os
+import sys
 from pathlib import Path
 
 import pytest
 
 from synthroads_addon.base.errors import OutputError
-from synthroads_addon.base.files import files_below, output_folder, write_file
-from synthroads_addon.base.scratch.folders import ASIDE, scratch_folder
+from synthroads_addon.base.files import check_file_target, files_below, made_folder, output_folder, write_file
+from synthroads_addon.base.scratch import folders
+from synthroads_addon.base.scratch.folders import ASIDE, record_folders_in, remove_recorded_folders, scratch_folder
 
 
 def test_files_appear_at_the_end(tmp_path: Path) -> None:
@@ -203,3 +205,38 @@ def test_folders_that_are_links_are_entered_once(tmp_path: Path) -> None:
     (here / "gone").symlink_to(there / "no-such", target_is_directory=True)
     found = [path.relative_to(here).as_posix() for path in files_below(here)]
     assert found == ["gone", "a/cloud.laz", "b/deep/cloud.laz"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a process of its own does the work on Linux alone")
+def test_after_a_kill_no_folder_that_was_made_for_files_is_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(folders, "_journal", None)  # is put back afterwards
+    (tmp_path / "mine").mkdir()
+    record_folders_in(journal := os.memfd_create("journal"))
+    places = [tmp_path / "new" / "deep", tmp_path / "mine" / "new"]
+    entered = [made_folder(place) for place in places]
+    for place, context in zip(places, entered, strict=True):
+        context.__enter__()  # and never left: the process is killed in it
+        assert place.is_dir()
+    remove_recorded_folders(journal)
+    os.close(journal)
+    assert [path.name for path in tmp_path.rglob("*")] == ["mine"]
+
+
+def test_a_file_target_is_judged_without_making_anything(tmp_path: Path) -> None:
+    (tmp_path / "there.txt").write_text("mine")
+    check_file_target(tmp_path / "new" / "deep" / "a.txt", ending=".txt")
+    check_file_target(tmp_path / "there.txt", overwrite=True)
+    cases = {
+        tmp_path / "a.png": "must end in .txt",
+        tmp_path: "must end in .txt",
+        tmp_path / "there.txt": "is there already; --overwrite replaces it",
+        tmp_path / "there.txt" / "a.txt": "cannot be written",
+    }
+    for path, message in cases.items():
+        with pytest.raises(OutputError, match=message):
+            check_file_target(path, ending=".txt")
+    with pytest.raises(OutputError, match="is a folder"):
+        check_file_target(tmp_path, overwrite=True)
+    assert [path.name for path in tmp_path.iterdir()] == ["there.txt"]

@@ -32,7 +32,7 @@ from synthroads_addon.calibration.job import (
 )
 from synthroads_addon.calibration.plot import save_plot
 from synthroads_addon.cloud.selection.classes import RealClass, class_by_label, ranges_and_incidences, read_real_cloud
-from synthroads_addon.cloud.selection.pavement import RoadClasses, axis_coordinates, road_classes
+from synthroads_addon.cloud.selection.pavement import RoadClasses, road_classes
 from synthroads_addon.materials.reflectance import facet_terms
 from synthroads_addon.materials.table import Material, materials, read_material_table, write_material_table
 from synthroads_addon.scenario.scenario import Scenario
@@ -225,17 +225,6 @@ def test_lines_are_found_where_they_are_and_not_by_each_points_own_brightness(tm
     assert not any(tuple(row) in on_paint for row in np.round(found["paved"].place, 3).tolist())
 
 
-def test_stations_and_offsets_beside_a_bent_axis_with_a_gap() -> None:
-    axis = np.array([[0.0, 0.0], [4.0, 0.0], [8.0, 0.0], [8.0, 4.0], [8.0, 40.0], [8.0, 44.0]])
-    points = np.array([[2.0, 1.0], [9.0, 2.0], [8.2, -0.2], [5.0, 20.0], [7.0, 42.0], [-3.0, 0.0], [2.0, 90.0]])
-    station, offset = axis_coordinates(points, axis)
-    assert station[[0, 1]] == pytest.approx([2.0, 10.0])
-    assert offset[[0, 1]] == pytest.approx([1.0, -1.0])
-    assert np.isfinite(offset[[2, 4]]).all()
-    assert offset[4] == pytest.approx(1.0)
-    assert np.isnan(offset[[3, 5, 6]]).all()
-
-
 def test_otsu_lies_between_two_heaps() -> None:
     rng = np.random.default_rng(3)
     values = np.concatenate([rng.normal(10.0, 1.0, 5000), rng.normal(20.0, 1.0, 1000)])
@@ -286,8 +275,8 @@ def test_classes_that_are_not_there_are_refused(tmp_path: Path) -> None:
     cloud = labelled(tmp_path / "real.laz", None, 60_000.0)
     real = read_real_cloud(cloud, "label")
     for code, message in (("41", "40, 60"), ("road", "a number")):
-        with pytest.raises(InputError, match=message):
-            class_by_label(real, code)
+        with pytest.raises(InputError, match=f"--material asphalt .*{message}"):
+            class_by_label(real, code, "--material asphalt")
     with pytest.raises(InputError, match="did you mean 'label'"):
         read_real_cloud(cloud, "labels")
     striped(tmp_path / "s.laz", tmp_path / "a.csv", 40.0)

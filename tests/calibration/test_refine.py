@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from synthroads_addon.base.changes import apply_values
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.calibration import refine
 from synthroads_addon.calibration.pulse_lines import pulse_step
@@ -23,7 +24,7 @@ from synthroads_addon.calibration.simulation import LevelPavement, simulate_pave
 from synthroads_addon.cloud.selection.classes import RealClass
 from synthroads_addon.materials.table import materials
 from synthroads_addon.scenario.scan import ScanScenario, scanner_setting
-from synthroads_addon.scenario.scenario import apply_values, load_scenario
+from synthroads_addon.scenario.scenario import load_scenario
 
 LANES = ((-5.0, -1.5), (1.5, 5.0))
 SPREAD = "spread"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from sklearn.metrics import roc_auc_score
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.cloud.selection.patches import make_patches
@@ -52,6 +53,14 @@ def test_clouds_of_other_densities_are_refused() -> None:
     one, other = (make_patches(pavement(density=density), "x") for density in (30.0, 120.0))
     with pytest.raises(InputError, match=r"thin.laz is \d+: at least 60 patches .*, 1\d\d to 1\d\d points/m2"):
         distinguish(one, other, 1, "thin.laz")
+
+
+def test_a_statistic_alone_tells_as_scikit_learn_says() -> None:
+    random = np.random.default_rng(3)
+    truth = random.random(300) < 0.4
+    for values in (random.normal(size=300) + truth, random.integers(0, 4, 300) - 1.0 * truth):
+        auc = roc_auc_score(truth, values)
+        assert classifier._auc_alone(values, truth) == pytest.approx(max(auc, 1.0 - auc), abs=1e-12)
 
 
 def test_the_discrepancy_grows_with_the_difference() -> None:

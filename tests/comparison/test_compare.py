@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -84,6 +85,25 @@ def test_report_and_picture_say_what_gives_a_cloud_away(folder: Path, capsys: py
     assert f"gives away {next(iter(report['giveaways'].values()))[0]:.2f}" in text
 
 
+def test_statistics_alone_need_neither_scikit_learn_nor_matplotlib(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("sklearn", "matplotlib"):
+        monkeypatch.setitem(sys.modules, name, None)
+    assert compare(folder) == 0
+    report = json.loads((folder / "out" / "comparison.json").read_text(encoding="utf-8"))
+    assert report["realism"] == {}
+    assert [row["auc"] for row in report["synthetic"] + report["real"]] == [{}] * 3
+    assert next(iter(report["giveaways"])) in ("clark_evans", "spacing_variation", "direction_entropy")
+    assert next(iter(report["giveaways"].values()))[0] > 0.97
+    assert report["discrepancy"] > 10.0
+    assert [path.name for path in (folder / "out").iterdir()] == ["comparison.json"]
+    said = capsys.readouterr()
+    assert f"synthetic synthetic-0: {report['synthetic'][0]['patches']} patches" in said.out
+    assert "told from" not in said.out
+    assert said.err.count("pip install 'synthroads[ml]'") == 2
+
+
 @pytest.mark.slow
 def test_the_same_clouds_give_the_same_report(folder: Path) -> None:
     assert compare(folder, "--overwrite", "--quiet") == 0
@@ -99,7 +119,7 @@ def test_the_same_clouds_give_the_same_report(folder: Path) -> None:
         ("type: CloudList\nclouds: [{cloud: none.laz}]", "none.laz"),
         ("type: CloudList\nclouds: [{cloud: real-0.laz, axis: a.csv}]", "axis and paved tell the pavement together"),
         ("type: CloudList\nclouds: [{cloud: real-0.laz, roads: 3}]", "unknown key 'roads' (did you mean 'road'?)"),
-        ("type: CloudList\nclouds: [{cloud: real-0.laz, class_field: user_data, road: '7'}]", "--class is 7"),
+        ("type: CloudList\nclouds: [{cloud: real-0.laz, class_field: user_data, road: '7'}]", "real-0.laz: road is 7"),
         (
             f"type: CloudList\nclouds: [{{cloud: real-0.laz, road: '{ROAD}', marking: road_markings}}]",
             "real-0.laz: marking is 'road_markings': must be one of ",
@@ -162,3 +182,22 @@ def test_pavement_beside_a_marking_is_left_out(tmp_path: Path) -> None:
     # Gaps between the line's points let some of the pavement come nearer.
     assert LINE + 0.4 < cloud.classes["road"].place[:, 1].min() < LINE + 1.0
     assert len(cloud.classes["marking"].place) > 100
+
+
+def test_a_cloud_without_the_class_of_the_road_is_named_with_the_remedy(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """No option says which class is meant: a list does."""
+    words = ["compare", str(folder / "real-0.laz"), str(folder / "real.yaml"), "--output", str(folder / "out")]
+    assert main(words) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("error: real-0.laz: road is 'road': must be one of")
+    assert "a list of clouds (.yaml)" in line
+    assert "--class" not in line
+
+
+def test_a_name_that_is_no_text_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Bytes that aren't UTF-8, as names of files may have on Linux."""
+    assert [row.cloud for _, row in find_clouds(Path("\udcff.las"))] == ["\\udcff.las"]
+    assert main(["compare", "\udcff.las", "\udcff.las", "--output", str(tmp_path / "out")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1

@@ -50,8 +50,11 @@ def recipe(**changes: Any) -> Recipe:
 
 
 @pytest.mark.parametrize("name", recipe_names())
-def test_built_in_recipes_load(name: str) -> None:
-    assert scene_jobs(load_recipe(name))
+def test_built_in_recipes_load_and_their_scanners_can_do_what_they_ask_for(name: str) -> None:
+    jobs = scene_jobs(load_recipe(name))
+    assert jobs
+    for job in jobs:
+        assert scanner_setting(job.scenario.scan), job.name
 
 
 def test_reference_set_is_what_it_says() -> None:

@@ -203,9 +203,9 @@ def _centimetres() -> object:
 def test_points_that_are_not_finite_are_refused_by_name(tmp_path: Path, ending: str, value: float, monkeypatch) -> None:
     points = make_points(100)
     points = replace(points, xyz=np.where(np.arange(300).reshape(100, 3) == 31, value, points.xyz))
-    from synthroads_addon.cloud.formats import base as writing
+    from synthroads_addon.cloud.formats import writer as writing
 
-    monkeypatch.setattr(writing.CloudWriter, "check_finite", lambda self, values, name: values)
+    monkeypatch.setattr(writing.CloudWriter, "check_finite", lambda self, values, *_: values)
     path = tmp_path / f"cloud{ending}"
     with open_writer(path, None, ORIGIN, 1.0, ()) as writer:
         writer.write(points)
@@ -245,7 +245,7 @@ NOTES = [{"intensity_scale": None}, {"intensity_scale": 0.0}, {"intensity_scale"
     ],
 )
 def test_notes_that_are_none_of_ours(tmp_path: Path, ending: str, notes: object, monkeypatch) -> None:
-    from synthroads_addon.cloud.formats import base as writing
+    from synthroads_addon.cloud.formats import writer as writing
 
     path = tmp_path / f"cloud{ending}"
     writer = open_writer(path, None, ORIGIN, 1.0, ())

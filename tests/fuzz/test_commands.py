@@ -5,7 +5,10 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
+from resource import RUSAGE_CHILDREN, getrusage
 
 from hypothesis import strategies as st
 
@@ -13,7 +16,9 @@ from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
 from tests.fuzz.test_bytes import cloud
 from tests.fuzz.test_files import LINES, MANIFEST
-from tests.helpers.files.mutations import TOKENS, damaged, for_all, fuzz, json_files, yaml_files
+from tests.helpers.files.command_figures import FIGURES, Figures
+from tests.helpers.files.command_runs import fuzz_commands
+from tests.helpers.files.mutations import TOKENS, damaged, for_all, json_files, yaml_files
 from tests.helpers.roads.checker_full_road import full
 
 ROOT = Path(__file__).parents[2]
@@ -38,8 +43,8 @@ ARGUMENTS = (
 )
 
 
-def answers(module: str, *arguments: str) -> None:
-    """Run a command; see that it ends as it should."""
+def answers(module: str, *arguments: str) -> int:
+    """Run a command, see that it ends as it should; return its exit code."""
     command = [sys.executable, "-m", module, *arguments]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, timeout=LONGEST, check=False)
     said = done.stderr.decode(errors="replace")
@@ -47,6 +52,7 @@ def answers(module: str, *arguments: str) -> None:
     assert "Traceback" not in said, said[-2000:]
     if done.returncode == 2:
         assert len(said.splitlines()) == 1, said[:2000]
+    return done.returncode
 
 
 def commands(folder: Path) -> st.SearchStrategy[tuple[str, bytes, tuple[str, ...]]]:
@@ -84,16 +90,23 @@ def commands(folder: Path) -> st.SearchStrategy[tuple[str, bytes, tuple[str, ...
     )
 
 
-@fuzz(3, 200)
-def test_commands(tmp_path: Path, count: int) -> None:
+@fuzz_commands(3, 200)
+def test_commands(tmp_path: Path, count: int, record_property: Callable[[str, object], None]) -> None:
+    figures = Figures("commands in processes of their own")
+
     def body(case: tuple[str, bytes, tuple[str, ...]]) -> None:
         name, content, (module, *arguments) = case
         (tmp_path / name).write_bytes(content)
         places = {"FILE": tmp_path / name, "OUT": tmp_path / "out", "IN": tmp_path, "SOUND": tmp_path / "sound.laz"}
         filled = [str(places[a]) if a in places else a.replace("FILE", str(places["FILE"])) for a in arguments]
-        answers(module, *filled, *(["--overwrite"] if module == "headless.twin" else []))
+        before = getrusage(RUSAGE_CHILDREN)
+        code = answers(module, *filled, *(["--overwrite"] if module == "headless.twin" else []))
+        after = getrusage(RUSAGE_CHILDREN)
+        seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        figures.add(code, seconds, after.ru_maxrss / 1000.0)
 
     for_all(commands(tmp_path), count, body)
+    record_property(FIGURES, asdict(figures))
 
 
 def test_names_of_files_that_are_no_text(tmp_path: Path) -> None:

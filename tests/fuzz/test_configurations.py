@@ -83,7 +83,7 @@ def test_a_checkpoint_of_something_else_is_refused(tmp_path: Path) -> None:
     import torch
 
     sound = load_configuration("segmentation-small")
-    Run.start(tmp_path, sound)
+    Run.start(tmp_path, sound).begin()
     torch.save({"weights": torch.zeros(3)}, tmp_path / CHECKPOINT)
     with pytest.raises(InputError, match=r"checkpoint\.pt: is no checkpoint"):
         Run.start(tmp_path, sound, resume=True)

@@ -106,7 +106,7 @@ def test_whatever_is_wrong_is_one_line(capsys, cloud: Path, tmp_path: Path) -> N
         ("convert", cloud, "--output", cloud): "must be another file than the input",
         ("convert", cloud, "--output", cloud, "--overwrite"): "must be another file than the input",
         ("convert", cloud, "--output", tmp_path / "new.xyz"): "must end in",
-        ("convert", cloud, "--output", tmp_path / "no" / "new.laz"): "there is no folder",
+        ("convert", cloud, "--output", cloud / "no" / "new.laz"): "cannot be written (Not a directory)",
         ("convert", cloud, "--output", new, "--classes", "6"): "must be one of 17, 5",
         ("convert", cut, "--output", new): "is truncated",
         ("subsample", cloud, "--output", new, "--grid", "0"): "grid is 0.0",

@@ -16,13 +16,14 @@ from pydantic import BaseModel
 from headless import cli
 from headless.list import KINDS
 from ml.configuration import SHIPPED
+from synthroads_addon.base.changes import apply_values
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.field_list import FieldEntry, fields_of
-from synthroads_addon.base.typed_text import alternatives
+from synthroads_addon.base.text.typed import alternatives
 from synthroads_addon.dataset.recipe import load_recipe, recipe_names, scene_jobs
 from synthroads_addon.scanning.devices.device import DEVICES, device_names, load_device
-from synthroads_addon.scenario.scenario import Scenario, apply_values, scenario_names
+from synthroads_addon.scenario.scenario import Scenario, scenario_names
 
 ROOT = Path(__file__).parents[2]
 Capture = pytest.CaptureFixture[str]

@@ -19,13 +19,15 @@ import pytest
 from headless import dataset_run, messages
 from headless.commands import Outcome, command, run
 from headless.messages import INTERVAL, progress_bar
+from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.progress import Stage
 from synthroads_addon.cloud.formats.registry import open_writer
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.road import RoadScenario
 from tests.helpers.clouds.random_points import make_points
 
 ROOT = Path(__file__).resolve().parents[2]
-LINE = re.compile(r"(.+): (\d+) % after (\d+) s")
+LINE = re.compile(r"(.+): (\d+) % after (\d+) s(?:, about (\d+) (s|min|hours) left)?(?: \((.+)\))?")
 
 
 # --- results that are written to no file -----------------------------------------------------------------------------
@@ -153,7 +155,7 @@ def test_outside_a_terminal_progress_is_lines(clock: Clock, capsys: pytest.Captu
     assert run(work(clock, STEPS), flags()) == 0
     out, err = capsys.readouterr()
     assert out == "done\n"
-    assert err.splitlines() == ["model: 0 % after 0 s", "scan: 0 % after 3 s", "scan: 90 % after 14 s"]
+    assert err.splitlines() == ["model: 0 % after 0 s", "scan: 0 % after 3 s", "scan: 90 % after 14 s, about 1 s left"]
 
 
 def test_at_most_one_line_in_ten_seconds_of_a_stage(clock: Clock, capsys: pytest.CaptureFixture[str]) -> None:
@@ -196,6 +198,80 @@ def test_what_was_held_back_is_shown_once_it_takes_longer(
 
     assert run(action, flags()) == 0
     assert capsys.readouterr().out == "scenes: 0 % after 0 s\n\n"
+
+
+def silent_work(seconds: float, *told: tuple[str, float]) -> Callable[[argparse.Namespace], Outcome]:
+    """Return a command that tells of stages and shares, and then nothing for some seconds."""
+
+    def action(arguments: argparse.Namespace) -> Outcome:
+        progress = progress_bar(arguments) if told else None
+        for stage, share in told:
+            assert progress is not None
+            progress(stage, share)
+        messages.time.sleep(seconds)
+        return 0, {}, "done"
+
+    return action
+
+
+@pytest.mark.parametrize("told", [(), (("model", 0.3),)])
+def test_work_that_tells_nothing_for_long_still_has_its_lines(
+    told: tuple[tuple[str, float], ...], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(messages, "PATIENCE", 0.0)
+    monkeypatch.setattr(messages, "INTERVAL", 0.2)
+    assert run(silent_work(1.1, *told), flags(command="gallery")) == 0
+    lines = capsys.readouterr().err.splitlines()
+    assert 3 <= len(lines) <= 6 + len(told)
+    wanted = r"model: 30 % after \d+ s" if told else r"gallery: at work after \d+ s"
+    assert all(re.fullmatch(wanted, line) for line in lines), lines
+
+
+def test_the_heartbeat_ends_with_the_command_and_keeps_quiet_if_asked(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(messages, "PATIENCE", 0.0)
+    monkeypatch.setattr(messages, "INTERVAL", 0.1)
+    assert run(silent_work(0.3), flags(quiet=True, output="x", command="gallery")) == 0
+    assert capsys.readouterr() == ("", "")
+    assert run(silent_work(0.0), flags(command="gallery")) == 0
+    messages.time.sleep(0.4)
+    assert capsys.readouterr().err == ""
+
+
+def test_the_time_that_is_left_follows_from_what_was_done(clock: Clock, capsys: pytest.CaptureFixture[str]) -> None:
+    steady = [("scan", share / 100, 6.0) for share in range(0, 101, 10)]
+    whole = [("path", 0.0, 30.0), ("views", 0.4, 30.0), ("judging", 0.8, 0.0)]  # shares of all, under several names
+    assert run(work(clock, [*steady, ("files", 0.0, 11.0), *whole]), flags()) == 0
+    found = [LINE.fullmatch(line) for line in capsys.readouterr().err.splitlines()]
+    left = {(line[1], int(line[2])): line[4] and int(line[4]) for line in found if line}
+    assert len(left) == len(found)
+    assert left["scan", 0] is None
+    assert left["scan", 20] == pytest.approx(48, abs=1)
+    assert left["scan", 80] == pytest.approx(12, abs=1)
+    assert left["files", 0] is None
+    assert left["views", 40] == pytest.approx(45, abs=1)
+    assert left["judging", 80] == pytest.approx(15, abs=1)
+
+
+def test_what_was_spent_in_silence_is_no_longer_left() -> None:
+    rate = messages._Rate()
+    rate.add(0.0, "scan", 0.0)
+    rate.add(100.0, "scan", 0.5)
+    assert [rate.left(now) for now in (100.0, 160.0, 300.0)] == [100.0, 40.0, 0.0]
+
+
+def test_a_stages_details_stand_behind_it(clock: Clock, capsys: pytest.CaptureFixture[str]) -> None:
+    steps: list[tuple[str, float, float]] = [
+        (Stage("training", f"epoch {number + 1} of 20, loss {1 / (number + 1):.3g}"), number / 20, 6.0)
+        for number in range(4)
+    ]
+    assert run(work(clock, steps), flags()) == 0
+    said = capsys.readouterr().err.splitlines()
+    assert said == [
+        "training: 0 % after 0 s (epoch 1 of 20, loss 1)",
+        "training: 10 % after 12 s, about 108 s left (epoch 3 of 20, loss 0.333)",
+    ]
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="has no such terminals")
@@ -273,3 +349,19 @@ def test_quiet_and_verbose_contradict_each_other(capsys: pytest.CaptureFixture[s
         command("parameters", ["--quiet", "--verbose"])
     assert stopped.value.code == 2
     assert "-v/--verbose: not allowed with argument -q/--quiet" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("verbose", [False, True])
+def test_warnings_of_libraries_are_details(verbose: bool, capsys: pytest.CaptureFixture[str]) -> None:
+    """So what was wrong stays a single line, whatever NumPy has said of the numbers before."""
+
+    def work(_: argparse.Namespace) -> Outcome:
+        with np.errstate(invalid="warn"):
+            np.array([np.inf]) - np.array([np.inf])
+        raise InputError("a.laz", None, "has no points")
+
+    assert run(work, argparse.Namespace(json=False, quiet=False, verbose=verbose)) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[-1] == "error: a.laz: has no points"
+    assert any("RuntimeWarning: invalid value" in line for line in lines) == verbose
+    assert verbose or len(lines) == 1

@@ -5,7 +5,9 @@ from __future__ import annotations
 import argparse
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,10 @@ import pytest
 
 from headless import cli, commands, dataset, generate, scan
 from synthroads_addon.dataset.recipe import load_recipe, scene_jobs
+from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scenario.road import RoadScenario
+
+NEEDS_TORCH = pytest.mark.skipif(find_spec("torch") is None, reason="needs PyTorch")
 
 
 def test_changes_of_a_data_set_are_of_the_type_of_their_field() -> None:
@@ -130,6 +136,42 @@ def test_options_that_set_contradicts_are_refused(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("option", "change", "name"),
+    [
+        ("--axis", "road.length=100", "length"),
+        ("--axis", "road.radius.minimum=800", "radius"),
+        ("--axis", 'road={"half_width": 30, "grade_percent": {"maximum": 3}}', "grade_percent"),
+        ("--axis", "road.map_origin=[1,2,3]", "map_origin"),
+        ("--parameters", "road.length=100", "length"),
+        ("--parameters", "road.barriers.concrete_median=1", "barriers"),
+    ],
+)
+def test_fields_of_the_road_without_effect_beside_an_axis_or_parameters_are_refused(
+    option: str, change: str, name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = ["--output", str(tmp_path / "out")]
+    said = refusal(capsys, "generate", *out, option, str(tmp_path / "none"), "--set", change)
+    assert f"road.{name} has no effect with {option}, whose file says" in said
+    allowed = refusal(capsys, "generate", *out, option, str(tmp_path / "none"), "-q", "--set", "scan.threads=1")
+    assert "none" in allowed, "the file is looked for then"
+    assert "no effect" not in allowed
+
+
+def test_fields_with_effect_beside_an_axis_are_taken(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = [
+        "generate",
+        "--output",
+        str(tmp_path / "out"),
+        "--axis",
+        str(tmp_path / "none"),
+        "-q",
+        "--set",
+        "road.lanes=2",
+    ]
+    assert "no effect" not in refusal(capsys, *words)
+
+
 def first_set(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, Any]:
     assert cli.main(["parameters", "--length", "300", *words]) == 0
     made: dict[str, Any] = json.loads(capsys.readouterr().out)
@@ -149,3 +191,77 @@ def test_one_of_design_class_and_cross_section_is_enough(capsys: pytest.CaptureF
     assert "cross_section is 'RQ31': EKA3 allows" in both
     twice = refusal(capsys, "parameters", "--design-class", "EKA3", "--set", "road.design_class=EKA2")
     assert "--design-class is 'EKA3': contradicts --set road.design_class=EKA2" in twice
+
+
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        (["genrate"], "generate"),
+        (["cloud", "inof", "x.laz"], "info"),
+        (["generate", "--outptu", "out"], "--output"),
+        (["cloud", "preview", "x.laz", "--output", "out", "--statoin=5"], "--station"),
+        (["generate", "-o", "out", "--fidelity", "drft"], "draft"),
+        (["generate", "-o", "out", "--without", "nosie"], "noise"),
+        (["generate", "-o", "out", "--set", "lenght=120"], "road.length"),
+        (["generate", "-o", "out", "--set", "devise=x"], "scan.device"),
+        (["generate", "-o", "out", "--set", "road.lenght=120"], "length"),
+        (["generate", "-o", "out", "--set", "fidelty=draft"], "fidelity"),
+        (["generate", "-o", "out", "--twin", "cityjsn"], "cityjson"),
+        (["twin", "road.json", "-o", "out", "--twin", "opendriv"], "opendrive"),
+        (["generate", "-o", "out", "--scenario", "rq31-60m"], "rq31-600m"),
+        (["generate", "-o", "out", "--device", "velodyne-vlp16"], "velodyne-vlp-16"),
+        (["list", "devicse"], "devices"),
+        (["list", "devices", "velodyne-vlp16"], "velodyne-vlp-16"),
+        pytest.param(["predict", "segmentation-overhed", "x.laz"], "segmentation-overhead", marks=NEEDS_TORCH),
+        (["dataset", "refernce", "-o", "out"], "reference"),
+    ],
+)
+def test_a_slip_of_the_keys_is_answered_by_what_was_meant(
+    words: list[str], meant: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "road.json").write_text(sample_road(RoadScenario(length=100.0), 1).to_json())
+    said = refusal(capsys, *words)
+    assert said.count("\n") == 1
+    assert f"(did you mean '{meant}'?)" in said
+    assert "the file" not in said
+
+
+def test_what_may_be_shortened_or_begins_like_an_option_is_taken() -> None:
+    parsed_arguments = parsed("generate", "--out", "x", "--set", "title=--not an option")
+    assert (parsed_arguments.output, parsed_arguments.changes) == (Path("x"), ["title=--not an option"])
+    assert parsed("cloud", "info", "--", "--strange-name.laz").file == Path("--strange-name.laz")
+
+
+def takes_numbers(action: argparse.Action) -> bool:
+    """Return whether an option's values are numbers, alone or with commas."""
+    with suppress(ValueError, TypeError, argparse.ArgumentTypeError):
+        return isinstance(action.type, Callable) and action.type("7") in (7.0, (7.0,))
+    with suppress(ValueError, TypeError, argparse.ArgumentTypeError):
+        return isinstance(action.type, Callable) and action.type("1,2,3") == (1.0, 2.0, 3.0)
+    return False
+
+
+NUMBERS = [
+    (name, action.option_strings[-1], action.nargs if isinstance(action.nargs, int) else 1)
+    for name, parser in PARSERS.items()
+    for action in parser._actions
+    if action.option_strings and takes_numbers(action)
+]
+
+
+@pytest.mark.parametrize(("name", "option", "count"), NUMBERS)
+def test_negative_numbers_are_values_in_every_notation(
+    name: str, option: str, count: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Whether an option takes the number is its own affair: none says that the number is missing."""
+    for text in ("-1e3", "-1E-3", "-.5", "-5.", "-1,2,3", "-inf"):
+        with suppress(SystemExit):
+            PARSERS[name].parse_args([option, *[text] * count])
+        assert "expected" not in (said := capsys.readouterr().err), said
+
+
+def test_options_with_negative_numbers_are_found() -> None:
+    assert {("cloud crop", "--heights", 2), ("calibrate", "--scanner", 1), ("calibrate", "--line", 1)} <= set(NUMBERS)
+    assert parsed("cloud", "crop", "a.laz", "-o", "b.laz", "--heights", "-1e3", "1e3").heights == [-1000.0, 1000.0]
+    assert parsed("cloud", "crop", "a.laz", "-o", "b.laz", "--box", "-1e3", "-2.5E2", "-0", "5e2").box[1] == -250.0

@@ -1,15 +1,20 @@
 """A road comes back from its cloud: the command on clouds thrown onto analytic roads, which know no Blender."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import laspy
 import numpy as np
 import pytest
+from pyproj import CRS
 
 from headless.cli import main
+from synthroads_addon.base.maps.crs import wkt
+from synthroads_addon.cloud.formats.registry import open_writer
 from synthroads_addon.reconstruction.comparison import compare_axis
-from synthroads_addon.road.centerline import read_axis
+from synthroads_addon.road.axes.centerline import read_axis
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import read_parameters
 from tests.helpers.clouds.road_clouds import cloud_of, road, write
@@ -87,3 +92,53 @@ def test_wrong_input_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[s
         assert message in said
         assert said.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+def in_feet(path: Path, output: Path, system: str, unit: float) -> Path:
+    """Write a cloud as others would have it in a system with another unit (m); return the path."""
+    las = laspy.read(path)
+    there = las.xyz / unit
+    las.change_scaling(scales=[1e-4] * 3, offsets=np.floor(there.min(axis=0)))
+    las.xyz = there
+    (record,) = las.header.vlrs.get("WktCoordinateSystemVlr")
+    record.string = CRS.from_user_input(system).to_wkt("WKT1_GDAL")
+    las.write(output)
+    return output
+
+
+@pytest.fixture(scope="module")
+def in_metres_and_feet(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Return folders of reconstructions from one cloud in California, in metres and in US survey feet."""
+    folder = tmp_path_factory.mktemp("units")
+    truth = road("RQ31", "EKA1A", 200.0, 4)
+    block = cloud_of(truth, 15.0, 4)
+    block = replace(block, xyz=block.xyz - block.xyz[0] + [1_900_000.0, 640_000.0, 150.0])
+    with open_writer(folder / "metres.las", None, block.xyz[0], 60_000.0, (), crs_text=wkt(26941, 5703)) as writer:
+        writer.write(block)
+    in_feet(folder / "metres.las", folder / "feet.las", "EPSG:2225+6360", 1200.0 / 3937.0)
+    for name in ("metres", "feet"):
+        words = ["reconstruct", str(folder / f"{name}.las"), "--output", str(folder / name), "--no-picture", "--quiet"]
+        assert main([*words, "--twin", "cityjson,opendrive,geojson"]) in (0, 3)
+    return {name: folder / name for name in ("metres", "feet")}
+
+
+def test_a_cloud_in_feet_gives_the_road_of_one_in_metres(in_metres_and_feet: dict[str, Path]) -> None:
+    lines = {name: read_axis(folder / "centerline.geojson") for name, folder in in_metres_and_feet.items()}
+    apart = np.interp(lines["feet"][:, 0], *lines["metres"][np.argsort(lines["metres"][:, 0])][:, :2].T)
+    assert np.abs(apart - lines["feet"][:, 1]).max() < 0.01
+
+
+@pytest.mark.parametrize("name", ["metres", "feet"])
+def test_both_codes_of_a_cloud_are_written_again(name: str, in_metres_and_feet: dict[str, Path]) -> None:
+    folder = in_metres_and_feet[name]
+    remarks = json.loads((folder / "reconstruction.json").read_text())["remarks"]
+    assert ["EPSG:2225" in remark and "metres" in remark for remark in remarks] == [True] * (name == "feet")
+    metadata = read_parameters(folder / "parameters.json").metadata
+    assert (metadata.epsg, metadata.height_epsg) == (26941, 5703)
+    for file in ("centerline.geojson", "twin.geojson"):
+        named = json.loads((folder / file).read_text())["crs"]["properties"]["name"]
+        assert named == "urn:ogc:def:crs,crs:EPSG::26941,crs:EPSG::5703"
+    about = json.loads((folder / "twin.city.json").read_text())["metadata"]
+    assert about["referenceSystem"].endswith("/26941")
+    assert about["heightReferenceSystem"].endswith("/5703")
+    assert 'code="height_epsg" value="5703"' in (folder / "twin.xodr").read_text()

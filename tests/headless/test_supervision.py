@@ -24,6 +24,7 @@ import sys; sys.argv = ["-m"]
 import argparse, ctypes, os, pathlib, signal, time
 from headless.commands import leave, run
 from synthroads_addon.base.files import output_folder
+from synthroads_addon.base.scratch.opened_file import being_opened
 
 def work(arguments):
     with output_folder(pathlib.Path("out"), [], False) as folder:
@@ -34,6 +35,8 @@ def work(arguments):
 leave(lambda: run(work, argparse.Namespace(json=False, quiet=False)))
 """
 EMBREE = "os.write(2, b'ERROR CAUGHT IN EMBREE\\nERROR: Unknown error\\nMESSAGE: pthread_create has failed\\n'); "
+OPENING = "with being_opened(pathlib.Path('scene.blend')): "
+CRASHED = "Blender crashed as it opened it (SIGSEGV); the file is damaged, or of another Blender: save it anew"
 SPEAK = "os.write(2, b'Warning: a\\nterminate called after throwing an instance of bad_alloc\\n what()\\n'); "
 
 
@@ -59,6 +62,12 @@ def nothing_is_left(folder: Path) -> bool:
         ("os.kill(os.getpid(), signal.SIGKILL)", 2, "error: too little memory (the work was ended by SIGKILL); "),
         (SPEAK + "os.abort()", 2, "Warning: a\nerror: too little memory (the work was ended by SIGABRT); "),
         (EMBREE + "ctypes.string_at(0)", 2, "error: too little memory (the work was ended by SIGSEGV); "),
+        (
+            OPENING + "ctypes.string_at(0)",
+            2,
+            f"error: scene.blend: {CRASHED}; ",
+        ),
+        (OPENING + "pass\n        ctypes.string_at(0)", 1, "error: a defect of a library ended the work (SIGSEGV); "),
         ("ctypes.string_at(0)", 1, "error: a defect of a library ended the work (SIGSEGV); "),
     ],
 )

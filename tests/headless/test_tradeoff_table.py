@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from headless import commands
 from headless.tradeoff_table import TABLES, better_row, markdown, time_noise
 from synthroads_addon.jobs.measure.tradeoff import KNOBS, knob_rows, row_scenario
 from synthroads_addon.scanning.platforms.path import Strip
@@ -108,3 +111,63 @@ def test_stretches_are_spread_over_each_strip(count: int, duration: float) -> No
     time = part.strips[-1].start_time + np.arange(3.0)
     for mine, all_of_it in zip(part.pose(part.strips[-1], time), path.pose(path.strips[1], time), strict=True):
         np.testing.assert_array_equal(mine, all_of_it)
+
+
+def _kept(**more: Any) -> dict[str, Any]:
+    return _row("caster", "embree", errors={"height_mm": 2.5}, all_seconds=[12.0, 12.34], machine="m") | more
+
+
+@pytest.mark.parametrize(
+    ("row", "said"),
+    [
+        (None, "row: must be an object with the knob caster and the value embree"),
+        (3, "row: must be an object"),
+        ([], "row: must be an object"),
+        ({}, "row: must be an object"),
+        (_kept(value="bvhtree"), "row: must be an object"),
+        ({name: value for name, value in _kept().items() if name != "seconds"}, "seconds must be a number from 0"),
+        (_kept(seconds="12"), "seconds must be a number from 0"),
+        (_kept(seconds=None), "seconds must be a number from 0"),
+        (_kept(model_seconds=[]), "model_seconds must be a number from 0"),
+        (_kept(triangles=1.5), "triangles must be a whole number from 0"),
+        (_kept(triangles=7.0), "triangles must be a whole number from 0"),
+        (_kept(triangles=-1), "triangles must be a whole number from 0"),
+        (_kept(errors=[]), "errors must be numbers by name"),
+        (_kept(errors={"height_mm": None}), "errors must be numbers by name"),
+        (_kept(errors={"weight": 1.0}), "errors must be numbers by name"),
+        (_kept(shares={"image": "all"}), "shares must be numbers by name"),
+        (_kept(all_seconds=3.0), "all_seconds must be a list of numbers above 0"),
+        (_kept(all_seconds=[0.0, 0.0]), "all_seconds must be a list of numbers above 0"),
+        (_kept(machine=["m"]), "machine must be a text"),
+    ],
+)
+def test_a_damaged_row_is_one_line(
+    tmp_path: Path, row: Any, said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def measured(scene: str, knob: str, value: Any) -> dict[str, Any]:
+        return _row(knob, value, errors={"height_mm": 2.5})
+
+    monkeypatch.setattr("headless.tradeoff._measured_once", measured)
+    words = ["--scenario", "rq31-600m", "--output", str(tmp_path), "--knobs", "caster", "--resume", "--quiet"]
+    assert commands.command("tradeoff", words) == 0
+    file = tmp_path / "rows" / "rq31-600m" / "caster-embree.json"
+    data = json.loads(file.read_text())
+    file.write_text(json.dumps(data | {"row": _kept()}))
+    assert commands.command("tradeoff", words) == 0, "a sound one is kept"
+    assert json.loads((tmp_path / "rq31-600m.json").read_text())["rows"][-1] == _kept()
+    capsys.readouterr()
+    file.write_text(json.dumps(data | {"row": row}))
+    assert commands.command("tradeoff", words) == 2
+    line, *others = capsys.readouterr().err.splitlines()
+    assert not others
+    assert said in line
+    assert str(file) in line
+    file.write_text(json.dumps([row]))
+    assert commands.command("tradeoff", words) == 2
+    assert "must be an object with the knob caster" in capsys.readouterr().err
+
+
+def test_a_row_that_lacks_an_error_is_not_as_accurate() -> None:
+    whole, part = _preset("a", 100.0, 3.0, 0.2), _preset("b", 10.0, 3.0)
+    assert better_row(whole, [part], 0.0) is None
+    assert better_row(part, [whole], 0.0) is None

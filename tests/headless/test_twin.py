@@ -8,13 +8,18 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from headless import cli
+from headless.twin import forecast
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.scenario.road import RoadScenario
 from synthroads_addon.scenario.scenario import Scenario, load_scenario
 from synthroads_addon.twin import formats as twin
 from tests.helpers.roads.twin_roads import one_of_many
+from tests.judges.registry import require
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -112,3 +117,62 @@ def test_generate_writes_the_twin_without_a_scene(tmp_path: Path) -> None:
         "twin.city.json",
     ]
     assert "twin" in report["stages"]
+
+
+def test_long_models_are_announced_with_time_and_size() -> None:
+    assert forecast(1000.0, ["ifc", "geojson"]) == ""
+    said = forecast(50_000.0, ["ifc"])
+    assert said.startswith("models of 50 km (ifc) take about 3 min and 215 MB")
+
+
+def test_the_progress_of_an_ifc_model_grows_in_small_steps(tmp_path: Path) -> None:
+    require("ifcopenshell")
+    told: list[tuple[str, float]] = []
+    twin.write_twin(
+        sample_road(RoadScenario(length=300.0), 1),
+        tmp_path,
+        ["geojson", "ifc"],
+        0.02,
+        progress=lambda stage, share: told.append((str(stage), share)),
+    )
+    shares = np.array([share for _, share in told])
+    assert {stage for stage, _ in told} == {"GeoJSON", "IFC"}
+    assert (np.diff(shares) >= -1e-9).all()
+    assert len(set(shares.round(3).tolist())) > 30
+    assert np.diff(shares[:-1]).max() < 0.2
+    assert shares[-1] > 0.75
+
+
+def test_a_job_tells_how_far_its_models_are(tmp_path: Path) -> None:
+    require("ifcopenshell")
+    from synthroads_addon.jobs.generate import Job, generate
+
+    told: list[tuple[str, str, float]] = []
+
+    def tell(stage: str, share: float) -> None:
+        told.append((str(stage), getattr(stage, "detail", ""), share))
+
+    scenario = load_scenario("rq31-600m", ["outputs=[]", 'twin=["geojson","ifc"]', "road.length=300"])
+    generate(Job(scenario, tmp_path), tell)
+    shares = [share for stage, _, share in told if stage == "twin"]
+    assert {detail for stage, detail, _ in told if stage == "twin"} >= {"GeoJSON", "IFC"}
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+    assert len({round(share, 3) for share in shares}) > 30
+
+
+def test_reconstruction_tells_how_far_its_models_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of the road that was found, after the stages of finding it."""
+    from headless import reconstruct
+    from tests.helpers.clouds.road_clouds import cloud_of, road, write
+
+    told: list[tuple[str, str]] = []
+    monkeypatch.setattr(
+        reconstruct,
+        "progress_bar",
+        lambda _: lambda stage, share: told.append((str(stage), getattr(stage, "detail", ""))),
+    )
+    cloud = write(tmp_path / "cloud.laz", cloud_of(road("RQ31", "EKA1A", 120.0, 4), 4.0, 4))
+    words = ["--output", str(tmp_path / "out"), "--twin", "geojson", "--no-picture"]
+    assert cli.main(["reconstruct", str(cloud), *words]) in (0, 3)
+    assert told[-1] == ("twin", "GeoJSON")

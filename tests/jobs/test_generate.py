@@ -14,7 +14,9 @@ import pytest
 from headless import commands
 from headless.generate import summary
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.maps.crs import MapSystem
 from synthroads_addon.blender.services import BlenderServices
+from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.cloud.points import concatenate
 from synthroads_addon.jobs.generate import Job, generate
 from synthroads_addon.jobs.job_files import FILES
@@ -24,6 +26,7 @@ from synthroads_addon.road.instances import InstanceNumbers
 from synthroads_addon.road.parameters import read_parameters
 from synthroads_addon.scenario.scenario import load_scenario
 from tests.helpers.label_truth import misplaced_points
+from tests.helpers.logged import logged
 from tests.helpers.scenes.scan_scenes import emit_pulses, scan_block
 
 ROOT = Path(__file__).parents[2]
@@ -54,6 +57,50 @@ def test_a_road_that_no_pulse_comes_back_from_is_told(tmp_path: Path) -> None:
     assert report["counts"]["points"] == 0
     assert "not one pulse came back" in json.loads((tmp_path / "report.json").read_text())["warnings"][0]
     assert summary(report, tmp_path).startswith("warning: not one pulse came back")
+
+
+@pytest.mark.parametrize(
+    ("change", "codes"), [("road.height_epsg=7837", (25832, 7837)), ("road.epsg=5555", (25832, 5783))]
+)
+def test_clouds_name_what_heights_are_counted_in(change: str, codes: tuple[int, int], tmp_path: Path) -> None:
+    files = 'cloud.formats=["laz","ply","npz"]'
+    generate(job(tmp_path, "road.length=20", change, files, 'outputs=["cloud","centerline"]'))
+    for name in ("cloud.laz", "cloud.ply", "cloud.npz"):
+        with open_cloud(tmp_path / name) as cloud:
+            assert (cloud.header.epsg, cloud.header.height_epsg) == codes
+    named = json.loads((tmp_path / "centerline.geojson").read_text())["crs"]["properties"]["name"]
+    system = MapSystem.read(named)
+    assert (system.epsg, system.height_epsg) == codes
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("road.height_epsg=25833", "road.height_epsg is 25833: must be the EPSG code of a vertical"),
+        ("road.epsg=4326", "road.epsg is 4326: must be a projected system, whose coordinates are metres"),
+        ("road.epsg=2225", "road.epsg is 2225: must have coordinates in metres, as EPSG:26941 has"),
+        ("road.epsg=7837", "road.epsg is 7837: .*heights alone"),
+    ],
+)
+def test_systems_that_no_road_can_be_in_are_refused(change: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=said):
+        generate(job(tmp_path / "out", change))
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_map_origin_in_another_country_is_told(tmp_path: Path) -> None:
+    with logged() as messages:
+        report = generate(job(tmp_path / "out", "road.length=20", "road.epsg=2056", 'outputs=["parameters"]'))
+    assert ["lies outside of the area that EPSG:2056 is meant for" in message for message in messages] == [True]
+    assert report["remarks"] == messages
+    assert json.loads((tmp_path / "out/report.json").read_text())["remarks"] == messages
+
+
+def test_a_report_has_the_remarks_of_its_own_job_alone(tmp_path: Path) -> None:
+    reports = []
+    for number, change in enumerate(("road.epsg=2056", "road.epsg=25832")):
+        reports.append(generate(job(tmp_path / str(number), "road.length=20", change, 'outputs=["parameters"]')))
+    assert [len(report["remarks"]) for report in reports] == [1, 0]
 
 
 def test_every_file_is_written_and_agrees(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,9 +6,7 @@ import json
 import os
 import random
 import signal
-import subprocess
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,8 +15,9 @@ from typing import Any
 import pytest
 
 from synthroads_addon.dataset.manifest import faults, read_manifest
+from tests.helpers.ended_commands import run_until
 from tests.jobs.test_dataset import content, recipe_file
-from tests.jobs.test_faults import ROOT, check_whole, command, files, inputs
+from tests.jobs.test_faults import check_whole, command, files, inputs
 
 pytestmark = [
     pytest.mark.slow,
@@ -88,18 +87,6 @@ def disturbed_job(kind: str, inputs: Path, folder: Path, output: Path) -> Distur
     return DisturbedJob(words, output, True, trainings.check_whole, trainings.outcome)
 
 
-def run_until(arguments: list[str], after: float, sign: signal.Signals | None) -> tuple[int, str, float]:
-    """Run a command and send it a signal after some seconds; return exit code, what it said, and how long it took."""
-    hearing = ["env", "--default-signal=INT,HUP", *arguments]  # a shell's background jobs are deaf to interrupts
-    begun = time.monotonic()
-    with subprocess.Popen(hearing, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True) as process:
-        if sign is not None:
-            time.sleep(after)
-            process.send_signal(sign)
-        _, said = process.communicate(timeout=600)
-    return process.returncode, said, time.monotonic() - begun
-
-
 @pytest.mark.parametrize("kind", ["generate", "scan", "twin", "dataset", "train"])
 def test_killed_at_any_moment(kind: str, inputs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """KILL_SEED=N kills at other moments than usual."""
@@ -108,7 +95,8 @@ def test_killed_at_any_moment(kind: str, inputs: Path, tmp_path: Path, monkeypat
         (tmp_path / name).mkdir()
     monkeypatch.setenv("TMPDIR", str(tmp_path / "temporary"))
     whole = disturbed_job(kind, inputs, tmp_path / "inputs", tmp_path / "whole")
-    code, said, seconds = run_until(whole.arguments(0), 0.0, None)
+    undisturbed = run_until(whole.arguments(0), 0.0, None)
+    code, said, seconds = undisturbed.code, undisturbed.said, undisturbed.seconds
     assert code == 0, said
     wanted = whole.outcome(whole.output)
     job = DisturbedJob(
@@ -121,7 +109,8 @@ def test_killed_at_any_moment(kind: str, inputs: Path, tmp_path: Path, monkeypat
     for number, sign in enumerate(signs):
         if sum(code != 0 for _, code in codes) == KILLS:
             break
-        code, said, _ = run_until(job.arguments(number), rng.uniform(0.1, 1.0) * seconds, sign)
+        ended = run_until(job.arguments(number), rng.uniform(0.1, 1.0) * seconds, sign)
+        code, said = ended.code, ended.said
         codes.append((sign.name, code))
         assert code in (0, 130, -sign), (sign, code, said)
         assert "Traceback" not in said, said
@@ -129,7 +118,8 @@ def test_killed_at_any_moment(kind: str, inputs: Path, tmp_path: Path, monkeypat
         if code == 0:  # the machine has become faster meanwhile
             seconds *= 0.8
     assert sum(code != 0 for _, code in codes) == KILLS, codes
-    code, said, _ = run_until(job.arguments(1), 0.0, None)
+    last = run_until(job.arguments(1), 0.0, None)
+    code, said = last.code, last.said
     assert code == 0, said
     assert job.outcome(job.output) == wanted
     assert list((tmp_path / "temporary").iterdir()) == []

@@ -13,13 +13,17 @@ import laspy
 import numpy as np
 import pytest
 
+from headless.cli import main
 from headless.commands import command
 from synthroads_addon.base.classes import class_id
+from synthroads_addon.base.remarks import collected_remarks
+from synthroads_addon.blender.files import empty_file
 from synthroads_addon.blender.model.build import build_road
 from synthroads_addon.blender.model.store import remember
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.blender.scene.foreign import open_scene
 from synthroads_addon.cloud.formats.registry import open_cloud
+from synthroads_addon.jobs.open_scene import ForeignScene
 from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.sampling.road import sample_road
@@ -108,7 +112,7 @@ def test_scenes_of_others_are_scanned_with_their_classes(
     before = file.read_bytes()
     las = scan(file, tmp_path / "out", "--height", "30", "--classes", mapping)
     assert file.read_bytes() == before
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["cloud.laz", "report.json"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["classes.json", "cloud.laz", "report.json"]
     label, xyz = np.array(las.class_id), las.xyz
     assert set(np.unique(label)) == {class_id("road"), class_id("pole"), 255}
     floor = xyz[label == class_id("road")]
@@ -119,13 +123,52 @@ def test_scenes_of_others_are_scanned_with_their_classes(
     assert np.abs(np.abs(pillars[:, 0]) - 10.0).max() < 1.002
     thing = xyz[label == 255]
     assert np.linalg.norm(thing[:, :2] - [0.0, -4.0], axis=1).max() < np.sqrt(2.0) + 0.002
+    open_classes = tmp_path / "out" / "classes.json"
+    assert set(json.loads(open_classes.read_text())["objects"].values()) == {""}
     for kind in (floor, pillars, thing):
         assert len(kind) > 100
     assert len(np.unique(las.instance_id)) == 4
     assert report(tmp_path / "out")["warnings"] == [
         f"{mapping}: nothing in the scene is named as in materials: Nothing*",
-        f"{len(thing):,} points have no class",
+        f"{len(thing):,} points have no class: fill in {open_classes} and scan with --classes {open_classes}",
     ]
+
+
+def test_what_has_no_class_is_said_before_the_scan_with_a_file_to_fill_in(
+    scene: Callable[[str], Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, output = scene(".blend"), tmp_path / "out"
+    words = ["scan", str(file), "--output", str(output), *DRAFT, "--height", "30"]
+
+    def stopped(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(ForeignScene, "scan", stopped)
+        assert main(words) == 130
+    said = capsys.readouterr().err
+    assert "warning: 4 of 4 objects have no class, and their points will have none: " in said
+    assert "objects Floor, Pillar.*, Thing; materials Tar" in said
+    assert f"Fill in {output / 'classes.json'} and scan with --classes {output / 'classes.json'}" in said
+    classes = json.loads((output / "classes.json").read_text())
+    assert classes == {
+        "objects": {"Floor": "", "Pillar.*": "", "Thing": ""},
+        "materials": {"Tar": ""},
+        "collections": {},
+    }
+    classes["objects"] |= {"Floor": "road", "Pillar.*": "pole"}  # one is left open
+    (output / "classes.json").write_text(json.dumps(classes))
+    assert main([*words, "--classes", str(output / "classes.json")]) == 0
+    said = capsys.readouterr().err
+    assert "warning: 1 of 4 objects have no class" in said
+    assert "none: objects Thing. Fill in " in said
+    las = laspy.read(output / "cloud.laz")
+    assert set(np.unique(np.array(las.class_id))) == {class_id("road"), class_id("pole"), 255}
+    assert json.loads((output / "classes.json").read_text()) == classes, "what was filled in stays"
+    classes["objects"]["Thing"] = "utility"
+    (output / "classes.json").write_text(json.dumps(classes))
+    assert main([*words, "--classes", str(output / "classes.json"), "--overwrite"]) == 0
+    assert "no class" not in "".join(capsys.readouterr())
 
 
 @pytest.mark.parametrize("suffix", [".ply", ".stl"])
@@ -133,6 +176,63 @@ def test_single_meshes_are_scanned(suffix: str, scene: Callable[[str], Path], tm
     las = scan(scene(suffix), tmp_path / "out", "--height", "30")
     assert np.isclose(np.median(las.z), 1.0, atol=0.002)
     assert np.isclose(las.z.max(), 4.0, atol=0.002)
+
+
+def labelled_ply(path: Path, kind: str, names: tuple[str, str]) -> Path:
+    """Write two squares of class 3 and 5 at heights 0 and 4, their labels being properties of the vertices."""
+    rows = np.zeros(8, dtype=[(axis, "<f4") for axis in "xyz"] + [(names[0], kind), (names[1], "<i4")])
+    for number, (x, label, instance) in enumerate(((-6.0, 3, 70), (6.0, 5, 80))):
+        square = rows[4 * number : 4 * number + 4]
+        square["x"], square["y"] = x + np.array([-4, 4, 4, -4]), [-4, -4, 4, 4]
+        square["z"], square[names[0]], square[names[1]] = 4 * number, label, instance
+    words = {"<f4": "float", "u1": "uchar", "<i4": "int"}
+    head = ["ply", "format binary_little_endian 1.0", "element vertex 8", *(f"property float {axis}" for axis in "xyz")]
+    head += [f"property {words[kind]} {names[0]}", f"property int {names[1]}", "element face 2"]
+    head += ["property list uchar int vertex_indices", "end_header", ""]
+    faces = np.array([(4, (0, 1, 2, 3)), (4, (4, 5, 6, 7))], dtype=[("n", "u1"), ("of", "<i4", 4)])
+    path.write_bytes("\n".join(head).encode() + rows.tobytes() + faces.tobytes())
+    return path
+
+
+@pytest.mark.parametrize("kind", ["u1", "<i4", "<f4"])
+@pytest.mark.parametrize("prefix", ["", "scalar_"])
+def test_labels_of_a_ply_meshs_vertices_are_those_of_its_faces(tmp_path: Path, prefix: str, kind: str) -> None:
+    open_scene(labelled_ply(tmp_path / "a.ply", kind, (f"{prefix}class_id", f"{prefix}instance_id")))
+    mesh = scene_mesh()
+    height = mesh.vertices[mesh.triangles[:, 0], 2] + mesh.origin[2]
+    assert set(mesh.class_id[height < 2]) == {3}
+    assert set(mesh.class_id[height > 2]) == {5}
+    assert set(mesh.instance_id[height > 2]) == {80}
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".gltf"])
+@pytest.mark.parametrize("name", ["_CLASS_ID", "_class_id"])
+@pytest.mark.parametrize("kind", ["INT", "FLOAT"])
+def test_labels_of_gltf_are_read(tmp_path: Path, name: str, kind: str, suffix: str) -> None:
+    primitives()
+    for item in bpy.data.objects:
+        attribute = item.data.attributes.new(name, kind, "POINT")
+        attribute.data.foreach_set("value", [7 if "Pillar" in item.name else 1] * len(item.data.vertices))
+    path = tmp_path / f"yard{suffix}"
+    form = "GLB" if suffix == ".glb" else "GLTF_SEPARATE"
+    bpy.ops.export_scene.gltf(filepath=str(path), export_format=form, export_attributes=True)
+    open_scene(path)
+    mesh = scene_mesh()
+    east = np.abs((mesh.vertices[mesh.triangles[:, 0]] + mesh.origin)[:, 0])
+    assert set(mesh.class_id) == {1, 7}
+    assert (mesh.class_id[(east > 8.5) & (east < 11.5)] == 7).all()
+
+
+def test_a_face_between_classes_is_told(tmp_path: Path) -> None:
+    path = labelled_ply(tmp_path / "a.ply", "u1", ("class_id", "instance_id"))
+    data = bytearray(path.read_bytes())
+    data[data.index(b"end_header") + 11 + 12] = 9  # the first vertex's class
+    path.write_bytes(bytes(data))
+    open_scene(path)
+    with collected_remarks() as remarks:
+        mesh = scene_mesh()
+    assert set(mesh.class_id) == {9, 5}
+    assert remarks == ["a: 1 faces have vertices of several class_id: the first vertex's is taken"]
 
 
 @pytest.mark.parametrize(("up", "flat"), [("y", False), ("z", True), (None, False)])
@@ -152,7 +252,7 @@ def test_pictures_come_with_the_cloud_and_colours_are_rendered(
     usual = ("--set", 'outputs=["cloud","previews"]', "--set", "colour.source=images", *coarse)
     las = scan(scene(".blend"), tmp_path / "out", "--height", "30", *usual)
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
-        "cloud.laz", "preview_class.png", "preview_intensity.png", "preview_rgb.png", "report.json"
+        "classes.json", "cloud.laz", "preview_class.png", "preview_intensity.png", "preview_rgb.png", "report.json"
     ]  # fmt: skip
     assert report(tmp_path / "out")["counts"]["rendered"]["images"] > 0
     assert las.red.std() > 0
@@ -355,7 +455,7 @@ CHANGES: dict[str, Callable[[], object]] = {
 
 
 @pytest.mark.parametrize("change", CHANGES)
-def test_the_digest_notices(change: str) -> None:
+def test_the_digest_remarks(change: str) -> None:
     furnish()
     before = digest()
     assert digest() == before
@@ -501,3 +601,86 @@ def test_it_is_a_command_of_its_own(words: list[str], scene: Callable[[str], Pat
     done = subprocess.run(command_line, cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["counts"] == report(tmp_path / "out")["counts"]
+
+
+def in_units(path: Path, unit: float, system: str = "METRIC", spread: float | None = None) -> Path:
+    """Write a floor of 40 m by 20 m, one slanted side of a card above it and a box that drives, in units of a length.
+
+    Bands of the floor are bright by the place in the world, those of the card clear by that of the object.
+
+    Args:
+        path: of the .blend file.
+        unit: its unit, m.
+        system: of units.
+        spread: how many of its units a metre is; those that the unit says if None.
+    """
+    size = 1.0 / unit if spread is None else spread
+    empty_file()
+    bpy.context.scene.unit_settings.system, bpy.context.scene.unit_settings.scale_length = system, unit
+    bpy.ops.mesh.primitive_plane_add(size=size)
+    floor = bpy.context.object
+    floor.scale = (40.0, 20.0, 1.0)
+    banded(floor, "ShaderNodeNewGeometry", "Position", 1.0 / size, "Base Color")
+    bpy.ops.mesh.primitive_plane_add(size=1.0, location=(0.0, 6.0 * size, 3.0 * size), rotation=(0.3, 0.0, 0.0))
+    card = bpy.context.object
+    card.scale = (8.0 * size, 4.0 * size, 1.0)
+    banded(card, "ShaderNodeTexCoord", "Object", 8.0, "Alpha")
+    bpy.ops.mesh.primitive_cube_add(size=size, location=(-10.0 * size, -5.0 * size, 1.0 * size), scale=(2.0, 2.0, 1.0))
+    bpy.context.object["synthroads_velocity"] = (1.0, 0.0, 0.0)
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def banded(item: bpy.types.Object, node: str, output: str, per_unit: float, socket: str) -> None:
+    """Give an object a material of which an input is 1 in every other metre along x, else 0, by a node's place."""
+    material = bpy.data.materials.new(item.name)
+    material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    source, parts = nodes.new(node), nodes.new("ShaderNodeSeparateXYZ")
+    share, dark = nodes.new("ShaderNodeMath"), nodes.new("ShaderNodeMath")
+    scaled, share.operation, dark.operation = nodes.new("ShaderNodeMath"), "PINGPONG", "GREATER_THAN"
+    scaled.operation = "MULTIPLY"
+    scaled.inputs[1].default_value, share.inputs[1].default_value, dark.inputs[1].default_value = per_unit, 1.0, 0.5
+    links.new(source.outputs[output], parts.inputs[0])
+    links.new(parts.outputs[0], scaled.inputs[0])
+    links.new(scaled.outputs[0], share.inputs[0])
+    links.new(share.outputs[0], dark.inputs[0])
+    links.new(dark.outputs[0], nodes["Principled BSDF"].inputs[socket])
+    item.data.materials.append(material)
+
+
+@pytest.mark.parametrize("unit", [0.01, 0.3048, 1000.0])
+def test_a_unit_that_a_file_declares_is_used(unit: float, tmp_path: Path) -> None:
+    """The cloud of the scene in metres comes back: places, colours and transparency by place, what drives."""
+    clouds = {}
+    for name, one in (("metres", 1.0), ("units", unit)):
+        file = in_units(tmp_path / f"{name}.blend", one)
+        clouds[name] = scan(file, tmp_path / name, "--height", "30", "--set", "colour.source=nodes")
+    metres, units = clouds["metres"], clouds["units"]
+    assert np.ptp(metres.x) > 39.0
+    assert abs(len(metres.points) - len(units.points)) < 0.001 * len(metres.points)
+    same, apart = np.intersect1d(*(np.asarray(cloud.gps_time) for cloud in (metres, units)), return_indices=True)[1:]
+    assert len(same) > 0.99 * len(metres.points)
+    assert np.percentile(np.abs(metres.xyz[same] - units.xyz[apart]), 99.9) < 0.005
+    bright, found = (np.asarray(cloud.red) > 20_000 for cloud in (metres, units))
+    assert 0.2 < bright.mean() < 0.8
+    assert (bright[same] == found[apart]).mean() > 0.99
+    driven = {name: cloud.xyz[(cloud.z > 0.1) & (cloud.y < -3.0)] for name, cloud in clouds.items()}
+    assert len(driven["metres"]) > 5
+    assert driven["units"].mean(axis=0) == pytest.approx(driven["metres"].mean(axis=0), abs=0.05)
+    high = {name: ((cloud.z > 1.7) & (cloud.y > 3.0)).sum() for name, cloud in clouds.items()}
+    assert high["metres"] > 50
+    assert high["units"] == pytest.approx(high["metres"], abs=2)
+
+
+def test_without_a_system_of_units_a_unit_is_a_metre(tmp_path: Path) -> None:
+    las = scan(in_units(tmp_path / "none.blend", 0.01, "NONE", 1.0), tmp_path / "out", "--height", "30")
+    assert np.ptp(las.x) > 39.0
+
+
+def test_a_scene_in_other_units_is_not_rendered(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = in_units(tmp_path / "small.blend", 0.01)
+    words = [str(file), "--output", str(tmp_path / "out"), "--height", "30", "--fidelity", "draft", "--quiet"]
+    assert command("scan", [*words, "--set", "colour.source=images"]) == 2
+    assert "colour.source is 'images': can't render a scene whose unit is 0.01 m: take nodes" in capsys.readouterr().err
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["classes.json"]

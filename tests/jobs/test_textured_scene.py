@@ -114,7 +114,7 @@ def test_an_error_while_others_wait_to_be_rendered_ends_the_scan(
     monkeypatch.setattr(CloudFiles, "write", fail)
     shaded_scene(tmp_path)
     with pytest.raises(ZeroDivisionError):
-        scanned(tmp_path / "out", None, *SHORT, "scan.threads=3")
+        scanned(tmp_path / "out", None, *SHORT, "scan.threads=3", "scan.kernels=off")
 
 
 @pytest.mark.slow

@@ -60,9 +60,9 @@ def plyfile_verdict(samples: Samples) -> list[str]:
     points = samples.points
     exact = {
         "red": (vertex["red"], points.rgb[:, 0] >> 8),
-        "class_id": (vertex["class_id"], points.class_id),
-        "instance_id": (vertex["instance_id"], points.instance_id),
-        "gps_time": (vertex["gps_time"], points.gps_time),
+        "class_id": (vertex["scalar_class_id"], points.class_id),
+        "instance_id": (vertex["scalar_instance_id"], points.instance_id),
+        "gps_time": (vertex["scalar_gps_time"], points.gps_time),
     }
     return _compared(samples, np.stack([vertex[axis] for axis in "xyz"], axis=1), 0.0, exact)
 

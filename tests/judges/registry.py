@@ -78,7 +78,8 @@ class Judge:
 def _requirements() -> dict[str, list[Requirement]]:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     found: dict[str, list[Requirement]] = {}
-    for text in (text for extra in EXTRAS for text in project["optional-dependencies"][extra]):
+    brought = [text for extra in EXTRAS for text in project["optional-dependencies"][extra]]
+    for text in (*project["dependencies"], *brought):
         found.setdefault(canonicalize_name(Requirement(text).name), []).append(Requirement(text))
     return found
 

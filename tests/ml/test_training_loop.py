@@ -142,7 +142,7 @@ def test_a_run_is_not_lost_by_mistake(tmp_path: Path) -> None:
         Run.start(tmp_path, configuration(seed=9), resume=True)
     Run.start(tmp_path, configuration().model_copy(update={"threads": 2}), resume=True)
     assert (tmp_path / CHECKPOINT).exists()
-    Run.start(tmp_path, configuration(seed=9), overwrite=True)
+    Run.start(tmp_path, configuration(seed=9), overwrite=True).begin()
     assert not (tmp_path / CHECKPOINT).exists()
 
 

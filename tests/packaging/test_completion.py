@@ -30,6 +30,7 @@ FILES = ("mine.json", "scene.glb", "recipe.yaml", "clouds")
 CASES = {
     "gen": {"generate"},
     "re": {"reconstruct"},
+    "ro": {"road"},
     "generate --fi": {"--fidelity"},
     "generate -": {"-o", "--output", "-s", "--seed", "-v", "--verbose", "--json", "-h", "--help"},
     "generate --fidelity ": {"draft", "standard", "high"},
@@ -135,5 +136,5 @@ def test_without_the_package_it_is_one_line(
     with pytest.raises(SystemExit) as ended:
         main(["--print-completion", "bash"])
     assert ended.value.code == 2
-    wanted = "synthroads: argument --print-completion: needs the package shtab: pip install shtab\n"
+    wanted = "error: the package shtab is missing: run pip install 'synthroads[blender]'\n"
     assert capsys.readouterr() == ("", wanted)

@@ -40,7 +40,7 @@ from tests.packaging.docs_pages import (
     modules,
     saved_files,
 )
-from tools.reference_pages import FILES, GENERATED, MARK, filled, generated
+from tools.reference_pages import FILES, GENERATED, MARK, filled, generated, stale_pages
 
 README = ROOT / "README.md"
 CHANGELOG = ROOT / "CHANGELOG.md"
@@ -290,6 +290,13 @@ def test_generated_parts_say_what_everything_is(name: str) -> None:
     assert all(f"](#{target})" not in text or target in anchors(text) for target in re.findall(r"\]\(#([^)]+)\)", text))
 
 
+@pytest.mark.first_python
+def test_the_reference_is_what_the_code_says() -> None:
+    """`python tools/reference_pages.py` writes it anew."""
+    pytest.importorskip("torch")
+    assert [path.name for path in stale_pages()] == []
+
+
 def test_the_reference_of_commands_has_all_of_them() -> None:
     assert set(COMMANDS) <= {heading.strip() for heading in re.findall(r"(?m)^# (.*)$", generated("commands"))}
 
@@ -302,7 +309,8 @@ def test_the_reference_of_commands_shows_no_option_that_help_hides() -> None:
 
 
 def test_headings_of_generated_parts_lie_below_the_one_before() -> None:
-    page = "# Page\n\n## Recipes\n\n<!-- generated: fields-recipe -->\n"
+    page = "# Page\n\n## Recipes\n\n<!-- generated: fields-recipe -->\n<!-- end: fields-recipe -->\n"
+    assert filled(filled(page)) == filled(page)
     assert [line for line in filled(page).splitlines() if line.startswith("#")][:3] == [
         "# Page",
         "## Recipes",

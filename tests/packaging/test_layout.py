@@ -36,7 +36,7 @@ def test_nothing_lies_loose_in_the_add_on() -> None:
     assert [path.name for path in (ROOT / "synthroads_addon").glob("*.py")] == ["__init__.py"]
 
 
-ABOUT_ALL = ("cluster", "fuzz", "helpers", "judges", "packaging", "robustness")
+ABOUT_ALL = ("cluster", "doors", "fuzz", "helpers", "judges", "packaging", "robustness")
 """Folders of tests that are about no folder of the source; those in `jobs` need Blender."""
 
 

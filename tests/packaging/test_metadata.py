@@ -13,7 +13,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 import noxfile
-from tools.build_extension import EXTENSIONS
+from tools.build_extension import EXTENSIONS, read_wheel_list
 
 ROOT = Path(__file__).resolve().parents[2]
 MANIFEST = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
@@ -117,6 +117,13 @@ def test_locks_hold_versions_in_the_ranges(name: str, python: str) -> None:
 def test_locks_of_bundled_wheels_are_of_the_listed_versions() -> None:
     lines = [line for extension in EXTENSIONS for line in _locked(extension.lock)]
     assert {canonicalize_name(line.name): str(next(iter(line.specifier)).version) for line in lines} == PINS
+
+
+def test_extensions_bring_one_version_of_what_they_share() -> None:
+    """Blender unpacks the wheels of all extensions into one folder."""
+    lines = {line for extension in EXTENSIONS for line in read_wheel_list(extension.wheel_list)}
+    names = [canonicalize_name(Requirement(line).name) for line in lines]
+    assert len(names) == len(set(names)), sorted(lines)
 
 
 def test_no_lock_names_where_packages_come_from() -> None:

@@ -21,7 +21,7 @@ from synthroads_addon.reconstruction.lines import Line
 from synthroads_addon.reconstruction.path import CloudPath
 from synthroads_addon.reconstruction.profiles import Profiles
 from synthroads_addon.reconstruction.reconstruct import Reconstruction, reconstruct
-from synthroads_addon.road.centerline import read_axis
+from synthroads_addon.road.axes.centerline import read_axis
 from synthroads_addon.road.geometry import RoadGeometry
 from tests.helpers.clouds.road_clouds import block_of, write
 

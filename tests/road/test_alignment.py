@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import time
 import tracemalloc
 
 import numpy as np
@@ -16,6 +15,7 @@ from scipy.special import fresnel
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.road.alignment import Alignment, Element, clip_offset, running_sum
+from tests.helpers.relative_speed import quiet_seconds
 
 
 def chain(*rows: tuple[float, float, float]) -> list[Element]:
@@ -329,9 +329,8 @@ def test_a_million_points_in_two_seconds_and_bounded_memory() -> None:
     alignment = Alignment(mixed_elements())
     s = rng.uniform(0.0, alignment.length, 1_000_000)
     points = left_of(alignment, s, rng.uniform(-35.0, 35.0, s.size))
-    start = time.process_time()
+    assert quiet_seconds(lambda: alignment.project(points)) < 2.0
     station, _ = alignment.project(points)
-    assert time.process_time() - start < 2.0
     assert np.mean(np.abs(station - s) < 1e-6) > 0.999
     tracemalloc.start()
     alignment.project(points)

@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from synthroads_addon.road.damage import damage_columns, damage_depth, damaged_strips, deepest_damage, space_shares
+from synthroads_addon.road.damage import (
+    damage_columns,
+    damage_depth,
+    damaged_strips,
+    deepest_damage,
+    space_shares,
+)
 from synthroads_addon.road.section import Carriageway, CrossfallPoint, Lane, Pavement, Pothole, Rut
 from synthroads_addon.road.section_geometry import CarriagewaySection
 

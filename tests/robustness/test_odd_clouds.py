@@ -118,7 +118,7 @@ def test_the_gate_names_the_point(ending: str, field: str, value: float, tmp_pat
     """Where a cloud is opened, whatever is done with it."""
     points = make_points(300)
     with open_writer(tmp_path / f"cloud{ending}", None, np.zeros(3), 1.0) as writer:
-        writer.check_finite = lambda values, name: values  # type: ignore[method-assign] # a writer of others
+        writer.check_finite = lambda values, *_: values  # type: ignore[method-assign] # a writer of others
         getattr(points, field)[123] = value
         writer.write(points)
     with open_cloud(tmp_path / f"cloud{ending}") as cloud, pytest.raises(InputError, match=r"of point 123 is"):

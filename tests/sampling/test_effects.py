@@ -8,8 +8,9 @@ import pytest
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.schema import canonical_json
+from synthroads_addon.jobs.generate import FROM_AXIS
 from synthroads_addon.road.parameters import RoadParameters
-from synthroads_addon.sampling.road import sample_road
+from synthroads_addon.sampling.road import sample_alignment, sample_road
 from synthroads_addon.scenario.road import RoadScenario
 from tests.helpers.effects import without_effect
 from tests.helpers.effects.field_paths import fields_of, other_values, value_at, with_value
@@ -68,6 +69,31 @@ def with_effect(parameters: RoadParameters) -> str:
             *way, name = path.split(".")[1:]
             (item[way[0]] if way else item).pop(name, None)
     return canonical_json(data)
+
+
+AXIS_FIELDS = sorted({path.partition(".")[0] for path in FIELDS} - SAYS - {"cross_section", "elevation_model"})
+"""Limits that are looked at beside an axis: not what an axis may have anywhere, and what takes free cross-sections."""
+
+
+@pytest.mark.parametrize("name", AXIS_FIELDS)
+def test_beside_an_axis_all_limits_have_an_effect_but_those_that_are_refused(name: str) -> None:
+    """The axis is another road's own, put elsewhere; `FROM_AXIS` says what is refused beside it."""
+    shown = any(
+        _differ_beside_axis(path, seed) for path in FIELDS if path.partition(".")[0] == name for seed in SEEDS[:8]
+    )
+    assert shown != (name in FROM_AXIS)
+
+
+def _differ_beside_axis(path: str, seed: int) -> bool:
+    """Return whether roads along one axis differ where a limit does; not where one of the two can't be had."""
+    before, after = changed_limits(path)
+    axis = sample_alignment(before, 5)
+    given = {"length": axis.length, "map_origin": (1.0, 2.0, 3.0)}  # as `fitted_axis` has them
+    try:
+        roads = [sample_road(limits.model_copy(update=given), seed, "", axis) for limits in (before, after)]
+    except InputError:
+        return False
+    return with_effect(roads[0]) != with_effect(roads[1])
 
 
 def seeds_that_show(path: str) -> Iterator[int]:

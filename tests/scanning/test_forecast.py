@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from synthroads_addon.base import machine
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.scanning import forecast as module
 from synthroads_addon.scanning.blocks import Blocks
@@ -31,6 +32,20 @@ def test_a_scan_of_the_demo_s_size_is_told_within_a_factor_of_two() -> None:
     assert 1.3e9 < told.memory < 5.4e9
     assert f"{told.pulses:,} pulses" in told.text()
     assert forecast_scan(cut, 1_500_000, threads=2).seconds == pytest.approx(told.seconds / 2.0)
+
+
+def test_a_busy_machine_takes_longer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Twelve others on two cores: one thread gets 2/13 of a core, two threads get 2/7 each by the same turns."""
+    monkeypatch.setattr(machine, "available_cores", lambda: 2)
+    idle = forecast_scan(blocks(10.0), 1000, threads=2)
+    for share, cores in ((1.0, 2.0), (0.97, 2.0), (2 / 13, 4 / 14)):
+        assert machine.free_cores(2, share) == pytest.approx(cores)
+        monkeypatch.setattr(module, "share_of_core", lambda share=share: share)
+        assert idle.beside_others().seconds == pytest.approx(idle.seconds * 2.0 / cores)
+
+
+def test_the_share_of_a_core_is_measured() -> None:
+    assert 0.01 <= machine.share_of_core(0.02) <= 1.0
 
 
 def test_what_nobody_can_have_meant_is_refused_and_a_field_lets_it_be_done() -> None:

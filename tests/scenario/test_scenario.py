@@ -2,15 +2,16 @@
 
 import pytest
 
+from synthroads_addon.base.changes import apply_change, parse_change
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.road.guidelines import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS
 from synthroads_addon.scanning.devices.device import device_names
 from synthroads_addon.scenario.scan import scanner_setting
-from synthroads_addon.scenario.scenario import Scenario, apply_change, load_scenario, parse_change, scenario_names
+from synthroads_addon.scenario.scenario import Scenario, load_scenario, scenario_names
 
 
 def test_changes_are_applied_and_unknown_keys_named() -> None:
-    data = apply_change({"a": {"b": 1}}, "a.c=[1,2]")
+    data = apply_change({"a": {"b": 1}}, "a.c=[1,2]", Scenario)
     assert data == {"a": {"b": 1, "c": [1, 2]}}
     with pytest.raises(InputError, match="did you mean 'platform'"):
         load_scenario("rq31-600m", ["scan.platfrom.height=3"])
@@ -74,7 +75,7 @@ TYPED = {
 
 @pytest.mark.parametrize("change", TYPED)
 def test_values_are_of_the_type_of_their_field(change: str) -> None:
-    path, value = parse_change(change)
+    path, value = parse_change(change, Scenario)
     assert path == change.partition("=")[0]
     assert value == TYPED[change]
     assert type(value) is type(TYPED[change])

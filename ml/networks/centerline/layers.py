@@ -77,7 +77,7 @@ def cell_sums(coord: Tensor, mask: Tensor, features: Tensor, reach: float, numbe
     sums = values.new_zeros(slices * number, channels + 2)
     for cell, weight in ((low, 1.0 - (at - low)), (low + 1.0, at - low)):
         inside = mask & (cell >= 0) & (cell < number)
-        index = first + cell.clamp(0, number - 1).long()
+        index = first + torch.where(inside, cell, 0.0).long()  # NaN, of weights beyond reason, is no number of a cell
         sums = sums.index_add(0, index.flatten(), values * (weight * inside).flatten()[:, None])
     return sums.view(slices, number, channels + 2)
 

@@ -1,7 +1,7 @@
 """Scratch folders: removed at the end of the work, and after a process that couldn't do so by the next one's.
 
-Each has a lock file that names its owner. A folder whose owner is known to be dead is removed by whoever makes one
-beside it.
+Each has a lock file that names its owner. A folder whose owner is known to be dead is removed by the next process that
+makes one beside it.
 """
 
 import os
@@ -14,6 +14,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from ..errors import OutputError
+from ..named_paths import is_inside
 from .locks import is_dead, read_owner, this_process, try_lock
 
 LOCK = ".owner.json"
@@ -26,10 +27,16 @@ REPORT = "report.json"
 _IN_OUTPUT, _IN_SYSTEM = ".partial-", "synthroads-"
 _NAME = re.compile(rf"({re.escape(_IN_OUTPUT)}|{_IN_SYSTEM})\d+-[a-z0-9_]{{8}}")
 _VARIABLES = ("TMPDIR", "TEMP", "TMP")
+_NO_LINK = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+"""Flags by which no link is followed, and a pipe that somebody put there not waited for."""
 _UNREADABLE = 60.0
 """Age, s, at which a lock file without an owner is one whose process was killed in the moment of writing it."""
 _mine: dict[Path, int] = {}
 """This process's scratch folders that still stand, and the descriptors of their locks."""
+_calls_left: dict[Path, int] = {}
+"""How often scratch folders are still made in a folder until it is listed again."""
+_ENTRIES_PER_CALL = 50
+"""Entries of a folder that are listed, on average, for each scratch folder that is made in it."""
 _journal: int | None = None
 """Descriptor of the file that names the folders which this process makes, for one that outlives it."""
 
@@ -45,7 +52,7 @@ def scratch_folder(parent: Path | None = None) -> Iterator[Path]:
         OSError: it can't be made.
     """
     place = Path(tempfile.gettempdir()) if parent is None else parent
-    remove_leftovers(place)
+    _look_for_leftovers(place)
     folder = _make_folder(place, _IN_SYSTEM if parent is None else _IN_OUTPUT)
     try:
         yield folder
@@ -87,13 +94,33 @@ def temporary_folder_error(folder: Path, error: Exception) -> OutputError:
     return OutputError("temporary folder", str(place), f"cannot be written ({reason}); TMPDIR names another")
 
 
-def remove_leftovers(parent: Path) -> None:
-    """Remove the scratch folders in a folder whose owners are known to be dead; doesn't raise."""
+def _look_for_leftovers(parent: Path) -> None:
+    """Remove a folder's leftovers, but in a full folder only at each so manyth call, as it is listed for that.
+
+    Work that puts a thousand files into one folder would list it a thousand times.
+    """
+    left = _calls_left.pop(parent, 0)
+    if left := left - 1 if left else remove_leftovers(parent) // _ENTRIES_PER_CALL:
+        _calls_left[parent] = left
+
+
+def remove_leftovers(parent: Path) -> int:
+    """Remove the scratch folders in a folder whose owners are known to be dead; doesn't raise.
+
+    Returns:
+        the number of entries that the folder has.
+    """
+    count, named = 0, []
     with suppress(OSError), os.scandir(parent) as entries:
-        for folder in [Path(entry.path) for entry in entries if _NAME.fullmatch(entry.name)]:
-            if folder not in _mine:
-                with suppress(OSError):  # the others' turn comes all the same
-                    _remove_leftover(folder)
+        for entry in entries:
+            count += 1
+            if _NAME.fullmatch(entry.name) and entry.is_dir(follow_symlinks=False):
+                named.append(Path(entry.path))
+    for folder in named:
+        if folder not in _mine:
+            with suppress(OSError):  # the others' turn comes all the same
+                _remove_leftover(folder)
+    return count
 
 
 def remove_scratch_folders() -> None:
@@ -182,10 +209,15 @@ def names_to_move(folder: Path) -> list[str]:
 
 
 def _finish_move(folder: Path) -> bool:
-    """Finish a scratch folder's move that was cut off; return whether the folder may go: no old file is in it alone."""
+    """Finish a scratch folder's move that was cut off; return whether the folder may go: no old file is in it alone.
+
+    Nothing is moved, and the folder stays, where links in it lead elsewhere: it isn't as a move leaves it.
+    """
     aside, target = folder / ASIDE, folder.parent
     if not folder.name.startswith(_IN_OUTPUT) or not aside.is_dir():
         return True
+    if not all(is_inside(folder, name, follow=True) for name in (NEW, ASIDE)):
+        return False
     for name in names_to_move(folder / NEW):
         with suppress(OSError):
             (folder / NEW / name).replace(target / name)
@@ -199,7 +231,7 @@ def _finish_move(folder: Path) -> bool:
 def _remove_leftover(folder: Path) -> None:
     """Remove a folder if its owner is dead, or if it is empty: its owner was killed before it named itself."""
     try:
-        lock = os.open(folder / LOCK, os.O_RDWR)
+        lock = os.open(folder / LOCK, os.O_RDWR | _NO_LINK)
     except FileNotFoundError:
         with suppress(OSError):
             folder.rmdir()

@@ -14,6 +14,8 @@ from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
 
+from ..named_paths import path_inside
+
 _TAKEN = (errno.EWOULDBLOCK, errno.EAGAIN, errno.EACCES, errno.EDEADLK)
 
 
@@ -152,15 +154,23 @@ class LockHeldError(Exception):
 
 
 @contextmanager
-def exclusive(path: Path) -> Iterator[None]:
-    """Hold a lock file while the context lasts; the system frees it if the process ends. The file stays, empty.
+def exclusive(path: Path, *, keep: bool = True) -> Iterator[None]:
+    """Hold a lock file while the context lasts; the system frees it if the process ends.
+
+    Args:
+        path: of the file.
+        keep: whether it stays, empty; else it is removed.
 
     Raises:
         LockHeldError: another process holds it, or may do so.
         OSError: it can't be written.
+        InputError: it is a link that leads out of its folder.
     """
+    path_inside(path.parent, path.name, path, follow=True)
     with path.open("a+", encoding="utf-8") as file:
         lock, owner = try_lock(file.fileno()), None
+        if lock and not keep and not _is_at(path, file.fileno()):
+            raise LockHeldError(None, certain=True)  # its owner removed it just now, and another may have it
         with suppress(OSError):  # Windows lets nobody read what is locked
             file.seek(0)
             owner = read_owner(file.read())
@@ -175,3 +185,14 @@ def exclusive(path: Path) -> Iterator[None]:
         finally:
             with suppress(OSError):
                 file.truncate(0)
+            if not keep:
+                with suppress(OSError):  # Windows removes no file that is open
+                    path.unlink()
+
+
+def _is_at(path: Path, descriptor: int) -> bool:
+    """Return whether an open file is the one that a path names."""
+    try:
+        return os.path.samestat(path.stat(), os.fstat(descriptor))
+    except OSError:
+        return False

@@ -23,10 +23,10 @@ from ...scanning.colour.request import LayerRequest, material_layers
 from ...scanning.colour.surfaces import SceneSurfaces
 from ...scanning.colour.views import View, scene_sample, views_along
 from ..materials.calculable import material_needs
-from .calculator import calculator
 from .images import RenderedLayers
 from .light import Daylight, daylight, measured_light
 from .nodes import NodeLayers
+from .programs import material_work
 from .returns import ReturnCamera
 from .snapshot import MaterialSnapshot
 from .stage import Passes, RenderStage, stage
@@ -105,6 +105,10 @@ def layer_source(
         if request.settings.source == "material" or not passes.channels:
             yield fallback
             return
+        if request.mesh.unit != 1.0:
+            text = f"can't render a scene whose unit is {request.mesh.unit:g} m: take nodes or material, or set its "
+            text += "unit scale to 1 and scale what is in it"
+            raise InputError("colour.source", request.settings.source, text)
         set_up = _lit_stage(stack, request, passes, day, source)
         exposure = day.exposure if day else 1.0
         if passes.position:
@@ -149,12 +153,12 @@ def _node_layers(
     obstacles = {index: need.obstacles for index, need in needs.items() if need.obstacles}
     easy = {index: item for index, item in items.items() if index not in obstacles}
     rest = None
-    if obstacles and HAS_RETURN_CAMERA:
+    if obstacles and HAS_RETURN_CAMERA and request.mesh.unit == 1.0:
         set_up = _lit_stage(stack, request, _passes(request, constants, by_return=True), day, source)
         rest = ReturnCamera(set_up, fallback, day.exposure if day else 1.0, calls)
-    work = stack.enter_context(calculator(easy, layers)) if easy else None
+    work = stack.enter_context(material_work(easy, layers, request.kernels))
     surfaces = SceneSurfaces(request.mesh, request.moving)
-    return NodeLayers(calls, work, surfaces, fallback, rest, obstacles, names, request.frame)
+    return NodeLayers(calls, work, surfaces, fallback, rest, obstacles, request)
 
 
 def node_layers(request: LayerRequest, constants: SurfaceConstants) -> tuple[str, ...]:
@@ -194,8 +198,7 @@ def snapshot_layers(
     varying = varying_materials(constants, layers)
     obstacles = {index: names for index, names in snapshot.obstacles.items() if index in varying}
     surfaces = SceneSurfaces(request.mesh, request.moving)
-    work = snapshot.calculator(varying, layers)
-    yield NodeLayers(calls, work, surfaces, fallback, None, obstacles, request.mesh.materials, request.frame)
+    yield NodeLayers(calls, snapshot.work(varying, layers), surfaces, fallback, None, obstacles, request)
 
 
 def image_views(request: LayerRequest) -> list[View]:

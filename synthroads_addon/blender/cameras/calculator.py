@@ -17,6 +17,7 @@ import numpy as np
 from ...base.arrays import Float32, Index
 from ...base.scratch.folders import scratch_folder
 from ...scanning.scene.surface_values import SurfaceInput
+from ..materials.image import unlink_missing
 from ..materials.inputs import InputSearch, copy_groups, replace_inputs
 from ..materials.surface_layers import LayerNodes, layer_expressions
 from .stage import Passes, RenderStage, new_stage
@@ -56,14 +57,18 @@ class Calculator:
 
     Attributes:
         stage: what renders.
+        materials: indices of those that it works out.
         layers: names of the layers that come back.
         at_once: places that are worked out at once.
+        main_thread: it can be used there alone.
     """
 
     at_once = 1 << 20
+    main_thread = True
 
     def __init__(self, stage: RenderStage, copies: dict[int, ReadingCopy], layers: Sequence[str]) -> None:
         self.stage, self.layers, self._copies = stage, tuple(layers), copies
+        self.materials = frozenset(copies)
         self._images: dict[SurfaceInput, bpy.types.Image] = {}
         self._size = 0, 0
         self._item: bpy.types.Object | None = None
@@ -185,19 +190,6 @@ class Calculator:
 
 
 @contextmanager
-def calculator(items: dict[int, bpy.types.Material], layers: Sequence[str]) -> Iterator[Calculator]:
-    """Context of a calculator of materials by their index; removes all its data-blocks on exit.
-
-    Args:
-        items: materials that can be worked out, see `material_needs`.
-        layers: those that are asked for.
-    """
-    with ExitStack() as stack:
-        copies = {number: stack.enter_context(reading_copy(item, layers)) for number, item in items.items()}
-        yield stack.enter_context(opened_calculator(copies, layers))
-
-
-@contextmanager
 def opened_calculator(copies: dict[int, ReadingCopy], layers: Sequence[str]) -> Iterator[Calculator]:
     """Yield a calculator with copies of materials, by their index; afterwards nothing of it is left but these."""
     with ExitStack() as stack:
@@ -221,6 +213,8 @@ def reading_copy(item: bpy.types.Material, layers: Sequence[str]) -> Iterator[Re
         tree = copied.node_tree
         groups = copy_groups(tree)
         _freeze(copied, groups, bpy.context.scene.frame_current)
+        for part in (tree, *groups):
+            unlink_missing(part)
         expressions = layer_expressions(copied)
         nodes = LayerNodes(tree)
         kept = {node.aov_name: node for node in tree.nodes if node.type == "OUTPUT_AOV" and node.aov_name in layers}

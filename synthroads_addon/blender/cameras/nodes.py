@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from threading import Lock
 from typing import Any, Protocol
 
@@ -18,9 +19,10 @@ from ...scanning.colour.colour import (
     SeenPoints,
 )
 from ...scanning.colour.reflection import reflected_sunlight
+from ...scanning.colour.request import LayerRequest
 from ...scanning.colour.surfaces import SceneSurfaces
-from ...scanning.scene.surface_values import SurfaceInput
-from ..materials.inputs import INCOMING, POSITION, TRUE_NORMAL
+from ...scanning.scene.surface_values import POSITION, SurfaceInput
+from ..materials.inputs import INCOMING, TRUE_NORMAL
 
 _OF_POINT: dict[SurfaceInput, Callable[[SeenPoints, Index], AnyArray]] = {
     TRUE_NORMAL: lambda points, rows: take_rows(points.normal, rows),
@@ -32,66 +34,92 @@ class LayerCalculator(Protocol):
     """Works out layers of materials at places.
 
     Attributes:
+        materials: indices of those that it works out.
         layers: names of the layers that come back.
         at_once: places that are worked out at once.
+        main_thread: whether it must be used on Blender's main thread; else any threads may use it side by side.
     """
 
+    materials: frozenset[int]
     layers: tuple[str, ...]
     at_once: int
+    main_thread: bool
 
     def inputs_of(self, material: int) -> frozenset[SurfaceInput]:
         """Return what a material asks for, by its index."""
         ...
 
     def calculate(self, material: Index, values: dict[SurfaceInput, Float32]) -> dict[str, Float32]:
-        """Return the layers (N, C) of N places, see `Calculator.calculate`; in Blender's main thread."""
+        """Return the layers (N, C) of N places, see `Calculator.calculate`."""
         ...
 
 
+@dataclass(frozen=True)
+class MaterialWork:
+    """Work on materials, and how it is done.
+
+    Attributes:
+        calculators: of the materials that vary, each of some.
+        kernels: how materials are worked out, as the report says it.
+        rendered: why Cycles works materials out that others have programs for, by material.
+    """
+
+    calculators: Sequence[LayerCalculator]
+    kernels: str
+    rendered: Mapping[int, str]
+
+
 class NodeLayers:
-    """Source of each return's layers, evaluated from its material's nodes; the main thread renders them.
+    """Source of each return's layers, evaluated from its material's nodes; what is rendered, the main thread renders.
 
     Args:
         calls: those that it has the main thread make.
-        calculator: of the materials that vary; None where none does.
+        work: what works materials out.
         surfaces: what materials ask of the places.
         fallback: the materials' means.
         rest: what gives the layers of materials that can't be worked out; None for their means.
         obstacles: names of nodes that stand in the way, by material.
-        materials: names of the scene's materials.
-        frame: (3,) where the scene's local frame begins in that of the whole road, of which it may be a section, m.
+        request: that is answered: its scene, and where that begins in the whole road, of which it may be a section.
     """
 
     def __init__(
         self,
         calls: MainThreadCalls,
-        calculator: LayerCalculator | None,
+        work: MaterialWork,
         surfaces: SceneSurfaces,
         fallback: MaterialLayers,
         rest: LayerSource | None,
         obstacles: Mapping[int, tuple[str, ...]],
-        materials: tuple[str, ...],
-        frame: Sequence[float] = (0.0, 0.0, 0.0),
+        request: LayerRequest,
     ) -> None:
-        self._frame = np.array(frame)
-        self._calculator, self._surfaces, self.material, self._rest = calculator, surfaces, fallback, rest
+        self._frame, self._unit, materials = np.array(request.frame), request.mesh.unit, request.mesh.materials
+        self._work, self._surfaces, self.material, self._rest = work, surfaces, fallback, rest
         self._obstacles, self._materials = obstacles, materials
         self._left_out, self._worked_out, self._counting = np.zeros(len(materials), np.int64), 0, Lock()
         known = np.zeros(len(materials), bool)
         known[list(obstacles)] = True
         self._hard: Bool = known
-        self._varying = np.zeros(len(materials), bool)
-        for name in calculator.layers if calculator else ():
-            self._varying |= fallback.constants.varies[name]
+        self._layers = work.calculators[0].layers if work.calculators else ()
+        self._worker = np.full(len(materials), -1, np.int8)
+        for number, calculator in enumerate(self._work.calculators):
+            self._worker[list(calculator.materials)] = number
+        varying = np.zeros(len(materials), bool)
+        for name in self._layers:
+            varying |= fallback.constants.varies[name]
+        self._worker[~varying] = -1
         self._calls = calls
-        self.calls = calls if calculator is not None or rest is not None else None
+        renders = rest is not None or any(calculator.main_thread for calculator in work.calculators)
+        self.calls = calls if renders else None
 
     @property
     def report(self) -> dict[str, Any]:
         """Return returns and layers evaluated, and materials left out with why and their points, as JSON data."""
         result: dict[str, Any] = {}
-        if self._calculator is not None:
-            result = {"returns": self._worked_out, "layers": list(self._calculator.layers)}
+        if self._work.calculators:
+            result = {"returns": self._worked_out, "layers": list(self._layers), "kernels": self._work.kernels}
+        if self._work.rendered:
+            reasons = self._work.rendered.items()
+            result["by_cycles"] = {self._materials[index]: {"because_of": why} for index, why in reasons}
         if self._obstacles:
             result["left_out"] = {
                 self._materials[index]: {"because_of": list(names), "points": int(self._left_out[index])}
@@ -125,43 +153,49 @@ class NodeLayers:
     def _work_out(self, points: SeenPoints, wanted: frozenset[str]) -> LayerValues:
         source = np.full(len(points), FROM_NODES, np.uint8)
         channels: dict[str, Float32] = {}
-        if self._calculator is not None:
-            varying = np.flatnonzero(np.take(self._varying, points.material))
-            parts = {name: (len(points), 3 if name == "base_color" else 1) for name in self._calculator.layers}
+        if self._work.calculators:
+            worker = np.take(self._worker, points.material)
+            parts = {name: (len(points), 3 if name == "base_color" else 1) for name in self._layers}
             channels = {name: np.zeros(shape, np.float32) for name, shape in parts.items()}
-            most = self._calculator.at_once
-            for start in range(0, len(varying), most):
-                self._calculate(points, varying[start : start + most], channels)
+            for number, calculator in enumerate(self._work.calculators):
+                mine = np.flatnonzero(worker == number)
+                for start in range(0, len(mine), calculator.at_once):
+                    self._calculate(calculator, points, mine[start : start + calculator.at_once], channels)
             with self._counting:
-                self._worked_out += len(varying)
+                self._worked_out += int((worker >= 0).sum())
         if "rgb" in wanted and self.material.mode == "lit":
             channels["sun"] = self._sunlight(points, channels)
         return self.material.layer_values(points, channels, source, wanted)
 
-    def _calculate(self, points: SeenPoints, rows: Index, channels: dict[str, Float32]) -> None:
+    def _calculate(
+        self, calculator: LayerCalculator, points: SeenPoints, rows: Index, channels: dict[str, Float32]
+    ) -> None:
         """Evaluate the layers of the points of `rows` and write them into the channels, in place."""
-        calculator = self._calculator
-        assert calculator is not None
         material = points.material[rows]
         order = np.argsort(material, kind="stable")
         rows, material = rows[order], material[order]
-        values = self._inputs(points, rows, material)
-        worked_out = self._calls.call(lambda: calculator.calculate(material.astype(np.intp), values))
+        values = self._inputs(calculator, points, rows, material)
+
+        def calculate() -> dict[str, Float32]:
+            return calculator.calculate(material.astype(np.intp), values)
+
+        worked_out = self._calls.call(calculate) if calculator.main_thread else calculate()
         for name, array in worked_out.items():
             channels[name][rows] = array
 
-    def _inputs(self, points: SeenPoints, rows: Index, material: UInt16) -> dict[SurfaceInput, Float32]:
+    def _inputs(
+        self, calculator: LayerCalculator, points: SeenPoints, rows: Index, material: UInt16
+    ) -> dict[SurfaceInput, Float32]:
         """Return the values (N, 4) float32 of all inputs that the materials of the N points `rows` read."""
-        assert self._calculator is not None
         asked: dict[SurfaceInput, list[int]] = {}
         for number in np.unique(material).tolist():
-            for what in self._calculator.inputs_of(number):
+            for what in calculator.inputs_of(number):
                 asked.setdefault(what, []).append(number)
         values = {what: np.zeros((len(rows), 4), np.float32) for what in asked}
         together: dict[tuple[int, ...], list[SurfaceInput]] = {}
         for what, numbers in asked.items():
             if what == POSITION:
-                values[what][:, :3] = take_rows(points.position, rows) + self._frame
+                values[what][:, :3] = (take_rows(points.position, rows) + self._frame) / self._unit
             elif what in _OF_POINT:
                 values[what][:, :3] = _OF_POINT[what](points, rows)
             else:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import Literal
 
 import bpy
 
@@ -18,6 +19,8 @@ from ...scanning.colour.colour import MATERIAL_LAYERS
 from ...scanning.scene.surface_values import SurfaceInput
 from ..materials.calculable import material_needs
 from .calculator import ReadingCopy, opened_calculator, reading_copy
+from .nodes import LayerCalculator, MaterialWork
+from .programs import CompiledMaterials
 from .surfaces import numbered_materials
 
 _INPUT, _IMAGE = "synthroads_input", "synthroads_image"
@@ -29,15 +32,19 @@ class MaterialSnapshot:
 
     Attributes:
         obstacles: names of nodes that stand in the way, of the materials that can't be worked out, by index.
+        compiled: programs of those that Blender isn't needed for.
     """
 
-    def __init__(self, names: Sequence[str], varying: Collection[int], folder: Path) -> None:
+    def __init__(
+        self, names: Sequence[str], varying: Collection[int], folder: Path, kernels: Literal["auto", "off"] = "auto"
+    ) -> None:
         """Write the file; in Blender's main thread.
 
         Args:
             names: the scene mesh's materials.
             varying: indices of those that are to be worked out.
             folder: for the file, as long as materials are worked out.
+            kernels: ``off`` to have Cycles work out all.
         """
         self._path = folder / "materials.blend"
         items = {index: item for index, item in numbered_materials(names) if index in varying}
@@ -45,22 +52,32 @@ class MaterialSnapshot:
         self.obstacles = {index: need.obstacles for index, need in needs.items() if need.obstacles}
         self._names: dict[int, str] = {}
         self._inputs: dict[int, frozenset[SurfaceInput]] = {}
+        self.compiled = CompiledMaterials.of(kernels)
         with ExitStack() as stack:
-            copies = {
-                index: stack.enter_context(reading_copy(item, tuple(MATERIAL_LAYERS)))
-                for index, item in items.items()
-                if index not in self.obstacles
-            }
+            copies: dict[int, ReadingCopy] = {}
+            for index, item in items.items():
+                if index in self.obstacles:
+                    continue
+                with ExitStack() as own:
+                    copy = own.enter_context(reading_copy(item, tuple(MATERIAL_LAYERS)))
+                    if not self.compiled.compile(index, copy, tuple(MATERIAL_LAYERS)):
+                        copies[index] = copy
+                        stack.push(own.pop_all())
             for index, copy in copies.items():
                 self._names[index] = copy.item.name
                 self._inputs[index] = frozenset(what for what, _ in copy.readers)
                 _mark_nodes(copy)
-            bpy.data.libraries.write(str(self._path), {copy.item for copy in copies.values()})
+            if copies:
+                bpy.data.libraries.write(str(self._path), {copy.item for copy in copies.values()})
 
-    def calculator(self, materials: Collection[int], layers: Sequence[str]) -> SnapshotCalculator | None:
-        """Return what works out layers of materials, by index; None if none of these can be worked out."""
-        easy = sorted(index for index in materials if index in self._names)
-        return SnapshotCalculator(self, easy, layers) if easy else None
+    def work(self, materials: Collection[int], layers: Sequence[str]) -> MaterialWork:
+        """Return what works out layers of materials, by index, as far as they can be worked out."""
+        programs = self.compiled.calculator(sorted(materials), layers)
+        rendered = sorted(index for index in materials if index in self._names)
+        calculators: list[LayerCalculator] = [] if programs is None else [programs]
+        if rendered:
+            calculators.append(SnapshotCalculator(self, rendered, layers))
+        return self.compiled.work(calculators, materials)
 
     def inputs_of(self, material: int) -> frozenset[SurfaceInput]:
         """Return what a material asks for, by its index."""
@@ -85,14 +102,18 @@ class SnapshotCalculator:
     """Works out layers of a snapshot's materials; all that it needs of Blender is made and removed each time.
 
     Attributes:
+        materials: indices of those that it works out.
         layers: names of the layers that come back.
         at_once: places that are worked out at once: the window stands still meanwhile.
+        main_thread: it can be used there alone.
     """
 
     at_once = 1 << 16
+    main_thread = True
 
     def __init__(self, snapshot: MaterialSnapshot, materials: Sequence[int], layers: Sequence[str]) -> None:
         self._snapshot, self._materials, self.layers = snapshot, materials, tuple(layers)
+        self.materials = frozenset(materials)
 
     def inputs_of(self, material: int) -> frozenset[SurfaceInput]:
         """Return what a material asks for, by its index."""

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 import bpy
 import numpy as np
 
 from ...scanning.colour.colour import MATERIAL_LAYERS, SurfaceConstants, surface_constants
+from ...scanning.colour.transparency import Transparency
 from ...scanning.relief.normal_images import NormalImage
 from ..materials import constants, scene_name
-from ..materials.image import linear_pixels
+from ..materials.image import linear_pixels, missing_images_filled, trees_below
 from ..materials.surface_layers import LayerNodes, layer_expressions, varies
 from ..materials.textures import NORMAL_IMAGE, is_normal_image
+from ..materials.transparency import read_transparency
 
 NUMBER = "sr_material"
 """Output that shows the material's number, for renderers that have no pass for it."""
@@ -41,6 +43,12 @@ def normal_images(names: Sequence[str]) -> dict[int, NormalImage]:
     return found
 
 
+def transparencies(names: Sequence[str]) -> dict[int, Transparency]:
+    """Return the light that the named materials let through at each place, by the material's index."""
+    read = {index: read_transparency(item).transparency for index, item in numbered_materials(names)}
+    return {index: found for index, found in read.items() if found is not None}
+
+
 @contextmanager
 def prepared_materials(names: Sequence[str], layers: Sequence[str], numbers: bool) -> Iterator[None]:
     """Context in which the named materials have pass indices and outputs for the layers; undone on exit.
@@ -52,7 +60,11 @@ def prepared_materials(names: Sequence[str], layers: Sequence[str], numbers: boo
     """
     before: list[tuple[bpy.types.Material, int]] = []
     added: list[LayerNodes] = []
+    items = [item for _, item in numbered_materials(names) if item.node_tree]
+    trees = {tree for item in items for tree in trees_below(item.node_tree)}
+    stack = ExitStack()
     try:
+        stack.enter_context(missing_images_filled(trees))
         for index, item in numbered_materials(names):
             before.append((item, item.pass_index))
             item.pass_index = index + 1
@@ -68,6 +80,7 @@ def prepared_materials(names: Sequence[str], layers: Sequence[str], numbers: boo
             nodes.remove()
         for item, number in before:
             item.pass_index = number
+        stack.close()
 
 
 def add_layer_outputs(item: bpy.types.Material, layers: Sequence[str], nodes: LayerNodes) -> None:

@@ -5,23 +5,29 @@ from __future__ import annotations
 import bpy
 
 from ...base.errors import InputError
+from ...scanning.kernels.library import NoKernelError
+from ...scanning.kernels.packets import usable_packets
 from ...scanning.scene.caster import Caster
 from ...scanning.scene.mesh import SceneMesh
+from .packets import PacketCaster
 
 NAMES = ("embree", "bvhtree")
 
 
-def make_caster(name: str, mesh: SceneMesh) -> Caster:
+def make_caster(name: str, mesh: SceneMesh, kernels: str = "auto") -> Caster:
     """Build the ray caster ``embree`` or ``bvhtree`` for a mesh; ``auto`` takes the fastest that is installed.
+
+    Args:
+        name: of the caster.
+        mesh: what rays are cast at.
+        kernels: ``auto`` to have Embree cast rays in packets where this machine can, ``off`` for one by one.
 
     Raises:
         InputError: there is no such caster, or its package isn't installed.
     """
     if name in ("auto", "embree"):
         try:
-            from .embree import EmbreeCaster
-
-            return EmbreeCaster(mesh, in_pieces=not bpy.app.background)
+            return _embree_caster(mesh, kernels)
         except ImportError:
             if name == "embree":
                 raise InputError("scan.caster", name, "needs the package embreex; bvhtree is always there") from None
@@ -30,3 +36,16 @@ def make_caster(name: str, mesh: SceneMesh) -> Caster:
 
         return BVHTreeCaster(mesh)
     raise InputError("scan.caster", name, f"must be auto or one of {', '.join(NAMES)}")
+
+
+def _embree_caster(mesh: SceneMesh, kernels: str) -> Caster:
+    """Return the caster that casts packets, where they are wanted and this machine can, else that of single rays."""
+    from .embree import EmbreeCaster  # embreex may be missing
+
+    in_pieces = not bpy.app.background
+    if kernels == "off":
+        return EmbreeCaster(mesh, in_pieces=in_pieces)
+    packets = usable_packets()
+    if isinstance(packets, NoKernelError):
+        return EmbreeCaster(mesh, in_pieces=in_pieces, kernels=f"none: rays are cast one by one, as {packets}")
+    return PacketCaster(packets, mesh)

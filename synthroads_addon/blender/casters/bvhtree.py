@@ -15,6 +15,7 @@ class BVHTreeCaster:
 
     name = "bvhtree"
     main_thread_only = False
+    kernels = "none: rays are cast one by one"
 
     def __init__(self, mesh: SceneMesh) -> None:
         self._tree = BVHTree.FromPolygons(mesh.vertices, mesh.triangles, all_triangles=True)

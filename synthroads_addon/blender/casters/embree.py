@@ -1,4 +1,4 @@
-"""The fast caster: Embree 4 through `embreex`. It lets go of Python's lock, so threads run side by side."""
+"""A fast caster: Embree 4 through `embreex`, ray by ray. It lets go of Python's lock, so threads run side by side."""
 
 from __future__ import annotations
 
@@ -45,12 +45,20 @@ class EmbreeCaster:
         mesh: what rays are cast at.
         robust: no ray slips through an edge that two faces share; a little slower.
         in_pieces: hand the mesh over in pieces, so that other threads run in between; it then casts a little slower.
+        kernels: why no packets are cast.
     """
 
     name = "embree"
     main_thread_only = False
 
-    def __init__(self, mesh: SceneMesh, robust: bool = True, in_pieces: bool = False) -> None:
+    def __init__(
+        self,
+        mesh: SceneMesh,
+        robust: bool = True,
+        in_pieces: bool = False,
+        kernels: str = "off: rays are cast one by one",
+    ) -> None:
+        self.kernels = kernels
         self._scene = EmbreeScene(robust=robust)
         self._meshes: list[TriangleMesh] = []
         at_once = _AT_ONCE if in_pieces else max(1, len(mesh.triangles))

@@ -23,6 +23,7 @@ from .shading import shade
 from .surface_layers import PROPERTY, layer_expressions, mean_value
 from .texture_nodes import texture_values
 from .textures import NORMAL_IMAGE, Texture, load_texture, remove_unused_images
+from .transparency import glass_weight
 
 MEAN = "synthroads_mean"
 """Custom property of a Blender material: its mean properties, as JSON."""
@@ -202,7 +203,14 @@ def _principled(name: str) -> Material:
     node = next((node for node in nodes if node.type == "BSDF_PRINCIPLED"), None)
     red, green, blue = (share(part) for part in means.get("base_color", item.diffuse_color[:3]))
     # A renderer's default specular of 0.5 would drown the contrast of the base colours.
-    specular = min(0.2, node.inputs["Specular IOR Level"].default_value) if node else 0.2
+    specular = min(0.2, float(node.inputs["Specular IOR Level"].default_value)) if node else 0.2
+    glass = glass_weight(item)
+    if glass:  # what a pane reflects is not its colour, which tints what passes
+        pane = materials()["glass"]
+        red, green, blue = (
+            part + glass * (own - part) for part, own in zip((red, green, blue), pane.base_color, strict=True)
+        )
+        specular += glass * (pane.specular - specular)
     return Material(
         base_color=(red, green, blue),
         roughness=share(means["roughness"][0] if "roughness" in means else item.roughness),

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import bpy
 
-from ...scanning.scene.surface_values import SurfaceInput
+from ...scanning.scene.surface_values import ALONG, SurfaceInput
 from .inputs import OF_POINT, InputSearch
 from .surface_layers import layer_expressions, sockets_of
+from .transparency import asked_by_transparency
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,11 @@ def material_needs(item: bpy.types.Material) -> MaterialNeeds:
 
 
 def asked_inputs(item: bpy.types.Material) -> frozenset[SurfaceInput]:
-    """Return what a material asks of surfaces beside the places; nothing of one that can't be worked out."""
+    """Return what a material asks of surfaces beside the places: its layers, if they can be worked out, and its alpha.
+
+    Args:
+        item: the material.
+    """
     needs = material_needs(item)
-    return frozenset() if needs.obstacles else needs.inputs - set(OF_POINT)
+    of_layers = frozenset() if needs.obstacles else needs.inputs
+    return (of_layers | asked_by_transparency(item)) - {*OF_POINT, ALONG}

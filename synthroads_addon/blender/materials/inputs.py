@@ -11,11 +11,9 @@ from dataclasses import dataclass, field
 
 import bpy
 
-from ...scanning.scene.surface_values import SurfaceInput
+from ...scanning.scene.surface_values import POSITION, SurfaceInput
 
-POSITION, NORMAL, TRUE_NORMAL, INCOMING = (
-    SurfaceInput(kind) for kind in ("position", "normal", "true_normal", "incoming")
-)
+NORMAL, TRUE_NORMAL, INCOMING = (SurfaceInput(kind) for kind in ("normal", "true_normal", "incoming"))
 OF_POINT = (POSITION, TRUE_NORMAL, INCOMING)
 """Inputs that every point has by itself; all others are read from the surfaces."""
 
@@ -115,7 +113,7 @@ class InputSearch:
             self._enter(node, socket, path)
         elif kind == "NodeGroupInput":
             self._leave(socket, path)
-        elif (what := self._input(node, socket)) is not None:
+        elif (what := input_of(node, socket)) is not None:
             self.sites.append(InputSite(what, tree, output=socket))
         elif kind in _PURE and not _turns_with_surface(node):
             for entry in node.inputs:
@@ -152,23 +150,24 @@ class InputSearch:
             if entry.identifier == socket.identifier:
                 self._follow(entry, path[:-1])
 
-    def _input(self, node: bpy.types.Node, socket: bpy.types.NodeSocket) -> SurfaceInput | None:
-        """Return the input that an output gives; None if it gives none, or one that no values can stand for."""
-        kind = node.bl_idname
-        if getattr(node, "from_instancer", False) or (kind == "ShaderNodeTexCoord" and node.object is not None):
-            return None
-        if kind in _NAMED:
-            feed, name = _NAMED[kind]
-            return SurfaceInput(feed, getattr(node, name))
-        if kind == "ShaderNodeAttribute" and node.attribute_type in ("GEOMETRY", "OBJECT"):
-            feed = "attribute" if node.attribute_type == "GEOMETRY" else "object_attribute"
-            return SurfaceInput(feed + ("_fac" if socket.name in ("Fac", "Factor") else ""), node.attribute_name)
-        return _OUTPUTS.get((kind, socket.name))
-
     def _refuse(self, node: bpy.types.Node, socket: bpy.types.NodeSocket) -> None:
         label = f"{node.bl_rna.name}: {socket.name}" if len(node.outputs) > 1 else node.bl_rna.name
         if label not in self.obstacles:
             self.obstacles.append(label)
+
+
+def input_of(node: bpy.types.Node, socket: bpy.types.NodeSocket) -> SurfaceInput | None:
+    """Return the input that an output gives; None if it gives none, or one that no values can stand for."""
+    kind = node.bl_idname
+    if getattr(node, "from_instancer", False) or (kind == "ShaderNodeTexCoord" and node.object is not None):
+        return None
+    if kind in _NAMED:
+        feed, name = _NAMED[kind]
+        return SurfaceInput(feed, getattr(node, name))
+    if kind == "ShaderNodeAttribute" and node.attribute_type in ("GEOMETRY", "OBJECT"):
+        feed = "attribute" if node.attribute_type == "GEOMETRY" else "object_attribute"
+        return SurfaceInput(feed + ("_fac" if socket.name in ("Fac", "Factor") else ""), node.attribute_name)
+    return _OUTPUTS.get((kind, socket.name))
 
 
 def copy_groups(tree: bpy.types.NodeTree) -> list[bpy.types.NodeTree]:

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from ...scanning.colour.colour import MATERIAL_LAYERS
-from .image import mean_color
+from .image import is_missing, mean_color
 from .inputs import group_output
 
 PROPERTY = "synthroads_material"
@@ -82,9 +82,10 @@ def layer_expressions(item: bpy.types.Material) -> dict[str, Expression]:
     layers: dict[str, Expression] = {name: _of_input(socket, ()) for name, socket in outputs.items()}
     if PROPERTY in item:
         return layers
-    surface = _surface(item.node_tree)
-    if surface is None:
+    entry = surface_socket(item.node_tree)
+    if entry is None or not entry.links:
         return layers
+    surface = entry.links[0].from_socket
     for name in ("base_color", "roughness", "metallic"):
         found = _of_shader(surface, (), name)
         if found is not None:
@@ -92,12 +93,16 @@ def layer_expressions(item: bpy.types.Material) -> dict[str, Expression]:
     return layers
 
 
-def _surface(tree: bpy.types.NodeTree) -> bpy.types.NodeSocket | None:
-    """Return the socket that gives a material's surface to Cycles."""
+def material_output(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
+    """Return the node that gives a material to Cycles; None if it has none."""
     ends = [node for node in tree.nodes if node.type == "OUTPUT_MATERIAL" and node.target in ("ALL", "CYCLES")]
-    end = next((node for node in ends if node.is_active_output), ends[0] if ends else None)
-    links = end.inputs["Surface"].links if end is not None else ()
-    return links[0].from_socket if links else None
+    return next((node for node in ends if node.is_active_output), ends[0] if ends else None)
+
+
+def surface_socket(tree: bpy.types.NodeTree) -> bpy.types.NodeSocket | None:
+    """Return the input that takes a material's surface for Cycles; None if it has none."""
+    end = material_output(tree)
+    return None if end is None else end.inputs["Surface"]
 
 
 def _of_shader(socket: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...], layer: str) -> Expression | None:
@@ -144,7 +149,14 @@ def _of_input(entry: bpy.types.NodeSocket, path: tuple[bpy.types.Node, ...]) -> 
     value = entry.default_value
     usual = tuple(float(part) for part in value[:3]) if hasattr(value, "__len__") else (float(value),) * 3
     links = entry.links
-    return Linked(links[0].from_socket, path, usual) if links else Constant(usual)  # type: ignore[arg-type]
+    if not links or _is_missing_image(links[0].from_node):
+        return Constant(usual)  # type: ignore[arg-type]
+    return Linked(links[0].from_socket, path, usual)  # type: ignore[arg-type]
+
+
+def _is_missing_image(node: bpy.types.Node) -> bool:
+    """Return whether a node would show a missing image: what stands in the socket that it feeds takes its place."""
+    return node.bl_idname == "ShaderNodeTexImage" and is_missing(node.image)
 
 
 def sockets_of(expression: Expression) -> Iterator[Linked]:

@@ -11,6 +11,7 @@ from itertools import count
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 from numpy.typing import NDArray
 
 from ..things.model_builder import ROLE
@@ -188,7 +189,7 @@ def place_root(root: bpy.types.Object, frame: NDArray[np.float64], scene: bpy.ty
     place[:3, 3] = frame - origin
     wanted = moved @ place if keep else place
     if not np.array_equal(wanted, np.array(root.matrix_world)):
-        root.matrix_world = wanted.tolist()
+        root.matrix_world = Matrix(wanted.tolist())  # of plain lists Blender takes rows for columns
 
 
 def displacement(root: bpy.types.Object) -> NDArray[np.float64]:

@@ -15,6 +15,8 @@ from .roads import has_parts, parts_and_copies, renew_ids, road_meant, roots
 
 SCENARIO = "synthroads_scenario"
 BUILT_FROM = "synthroads_built_from"
+FOUND = "synthroads_found"
+"""Custom property of a road's root: how it was found in a cloud, as JSON."""
 
 
 def roads(scene: bpy.types.Scene) -> list[bpy.types.Object]:
@@ -49,11 +51,25 @@ def road_named(scene: bpy.types.Scene, name: str | None) -> bpy.types.Object | N
     return known[name]
 
 
-def remember(root: bpy.types.Object, parameters: RoadParameters, scenario: Scenario, built_from: str) -> None:
-    """Store in a road's root the parameter set, the scenario, and the text of the settings it was built from."""
+def remember(
+    root: bpy.types.Object, parameters: RoadParameters, scenario: Scenario, built_from: str, found: str = ""
+) -> None:
+    """Store in a road's root what is known of it.
+
+    Args:
+        root: where it is stored.
+        parameters: its parameter set.
+        scenario: its limits and the model's fidelity.
+        built_from: text of the settings that it was built from.
+        found: how it was found in a cloud, as JSON; empty for a road that wasn't.
+    """
     root[PARAMETERS] = parameters.to_json()
     root[SCENARIO] = scenario.to_json()
     root[BUILT_FROM] = built_from
+    if found:
+        root[FOUND] = found
+    elif FOUND in root:
+        del root[FOUND]
 
 
 def objects_of(root: bpy.types.Object, scene: bpy.types.Scene | None = None) -> dict[str, bpy.types.Object]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Generator, Hashable, Iterator, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from itertools import chain, count
 from typing import Any, TypeAlias
@@ -29,7 +30,10 @@ from ..labels import Label, Labels, velocity_of
 from ..model.roads import origin_of, parts_and_copies, road_of_id, world_matrix
 from ..things.model_builder import SUPPORT
 from .changes import Changes
+from .left_out import LeftOut
 from .reading import MeshCopy, MeshPart, Places, SceneTables, copy_mesh, join_parts, slot_names
+from .render_state import Visible, is_seen, shown_as
+from .units import scene_unit
 from .values import ObjectValues, asked_by_material, object_values, random_number
 
 Float = NDArray[np.float64]
@@ -48,8 +52,12 @@ def scene_mesh(
     number_objects: bool = False,
     class_ids: Mapping[str, int] | None = None,
     road: str = "",
+    *,
+    visible: Visible = "render",
 ) -> SceneMesh:
-    """Return all visible faces of the evaluated scene as labelled triangles in its local frame.
+    """Return all visible faces of the evaluated scene as labelled triangles in its local frame, m.
+
+    A unit of the scene is what its unit scale says; beside a road of ours, which are built in metres, a metre.
 
     A face's class is its attribute ``class_id``, else its object's custom property ``synthroads_class``, else the class
     that a collection of the object is named after, else unlabelled; names can have classes as well, see `ClassMapping`.
@@ -64,21 +72,23 @@ def scene_mesh(
             their names, from 1 on past those that are taken.
         class_ids: ``class_id`` by the names of classes; that of the full table if None, see `ClassScheme.source_ids`.
         road: id of the road that says where on the map the scene is; that of the one that is meant if empty.
+        visible: whose state is read, a render's or the viewport's; of a depsgraph always its own.
 
     Raises:
         InputError: an object's vertices aren't finite, or a custom property isn't what it must be; names the object.
     """
-    depsgraph = _depsgraph(source)
-    root = road_of_id(depsgraph.scene, road)
-    reading = _SceneWalk(depsgraph, objects, classes, class_ids, root)
-    reading.copy_all()
+    with _shown(source, visible):
+        depsgraph = _depsgraph(source)
+        root = road_of_id(depsgraph.scene, road)
+        as_shown = None if isinstance(source, bpy.types.Depsgraph) else visible
+        reading = _SceneWalk(depsgraph, objects, classes, class_ids, root, visible=as_shown)
+        reading.copy_all()
     tables = reading.tables(_origin(root), number_objects)
     return join_parts(reading.pairs(None), tables)
 
 
 def scanned_scene(
     source: Source = None,
-    objects: Collection[bpy.types.Object] | None = None,
     classes: ClassMapping | None = None,
     geometry: RoadGeometry | None = None,
     speed_factor: float = 1.0,
@@ -86,6 +96,7 @@ def scanned_scene(
     number_objects: bool = False,
     class_ids: Mapping[str, int] | None = None,
     road: str = "",
+    visible: Visible = "render",
 ) -> ScannedScene:
     """Return the evaluated scene as labelled triangles: standing ones as one mesh, moving bodies each with its motion.
 
@@ -95,7 +106,7 @@ def scanned_scene(
     (vx, vy, vz), m/s; what such an object shows or carries moves with it as one body.
 
     Args:
-        source, objects, classes, number_objects, class_ids, road: see `scene_mesh`.
+        source, classes, number_objects, class_ids, road, visible: see `scene_mesh`.
         geometry: the road that the scene was built from; if None its vehicles stand.
         speed_factor: share of all speeds that they have in the scan, >= 0; with 0 everything stands.
 
@@ -104,7 +115,8 @@ def scanned_scene(
             another road.
     """
     further: dict[str, Any] = {"number_objects": number_objects, "class_ids": class_ids, "road": road}
-    steps = scanned_scene_steps(source, objects, classes, geometry, speed_factor, **further)
+    further["visible"] = visible
+    steps = scanned_scene_steps(source, classes, geometry, speed_factor, **further)
     while True:
         try:
             next(steps)
@@ -115,7 +127,6 @@ def scanned_scene(
 
 def scanned_scene_steps(
     source: Source = None,
-    objects: Collection[bpy.types.Object] | None = None,
     classes: ClassMapping | None = None,
     geometry: RoadGeometry | None = None,
     speed_factor: float = 1.0,
@@ -123,11 +134,13 @@ def scanned_scene_steps(
     number_objects: bool = False,
     class_ids: Mapping[str, int] | None = None,
     road: str = "",
+    visible: Visible = "render",
 ) -> Generator[float, None, CopiedScene]:
     """Generator that copies the evaluated scene in short main-thread steps; its value is the copy.
 
-    Each mesh is copied in a step of its own. If the user changes something meanwhile, it begins again; if he goes on
-    changing things, all is read in one step. After an undo, or when another file was opened, it must be closed.
+    Each mesh is copied in a step of its own, but all in one where a render shows the scene otherwise than the viewport:
+    its settings are changed within that step alone. If the user changes something meanwhile, it begins again; if he
+    goes on changing things, all is read in one step. After an undo, or when another file was opened, it must be closed.
 
     Yields:
         the share that is done, 0 to 1.
@@ -136,21 +149,24 @@ def scanned_scene_steps(
         what was read.
     """
     checked_factor(speed_factor)
+    as_shown = None if isinstance(source, bpy.types.Depsgraph) else visible
     reading: _SceneWalk | None = None
     attempt = 0
     with Changes() as changes:
         while reading is None or not reading.complete:
             attempt += 1
-            depsgraph = _depsgraph(source)
-            changes.forget()
-            root = road_of_id(depsgraph.scene, road)
-            origin = _origin(root)
-            lanes: dict[str, LaneMotion] = {}
-            if geometry is not None:
-                lanes = lane_motions(geometry, speed_factor, origin - np.array(geometry.parameters.transform.translate))
-            reading = _SceneWalk(depsgraph, objects, classes, class_ids, root, lanes, speed_factor)
-            if attempt == _ATTEMPTS:
-                reading.copy_all()
+            with _shown(source, visible) as differs:
+                depsgraph = _depsgraph(source)
+                changes.forget()
+                root = road_of_id(depsgraph.scene, road)
+                origin = _origin(root)
+                lanes: dict[str, LaneMotion] = {}
+                if geometry is not None:
+                    begin = origin - np.array(geometry.parameters.transform.translate)
+                    lanes = lane_motions(geometry, speed_factor, begin)
+                reading = _SceneWalk(depsgraph, None, classes, class_ids, root, lanes, speed_factor, as_shown)
+                if attempt == _ATTEMPTS or differs:
+                    reading.copy_all()
             for share in reading.copies():
                 yield share
                 if changes.seen:
@@ -162,7 +178,8 @@ def scanned_scene_steps(
 def _put_together(reading: _SceneWalk, origin: Float, number_objects: bool) -> ScannedScene:
     tables = reading.tables(origin, number_objects)
     moving = tuple(_moving(reading, carrier, motion, tables) for carrier, motion in reading.motions.items())
-    return ScannedScene(join_parts(reading.pairs(None), tables), moving, reading.labels.by_name.unmatched_patterns())
+    unmatched = reading.labels.by_name.unmatched_patterns()
+    return ScannedScene(join_parts(reading.pairs(None), tables), moving, unmatched, reading.warnings)
 
 
 @dataclass(frozen=True)
@@ -239,6 +256,7 @@ class _SceneWalk:
         labels: of its objects.
         motions: of what moves, by carrier.
         again: numbers of later passes of the road's vehicles, by carrier.
+        warnings: what isn't scanned as it is declared.
     """
 
     def __init__(
@@ -250,7 +268,9 @@ class _SceneWalk:
         root: bpy.types.Object | None = None,
         lanes: Mapping[str, LaneMotion] | None = None,
         speed_factor: float = 0.0,
+        visible: Visible | None = None,
     ) -> None:
+        self._unit = 1.0 if root is not None else scene_unit(depsgraph.scene)
         self.labels = Labels(depsgraph.scene, classes, class_ids)
         self.motions: dict[Hashable, BodyMotion] = {}
         self.again: dict[Hashable, PassNumbers] = {}
@@ -269,7 +289,10 @@ class _SceneWalk:
         self._root = np.eye(4) if root is None else world_matrix(root)
         parts = parts_and_copies(root, depsgraph.scene)[0] if root is not None and self._lanes else {}
         self._drivers = {item: role for role, item in parts.items() if role in self._lanes}
+        self._visible, self._layer, self._left_out = visible, depsgraph.view_layer, LeftOut()
         self._walk(depsgraph)
+        self._left_out.see_hair(depsgraph)
+        self.warnings = self._left_out.warnings(depsgraph.view_layer)
 
     def copies(self) -> Iterator[float]:
         """Copy the queued meshes one by one, yielding the share done after each.
@@ -323,7 +346,7 @@ class _SceneWalk:
     def tables(self, origin: Float, number_objects: bool) -> SceneTables:
         """Return the scene's labels, materials and origin (3,), m; with numbers for unnumbered objects if asked."""
         labels = self._numbered() if number_objects else self._labels
-        return SceneTables(labels, self.materials, origin, self.labels.reserved)
+        return SceneTables(labels, self.materials, origin, self.labels.reserved, self._unit)
 
     def _walk(self, depsgraph: bpy.types.Depsgraph) -> None:
         known: dict[tuple[int, int, int], _MeshUse | None] = {}
@@ -331,6 +354,7 @@ class _SceneWalk:
             # Curves, texts, surfaces and metaballs come a second time as the mesh that they make.
             item = use.object
             if item.type != "MESH":
+                self._left_out.see_kind(item)
                 continue
             owner = use.parent if use.is_instance else item
             # A million uses may share one mesh: what they have in common is found once.
@@ -355,7 +379,12 @@ class _SceneWalk:
             return None
         if self._chosen is not None and shown_by not in self._chosen:
             return None
+        if self._visible is not None and not (
+            is_seen(self._visible, shown_by, self._layer) and (self._visible == "viewport" or original.visible_camera)
+        ):
+            return None
         slots = slot_names(item)
+        self._left_out.see_object(shown_by, slots)
         # Materials may be linked to the object, so that the same mesh can look different.
         part = (item.data.as_pointer(), *slots)
         if part not in self._queued and part not in self._copied:
@@ -390,7 +419,7 @@ class _SceneWalk:
         if known.velocity is not None:
             key, velocity = known.velocity
             if key not in self.motions:
-                self.motions[key] = LinearMotion(velocity, matrix[3:12:4])
+                self.motions[key] = LinearMotion(velocity, [self._unit * value for value in matrix[3:12:4]])
             return key
         assert known.lane is not None
         role, motion = known.lane
@@ -418,6 +447,15 @@ class _SceneWalk:
         for index, name in nameless.items():
             labels[index] = replace(labels[index], instance=numbers[name])
         return labels
+
+
+def _shown(source: Source, visible: Visible) -> AbstractContextManager[bool]:
+    """Return the context in which a scene is shown as it is to be read."""
+    if isinstance(source, bpy.types.Depsgraph):
+        return nullcontext(False)
+    scene = source or bpy.context.scene
+    layer = bpy.context.view_layer if scene == bpy.context.scene else scene.view_layers[0]
+    return shown_as(visible, scene, layer)
 
 
 def _origin(root: bpy.types.Object | None) -> Float:

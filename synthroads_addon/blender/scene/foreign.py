@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Literal
 
 import bpy
+import mathutils
+import numpy as np
 
+from ...base.arrays import Float
 from ...base.errors import InputError, MissingFileError
-from ...scanning.scene.mesh_files import check_mesh_file
+from ...base.scratch.opened_file import being_opened
+from ...scanning.scene.map_coordinates import moved_copy, to_scene_axes
+from ...scanning.scene.mesh_files import REMEDY, STAY, check_mesh_file, refuse_outside
 from ..files import empty_file, error_line, stderr_if_it_succeeds
+from ..materials.imported_alpha import mend_imported_alpha
+from ..references import check_references
+from .usd_trial import INSIDE, OUTSIDE
 
 UpAxis = Literal["y", "z"]
 
@@ -31,6 +42,7 @@ _AXES = {"y": {"up_axis": "Y", "forward_axis": "NEGATIVE_Z"}, "z": {"up_axis": "
 _WITH_AXES = (".obj", ".ply", ".stl")
 """Kinds of files that don't say which axis points up."""
 
+_TRIAL = Path(__file__).with_name("usd_trial.py")
 _CRASHING = (".usd", ".usda", ".usdc", ".usdz")
 """Kinds of files whose importer, USD's library, ends the process where they are damaged."""
 
@@ -54,17 +66,24 @@ def check_scene_file(path: Path, up: UpAxis | None = None) -> None:
         raise InputError("--up", up, f"only for {', '.join(_WITH_AXES)}: a {suffix} file says itself what is up")
 
 
-def open_scene(path: Path, up: UpAxis | None = None) -> None:
+def open_scene(path: Path, up: UpAxis | None = None, to_origin: bool = False, also_from: Sequence[Path] = ()) -> Float:
     """Open a .blend file, or import another format into a new empty file, discarding the open one.
 
-    Scripts in a .blend aren't run.
+    Scripts in a .blend aren't run; files that it names are read wherever they lie, as in Blender. What a file of
+    another format names must lie in its folder.
 
     Args:
         path: the file.
         up: the axis that points up in an .obj, .ply or .stl; what is usual for its kind if None (y, z, z).
+        to_origin: move what stands in map coordinates near the origin before it is read, as far as the file has more
+            than single precision.
+        also_from: further folders in which files that it names may lie.
+
+    Returns:
+        what was subtracted (3,), m, in the scene's axes.
 
     Raises:
-        InputError: see `check_scene_file`; or Blender can't read it.
+        InputError: see `check_scene_file`; or Blender can't read it, or it names a file that lies elsewhere.
     """
     check_scene_file(path, up)
     suffix = path.suffix.lower()
@@ -72,45 +91,76 @@ def open_scene(path: Path, up: UpAxis | None = None) -> None:
     place = str(path.resolve())
     try:
         if suffix == ".blend":
-            bpy.ops.wm.open_mainfile(filepath=place, load_ui=False, use_scripts=False)
-            return
-        check_mesh_file(path)
+            with being_opened(path):
+                bpy.ops.wm.open_mainfile(filepath=place, load_ui=False, use_scripts=False)
+            return np.zeros(3)
+        check_mesh_file(path, also_from)
+        if to_origin and suffix in _WITH_AXES:
+            with TemporaryDirectory() as folder:
+                copy, shift = moved_copy(path, Path(folder))
+                if copy != path:
+                    open_scene(copy, up, also_from=(path.resolve().parent, *also_from))
+                    return to_scene_axes(shift, suffix, up)
         module, name = _IMPORTERS[suffix]
+        folders = (path.parent, *also_from)
         if suffix in _CRASHING:
-            _try_in_a_process(path, f"{module}.{name}")
+            _try_in_a_process(path, f"{module}.{name}", folders)
         empty_file()
         options: dict[str, Any] = dict(_AXES[up]) if up else {}
-        with stderr_if_it_succeeds():
+        with being_opened(path), stderr_if_it_succeeds():
             getattr(getattr(bpy.ops, module), name)(filepath=place, **options)
+        check_references(path, folders, REMEDY)
+        mend_imported_alpha(path, bpy.data.materials)
+        for item in bpy.data.objects:
+            # A file knows one state alone: importers set the viewport's, as of an FBX's hidden parts.
+            item.hide_render |= item.hide_viewport or item.hide_get()
     except (AttributeError, RuntimeError) as error:
         raise InputError("SCENE", str(path), f"can't be read by Blender: {error_line(error)}") from None
+    return np.zeros(3)
 
 
-def _try_in_a_process(path: Path, importer: str) -> None:
-    """Import a file in a separate process as a trial; raise `InputError` if that process crashes.
+def move_scene(by: Float) -> None:
+    """Move all that is in the open scene by a vector (3,) in its own units: each object that hangs on no other."""
+    for item in bpy.context.scene.objects:
+        if item.parent is None:
+            item.matrix_world.translation += mathutils.Vector(by.tolist())
+    bpy.context.view_layer.update()
+
+
+def _try_in_a_process(path: Path, importer: str, folders: Sequence[Path]) -> None:
+    """Import a USD file in a separate process as a trial, see `usd_trial`.
 
     Args:
         path: the file.
         importer: name of Blender's operator.
+        folders: from which may be read.
+
+    Raises:
+        InputError: the process crashes, or the file or one of its layers names a file elsewhere.
     """
-    code = f"import bpy; bpy.ops.{importer}(filepath={str(path.resolve())!r})"
+    given = {"PATH": str(path.resolve()), "IMPORTER": importer, "FOLDERS": [str(one.resolve()) for one in folders]}
+    code = f"import bpy, runpy; runpy.run_path({str(_TRIAL)!r}, {given!r}, '__main__')"
     blender = bpy.app.binary_path  # none where Blender is a Python package
     inside = [blender, "--background", "--factory-startup", "--python-expr", code]
     alone = inside if blender else [sys.executable, "-c", code]
     done = subprocess.run(alone, stdin=subprocess.DEVNULL, capture_output=True, check=False)
     if not 0 <= done.returncode < 256:  # what went wrong in an orderly way is told when it does so here
         raise InputError("SCENE", str(path), "can't be read by Blender: it is damaged so that its importer crashes")
+    lines = done.stdout.decode(errors="replace").splitlines()
+    for line in lines:
+        if line.startswith(OUTSIDE):
+            layer, address = json.loads(line.removeprefix(OUTSIDE))
+            refuse_outside(Path(layer.partition("[")[0]), address.replace("<UDIM>", "1001"), folders, REMEDY)
+            raise InputError(layer, address, f"{STAY}: {REMEDY}")
+    if INSIDE not in lines:
+        told = "can't be looked into for the files that it names: it is damaged, or this Blender has no module pxr"
+        raise InputError("SCENE", str(path), told)
 
 
 def open_scene_warnings() -> list[str]:
-    """Return warnings about missing linked files and a unit scale other than 1 m in the open scene, as sentences."""
-    warnings = [
+    """Return warnings about missing linked files of the open scene, as sentences."""
+    return [
         f"the linked file {library.filepath} is missing: what it holds is not scanned"
         for library in bpy.data.libraries
         if not Path(bpy.path.abspath(library.filepath)).is_file()
     ]
-    units = bpy.context.scene.unit_settings
-    scale = units.scale_length
-    if units.system != "NONE" and abs(scale - 1.0) > 1e-6:
-        warnings.append(f"the scene's unit scale is {scale:g}: it is scanned as if a unit were 1 m")
-    return warnings

@@ -16,6 +16,7 @@ from ...base.class_mapping import NameClasses
 from ...base.classes import UNLABELLED
 from ...base.errors import InputError
 from ...base.machine import linear_algebra_on_one_thread
+from ...base.remarks import warn
 from ...materials.table import entry_of
 from ...scanning.scene.mesh import SceneMesh, empty_scene_mesh
 from ...scanning.scene.surface_values import MeshValues, PartValues, SurfaceInput, ValuesBuilder
@@ -26,6 +27,7 @@ from .values import OF_FRAME, OF_OBJECT, mesh_values
 Float = NDArray[np.float64]
 
 _SMALLEST_AREA = 1e-12
+_LARGEST_LABEL = 2.0**31
 _BLOCK = 1 << 17
 """Triangles or vertices worked on at a time."""
 _PER_FACE = ("class_id", "instance_id", "material")
@@ -80,12 +82,14 @@ class SceneTables:
         materials: names.
         origin: (3,) map coordinates of the local origin, m.
         reserved: values of ``class_id`` that faces' own numbers can't have, see `Labels`.
+        unit: metres that a unit of the scene stands for.
     """
 
     labels: Sequence[Label]
     materials: tuple[str, ...]
     origin: Float
     reserved: frozenset[int] = frozenset()
+    unit: float = 1.0
 
 
 def slot_names(item: bpy.types.Object) -> list[str]:
@@ -190,8 +194,8 @@ def copy_mesh(
         triangles,
         face,
         _face_values(mesh, "material_index") if len(set(slots)) > 1 else None,
-        _face_values(mesh, "class_id"),
-        _face_values(mesh, "instance_id"),
+        _face_labels(name, mesh, "class_id", corners),
+        _face_labels(name, mesh, "instance_id", corners),
         np.array([materials.setdefault(entry, len(materials)) for entry in slots], np.uint16),
         _material_classes(slots, materials, by_name),
         asked,
@@ -245,6 +249,43 @@ def _face_values(mesh: bpy.types.Mesh, name: str) -> NDArray[Any] | None:
     return values
 
 
+def _face_labels(owner: str, mesh: bpy.types.Mesh, name: str, corners: NDArray[np.int32]) -> NDArray[np.int32] | None:
+    """Return a mesh's labels (F,) of faces, or as glTF and PLY keep them of vertices; None if it has none.
+
+    glTF's attributes of others begin with an underscore, by rule in capitals; the scalars of CloudCompare's files with
+    ``scalar_``. A face has the label of its first vertex; the user is told where its vertices differ.
+
+    Args:
+        owner: name of the mesh's object, for messages.
+        mesh: the mesh.
+        name: of the label.
+        corners: (C,) vertices of the mesh's corners.
+    """
+    values = _face_values(mesh, name)
+    if values is not None:
+        return values
+    attribute = next((mesh.attributes[one] for one in _spellings(name) if one in mesh.attributes), None)
+    if attribute is None or attribute.domain != "POINT" or attribute.data_type not in ("INT", "INT8", "FLOAT"):
+        return None
+    if not len(mesh.polygons):
+        return np.zeros(0, np.int32)
+    of_vertex = np.empty(len(mesh.vertices), np.float32 if attribute.data_type == "FLOAT" else np.int32)
+    attribute.data.foreach_get("value", of_vertex)
+    of_corner = np.rint(np.where(np.abs(of_vertex) < _LARGEST_LABEL, of_vertex, -1.0)).astype(np.int32)[corners]
+    first = np.empty(len(mesh.polygons), np.int32)
+    mesh.polygons.foreach_get("loop_start", first)
+    mixed = np.minimum.reduceat(of_corner, first) != np.maximum.reduceat(of_corner, first)
+    if mixed.any():
+        text = f"{np.count_nonzero(mixed):,} faces have vertices of several {name}: the first vertex's is taken"
+        warn(f"{owner}: {text}")
+    return of_corner[first]
+
+
+def _spellings(name: str) -> tuple[str, ...]:
+    """Return what a label's attribute may be called: as ours, by glTF's rule for names of others, by CloudCompare's."""
+    return name, f"_{name.upper()}", f"_{name}", f"scalar_{name}"
+
+
 @linear_algebra_on_one_thread()  # thousands of small products
 def join_parts(pairs: list[tuple[MeshPart, Places]], tables: SceneTables, frame: Float | None = None) -> SceneMesh:
     """Return all placed parts as one mesh, without triangles of no area; empties `pairs`.
@@ -252,9 +293,11 @@ def join_parts(pairs: list[tuple[MeshPart, Places]], tables: SceneTables, frame:
     Args:
         pairs: parts and where they stand; emptied, so that no part is held longer than it is needed.
         tables: of the scene.
-        frame: (4, 4) from the scene's frame to the mesh's own, whose origin is 0 then; the same frame if None.
+        frame: (4, 4) from the scene's frame, m, to the mesh's own, whose origin is 0 then; the same frame if None.
     """
     origin = tables.origin if frame is None else np.zeros(3)
+    if tables.unit != 1.0:
+        frame = (np.eye(4) if frame is None else frame) @ np.diag([*[tables.unit] * 3, 1.0])
     uses = np.array([len(places.labels) for _, places in pairs], dtype=np.int64)
     sizes = np.array([(len(part.vertices), len(part.triangles)) for part, _ in pairs], dtype=np.int64).reshape(-1, 2)
     counts = uses @ sizes
@@ -289,7 +332,8 @@ def join_parts(pairs: list[tuple[MeshPart, Places]], tables: SceneTables, frame:
     if keep is not None:
         for name in ("triangles", *_PER_FACE):
             arrays[name] = arrays[name][keep]
-    return SceneMesh(**arrays, materials=tables.materials, origin=origin, surface=surface.table(keep))
+    surfaces = surface.table(keep)
+    return SceneMesh(**arrays, materials=tables.materials, origin=origin, surface=surfaces, unit=tables.unit)
 
 
 def _part_values(part: MeshPart, places: Places, first: int, frame: Float | None) -> PartValues:

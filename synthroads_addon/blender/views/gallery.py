@@ -12,8 +12,9 @@ import bpy
 import numpy as np
 from mathutils import Matrix, Vector
 
-from ...base.files import PRESETS
+from ...base.files import PRESETS, made_folder
 from ...base.schema import read_json
+from ...base.scratch.folders import scratch_folder
 from ...materials.table import materials
 from ...road.geometry import RoadGeometry
 from ...road.parameters import AlignmentObject, RoadParameters
@@ -45,6 +46,7 @@ _ON_CUBES = {COLOR: (0.03, 0.09, 0.3), "shade": 0.5}
 _DAYLIGHT = Environment(sun_azimuth_deg=215.0, sun_elevation_deg=42.0, cloud_cover=0.35, cloud_size=250.0)
 _HERE = Matrix.Identity(4)
 """From the road's coordinates to the scene's."""
+_VIEWS = {"aerial": aerial_view, "driver": driver_view}
 _NOT_SHOWN = ("Alignment", "Carriageway", "Median", "Terrain", "LineMarking", "Landscape")
 
 
@@ -78,6 +80,24 @@ def make_gallery(folder: Path, quality: Quality, only: str, say: Callable[[str],
     return made
 
 
+def planned_pictures(only: str) -> int:
+    """Return how many pictures `make_gallery` renders at most: objects without a face in sight have none."""
+    preset = read_json(PRESET)
+    names = {f"scene-{name}-{view}" for name in preset["scenes"] for view in _VIEWS}
+    names |= {f"class-{design_class.lower()}" for design_class in preset["design_classes"]}
+    names |= {f"materials-{layer}" for layer in ("lit", *LAYERS)}
+    for name, settings in preset["scenes"].items():
+        if _is_built(name, only):
+            road = sample_road(RoadScenario.from_dict(settings["road"]), settings["seed"])
+            names |= {f"object-{kind}" for kind, _ in _shown_objects(road)}
+    return sum(only in name for name in names)
+
+
+def _is_built(name: str, only: str) -> bool:
+    """Return whether a scene of the gallery is needed for the pictures that are wanted."""
+    return not only or only.startswith("object") or any(only in f"scene-{name}-{view}" for view in _VIEWS)
+
+
 def _scene_pictures(
     folder: Path,
     name: str,
@@ -87,12 +107,11 @@ def _scene_pictures(
     say: Callable[[str], None],
     closed_up: set[str],
 ) -> list[Path]:
-    views = {"aerial": aerial_view, "driver": driver_view}
-    if only and not only.startswith("object") and not any(only in f"scene-{name}-{view}" for view in views):
+    if not _is_built(name, only):
         return []
     scene = _build_scene(settings)
     made = []
-    for seen, viewpoint in views.items():
+    for seen, viewpoint in _VIEWS.items():
         if only in f"scene-{name}-{seen}":
             scene.aim_camera(viewpoint(scene.parameters))
             made.append(_render(folder / f"scene-{name}-{seen}.png", quality, say))
@@ -234,6 +253,8 @@ def _show_layer(layer: str) -> None:
 
 
 def _render(path: Path, quality: Quality, say: Callable[[str], None]) -> Path:
-    pictures.render(path, quality.size, quality.samples)
+    with made_folder(path.parent), scratch_folder(path.parent) as folder:
+        pictures.render(folder / path.name, quality.size, quality.samples)
+        (folder / path.name).replace(path)
     say(str(path))
     return path

@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 from mathutils import Vector
 from numpy.typing import ArrayLike
+from PIL import Image
 
 from ...road.surroundings import Environment
 from ..sky import fill_sky, new_sun
@@ -60,6 +61,10 @@ def render(path: Path, size: tuple[int, int] = (1280, 720), samples: int = 48) -
     scene.render.filepath = str(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     bpy.ops.render.render(write_still=True)
+    with Image.open(path, formats=("PNG",)) as picture:
+        picture.load()
+    picture.info.clear()
+    picture.save(path, "PNG")  # without the date and the times that Blender and Cycles write into it
 
 
 def remove(name: str) -> None:

@@ -7,17 +7,23 @@ Here coordinates are scaled integers of 0.1 mm about a pose that carries the off
 import json
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...base.arrays import AnyArray
-from ...base.errors import InputError
+from ...base.errors import InputError, MissingPackageError
+from ...base.maps.places import Placement
+from ...base.remarks import assume
 from ...base.rotations import quaternion_matrices
-from ..layers import Column, columns, make_points
+from ..colours import SIXTEEN_BITS
+from ..layers import Column, columns
 from ..points import PointBlock
-from .base import CloudReader, CloudWriter, check_coordinates, damage_error, header_from_notes
+from .header import header_from_notes, placed, system_of_text
+from .reader import CloudReader, check_coordinates, damage_error
+from .writer import CloudWriter
 
 SCALE = 1e-4
 """Size of a coordinate's step, m."""
@@ -50,7 +56,7 @@ def load_libe57() -> Any:
     try:
         from pye57 import libe57
     except ModuleNotFoundError:
-        raise InputError("e57", None, "needs the package pye57: pip install 'synthroads[e57]'") from None
+        raise MissingPackageError("e57", None, "pye57", "e57") from None
     return libe57
 
 
@@ -137,13 +143,13 @@ class E57Writer(CloudWriter):
         packed = {f"cartesian{'XYZ'[i]}": self.to_integers(local[:, i], "int32", "xyz", SCALE) for i in range(3)}
         rgb = self.to_integers(part.rgb, "uint16", "rgb") >> 8
         packed |= dict(zip(_CHANNELS, rgb.T, strict=True))
-        number = self.to_integers(part.return_number, "uint8", "return_number")
+        number, angle = self.to_integers(part.return_number, "uint8", "return_number"), f"{EXTENSION}:scan_angle"
         packed |= {
-            "intensity": self.check_finite(part.intensity, "intensity"),
-            "timeStamp": self.check_finite(part.gps_time, "gps_time"),
+            "intensity": self.check_finite(part.intensity, "intensity", self._types["intensity"]),
+            "timeStamp": self.check_finite(part.gps_time, "gps_time", self._types["timeStamp"]),
             "returnIndex": np.maximum(number, 1) - 1,  # counts from 0
             "returnCount": self.to_integers(part.number_of_returns, "uint8", "number_of_returns"),
-            f"{EXTENSION}:scan_angle": self.check_finite(part.scan_angle_deg, "scan_angle"),
+            angle: self.check_finite(part.scan_angle_deg, "scan_angle", self._types[angle]),
             f"{EXTENSION}:strip": self.to_integers(part.strip, "uint16", "strip"),
             # Readers such as pye57's `read_scan` insist on it.
             "cartesianInvalidState": np.full(len(part), _VALID, dtype=np.uint8),
@@ -220,6 +226,16 @@ _FIELDS = {
     "strip": f"{EXTENSION}:strip",
 }
 """Names of the arrays that every block has."""
+_FLAGGED = {
+    "isIntensityInvalid": ("intensity",),
+    "isColorInvalid": _CHANNELS,
+    "isTimeStampInvalid": ("timeStamp",),
+}
+"""Fields that say whether others of a point mean something, and the others."""
+_PLAIN = {"isIntensityInvalid": "intensity", "isColorInvalid": "colour", "isTimeStampInvalid": "time"}
+_SANE = 1e30
+"""Limits beyond this aren't those of any instrument, but of the number's type."""
+Limits = tuple[float, float]
 
 
 class E57Reader(CloudReader):
@@ -245,6 +261,8 @@ class E57Reader(CloudReader):
             counts = [int(scan["points"].childCount()) for scan in self._scans]
             noted = f"{EXTENSION}:notes" in _field_names(root)
             notes = json.loads(root[f"{EXTENSION}:notes"].value()) if noted else None
+            metadata = "coordinateMetadata"
+            text = str(root[metadata].value()) if not noted and metadata in _field_names(root) else None
         except Exception as problem:
             self.close()
             raise InputError(str(path), None, f"is an E57 file that is damaged ({_error_text(problem)})") from None
@@ -253,20 +271,42 @@ class E57Reader(CloudReader):
             self.close()
             raise InputError(str(path), None, "has no Cartesian coordinates")
         self._counts = counts
-        self.header = header_from_notes(
-            path, "E57", sum(counts), names, notes, name_of=e57_name, usual=set(_FIXED), has_color="colorRed" in names
-        )
+        try:
+            header = header_from_notes(
+                path,
+                "E57",
+                sum(counts),
+                names,
+                notes,
+                name_of=e57_name,
+                usual={*_FIXED, *_FLAGGED},
+                has_color="colorRed" in names,
+            )
+            self.header = replace(header, place=_declared_place(path, text)) if text else header
+        except InputError:
+            self.close()
+            raise
+        self._intensities: list[Limits | None] = [None] * len(self._scans)
+        if not self.header.labelled:  # ours are in the unit of the notes, whatever the limits
+            self._intensities = [self._limits(scan, "intensity", fields) for scan, fields in self._scanned()]
+            pairs = zip(self._intensities, self._fields, strict=True)
+            given = [found for found, fields in pairs if "intensity" in fields]
+            if given and None not in given:
+                self.header = replace(self.header, intensity_scale=SIXTEEN_BITS)
+            elif any(given):
+                text = "only some of its scans say what intensities count to: all are taken as they stand"
+                assume(f"{path.name}: {text}")
+                self._intensities = [None] * len(self._scans)
 
     def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
         """Yield the points of one scan after the other, in map coordinates, without invalid ones."""
         done = 0
-        for scan, fields, count in zip(self._scans, self._fields, self._counts, strict=True):
-            names = [name for name in sorted(_FIXED.keys() | self._layer_names()) if name in fields]
+        for number, (scan, fields, count) in enumerate(zip(self._scans, self._fields, self._counts, strict=True)):
+            names = [name for name in sorted(_FIXED.keys() | _FLAGGED.keys() | self._layer_names()) if name in fields]
+            intensities, colors = self._intensities[number], self._color_limits(scan, fields)
             room = min(size, count)
             arrays = {name: np.zeros(room) for name in names}
-            buffers = self._e57.VectorSourceDestBuffer()
-            for name, array in arrays.items():
-                buffers.append(self._e57.SourceDestBuffer(self._file, name, array, room, True, True))
+            buffers = self._buffers(arrays)
             left, reader = count, None
             while left:
                 try:
@@ -276,9 +316,12 @@ class E57Reader(CloudReader):
                     raise damage_error(self.header.path, done, self.header.count) from None
                 if got == 0:
                     raise damage_error(self.header.path, done, self.header.count)
-                block = self._block({name: array[:got] for name, array in arrays.items()}, got, _pose(scan))
-                invalid = arrays["cartesianInvalidState"][:got] if "cartesianInvalidState" in arrays else None
-                block = block if invalid is None else block.select(invalid == 0)
+                part = {name: array[:got] for name, array in arrays.items()}
+                self._scale(part, intensities, colors)
+                block = self._block(part, got, _pose(scan), done)
+                if "cartesianInvalidState" in part and (invalid := part["cartesianInvalidState"] != _VALID).any():
+                    self._remarks["points have no valid coordinates and are left out"] += int(np.count_nonzero(invalid))
+                    block = block.select(~invalid)
                 check_coordinates(self.header.path, done, block.xyz)
                 yield block
                 done, left = done + got, left - got
@@ -288,18 +331,122 @@ class E57Reader(CloudReader):
     def _layer_names(self) -> set[str]:
         return {e57_name(column) for column in columns(self.header.attributes)}
 
-    def _block(self, arrays: dict[str, AnyArray], count: int, pose: tuple[AnyArray, AnyArray]) -> PointBlock:
+    def _scanned(self) -> Iterator[tuple[Any, set[str]]]:
+        """Yield each scan with the names of its fields."""
+        return zip(self._scans, self._fields, strict=True)
+
+    def _limits(self, scan: Any, name: str, fields: set[str]) -> Limits | None:
+        """Return least and largest value that a field can have, by the scan's limits or the field's; None without."""
+        if name not in fields:
+            return None
+        group = "colorLimits" if name in _CHANNELS else f"{name}Limits"
+        found: Limits | None = None
+        try:
+            if scan.isDefined(group) and all(scan[group].isDefined(f"{name}{end}") for end in _ENDS):
+                low, high = (_number_of(scan[group][f"{name}{end}"]) for end in _ENDS)
+                found = (low, high)
+            if not _tells(found):
+                found = _field_limits(self._e57.StructureNode(scan["points"].prototype())[name])
+        except Exception as problem:
+            raise InputError(
+                str(self.header.path), None, f"is an E57 file that is damaged ({_error_text(problem)})"
+            ) from None
+        return found if _tells(found) else None
+
+    def _color_limits(self, scan: Any, fields: set[str]) -> dict[str, Limits]:
+        """Return the limits of a scan's colour channels; where none are declared, by the largest value there is."""
+        limits = {name: self._limits(scan, name, fields) for name in _CHANNELS if name in fields}
+        if None in limits.values():
+            full = self._assumed_brightness(self._colors(), whole=False)
+            return {name: found or (0.0, full) for name, found in limits.items()}
+        return {name: found for name, found in limits.items() if found}
+
+    def _colors(self) -> Iterator[AnyArray]:
+        """Yield the stored colours of all scans, in parts, invalid ones as NaN."""
+        for (scan, fields), count in zip(self._scanned(), self._counts, strict=True):
+            names = [name for name in (*_CHANNELS, "isColorInvalid") if name in fields]
+            if not count or "colorRed" not in names:
+                continue
+            arrays = {name: np.zeros(min(_CAPACITY, count)) for name in names}
+            try:
+                reader = scan["points"].reader(self._buffers(arrays))
+                while got := reader.read():
+                    invalid = arrays["isColorInvalid"][:got] != 0 if "isColorInvalid" in arrays else False
+                    parts = (array[:got] for name, array in arrays.items() if name in _CHANNELS)
+                    yield np.where(invalid, np.nan, np.stack(list(parts)))
+                reader.close()
+            except self._e57.E57Exception:
+                return  # damage is found where the points are read
+
+    def _buffers(self, arrays: dict[str, AnyArray]) -> Any:
+        """Return the buffers by which the library reads fields into arrays (n,) of their names."""
+        buffers = self._e57.VectorSourceDestBuffer()
+        for name, array in arrays.items():
+            buffers.append(self._e57.SourceDestBuffer(self._file, name, array, len(array), True, True))
+        return buffers
+
+    def _scale(self, part: dict[str, AnyArray], intensities: Limits | None, colors: dict[str, Limits]) -> None:
+        """Bring a part's intensities to shares of their limits and colours to 16 bits, in place; invalid ones to 0."""
+        void = {name: part[flag] != 0 for flag, names in _FLAGGED.items() if flag in part for name in names}
+        for flag, (name, *_) in _FLAGGED.items():
+            if name in void and (count := int(np.count_nonzero(void[name]))):
+                self._remarks[f"points have an invalid {_PLAIN[flag]}: it is taken for 0"] += count
+        spans = colors if intensities is None else {**colors, "intensity": intensities}
+        for name in (*_CHANNELS, "intensity", "timeStamp"):
+            if name not in part:
+                continue
+            values = np.where(void[name], np.nan, part[name]) if name in void else part[name]
+            if name in spans:
+                values = self._share_of(values, spans[name], "an intensity" if name == "intensity" else "a colour")
+                values = np.rint(np.nan_to_num(values) * SIXTEEN_BITS) if name in _CHANNELS else values
+            part[name] = np.where(void[name], 0.0, values) if name in void else values
+
+    def _share_of(self, values: AnyArray, limits: Limits, what: str) -> AnyArray:
+        """Return values (n,) as shares of what lies between their limits, to which those beyond are set."""
+        share = (values - limits[0]) / (limits[1] - limits[0])
+        if count := int(np.count_nonzero((share < 0.0) | (share > 1.0))):
+            self._remarks[f"points have {what} beyond the limits that the file names, to which it is set"] += count
+        return np.clip(share, 0.0, 1.0)
+
+    def _block(self, arrays: dict[str, AnyArray], count: int, pose: tuple[AnyArray, AnyArray], done: int) -> PointBlock:
         rotation, translation = pose
         present = [column for column in columns(self.header.attributes) if e57_name(column) in arrays]
         stored = {column.name: arrays[e57_name(column)].copy() for column in present}
         stored |= {name: arrays[field].copy() for name, field in _FIELDS.items() if field in arrays}
         stored["xyz"] = np.stack([arrays[f"cartesian{axis}"] for axis in "XYZ"], axis=1) @ rotation.T + translation
-        index = arrays.get("returnIndex", np.zeros(count))  # counts from 0
-        stored["return_number"] = index.astype(np.uint8) + np.uint8(1)
+        if "returnIndex" in arrays:  # counts from 0
+            stored["return_number"] = arrays["returnIndex"] + 1.0
+        else:
+            stored["return_number"] = np.ones(count, dtype=np.uint8)
         dark = np.zeros(count)
-        channels = [arrays.get(name, dark).astype(np.uint16) for name in _CHANNELS]
-        stored["rgb"] = np.stack(channels, axis=1) * np.uint16(257)
-        return make_points(stored, self.header.attributes, count)
+        stored["rgb"] = np.stack([arrays.get(name, dark) for name in _CHANNELS], axis=1)
+        return self._points(stored, count, done)
+
+
+def _tells(limits: Limits | None) -> bool:
+    """Return whether limits are some of a quantity, and not those of a number's type or of nothing."""
+    return limits is not None and -_SANE < limits[0] < limits[1] < _SANE
+
+
+def _number_of(node: Any) -> float:
+    """Return the value of an E57 node of any kind of number."""
+    return float(node.scaledValue() if hasattr(node, "scaledValue") else node.value())
+
+
+def _field_limits(node: Any) -> Limits:
+    """Return the least and the largest value that the prototype of an E57 field allows."""
+    if hasattr(node, "scaledMinimum"):
+        return float(node.scaledMinimum()), float(node.scaledMaximum())
+    return float(node.minimum()), float(node.maximum())
+
+
+def _declared_place(path: Path, text: str) -> Placement:
+    """Return the placement that a file of others declares, whose coordinates are metres by the standard."""
+    place = placed(path, *system_of_text(text))
+    if place.declared is not None and place.scale is not None:
+        allowed = "isn't in metres, which E57's coordinates are by its standard: which of the two holds can't be told"
+        raise InputError(f"{path}: coordinate system", place.declared.label, allowed)
+    return place
 
 
 def _field_names(prototype: Any) -> set[str]:

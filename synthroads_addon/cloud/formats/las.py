@@ -8,7 +8,10 @@ of the 16-bit intensity and the table of classes stand as JSON in the VLR ``Synt
 import json
 import struct
 from collections.abc import Iterator
+from contextlib import suppress
 from datetime import date
+from functools import lru_cache
+from itertools import islice
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -19,13 +22,22 @@ from laspy.vlrs.known import WktCoordinateSystemVlr
 from numpy.typing import NDArray
 
 from ...base.arrays import AnyArray, Float
-from ...base.classes import asprs_scheme, class_scheme, stored_scheme
+from ...base.classes import ClassScheme, asprs_scheme, class_scheme, numbered_scheme, stored_scheme
 from ...base.errors import InputError, OutputError
 from ...base.schema import canonical_json
-from ..layers import Column, attributes_of, columns, make_points
+from ..colours import SIXTEEN_BITS, sixteen_bits
+from ..flags import FLAGS
+from ..layers import PREDICTED, Column, attributes_of, columns
 from ..points import PointBlock
-from .base import CloudHeader, CloudReader, CloudWriter, damage_error, epsg_of, intensity_scale
+from .header import CloudHeader, intensity_scale, placed
+from .las_system import declared_system
+from .reader import CloudReader, damage_error
+from .writer import CloudWriter
 
+OWN = "SynthRoads"
+"""User id of our records."""
+NOTES, PREDICTED_CLASSES = 1, 2
+"""Their ids: intensity scale and classes; the classes of the extra byte `PREDICTED`."""
 SCALE = 0.001
 """Size of a coordinate's step, m."""
 SCAN_ANGLE_STEP = 0.006
@@ -33,13 +45,17 @@ SCAN_ANGLE_STEP = 0.006
 _CHUNK = 50_000
 """Points in a chunk of LAZ, the unit of its compression: whole ones are compressed side by side."""
 _BUFFER = 8 * _CHUNK
+_FEW_CHUNKS = 4
 _SLICE = 16_384
 """Points that are packed at a time: their intermediate arrays then stay in the processor's cache."""
+_FIRST = 1024
+"""Points that a writer has room for at first."""
 
 
 class LasWriter(CloudWriter):
     """Writer of point blocks to a LAZ (or, by its ending, LAS) file; see `CloudWriter`."""
 
+    keeps_flags = True
     faults = (OSError, lazrs.LazrsError)
 
     def _open(self) -> None:
@@ -53,7 +69,7 @@ class LasWriter(CloudWriter):
             laz_backend=laspy.LazBackend.LazrsParallel,
             closefd=False,
         )
-        self._buffer = np.zeros(_BUFFER, dtype=self._header.point_format.dtype())
+        self._buffer = np.zeros(_FIRST, dtype=self._header.point_format.dtype())
         self._held = 0
         self._low = np.full(3, np.iinfo(np.int32).max, dtype=np.int64)
         self._high = np.full(3, np.iinfo(np.int32).min, dtype=np.int64)
@@ -63,11 +79,19 @@ class LasWriter(CloudWriter):
         first = 0
         while first < len(block):
             last = min(first + _SLICE, first + _BUFFER - self._held, len(block))
+            self._make_room(self._held + last - first)
             self._pack(block.select(slice(first, last)), self._buffer[self._held : self._held + last - first])
             self._held += last - first
             first = last
             if self._held == _BUFFER:
                 self._flush()
+
+    def _make_room(self, count: int) -> None:
+        """Enlarge the buffer to a number of records; it grows by doubling, as many files of few points may be open."""
+        if count > len(self._buffer):
+            larger = np.zeros(min(max(2 * len(self._buffer), count), _BUFFER), self._buffer.dtype)
+            larger[: self._held] = self._buffer[: self._held]
+            self._buffer = larger
 
     def _finish(self) -> None:
         self._flush()
@@ -103,6 +127,7 @@ class LasWriter(CloudWriter):
         record["gps_time"] = self.check_finite(block.gps_time, "gps_time")
         record["scan_angle"] = self._scan_angle(block)
         record["point_source_id"] = self.to_integers(block.strip, "uint16", "strip") + np.uint16(1)
+        record["classification_flags"], record["user_data"] = self._pack_flags(block), block.more.get("user_data", 0)
         for column in self.columns:
             record[column.name] = self.stored_integers(column, block)
         record["classification"] = np.take(self._codes, self.to_integers(block.class_id, "uint8", "class_id"))
@@ -129,6 +154,17 @@ class LasWriter(CloudWriter):
         record["bit_fields"] = number | (of << np.uint8(4))
         self._by_return += [np.count_nonzero(number == k) for k in range(16)]  # faster than to sort them into bins
 
+    def _pack_flags(self, block: PointBlock) -> AnyArray:
+        """Return the byte (N,) of classification flags, scanner channel, scan direction and edge of the flight line."""
+        packed = np.zeros(len(block), dtype=np.uint8)
+        for name, (shift, bits) in _FLAG_BITS.items():
+            if name in block.more:
+                value = self.to_integers(block.more[name], "uint8", name)
+                if value.max() >= 1 << bits:
+                    raise OutputError(str(self.path), int(value.max()), f"{name} must be at most {(1 << bits) - 1}")
+                packed |= value << np.uint8(shift)
+        return packed
+
     def _scan_angle(self, block: PointBlock) -> NDArray[np.int16]:
         steps = self.to_integers(block.scan_angle_deg, "int16", "scan_angle", SCAN_ANGLE_STEP)
         if max(-int(steps.min()), int(steps.max())) > 30_000:
@@ -143,12 +179,14 @@ class LasWriter(CloudWriter):
         # No wall clock in files: the same seed gives the same bytes on any day.
         header.creation_date = date(2000, 1, 1)
         header.global_encoding.wkt = True
+        if self.standard_time:
+            header.global_encoding.gps_time_type = laspy.header.GpsTimeType.STANDARD
         header.add_extra_dims([self._extra_bytes(column) for column in self.columns])
         for extra in header.vlrs.get("ExtraBytesVlr")[0].extra_bytes_structs:
             # Smallest and largest value are optional, and unknown until the end.
             extra.options &= ~(extra.MIN_BIT_MASK | extra.MAX_BIT_MASK)
-        notes = canonical_json(self.notes())
-        header.vlrs.append(laspy.VLR("SynthRoads", 1, "intensity scale, classes", notes.encode()))
+        notes = _laid_out(json.dumps(self.notes()))
+        header.vlrs.append(laspy.VLR(OWN, NOTES, "intensity scale, classes", notes.encode()))
         if self.crs_text:
             header.vlrs.append(WktCoordinateSystemVlr(self.crs_text))
         return header
@@ -162,6 +200,12 @@ class LasWriter(CloudWriter):
         )
 
 
+@lru_cache(maxsize=4)
+def _laid_out(notes: str) -> str:
+    """Return notes given as JSON in the project's layout, which takes ten times as long: tiles have the same."""
+    return canonical_json(json.loads(notes))
+
+
 _FAULTS = (
     *(laspy.errors.LaspyException, lazrs.LazrsError, ValueError, struct.error, OSError, EOFError, MemoryError),
     *(LookupError, ArithmeticError, TypeError, RecursionError),
@@ -172,11 +216,16 @@ _READ = {
     *("gps_time", "scan_angle", "scan_angle_rank", "point_source_id", "class_id", "instance_id"),
 }
 """Dimensions that are read besides attributes."""
-_FLAGS = {
-    *("user_data", "synthetic", "key_point", "withheld", "overlap", "scanner_channel", "scan_direction_flag"),
-    "edge_of_flight_line",
+_FLAG_BITS = {
+    "synthetic": (0, 1),
+    "key_point": (1, 1),
+    "withheld": (2, 1),
+    "overlap": (3, 1),
+    "scanner_channel": (4, 2),
+    "scan_direction_flag": (6, 1),
+    "edge_of_flight_line": (7, 1),
 }
-"""Standard dimensions of LAS that the project has no use for."""
+"""First bit and number of bits of the flags that share a byte in point formats 6 and above (LAS 1.4 R15, table 16)."""
 _LAYERED = 3
 """Compressor whose chunks store each attribute in a layer of its own."""
 _LAYERS = {10: 9, 11: 1, 12: 2, 13: 1}
@@ -216,6 +265,7 @@ class LasReader(CloudReader):
         done, path = 0, self.header.path
         if self._reader.points_read:
             self._reader.seek(0)
+        full = self._full_brightness() if self.header.has_color else SIXTEEN_BITS
         while done < self.header.count:
             count = min(size, self.header.count - done)
             try:
@@ -228,8 +278,8 @@ class LasReader(CloudReader):
                 raise
             if len(record) != count:
                 raise damage_error(path, done + len(record), self.header.count)
+            yield self._block(record, full, done)
             done += count
-            yield self._block(record)
 
     def _check_size(self, path: Path) -> None:
         """Raise `InputError` if a LAS file ends before its points do or a LAZ file's chunks don't fill it."""
@@ -242,10 +292,28 @@ class LasReader(CloudReader):
         elif header.point_count:
             _check_chunks(path, start, header.vlrs.get("LasZipVlr")[0].record_data)
 
-    def _block(self, record: Any) -> PointBlock:
+    def _full_brightness(self) -> float:
+        """Return the stored value of full brightness: LAS has 16 bits, and many files hold 8 all the same."""
+        channels = ("red", "green", "blue")
+
+        def colors() -> Iterator[AnyArray]:
+            only = laspy.DecompressionSelection.base() | laspy.DecompressionSelection.RGB
+            with (
+                suppress(*_FAULTS),  # damage is found where the points are read
+                laspy.open(self.header.path, read_evlrs=False, decompression_selection=only) as reader,
+            ):
+                # Ours have 16 bits, but were converted as they stood by earlier versions: a few chunks tell.
+                few = _FEW_CHUNKS if self.header.labelled else None
+                for record in islice(reader.chunk_iterator(_CHUNK), few):
+                    yield np.stack([record[name] for name in channels])
+
+        return self._assumed_brightness(colors(), whole=True)
+
+    def _block(self, record: Any, full: float, done: int) -> PointBlock:
         header = self._reader.header
         names = set(record.point_format.dimension_names)
         present = [column.name for column in columns(self.header.attributes) if column.name in names]
+        present += [name for name in FLAGS if name in names]
         fields = [name for name in ("return_number", "number_of_returns", "gps_time") if name in names]
         stored = {name: np.array(record[name]) for name in (*present, *fields)}
         stored["class_id"] = np.array(record["class_id" if self.header.labelled else "classification"])
@@ -253,10 +321,12 @@ class LasReader(CloudReader):
         stored["xyz"] = steps * header.scales + header.offsets
         stored["intensity"] = np.asarray(record["intensity"]).astype(np.float64) / (self.header.intensity_scale or 1.0)
         if self.header.has_color:
-            stored["rgb"] = np.stack([record[name] for name in ("red", "green", "blue")], axis=1)
+            rgb = np.stack([record[name] for name in ("red", "green", "blue")], axis=1)
+            stored["rgb"] = rgb if full == SIXTEEN_BITS else sixteen_bits(rgb, full)
         stored["scan_angle_deg"] = _scan_angle(record, names)
         stored["strip"] = np.asarray(record["point_source_id"]) - np.uint16(1)
-        return make_points(stored, self.header.attributes, len(record))
+        block = self._points(stored, len(record), done)
+        return block if self.header.predicted is None else block.with_arrays({PREDICTED: np.array(record[PREDICTED])})
 
 
 def open_to_copy(path: Path) -> laspy.LasReader:
@@ -317,51 +387,52 @@ def _scan_angle(record: Any, names: set[str]) -> AnyArray:
 
 def _header(path: Path, las: laspy.LasHeader) -> CloudHeader:
     names = set(las.point_format.dimension_names)
-    record = next((v.record_data_bytes() for v in las.vlrs if v.user_id == "SynthRoads" and v.record_id == 1), None)
-    notes = json.loads(record) if record else {}
-    if not isinstance(notes, dict):
-        raise InputError(str(path), None, "its notes on intensity scale and classes are damaged")
+    notes = _notes(path, las, NOTES)
     if not (np.isfinite(las.offsets).all() and np.isfinite(las.scales).all() and np.all(las.scales != 0.0)):
         scales = [*las.scales.tolist(), *las.offsets.tolist()]
         raise InputError(f"{path}: scales and offsets", scales, "must be finite numbers, the scales not 0")
     labelled = bool(notes) and "class_id" in names
     attributes = attributes_of(names) if notes else ()
-    read = _READ | _FLAGS | {column.name for column in columns(attributes)}
+    read = _READ | {*FLAGS} | {column.name for column in columns(attributes)}
     if not labelled:
         read -= {"class_id"}
     scheme = asprs_scheme(range(256))
     if labelled:
         rows = notes.get("classes")
         scheme = stored_scheme(rows, str(path)) if isinstance(rows, dict) else class_scheme("17")
-    text = _crs_text(las)
+    place = placed(path, *declared_system(path, las))
     return CloudHeader(
         path,
         f"LAS {las.version}, point format {las.point_format.id}, {'LAZ' if las.are_points_compressed else 'LAS'}",
         int(las.point_count),
-        np.array(las.offsets, dtype=np.float64),
-        crs_text=text,
-        epsg=epsg_of(text) or _geotiff_epsg(las),
+        place.in_metres(np.array(las.offsets, dtype=np.float64)),
+        place=place,
         intensity_scale=intensity_scale(path, notes) if notes else None,
         scheme=scheme,
         labelled=labelled,
         attributes=attributes,
         has_color="red" in names,
+        predicted=_predicted_classes(path, las),
         left_out=tuple(sorted(names - read)),
+        standard_time=las.global_encoding.gps_time_type == laspy.header.GpsTimeType.STANDARD,
     )
 
 
-def _crs_text(las: laspy.LasHeader) -> str | None:
-    texts = [v.string for v in las.vlrs.get("WktCoordinateSystemVlr")]
-    return texts[0].rstrip("\0 ") or None if texts else None
+def _notes(path: Path, las: laspy.LasHeader, number: int) -> dict[str, Any]:
+    """Return the content of one of our own records, JSON; empty if there is none."""
+    record = next((v.record_data_bytes() for v in las.vlrs if v.user_id == OWN and v.record_id == number), None)
+    notes = json.loads(record) if record else {}
+    if not isinstance(notes, dict):
+        raise InputError(str(path), None, "its notes on intensity scale and classes are damaged")
+    return notes
 
 
-def _geotiff_epsg(las: laspy.LasHeader) -> int | None:
-    """Return the EPSG code of the projected system in GeoTIFF keys (3072), as before LAS 1.4; None without."""
-    for record in las.vlrs.get("GeoKeyDirectoryVlr"):
-        for key in record.geo_keys:
-            if key.id == 3072 and key.tiff_tag_location == 0 and key.value_offset != 32767:
-                return int(key.value_offset)
-    return None
+def _predicted_classes(path: Path, las: laspy.LasHeader) -> ClassScheme | None:
+    """Return the scheme of a file's predicted classes, of which only the numbers may be known; None if it has none."""
+    if not any(one.name == PREDICTED and one.dtype == np.uint8 for one in las.point_format.extra_dimensions):
+        return None
+    notes = _notes(path, las, PREDICTED_CLASSES)
+    return stored_scheme(notes, str(path)) if notes else numbered_scheme()
 
 
 def _check_chunks(path: Path, start: int, record: bytes) -> None:

@@ -21,11 +21,16 @@ from numpy.lib import format as npy
 
 from ...base.arrays import AnyArray
 from ...base.errors import InputError
-from ..layers import columns, layer_arrays, make_points
+from ..colours import EIGHT_BITS, SIXTEEN_BITS, sixteen_bits
+from ..flags import FLAGS
+from ..layers import columns, layer_arrays
 from ..points import POINT_TYPES, PointBlock
-from .base import CloudReader, CloudWriter, check_coordinates, damage_error, header_from_notes
+from .header import header_from_notes
+from .reader import PEEK, CloudReader, check_coordinates, damage_error
+from .writer import CloudWriter
 
 _ON_REQUEST = {name: (np.dtype(kind).str, width) for name, (kind, width) in layer_arrays().items()}
+_KNOWN = POINT_TYPES | _ON_REQUEST | dict.fromkeys(FLAGS, ("|u1", 1))
 ARCHIVE_FAULTS = (
     *(KeyError, ValueError, EOFError, OSError, RuntimeError, MemoryError, SyntaxError, OverflowError),
     *(zipfile.BadZipFile, zlib.error, struct.error, tokenize.TokenError),
@@ -112,6 +117,7 @@ class NpzReader(CloudReader):
 
     def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
         """Yield the points as blocks of at most ``size``, read in step from all arrays."""
+        full = self._full_brightness() if self.header.has_color else SIXTEEN_BITS
         members = {name: self._file.open(f"{name}.npy") for name in self._kinds}
         try:
             for member in members.values():
@@ -123,10 +129,26 @@ class NpzReader(CloudReader):
                 except ARCHIVE_FAULTS:
                     raise damage_error(self.header.path, done, self.header.count) from None
                 check_coordinates(self.header.path, done, arrays["xyz"])
-                yield self._block(arrays, rows)
+                if "rgb" in arrays and (full != SIXTEEN_BITS or arrays["rgb"].dtype.kind == "f"):
+                    arrays["rgb"] = sixteen_bits(arrays["rgb"], full)
+                yield self._block(arrays, rows, done)
         finally:
             for member in members.values():
                 member.close()
+
+    def _full_brightness(self) -> float:
+        """Return the stored value of full brightness: of 8-bit arrays 255, of others' by the largest value."""
+        kind = self._kinds["rgb"][1]
+        if kind.itemsize == 1:
+            return EIGHT_BITS
+
+        def colors() -> Iterator[AnyArray]:
+            with self._file.open("rgb.npy") as member, suppress(*ARCHIVE_FAULTS):  # damage is found with the points
+                _npy_header(member)
+                for done in range(0, self.header.count, PEEK):
+                    yield self._rows(member, "rgb", min(PEEK, self.header.count - done))
+
+        return self._assumed_brightness(colors(), whole=kind.kind in "iu")
 
     def _rows(self, member: IO[bytes], name: str, count: int) -> AnyArray:
         shape, kind = self._kinds[name]
@@ -134,18 +156,18 @@ class NpzReader(CloudReader):
         data = np.frombuffer(member.read(int(np.prod(rows)) * kind.itemsize), dtype=kind)
         return data.reshape(rows).copy()
 
-    def _block(self, arrays: dict[str, AnyArray], count: int) -> PointBlock:
+    def _block(self, arrays: dict[str, AnyArray], count: int, done: int) -> PointBlock:
         stored = {
             c.name: arrays[c.array] if c.component is None else arrays[c.array][:, c.component]
             for c in columns(self.header.attributes)
             if c.array in arrays
         }
-        return make_points(arrays | stored, self.header.attributes, count)
+        return self._points(arrays | stored, count, done)
 
     def _read_kinds(self, path: Path) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
         """Return shape and type of each array of the file that `PointBlock` knows, by name."""
         kinds = {}
-        for name in POINT_TYPES | _ON_REQUEST:
+        for name in _KNOWN:
             if f"{name}.npy" in self._file.namelist():
                 with self._file.open(f"{name}.npy") as member:
                     kinds[name] = _npy_header(member)
@@ -153,7 +175,7 @@ class NpzReader(CloudReader):
             raise InputError(str(path), None, "has no array xyz")
         count = kinds["xyz"][0][0] if kinds["xyz"][0] else 0
         for name, (shape, kind) in kinds.items():
-            width = (POINT_TYPES | _ON_REQUEST)[name][1]
+            width = _KNOWN[name][1]
             if shape != ((count, width) if width > 1 else (count,)) or kind.kind not in "fiub":
                 expected = f"({count}, {width})" if width > 1 else f"({count},)"
                 raise InputError(f"{path}: {name}", shape, f"must be numbers of shape {expected}")

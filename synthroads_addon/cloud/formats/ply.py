@@ -7,16 +7,23 @@ because common readers take lines of 1023 characters at most.
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
-from ...base.arrays import AnyArray, UInt16
+from ...base.arrays import AnyArray
+from ...base.classes import class_scheme
 from ...base.errors import InputError
-from ..layers import Column, columns, make_points
+from ...base.remarks import assume
+from ..colours import EIGHT_BITS, SIXTEEN_BITS, sixteen_bits
+from ..flags import FLAGS
+from ..layers import LABELS, LAYERS, Column, columns
 from ..points import PointBlock
-from .base import CloudReader, CloudWriter, check_coordinates, damage_error, header_from_notes
+from .header import header_from_notes
+from .reader import PEEK, CloudReader, check_coordinates, damage_error
+from .writer import CloudWriter
 
 _NAMES = {"NormalX": "nx", "NormalY": "ny", "NormalZ": "nz"}
 """Columns that PLY has names of its own for."""
@@ -32,19 +39,37 @@ _WORDS = {
 }
 PLY_TYPES = {word: kind for kind, words in _WORDS.items() for word in words}
 """Types by their names in headers, of which there are two."""
+_SCALAR = "scalar_"
+"""Beginning of the properties that CloudCompare loads as scalar fields, whatever else they are called."""
 _FIELDS = {
     "intensity": ("intensity", "<f4"),
-    "return_number": ("return_number", "u1"),
-    "number_of_returns": ("number_of_returns", "u1"),
-    "gps_time": ("gps_time", "<f8"),
-    "scan_angle_deg": ("scan_angle", "<f4"),
-    "strip": ("strip", "<u2"),
+    "return_number": (f"{_SCALAR}return_number", "u1"),
+    "number_of_returns": (f"{_SCALAR}number_of_returns", "u1"),
+    "gps_time": (f"{_SCALAR}gps_time", "<f8"),
+    "scan_angle_deg": (f"{_SCALAR}scan_angle", "<f4"),
+    "strip": (f"{_SCALAR}strip", "<i4"),
 }
 """Arrays that every block has -> their properties and types."""
 _CHANNELS = ("red", "green", "blue")
 _FIXED = (*((axis, "<f8") for axis in "xyz"), *((name, "u1") for name in _CHANNELS), *_FIELDS.values())
-_CLASS_NAMES = ("classification", "class", "label", "scalar_Classification", "scalar_Label")
-"""Where others keep classes."""
+_CLASSES = ("classification", "class", "label", "classid")
+"""Names that others give to classes, in this order, see `_plain`; only the first is said to be a LAS code."""
+_OTHERS = {
+    "intensity": ("intensity",),
+    "return_number": ("returnnumber",),
+    "number_of_returns": ("numberofreturns",),
+    "gps_time": ("gpstime",),
+    "scan_angle_deg": ("scanangle", "scananglerank"),
+    "source": ("pointsourceid",),
+    "class": _CLASSES,
+    **{name: (name.replace("_", ""), f"{name.replace('_', '')}flag") for name in FLAGS},
+    "scanner_channel": ("scannerchannel", "scanchannel"),
+    "scan_direction_flag": ("scandirectionflag", "scandirection"),
+    "red": ("red", "diffusered", "r"),
+    "green": ("green", "diffusegreen", "g"),
+    "blue": ("blue", "diffuseblue", "b"),
+}
+"""Names of each quantity in the files of others, as PDAL's, CloudCompare's and MeshLab's, see `_plain`."""
 _PIECE = 160
 _LONGEST_LINE = 1 << 16
 _MOST_DIGITS = 18
@@ -52,13 +77,22 @@ _MOST_DIGITS = 18
 
 def ply_name(column: Column) -> str:
     """Return the name of a column in PLY."""
-    return _NAMES.get(column.name, column.name)
+    return _NAMES.get(column.name, f"{_SCALAR}{column.name}")
 
 
 def _ply_type(column: Column) -> str:
+    """Return a column's type: one of the four (uchar, int, float, double) that Open3D's tensor reader takes.
+
+    No int holds all of 32 bits without a sign, but a double does.
+    """
     if column.scale is None:
-        return {"uint8": "u1", "uint16": "<u2", "uint32": "<u4"}[column.dtype]
+        return {"uint8": "u1", "uint16": "<i4", "uint32": "<f8"}[column.dtype]
     return "<f8" if column.unit == "m" else "<f4"
+
+
+def _plain(name: str) -> str:
+    """Return a property's name as `_OTHERS` has it: small letters and digits only, without CloudCompare's prefix."""
+    return "".join(sign for sign in name.lower().removeprefix(_SCALAR) if sign.isalnum())
 
 
 class PlyWriter(CloudWriter):
@@ -79,9 +113,10 @@ class PlyWriter(CloudWriter):
             record[name] = self.fit_values(block.array(array), kind, name)
         for column in self.columns:
             if column.array == "class_id":
-                record["class_id"] = self.file_class_ids(block)
+                record[ply_name(column)] = self.file_class_ids(block)
             else:
-                values = self.check_finite(column.values(block), column.name)
+                kind = "f8" if column.whole else _ply_type(column)
+                values = self.check_finite(column.values(block), column.name, kind)
                 record[ply_name(column)] = (
                     self.to_integers(values, column.dtype, column.name) if column.whole else values
                 )
@@ -131,41 +166,88 @@ class PlyReader(CloudReader):
         except BaseException:
             self._file.close()
             raise
-        usual = {name for name, _ in _FIXED} | {*_CLASS_NAMES}
-        colored = set(_CHANNELS) <= self._names
+        self._own = {name: found for name in _own_names() if (found := self._stored_name(name))}
+        self._others = {} if isinstance(notes, dict) else self._names_of_others()
+        used = {*"xyz", *self._own.values(), *self._others.values()}
+        colored = all(name in self._own or name in self._others for name in _CHANNELS)
+        stored, usual = {*self._own, *(self._names - used)}, {*_own_names()}
         self.header = header_from_notes(
-            path, "PLY", count, self._names, notes, name_of=ply_name, usual=usual, has_color=colored
+            path, "PLY", count, stored, notes, name_of=ply_name, usual=usual, has_color=colored
         )
+        self._assumed_scheme = not self.header.labelled and {ply_name(column) for column in LABELS} <= self._own.keys()
+        if self._assumed_scheme:  # one of ours that other software wrote again, without its notes
+            self.header = replace(self.header, scheme=class_scheme("17"), labelled=True)
+
+    def _stored_name(self, name: str) -> str | None:
+        """Return what a property of ours is called in the file: older files lack the prefix; None without it."""
+        return next((one for one in (name, name.removeprefix(_SCALAR)) if one in self._names), None)
+
+    def _names_of_others(self) -> dict[str, str]:
+        """Return the properties of a file of others by the quantity that they are, as far as ours aren't there."""
+        plain = {_plain(name): name for name in sorted(self._names, reverse=True)}
+        found = {what: next((plain[name] for name in names if name in plain), None) for what, names in _OTHERS.items()}
+        if not all(found[name] for name in _CHANNELS):
+            found |= dict.fromkeys(_CHANNELS)
+        mine = {**{array: name for array, (name, _) in _FIELDS.items()}, "source": f"{_SCALAR}strip"}
+        return {what: name for what, name in found.items() if name and mine.get(what, what) not in self._own}
 
     def _stored_blocks(self, size: int) -> Iterator[PointBlock]:
         """Yield the points as blocks of at most ``size``, from the file's first point on."""
+        label = self._others.get("class")
+        if self._assumed_scheme:
+            assume(f"{self.header.path.name}: its class_id is taken for numbers of the 17 classes")
+        elif label and _plain(label) != _CLASSES[0]:
+            assume(f"{self.header.path.name}: its property {label} is taken for LAS codes of classes")
+        full = self._full_brightness() if self.header.has_color else SIXTEEN_BITS
         self._file.seek(self._start)
         for done in range(0, self.header.count, size):
             rows = min(size, self.header.count - done)
             data = self._file.read(rows * self._type.itemsize)
             if len(data) != rows * self._type.itemsize:
                 raise damage_error(self.header.path, done, self.header.count)
-            yield self._block(np.frombuffer(data, dtype=self._type), done)
+            yield self._block(np.frombuffer(data, dtype=self._type), full, done)
 
-    def _block(self, record: AnyArray, done: int) -> PointBlock:
-        stored = {c.name: record[ply_name(c)] for c in columns(self.header.attributes) if ply_name(c) in self._names}
-        stored |= {name: record[field].copy() for name, (field, _) in _FIELDS.items() if field in self._names}
+    def _channels(self) -> list[str]:
+        """Return the names of the properties of red, green and blue."""
+        return [self._own.get(name) or self._others[name] for name in _CHANNELS]
+
+    def _full_brightness(self) -> float:
+        """Return the stored value of full brightness: of 8-bit properties 255, of others by the largest value."""
+        kinds = [self._type[name] for name in self._channels()]
+        if all(kind.itemsize == 1 for kind in kinds):
+            return EIGHT_BITS
+
+        def colors() -> Iterator[AnyArray]:
+            self._file.seek(self._start)
+            for done in range(0, self.header.count, PEEK):
+                rows = min(PEEK, self.header.count - done)
+                data = self._file.read(rows * self._type.itemsize)
+                record = np.frombuffer(data[: len(data) // self._type.itemsize * self._type.itemsize], dtype=self._type)
+                yield np.stack([record[name] for name in self._channels()])
+
+        return self._assumed_brightness(colors(), whole=all(kind.kind in "iu" for kind in kinds))
+
+    def _block(self, record: AnyArray, full: float, done: int) -> PointBlock:
+        own, others = self._own, self._others
+        stored = {c.name: record[own[ply_name(c)]] for c in columns(self.header.attributes) if ply_name(c) in own}
+        stored |= {array: record[own[name]].copy() for array, (name, _) in _FIELDS.items() if name in own}
+        stored |= {name: record[field].copy() for name, field in others.items() if name in (*_FIELDS, *FLAGS)}
+        if "source" in others:  # from 1, as in LAS; 0 is none, which strips count as 65535
+            source = self._fit(record[others["source"]], "strip", done)
+            stored["strip"] = source - np.uint16(1)
         if not self.header.labelled:
-            label = next((name for name in _CLASS_NAMES if name in self._names), None)
-            stored["class_id"] = record[label] if label else np.zeros(len(record))
+            stored["class_id"] = record[others["class"]] if "class" in others else np.zeros(len(record))
         xyz = np.stack([record[name].astype(np.float64) for name in "xyz"], axis=1)
         stored["xyz"] = check_coordinates(self.header.path, done, xyz)
-        dark = np.zeros(len(record), dtype=np.uint16)
-        channels = (_sixteen_bits(record[name]) if name in self._names else dark for name in _CHANNELS)
-        stored["rgb"] = np.stack(list(channels), axis=1)
-        return make_points(stored, self.header.attributes, len(record))
+        if self.header.has_color:
+            stored["rgb"] = sixteen_bits(np.stack([record[name] for name in self._channels()], axis=1), full)
+        return self._points(stored, len(record), done)
 
 
-def _sixteen_bits(channel: AnyArray) -> UInt16:
-    """Return a colour channel as 16 bits, from 8 bits, 16 bits or floats of 0 to 1."""
-    if channel.dtype.kind == "f":
-        return np.rint(np.clip(channel, 0, 1) * 65535).astype(np.uint16)
-    return channel.astype(np.uint16) * np.uint16(257 if channel.dtype.itemsize == 1 else 1)
+def _own_names() -> tuple[str, ...]:
+    """Return the names of all properties of our own files."""
+    every = (column for layer in LAYERS.values() for column in layer.columns)
+    return (*(name for name, _ in _FIXED), *map(ply_name, LABELS), *map(ply_name, every))
 
 
 def read_ply_header(path: Path, file: BinaryIO) -> tuple[int, np.dtype[Any], Any]:
@@ -173,7 +255,7 @@ def read_ply_header(path: Path, file: BinaryIO) -> tuple[int, np.dtype[Any], Any
     if file.readline(8).strip() != b"ply":
         raise InputError(str(path), None, "is not a PLY file")
     fields: list[tuple[str, str]] = []
-    count, element, notes = -1, "", ""
+    count, element, notes = -1, 0, ""
     for line in _header_lines(path, file):
         words = line.split()
         if line.startswith("comment synthroads "):
@@ -181,10 +263,10 @@ def read_ply_header(path: Path, file: BinaryIO) -> tuple[int, np.dtype[Any], Any
         elif words[:1] == ["format"] and words[1:2] != ["binary_little_endian"]:
             raise InputError(str(path), " ".join(words[1:2]), "must be a PLY file of the kind binary_little_endian")
         elif words[:1] == ["element"] and len(words) == 3:
-            element = words[1]
+            element += 1
             if count < 0:
                 count = _number_of_points(path, words)
-        elif words[:1] == ["property"] and element == "vertex":
+        elif words[:1] == ["property"] and element == 1:
             if len(words) != 3 or words[1] not in PLY_TYPES:
                 raise InputError(str(path), line, "properties of points must be numbers")
             fields.append((words[2], PLY_TYPES[words[1]]))
@@ -204,8 +286,6 @@ def _header_lines(path: Path, file: BinaryIO) -> Iterator[str]:
 
 
 def _number_of_points(path: Path, words: list[str]) -> int:
-    if words[1] != "vertex":
-        raise InputError(str(path), words[1], "must begin with the element vertex")
     if not words[2].isdecimal() or len(words[2]) > _MOST_DIGITS:
         raise InputError(str(path), words[2], "must be a number of points")
     return int(words[2])

@@ -8,8 +8,10 @@ from typing import Any, Literal
 from ...base.arrays import Float
 from ...base.classes import ClassScheme
 from ...base.errors import InputError, MissingFileError, nearest_name
+from ...base.remarks import warn
 from ..layers import DEFAULT_ATTRIBUTES, Attribute
-from .base import CloudReader, CloudWriter
+from .reader import CloudReader
+from .writer import CloudWriter
 
 _FORMATS = {".laz": "Las", ".las": "Las", ".ply": "Ply", ".e57": "E57", ".npz": "Npz"}
 """Beginnings of the names of the classes, by ending; their module has the same name in small letters."""
@@ -23,6 +25,11 @@ def missing_package(ending: str) -> str | None:
     """Return the package that files of this ending need and that isn't installed; None if nothing is missing."""
     package = _PACKAGES.get(ending)
     return package if package and importlib.util.find_spec(package) is None else None
+
+
+def installed_endings() -> tuple[str, ...]:
+    """Return the endings of the files that can be written and read with the packages that are installed."""
+    return tuple(ending for ending in ENDINGS if not missing_package(ending))
 
 
 def check_ending(path: Path, field: str = "file") -> str:
@@ -41,10 +48,11 @@ def open_writer(
     attributes: tuple[Attribute, ...] = DEFAULT_ATTRIBUTES,
     scheme: ClassScheme | None = None,
     crs_text: str | None = None,
+    standard_time: bool = False,
 ) -> CloudWriter:
     """Return the writer that suits a file's ending, not yet entered as a context; arguments as `CloudWriter`."""
     make: type[CloudWriter] = _format_class(check_ending(path), "Writer")
-    return make(path, epsg, offset, intensity_scale, attributes, scheme, crs_text)
+    return make(path, epsg, offset, intensity_scale, attributes, scheme, crs_text, standard_time)
 
 
 def _format_class(ending: str, role: Literal["Reader", "Writer"]) -> Any:
@@ -54,7 +62,7 @@ def _format_class(ending: str, role: Literal["Reader", "Writer"]) -> Any:
 
 
 def open_cloud(path: Path) -> CloudReader:
-    """Open a LAS, LAZ, PLY, E57 or NPZ file, by its ending, and return its reader.
+    """Open a LAS, LAZ, PLY, E57 or NPZ file, by its ending, and return its reader; log what it has to say of itself.
 
     Raises:
         MissingFileError: there is no such file, or it can't be read.
@@ -70,4 +78,6 @@ def open_cloud(path: Path) -> CloudReader:
     except OSError as problem:
         raise MissingFileError(str(path), None, f"cannot be read ({problem.strerror})") from None
     reader: CloudReader = _format_class(ending, "Reader")(path)
+    for note in reader.header.place.notes:
+        warn("%s: %s", path.name, note)
     return reader

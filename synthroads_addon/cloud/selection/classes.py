@@ -1,6 +1,6 @@
 """The points of a class in a real cloud: by the cloud's labels, or by where they lie beside an axis."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import laspy
@@ -9,6 +9,8 @@ import numpy as np
 from ...base.arrays import AnyArray, Bool, Float, Index, Int, UInt8
 from ...base.classes import ClassScheme
 from ...base.errors import InputError, nearest_name
+from ...base.maps.places import Placement
+from ..flags import without_flags
 from ..formats.registry import open_cloud
 from ..points import concatenate
 
@@ -28,6 +30,7 @@ class RealCloud:
         distance, incidence: m and rad; NaN where the file doesn't say.
         returns: how many returns the pulse of each has.
         time: GPS time, s; None where all have the same, as where none is known.
+        place: the coordinate system.
     """
 
     xyz: Float
@@ -38,6 +41,7 @@ class RealCloud:
     incidence: Float
     returns: UInt8
     time: Float | None = None
+    place: Placement = field(default_factory=Placement)
 
 
 @dataclass(frozen=True)
@@ -66,23 +70,29 @@ class RealClass:
     beside: Float | None = None
 
 
-def read_real_cloud(path: Path, attribute: str | None = None) -> RealCloud:
-    """Read all points of a measured cloud, with class labels from ``class_id`` or another attribute.
+def read_real_cloud(path: Path, attribute: str | None = None, field: str = "--class-field") -> RealCloud:
+    """Read a measured cloud's points, withheld ones and noise left out, with class labels.
 
     Args:
         path: of any format that is read here.
-        attribute: extra attribute of a LAS or LAZ file that holds the classes; the usual ones if None.
+        attribute: extra attribute of a LAS or LAZ file that holds the labels; ``class_id`` if None.
+        field: what names the attribute, for errors.
 
     Raises:
         InputError: the file can't be read, has no points, or lacks the attribute.
     """
     with open_cloud(path) as cloud:
         header = cloud.header
-        blocks = list(cloud.blocks())
-    if not blocks:
+        blocks, kept = [], []
+        for block in cloud.blocks():
+            kept.append(cloud.usable_points(block, noise=attribute is not None))
+            blocks.append(without_flags(block.select(kept[-1])))
+    if not sum(map(len, blocks)):
         raise InputError(str(path), 0, "has no points")
     points = concatenate(blocks)
-    label = points.class_id.astype(np.int64) if attribute is None else _attribute(path, attribute)
+    label = points.class_id.astype(np.int64)
+    if attribute is not None:
+        label = _attribute(path, attribute, field)[np.concatenate(kept)]
     return RealCloud(
         xyz=points.xyz,
         intensity=points.intensity * (header.intensity_scale or 1.0),
@@ -92,51 +102,67 @@ def read_real_cloud(path: Path, attribute: str | None = None) -> RealCloud:
         incidence=np.deg2rad(points.incidence_deg.astype(np.float64)),
         returns=points.number_of_returns,
         time=points.gps_time if len(points) and np.ptp(points.gps_time) > 0.0 else None,
+        place=header.place,
     )
 
 
-def _attribute(path: Path, name: str) -> Int:
+def _attribute(path: Path, name: str, field: str) -> Int:
     """Return a named attribute (N,) of a LAS or LAZ file as integers."""
     if path.suffix.lower() not in (".las", ".laz"):
-        raise InputError("--class-field", name, f"needs a LAS or LAZ file, not {path.name}")
+        raise InputError(field, name, f"needs a LAS or LAZ file, not {path.name}")
     with laspy.open(path, read_evlrs=False) as file:
         names = list(file.header.point_format.dimension_names)
         if name not in names:
-            raise InputError("--class-field", name, f"must be one of {', '.join(names)}{nearest_name(name, names)}")
+            raise InputError(field, name, f"must be one of {', '.join(names)}{nearest_name(name, names)}")
         return np.asarray(file.read_points(file.header.point_count)[name]).astype(np.int64)
 
 
-def class_by_label(cloud: RealCloud, code: str) -> RealClass:
+def class_by_label(cloud: RealCloud, code: str, field: str) -> RealClass:
     """Return the points of a measured cloud's class, given by its number or its name.
+
+    Args:
+        cloud: with its labels.
+        code: number or name.
+        field: what names the class, for errors.
 
     Raises:
         InputError: there is no such class, or fewer than `FEWEST` of its points have an intensity.
     """
-    number, name = _number(cloud, code)
-    return select_class(cloud, np.flatnonzero(cloud.label == number), f"labelled {name} in the file")
+    number, name = _number(cloud, code, field)
+    return select_class(cloud, np.flatnonzero(cloud.label == number), f"labelled {name} in the file", field)
 
 
-def _number(cloud: RealCloud, code: str) -> tuple[int, str]:
+def _number(cloud: RealCloud, code: str, field: str) -> tuple[int, str]:
     there = {int(value) for value in np.unique(cloud.label)}
     if code.lstrip("-").isdigit():
         number = int(code)
         if number not in there:
             known = ", ".join(str(value) for value in sorted(there)[:40])
-            raise InputError("--class", number, f"no point has it; the file has {known}")
+            raise InputError(field, number, f"no point has it; the file has {known}")
         return number, str(number)
     names = {row.name: row.id for row in cloud.scheme.rows} if cloud.scheme else {}
     named = {name: row for name, row in names.items() if row in there}
     if code not in named:
-        allowed = ", ".join(sorted(named)) or "a number: the attribute has no names"
-        raise InputError("--class", code, f"must be one of {allowed}{nearest_name(code, named)}")
+        known = f"one of {', '.join(sorted(named))}" if named else "a number: the attribute has no names"
+        raise InputError(field, code, f"must be {known}{nearest_name(code, named)}")
     return named[code], f"{code} ({named[code]})"
 
 
-def select_class(cloud: RealCloud, chosen: Index, selection: str) -> RealClass:
-    """Return the points at these indices as a class; those of intensity 0 are only counted."""
+def select_class(cloud: RealCloud, chosen: Index, selection: str, field: str) -> RealClass:
+    """Return the points at these indices as a class; those of intensity 0 are only counted.
+
+    Args:
+        cloud: that they are of.
+        chosen: (N,) their indices.
+        selection: in words, how they were chosen.
+        field: what asks for them, for errors.
+
+    Raises:
+        InputError: fewer than `FEWEST` have an intensity.
+    """
     bright = chosen[cloud.intensity[chosen] > 0.0]
     if len(bright) < FEWEST:
-        raise InputError("--real", selection, f"{len(bright)} points have an intensity, at least {FEWEST} are needed")
+        raise InputError(field, selection, f"{len(bright)} points have an intensity, at least {FEWEST} are needed")
     return RealClass(
         selection=selection,
         place=cloud.xyz[bright],

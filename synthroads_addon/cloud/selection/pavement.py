@@ -19,7 +19,7 @@ import numpy as np
 
 from ...base.arrays import Float, Index, otsu_threshold
 from ...base.errors import InputError
-from ...road.centerline import read_axis
+from ...road.axes.measured_axis import MeasuredAxis
 from .classes import RealClass, RealCloud, select_class
 
 STRETCH = 20.0
@@ -27,11 +27,8 @@ REACH = 0.6
 ALONG = 1.5
 CLEAR = 0.9
 """m."""
-_CELL = 20.0
 _FARTHEST = 40.0
 """Points farther from the axis than this, m, are not looked at."""
-_GAP = 5.0
-"""Axis points farther apart than this, m, are ends: what lies between them is not looked at."""
 _FEWEST_OF_LINE = 30
 
 
@@ -52,13 +49,18 @@ class RoadClasses:
     line_width: float = 0.15
 
 
-def road_classes(cloud: RealCloud, road: RoadClasses) -> dict[str, RealClass]:
+def road_classes(cloud: RealCloud, road: RoadClasses, owner: str | None = None) -> dict[str, RealClass]:
     """Return the points of pavement (``paved``) and markings (``line``) of a cloud, told by offset from the axis.
+
+    Args:
+        cloud: with its points.
+        road: axis and offsets.
+        owner: of the fields ``paved`` and ``lines``, which errors put before their names; options if None.
 
     Raises:
         InputError: the axis can't be read, or too few points lie where pavement or markings should be.
     """
-    station, offset = axis_coordinates(cloud.xyz[:, :2], read_axis(road.axis)[:, :2])
+    station, offset = MeasuredAxis.read(road.axis, place=cloud.place).beside(cloud.xyz, _FARTHEST)
     free = np.isfinite(offset)
     for line in road.lines:
         free &= ~(np.abs(offset - line) < CLEAR)
@@ -66,22 +68,25 @@ def road_classes(cloud: RealCloud, road: RoadClasses) -> dict[str, RealClass]:
     for low, high in road.paved:
         on |= (offset > low) & (offset < high)
     spans = " and ".join(f"{low:g} to {high:g}" for low, high in road.paved)
+    fields = ("--paved", "--line") if owner is None else (f"{owner}paved", f"{owner}lines")
     result = {}
     if road.paved:
         selection = f"{spans} m beside the axis, more than {CLEAR:g} m from the lines" if road.lines else f"{spans} m"
-        result["paved"] = select_class(cloud, np.flatnonzero(on & free), selection)
+        result["paved"] = select_class(cloud, np.flatnonzero(on & free), selection, fields[0])
     if road.lines:
-        chosen, threshold = _points_on_dashes(cloud.intensity, station, offset, road)
+        chosen, threshold = _points_on_dashes(cloud.intensity, station, offset, road, fields[1])
         selection = (
             f"within {road.line_width / 2:g} m of the lines at {', '.join(f'{line:g}' for line in road.lines)} m, "
             f"each {STRETCH:g} m of them moved by up to {REACH:g} m to where it is brightest, where the "
             f"median intensities of {ALONG:g} m of the line before and behind exceed {threshold:,.0f} (Otsu)"
         )
-        result["line"] = select_class(cloud, chosen, selection)
+        result["line"] = select_class(cloud, chosen, selection, fields[1])
     return result
 
 
-def _points_on_dashes(intensity: Float, station: Float, offset: Float, road: RoadClasses) -> tuple[Index, float]:
+def _points_on_dashes(
+    intensity: Float, station: Float, offset: Float, road: RoadClasses, field: str
+) -> tuple[Index, float]:
     """Return the indices of points on dashes, and Otsu's threshold of median intensities that told them apart."""
     half = road.line_width / 2.0
     points, medians = [], []
@@ -97,7 +102,7 @@ def _points_on_dashes(intensity: Float, station: Float, offset: Float, road: Roa
                 points.append(rows)
                 medians.append(_median_along(station[rows], intensity[rows]))
     if not points:
-        raise InputError("--line", list(road.lines), "no points lie there")
+        raise InputError(field, list(road.lines), "no points lie there")
     chosen, level = np.concatenate(points), np.concatenate(medians)
     threshold = otsu_threshold(level)
     return chosen[level > threshold], threshold
@@ -121,42 +126,3 @@ def _median_along(station: Float, intensity: Float) -> Float:
     spans = zip(begin, range(len(station)), end, strict=True)
     result[order] = [min(np.median(value[a : i + 1]), np.median(value[i:b])) for a, i, b in spans]
     return result
-
-
-def axis_coordinates(points: Float, axis: Float) -> tuple[Float, Float]:
-    """Return stations and offsets (N,), m, of points (N, 2) beside an axis polyline (M, 2); NaN where beside none.
-
-    Each point belongs to the nearest of the segments whose ends it lies between, or to the corner of two.
-    """
-    step = np.diff(axis, axis=0)
-    length = np.hypot(step[:, 0], step[:, 1])
-    start = np.concatenate([[0.0], np.cumsum(length)[:-1]])
-    kept = np.flatnonzero((length > 1e-6) & (length <= _GAP))
-    begin, step, length, start = axis[:-1][kept], step[kept], length[kept], start[kept]
-    station, offset = np.full(len(points), np.nan), np.full(len(points), np.nan)
-    cell = np.floor(points / _CELL).astype(np.int64)
-    corners, owner = np.unique(cell, axis=0, return_inverse=True)
-    order = np.argsort(owner.ravel(), kind="stable")
-    groups = np.split(order, np.cumsum(np.bincount(owner.ravel(), minlength=len(corners)))[:-1])
-    for corner, rows in zip(corners, groups, strict=True):
-        middle = (corner + 0.5) * _CELL
-        near = np.flatnonzero(np.abs(begin - middle).max(axis=1) < _CELL / 2.0 + _FARTHEST)
-        if len(near):
-            nearest = _nearest_segments(points[rows], begin[near], step[near], length[near])
-            station[rows], offset[rows] = start[near][nearest[0]] + nearest[1], nearest[2]
-    return station, offset
-
-
-def _nearest_segments(points: Float, begin: Float, step: Float, length: Float) -> tuple[Index, Float, Float]:
-    """Return for each point (P,) its nearest segment, the distance along it and the offset, m; NaN beyond all ends."""
-    direction = step / length[:, None]
-    offset = points[:, None, :] - begin
-    along = np.einsum("psi,si->ps", offset, direction)
-    aside = direction[:, 0] * offset[:, :, 1] - direction[:, 1] * offset[:, :, 0]
-    beyond = along - np.clip(along, 0.0, length)
-    distance = np.hypot(aside, beyond)
-    best = distance.argmin(axis=1)
-    row = np.arange(len(points))
-    # In the wedge at a corner the foot is the corner itself; past an end there is none.
-    lost = (np.abs(beyond[row, best]) > 0.5) | (distance[row, best] > _FARTHEST)
-    return best, along[row, best], np.where(lost, np.nan, aside[row, best])

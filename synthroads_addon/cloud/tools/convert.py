@@ -1,7 +1,7 @@
 """Operations on a cloud's file: convert, thin out, map intensities, draw. All in memory that stays the same."""
 
-import os
-from collections.abc import Iterable, Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,19 +10,24 @@ import numpy as np
 from ...base.arrays import Float
 from ...base.classes import ClassScheme, class_scheme
 from ...base.errors import InputError, OutputError
-from ...base.files import output_folder
+from ...base.files import check_file_target, made_folder, output_folder
+from ...base.maps.places import Placement, bring_plan
 from ...base.progress import Progress, silent
+from ...base.remarks import warn
 from ...base.schema import read_json
-from ..formats.base import BLOCK, CloudReader, CloudWriter
+from ..flags import WITHHELD
+from ..formats.reader import BLOCK, CloudReader
 from ..formats.registry import check_ending, open_cloud, open_writer
+from ..formats.writer import CloudWriter
+from ..layers import PREDICTED
 from ..points import PointBlock, concatenate
 from ..strays import Strays
 from .previews import CrossSection, TopView
 from .quantile_mapping import IntensityMapping, steps_per_unit
 from .subsample import GridSubsampler
 
-PREVIEWS = ("preview_class.png", "preview_intensity.png", "preview_rgb.png", "preview_section.png")
-"""Names of the pictures that `draw_previews` writes."""
+KINDS = ("class", "predicted", "intensity", "rgb", "section")
+"""Pictures that `draw_previews` draws, in files of `preview_file`."""
 
 
 def convert(
@@ -63,9 +68,9 @@ def subsample(
 ) -> dict[str, Any]:
     """Write one point per occupied cell (edge in m) of a cubic grid; return what was done as JSON data."""
     check_output(source, output, overwrite)
-    with open_cloud(source) as cloud, GridSubsampler(cell, output.parent) as grid:
+    with open_cloud(source) as cloud, made_folder(output.parent), GridSubsampler(cell, output.parent) as grid:
         scheme = scheme_of(cloud, classes)
-        for points in pass_with_progress(cloud.blocks(block), cloud.header.count, progress, "read"):
+        for points in pass_with_progress(cloud.usable_blocks(block), cloud.header.count, progress, "read"):
             grid.add(points)
         with writer_like(cloud, output, scheme) as writer:
             for points in grid.blocks():
@@ -101,74 +106,137 @@ def map_intensity(
         return result
 
 
+def preview_file(kind: str) -> str:
+    """Return the file's name of a picture of `KINDS`."""
+    return f"preview_{kind}.png"
+
+
 def draw_previews(
     source: Path,
-    folder: Path,
+    output: Path,
     line: tuple[float, float, float, float] | None = None,
     station: float | None = None,
     centerline: Float | None = None,
     depth: float = 1.0,
     overwrite: bool = False,
+    only: str | None = None,
 ) -> dict[str, Any]:
     """Draw a cloud from above and in cross-section into PNG files; return what was drawn as JSON data.
 
     Args:
-        folder: for the pictures (`PREVIEWS`; the coloured one only if the cloud has colours).
+        output: folder for the pictures, `KINDS`; those by predicted class and by colour only if the cloud has these.
+            With ``only`` a .png file for this picture.
         line: x, y of the ends of the cut, from left to right; across the cloud's long axis if not given.
         station: where to cut, m along the centreline or the long axis; in its middle if not given.
         centerline: (N, 2) map coordinates that stations count along.
         depth: thickness of the slab that is cut out, m.
+        only: the one picture of `KINDS` that is wanted; all if None.
 
     Raises:
-        InputError: the cloud can't be read or has no points, or the cut lies outside of it.
+        InputError: the cloud can't be read, has no points or not what a picture shows, or the cut lies outside of it.
         OutputError: a picture is there already or can't be written.
     """
+    alone = output if output.suffix.lower() == ".png" and not output.is_dir() else None
+    folder = output.parent if alone else output
+    if alone and only is None:
+        raise OutputError("--output", str(output), _one_of_several())
     with open_cloud(source) as cloud:
-        strays = _strays_of(cloud)
-        extent = _Extent(cloud.header.path, _staying_blocks(cloud, strays))
-        start, end = (extent.start, extent.end) if centerline is None else (centerline[0], centerline[-1])
-        low, high = extent.across(start, end)
-        view = TopView(start, end, low, high, cloud.header.scheme)
-        path = extent.axis() if centerline is None else centerline
-        middle, right, reach = _cross_cut(line, station, path, max(1.0, (high - low) / 2), extent)
-        slab: list[PointBlock] = []
-        for block in _staying_blocks(cloud, strays):
-            view.add(block)
-            away = (block.xyz[:, :2] - middle) @ np.array([-right[1], right[0]])
-            slab.append(block.select(np.abs(away) <= depth / 2))
-        cut = concatenate(slab)
-        if len(cut) == 0:
-            raise InputError("--line" if line else "--station", line or station, "cuts no points of the cloud")
-        heights = float(cut.xyz[:, 2].min()), float(cut.xyz[:, 2].max())
-        if line is None:
-            reach = 1.02 * float(np.abs((cut.xyz[:, :2] - middle) @ right).max()) + 0.5
-        by_class = len(np.unique(cut.class_id)) > 1
-        section = CrossSection(middle, right, reach, depth, heights, cloud.header.scheme, by_class)
-        section.add(cut)
-        with output_folder(folder, PREVIEWS, overwrite) as temporary:
-            paths = view.save(temporary, cloud.header.epsg, cloud.header.has_color)
-            paths.append(section.save(temporary / PREVIEWS[3]))
-            names = [path.name for path in paths]
-    drawn = {"file": source.name, "points": int(view.raster.count.sum()), "pictures": names, "section_points": len(cut)}
-    return drawn | ({"strays_left_out": strays.count()} if strays else {})
+        kinds = _kinds_of(cloud, only)
+        if alone:
+            check_file_target(alone, overwrite=overwrite)
+        names = {kind: alone.name if alone else preview_file(kind) for kind in kinds}
+        with output_folder(folder, names.values(), overwrite) as work:
+            drawn, shown = _draw(cloud, work, kinds, line, station, centerline, depth)
+            for kind, name in names.items():
+                (work / preview_file(kind)).rename(work / name)
+    fields = {name: shown[kind] for kind, name in names.items()}
+    return {"file": source.name, "pictures": list(names.values()), "fields": fields} | drawn
+
+
+def _one_of_several() -> str:
+    kinds = ", ".join(KINDS[:-1])
+    return f"names one picture of several: --picture {kinds} or {KINDS[-1]} says which; a folder gets all of them"
+
+
+def _kinds_of(cloud: CloudReader, only: str | None) -> list[str]:
+    """Return the pictures that are drawn of a cloud: those of what it has, or the one that is wanted."""
+    absent = {"predicted": cloud.header.predicted is None, "rgb": not cloud.header.has_color}
+    if only and absent.get(only):
+        what = "predicted classes: `synthroads predict` adds them" if only == "predicted" else "colours"
+        raise InputError("--picture", only, f"{cloud.header.path.name} has no {what}")
+    return [only] if only else [kind for kind in KINDS if not absent.get(kind)]
+
+
+def _draw(
+    cloud: CloudReader,
+    folder: Path,
+    kinds: Sequence[str],
+    line: tuple[float, float, float, float] | None,
+    station: float | None,
+    centerline: Float | None,
+    depth: float,
+) -> tuple[dict[str, Any], dict[str, str]]:
+    """Draw a cloud's pictures into a folder, see `draw_previews`; return counts of points, and each picture's field."""
+    header, strays = cloud.header, _strays_of(cloud)
+    extent = _Extent(header.path, _staying_blocks(cloud, strays))
+    start, end = (extent.start, extent.end) if centerline is None else (centerline[0], centerline[-1])
+    low, high = extent.across(start, end)
+    view = TopView(start, end, low, high, header.scheme)
+    predicted = TopView(start, end, low, high, header.predicted) if "predicted" in kinds else None
+    path = extent.axis() if centerline is None else centerline
+    middle, right, reach = _cross_cut(line, station, path, max(1.0, (high - low) / 2), extent)
+    slab: list[PointBlock] = []
+    for block in _staying_blocks(cloud, strays):
+        view.add(block)
+        if predicted:
+            predicted.add(block.with_arrays({"class_id": block.array(PREDICTED)}))
+        away = (block.xyz[:, :2] - middle) @ np.array([-right[1], right[0]])
+        slab.append(block.select(np.abs(away) <= depth / 2))
+    fields = {kind: {"class": header.class_field, "predicted": PREDICTED}.get(kind, kind) for kind in kinds}
+    view.save(folder, header.epsg, [kind for kind in kinds if kind not in ("predicted", "section")], fields)
+    if predicted:
+        predicted.save(folder, header.epsg, ["predicted"], fields)
+    drawn = {"points": int(view.raster.count.sum())} | ({"strays_left_out": strays.count()} if strays else {})
+    if "section" not in kinds:
+        return drawn, fields
+    cut = concatenate(slab)
+    if len(cut) == 0:
+        raise InputError("--line" if line else "--station", line or station, "cuts no points of the cloud")
+    heights = float(cut.xyz[:, 2].min()), float(cut.xyz[:, 2].max())
+    if line is None:
+        reach = 1.02 * float(np.abs((cut.xyz[:, :2] - middle) @ right).max()) + 0.5
+    by_class = len(np.unique(cut.class_id)) > 1
+    section = CrossSection(middle, right, reach, depth, heights, header.scheme, by_class)
+    section.add(cut)
+    fields["section"] = header.class_field if by_class else "intensity"
+    section.save(folder / preview_file("section"), fields["section"])
+    return drawn | {"section_points": len(cut)}, fields
 
 
 def _strays_of(cloud: CloudReader) -> Strays | None:
     """Return the detector of a cloud's stray points, which would make pictures too wide; None if there are none."""
     strays = Strays()
-    for block in cloud.blocks():
+    for block in cloud.usable_blocks():
         strays.add(block.xyz)
     return strays if strays.count() else None
 
 
 def _staying_blocks(cloud: CloudReader, strays: Strays | None) -> Iterator[PointBlock]:
     """Yield a cloud's blocks without their stray points."""
-    for block in cloud.blocks():
+    for block in cloud.usable_blocks():
         yield block if strays is None else block.select(np.flatnonzero(strays.stay(block.xyz)))
 
 
-def read_centerline(path: Path) -> Float:
-    """Read the first LineString of a GeoJSON file and return its points (N, 2) in the file's coordinates."""
+def read_centerline(path: Path, place: Placement | None = None) -> Float:
+    """Read the first LineString of a GeoJSON file and return its points (N, 2).
+
+    Args:
+        path: the file.
+        place: the system that they are wanted in; without it they stay as they stand in the file.
+
+    Raises:
+        InputError: it isn't GeoJSON with a line, or there is no way into that system.
+    """
     data = read_json(path)
     try:
         shapes = [feature["geometry"] for feature in data["features"]] if "features" in data else [data]
@@ -178,7 +246,7 @@ def read_centerline(path: Path) -> Float:
         raise InputError(str(path), None, "must be GeoJSON with a LineString") from None
     if len(points) < 2 or np.ptp(points, axis=0).max() == 0:
         raise InputError(str(path), None, "must have a line of some length")
-    return points
+    return points if place is None else bring_plan(str(path), [points], data, place)[0]
 
 
 class _Extent:
@@ -275,7 +343,11 @@ def scheme_of(cloud: CloudReader, classes: str | None) -> ClassScheme:
 
 
 def writer_like(
-    cloud: CloudReader, output: Path, scheme: ClassScheme, intensity_scale: float | None = None
+    cloud: CloudReader,
+    output: Path,
+    scheme: ClassScheme,
+    intensity_scale: float | None = None,
+    offset: Float | None = None,
 ) -> CloudWriter:
     """Return the writer of a cloud that has what another one has; a context manager.
 
@@ -284,18 +356,25 @@ def writer_like(
         output: file to write.
         scheme: classes to write it with.
         intensity_scale: 16-bit steps per unit of intensity; the other one's if None.
+        offset: map coordinates near the points, m, as `offset_of` finds them, which is done if None.
     """
-    header, offset = cloud.header, cloud.header.offset
-    if not header.labelled and not np.any(offset):
-        first = next((block.xyz[0] for block in cloud.blocks(1)), None)
-        offset = offset if first is None else first
+    header = cloud.header
+    offset = offset_of(cloud) if offset is None else offset
     scale = steps_per_unit(cloud) if intensity_scale is None else intensity_scale
-    crs = None if header.crs_text else header.epsg
-    return open_writer(output, crs, offset, scale, header.attributes, scheme, header.crs_text)
+    return open_writer(output, None, offset, scale, header.attributes, scheme, header.crs_text, header.standard_time)
+
+
+def offset_of(cloud: CloudReader) -> Float:
+    """Return map coordinates (3,) near a cloud's points, m: its own offset, or its first point where that is none."""
+    offset = cloud.header.offset
+    if cloud.header.labelled or np.any(offset):
+        return offset
+    return next((block.xyz[0] for block in cloud.blocks(1)), offset)
 
 
 def summary_of(cloud: CloudReader, writer: CloudWriter) -> dict[str, Any]:
-    """Return what was written of a cloud as JSON data."""
+    """Return what was written of a cloud as JSON data; tell the user what the format has no fields for."""
+    report_losses(cloud.header.path.name, [writer])
     return {
         "file": cloud.header.path.name,
         "output": str(writer.path),
@@ -303,7 +382,22 @@ def summary_of(cloud: CloudReader, writer: CloudWriter) -> dict[str, Any]:
         "intensity_clipped": writer.clipped,
         "class_scheme": writer.scheme.name,
         "left_out": list(cloud.header.left_out),
+        "lost": dict(writer.lost),
     }
+
+
+def report_losses(name: str, writers: Iterable[CloudWriter]) -> None:
+    """Tell the user of how many points which flags were lost, for want of a field in the format written."""
+    lost: Counter[str] = Counter()
+    kind = ""
+    for writer in writers:
+        lost.update(writer.lost)
+        kind = writer.path.suffix.strip(".").upper()
+    if held := lost.pop(WITHHELD, 0):
+        warn(f"{name}: {held:,} withheld points left out: {kind} has no field for the flag")
+    if lost:
+        listed = ", ".join(f"{flag} of {count:,} points" for flag, count in lost.items())
+        warn(f"{name}: {listed} lost: {kind} has no field for them")
 
 
 def check_output(source: Path, output: Path, overwrite: bool) -> None:
@@ -312,14 +406,7 @@ def check_output(source: Path, output: Path, overwrite: bool) -> None:
     check_ending(source)
     if output.exists() and source.exists() and source.samefile(output):
         raise OutputError("--output", str(output), "must be another file than the input")
-    if output.is_dir():
-        raise OutputError("--output", str(output), "is a folder")
-    if output.exists() and not overwrite:
-        raise OutputError("--output", str(output), "is there already; --overwrite replaces it")
-    if not output.parent.is_dir():
-        raise OutputError("--output", str(output), f"there is no folder {output.parent}")
-    if not os.access(output.parent, os.W_OK):
-        raise OutputError("--output", str(output), "cannot be written (Permission denied)")
+    check_file_target(output, overwrite=overwrite)
 
 
 def pass_with_progress(

@@ -17,7 +17,7 @@ from ...base.arrays import Float, Float32, Int, UInt8
 from ...base.classes import ClassScheme, PointClass
 from ...base.errors import InputError
 from ...base.random_streams import stream
-from ..formats.base import CloudHeader
+from ..formats.header import CloudHeader
 from ..formats.registry import open_cloud
 from .picture import Brightness, grays
 
@@ -172,8 +172,7 @@ def read_display(
             done, kept = done + len(points), last
             progress(done / cloud.header.count)
         assert origin is not None
-        # Colours have 16 bits; some programs write 8 into them all the same.
-        rgb_8 = (rgb if rgb.max() < 256 else rgb >> 8).astype(np.uint8)
+        rgb_8 = (rgb >> 8).astype(np.uint8)
         return DisplayCloud(cloud.header, origin, xyz, class_id, rgb_8, brightness, measure.text, counts)
 
 

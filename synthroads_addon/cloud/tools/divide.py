@@ -9,12 +9,15 @@ import numpy as np
 
 from ...base.arrays import Bool, Float
 from ...base.errors import InputError
-from ...base.files import output_folder
+from ...base.files import output_folder, writable_folder
+from ...base.maps.places import Placement, bring_plan
 from ...base.progress import Progress, silent
 from ...base.schema import read_json
-from ..formats.base import CloudReader
+from ..formats.header import CloudHeader
+from ..formats.reader import CloudReader
 from ..formats.registry import ENDINGS, open_cloud
-from .convert import check_output, pass_with_progress, scheme_of, summary_of, writer_like
+from ..formats.writer import CloudWriter
+from .convert import check_output, offset_of, pass_with_progress, report_losses, scheme_of, summary_of, writer_like
 from .quantile_mapping import steps_per_unit
 from .subsample import TileFiles, keep_one_per_cell
 
@@ -63,7 +66,7 @@ def crop(
         output: file to write.
         box: least x and y, then largest, map, m; borders belong to it.
         heights: least and largest z, m.
-        polygon: GeoJSON file with a Polygon or MultiPolygon in map coordinates; holes are left out.
+        polygon: GeoJSON file with a Polygon or MultiPolygon, moved into the cloud's system; holes are left out.
         overwrite: whether the output may be replaced.
         progress: is told how far it is.
 
@@ -78,25 +81,33 @@ def crop(
         raise InputError("--box", list(box), "must be the least x and y, then the largest")
     if heights is not None and not heights[0] <= heights[1]:
         raise InputError("--heights", list(heights), "must be the least, then the largest")
-    rings = None if polygon is None else read_polygon(polygon)
-
-    def inside(xyz: Float) -> Bool:
-        kept = np.ones(len(xyz), dtype=bool)
-        if box is not None:
-            kept &= np.all((xyz[:, :2] >= box[:2]) & (xyz[:, :2] <= box[2:]), axis=1)
-        if heights is not None:
-            kept &= (xyz[:, 2] >= heights[0]) & (xyz[:, 2] <= heights[1])
-        if rings is not None:
-            kept &= points_in_rings(xyz[:, :2], rings)
-        return kept
-
+    if polygon is not None:
+        read_polygon(polygon)  # before the cloud is opened
     with open_cloud(source) as cloud:
+        rings = None if polygon is None else read_polygon(polygon, cloud.header.place)
         with writer_like(cloud, output, scheme_of(cloud, None)) as writer:
             for points in pass_with_progress(cloud.blocks(), cloud.header.count, progress, "crop"):
-                writer.write(points.select(inside(points.xyz)))
+                writer.write(points.select(_inside(points.xyz, box, heights, rings)))
             if not writer.count:
                 raise InputError(str(source), None, "has no points within what is to be kept")
         return summary_of(cloud, writer) | {"points_read": cloud.header.count}
+
+
+def _inside(
+    xyz: Float,
+    box: tuple[float, float, float, float] | None,
+    heights: tuple[float, float] | None,
+    rings: list[Float] | None,
+) -> Bool:
+    """Return which points (N, 3) lie within all that is given."""
+    kept = np.ones(len(xyz), dtype=bool)
+    if box is not None:
+        kept &= np.all((xyz[:, :2] >= box[:2]) & (xyz[:, :2] <= box[2:]), axis=1)
+    if heights is not None:
+        kept &= (xyz[:, 2] >= heights[0]) & (xyz[:, 2] <= heights[1])
+    if rings is not None:
+        kept &= points_in_rings(xyz[:, :2], rings)
+    return kept
 
 
 def tile(
@@ -133,32 +144,41 @@ def tile(
     if grid is not None and not 0.0005 <= grid <= size:
         raise InputError("--grid", grid, "must be 0.0005 m to the tiles' size")
     written: list[dict[str, Any]] = []
-    with open_cloud(source) as cloud, ExitStack() as stack:
-        files = stack.enter_context(TileFiles(folder.parent if folder.parent.is_dir() else Path.cwd()))
+    writers: list[CloudWriter] = []
+    with writable_folder(folder), open_cloud(source) as cloud, ExitStack() as stack:
+        files = stack.enter_context(TileFiles(folder))
         keys: set[tuple[int, int]] = set()
-        for points in pass_with_progress(cloud.blocks(), cloud.header.count, progress, "read"):
+        blocks = cloud.blocks() if grid is None else cloud.usable_blocks()
+        for points in pass_with_progress(blocks, cloud.header.count, progress, "read"):
             numbers = np.floor(points.xyz[:, :2] / size).astype(np.int64)
             keys |= {(int(x), int(y)) for x, y in np.unique(numbers, axis=0)}
             files.append(points, numbers)
+        scheme, offset = scheme_of(cloud, None), offset_of(cloud)
         names = {key: f"{source.stem}_{_corner(key[0], size)}_{_corner(key[1], size)}{ending}" for key in keys}
         with output_folder(folder, names.values(), overwrite) as work:
             for done, (key, points) in enumerate(files.by_tile(), 1):
                 kept = points if grid is None else points.select(np.sort(keep_one_per_cell(points, grid)))
                 progress("tile", done / len(keys))
                 if len(kept) >= fewest:
-                    with writer_like(cloud, work / names[key], scheme_of(cloud, None)) as writer:
+                    with writer_like(cloud, work / names[key], scheme, offset=offset) as writer:
                         writer.write(kept)
-                    written.append({"file": names[key], "points": len(kept)})
+                    written.append({"file": names[key], "points": writer.count})
+                    writers.append(writer)
+            report_losses(source.name, writers)
             if not written:
                 raise InputError("--fewest", fewest, "is more than any tile's points")
     return {"file": source.name, "output": str(folder), "size": size, "grid": grid, "tiles": written}
 
 
-def read_polygon(path: Path) -> list[Float]:
+def read_polygon(path: Path, place: Placement | None = None) -> list[Float]:
     """Return the rings (N, 2) of all polygons in a GeoJSON file, holes among them.
 
+    Args:
+        path: the file.
+        place: the system that they are wanted in; without it they stay as they stand in the file.
+
     Raises:
-        InputError: it isn't GeoJSON with a polygon.
+        InputError: it isn't GeoJSON with a polygon, or there is no way into that system.
     """
     data = read_json(path)
     try:
@@ -171,7 +191,7 @@ def read_polygon(path: Path) -> list[Float]:
         rings = []
     if not rings or any(ring.ndim != 2 or len(ring) < 4 or not np.isfinite(ring).all() for ring in rings):
         raise InputError(str(path), None, "must be GeoJSON with a Polygon of 4 points or more in each ring")
-    return rings
+    return rings if place is None else bring_plan(str(path), rings, data, place)
 
 
 def points_in_rings(points: Float, rings: list[Float]) -> Bool:
@@ -195,15 +215,22 @@ def _corner(number: int, size: float) -> str:
     return str(int(number * size)) if float(size).is_integer() else f"{number * size:.3f}".rstrip("0")
 
 
+def _system_of(header: CloudHeader) -> object:
+    """Return what tells a cloud's coordinate system from another's: its codes, or its text without them."""
+    system = header.system
+    return system and ((system.epsg, system.height_epsg) if system.epsg else system.text)
+
+
 def _check_alike(first: CloudReader, other: CloudReader) -> None:
     """Refuse a cloud that can't stand in one file with the first."""
     one, two = first.header, other.header
     for what, mine, theirs in (
         ("attributes", sorted(one.attributes), sorted(two.attributes)),
         ("classes", one.scheme.to_dict() if one.labelled else None, two.scheme.to_dict() if two.labelled else None),
-        ("coordinate system", one.epsg or one.crs_text, two.epsg or two.crs_text),
+        ("coordinate system", _system_of(one), _system_of(two)),
         ("colours", one.has_color, two.has_color),
         ("unit of intensity", one.intensity_scale is None, two.intensity_scale is None),
+        ("epoch of GPS time", one.standard_time, two.standard_time),
     ):
         if mine != theirs:
             raise InputError(str(two.path), None, f"has other {what} than {one.path.name}: convert one of them first")

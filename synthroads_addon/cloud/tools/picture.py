@@ -1,5 +1,7 @@
 """A picture of a cloud: points gathered into its cells block by block, and its frame of title, legend and axes."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -41,6 +43,14 @@ class Brightness:
             return block.intensity
         self.text = "intensity x squared range (white target = 1)"
         return block.intensity * block.range**2
+
+
+_FACTORS = (1, 2, 3, 4, 5, 6, 8, 10, 12)
+"""Numbers by which a raster's cells may be merged: the last leaves 150 across a picture."""
+_GAP = 2
+"""How often single empty cells between filled ones are closed."""
+_FILLED = 0.8
+"""Share of the neighbours of filled cells that are filled where points are as near to each other as cells are."""
 
 
 class Raster:
@@ -97,13 +107,57 @@ class Raster:
         """Return the mean colour of each cell (cells, 3), 0 to 255; black where there are no points."""
         return (self._rgb / np.maximum(self.count, 1) / 257.0).T
 
+    def merged(self, factor: int) -> Raster:
+        """Return a raster whose cells are ``factor`` times as wide and high; points in them are counted together."""
+        size = (-(-self.width // factor), -(-self.height // factor))
+        axes = Axes(self.axes.left, self.axes.low, self.axes.across * factor, self.axes.up * factor)
+        result = Raster(axes, size)
+        result.brightness = self.brightness
+        result.count = self._blocks(self.count, factor).sum(axis=1)
+        result._intensity = self._blocks(self._intensity, factor).sum(axis=1)
+        result._rgb = np.stack([self._blocks(channel, factor).sum(axis=1) for channel in self._rgb])
+        front = self._blocks(self._front, factor, -np.inf)
+        first = front.argmax(axis=1)[:, None]
+        result._front = np.take_along_axis(front, first, axis=1)[:, 0]
+        result.label = np.take_along_axis(self._blocks(self.label, factor, 255), first, axis=1)[:, 0]
+        return result
+
+    def density_factor(self) -> int:
+        """Return by what the cells have to be merged so that the points are hardly farther apart than they are wide.
+
+        That is the smallest of `_FACTORS` with which four of five neighbours of filled cells are filled, along both
+        axes: lines of a scanner are near each other in one direction only.
+        """
+        for factor in _FACTORS:
+            filled = self._blocks(self.count, factor).any(axis=1).reshape(-1, -(-self.width // factor))
+            if min(_shared(filled, axis) for axis in (0, 1)) >= _FILLED:
+                return factor
+        return _FACTORS[-1]
+
+    def _blocks(self, cells: AnyArray, factor: int, rest: float = 0) -> AnyArray:
+        """Return cells (cells,) as (merged cells, factor ** 2); those beyond the raster's edge are ``rest``."""
+        up, right = -self.height % factor, -self.width % factor  # row 0 is the highest: the lowest stay where they are
+        padded = np.pad(cells.reshape(self.height, self.width), ((up, 0), (0, right)), constant_values=rest)
+        parts = padded.reshape(padded.shape[0] // factor, factor, padded.shape[1] // factor, factor)
+        return parts.swapaxes(1, 2).reshape(-1, factor**2)
+
     def picture(self, colors: AnyArray, paper: tuple[int, int, int]) -> UInt8:
-        """Return cell colours as an image (height, width, 3), with dots enlarged the fewer cells are filled."""
+        """Return cell colours as an image (height, width, 3).
+
+        Dots are enlarged where few cells are filled; else single empty cells are closed.
+
+        Args:
+            colors: (cells, 3), 8 bits.
+            paper: colour of cells without points.
+        """
         shape = (self.height, self.width)
         filled = (self.count > 0).reshape(shape)
         result = np.where(self.count[:, None] > 0, colors, paper).astype(np.uint8).reshape(*shape, 3)
-        for _ in range(self._dot_growth(filled)):
+        growth = self._dot_growth(filled)
+        for _ in range(growth):
             result, filled = _grow_cells(result, filled)
+        for _ in range(0 if growth else _GAP):
+            result, filled = _close_gaps(result, filled)
         return result
 
     def _dot_growth(self, filled: Bool) -> int:
@@ -118,6 +172,27 @@ class Raster:
         np.maximum.at(self._front, cell, depth)
         foremost = depth == self._front[cell]
         self.label[cell[foremost]] = label[foremost]
+
+
+def _shared(filled: Bool, axis: int) -> float:
+    """Return the share of filled cells (rows, columns) whose next neighbour along an axis is filled as well."""
+    first = filled[:-1] if axis == 0 else filled[:, :-1]
+    second = filled[1:] if axis == 0 else filled[:, 1:]
+    return float((first & second).sum() / max(1, first.sum()))
+
+
+def _close_gaps(picture: UInt8, filled: Bool) -> tuple[UInt8, Bool]:
+    """Return copies of a picture and its mask in which empty cells between two filled ones take the colour of one."""
+    result, done = picture.copy(), filled.copy()
+    for axis in (0, 1):
+        ends: list[slice] = [slice(None), slice(None)]
+        before, between, behind = (
+            tuple(ends[:axis] + [part] + ends[axis + 1 :]) for part in (slice(-2), slice(1, -1), slice(2, None))
+        )
+        gap = filled[before] & filled[behind] & ~done[between]
+        result[between][gap] = picture[before][gap]
+        done[between] |= gap
+    return result, done
 
 
 def _grow_cells(picture: UInt8, filled: Bool) -> tuple[UInt8, Bool]:

@@ -1,6 +1,8 @@
 """Pictures of a cloud, gathered block by block: from above by class, intensity and colour, and a cross-section."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Self
 
 import numpy as np
@@ -77,23 +79,42 @@ class TopView:
         height = block.xyz[:, 2] + self._lift[block.class_id]
         self.raster.add(block, (relative @ self.along, across), height)
 
-    def save(self, folder: Path, epsg: int | None, has_color: bool = True) -> list[Path]:
-        """Write PNGs by class, intensity and, if asked, RGB, with the EPSG code in their title; return their paths."""
-        raster = self.raster
-        pictures: dict[str, tuple[AnyArray, Legend]] = {
-            "class": _class_colors(raster, self.scheme),
-            "intensity": _grays(raster),
-        }
-        if has_color:
-            pictures["rgb"] = (raster.rgb(), None)
+    def save(
+        self,
+        folder: Path,
+        epsg: int | None,
+        kinds: Sequence[str] = ("class", "intensity", "rgb"),
+        fields: Mapping[str, str] = MappingProxyType({}),
+    ) -> list[Path]:
+        """Write PNGs of these kinds, with the EPSG code in their title; return their paths.
+
+        Cells are merged until they are as wide as the points are apart, so that sparse clouds show surfaces.
+
+        Args:
+            folder: for the pictures, ``preview_KIND.png``.
+            epsg: of the coordinates, or None.
+            kinds: by what they are coloured: ``class``, ``intensity``, ``rgb``, or another name by class.
+            fields: by kind, the file's field that its title names; the kind itself where there is none.
+        """
+        factor = self.raster.density_factor()
+        raster = self.raster.merged(factor) if factor > 1 else self.raster
         system = f"   EPSG:{epsg}" if epsg else ""
         north = (float(self.along[1]), float(self.along[0]))
         paths = []
-        for name, (colors, legend) in pictures.items():
-            title = f"{name}   {int(raster.count.sum()):,} points{system}   pixel {raster.axes.across:.3g} m"
-            paths.append(folder / f"preview_{name}.png")
-            add_frame(raster.picture(colors, PAPER), title, legend, raster.axes, north).save(paths[-1])
+        for kind in kinds:
+            colors, legend = self._colors(raster, kind)
+            shown = f"{int(raster.count.sum()):,} points{system}   pixel {raster.axes.across:.3g} m"
+            title = f"{fields.get(kind, kind)}   {shown}"
+            paths.append(folder / f"preview_{kind}.png")
+            pixels = raster.picture(colors, PAPER).repeat(factor, axis=0).repeat(factor, axis=1)
+            add_frame(pixels, title, legend, self.raster.axes, north).save(paths[-1])
         return paths
+
+    def _colors(self, raster: Raster, kind: str) -> tuple[AnyArray, Legend]:
+        """Return the colours (cells, 3) of a raster by class, intensity or colour, with their legend."""
+        if kind == "intensity":
+            return _grays(raster)
+        return (raster.rgb(), None) if kind == "rgb" else _class_colors(raster, self.scheme)
 
 
 class CrossSection:
@@ -143,12 +164,13 @@ class CrossSection:
             place = (relative[inside] @ self.right, part.xyz[:, 2])
             self.raster.add(part, place, -away[inside])
 
-    def save(self, path: Path) -> Path:
-        """Write the section as a picture to a path and return the path."""
+    def save(self, path: Path, field: str = "") -> Path:
+        """Write the section as a picture to a path and return the path; its title names the field that it shows."""
         raster = self.raster
         colors, legend = _class_colors(raster, self.scheme) if self.by_class else _grays(raster)
         scale = "" if abs(self.exaggeration - 1) < 0.01 else f"   heights x {self.exaggeration:.3g}"
-        title = f"cross-section   {int(raster.count.sum()):,} points in {self.depth:g} m{scale}"
+        name = f"cross-section by {field}" if field else "cross-section"
+        title = f"{name}   {int(raster.count.sum()):,} points in {self.depth:g} m{scale}"
         add_frame(raster.picture(colors, _SECTION_PAPER), title, legend, raster.axes, ticks=True).save(path)
         return path
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...base.arrays import Float, Index, Int
 from ...base.errors import InputError
-from ..formats.base import CloudReader
+from ..formats.reader import CloudReader
 from ..points import PointBlock
 
 LEVELS = 65_536
@@ -25,7 +25,7 @@ def steps_per_unit(cloud: CloudReader) -> float:
         return header.intensity_scale
     if header.kind.startswith("LAS"):
         return 1.0
-    brightest = max((float(block.intensity.max()) for block in cloud.blocks()), default=0.0)
+    brightest = max((float(block.intensity.max()) for block in cloud.usable_blocks()), default=0.0)
     return (LEVELS - 1) / brightest if brightest > 0 else 1.0
 
 
@@ -37,7 +37,7 @@ def levels(intensity: Float, scale: float) -> Index:
 def histograms(cloud: CloudReader, scale: float) -> dict[int, Int]:
     """Return the number of points on each intensity level (65536,) by class id; reads the whole cloud."""
     result: dict[int, Int] = {}
-    for block in cloud.blocks():
+    for block in cloud.usable_blocks():
         level = levels(block.intensity, scale)
         for label in np.unique(block.class_id):
             counts = np.bincount(level[block.class_id == label], minlength=LEVELS)
@@ -118,7 +118,7 @@ class IntensityMapping:
 
     def blocks(self, source: CloudReader) -> Iterator[PointBlock]:
         """Yield the source's points with mapped intensities; the distances afterwards count these."""
-        for block in source.blocks():
+        for block in source.usable_blocks():
             level = levels(block.intensity, self._steps)
             mapped = np.zeros(len(level), dtype=np.intp)
             for table in {id(table): table for table in self._maps.values()}.values():

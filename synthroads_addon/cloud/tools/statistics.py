@@ -8,8 +8,11 @@ from numpy.typing import NDArray
 
 from ...base.arrays import Float, Index, Int, UInt8, UInt16
 from ...materials.reflectance import LUMINANCE
-from ..formats.base import CloudReader
+from ..flags import withheld_points
+from ..formats.reader import CloudReader
+from ..layers import PREDICTED
 from ..points import PointBlock
+from .predicted import PredictedCounts
 
 AREA_CELL = 1.0
 """Edge of the cells whose occupied ones are a cloud's area, m."""
@@ -33,28 +36,43 @@ def cloud_statistics(cloud: CloudReader, radius: float = RADIUS, samples: int = 
     ``density`` is points per m2 of the 1 m cells that hold any; ``roughness`` the mean surface variation
     l0 / (l0 + l1 + l2), l0 the smallest eigenvalue of the covariance of the points within ``radius`` (Pauly et al.
     2002), of ``samples`` points per class; intensity is a share of 16 bits where the file has those or says its scale.
-    None stands where the file doesn't hold what a figure needs.
+    None stands where the file doesn't hold what a figure needs. Withheld points are only counted. Of a cloud with
+    predicted classes there are their points too, and how they agree with its own (`PredictedCounts.figures`).
     """
-    first = _FirstPass(cloud, samples)
-    for block in cloud.blocks():
-        first.add(block)
     header = cloud.header
+    first = _FirstPass(cloud, samples)
+    predicted = PredictedCounts(header) if header.predicted else None
+    withheld = 0
+    for block in cloud.blocks():
+        kept = cloud.usable_points(block, noise=True)
+        withheld += len(block) - int(np.count_nonzero(kept))
+        if not kept.any():
+            continue
+        used = block.select(kept)
+        first.add(used)
+        if predicted:
+            predicted.add(used)
     result: dict[str, Any] = {
         "file": header.path.name,
         "kind": header.kind,
         "points": header.count,
+        "withheld": withheld,
         "epsg": header.epsg,
+        "height_epsg": header.height_epsg,
+        "coordinate_system": header.system.label if header.system else None,
+        "unit_factors": None if header.place.scale is None else header.place.scale.tolist(),
         "attributes": list(header.attributes),
-        "left_out": list(header.left_out),
+        "left_out": [name for name in header.left_out if name != PREDICTED or not predicted],
         "class_scheme": header.scheme.name,
+        "class_field": header.class_field,
         "roughness_radius": radius,
-    }
+    } | (predicted.figures() if predicted else {})
     if first.moments.count.sum() == 0:
         return result | {"bounds": None, "all": None, "classes": {}}
     spread = _Roughness(first.samples(radius), radius)
     if radius > 0 and samples > 0:
         for block in cloud.blocks():
-            spread.add(block.xyz)
+            spread.add(block.select(~withheld_points(block)).xyz)
     names = header.scheme.names()
     rough = spread.by_class()
     present = np.flatnonzero(first.moments.count)

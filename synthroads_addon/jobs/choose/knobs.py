@@ -4,9 +4,10 @@ from collections.abc import Mapping
 from operator import attrgetter
 from typing import Any, NamedTuple
 
+from ...base.changes import apply_values
 from ...scanning.beam import RINGS
 from ...scenario.colour import COLOUR_FIDELITIES, image_scale
-from ...scenario.scenario import FIDELITIES, Scenario, apply_values
+from ...scenario.scenario import FIDELITIES, Scenario
 
 _COARSEST, _FINEST = FIDELITIES["draft"], FIDELITIES["high"]
 KNOBS = (

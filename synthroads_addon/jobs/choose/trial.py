@@ -181,7 +181,7 @@ class Trial:
         with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
             files = self.site.files(Path(folder), plan.target.origin)
             begin = self.clock()
-            record_to_files([plan], files, StageTimer(), announce=False)
+            record_to_files([plan], files, StageTimer(), announce=None)
             seconds = self.clock() - begin
         # Pulses come in whole lines, so that stretches hold fewer of them than their duration says.
         return sum(map(plan.pulse_count, plan.path.strips)), seconds, files.counts.points

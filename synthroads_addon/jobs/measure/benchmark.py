@@ -127,8 +127,8 @@ def _measure_casting(plan: ScanPlan) -> Rate:
         kept.append((origins.copy(), directions.copy()))
         return caster.cast(origins, directions, maximum_range)
 
-    keeping: Any = SimpleNamespace(name=caster.name, main_thread_only=False, cast=cast_and_keep)
-    target._parts = [replace(part, caster=keeping), *target._parts[1:]]
+    keeping: Any = SimpleNamespace(name=caster.name, main_thread_only=False, kernels=caster.kernels, cast=cast_and_keep)
+    target._parts, target.caster = [replace(part, caster=keeping), *target._parts[1:]], keeping
     for block in blocks:
         BlockScan(replace(plan, target=target, ground=None)).scan_block(*block)
     origins, directions = map(np.concatenate, zip(*kept, strict=True))

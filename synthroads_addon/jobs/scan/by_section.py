@@ -18,6 +18,7 @@ from ...base.progress import StageTimer
 from ...blender.materials import RoadMaterials
 from ...blender.model.build import build_road, remove_road
 from ...blender.scene.evaluated import scene_mesh
+from ...blender.scene.left_out import material_warnings
 from ...blender.scene.vehicle_meshes import VehicleMeshes
 from ...blender.services import BlenderServices
 from ...road.geometry import RoadGeometry
@@ -29,13 +30,15 @@ from .files import record_to_files
 from .plan import Site
 
 
-def scan_by_section(site: Site, road: RoadGeometry, folder: Path, timer: StageTimer) -> dict[str, Any]:
+def scan_by_section(
+    site: Site, road: RoadGeometry, folder: Path, timer: StageTimer
+) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Build and scan a road section by section, and write cloud and previews; only in the main thread.
 
     A road in the open scene is replaced; afterwards there is none.
 
     Returns:
-        the counts, as JSON data.
+        the counts, as JSON data; warnings about what isn't scanned as it is declared.
 
     Raises:
         InputError: see `plan_scan` and `check_colour`.
@@ -44,7 +47,7 @@ def scan_by_section(site: Site, road: RoadGeometry, folder: Path, timer: StageTi
     files = site.files(folder, np.array(road.parameters.transform.translate))
     with closing(work.plans(timer)) as plans:
         counts = record_to_files(plans, files, timer)
-    return counts | {"sections": work.scanned}
+    return counts | {"sections": work.scanned}, tuple(work.warnings)
 
 
 class SectionScan:
@@ -57,6 +60,7 @@ class SectionScan:
     Attributes:
         cut: the scan's blocks.
         scanned: sections that are done.
+        warnings: what of them isn't scanned as it is declared, each once.
     """
 
     def __init__(self, site: Site, road: RoadGeometry) -> None:
@@ -67,6 +71,7 @@ class SectionScan:
         self._vehicles = VehicleMeshes(RoadMaterials.of(road.parameters, self._own))
         standing = {name: item for name, item in road.parameters.objects.items() if name not in self._motions}
         self.scanned = 0
+        self.warnings: list[str] = []
         self._standing = road.parameters.model_copy(update={"objects": standing})
 
     def sections(self) -> Iterator[RoadSection]:
@@ -114,6 +119,8 @@ class SectionScan:
         frame = model.origin - np.array(whole.transform.translate)
         class_ids = self._scenario.cloud.scheme().source_ids()
         static = scene_mesh(objects=list(model.objects.values()), class_ids=class_ids)
+        found = material_warnings(dict.fromkeys(static.materials, ()))
+        self.warnings += [text for text in found if text not in self.warnings]
         passing = vehicles_through(section, self.cut, self._motions, self._scenario.scan.traffic_speed_factor)
         vehicles = {name: motion.vehicle for name, motion in passing.items()}
         motions = {name: ShiftedMotion(motion, frame) for name, motion in passing.items()}

@@ -2,7 +2,7 @@
 
 import logging
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, field
@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.progress import StageTimer
-from ...cloud.formats.base import CloudWriter
 from ...cloud.formats.registry import open_writer
+from ...cloud.formats.writer import CloudWriter
 from ...cloud.points import PointBlock
 from ...cloud.tools.previews import TopView
 from ...cloud.tools.subsample import GridSubsampler
 from ...scanning.colour.colour import shares_by_source
+from ...scanning.forecast import ScanForecast
 from ...scanning.plan import ScanPlan
 from ...scanning.receiver import Response
 from ...scanning.record import record
@@ -30,8 +31,6 @@ from ...scenario.scenario import Scenario
 _logger = logging.getLogger("synthroads")
 _MOST_PAINTED = 2
 """Blocks that wait to be painted into the previews: the scan goes on meanwhile, and its memory stays small."""
-_LONG = 300.0
-"""Seconds from which on a scan's forecast is told unasked; of a shorter one only where details are asked for."""
 
 
 @dataclass
@@ -69,8 +68,9 @@ class CloudFiles:
         folder: where the files go.
         origin: (3,) map coordinates near the points, m.
         typical_range: usual distance to what is scanned, m.
-        epsg: map coordinate system; None if unknown.
+        epsg: map coordinate system, for the previews' titles; None if unknown.
         view: raster for the previews, which are written if it is given.
+        system_text: map and vertical coordinate system as WKT; that of ``epsg`` alone if None.
         counts: what was counted so far.
     """
 
@@ -80,6 +80,7 @@ class CloudFiles:
     typical_range: float
     epsg: int | None = None
     view: TopView | None = None
+    system_text: str | None = None
     counts: ScanCounts = field(default_factory=ScanCounts)
     _writers: list[CloudWriter] = field(default_factory=list)
     _grid: GridSubsampler | None = None
@@ -138,7 +139,9 @@ class CloudFiles:
     def open_writer(self, name: str) -> CloudWriter:
         """Return a writer for a cloud file in the folder, with the scenario's attributes and classes."""
         cloud, path = self.scenario.cloud, self.folder / name
-        return open_writer(path, self.epsg, self.origin, self.intensity_scale, cloud.attributes, cloud.scheme())
+        epsg = self.epsg if self.system_text is None else None
+        scale = self.intensity_scale
+        return open_writer(path, epsg, self.origin, scale, cloud.attributes, cloud.scheme(), self.system_text)
 
     def _keep(self, points: PointBlock) -> None:
         for writer in self._writers:
@@ -179,8 +182,17 @@ class CloudFiles:
         return {"footprints": rows} if rows else {}
 
 
+def log_forecast(forecast: ScanForecast) -> None:
+    """Log what a scan will take; unless details are asked for only if that is long."""
+    level = logging.INFO if forecast.is_long else logging.DEBUG
+    _logger.log(level, "scan: %s", forecast.text())
+
+
 def record_to_files(
-    plans: Iterable[ScanPlan], files: CloudFiles, timer: StageTimer, announce: bool = True
+    plans: Iterable[ScanPlan],
+    files: CloudFiles,
+    timer: StageTimer,
+    announce: Callable[[ScanForecast], None] | None = log_forecast,
 ) -> dict[str, Any]:
     """Scan plans one after the other into the cloud and the previews.
 
@@ -191,7 +203,7 @@ def record_to_files(
         plans: the sections, or the one scan.
         files: the sink.
         timer: of the job's stages.
-        announce: say beforehand what the whole scan will take; not of stretches that are tried.
+        announce: is told beforehand what the whole scan will take; None for stretches that are tried.
 
     Returns:
         the counts, as JSON data; triangles and vertices are those of the largest scene.
@@ -202,9 +214,7 @@ def record_to_files(
         stack.enter_context(files.open())
         for plan in plans:
             if announce and not figures:  # the path is the whole scan's, whatever section the plan is of
-                forecast = plan.forecast()
-                level = logging.INFO if forecast.seconds >= _LONG else logging.DEBUG
-                _logger.log(level, "scan: %s", forecast.text())
+                announce(plan.forecast().beside_others())
             summary = plan.summary()
             largest = {name: max(figures.get(name, 0), summary[name]) for name in ("triangles", "vertices")}
             figures = summary | largest

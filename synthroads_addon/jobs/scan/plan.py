@@ -3,7 +3,7 @@
 `Site`: where a scenario's scan takes place, whoever made the scene; and its scan into files.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
@@ -23,15 +23,19 @@ from ...scanning.beam import RINGS, outer_radii
 from ...scanning.blocks import Blocks
 from ...scanning.colour.colour import takes_nodes
 from ...scanning.colour.request import LayerRequest
+from ...scanning.colour.surfaces import SceneSurfaces
+from ...scanning.colour.transparency import SeeThrough, Transparency
 from ...scanning.finish import OF_INTENSITY
 from ...scanning.forecast import check_scan_size, forecast_scan
 from ...scanning.multipath import Multipath, mirrors_of
 from ...scanning.plan import ScanConditions, ScanPlan, SceneServices
 from ...scanning.platforms.guides import RoadGuide
 from ...scanning.platforms.path import Path as ScanPath
+from ...scanning.platforms.path import epoch_of
 from ...scanning.relief.micro_relief import micro_relief
 from ...scanning.relief.normal_images import NormalImages
 from ...scanning.scene.bare_ground import MOST_CELLS, BareGround
+from ...scanning.scene.caster import Caster
 from ...scanning.scene.classify import classify_scene
 from ...scanning.scene.mesh import SceneMesh
 from ...scanning.scene.motion import ScannedScene
@@ -91,7 +95,7 @@ def plan_scan(
         InputError: the device can't do what the scenario asks for, or its table of materials can't be read.
     """
     conditions = conditions or ScanConditions()
-    path = with_motion(path, scenario.scan.motion, scenario.seed)
+    epoch, path = epoch_of(path), with_motion(path, scenario.scan.motion, scenario.seed)
     usual, scene = scene.static, classify_scene(scene, scenario.cloud.scheme(), conditions.road)
     kept, coloured, rings = scenario.kept_layers, scenario.coloured_layers, scenario.beam_rings
     scan, settings, table = scenario.scan, scenario.settings(), scenario.own_materials()
@@ -105,7 +109,11 @@ def plan_scan(
     means = services.materials(materials)
     road = conditions.road
     damages = InstanceNumbers(road).damages() if road is not None and "damage" in kept else {}
-    target = Target(scene, lambda mesh: services.caster(scan.caster, mesh), damages)
+
+    def make_caster(mesh: SceneMesh) -> Caster:
+        return services.caster(scan.caster, mesh, scan.kernels)
+
+    target = Target(scene, make_caster, damages)
     relief = micro_relief(materials, means) if shifts else None
     variation = conditions.variation
     scanned = [
@@ -117,7 +125,8 @@ def plan_scan(
     ]
     by_layers = _intensity_from_layers(scenario, scanned, services, materials)
     # The layers of each point have the variation of their own already.
-    surfaces = surfaces_of(scanned, scan.reflection, spread=not by_layers)
+    transparencies = services.transparencies(materials)
+    surfaces = surfaces_of(scanned, scan.reflection, spread=not by_layers, clear=transparencies)
     effects = weather.effects() if loss is None else ()
     multipath = _multipath(scan.multipath, materials, scanned, conditions)
     ground, all_from_surfaces = None, not effects and multipath is None
@@ -127,7 +136,7 @@ def plan_scan(
     if rings and not effects and len(usual.triangles):
         widest = max(max(outer_radii(pattern, setting.divergence)) for pattern in RINGS.values())
         margin = widest * setting.maximum_range  # measurements take the plan with other rays per pulse
-        outline = Outline(usual, lambda mesh: services.caster(scan.caster, mesh), margin)
+        outline = Outline(usual, make_caster, margin)
     return ScanPlan(
         target=target,
         surfaces=surfaces,
@@ -135,6 +144,7 @@ def plan_scan(
         path=path,
         rings=rings,
         seed=scenario.seed,
+        epoch=epoch,
         noise=scan.noise,
         strip_errors=scan.strip_errors,
         attenuation=weather.attenuation(setting.device.wavelength_nm) if loss is None else loss,
@@ -143,6 +153,7 @@ def plan_scan(
         air_class=scenario.cloud.scheme().source_ids().get(AIR_CLASS, UNLABELLED),
         ground=ground,
         outline=outline,
+        transparency=_see_through(scene, transparencies),
         beam=scan.beam,
         measured_layers=(kept & optional_arrays("scan")) | ({"normal", "material"} if shifts or tilting else set()),
         records_seen_points=bool(coloured) or by_layers or shifts or bool(tilting),
@@ -168,6 +179,7 @@ def plan_scan(
             field_of_view=setting.field_of_view,
             seed=scenario.seed,
             moving=scene.moving,
+            kernels=scan.kernels,
         ),
         services=services,
     )
@@ -181,6 +193,13 @@ def _multipath(
         return None
     films = [water_film(entry_of(name), conditions.environment) for name in names]
     return Multipath(mirrors_of(rows, films), strength)
+
+
+def _see_through(scene: ScannedScene, materials: Mapping[int, Transparency]) -> SeeThrough | None:
+    """Return the transparent materials of a scene by their index; None if it has none."""
+    if not materials:
+        return None
+    return SeeThrough(SceneSurfaces(scene.static, scene.moving), materials, unit=scene.static.unit)
 
 
 def _bare_ground(mesh: SceneMesh, surfaces: Surfaces, cut: Blocks, radii: tuple[float, float]) -> BareGround:
@@ -245,7 +264,9 @@ class Site:
 
     def files(self, folder: Path, origin: Float) -> CloudFiles:
         """Return a sink that writes cloud and previews to a folder; the origin (3,) is near the points, map, m."""
-        return CloudFiles(self.scenario, folder, origin, self.path.typical_range, self.conditions.epsg, self.view)
+        conditions, typical = self.conditions, self.path.typical_range
+        text = conditions.system.to_wkt() if conditions.system else None
+        return CloudFiles(self.scenario, folder, origin, typical, conditions.epsg, self.view, system_text=text)
 
     def scan(self, scene: ScannedScene, services: SceneServices, folder: Path, timer: StageTimer) -> dict[str, Any]:
         """Scan a scene and write the cloud and the previews to a folder; return the counts as JSON data.

@@ -1,7 +1,7 @@
 """Several views of the axis become one: those that agree are averaged by their stated deviations, rivals are named."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import ndimage
@@ -23,6 +23,7 @@ _VAGUE = 0.5  # m: a view less sure than this leads the less
 _WAVELENGTH = 60.0  # m
 DEFINITION = 0.15
 """Standard deviation, m, of where a road's axis is said to lie about where its markings and edges put it."""
+_SAME = 0.3  # m: axes of two grids that lie farther apart are two places
 _DRIFT = 0.02  # m per m of a gap that the axis may leave its course by
 
 
@@ -73,6 +74,31 @@ def fuse(stations: Float, views: Sequence[View]) -> FusedAxis:
     smoothed, wide = _along(stations, raw, deviation)
     names = {view.name: member[number] for number, view in enumerate(views)}
     return FusedAxis(stations, smoothed, wide, raw, opened, names, tuple(views))
+
+
+def mean_axis(first: FusedAxis, others: Sequence[FusedAxis]) -> FusedAxis:
+    """Return the mean of axes at the same stations that several grids of bins over the same points show.
+
+    Where a line moves by a fraction of a bin, or some points are missing, bins hold other points and the axis in one
+    grid jumps. The others count where they lie near the first, whose views, rivals and members stay: where one of them
+    slips it has no say. The grids share their points: the mean is as sure as they are on average.
+    """
+    axes = [first, *others]
+    near = np.array([np.abs(axis.offsets - first.offsets) <= _SAME for axis in axes])
+    raw = np.array([axis.raw for axis in axes])
+    return replace(
+        first,
+        offsets=_mean_where(near, np.array([axis.offsets for axis in axes])),
+        std=_mean_where(near, np.array([axis.std for axis in axes])),
+        raw=np.where(np.isfinite(first.raw), _mean_where(near & np.isfinite(raw), raw), np.nan),
+    )
+
+
+def _mean_where(counted: Bool, values: Float) -> Float:
+    """Return the mean (K,) of those of values (A, K) that count; NaN where none does."""
+    count = counted.sum(axis=0)
+    total = np.where(counted, values, 0.0).sum(axis=0)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan)
 
 
 def _agreement(offsets: Float, std: Float, seen: Bool) -> Bool:

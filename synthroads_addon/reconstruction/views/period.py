@@ -10,6 +10,7 @@ from scipy import ndimage
 from scipy.signal import find_peaks
 
 from ...base.arrays import Float
+from ..path import SPACING
 from ..profiles import ACROSS, STRETCH, Grid, Profiles
 from .view import View
 
@@ -22,10 +23,14 @@ _WIDTH = 3  # bins across that count as one: about a line and the points beside 
 _LANE = 2.3  # m: dashed lines are at least this far apart
 _RIVAL = 0.5  # of the best's power: another dashed line so strong leaves a single carriageway's axis open
 _FLOOR = 0.12  # m that a dashed line is off the axis where nothing scatters
+_TURN = 0.01  # m per m beside a window's middle that a path may leave the line by, at the ends
 
 
 def view_period(profiles: Profiles, dual: bool, middle: float) -> View:
     """Return the view of the axis by dashed lines.
+
+    Near the ends the windows don't reach as far as the stretches: their line is that of a place farther on, and says
+    little of where a path turns off.
 
     Args:
         profiles: along a path parallel to the road.
@@ -33,14 +38,15 @@ def view_period(profiles: Profiles, dual: bool, middle: float) -> View:
         middle: offset between the carriageways, or of a single one's middle, m: roughly.
     """
     rows, paint = len(profiles.stations), _widened(profiles.paint)
-    offsets = np.full(profiles.stretches, np.nan)
+    offsets, beside = np.full(profiles.stretches, np.nan), np.zeros(profiles.stretches)
     for number in range(profiles.stretches):
         centre = number * STRETCH + STRETCH // 2
         first = int(np.clip(centre - _WINDOW // 2, 0, max(0, rows - _WINDOW)))
         window = slice(first, min(rows, first + _WINDOW))
         power = dash_power(paint[window], profiles.stations[window])
         offsets[number] = _axis_of(power, profiles.offsets, dual, middle)
-    return View.of("marking period", offsets, _FLOOR)
+        beside[number] = SPACING * abs(centre - 0.5 * (window.start + window.stop - 1))
+    return View.of("marking period", offsets, _FLOOR, _TURN * beside)
 
 
 def _widened(paint: Grid) -> Float:

@@ -14,7 +14,7 @@ from ..geometry import RoadGeometry
 from ..objects import Side
 from ..paint import arrow_outlines, cut_outline, hatching_outlines
 from ..section import Arrow, Hatching, LineMarking
-from .clipping import covers, edges_of, meet, split_outline, subtract
+from .clipping import covers, edges_of, split_outline, subtract
 from .outlines import patch_outline
 
 
@@ -47,12 +47,14 @@ class MarkingFilms:
             if road.carriageway_of(item).side == side
             for outline in painted_outlines(geometry, item)
         ]
+        outlines = [outline for outline, _, _ in self._areas]
+        self._lows = np.array([outline.min(axis=0) for outline in outlines]).reshape(-1, 2)
+        self._highs = np.array([outline.max(axis=0) for outline in outlines]).reshape(-1, 2)
 
     def thickness(self, station: Float, offset: Float) -> Float:
         """Return the thickness (N,) of the thickest film at places (N,), m; 0 where there is none."""
         result = self._line_thickness(range(len(self._lines)), station, offset)
-        for outline, edges, film in self._areas:
-            (low, _), (high, _) = outline.min(axis=0), outline.max(axis=0)
+        for (_, edges, film), low, high in zip(self._areas, self._lows[:, 0], self._highs[:, 0], strict=True):
             near = np.flatnonzero((station >= low) & (station <= high))
             inside = near[covers(edges, station[near], offset[near])]
             result[inside] = np.maximum(result[inside], film)
@@ -66,11 +68,15 @@ class MarkingFilms:
             else:
                 yield from self._cut_by_areas(outline)
 
+    def _areas_near(self, low: Float, high: Float) -> list[int]:
+        """Return the numbers of the areas whose boxes meet a box (station, offset): a long road has hundreds."""
+        near: list[int] = np.flatnonzero(((self._lows < high) & (self._highs > low)).all(axis=1)).tolist()
+        return near
+
     def _cut_by_areas(self, outline: Float) -> Iterator[tuple[Float, float]]:
         left = [outline]
-        for area, _, film in self._areas:
-            if not meet(outline, area):
-                continue
+        for number in self._areas_near(outline.min(axis=0), outline.max(axis=0)):
+            area, _, film = self._areas[number]
             parts, left = left, []
             for part in parts:
                 inside, outside = split_outline(part, area)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 from ...road.surroundings import Environment
 from ..platforms.path import Path
@@ -21,6 +22,7 @@ class LayerRequest:
         wanted: layers: ``rgb``, ``base_color``, ``roughness``, ``metallic``, ``specular``.
         mesh: what is scanned, without what moves.
         moving: what moves.
+        kernels: ``auto`` to have a kernel work materials out where this machine and their nodes let it, else ``off``.
         environment: light and weather.
         path: the scanner's.
         field_of_view: the scanner's, rad.
@@ -39,6 +41,7 @@ class LayerRequest:
     frame: tuple[float, float, float] = (0.0, 0.0, 0.0)
     pick: Callable[[list[View]], list[View]] | None = None
     moving: tuple[MovingMesh, ...] = ()
+    kernels: Literal["auto", "off"] = "auto"
 
     @property
     def lit(self) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...base.arrays import Float, Float32, Index, take_rows
 from ..scene.mesh import SceneMesh
@@ -28,25 +29,47 @@ class SceneSurfaces:
 
     def read(self, inputs: Iterable[SurfaceInput], points: SeenPoints) -> dict[SurfaceInput, Float32]:
         """Return each surface input's values (N, 4) at N points; 0 where the surface lacks it, as renderers have it."""
-        result = {what: np.zeros((len(points), 4), np.float32) for what in sorted(inputs)}
-        if points.face is None or not result:
+        if points.face is None:
+            return {what: np.zeros((len(points), 4), np.float32) for what in sorted(inputs)}
+        return self.read_places(inputs, points.face, points.position, points.normal)
+
+    def read_places(
+        self, inputs: Iterable[SurfaceInput], face: Index, place: Float, normal: NDArray[np.floating] | None = None
+    ) -> dict[SurfaceInput, Float32]:
+        """Return each surface input's values (N, 4) at N places; 0 where the surface lacks it.
+
+        Args:
+            inputs: no normals where none are given.
+            face: (N,) triangles of the scene, those that move after those that stand.
+            place: (N, 3) on them in the scene at time 0, local, m.
+            normal: (N, 3) unit normals there, towards the scanner; None if no input needs them.
+        """
+        result = {what: np.zeros((len(face), 4), np.float32) for what in sorted(inputs)}
+        if not result:
             return result
+        normal = np.zeros((len(face), 3)) if normal is None else normal
         for number, mesh in enumerate(self._meshes):
             low, high = self._firsts[number], self._firsts[number + 1]
-            mine = np.flatnonzero((points.face >= low) & (points.face < high))
+            mine = np.flatnonzero((face >= low) & (face < high))
             if len(mine):
-                part = points if len(mine) == len(points) else points.select(mine)
-                self._read_mesh(number, mesh, part, mine, result)
+                some = (face, place, normal)
+                if len(mine) < len(face):
+                    some = (take_rows(face, mine), take_rows(place, mine), take_rows(normal, mine))
+                self._read_mesh(number, mesh, some, mine, result)
         return result
 
     def _read_mesh(
-        self, number: int, mesh: SceneMesh, points: SeenPoints, rows: Index, result: dict[SurfaceInput, Float32]
+        self,
+        number: int,
+        mesh: SceneMesh,
+        places: tuple[Index, Float, NDArray[np.floating]],
+        rows: Index,
+        result: dict[SurfaceInput, Float32],
     ) -> None:
-        """Fill in, in place, the surface inputs' values of the points that lie on one of the meshes."""
-        assert points.face is not None
-        faces = points.face - self._firsts[number]
+        """Fill in, in place, the surface inputs' values of places (face, place, normal) on one of the meshes."""
+        faces, place, towards = places[0] - self._firsts[number], places[1], places[2]
         rotation, begin = self._poses[number]
-        place, normal = points.position, np.asarray(points.normal, np.float64)
+        normal = np.asarray(towards, np.float64)
         if number:  # what stands is in the scene's own frame
             place, normal = (place - begin) @ rotation, normal @ rotation
         corners = take_rows(mesh.vertices, take_rows(mesh.triangles, faces))
@@ -58,7 +81,7 @@ class SceneSurfaces:
             if what.kind == "normal":
                 # Where the shading isn't smooth it is the face's own.
                 values[rows[found], :3] = values[rows[found], :3] @ rotation.T
-                values[rows[~found], :3] = points.normal[~found]
+                values[rows[~found], :3] = towards[~found]
 
 
 def _initial_pose(part: MovingMesh) -> tuple[Float, Float]:

@@ -4,11 +4,14 @@ A guide is a curve in plan, evaluated by station (m) in float64, with an elevati
 offsets count to the left.
 """
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...base.arrays import Float
 from ...base.errors import InputError
+from ...base.maps.places import Placement
 from ...road.alignment import Alignment
 from ...road.damage import damage_depth
 from ...road.geometry import RoadGeometry
@@ -34,7 +37,10 @@ class Guide:
         length: the largest station, m; the first is 0.
         origin: (3,) map coordinates of the local origin, m.
         breaks: (B,) stations at which the curvature may jump or bend.
+        place: the map's coordinate system, as far as it is known.
     """
+
+    place: Placement = Placement()
 
     def __init__(self, alignment: Alignment, profile: Profile, origin: ArrayLike) -> None:
         self.alignment, self.profile = alignment, profile
@@ -83,6 +89,11 @@ class RoadGuide(Guide):
     def __init__(self, geometry: RoadGeometry) -> None:
         super().__init__(geometry.alignment, geometry.profile, geometry.parameters.transform.translate)
         self.geometry = geometry
+
+    @cached_property
+    def place(self) -> Placement:  # type: ignore[override]
+        """Return the road's map coordinate system."""
+        return Placement.of(self.geometry.parameters.metadata.system)
 
     def ground(self, station: Float, offset: Float, damaged: bool) -> Float:
         """Return the local elevation (K,), m, of the road, its batter or the ground; NaN beyond an elevation model."""

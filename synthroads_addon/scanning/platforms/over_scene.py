@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ...base.errors import InputError
+from ...base.maps.places import Placement
 from ...road.geometry import RoadGeometry
 from ..scene.extent import elevation_at, middle_line
 from ..scene.mesh import SceneMesh
@@ -59,6 +60,7 @@ def path_over(
     road: RoadGeometry | None = None,
     line: FilePath | None = None,
     places: Sequence[Sequence[float]] = (),
+    map_place: Placement | None = None,
 ) -> Path:
     """Return the scanner's path: at places, along a line or the scene's road, or straight over the scene's middle.
 
@@ -70,6 +72,7 @@ def path_over(
         road: that the scene shows.
         line: CSV or GeoJSON, in map coordinates.
         places: of a tripod, (x, y) or (x, y, z) in map coordinates; z is that of the scanner itself.
+        map_place: the map's coordinate system, which the line is moved into; unknown if None.
 
     Raises:
         InputError: places are given and the platform is no tripod, or there is nothing below one; or see
@@ -81,7 +84,8 @@ def path_over(
         return TripodPath(tripod, [_scanner_place(tripod, place, mesh) for place in places])
     if road and not line:
         return platform.make_path(RoadGuide(road))
-    guide = PolylineGuide.read(line, origin) if line else PolylineGuide(middle_line(mesh), origin)
+    guide = PolylineGuide.read(line, origin, place=map_place) if line else PolylineGuide(middle_line(mesh), origin)
+    guide.place = map_place or Placement()
     return platform.as_single_strip().make_path(guide, origin)
 
 

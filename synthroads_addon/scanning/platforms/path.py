@@ -39,6 +39,11 @@ class Strip:
     ends: bool = False
 
 
+def epoch_of(path: object) -> float:
+    """Return what the times of points count from, s: 0, the scan's start, where a path says nothing else."""
+    return float(getattr(path, "epoch", 0.0))
+
+
 class Path(Protocol):
     """Interface of a scanner's path: its strips, and its position and orientation at any time."""
 

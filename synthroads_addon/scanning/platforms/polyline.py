@@ -9,9 +9,10 @@ from numpy.typing import ArrayLike
 
 from ...base.arrays import Float, Index
 from ...base.errors import InputError
+from ...base.maps.places import Placement
 from ...base.rotations import wrap_angle
 from ...road.alignment import CURVATURE_LIMIT, Alignment, Element, finite_array
-from ...road.centerline import read_axis
+from ...road.axes.centerline import read_axis
 from ...road.profile import IntersectionPoint, Profile
 from .guides import Guide
 
@@ -72,7 +73,11 @@ class PolylineGuide(Guide):
 
     @classmethod
     def read(
-        cls, path: str | os.PathLike[str], origin: Sequence[float] | None = None, tolerance: float = MEASURED
+        cls,
+        path: str | os.PathLike[str],
+        origin: Sequence[float] | None = None,
+        tolerance: float = MEASURED,
+        place: Placement | None = None,
     ) -> Self:
         """Read a line in map coordinates from CSV or GeoJSON, by `read_axis`, and return its guide.
 
@@ -80,11 +85,12 @@ class PolylineGuide(Guide):
             path: the file, in map coordinates.
             origin: map coordinates of the local origin, m; the points' mean to the metre if not given.
             tolerance: m, see the class.
+            place: the map's coordinate system, see `read_axis`.
 
         Raises:
             InputError: the file is missing or no line, or has a corner too sharp to be rounded.
         """
-        points = read_axis(path)
+        points = read_axis(path, place)
         base = np.round(points.mean(axis=0)) if origin is None else np.array(origin, dtype=np.float64)
         return cls(points - base, base.tolist(), tolerance)
 

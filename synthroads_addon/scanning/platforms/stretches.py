@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...base.arrays import Float
-from .path import Path, Strip
+from .path import Path, Strip, epoch_of
 
 
 @dataclass(frozen=True)
@@ -31,6 +31,11 @@ class PathStretches:
     def typical_range(self) -> float:
         """Return the whole path's usual range, m."""
         return self.whole.typical_range
+
+    @property
+    def epoch(self) -> float:
+        """Return what the whole path's times count from, s."""
+        return epoch_of(self.whole)
 
     @property
     def share(self) -> float:

@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -14,11 +15,15 @@ from pydantic import Field
 from ...base.arrays import Float, Int
 from ...base.errors import InputError, nearest_name
 from ...base.files import read_text
-from ...base.rotations import angle_between, quaternion_matrices, quaternions, rotation_matrix, slerp
-from ...road.centerline import FARTHEST, fields_of
+from ...base.maps.places import Placement, bring, check_heights
+from ...base.remarks import warn
+from ...base.rotations import angle_between, quaternion_matrices, quaternions, rotation_matrix, slerp, wrap_angle
+from ...base.schema import quantity
+from ...road.axes.centerline import FARTHEST, csv_system, fields_of
 from .guides import Guide
 from .path import KNOT_RANGE, Strip, knot_spacing_for
 from .platform import Platform
+from .sbet import is_sbet, poses_on_map, read_records
 
 COLUMNS = ("time", "x", "y", "z", "roll", "pitch", "heading")
 """Names in the header; in any order and case, beside any others."""
@@ -27,6 +32,10 @@ _LARGEST = 1e10
 _NEAREST = 8.0  # m, of the typical range
 _GRID = 1e-6  # s, that times may lie beside an even grid
 _SUBDIVISIONS = 50
+_STILL = 0.5  # m/s: slower than this a platform has no course
+_ACROSS, _BESIDE, _ALONG = 35.0, 8.0, 4.0
+"""Median angles (deg) between heading and course: too wide in any case; odd where another convention fits as well."""
+_CONVENTION = "degrees clockwise from grid north"
 _LARGEST_TURN = np.deg2rad(150.0)
 
 
@@ -36,7 +45,13 @@ class RecordedTrajectory(Platform):
     order: ClassVar[int] = 4
 
     kind: Literal["trajectory"] = Field("trajectory", title="Platform", description="Platform.")
-    file: str | None = Field(None, title="Trajectory", description="CSV with time, x, y, z, roll, pitch, heading.")
+    file: str | None = Field(
+        None, title="Trajectory", description="CSV with time, x, y, z, roll, pitch, heading; or SBET."
+    )
+    keep_time: bool = Field(False, title="Keep Time", description="Points have the file's times, not its first as 0.")
+    height_shift: float = quantity(
+        0.0, "m", "Added to the file's heights; minus the geoid's where they count from the ellipsoid.", (-1000, 1000)
+    )
 
     def make_path(self, guide: Guide, origin: Sequence[float] | None = None) -> TrajectoryPath:
         """Return the path through the poses of the platform's file, as one strip."""
@@ -51,6 +66,7 @@ class TrajectoryPath:
         knot_spacing: s, see `Path`. Where the file's times lie on an even grid, knots do too, and positions between
             them are exact; otherwise it is short enough for the corners of the trajectory.
         typical_range: median height above the guide, but `_NEAREST` at least, m.
+        epoch: what points' times count from, s: see `epoch_of`.
 
     Args:
         platform: with a file and a mounting.
@@ -64,10 +80,12 @@ class TrajectoryPath:
     def __init__(self, platform: RecordedTrajectory, guide: Guide, origin: Sequence[float] | None = None) -> None:
         if platform.file is None:
             raise InputError("scan.platform.file", None, "a trajectory needs a CSV file")
-        rows = read_trajectory(platform.file)
+        rows = read_trajectory(platform.file, guide.place)
+        check_headings(Path(platform.file).name, rows)
         base = guide.origin if origin is None else np.array(origin, dtype=np.float64)
         self._time = rows.time - rows.time[0]
-        self._position = rows.position - base
+        self._position = rows.position + (0.0, 0.0, platform.height_shift) - base
+        self.epoch = float(rows.time[0]) if platform.keep_time else 0.0
         # North is local y: a heading clockwise from it is 90 degrees less itself, counter-clockwise from x.
         angles = np.deg2rad([90.0 - rows.heading, rows.pitch, rows.roll])
         self._attitude = quaternions(rotation_matrix(*angles))
@@ -110,6 +128,44 @@ class TrajectoryPath:
         return knot_spacing_for(KNOT_RANGE * float(turning.max()) ** 2, float(corner.max(initial=0.0)))
 
 
+def check_headings(name: str, rows: Trajectory) -> None:
+    """Warn where headings lie across the course over ground, and say which other convention they would suit.
+
+    Args:
+        name: of the file.
+        rows: the poses; where the platform stands still it has no course.
+    """
+    step, interval = np.diff(rows.position[:, :2], axis=0), np.diff(rows.time)
+    moves = np.hypot(*step.T) > _STILL * interval
+    if not moves.any():
+        return
+    course = np.rad2deg(np.arctan2(step[moves, 0], step[moves, 1]))
+    heading = rows.heading[:-1][moves]
+
+    def across(angle: Float) -> float:
+        return float(np.median(np.abs(np.rad2deg(wrap_angle(np.deg2rad(angle - course))))))
+
+    own, others = across(heading), {what: across(angle) for what, angle in _conventions(heading).items()}
+    best = min(others, key=lambda what: others[what])
+    if own > _ACROSS or (own > _BESIDE and others[best] < _ALONG):
+        looks = f"; they look like {best}" if others[best] < _ALONG + 0.1 * own else ""
+        text = "%s: headings lie %.0f degrees across the course (median); %s is needed, and roll and pitch in degrees%s"
+        warn(text, name, own, _CONVENTION, looks)
+
+
+def _conventions(heading: Float) -> dict[str, Float]:
+    """Return headings (K,) read by other conventions than ours, in ours."""
+    degrees = np.rad2deg(heading)
+    return {
+        "radians clockwise from north": degrees,
+        "degrees counter-clockwise from east": 90.0 - heading,
+        "radians counter-clockwise from east": 90.0 - degrees,
+        "degrees counter-clockwise from north": -heading,
+        "radians counter-clockwise from north": -degrees,
+        "degrees of where it comes from": heading + 180.0,
+    }
+
+
 def _refuse_wide_turns(file: str, rows: Trajectory, attitude: Float) -> None:
     turn = angle_between(attitude[:-1], attitude[1:])
     if turn.max() > _LARGEST_TURN:
@@ -139,18 +195,59 @@ class Trajectory:
     lines: Int
 
 
-def read_trajectory(path: str | os.PathLike[str]) -> Trajectory:
-    """Read poses from a CSV file with the columns time, x, y, z, roll, pitch and heading (s, m, deg).
+def read_trajectory(path: str | os.PathLike[str], place: Placement | None = None) -> Trajectory:
+    """Read poses from SBET, or from a CSV file with the columns time, x, y, z, roll, pitch and heading (s, m, deg).
 
-    The first line that is neither empty nor a comment (``#``) is the header; columns are separated by commas,
-    semicolons, tabs or spaces.
+    Of CSV the first line that is neither empty nor a comment (``#``) is the header; columns are separated by commas,
+    semicolons, tabs or spaces. A comment may name the coordinate system, as for `read_axis`.
+
+    Args:
+        path: the file.
+        place: the map's coordinate system, which the poses are moved into; without one CSV stays as it is.
 
     Raises:
         MissingFileError: the file doesn't exist or cannot be read.
-        InputError: a column is missing or there twice, a value is no finite number, the time doesn't increase, or
-            there are fewer than two rows.
+        InputError: a column is missing or there twice, a value is no finite number, the time doesn't increase, there
+            are fewer than two rows, or there is no way to the map's system.
     """
-    name, kind = os.fspath(path), f"this is no text: CSV with columns {', '.join(COLUMNS)} is needed"
+    name, place = os.fspath(path), place or Placement()
+    records = _sbet_records(name)
+    if records is not None:
+        points, heading = poses_on_map(name, records, place)
+        roll, pitch = np.rad2deg(records[:, 7]), np.rad2deg(records[:, 8])
+        return Trajectory(records[:, 0], points, roll, pitch, heading, np.arange(1, len(records) + 1))
+    rows, numbers = _read_csv(name)
+    declared, points = csv_system(name), rows[:, 1:4]
+    if declared is None and place.system is None:  # a scene of no map, which may be as small as degrees are
+        points = check_heights(name, points)
+    else:
+        points = bring(name, points, declared, place)
+    return Trajectory(rows[:, 0], points, rows[:, 4], rows[:, 5], rows[:, 6], numbers)
+
+
+def check_trajectory_file(path: str | os.PathLike[str]) -> None:
+    """Raise an error if a file is no trajectory, wherever its poses lie; see `read_trajectory`."""
+    name = os.fspath(path)
+    if _sbet_records(name) is None:
+        _read_csv(name)
+
+
+def _sbet_records(name: str) -> Float | None:
+    """Return the records (R, 17) of a file if it is SBET, else None."""
+    try:
+        size = Path(name).stat().st_size
+        with Path(name).open("rb") as file:
+            if not is_sbet(file.read(4096), size):
+                return None
+            file.seek(0)
+            return read_records(name, file.read())
+    except (OSError, ValueError):  # told by whoever reads it as text
+        return None
+
+
+def _read_csv(name: str) -> tuple[Float, Int]:
+    """Return the values (R, 7) of `COLUMNS` in a CSV file, and the numbers (R,) of their lines."""
+    kind = f"this is no text: CSV with columns {', '.join(COLUMNS)} is needed"
     text = read_text(name, kind, "a trajectory file is needed here", encoding="utf-8-sig")
     numbered = enumerate(text.splitlines(), 1)
     lines = [(number, line) for number, line in numbered if line.strip() and not line.lstrip().startswith("#")]
@@ -169,7 +266,7 @@ def read_trajectory(path: str | os.PathLike[str]) -> Trajectory:
         before, row = late[0], late[0] + 1
         allowed = f"times must increase: more than {float(rows[before, 0])!r} s is needed"
         raise InputError(f"{name}:{numbers[row]} time", float(rows[row, 0]), allowed)
-    return Trajectory(rows[:, 0], rows[:, 1:4], rows[:, 4], rows[:, 5], rows[:, 6], numbers)
+    return rows, numbers
 
 
 def _columns(place: str, head: list[str]) -> list[int]:

@@ -15,10 +15,12 @@ class Caster(Protocol):
     Attributes:
         name: as `scan.caster` in a scenario.
         main_thread_only: whether `cast` must be called from Blender's main thread; else any threads may, side by side.
+        kernels: how the rays are cast, as a scan's report says it: in packets of how many, or why not.
     """
 
     name: str
     main_thread_only: bool
+    kernels: str
 
     def cast(self, origins: Float32, directions: Float32, maximum_range: float) -> NDArray[np.int32]:
         """Return the (N,) indices of the faces hit; -1 where nothing is hit within ``maximum_range`` (m).

@@ -23,7 +23,7 @@ from ...materials.surfaces import Surfaces
 from ..beam import beam_radii
 from ..devices.device import ScannerSetting
 
-_CORNERS = np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)]) / math.sqrt(3.0)
+CORNERS = np.array([(1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)]) / math.sqrt(3.0)
 """Corners of a regular tetrahedron around the origin, with a radius of 1."""
 
 
@@ -65,7 +65,7 @@ class LeafGaps:
         middle = (place + self.frame_origin[:, None]) / size
         spread = radius / size
         result = np.zeros(len(material))
-        for corner in _CORNERS:
+        for corner in CORNERS:
             cells = np.floor(middle + corner[:, None] * spread).astype(np.int64)
             result += hash_cells(cells, self.key) < open_below
-        return result / len(_CORNERS)
+        return result / len(CORNERS)

@@ -35,6 +35,7 @@ class SceneMesh:
             scene's own.
         origin: (3,) float64 map coordinates of the local origin, m.
         surface: what its materials ask of the places on it; None if they ask nothing.
+        unit: metres that a unit of the scene's own coordinates stands for, which its materials' nodes see.
 
     Raises:
         InputError: wrong shape or type, indices out of range, or numbers that aren't finite; names the field.
@@ -48,6 +49,7 @@ class SceneMesh:
     materials: tuple[str, ...]
     origin: Float
     surface: SurfaceValues | None = None
+    unit: float = 1.0
 
     def __post_init__(self) -> None:
         for name, (dtype, shape) in _SHAPES.items():

@@ -2,14 +2,15 @@
 
 Blender's reader of PLY ends the process where a face names a vertex that isn't there, and its reader of STL takes what
 is left of a truncated file without a word. Its reader of glTF, in Python, makes room for as many values as a header
-says, and reads whatever an address in the file names, also outside of its folder.
+says. And its readers read whatever an address in a file names, also outside of its folder.
 """
 
 import json
 import os
 import re
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 from urllib.parse import unquote
@@ -18,6 +19,7 @@ import numpy as np
 
 from ...base.arrays import AnyArray, UInt8
 from ...base.errors import InputError
+from ...base.named_paths import file_in_one_of
 from ...cloud.formats.ply import PLY_TYPES
 
 _GLB, _JSON = 0x46546C67, 0x4E4F534A  # "glTF", "JSON"
@@ -30,6 +32,19 @@ _FAULTS = (ValueError, LookupError, TypeError, ArithmeticError, AttributeError, 
 _DEEPEST = 256
 """Levels of nodes in a glTF at most: Blender's reader calls itself for each."""
 _SHOWN = 100
+STAY = "what it names must stay in the file's folder, also where links lead to"
+REMEDY = "copy it there, or name its folder by --also-from"
+"""Remedy where a scene names a file elsewhere."""
+_BLOCK = 1 << 24
+_LONGEST_LINE = 1 << 12
+"""Bytes of the longest line that names a material library."""
+_LIBRARY = re.compile(rb"\n[ \t]*mtllib[ \t]+")
+_PICTURES = ("map_", "norm", "bump", "disp", "decal", "refl")
+"""Beginnings of the lines of a material that name a picture."""
+_MANY = 3
+_OPTIONS = {"-o": _MANY, "-s": _MANY, "-t": _MANY, "-mm": 2}
+"""Options before the name of a picture that take more than one word, or up to three numbers."""
+_NUMBER = re.compile(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?")
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]*:")
 """Beginning of an address with a scheme, as of the network, or with a drive's letter."""
 _MOST_VALUES = 1 << 24
@@ -39,30 +54,59 @@ _Property = tuple[str, str, str]
 """Type of a list's length ("" for a scalar), type of the values, name."""
 
 
-def check_mesh_file(path: Path) -> None:
+def check_mesh_file(path: Path, also_from: Sequence[Path] = (), remedy: str = REMEDY) -> None:
     """Raise `InputError` if a mesh file is truncated, inconsistent, or points outside of its folder.
 
     Args:
-        path: a .ply, .stl, .glb or .gltf that exists; files of other kinds aren't looked into.
+        path: a .ply, .stl, .obj, .glb or .gltf that exists; files of other kinds aren't looked into.
+        also_from: further folders in which files that it names may lie.
+        remedy: what is said to be done where it names one that lies elsewhere.
 
     Raises:
         InputError: it is damaged, or its address of a part leaves its folder or names no regular file.
     """
-    look: dict[str, Callable[[Path], None]] = {
-        ".ply": _check_ply, ".stl": _check_stl, ".glb": _check_glb, ".gltf": _check_gltf,
+    reach = _Reach(path, (path.parent, *also_from), remedy)
+    look: dict[str, Callable[[Path, _Reach], None]] = {
+        ".ply": _check_ply, ".stl": _check_stl, ".glb": _check_glb, ".gltf": _check_gltf, ".obj": _check_obj,
     }  # fmt: skip
     try:
-        look.get(path.suffix.lower(), lambda _: None)(path)
+        look.get(path.suffix.lower(), lambda *_: None)(path, reach)
     except RecursionError:
         raise InputError(str(path), None, "is damaged (it is nested too deeply)") from None
     except _FAULTS as problem:
         raise InputError(str(path), None, f"is damaged ({problem})") from None
 
 
+def refuse_outside(path: Path, address: str, folders: Sequence[Path], remedy: str) -> None:
+    """Raise `InputError` if something is at an address that a file names, and lies in none of some folders.
+
+    Args:
+        path: the file; relative addresses count from its folder.
+        address: as it stands in the file.
+        folders: from which may be read, links resolved.
+        remedy: what is said to be done.
+    """
+    if not file_in_one_of(folders, address, path.parent):
+        shown = address if len(address) < _SHOWN else f"{address[:_SHOWN]}..."
+        raise InputError(str(path), shown, f"{STAY}: {remedy}")
+
+
+@dataclass(frozen=True)
+class _Reach:
+    """Reach of a file's addresses: it, the folders that they may lead to, and what is to be done about others."""
+
+    path: Path
+    folders: tuple[Path, ...]
+    remedy: str
+
+    def refuse(self, address: str, beside: Path | None = None) -> None:
+        refuse_outside(beside or self.path, address, self.folders, self.remedy)
+
+
 # --- STL ------------------------------------------------------------------------------------------------------------
 
 
-def _check_stl(path: Path) -> None:
+def _check_stl(path: Path, _: _Reach) -> None:
     """Raise ValueError if a binary STL is shorter than its triangles take: 84 bytes and 50 for each."""
     size = path.stat().st_size
     with path.open("rb") as file:
@@ -76,9 +120,9 @@ def _check_stl(path: Path) -> None:
 # --- PLY ------------------------------------------------------------------------------------------------------------
 
 
-def _check_ply(path: Path) -> None:
+def _check_ply(path: Path, _: _Reach) -> None:
     with path.open("rb") as file:
-        kind, elements = _ply_header(file)
+        kind, elements = read_ply_header(file)
         rows = _ply_text(file, elements) if kind == "ascii" else _ply_bytes(path, file, kind, elements)
         vertices = next((count for name, count, _ in elements if name == "vertex"), 0)
         for numbers in rows:
@@ -86,7 +130,7 @@ def _check_ply(path: Path) -> None:
                 raise ValueError(f"a face names a vertex that is none of its {vertices:,}")
 
 
-def _ply_header(file: BinaryIO) -> tuple[str, list[tuple[str, int, list[_Property]]]]:
+def read_ply_header(file: BinaryIO) -> tuple[str, list[tuple[str, int, list[_Property]]]]:
     """Read a PLY's header; return its format, and name, number and properties of each element."""
     kind, elements = "", list[tuple[str, int, list[_Property]]]()
     while (line := file.readline(_LONGEST_HEADER).decode("ascii", errors="replace")) and file.tell() < _LONGEST_HEADER:
@@ -166,10 +210,57 @@ def _ply_lists(data: UInt8, at: int, count: int, properties: list[_Property]) ->
         yield rows["values"][:same], at
 
 
+# --- OBJ ------------------------------------------------------------------------------------------------------------
+
+
+def material_libraries(path: Path) -> Iterator[str]:
+    """Yield the names of an .obj's material libraries, of the whole file, which may be large."""
+    with path.open("rb") as file:
+        rest = b"\n"
+        while block := file.read(_BLOCK):
+            text, _, rest = (rest + block).rpartition(b"\n")
+            yield from _libraries_in(text)
+            rest = b"\n" + rest
+        yield from _libraries_in(rest)
+
+
+def _libraries_in(text: bytes) -> Iterator[str]:
+    """Yield the names of material libraries in whole lines of an .obj, each with the line's end before it."""
+    for found in _LIBRARY.finditer(text):
+        line = text[found.end() : found.end() + _LONGEST_LINE].split(b"\n", 1)[0]
+        yield line.decode("utf-8", errors="replace").strip().strip('"')
+
+
+def _check_obj(path: Path, reach: _Reach) -> None:
+    """Raise `InputError` if a material library of an .obj, or a picture that one names, is there and lies elsewhere."""
+    for name in dict.fromkeys((path.with_suffix(".mtl").name, *material_libraries(path))):
+        reach.refuse(name)
+        library = path.parent / name.replace("\\", "/")
+        if not library.is_file():
+            continue
+        for line in library.read_text(encoding="utf-8", errors="replace").splitlines():
+            statement, _, rest = line.strip().partition(" ")
+            if statement.lower().startswith(_PICTURES):
+                for address in _addresses(rest):
+                    reach.refuse(address, library)
+
+
+def _addresses(rest: str) -> Iterator[str]:
+    """Yield what may be the address in a material's line about a picture: all of it, and it without its options."""
+    words = rest.split()
+    yield rest.strip().strip('"')
+    while words and words[0].startswith("-"):
+        count = _OPTIONS.get(words[0].lower(), 1)
+        words = words[1:]
+        while words[1:] and count and (count < _MANY or _NUMBER.fullmatch(words[0])):
+            words, count = words[1:], count - 1
+        yield " ".join(words).strip('"')
+
+
 # --- glTF -----------------------------------------------------------------------------------------------------------
 
 
-def _check_glb(path: Path) -> None:
+def _check_glb(path: Path, reach: _Reach) -> None:
     size = path.stat().st_size
     with path.open("rb") as file:
         magic, _, length, chunk, kind = struct.unpack("<5I", file.read(20))
@@ -178,33 +269,33 @@ def _check_glb(path: Path) -> None:
         if length > size or chunk > size - 20:
             raise ValueError(f"{size:,} bytes are left of {length:,}")
         text = file.read(chunk)
-    _check_content(path, json.loads(text), max(0, size - 20 - chunk - 8))
+    _check_content(reach, json.loads(text), max(0, size - 20 - chunk - 8))
 
 
-def _check_gltf(path: Path) -> None:
-    _check_content(path, json.loads(path.read_bytes()), 0)
+def _check_gltf(path: Path, reach: _Reach) -> None:
+    _check_content(reach, json.loads(path.read_bytes()), 0)
 
 
-def _check_content(path: Path, content: dict[str, Any], binary: int) -> None:
+def _check_content(reach: _Reach, content: dict[str, Any], binary: int) -> None:
     """Raise an error if a glTF's buffers, images, views, accessors or nodes can't be read.
 
     Args:
-        path: the file.
+        reach: of the file.
         content: what its JSON holds.
         binary: bytes of the file's own buffer.
     """
     for number, buffer in enumerate(content.get("buffers", [])):
-        there = _part_size(path, buffer["uri"]) if "uri" in buffer else binary if number == 0 else None
+        there = _part_size(reach, buffer["uri"]) if "uri" in buffer else binary if number == 0 else None
         if there is not None and buffer["byteLength"] > there:
             raise ValueError(f"its buffer has {there:,} bytes of {buffer['byteLength']:,}")
     for image in content.get("images", []):
         if "uri" in image:
-            _part_size(path, image["uri"], optional=True)
+            _part_size(reach, image["uri"], optional=True)
     _check_views(content)
     _check_nodes(content.get("nodes", []))
 
 
-def _part_size(path: Path, address: str, optional: bool = False) -> int:
+def _part_size(reach: _Reach, address: str, optional: bool = False) -> int:
     """Return the size, bytes, of a glTF's data URI or of the file that it names; 0 if missing and optional.
 
     Raises:
@@ -214,14 +305,14 @@ def _part_size(path: Path, address: str, optional: bool = False) -> int:
         return 3 * len(address.partition(",")[2]) // 4
     shown = address if len(address) < _SHOWN else f"{address[:_SHOWN]}..."
     name = unquote(address).replace("\\", "/")
-    folder = path.parent.resolve()
-    place = Path(os.path.realpath(folder / name))
-    if _SCHEME.match(name) or not place.is_relative_to(folder):
-        raise InputError(str(path), shown, "an address in a glTF must stay in the file's folder")
+    folders = [Path(os.path.realpath(folder)) for folder in reach.folders]
+    place = Path(os.path.realpath(folders[0] / name))
+    if _SCHEME.match(name) or name.startswith("//") or not any(place.is_relative_to(folder) for folder in folders):
+        raise InputError(str(reach.path), shown, f"{STAY}: {reach.remedy}")
     if not place.exists() and optional:
         return 0
     if not place.is_file():
-        raise InputError(str(path), shown, "a regular file is needed at this address")
+        raise InputError(str(reach.path), shown, "a regular file is needed at this address")
     return place.stat().st_size
 
 

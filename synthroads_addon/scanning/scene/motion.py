@@ -62,11 +62,13 @@ class ScannedScene:
         static: what stands, in the local frame.
         moving: what moves; at the time 0 it is where the scene shows it.
         unmatched: patterns of the class mapping that nothing in the scene matched, e.g. ``materials: Lack*``.
+        warnings: what isn't scanned as the scene declares it, and what was assumed, as sentences.
     """
 
     static: SceneMesh
     moving: tuple[MovingMesh, ...] = ()
     unmatched: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 class LinearMotion:

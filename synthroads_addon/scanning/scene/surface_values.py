@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -24,6 +25,10 @@ class SurfaceInput(NamedTuple):
 
     kind: str
     name: str = ""
+
+
+POSITION, ALONG = SurfaceInput("position"), SurfaceInput("along")
+"""The place itself, m; and n . d of the face's normal and the ray that meets it."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +83,11 @@ class SurfaceValues:
     parts: tuple[PartValues, ...] = ()
     kept: AnyArray | None = None
 
+    @cached_property
+    def _firsts(self) -> AnyArray:
+        """Return the first triangle (P,) of each part; cached."""
+        return np.array([part.first for part in self.parts], np.int64)
+
     def read(
         self, what: SurfaceInput, faces: Index, shares: Float, place: Float, normal: Float
     ) -> tuple[Float32, Bool]:
@@ -91,8 +101,11 @@ class SurfaceValues:
         """
         result, found = np.zeros((len(faces), 4), np.float32), np.zeros(len(faces), bool)
         number = faces if self.kept is None else np.take(self.kept, faces).astype(np.intp)
-        for part in self.parts:
-            mine = np.flatnonzero((number >= part.first) & (number < part.first + len(part.corners) * part.uses))
+        # Meshes may be many: only those are looked at that the triangles are of.
+        owner = np.searchsorted(self._firsts, number, side="right") - 1
+        for at in np.unique(owner[owner >= 0]).tolist():
+            part = self.parts[at]
+            mine = np.flatnonzero((owner == at) & (number < part.first + len(part.corners) * part.uses))
             if not len(mine):
                 continue
             use, triangle = np.divmod(number[mine] - part.first, len(part.corners))

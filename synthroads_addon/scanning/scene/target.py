@@ -259,6 +259,11 @@ class Target:
                 result[:, mine] = begin_rotation[0] @ _unrotate(rotation, vector[:, mine])
         return results
 
+    @property
+    def static_planes(self) -> Float:
+        """Return the planes (4, F) of the static mesh's faces, see `FacePlanes`."""
+        return self._parts[0].planes.planes
+
     def static_normals(self, faces: Index) -> Float:
         """Return the local unit normals (3, H) of faces of the static mesh, on the side that these are seen from."""
         return np.take(self._parts[0].planes.planes[:3], faces, axis=1)
@@ -313,9 +318,10 @@ def _cast(part: _TargetPart, origins: Float, directions: Float, maximum_range: f
     # A miss is worked out with some face and then forgotten: that is less work than to sort them out before.
     distance, along = part.planes.intersect(face, origins, directions)
     missed = face < 0
-    edge_on = not along.all()  # in the face's plane, or a face without area
+    finite = np.isfinite(distance)
+    edge_on = not finite.all()  # in the face's plane, or a face without area
     if edge_on:
-        missed |= ~np.isfinite(distance)
+        missed |= ~finite
     np.copyto(distance, np.inf, where=missed)
     face += part.first
     if part.first or edge_on:

@@ -12,12 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.schema import compact_json
-from ..faces import Faces, Float, Int, drop_collapsed
+from ..faces import Faces, Float, Int, drop_collapsed, drop_polygons, polygon_areas
 from ..trace import Trace
 
 SCALE = 1e-4
 """Step of the vertices' whole numbers, m: rounding moves a vertex by 0.05 mm at most along each axis."""
 
+SLIVER = 1e-6
+"""Area, m2, below which a polygon of a surface is left out; those of bodies stay, which would be open without."""
 _LINE = 20_000  # polygons and vertices turned into text at a time
 
 GeometryType = Literal[
@@ -149,27 +151,41 @@ class CityModel:
         self._vertices = []
         same = _first_equal(raw)
         used = np.zeros(len(raw), dtype=bool)
-        for shell, closed in self._shells():
+        for shell, closed, solid in self._shells():
             corners = same[shell.corners]
             if closed:
                 shell.corners, shell.sizes, shell.kept = drop_collapsed(corners, shell.sizes)
+                if not solid:
+                    _drop_slivers(shell, raw)
             else:
                 shell.corners, shell.kept = corners, np.ones(len(shell.sizes), dtype=bool)
             used[shell.corners] = True
         number = np.cumsum(used) - 1
-        for shell, _ in self._shells():
+        for shell, _, _ in self._shells():
             shell.corners = number[shell.corners]
         return raw[used]
 
-    def _shells(self) -> Iterator[tuple[_Shell, bool]]:
-        """Yield every shell with whether its corners are closed rings of polygons, not points or lines."""
+    def _shells(self) -> Iterator[tuple[_Shell, bool, bool]]:
+        """Yield every shell with whether its corners are rings of polygons, not points or lines, and bound a body."""
         for item, shapes in self._objects:
             for shape, shells in zip(item.geometry, shapes, strict=True):
-                yield from ((shell, "Surface" in shape.type or "Solid" in shape.type) for shell in shells)
+                solid = "Solid" in shape.type
+                yield from ((shell, "Surface" in shape.type or solid, solid) for shell in shells)
 
     def _extent(self, vertices: Int) -> list[float]:
         ends = [vertices.min(axis=0), vertices.max(axis=0)] if len(vertices) else [np.zeros(3), np.zeros(3)]
         return [round(float(v) * SCALE + t, 4) for end in ends for v, t in zip(end, self.translate, strict=True)]
+
+
+def _drop_slivers(shell: _Shell, vertices: Int) -> None:
+    """Drop a surface's polygons smaller than `SLIVER`, in place: no reader can tell which way they look."""
+    areas = polygon_areas(vertices * SCALE, shell.corners, shell.sizes)
+    large = areas >= SLIVER
+    if not large.all():
+        shell.corners, shell.sizes = drop_polygons(shell.corners, shell.sizes, large)
+        kept = shell.kept.copy()
+        kept[shell.kept] = large
+        shell.kept = kept
 
 
 def _first_equal(vertices: Int) -> Int:

@@ -12,12 +12,12 @@ from ...road.geometry import RoadGeometry
 from ...road.surroundings import Landscape, Terrain, Vegetation
 from ...road.vegetation.species import PlantShape
 from ..attributes import attributes_of
-from ..faces import Faces, Float, loft
+from ..faces import Faces, Float, loft, upward_triangles
 from ..ground import GroundMesh, swales, triangulate_ground
 from ..plants import PlacedPlant, grass_strips, placed_plants
 from ..trace import NO_LAND
 from ..vehicles import placed_vehicles
-from .model import CityGeometry, CityModel, CityObject, solid_geometry
+from .model import SCALE, CityGeometry, CityModel, CityObject, solid_geometry
 
 _GROUND, _PLANTS, _BOXES = "2", "2", "1"
 """Levels of detail: surfaces, plants as trunk and crown, boxes around vehicles."""
@@ -47,7 +47,10 @@ def add_surroundings(model: CityModel, geometry: RoadGeometry, stations: Float, 
 
 def _terrain(name: str, terrain: Terrain, ground: GroundMesh) -> CityObject:
     attributes = attributes_of(terrain) | {"class": terrain.points_class, "deviation": round(ground.deviation, 4)}
-    shapes = (CityGeometry("CompositeSurface", _GROUND, (faces,)) for faces in ground.faces if len(faces))
+    # Once more after the vertices were rounded, by which the thinnest triangles turn over.
+    rounded = ((np.rint(faces.points / SCALE) * SCALE, faces.corners.reshape(-1, 3)) for faces in ground.faces)
+    upward = (upward_triangles(points, corners) for points, corners in rounded)
+    shapes = (CityGeometry("CompositeSurface", _GROUND, (faces,)) for faces in upward if len(faces))
     return CityObject(name, "TINRelief", attributes, tuple(shapes))
 
 

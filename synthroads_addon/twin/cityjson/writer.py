@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ...base.maps.crs import EPSG_URI
 from ...road.geometry import RoadGeometry
 from ...road.parameters import RoadParameters
 from ..attributes import attributes_of
@@ -41,7 +42,9 @@ def write_cityjson(parameters: RoadParameters, path: Path, tolerance: float) -> 
         model.add(item)
     add_surroundings(model, geometry, stations, tolerance)
     about = parameters.metadata
-    metadata = {"identifier": about.identifier, "referenceSystem": about.referenceSystem}
+    metadata = {"identifier": about.identifier, "referenceSystem": EPSG_URI.format(about.code)}
+    if about.heightReferenceSystem:
+        metadata["heightReferenceSystem"] = about.heightReferenceSystem
     if about.title:
         metadata["title"] = about.title
     model.write(path, metadata)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.errors import InputError
+from ...base.errors import InputError, MissingPackageError
 from ...base.schema import Model, canonical_json, unit_of
 from ...materials.table import UNKNOWN, materials
 from ..trace import Trace
@@ -40,7 +40,7 @@ def import_ifcopenshell() -> Any:
         import ifcopenshell
         import ifcopenshell.guid
     except ImportError:
-        raise InputError("format", "ifc", "needs ifcopenshell: pip install 'synthroads[twin]'") from None
+        raise MissingPackageError("twin", "ifc", "ifcopenshell", "twin") from None
     return ifcopenshell
 
 

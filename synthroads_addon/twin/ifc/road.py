@@ -6,13 +6,15 @@ of one IfcCourse per strip, which its part refers to; verge and median are IfcEa
 IfcSurfaceFeatures that adhere to their carriageway's pavement, not contained in any part.
 """
 
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...base.progress import Progress
 from ...road.damage import damage_columns, damage_depth, damaged_strips
 from ...road.geometry import SurfaceStrip
 from ...road.guidelines import LIMITS
@@ -38,7 +40,7 @@ from ...road.turnout_geometry import TURNOUT_STRIPS, TurnoutShape
 from ..faces import Faces, join_faces
 from ..surfaces import damaged_surface, dash_surfaces, joint_surface, painted_surface
 from .entities import Entity, Float, IfcFile, rounded
-from .scene import Scene, grid_triangles
+from .scene import STAGE, Scene, grid_triangles
 
 _NARROWEST = 1e-4
 """A strip that is nowhere wider (m) isn't there."""
@@ -77,13 +79,15 @@ def write_road(ifc: IfcFile, parameters: RoadParameters, site: Entity) -> Entity
     return road
 
 
-def write_carriageways(scene: Scene) -> None:
+def write_carriageways(scene: Scene, progress: Progress) -> None:
     """Add roadsides, carriageways with pavement and damage, and the median; fill in `scene.parts`."""
     for side in _SIDES:
         # With a slash, as no object's id has one.
         scene.parts[f"roadside-{side}"] = _part(scene, scene.road, f"road/roadside-{side}", "ROADSIDE")
-    for name, carriageway in scene.geometry.parameters.of_type(Carriageway).items():
+    carriageways = scene.geometry.parameters.of_type(Carriageway)
+    for number, (name, carriageway) in enumerate(carriageways.items(), 1):
         _CarriagewayWriter(scene, name, carriageway).write()
+        progress(STAGE, number / len(carriageways))
     _write_median(scene)
 
 
@@ -128,6 +132,8 @@ class _CarriagewayWriter:
         self.scene, self.ifc, self.name, self.carriageway = scene, scene.ifc, name, carriageway
         self.section = scene.geometry.sections[carriageway.side]
         self._damaged_strips = set(damaged_strips(self.section))
+        self._damages: list[Rut | Pothole] = [*carriageway.pavement.ruts, *carriageway.pavement.potholes]
+        self._bare = _with_damages(self.section, ())
         self.turnouts = {
             shape.turnout.instance: key
             for shape in self.section.turnouts
@@ -237,17 +243,20 @@ class _CarriagewayWriter:
 
     def _meshes(self, piece: _Piece, station: Float) -> Iterator[tuple[Float, NDArray[np.intp]]]:
         """Yield vertices (N, 3) and triangles (M, 3) of a strip's blocks, finer across where it is damaged."""
-        for first, last, damaged in self._blocks(piece, station):
-            section, rows = self.section, station[first : last + 1]
-            shares = np.array([0.0, 1.0])
-            if damaged:
-                section = _local_damage(section, rows[0], rows[-1])
+        for first, last, damages in self._blocks(piece, station):
+            shares, section = np.array([0.0, 1.0]), self.section
+            if damages:
+                section = _with_damages(section, damages)
                 shares = damage_columns(section, piece.index, self.scene.tolerance)
-            yield self._mesh(piece.index, rows, shares)
+            elif piece.index in self._damaged_strips:
+                section = self._bare
+            yield self._mesh(piece.index, station[first : last + 1], shares, section)
 
-    def _mesh(self, index: int, station: Float, shares: Float) -> tuple[Float, NDArray[np.intp]]:
+    def _mesh(
+        self, index: int, station: Float, shares: Float, section: CarriagewaySection
+    ) -> tuple[Float, NDArray[np.intp]]:
         """Return points (N, 3) and triangles (M, 3) of a strip at shares (K,) of its width, lowered by damage."""
-        geometry, section = self.scene.geometry, self.section
+        geometry = self.scene.geometry
         inner, outer = section.distances(station)[:, index : index + 2].T
         crossfall = geometry.crossfall(self.carriageway, station)
         low, high = section.elevations(station, crossfall)[:, index : index + 2].T
@@ -261,14 +270,22 @@ class _CarriagewayWriter:
         # On the left carriageway a row runs from right to left, on the right one from left to right.
         return points, grid_triangles(len(station), len(shares), flip=self.carriageway.sign < 0)
 
-    def _blocks(self, piece: _Piece, station: Float) -> Iterator[tuple[int, int, bool]]:
-        """Yield (first row, last row, whether damaged) of each stretch along which the same damage lies."""
-        ranges = _damage_ranges(self.section) if piece.index in self._damaged_strips else []
-        masks = [(station[1:] > low) & (station[:-1] < high) for low, high in ranges]
-        damage = np.array([np.zeros(len(station) - 1, dtype=bool), *masks])
-        borders = [0, *(np.flatnonzero(np.diff(damage, axis=1).any(axis=0)) + 1).tolist(), len(station) - 1]
-        for first, last in pairwise(borders):
-            yield first, last, bool(damage[:, first].any())
+    def _blocks(self, piece: _Piece, station: Float) -> Iterator[tuple[int, int, list[Rut | Pothole]]]:
+        """Yield (first row, last row, its ruts and potholes) of each stretch along which the same damage lies."""
+        damages = self._damages if piece.index in self._damaged_strips else []
+        ranges = np.array([_damage_range(damage) for damage in damages]).reshape(-1, 2)
+        # A damage lies in the cells from the first that ends behind its start to the last that begins before its end.
+        first = np.searchsorted(station[1:], ranges[:, 0], "right").tolist()
+        last = np.searchsorted(station[:-1], ranges[:, 1], "left").tolist()
+        begun, ended = defaultdict(list), defaultdict(list)
+        for number, (begin, end) in enumerate(zip(first, last, strict=True)):
+            if begin < end:
+                begun[begin].append(number)
+                ended[end].append(number)
+        here: set[int] = set()
+        for low, high in pairwise(sorted({0, len(station) - 1, *begun, *ended})):
+            here = (here - set(ended[low])) | set(begun[low])
+            yield low, high, [damages[number] for number in sorted(here)]
 
     def _write_damage(self) -> None:
         """Add a DEFECT for each damage; only patches and cracks get shapes: ruts and potholes are in the courses."""
@@ -333,22 +350,18 @@ def _range(shape: TurnoutShape, length: float) -> tuple[float, float]:
     return max(low, 0.0), min(high, length)
 
 
-def _damage_ranges(section: CarriagewaySection) -> list[tuple[float, float]]:
-    """Return (start, end) stations (m) of every pothole and rut of a carriageway."""
-    pavement = section.carriageway.pavement
-    holes = [(hole.station - hole.length / 2.0, hole.station + hole.length / 2.0) for hole in pavement.potholes]
-    return holes + [(rut.start_station, rut.end_station) for rut in pavement.ruts]
+def _damage_range(damage: Rut | Pothole) -> tuple[float, float]:
+    """Return the start and end stations (m) of a rut or pothole."""
+    if isinstance(damage, Rut):
+        return damage.start_station, damage.end_station
+    return damage.station - damage.length / 2.0, damage.station + damage.length / 2.0
 
 
-def _local_damage(section: CarriagewaySection, low: float, high: float) -> CarriagewaySection:
-    """Return a copy of a section with only the ruts and potholes between two stations (m)."""
-    carriageway, pavement = section.carriageway, section.carriageway.pavement
-    ruts = tuple(rut for rut in pavement.ruts if rut.start_station < high and rut.end_station > low)
-    middle, half = (low + high) / 2.0, (high - low) / 2.0
-    holes = tuple(h for h in pavement.potholes if abs(h.station - middle) < half + h.length / 2.0)
-    local = pavement.model_copy(update={"ruts": ruts, "potholes": holes})
-    turnouts = [shape.turnout for shape in section.turnouts]
-    return CarriagewaySection(carriageway.model_copy(update={"pavement": local}), turnouts)
+def _with_damages(section: CarriagewaySection, damages: Sequence[Rut | Pothole]) -> CarriagewaySection:
+    """Return a copy of a section with other ruts and potholes, on which its strips don't depend."""
+    ruts = tuple(damage for damage in damages if isinstance(damage, Rut))
+    holes = tuple(damage for damage in damages if isinstance(damage, Pothole))
+    return section.with_pavement(section.carriageway.pavement.model_copy(update={"ruts": ruts, "potholes": holes}))
 
 
 def _write_median(scene: Scene) -> None:
@@ -389,10 +402,12 @@ _MARKINGS: dict[type, str] = {LineMarking: "LINEMARKING", Hatching: "HATCHMARKIN
 """Class of a marking -> its predefined type."""
 
 
-def write_markings(scene: Scene) -> None:
+def write_markings(scene: Scene, progress: Progress) -> None:
     """Add every line, hatching and arrow as an IfcSurfaceFeature that adheres to its carriageway's pavement."""
-    for name, item in scene.geometry.parameters.objects.items():
+    objects = scene.geometry.parameters.objects
+    for number, (name, item) in enumerate(objects.items()):
         if isinstance(item, LineMarking | Hatching | Arrow):
+            progress(STAGE, number / len(objects))
             if isinstance(item, LineMarking):
                 _, faces, _ = dash_surfaces(scene.geometry, item, scene.stations)
             else:

@@ -13,6 +13,9 @@ from ..surfaces import surface_points
 from .alignment import Axis, linear_placement, local_placement
 from .entities import Entity, Float, IfcFile
 
+STAGE = "IFC"
+"""Name of the work for progress."""
+
 
 @dataclass(frozen=True)
 class IfcPlace:
@@ -91,7 +94,9 @@ class Scene:
 
     def rows(self, start: float, end: float) -> Float:
         """Return a range's ends (m) and the scene's sampling stations between them, sorted (N,)."""
-        inside = self.stations[(self.stations > start) & (self.stations < end)]
+        inside = self.stations[
+            np.searchsorted(self.stations, start, "right") : np.searchsorted(self.stations, end, "left")
+        ]
         return np.unique(np.concatenate([[start], inside, [end]]))
 
     def place(self, station: float, offset: float, above: float = 0.0) -> IfcPlace:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ...base.progress import Progress, part_of
 from ...road.surroundings import Landscape, Terrain, Vegetation
 from ...road.vegetation.species import PlantShape
 from ..faces import Faces, loft, triangulate
@@ -10,19 +11,22 @@ from ..plants import GrassStrip, PlacedPlant, grass_strips, placed_plants
 from ..trace import NO_LAND
 from ..vehicles import PlacedVehicle, placed_vehicles
 from .entities import Entity
-from .scene import Scene
+from .scene import STAGE, Scene
 from .solids import assign_bodies
 
 _MEASURES = ("height", "crownDiameter", "crownBottom", "trunkDiameter", "averageHeight")
 """Measures of plants, in metres."""
 
+_OF_GROUND = 0.3
+"""Share of the surroundings' time that the ground takes."""
 
-def write_surroundings(scene: Scene) -> None:
+
+def write_surroundings(scene: Scene, progress: Progress) -> None:
     """Add the terrain, its vegetation, the landscape's parameters and the vehicles at time 0 to the IFC file."""
     for name, item in scene.geometry.parameters.of_type(Terrain).items():
         ground = triangulate_ground(scene.geometry, item, scene.stations, scene.tolerance)
         _write_ground(scene, name, item, ground)
-        _write_plants(scene, ground)
+        _write_plants(scene, ground, part_of(progress, _OF_GROUND, 1.0))
     for name, landscape in scene.geometry.parameters.of_type(Landscape).items():
         scene.ifc.trace.record_loss(name, NO_LAND)
         scene.add_parameters(_geographic(scene, name, "USERDEFINED", None, "Landscape"), landscape)
@@ -68,7 +72,7 @@ def _write_swale(scene: Scene, name: str, item: Terrain, faces: Faces) -> None:
 # --- plants ---------------------------------------------------------------------------------------------------------
 
 
-def _write_plants(scene: Scene, ground: GroundMesh) -> None:
+def _write_plants(scene: Scene, ground: GroundMesh, progress: Progress) -> None:
     """Add every stand as an element that aggregates its plants or strips of grass."""
     stands = {}
     for name, item in scene.geometry.parameters.of_type(Vegetation).items():
@@ -77,7 +81,10 @@ def _write_plants(scene: Scene, ground: GroundMesh) -> None:
         grass = "grass is its strips, without its tufts"
         trees = "a plant is its trunk and its crown's outline, upright, without branches and leaves"
         scene.ifc.trace.record_loss(name, grass if item.kind == "grass" else trees)
-    for plant in placed_plants(scene.geometry):
+    numbers = scene.geometry.numbers.parts
+    count = sum(numbers[name].count for name in stands if name in numbers)
+    for number, plant in enumerate(placed_plants(scene.geometry)):
+        progress(STAGE, min(1.0, number / max(count, 1)))
         scene.ifc.trace.record_plant(plant)
         _write_plant(scene, plant, stands[plant.stand])
     for strip in grass_strips(scene.geometry, ground):

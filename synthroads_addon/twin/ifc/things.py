@@ -12,20 +12,23 @@ from typing import Any
 
 from ...base.arrays import Float
 from ...base.errors import InputError
+from ...base.progress import Progress
 from ...road.things.body import Body, rotate_z
 from ...road.things.thing import LengthwiseThing, StandingThing, Thing, TwinTypes
 from ..things import PlacedThing, placed_things
 from .entities import Entity, Values
-from .scene import IfcPlace, Scene
+from .scene import STAGE, IfcPlace, Scene
 from .solids import assign_bodies
 
 _SUBSTRUCTURE = ("IfcColumn", "IfcWall")
 """Elements that carry a bridge."""
 
 
-def write_things(scene: Scene) -> None:
+def write_things(scene: Scene, progress: Progress) -> None:
     """Add every thing on and beside the road to the IFC file, and record what is left out."""
-    for placed in placed_things(scene.geometry, scene.tolerance):
+    count = len(scene.geometry.parameters.of_type(Thing))
+    for number, placed in enumerate(placed_things(scene.geometry, scene.tolerance)):
+        progress(STAGE, number / count)
         _Writer(scene, placed).write()
         scene.ifc.trace.record_omissions(placed)
 

@@ -10,8 +10,8 @@ import re
 from pathlib import Path
 from typing import Literal
 
-from ...base.crs import wkt
 from ...base.errors import InputError
+from ...base.progress import Progress, part_of, silent
 from ...road.geometry import RoadGeometry
 from ...road.objects import PointObject
 from ...road.parameters import RoadParameters
@@ -20,7 +20,7 @@ from ..trace import LEVEL, Trace
 from .alignment import write_alignment
 from .entities import Entity, IfcFile
 from .road import write_carriageways, write_markings, write_road
-from .scene import Scene
+from .scene import STAGE, Scene
 from .surroundings import write_surroundings
 from .things import write_things
 
@@ -32,8 +32,16 @@ _SHORTEST_ELEMENT = 1e-6
 """Shortest element of an axis, m."""
 
 
+_SHARES = (0.15, 0.05, 0.25, 0.35)
+"""Of the time, what carriageways, markings, things and surroundings take; the file's own writing takes the rest."""
+
+
 def write_ifc(
-    parameters: RoadParameters, path: Path, tolerance: float = 0.005, placement: Literal["linear", "local"] = "linear"
+    parameters: RoadParameters,
+    path: Path,
+    tolerance: float = 0.005,
+    placement: Literal["linear", "local"] = "linear",
+    progress: Progress = silent,
 ) -> Trace:
     """Write a road as IFC 4.3, the same bytes for the same road; return the trace of what became of each object.
 
@@ -43,6 +51,7 @@ def write_ifc(
         tolerance: largest chord error of the road's surfaces, m; their vertices are exact.
         placement: what says where an object stands: a place along the alignment (``linear``), which few viewers read,
             or coordinates (``local``).
+        progress: is told how far it is.
 
     Raises:
         InputError: ifcopenshell isn't installed, the map coordinate system is unknown, the road is too long or too
@@ -70,10 +79,13 @@ def write_ifc(
         along_axis=placement == "linear",
     )
     scene.cache_surface((item.station, item.offset) for item in parameters.of_type(PointObject).values())
-    write_carriageways(scene)
-    write_markings(scene)
-    write_things(scene)
-    write_surroundings(scene)
+    done = 0.0
+    for share, write in zip(
+        _SHARES, (write_carriageways, write_markings, write_things, write_surroundings), strict=True
+    ):
+        write(scene, part_of(progress, done, done + share))
+        done += share
+        progress(STAGE, done)
     ifc.write_relations()
     ifc.write(path, parameters.metadata.identifier, parameters.metadata.generator)
     return ifc.trace
@@ -115,6 +127,8 @@ def write_project(ifc: IfcFile, parameters: RoadParameters) -> Entity:
         "referenceSystem": ifc.value(metadata.referenceSystem),
         "translate": ifc.value(parameters.transform.translate),
     }
+    if metadata.heightReferenceSystem:
+        about["heightReferenceSystem"] = ifc.value(metadata.heightReferenceSystem)
     ifc.add_properties(ifc.project, "SynthRoads", about)
     return site
 
@@ -140,12 +154,13 @@ def _georeference(ifc: IfcFile, parameters: RoadParameters, model: Entity, metre
 
     So the file's coordinates stay small, and the map's origin is kept in float64.
     """
-    text = wkt(parameters.metadata.epsg)
+    metadata = parameters.metadata
+    text = metadata.system.to_wkt()
     names = {key: _quoted_name(text, key) for key in ("DATUM", "VERT_DATUM", "PROJECTION")}
     title = re.search(r'"([^"]*)"', text)
     target = ifc.add(
         "IfcProjectedCRS",
-        Name=f"EPSG:{parameters.metadata.epsg}",
+        Name=f"EPSG:{metadata.code}",
         Description=title[1] if title else None,
         GeodeticDatum=names["DATUM"],
         VerticalDatum=names["VERT_DATUM"],

@@ -188,10 +188,15 @@ def _cubics(parent: Element, tag: str, function: Cubics) -> None:
         add_cubic(parent, tag, {"s": start}, coefficients)
 
 
-def header_bounds(geometry: RoadGeometry) -> dict[str, float]:
-    """Return the header's bounding box of the road: north, south, east, west in local coordinates, whole metres."""
+def edge_points(geometry: RoadGeometry) -> Float:
+    """Return local coordinates (N, 2), m, of points on both edges of the road, every 10 m."""
     stations = np.linspace(0.0, geometry.length, max(2, int(geometry.length / 10.0) + 2))
     edges = geometry.offsets(stations)
-    points = np.concatenate([geometry.alignment.place(stations, edges[:, i]) for i in (0, -1)])
+    return np.concatenate([geometry.alignment.place(stations, edges[:, i]) for i in (0, -1)])
+
+
+def header_bounds(geometry: RoadGeometry) -> dict[str, float]:
+    """Return the header's bounding box of the road: north, south, east, west in local coordinates, whole metres."""
+    points = edge_points(geometry)
     low, high = np.floor(points.min(axis=0)) - 1.0, np.ceil(points.max(axis=0)) + 1.0
     return {"north": float(high[1]), "south": float(low[1]), "east": float(high[0]), "west": float(low[0])}

@@ -9,7 +9,9 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from ...base.crs import wkt
+import numpy as np
+
+from ...base.maps.crs import wkt
 from ...road.geometry import RoadGeometry
 from ...road.instances import InstanceNumbers
 from ...road.parameters import AlignmentObject, RoadParameters
@@ -20,6 +22,7 @@ from ..things import placed_things, standing_things
 from ..trace import LEVEL, Trace
 from .entities import LOST, trace_elements
 from .lanes import write_lanes
+from .local_projection import LocalProjection
 from .marks import RoadMarks
 from .numbers import FreeIds
 from .objects import Objects
@@ -27,7 +30,7 @@ from .places import Ground
 from .sections import LanePlan
 from .signals import Face, signal_faces, write_signals
 from .speeds import ADVISORY, SpeedLimits
-from .surface import RoadFrame, elevation_profile, header_bounds, lateral_profile, plan_view
+from .surface import RoadFrame, edge_points, elevation_profile, header_bounds, lateral_profile, plan_view
 from .xml import Element, Value, add_cdata, add_user_data, element, write_xml
 
 REVISION = (1, 8)
@@ -35,24 +38,28 @@ _GROUND = 0.001
 """Largest distance (m) of barriers from the ground that they stand on, whatever the tolerance."""
 
 
-def write_opendrive(parameters: RoadParameters, path: Path, tolerance: float) -> Trace:
+def write_opendrive(parameters: RoadParameters, path: Path, tolerance: float, local_projection: bool = False) -> Trace:
     """Write a road as an OpenDRIVE 1.8 file; return the trace of what became of each object.
 
     Coordinates in it are local; the header's offset adds the map origin, and its ``geoReference`` names the map's
-    coordinate system. Each carriageway is a road of its own along the same line, with its own superelevation. Lanes,
-    line and surface don't depend on the tolerance.
+    coordinate system; or they are those of a projection about the map origin, without an offset. Each carriageway is a
+    road of its own along the same line, with its own superelevation. Lanes, line and surface don't depend on the
+    tolerance.
 
     Args:
         parameters: the road.
         path: the file.
         tolerance: largest chord error (m) of lines that follow no lane.
+        local_projection: whether coordinates are those of a `LocalProjection` about the map origin.
 
     Raises:
         InputError: an object stands beyond the road's end, or the coordinate system isn't known here.
     """
     geometry = RoadGeometry(parameters)
     root = element(None, "OpenDRIVE")
-    _header(root, geometry)
+    translate = np.array(parameters.transform.translate, dtype=np.float64)
+    local = LocalProjection.about(parameters.metadata.epsg, translate) if local_projection else None
+    _header(root, geometry, local)
     ground = Ground(geometry, min(tolerance, _GROUND))
     numbers = FreeIds(parameters)
     trace = Trace(geometry, within=("dash",), reasons=LOST)
@@ -67,6 +74,8 @@ def write_opendrive(parameters: RoadParameters, path: Path, tolerance: float) ->
         trace.record_entity(parameters.alignment.instance, element="planView", road=item.instance)
     trace_elements(root, trace)
     _list_unwritten(root, parameters)
+    if local:
+        local.turn_plan(root, edge_points(geometry))
     write_xml(root, path)
     for plant in plants:
         trace.record_plant(plant)
@@ -87,7 +96,7 @@ def _road(road: Element, objects: Objects, faces: list[Face], plants: list[Place
     geometry, limits = frame.geometry, SpeedLimits(frame.geometry, frame.side)
     kind = element(road, "type", {"s": 0.0, "type": "motorway", "country": "DE"})
     if limits.without == ADVISORY:
-        element(kind, "speed", {"max": "no limit"})
+        element(kind, "speed", {"max": "no limit", "unit": "km/h"})
     else:
         element(kind, "speed", {"max": limits.without, "unit": "km/h"})
     plan_view(road, geometry)
@@ -105,8 +114,14 @@ def _road(road: Element, objects: Objects, faces: list[Face], plants: list[Place
     add_user_data(road, "side", frame.side)
 
 
-def _header(root: Element, geometry: RoadGeometry) -> None:
-    """Add the `header` element, without a date so that the same road gives the same bytes."""
+def _header(root: Element, geometry: RoadGeometry, local: LocalProjection | None) -> None:
+    """Add the `header` element, without a date so that the same road gives the same bytes.
+
+    Args:
+        root: of the file.
+        geometry: the road.
+        local: projection that takes the place of the map's system and the offset; None for these.
+    """
     parameters = geometry.parameters
     metadata = parameters.metadata
     attributes: dict[str, Value] = {
@@ -116,10 +131,13 @@ def _header(root: Element, geometry: RoadGeometry) -> None:
         "version": "1",
     }
     header = element(root, "header", {**attributes, **header_bounds(geometry), "vendor": metadata.generator})
-    add_cdata(header, "geoReference", geo_reference(metadata.epsg))
-    x, y, z = parameters.transform.translate
-    element(header, "offset", {"x": float(x), "y": float(y), "z": float(z), "hdg": 0.0})
+    add_cdata(header, "geoReference", local.text if local else geo_reference(metadata.epsg))
+    if local is None:
+        x, y, z = parameters.transform.translate
+        element(header, "offset", {"x": float(x), "y": float(y), "z": float(z), "hdg": 0.0})
     add_user_data(header, "epsg", metadata.epsg)
+    if metadata.height_epsg is not None:
+        add_user_data(header, "height_epsg", metadata.height_epsg)
     add_user_data(header, "title", metadata.title)
     add_user_data(header, "level_of_detail", LEVEL)
 
@@ -141,7 +159,7 @@ def geo_reference(epsg: int) -> str:
     A datum other than WGS 84's or ETRS89's has no PROJ string that would say it exactly: WKT names it.
 
     Raises:
-        InputError: the code is unknown, or it isn't shipped and `pyproj` isn't installed.
+        InputError: the code is unknown.
     """
     text = wkt(epsg)
     number = dict(re.findall(r'PARAMETER\["(\w+)",([-0-9.]+)\]', text))

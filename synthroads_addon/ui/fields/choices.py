@@ -7,6 +7,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from ...base.errors import InputError
+from ...cloud.formats.registry import missing_package
 from ...road.guidelines import SECTIONS_OF_CLASS, STANDARD_CROSS_SECTIONS
 from ...scanning.devices.device import Device, load_device
 from ...scenario.road import RoadScenario
@@ -43,6 +44,11 @@ ITEMS: dict[str, Items] = {"fidelity": tuple(_fidelities()), "road.design_class"
 """Path of a choice and its items."""
 STANDARD_PARTS: dict[str, Items] = {"road.cross_section": tuple(_cross_sections())}
 """Path of a field that takes a standard part's name or a part by hand, and the standard parts."""
+
+
+def is_offered(path: str, name: str) -> bool:
+    """Return whether one of the values of the field at a path can be chosen here: not what has to be brought by pip."""
+    return path != "cloud.formats" or not missing_package(f".{name}")
 
 
 def device_of(name_or_file: str) -> Device | None:

@@ -23,7 +23,7 @@ from ...base.errors import InputError
 from ...base.schema import note_of, unit_of
 from ...road.things.limits import Interval
 from ...scenario.scenario import Scenario
-from .choices import ITEMS
+from .choices import ITEMS, is_offered
 from .inherited import SOURCES, Value
 from .numbers import clamp_32_bit, exact, is_share, list_as_text, number_property, numbers_in, push_along
 from .room import draw_flag, draw_text, fits, value_row, value_share
@@ -69,11 +69,6 @@ class Field:
         """Return the name of the checkbox property that says whether an optional field is given."""
         return f"own_{self.name}"
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Return the names of the Blender properties that hold the field's value."""
-        return (self.name,)
-
     def properties(self, hooks: Hooks) -> dict[str, Any]:
         """Return the field's Blender properties by name, for a property group's annotations."""
         raise NotImplementedError
@@ -85,6 +80,10 @@ class Field:
     def write(self, owner: Any, value: Any) -> None:
         """Set the properties of a property group to a value given as JSON data."""
         setattr(owner, self.name, value)
+
+    def state(self, owner: Any) -> Any:
+        """Return what a property group's properties show for this field as JSON data, valid or not."""
+        return getattr(owner, self.name)
 
     def classes(self) -> Iterator[type]:
         """Yield the property group classes to register before the group that holds this field."""
@@ -158,11 +157,6 @@ class OptionalField(Field):
         """Return the names of the value's properties, without the checkbox."""
         return (self.name,)
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Return the names of all its properties, with the checkbox if it is optional."""
-        return (self.checkbox_name, *self.values) if self.optional else self.values
-
     def read(self, owner: Any, base: Any) -> Any:
         """Return the value as JSON data, or None if the checkbox isn't ticked."""
         return None if self.optional and not getattr(owner, self.checkbox_name) else self.read_given(owner, base)
@@ -170,6 +164,14 @@ class OptionalField(Field):
     def read_given(self, owner: Any, base: Any) -> Any:
         """Return the value as JSON data without regard to the checkbox; see `Field.read`."""
         raise NotImplementedError
+
+    def state(self, owner: Any) -> Any:
+        """Return what the value's properties show, or False if the checkbox isn't ticked; see `Field.state`."""
+        return False if self.optional and not getattr(owner, self.checkbox_name) else self.given_state(owner)
+
+    def given_state(self, owner: Any) -> Any:
+        """Return what the value's properties show, without regard to the checkbox."""
+        return [getattr(owner, name) for name in self.values]
 
     def write(self, owner: Any, value: Any) -> None:
         """Set the properties of a property group to a value; None unticks the checkbox."""
@@ -372,15 +374,21 @@ class ChoicesField(Field):
             return base
         return [name for name in self.values if name in chosen]
 
+    def state(self, owner: Any) -> list[str]:
+        """Return the chosen values in order; see `Field.state`."""
+        return sorted(getattr(owner, self.name))
+
     def write(self, owner: Any, value: Any) -> None:
         """Select exactly the given values."""
         setattr(owner, self.name, set(value or ()))
 
     def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
-        """Draw a button for each value, below each other."""
+        """Draw a button for each value that is offered or chosen already, below each other."""
         column = value_row(layout, self.label).column(align=True)
+        chosen = getattr(owner, self.name)
         for name in self.values:
-            column.prop_enum(owner, self.name, name)
+            if name in chosen or is_offered(self.path, name):
+                column.prop_enum(owner, self.name, name)
 
 
 class TextField(Field):
@@ -484,6 +492,10 @@ class FilesField(Field):
         """Return the paths that aren't empty, with Blender's ``//`` resolved."""
         texts = [item.file for item in getattr(owner, self.name) if item.file]
         return [bpy.path.abspath(text) if text.startswith("//") else text for text in texts]
+
+    def state(self, owner: Any) -> list[str]:
+        """Return the paths as they are written; see `Field.state`."""
+        return [item.file for item in getattr(owner, self.name)]
 
     def write(self, owner: Any, value: Any) -> None:
         """Replace the list of files with the given paths."""

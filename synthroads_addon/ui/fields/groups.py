@@ -24,8 +24,6 @@ class GroupField(OptionalField):
         group: its class.
     """
 
-    values = ()
-
     def __init__(self, path: str, info: FieldInfo, kind: Any, optional: bool, default: Any, hooks: Hooks) -> None:
         super().__init__(path, info, kind, optional, default)
         self.fields = make_fields(kind, _defaults(kind) | (default or {}), path, hooks)
@@ -65,6 +63,10 @@ class GroupField(OptionalField):
         """Draw the checkbox, if it is optional, and the nested fields if they are given."""
         if not self.optional or self.draw_checkbox(layout, settings, owner):
             self.draw_fields(layout, settings)
+
+    def given_state(self, owner: Any) -> Any:
+        """Return the states of those of the nested fields that are declared; see `Field.state`."""
+        return shown_state(self.fields_of(self.model_in(owner)), getattr(owner, self.name))
 
     def draw_fields(self, layout: bpy.types.UILayout, settings: Any) -> None:
         """Draw those of the nested fields that have an effect."""
@@ -128,11 +130,6 @@ class NamedOrByHandField(Field):
         start = default if isinstance(default, dict) else _first_values(model)
         self.by_hand = GroupField(path + BY_HAND_ENDING, info, model, False, start, hooks)
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Return the names of the menu's and the group's properties."""
-        return (self.name, self.by_hand.name)
-
     def properties(self, hooks: Hooks) -> dict[str, Any]:
         """Return the menu property and the pointer to the nested group, by name."""
         items = [*self.items, (BY_HAND, "By Hand", "Widths of your own")]
@@ -150,6 +147,11 @@ class NamedOrByHandField(Field):
         setattr(owner, self.name, BY_HAND if isinstance(value, dict) else value)
         if isinstance(value, dict):
             self.by_hand.write(owner, value)
+
+    def state(self, owner: Any) -> Any:
+        """Return the menu's choice and, if that is By Hand, the states of the nested fields; see `Field.state`."""
+        chosen = getattr(owner, self.name)
+        return [chosen, self.by_hand.state(owner)] if chosen == BY_HAND else chosen
 
     def draw_row(self, layout: bpy.types.UILayout, settings: Any, owner: Any) -> None:
         """Draw the menu and, if By Hand is chosen, the nested fields."""
@@ -225,19 +227,8 @@ def write_fields(fields: Mapping[str, Field], owner: Any, data: Mapping[str, Any
 
 
 def shown_state(fields: Mapping[str, Field], owner: Any) -> list[Any]:
-    """Return the raw values of all properties in a group, valid or not, for fast comparison."""
-    result: list[Any] = []
-    for field in fields.values():
-        for name in field.names:
-            value = getattr(owner, name)
-            if isinstance(field, FilesField):
-                value = [item.file for item in value]
-            elif isinstance(value, bpy.types.PropertyGroup):
-                group = field.by_hand if isinstance(field, NamedOrByHandField) else field
-                assert isinstance(group, GroupField)
-                value = shown_state(group.fields, value)
-            result.append(sorted(value) if isinstance(value, set) else value)
-    return result
+    """Return the states of a group's fields as JSON data, valid or not, for fast comparison; see `Field.state`."""
+    return [field.state(owner) for field in fields.values()]
 
 
 def leaves(fields: Mapping[str, Field]) -> Iterator[Field]:

@@ -55,7 +55,7 @@ SHEETS = (
     PanelFields("pavement", "Pavement", "road", 3, "road.pavement.*"),
     PanelFields("markings", "Markings", "road", 4, "road.markings.*"),
     PanelFields("materials", "Materials", "road", 5, "road.materials.* materials_table road.textures"),
-    PanelFields("map", "Map", "road", 6, "title road.epsg road.map_origin"),
+    PanelFields("map", "Map", "road", 6, "title road.epsg road.height_epsg road.map_origin"),
     PanelFields(
         "objects",
         "Objects",
@@ -108,7 +108,7 @@ SHEETS = (
     PanelFields("noise", "Noise", "scanner", 5, "scan.noise.*"),
     PanelFields("motion", "Motion", "scanner", 5, "scan.motion.*"),
     PanelFields("strip_errors", "Strip Errors", "scanner", 5, "scan.strip_errors.*"),
-    PanelFields("performance", "Performance", "scanner", 6, "scan.caster scan.threads"),
+    PanelFields("performance", "Performance", "scanner", 6, "scan.caster scan.kernels scan.threads"),
     PanelFields("colour", "Colour", "main", 50, "colour.source colour.rgb colour.mode"),
     PanelFields("images", "Rendering", "colour", 1, "colour.*"),
     PanelFields("output", "Output", "main", 60, "outputs cloud.formats twin ifc"),

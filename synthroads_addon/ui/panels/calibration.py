@@ -5,7 +5,7 @@ The work is `calibration.job`'s, in a thread.
 Annotations are not postponed here: Blender reads the properties from them.
 """
 
-from typing import cast
+from typing import ClassVar, cast
 
 import bpy
 
@@ -14,12 +14,12 @@ from ...base.progress import exhaust
 from ...calibration.fit import FITTED
 from ...calibration.job import Calibration, CalibrationJob, ClassComparison, calibration_steps, save_fitted
 from ...calibration.plot import calibration_picture
-from ..fields.room import buttons_row, draw_text
+from ..fields.room import NAMES_SHARE, buttons_row, draw_text, fits
 from ..work.common import Sidebar, column, large_button, refusing
 from ..work.job import PanelJob
 from ..work.long_operator import LongOperator
 from ..work.pictures import ShowPicture, keep_picture
-from .calibration_settings import path_of, textured_materials
+from .calibration_settings import path_of, textured_materials, usual_classes
 
 PICTURE = "SynthRoads Calibration"
 """Name of the image that shows the result."""
@@ -42,6 +42,13 @@ def fitted_result() -> Calibration | None:
 class _CalibrationOperator(LongOperator):
     """Base of the two operators that calibrate: compare, and fit."""
 
+    option_labels: ClassVar = {
+        "--real": "Real Cloud",
+        "--incidence-deg": "Incidence",
+        "--range": "Ranges",
+        "--line": "Lines",
+        "--device": "Beam",
+    }
     fit = False
 
     @classmethod
@@ -117,9 +124,9 @@ class SYNTHROADS_OT_add_calibration_class(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Add a row to the list of materials: asphalt as the first, white paint after it."""
         settings = context.scene.synthroads_calibration
-        usual = (("asphalt", "road"), ("paint_white", "road_marking"))
         row = settings.classes.add()
-        row.material, row.told = usual[min(len(settings.classes), 2) - 1]
+        number = min(len(settings.classes), 2) - 1
+        row.material, row.told = ("asphalt", "paint_white")[number], usual_classes(settings)[number]
         settings.active = len(settings.classes) - 1
         return {"FINISHED"}
 
@@ -144,6 +151,7 @@ class SYNTHROADS_OT_show_calibration(ShowPicture, bpy.types.Operator):
     bl_idname = "synthroads.show_calibration"
     bl_label = "Show Diagrams"
     picture = PICTURE
+    no_picture = "Compare or fit materials first"
 
 
 class SYNTHROADS_PT_calibration(Sidebar, bpy.types.Panel):
@@ -193,7 +201,9 @@ def _draw_cloud(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -
         layout.prop(settings, name)
     for name in ("range_corrected", "decibels", "gain"):
         layout.prop(settings, name)
-    layout.row().prop(settings, "parts")
+    names = [item.name for item in settings.bl_rna.properties["parts"].enum_items]
+    side_by_side = all(fits(name, (1.0 - NAMES_SHARE) / len(names)) for name in names)
+    (layout.row() if side_by_side else layout.column()).prop(settings, "parts")
 
 
 def _draw_view(layout: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
@@ -228,11 +238,13 @@ def result_lines(entry: ClassComparison) -> list[str]:
     names = [f"{100 * share:g}" for share in FITTED]
     if entry.real is not None:
         lines.append(f"{data['points']:,} points, {data['zeros_left_out']:,} zeros left out")
-        lines.append("Real: " + ", ".join(f"{data['real'][name]:,.5g}" for name in names))
-    lines.append("Expected: " + ", ".join(f"{data['expected'][name]:,.5g}" for name in names))
+    lines.append(f"Percentiles {', '.join(names)}:")
+    if entry.real is not None:
+        lines.append("Real: " + "  ".join(f"{data['real'][name]:.5g}" for name in names))
+    lines.append("Expected: " + "  ".join(f"{data['expected'][name]:.5g}" for name in names))
     if entry.real is not None:
         errors = data["error_of_interquartile_range"]
-        lines.append("Error / IQR: " + ", ".join(f"{errors[name]:+.1%}" for name in names))
+        lines.append("Error / IQR: " + "  ".join(f"{errors[name]:+.0%}" for name in names))
     return lines
 
 

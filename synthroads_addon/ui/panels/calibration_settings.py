@@ -56,6 +56,23 @@ class SYNTHROADS_PG_calibration_class(bpy.types.PropertyGroup):
     )
 
 
+_USUAL = (("road", "road_marking"), ("paved", "line"))
+"""Classes of asphalt and paint in a cloud with classes, and beside an axis."""
+
+
+def usual_classes(settings: Any) -> tuple[str, str]:
+    """Return the usual classes of asphalt and paint in the settings' real cloud."""
+    return _USUAL[bool(settings.axis)]
+
+
+def _follow_axis(settings: Any, context: bpy.types.Context) -> None:
+    """Give materials that have a usual class the one that is meant with the axis, or without; others stay."""
+    before, now = _USUAL[not settings.axis], usual_classes(settings)
+    for row in settings.classes:
+        if row.told in before:
+            row.told = now[before.index(row.told)]
+
+
 class SYNTHROADS_PG_calibration(bpy.types.PropertyGroup):
     """Settings of the calibration panel."""
 
@@ -66,7 +83,10 @@ class SYNTHROADS_PG_calibration(bpy.types.PropertyGroup):
         name="Class Field", description="Extra attribute of the cloud that holds the classes, if it isn't the usual one"
     )
     axis: bpy.props.StringProperty(
-        name="Axis", subtype="FILE_PATH", description="Tells pavement and markings apart in a cloud without classes"
+        name="Axis",
+        subtype="FILE_PATH",
+        description="Tells pavement and markings apart in a cloud without classes",
+        update=_follow_axis,
     )
     paved: bpy.props.StringProperty(
         name="Paved", default="-7 -1; 1 7", description="Offsets from the axis between which there is pavement, m"

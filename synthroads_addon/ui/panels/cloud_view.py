@@ -18,15 +18,17 @@ from ...blender.model.roads import scene_origin
 from ...blender.model.store import find_road
 from ...blender.views.cloud import CloudView
 from ...blender.views.cloud_object import add_cloud_object, cloud_objects, color_cloud_object
-from ...cloud.formats.registry import ENDINGS
+from ...cloud.formats.registry import ENDINGS, installed_endings
 from ...cloud.tools.display import COLOURINGS, ColourBy, DisplayCloud, height_colors, read_display
 from ..fields.room import draw_text, is_narrow
-from ..work.common import Sidebar, column, right_label
+from ..work.common import Sidebar, column, is_free, right_label
 from ..work.job import PanelJob, Report
 from ..work.long_operator import LongOperator, draw_job
 from ..work.view import frame_points, redraw_views, view_of
 
-ENDINGS_GLOB = ";".join(f"*{ending}" for ending in ENDINGS)
+AVAILABLE = installed_endings()
+"""Endings of clouds that are offered: those that can be read and written here."""
+ENDINGS_GLOB = ";".join(f"*{ending}" for ending in AVAILABLE)
 _FAR = 20_000.0
 """A cloud farther than this (m) from the road's origin and beyond the road's length is likely to be of elsewhere."""
 _LABELS: dict[ColourBy, tuple[str, str]] = {
@@ -49,6 +51,13 @@ def last_cloud(context: bpy.types.Context) -> Path | None:
         return None
     paths = [settings.folder() / f"cloud{ending}" for ending in ENDINGS]
     return next((path for path in paths if path.is_file()), None)
+
+
+def _is_shown(operator: type[bpy.types.Operator]) -> bool:
+    """Return whether a cloud is shown, for an operator's `poll`; else set its tooltip to the reason."""
+    if view.cloud is None:
+        operator.poll_message_set("Show a cloud first")
+    return view.cloud is not None
 
 
 def cloud_path(context: bpy.types.Context, given: str) -> Path:
@@ -84,7 +93,7 @@ class SYNTHROADS_PG_cloud_view(bpy.types.PropertyGroup):
 
     file: bpy.props.StringProperty(
         name="File",
-        description="Cloud to show (LAZ, LAS, PLY, E57, NPZ); the last scan's if empty",
+        description=f"Cloud to show ({', '.join(AVAILABLE)}); the last scan's if empty",
         subtype="FILE_PATH",
     )
     points: bpy.props.IntProperty(
@@ -158,7 +167,7 @@ class SYNTHROADS_OT_hide_cloud(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether a cloud is shown."""
-        return view.cloud is not None
+        return _is_shown(cls)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Remove the shown cloud and redraw the views."""
@@ -181,7 +190,7 @@ class SYNTHROADS_OT_add_cloud(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether a cloud is shown and Blender is in object mode."""
-        return view.cloud is not None and context.mode == "OBJECT"
+        return _is_shown(cls) and is_free(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Add the cloud as an object, and hide the overlay, so that each point is seen once."""
@@ -201,7 +210,12 @@ class SYNTHROADS_OT_frame_cloud(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether a cloud is shown and there is a 3D view."""
-        return view.cloud is not None and view_of(context) is not None
+        if not _is_shown(cls):
+            return False
+        if view_of(context) is None:
+            cls.poll_message_set("There is no 3D view")
+            return False
+        return True
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Frame the cloud's points in the 3D view."""

@@ -142,7 +142,7 @@ class SYNTHROADS_OT_show_plants(bpy.types.Operator):
         plants = plants_of(context.scene)
         hide = any(not item.hide_viewport for item in plants)
         for item in plants:
-            item.hide_viewport = hide  # what is only hidden by `hide_set` is still evaluated
+            item.hide_viewport = item.hide_render = hide  # what is only hidden by `hide_set` is still evaluated
         return {"FINISHED"}
 
 

@@ -15,7 +15,6 @@ import bpy
 
 from ...base.errors import InputError
 from ...base.files import output_folder
-from ...cloud.formats.registry import ENDINGS
 from ...cloud.formats.registry import missing_package as cloud_package
 from ...cloud.tools.convert import convert, subsample
 from ...cloud.tools.display import BLOCK
@@ -32,16 +31,15 @@ from ...twin.formats import (
 )
 from ..fields.numbers import exact
 from ..fields.room import draw_text
+from ..work import common
 from ..work.common import Sidebar, column, has_road, is_free, refusing
 from ..work.job import PanelJob, Report
 from ..work.long_operator import FileChooser, FileOperator, draw_job
-from .cloud_view import ENDINGS_GLOB, cloud_path, last_cloud
+from .cloud_view import AVAILABLE, ENDINGS_GLOB, cloud_path, last_cloud
 from .road_choice import draw_road_name
 from .rules import edited_parameters
 
 IFC_PACKAGE = "ifcopenshell"
-RUNS_AS_EXTENSION = str(__package__).startswith("bl_ext.")
-"""Whether Blender has installed this as an extension, which brings its packages with it."""
 _REPOSITORY = "user_default"
 """Blender's name of where extensions from files go."""
 _FORMATS = {
@@ -70,15 +68,15 @@ def export_twin(
     formats: Sequence[str],
     tolerance: float,
     ifc: IfcSettings,
+    local_projection: bool,
     overwrite: bool,
     report: Report,
 ) -> tuple[str, ...]:
     """Write a road's geometric-semantic model into a folder, all formats or none; return the names of the files."""
     names = twin_file_names(formats)
     with output_folder(folder, names, overwrite) as temporary:
-        for number, name in enumerate(formats, 1):
-            write_twin(parameters, temporary, [name], tolerance, ifc)
-            report(number / len(formats))
+        write_twin(parameters, temporary, formats, tolerance, ifc, local_projection, lambda _, share: report(share))
+        report(1.0)  # the last chance to stop
     return names
 
 
@@ -96,7 +94,7 @@ class SYNTHROADS_OT_export_cloud(FileOperator, bpy.types.Operator):
         name="Cloud", description="Cloud to read; the last scan's if empty", options={"SKIP_SAVE"}
     )
     format: bpy.props.EnumProperty(
-        name="Format", items=[(ending, *_FORMATS[ending]) for ending in ENDINGS], description="Kind of file"
+        name="Format", items=[(ending, *_FORMATS[ending]) for ending in AVAILABLE], description="Kind of file"
     )
     classes: bpy.props.EnumProperty(
         name="Classes",
@@ -138,7 +136,7 @@ class SYNTHROADS_OT_export_cloud(FileOperator, bpy.types.Operator):
 
     def job(self, context: bpy.types.Context) -> PanelJob[dict[str, Any]]:
         """Return the export as a job in a thread; an existing file is replaced."""
-        source, output = cloud_path(context, self.source), Path(bpy.path.abspath(self.filepath))
+        source, output = cloud_path(context, self.source), self.chosen_file()
         classes = None if self.classes == "own" else self.classes
         work = partial(export_cloud, source, output, classes, exact(self.spacing, None))
         return PanelJob.aside("Export", work, "Exporting")
@@ -185,6 +183,10 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
         ],
         description="What says in IFC where an object stands",
     )
+    local_projection: bpy.props.BoolProperty(
+        name="Local Projection",
+        description="OpenDRIVE in a projection about the site without an offset, for readers of lat_0 and lon_0 alone",
+    )
     overwrite: bpy.props.BoolProperty(name="Replace Files", description="Replace files that are already there")
 
     @classmethod
@@ -211,6 +213,9 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
         row = layout.row()
         row.enabled = "ifc" in self.formats
         row.prop(self, "ifc_placement")
+        row = layout.row()
+        row.enabled = "opendrive" in self.formats
+        row.prop(self, "local_projection")
         layout.prop(self, "overwrite")
 
     def job(self, context: bpy.types.Context) -> PanelJob[tuple[str, ...]]:
@@ -225,7 +230,7 @@ class SYNTHROADS_OT_export_twin(FileOperator, bpy.types.Operator):
         check_formats(formats)
         folder, tolerance = Path(bpy.path.abspath(self.directory)), exact(self.tolerance, None)
         ifc = IfcSettings(placement=self.ifc_placement)
-        work = partial(export_twin, parameters, folder, formats, tolerance, ifc, self.overwrite)
+        work = partial(export_twin, parameters, folder, formats, tolerance, ifc, self.local_projection, self.overwrite)
         return PanelJob.aside("Export", work, "Exporting")
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[tuple[str, ...]]) -> str:
@@ -246,7 +251,7 @@ class SYNTHROADS_OT_install_ifc(FileChooser, bpy.types.Operator):
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
         """Install and enable the chosen extension zip, and check that IFC can then be written."""
-        path = Path(bpy.path.abspath(self.filepath))
+        path = self.chosen_file()
         if not path.name.startswith("synthroads_ifc") or not path.is_file():
             raise InputError("File", str(path), "choose the zip of SynthRoads IFC: synthroads_ifc-….zip")
         install = bpy.ops.extensions.package_install_files
@@ -300,8 +305,10 @@ def draw_missing_packages(layout: bpy.types.UILayout, context: bpy.types.Context
 
 def _draw_missing_packages(layout: bpy.types.UILayout, missing: Mapping[str, str]) -> None:
     for name, package in missing.items():
-        if package == IFC_PACKAGE and RUNS_AS_EXTENSION:
-            draw_text(layout, f"{name} needs the extension SynthRoads IFC, which comes beside this one", "INFO")
-            layout.operator(SYNTHROADS_OT_install_ifc.bl_idname, text="Install SynthRoads IFC", icon="IMPORT")
+        extra = "twin" if package == IFC_PACKAGE else "e57"
+        if not common.RUNS_AS_EXTENSION:
+            draw_text(layout, f"{name} needs the package {package}: pip install {package}, with Blender's Python")
             continue
-        draw_text(layout, f"{name} needs the package {package}: pip install {package}, with Blender's Python")
+        draw_text(layout, f"{name} {common.IN_BLENDER[extra]}", "INFO")
+        if package == IFC_PACKAGE:
+            layout.operator(SYNTHROADS_OT_install_ifc.bl_idname, text="Install SynthRoads IFC", icon="IMPORT")

@@ -5,12 +5,12 @@ Annotations are not postponed here: Blender reads the properties from them.
 
 import bpy
 
-from ...cloud.formats.registry import ENDINGS
-from .cloud_view import SYNTHROADS_OT_show_cloud
+from .cloud_view import AVAILABLE, SYNTHROADS_OT_show_cloud
 from .export import SYNTHROADS_OT_export_cloud, SYNTHROADS_OT_export_twin
 from .road_files import SYNTHROADS_OT_load_axis, SYNTHROADS_OT_load_road, SYNTHROADS_OT_save_road
+from .scan_road import SYNTHROADS_OT_road_from_scan
 
-_AXES = (".csv", ".txt", ".geojson")
+_AXES = (".csv", ".txt", ".geojson", ".xodr", ".xml", ".ifc", ".kml", ".gpx")
 
 
 class _DropHandler:
@@ -33,7 +33,7 @@ class SYNTHROADS_FH_parameters(_DropHandler, bpy.types.FileHandler):
 
 
 class SYNTHROADS_FH_axis(_DropHandler, bpy.types.FileHandler):
-    """Handler of dropped measured axes (.csv, .txt, .geojson)."""
+    """Handler of dropped centrelines: roads of other programs (.xodr, .xml, .ifc) and measured lines (the others)."""
 
     bl_idname = "SYNTHROADS_FH_axis"
     bl_label = "SynthRoads Centreline"
@@ -47,13 +47,15 @@ class SYNTHROADS_FH_cloud(_DropHandler, bpy.types.FileHandler):
     bl_idname = "SYNTHROADS_FH_cloud"
     bl_label = "SynthRoads Point Cloud"
     bl_import_operator = SYNTHROADS_OT_show_cloud.bl_idname
-    bl_file_extensions = ";".join(ending for ending in ENDINGS if ending != ".ply")
+    bl_file_extensions = ";".join(ending for ending in AVAILABLE if ending != ".ply")
 
 
 def _draw_import(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
     layout = menu.layout
     layout.operator(SYNTHROADS_OT_load_road.bl_idname, text="SynthRoads Parameter Set (.json)")
-    layout.operator(SYNTHROADS_OT_load_axis.bl_idname, text="SynthRoads Centreline (.csv, .geojson)")
+    layout.operator(SYNTHROADS_OT_load_axis.bl_idname, text="SynthRoads Centreline (.xodr, .xml, .ifc, .csv, .geojson)")
+    endings = ", ".join(AVAILABLE)
+    layout.operator(SYNTHROADS_OT_road_from_scan.bl_idname, text=f"SynthRoads Road from a Scan ({endings})")
 
 
 def _draw_export(menu: bpy.types.Menu, context: bpy.types.Context) -> None:

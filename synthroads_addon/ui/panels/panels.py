@@ -27,6 +27,7 @@ from .presets import (
 )
 from .road_choice import draw_road_choice, draw_road_name
 from .road_files import draw_road_files, source_file_name
+from .scan_road import SYNTHROADS_OT_road_from_scan
 from .scene_scan import draw_scene_scan
 
 _SOLID = {"MESH", "CURVE", "SURFACE", "META", "FONT"}
@@ -82,7 +83,7 @@ class RoadPanel(SheetPanel):
         row = buttons_row(large_button(layout), (text, "Random Road"))
         row.operator(SYNTHROADS_OT_build.bl_idname, text=text, icon="MOD_BUILD")
         row.operator(SYNTHROADS_OT_random_road.bl_idname, text="Random Road", icon="FILE_REFRESH")
-        draw_road_files(layout)
+        draw_road_files(layout).operator(SYNTHROADS_OT_road_from_scan.bl_idname, icon="POINTCLOUD_DATA")
 
 
 class ScannerPanel(SheetPanel):

@@ -9,15 +9,15 @@ from typing import Any
 
 import bpy
 
+from ...base.errors import InputError
 from ...base.files import output_folder
-from ...base.random_streams import stream
 from ...scanning.devices.device import device_names, load_device
 from ...scenario.scenario import load_scenario, scenario_names
 from ..fields.choices import device_of
-from ..fields.fields import ADD_FILE, REMOVE_FILE
-from ..fields.numbers import LARGEST_INTEGER
+from ..fields.fields import ADD_FILE, REMOVE_FILE, FilesField
 from ..fields.preferences import preferences
 from ..fields.properties import PATHS
+from ..work.build import next_seed
 from ..work.common import is_free, refusing
 from ..work.long_operator import FileChooser
 
@@ -106,7 +106,7 @@ class SYNTHROADS_OT_load_scenario(_LibraryFile, _Undoable, bpy.types.Operator):
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
         """Set the panel to the scenario in the chosen file."""
-        context.scene.synthroads.show_preset(self.filepath)
+        context.scene.synthroads.show_preset(str(self.chosen_file()))
 
 
 class SYNTHROADS_OT_load_device(_LibraryFile, _Undoable, bpy.types.Operator):
@@ -119,7 +119,7 @@ class SYNTHROADS_OT_load_device(_LibraryFile, _Undoable, bpy.types.Operator):
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
         """Set the panel's device to the chosen file; one that can't be read is refused."""
-        _set_device(context, self.filepath)
+        _set_device(context, str(self.chosen_file()))
 
 
 class SYNTHROADS_OT_save_scenario(_LibraryFile, bpy.types.Operator):
@@ -143,7 +143,7 @@ class SYNTHROADS_OT_save_scenario(_LibraryFile, bpy.types.Operator):
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
         """Write the panel's scenario as JSON; an existing file is replaced."""
-        target = Path(self.filepath).with_suffix(".json").absolute()
+        target = self.chosen_file().with_suffix(".json").absolute()
         scenario = context.scene.synthroads.scenario()
         with output_folder(target.parent, [target.name], overwrite=True) as folder:
             (folder / target.name).write_text(scenario.to_json(), encoding="utf-8")
@@ -151,8 +151,11 @@ class SYNTHROADS_OT_save_scenario(_LibraryFile, bpy.types.Operator):
 
 
 def _file_list(context: bpy.types.Context, path: str) -> Any:
-    """Return the Blender collection of files that belongs to the scenario field at a path."""
-    field = PATHS[path]
+    """Return the Blender collection of files that belongs to the scenario field at a path; InputError without one."""
+    field = PATHS.get(path)
+    if not isinstance(field, FilesField):
+        lists = ", ".join(known for known, other in PATHS.items() if isinstance(other, FilesField))
+        raise InputError("path", path, f"must be a field of the scenario that lists files: {lists}")
     return getattr(field.owner(context.scene.synthroads), field.name)
 
 
@@ -164,10 +167,12 @@ class SYNTHROADS_OT_add_file(JsonFileChooser, _Undoable, bpy.types.Operator):
 
     path: bpy.props.StringProperty(options={"HIDDEN"})
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
-        """Append the chosen file to the list of the field `path`."""
-        _file_list(context, self.path).add().file = self.filepath
-        return {"FINISHED"}
+    @refusing
+    def execute(self, context: bpy.types.Context) -> None:
+        """Append the chosen file, as it was written, to the list of the field `path`."""
+        files = _file_list(context, self.path)
+        self.chosen_file()
+        files.add().file = self.filepath
 
 
 class SYNTHROADS_OT_remove_file(_Undoable, bpy.types.Operator):
@@ -179,10 +184,13 @@ class SYNTHROADS_OT_remove_file(_Undoable, bpy.types.Operator):
     path: bpy.props.StringProperty(options={"HIDDEN"})
     number: bpy.props.IntProperty(options={"HIDDEN"})
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    @refusing
+    def execute(self, context: bpy.types.Context) -> None:
         """Remove entry `number` from the list of the field `path`."""
-        _file_list(context, self.path).remove(self.number)
-        return {"FINISHED"}
+        files = _file_list(context, self.path)
+        if not 0 <= self.number < len(files):
+            raise InputError("number", self.number, f"the list has {len(files)} files, counted from 0")
+        files.remove(self.number)
 
 
 class SYNTHROADS_OT_random_road(bpy.types.Operator):
@@ -245,11 +253,6 @@ class SYNTHROADS_MT_devices(bpy.types.Menu):
         _list(layout, SYNTHROADS_OT_choose_device.bl_idname, device_names(), device_title)
         _list(layout, SYNTHROADS_OT_choose_device.bl_idname, library_files("devices"), device_title)
         layout.operator(SYNTHROADS_OT_load_device.bl_idname, text="Load Device...", icon="FILE_FOLDER")
-
-
-def next_seed(seed: int) -> int:
-    """Return the seed that Random Road uses after this one, deterministically."""
-    return int(stream(seed, "random road").integers(1, LARGEST_INTEGER))
 
 
 def library_files(kind: str) -> list[str]:

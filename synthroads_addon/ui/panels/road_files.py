@@ -4,6 +4,7 @@ Annotations are not postponed here: Blender reads the properties from them.
 """
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -14,6 +15,7 @@ from ...blender.model.build import BuildTarget
 from ...blender.model.store import BUILT_FROM, find_road, recall_parameters
 from ...fitting.fit import AxisRefusedError
 from ...fitting.plot import axis_picture
+from ...jobs.axis_source import axis_summary
 from ...jobs.generate import RoadSource
 from ...road.parameters import RoadParameters
 from ...scenario.scenario import Scenario
@@ -32,6 +34,11 @@ FIT_PICTURE = "SynthRoads Axis Fit"
 """Name of the image that shows how far an axis was missed."""
 
 
+def from_file(path: Path) -> str:
+    """Return the text that is kept with a road of what it was built from: this file."""
+    return json.dumps([_FROM_FILE, path.name])
+
+
 def source_file_name(road: bpy.types.Object) -> str | None:
     """Return the name of the file that a road was built from; None if it was built from settings."""
     try:
@@ -41,7 +48,7 @@ def source_file_name(road: bpy.types.Object) -> str | None:
     return str(name) if what == _FROM_FILE else None
 
 
-class _RoadLoader(FileOperator):
+class RoadLoader(FileOperator):
     """Base of operators that build a road from a file, read in a thread."""
 
     filepath: bpy.props.StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"})
@@ -56,8 +63,9 @@ class _RoadLoader(FileOperator):
     def job(self, context: bpy.types.Context) -> PanelJob[str]:
         """Return the job that reads the file in a thread and builds its road."""
         self._first = find_road(context.scene) is None
-        path, scenario = Path(bpy.path.abspath(self.filepath)), context.scene.synthroads.scenario()
-        return PanelJob("Build", self._work(path, scenario, shown_place(context.scene)))
+        path, scenario = self.chosen_file(), context.scene.synthroads.scenario()
+        place = replace(shown_place(context.scene), keep_moves=False)  # the file says where its road lies
+        return PanelJob("Build", self._work(path, scenario, place))
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[str]) -> str:
         """Turn the view to the road if it is the first; return the message."""
@@ -68,7 +76,7 @@ class _RoadLoader(FileOperator):
 
     def _work(self, path: Path, scenario: Scenario, place: BuildTarget) -> Work[str]:
         parameters, message = yield Aside(lambda _: self.read(path, scenario), "Reading", 0.0, 0.02)
-        yield from road_work(parameters, scenario, json.dumps([_FROM_FILE, path.name]), place)
+        yield from road_work(parameters, scenario, from_file(path), place)
         return message
 
     def read(self, path: Path, scenario: Scenario) -> tuple[RoadParameters, str]:
@@ -76,7 +84,7 @@ class _RoadLoader(FileOperator):
         raise NotImplementedError
 
 
-class SYNTHROADS_OT_load_road(_RoadLoader, bpy.types.Operator):
+class SYNTHROADS_OT_load_road(RoadLoader, bpy.types.Operator):
     """Build the road of a parameter set, at the panel's fidelity. It takes the place of the road built before"""
 
     bl_idname = "synthroads.load_road"
@@ -89,20 +97,20 @@ class SYNTHROADS_OT_load_road(_RoadLoader, bpy.types.Operator):
         return parameters, f"Built {parameters.alignment.length:,.0f} m of road from {path.name}"
 
 
-class SYNTHROADS_OT_load_axis(_RoadLoader, bpy.types.Operator):
-    """Fit a road to a measured centreline (CSV with x, y, z, or GeoJSON), with the panel's cross-section and map coordinate system. It takes the place of the road built before"""  # noqa: E501 (a tooltip is one line)
+class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
+    """Build a road along a centreline: that of an OpenDRIVE, LandXML or IFC file as it is designed, or one fitted to measured points (CSV with x, y, z, GeoJSON, KML, GPX). Its cross-section is the panel's. It takes the place of the road built before"""  # noqa: E501 (a tooltip is one line)
 
     bl_idname = "synthroads.load_axis"
-    bl_label = "Fit to Centreline"
-    filter_glob: bpy.props.StringProperty(default="*.csv;*.txt;*.geojson;*.json", options={"HIDDEN"})
+    bl_label = "Along Centreline"
+    filter_glob: bpy.props.StringProperty(
+        default="*.xodr;*.xml;*.ifc;*.kml;*.gpx;*.csv;*.txt;*.geojson;*.json", options={"HIDDEN"}
+    )
 
     def read(self, path: Path, scenario: Scenario) -> tuple[RoadParameters, str]:
         """Fit an alignment to the file's centreline; return a road sampled along it, and the message."""
         parameters, report = RoadSource(scenario, axis=path).read()
-        fit = report["axis"]
-        across, up = (fit[name]["worst"] for name in ("horizontal", "height"))
-        deviations = f"{fit['points']:,} points, {fit['elements']} elements, within {across:.3f} m, heights {up:.3f} m"
-        return parameters, f"Built {parameters.alignment.length:,.0f} m of road along {path.name}: {deviations}"
+        length = parameters.alignment.length
+        return parameters, f"Built {length:,.0f} m of road along {path.name}: {axis_summary(report['axis'])}"
 
     def refuse(self, error: InputError) -> set[str]:
         """Report an error; if the fit misses its points, also keep a picture of it."""
@@ -118,6 +126,7 @@ class SYNTHROADS_OT_show_fit(ShowPicture, bpy.types.Operator):
     bl_idname = "synthroads.show_fit"
     bl_label = "Show Missed Axis"
     picture = FIT_PICTURE
+    no_picture = "No centreline has been missed"
 
 
 class SYNTHROADS_OT_save_road(JsonFileChooser, bpy.types.Operator):
@@ -141,15 +150,15 @@ class SYNTHROADS_OT_save_road(JsonFileChooser, bpy.types.Operator):
     @refusing
     def execute(self, context: bpy.types.Context) -> None:
         """Write the road's parameter set with edits read back; an existing file is replaced."""
-        parameters, path = edited_parameters(context.scene), Path(bpy.path.abspath(self.filepath)).with_suffix(".json")
+        parameters, path = edited_parameters(context.scene), self.chosen_file().with_suffix(".json")
         assert parameters  # poll() has seen the road
         with output_folder(path.parent, [path.name], overwrite=True) as folder:
             (folder / path.name).write_text(parameters.to_json(), encoding="utf-8")
         self.report({"INFO"}, f"Parameter set written to {path}")
 
 
-def draw_road_files(layout: bpy.types.UILayout) -> None:
-    """Draw buttons to load and save a parameter set and to fit an axis, and to show a missed fit."""
+def draw_road_files(layout: bpy.types.UILayout) -> bpy.types.UILayout:
+    """Draw buttons to load and save a parameter set fit an axis, and show a missed fit; return their layout."""
     column = layout.column(align=True)
     row = buttons_row(column, ("Load Set", "Save Set"), align=True)
     row.operator(SYNTHROADS_OT_load_road.bl_idname, text="Load Set", icon="IMPORT")
@@ -157,3 +166,4 @@ def draw_road_files(layout: bpy.types.UILayout) -> None:
     column.operator(SYNTHROADS_OT_load_axis.bl_idname, icon="CURVE_PATH")
     if FIT_PICTURE in bpy.data.images:
         column.operator(SYNTHROADS_OT_show_fit.bl_idname, icon="IMAGE_DATA")
+    return column

@@ -182,7 +182,10 @@ class SYNTHROADS_OT_show_violation(bpy.types.Operator):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         """Return whether the list of broken rules has entries."""
-        return len(context.window_manager.synthroads_rules.violations) > 0
+        broken = len(context.window_manager.synthroads_rules.violations)
+        if not broken:
+            cls.poll_message_set("Check the rules first: none is listed as broken")
+        return broken > 0
 
     @refusing
     def execute(self, context: bpy.types.Context) -> None:

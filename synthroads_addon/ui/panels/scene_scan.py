@@ -42,6 +42,14 @@ class SYNTHROADS_PG_scene_scan(bpy.types.PropertyGroup):
         description="JSON file with classes by names of objects, materials and collections, as synthroads scan takes",
         options={"PATH_SUPPORTS_BLEND_RELATIVE"},
     )
+    visible: bpy.props.EnumProperty(
+        name="As Seen In",
+        items=(
+            ("render", "Renders", "Objects, modifiers, particles and their levels as renders have them"),
+            ("viewport", "Viewport", "Objects, modifiers, particles and their levels as the viewport shows them"),
+        ),
+        description="Whose state of the scene is scanned",
+    )
     point_class: bpy.props.EnumProperty(
         name="Class", items=_class_items, description="Class that the button gives to the selected objects"
     )
@@ -75,11 +83,11 @@ def unclassified(context: bpy.types.Context) -> list[bpy.types.Object]:
     names = {row.name for row in classes()}
     collections = [item for item in context.scene.collection.children_recursive if item.name in names]
     named = {item for collection in collections for item in collection.all_objects}
-    return [
-        item
-        for item in context.visible_objects
-        if item.type in _SOLID and CLASS_PROPERTY not in item and item not in named
-    ]
+    rendered = context.scene.synthroads_scene_scan.visible == "render"
+    visible = context.visible_objects
+    if rendered:
+        visible = [item for item in context.view_layer.objects if not item.hide_render]
+    return [item for item in visible if item.type in _SOLID and CLASS_PROPERTY not in item and item not in named]
 
 
 def draw_scene_scan(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -88,6 +96,7 @@ def draw_scene_scan(layout: bpy.types.UILayout, context: bpy.types.Context) -> N
     draw_text(layout, "No road: what is visible is scanned", "INFO")
     if context.scene.synthroads.scan.platform.kind != "trajectory":
         value_row(layout, "Along").prop(settings, "guide", text="")
+    value_row(layout, "As Seen In").prop(settings, "visible", text="")
     value_row(layout, "Classes").prop(settings, "classes", text="")
     row = value_row(layout, "Class")
     row.prop(settings, "point_class", text="")

@@ -10,6 +10,7 @@ import os
 import sys
 import threading
 import traceback
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -18,6 +19,7 @@ import bpy
 from ...base.class_mapping import ClassMapping
 from ...base.errors import InputError
 from ...base.progress import Progress, StageTimer
+from ...base.remarks import collected_remarks
 from ...blender.cameras import renders_returns
 from ...blender.scene.evaluated import scanned_scene
 from ...jobs.open_scene import ForeignScene, RoadScene
@@ -49,7 +51,7 @@ def main(path: str) -> NoReturn:
 
 
 def _scan(job: dict[str, Any]) -> dict[str, Any]:
-    """Open the copied file and scan it; return the counts of points and the timed stages."""
+    """Open the copied file and scan it; return counts of points, timed stages, warnings of the scene and remarks."""
     bpy.ops.wm.open_mainfile(filepath=job["file"], load_ui=False, use_scripts=job["scripts"])
     scene = bpy.data.scenes[job["scene"]]
     window = bpy.context.window_manager.windows[0]
@@ -57,25 +59,27 @@ def _scan(job: dict[str, Any]) -> dict[str, Any]:
     scenario = Scenario.from_dict(job["scenario"])
     colour = scenario.colour.settings(scenario.fidelity)
     timer = StageTimer(_overall_progress(takes_nodes(colour) or renders_returns(colour)))
-    with bpy.context.temp_override(window=window):
-        counts = (_scan_road if "parameters" in job else _scan_visible)(job, scenario, timer)
-    return {"counts": counts, "stages": timer.stages}
+    with bpy.context.temp_override(window=window), collected_remarks() as remarks:
+        counts, warnings = (_scan_road if "parameters" in job else _scan_visible)(job, scenario, timer)
+    return {"counts": counts, "stages": timer.stages, "warnings": list(warnings), "remarks": remarks}
 
 
-def _scan_road(job: dict[str, Any], scenario: Scenario, timer: StageTimer) -> dict[str, Any]:
+def _scan_road(job: dict[str, Any], scenario: Scenario, timer: StageTimer) -> tuple[dict[str, Any], Sequence[str]]:
     road = RoadGeometry(RoadParameters.from_dict(job["parameters"]))
-    return RoadScene(scenario, road, road_id=job["road"]).scan(Path(job["folder"]), timer)
+    scene = RoadScene(scenario, road, road_id=job["road"])
+    return scene.scan(Path(job["folder"]), timer), scene.read().warnings
 
 
-def _scan_visible(job: dict[str, Any], scenario: Scenario, timer: StageTimer) -> dict[str, Any]:
+def _scan_visible(job: dict[str, Any], scenario: Scenario, timer: StageTimer) -> tuple[dict[str, Any], Sequence[str]]:
     classes = ClassMapping.from_dict(job["classes"]) if job["classes"] else None
     factor, class_ids = scenario.scan.traffic_speed_factor, scenario.cloud.scheme().source_ids()
     with timer.stage("scene mesh"):
-        scene = scanned_scene(classes=classes, speed_factor=factor, number_objects=True, class_ids=class_ids)
+        further = {"number_objects": True, "class_ids": class_ids, "visible": job["visible"]}
+        scene = scanned_scene(classes=classes, speed_factor=factor, **further)
     if not len(scene.static) and not scene.moving:
         raise InputError("Scene", None, "nothing visible in it has faces that could be scanned")
     site = route_site(scenario, SceneRoute(**job["route"]), scene.static)
-    return ForeignScene(site, scene).scan(Path(job["folder"]), timer)
+    return ForeignScene(site, scene).scan(Path(job["folder"]), timer), scene.warnings
 
 
 def _overall_progress(by_return: bool) -> Progress:

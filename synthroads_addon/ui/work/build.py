@@ -3,18 +3,24 @@
 Annotations are not postponed here: Blender reads the properties from them.
 """
 
+from contextlib import suppress
+
 import bpy
 
+from ...base.errors import InputError
+from ...base.random_streams import stream
+from ...blender.model.beside import move_beside
 from ...blender.model.build import MEANT, BuildTarget, RoadModel, build_steps
 from ...blender.model.roads import ROAD, choose_road
 from ...blender.model.settle import settle_steps
-from ...blender.model.store import find_road, recall, remember
+from ...blender.model.store import find_road, recall, remember, roads
 from ...blender.model.truth import EditedRoad, read_road
 from ...road.parameters import RoadParameters
 from ...sampling.road import sample_road
 from ...scenario.scenario import Scenario
+from ..fields.numbers import LARGEST_INTEGER
 from .common import has_road, is_free
-from .job import Aside, PanelJob, Step, Work
+from .job import Aside, PanelJob, Step, Work, part_of_work
 from .long_operator import LongOperator
 from .unseen import build_unseen
 from .view import look_along
@@ -29,18 +35,28 @@ class SYNTHROADS_OT_build(LongOperator, bpy.types.Operator):
 
     beside: bpy.props.BoolProperty(
         name="One More",
-        description="Build one more road instead of building the shown one anew",
+        description="Build one more road beside what is there, with another seed where a road has this one, "
+        "instead of building the shown one anew",
         options={"SKIP_SAVE"},
     )
 
     _first = False
+    _seed = 0
 
     def job(self, context: bpy.types.Context) -> PanelJob[RoadModel]:
         """Return the job that builds a road from the panel's settings."""
         settings = context.scene.synthroads
         self._first = find_road(context.scene) is None
         place = BuildTarget(beside=True) if self.beside else shown_place(context.scene)
-        return PanelJob("Build", build_work(settings.scenario(), settings.road_values(), place))
+        before, self._seed = settings.seed, settings.exact_seed()
+        if self.beside:
+            self._seed = unused_seed(self._seed, context.scene)
+        try:  # the panel's seed changes once the road is there
+            if self._seed != settings.exact_seed():
+                settings.seed = self._seed
+            return PanelJob("Build", build_work(settings.scenario(), settings.road_values(), place))
+        finally:
+            settings.seed = before
 
     def succeed(self, context: bpy.types.Context, job: PanelJob[RoadModel]) -> str:
         """Make the new road the current one, look along it if it is the scene's first, and return the message."""
@@ -49,6 +65,8 @@ class SYNTHROADS_OT_build(LongOperator, bpy.types.Operator):
         choose_road(context.scene, job.result.root)
         if self.beside:
             context.view_layer.objects.active = job.result.root
+            if self._seed != context.scene.synthroads.exact_seed():
+                context.scene.synthroads.seed = self._seed
         space = context.space_data
         if self._first and not bpy.app.background and isinstance(space, bpy.types.SpaceView3D):
             look_along(space, parameters)
@@ -79,6 +97,22 @@ class SYNTHROADS_OT_build_edited(LongOperator, bpy.types.Operator):
         return f"Built {recall(job.result.root)[0].alignment.length:,.0f} m of road as it was edited"
 
 
+def next_seed(seed: int) -> int:
+    """Return the seed that Random Road uses after this one, deterministically."""
+    return int(stream(seed, "random road").integers(1, LARGEST_INTEGER))
+
+
+def unused_seed(seed: int, scene: bpy.types.Scene) -> int:
+    """Return a seed that none of a scene's roads was drawn from: this one if it can be, else one after it."""
+    taken = set()
+    for root in roads(scene):
+        with suppress(InputError):  # what is kept of the road is damaged
+            taken.add(recall(root)[1].seed)
+    while seed in taken:
+        seed = next_seed(seed)
+    return seed
+
+
 def edited_work(road: str, edited: EditedRoad) -> Work[RoadModel]:
     """Generator that rebuilds an edited road in its place, as a job's work; see `settle_steps`."""
     yield Step(0.0, "Building")
@@ -107,12 +141,14 @@ def build_work(scenario: Scenario, built_from: str, place: BuildTarget = MEANT) 
 
 
 def road_work(
-    parameters: RoadParameters, scenario: Scenario, built_from: str, place: BuildTarget = MEANT
+    parameters: RoadParameters, scenario: Scenario, built_from: str, place: BuildTarget = MEANT, found: str = ""
 ) -> Work[RoadModel]:
-    """Generator that builds a road from given parameters, as a job's work; see `build_work`."""
+    """Generator that builds a road from given parameters, as a job's work; see `build_work` and `remember`."""
     fidelity = scenario.settings()
     yield Step(0.02, "Building")
     steps = build_steps(parameters, fidelity.tolerance, fidelity.vegetation_detail, place=place)
-    model = yield from build_unseen(steps)
-    remember(model.root, parameters, scenario, built_from)
+    model = yield from part_of_work(build_unseen(steps), 0.02, 1.0)
+    remember(model.root, parameters, scenario, built_from, found)
+    if place.beside:
+        move_beside(model.root, bpy.context.view_layer)
     return model

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping
 from functools import wraps
+from types import MappingProxyType
 from typing import Any
 
 import bpy
 
-from ...base.errors import InputError
+from ...base.errors import InputError, MissingPackageError
 from ...blender.model.store import find_road
 from .job import running_job
 
-_PIP = "pip install 'synthroads[twin]'"
+RUNS_AS_EXTENSION = str(__package__).startswith("bl_ext.")
+"""Whether Blender has installed this as an extension, which brings its packages with it: there is no pip."""
+IN_BLENDER = {
+    "twin": "needs the extension SynthRoads IFC, which comes beside this one: Output > Export installs it",
+    "e57": "is no format of the extension: the command synthroads cloud convert makes LAZ of it, and it of LAZ",
+}
+"""Sentences in Blender about a package that is missing, by the extra that brings it elsewhere."""
 
 
 class Sidebar:
@@ -83,13 +91,27 @@ def refusing(execute: Callable[[Any, bpy.types.Context], None]) -> Execute:
 
 
 def refuse(operator: bpy.types.Operator, error: InputError) -> set[str]:
-    """Report an error with command-line options replaced by the panel's labels; return CANCELLED."""
-    message = str(error).replace("--overwrite replaces it", "tick Replace Files, or choose another folder")
-    message = message.replace("--allow-large", "the command's --allow-large")
-    if str(__package__).startswith("bl_ext."):  # as an extension there is no pip
-        message = message.replace(_PIP, "install the extension SynthRoads IFC, see Output > Export")
-    operator.report({"ERROR"}, message.replace("--output", "Output"))
+    """Report an error in the panel's words, see `panel_words`; return CANCELLED."""
+    if isinstance(error, MissingPackageError) and RUNS_AS_EXTENSION:
+        error = InputError(error.field, error.value, IN_BLENDER[error.extra])
+    operator.report({"ERROR"}, panel_words(str(error), getattr(operator, "option_labels", {})))
     return {"CANCELLED"}
+
+
+def panel_words(message: str, labels: Mapping[str, str] = MappingProxyType({})) -> str:
+    """Return an error's message with the command line's options replaced by what the panel calls them.
+
+    Args:
+        message: one line.
+        labels: what an option is called where that isn't its own name with capitals.
+    """
+    message = message.replace("--overwrite replaces it", "tick Replace Files, or choose another folder")
+
+    def label(option: re.Match[str]) -> str:
+        return labels.get(option[0]) or option[1].replace("-", " ").title()
+
+    message = re.sub(r"(?<![\w-])--(?!allow-large)([a-z][a-z-]*)", label, message)
+    return message.replace("--allow-large", "the command's --allow-large")
 
 
 def redraw_sidebars(context: bpy.types.Context) -> None:

@@ -15,11 +15,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Generator
-from dataclasses import dataclass
+from contextlib import closing
+from dataclasses import dataclass, field, replace
 from threading import Event, Thread
-from typing import Any, Generic, TypeAlias, TypeVar
+from typing import Any, Generic, TypeAlias, TypeVar, cast
 
 from ...base.errors import Cancelled
+from ...base.remarks import collected_remarks
 from ...base.turns.main_thread import MainThreadCalls
 
 T = TypeVar("T")
@@ -79,6 +81,7 @@ class Aside:
         state: what it does, in words for the window.
         first, last: the shares of the job at its begin and end.
         calls: what the thread has the main thread do meanwhile; each of them leaves nothing in the file.
+        notes: sentences that the window shows below the progress; the work may add some while it runs.
     """
 
     work: Callable[[Report], Any]
@@ -86,6 +89,7 @@ class Aside:
     first: float = 0.0
     last: float = 1.0
     calls: MainThreadCalls | None = None
+    notes: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -100,6 +104,26 @@ Work: TypeAlias = Generator[float | Step | Aside | None, Any, T]
 """Work of a job. ``None`` means that there is nothing to do in the main thread just now."""
 
 
+def part_of_work(work: Work[T], first: float, last: float) -> Work[T]:
+    """Generator that does a part of a job's work in the main thread, at the shares from `first` to `last` of the whole.
+
+    Args:
+        work: steps without `Aside`.
+        first, last: the shares of the job at its begin and end.
+    """
+    with closing(work):
+        while True:
+            try:
+                outcome = next(work)
+            except StopIteration as end:
+                return cast(T, end.value)
+            assert not isinstance(outcome, Aside)
+            if outcome is not None:
+                step = outcome if isinstance(outcome, Step) else Step(outcome)
+                outcome = replace(step, share=first + step.share * (last - first))
+            yield outcome
+
+
 class PanelJob(Generic[T]):
     """Long-running job of the panel. While a thread runs it must hold no data-blocks: an undo may free them.
 
@@ -112,6 +136,7 @@ class PanelJob(Generic[T]):
         share: how much is done, 0 to 1.
         error: what ended it early, if something did; `Cancelled` after `stop`.
         result: what the work returned; None until it has ended well.
+        remarks: what users must know of the input, see `base.remarks`.
     """
 
     def __init__(self, title: str, work: Work[T]) -> None:
@@ -119,10 +144,11 @@ class PanelJob(Generic[T]):
         self.share = 0.0
         self.error: BaseException | None = None
         self.result: T | None = None
+        self.remarks: list[str] = []
         self._work = work
         self._state = ""
         self._stopping = Event()
-        self._ended = self._idle = self._is_new = False
+        self._ended = self._idle = self._is_new = self._done_aside = False
         self._thread: _Thread | None = None
         self._answer: Any = None
         self._failure: BaseException | None = None
@@ -148,6 +174,11 @@ class PanelJob(Generic[T]):
         if self._stopping.is_set():
             return "Stopping"
         return f"{self._state or self.title} {self.share:.0%}"
+
+    @property
+    def notes(self) -> list[str]:
+        """Return the sentences that are shown below the progress of what runs aside; none in between."""
+        return self._aside.notes if self._thread is not None and self._aside is not None else []
 
     @property
     def touches_scene(self) -> bool:
@@ -226,34 +257,54 @@ class PanelJob(Generic[T]):
                 time.sleep(_LOOK_AGAIN)
 
     def _advance(self, begin: Callable[[Aside], None]) -> None:
-        """Run the generator up to its next `yield`."""
-        if self._stopping.is_set() and not self._idle:
+        """Run the generator up to its next `yield`; a job that is to stop is closed there, unless it has ended.
+
+        What was done aside to its end is handed over even then: its files may stand already, and nothing be left to do.
+        """
+        stopping, done = self._stopping.is_set() and not self._idle, self._done_aside
+        self._done_aside = False
+        if stopping and not done:
             self._close(Cancelled(f"{self.title} was cancelled"))
             return
         answer, failure, self._answer, self._failure = self._answer, self._failure, None, None
         try:
-            outcome = self._work.send(answer) if failure is None else self._work.throw(failure)
+            with collected_remarks(self.remarks):
+                outcome = self._work.send(answer) if failure is None else self._work.throw(failure)
         except StopIteration as end:
             self.result, self.share = end.value, 1.0
             self._end()
         except BaseException as error:
             self._close(error)
         else:
-            self._note(outcome, begin)
+            if stopping:
+                self._close(Cancelled(f"{self.title} was cancelled"))
+            else:
+                self._note(outcome, begin)
 
     def _note(self, found: float | Step | Aside | None, begin: Callable[[Aside], None]) -> None:
         """Update progress from the value that the generator yielded; if it is an `Aside`, begin its thread."""
         self._idle = found is None
         if isinstance(found, Aside):
+            found = replace(found, work=self._with_remarks(found.work))
             self._aside, self._state, self.share = found, found.state or self._state, found.first
             begin(found)
         elif found is not None:
             step = found if isinstance(found, Step) else Step(found)
             self.share, self._state = step.share, step.state or self._state
 
+    def _with_remarks(self, work: Callable[[Report], Any]) -> Callable[[Report], Any]:
+        """Return a function that does work and collects its remarks."""
+
+        def do(report: Report) -> Any:
+            with collected_remarks(self.remarks):
+                return work(report)
+
+        return do
+
     def _do_at_once(self, aside: Aside) -> None:
         try:
             self._answer = aside.work(self._report)
+            self._done_aside = True
         except BaseException as error:
             self._failure = error
 
@@ -267,6 +318,7 @@ class PanelJob(Generic[T]):
         assert self._thread is not None
         thread, self._thread = self._thread, None
         self._answer, self._failure = thread.result, thread.error
+        self._done_aside = thread.error is None
 
     def _report(self, share: float) -> None:
         if self._stopping.is_set():

@@ -7,12 +7,15 @@ own. Called from Python (``bpy.ops.synthroads.scan()``) it does the same at once
 from __future__ import annotations
 
 import traceback
+from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 import bpy
 
 from ...base.errors import Cancelled, InputError
 from ...blender.model.stage import remove_staged
+from ..fields.room import draw_text
 from .common import is_free, redraw_sidebars, refuse
 from .job import TICK, PanelJob, WorkPace, running_job, stop_job
 
@@ -109,11 +112,11 @@ class LongOperator:
             job.run()
         except InputError as error:
             return self.refuse(error)
-        return self._say(self.succeed(context, job))
+        return self._say(self.succeed(context, job), job.remarks)
 
     def _end(self, context: bpy.types.Context, job: PanelJob[Any]) -> set[str]:
         if job.error is None:
-            return self._say(self.succeed(context, job))
+            return self._say(self.succeed(context, job), job.remarks)
         if isinstance(job.error, Cancelled):
             self.report({"WARNING"}, f"{job.title} cancelled; {self.nothing_done}")
             return {"CANCELLED"}
@@ -123,7 +126,9 @@ class LongOperator:
         self.report({"ERROR"}, f"{job.title} failed, {self.nothing_done}: {job.error!r} (the console says more)")
         return {"CANCELLED"}
 
-    def _say(self, message: str) -> set[str]:
+    def _say(self, message: str, remarks: Sequence[str]) -> set[str]:
+        for remark in remarks:
+            self.report({"WARNING"}, remark)
         self.report({"INFO"}, message)
         return {"FINISHED"}
 
@@ -138,8 +143,27 @@ class LongOperator:
 class FileChooser:
     """Base of operators that open the file browser first and then work on the chosen file or folder."""
 
+    if TYPE_CHECKING:
+        filepath: str
+
     def suggest(self, context: bpy.types.Context) -> None:
         """Set the path that the file browser opens with."""
+
+    def chosen_file(self) -> Path:
+        """Return the path of the chosen file, with Blender's ``//`` resolved.
+
+        Raises:
+            InputError: none was chosen, as where a script calls the operator without one.
+        """
+        path = self.optional_file(self.filepath)
+        if path is None or not path.name:
+            raise InputError("File", self.filepath or None, "choose a file")
+        return path
+
+    @staticmethod
+    def optional_file(text: str) -> Path | None:
+        """Return the path of a file that may be left out, with Blender's ``//`` resolved; None for an empty text."""
+        return Path(bpy.path.abspath(text.strip())).expanduser() if text.strip() else None
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """Open the file browser, which calls `execute`."""
@@ -186,6 +210,8 @@ def draw_job(layout: bpy.types.UILayout) -> bool:
     row.scale_y = 1.4
     row.progress(factor=job.share, text=job.state)
     row.operator(SYNTHROADS_OT_cancel.bl_idname, text="", icon="X")
+    for note in job.notes:
+        draw_text(layout, note, "INFO")
     return True
 
 

@@ -26,14 +26,23 @@ class ShowPicture:
 
     Attributes:
         picture: the image's name.
+        no_picture: what is said while there is none.
     """
 
     picture = ""
+    no_picture = ""
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        """Return whether the image exists and Blender has a window."""
-        return cls.picture in bpy.data.images and context.window is not None
+        """Return whether the image exists and Blender has a window; else set the tooltip to the reason."""
+        reason = ""
+        if bpy.app.background or context.window is None:
+            reason = "Blender has no window to show it in"
+        elif cls.picture not in bpy.data.images:
+            reason = cls.no_picture
+        if reason:
+            cls.poll_message_set(reason)  # type: ignore[attr-defined]
+        return not reason
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Show the image in an open image editor, else in a new window."""

@@ -16,6 +16,7 @@ from typing import Any
 import bpy
 
 from ...base.errors import InputError, OutputError
+from ...base.remarks import warn
 from ...blender.files import save_scene
 from ...scenario.scenario import Scenario
 from .background_scan import MARK
@@ -28,10 +29,19 @@ _JOB, _LINES, _ERRORS = "job.json", "lines.txt", "errors.txt"
 
 @dataclass(frozen=True)
 class Scanned:
-    """Result of the second Blender's scan: counts as JSON data, and its timed stages, see `StageTimer`."""
+    """Result of the second Blender's scan.
+
+    Attributes:
+        counts: as JSON data.
+        stages: timed, see `StageTimer`.
+        warnings: of the scene.
+        remarks: what users must know of the input, see `base.remarks`; told in this Blender too.
+    """
 
     counts: dict[str, Any]
     stages: dict[str, Any]
+    warnings: list[str]
+    remarks: list[str]
 
 
 @dataclass(frozen=True)
@@ -58,9 +68,12 @@ class SavedScene:
         try:
             with self._process() as process:
                 self._watch(process, messages, report)
-            return self._result(process.returncode, messages)
+            scanned = self._result(process.returncode, messages)
         finally:
             shutil.rmtree(self.place, ignore_errors=True)
+        for remark in scanned.remarks:
+            warn("%s", remark)
+        return scanned
 
     @contextmanager
     def _process(self) -> Iterator[subprocess.Popen[bytes]]:
@@ -148,7 +161,7 @@ def save_open_scene(scenario: Scenario, folder: Path, scanned: Mapping[str, Any]
         scenario: what is scanned and rendered, and how.
         folder: where the scan's files go; the copy is in a folder inside until it is scanned.
         scanned: what is scanned, as JSON data: a road's ``parameters`` and its id ``road``; or, without a road, the
-            ``route`` and the ``classes`` by name.
+            ``route``, the ``classes`` by name, and whose state of the scene is ``visible``.
 
     Raises:
         OutputError: the copy can't be written.

@@ -8,12 +8,12 @@ works on a copy of the file.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Generator
+from collections.abc import Generator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import bpy
 
@@ -39,9 +39,11 @@ from .long_operator import LongOperator
 from .rendered_scan import save_open_scene
 from .scan_steps import (
     READ,
+    Measure,
     Workplace,
     Written,
     follow_scan,
+    followed_models,
     pass_on_reading,
     renders_scene,
     snapshot_services,
@@ -73,10 +75,6 @@ class RoadScan:
         return RoadGeometry(self.edited.parameters)
 
 
-_Measure: TypeAlias = Callable[[Report], dict[str, Any]]
-"""Scans, writes the cloud and the previews, and returns the counts. It touches no data of Blender."""
-
-
 def scan_work(scan: RoadScan) -> Work[Written]:
     """Generator that scans the open scene's road into files, as a job's work; leaves nothing half-written.
 
@@ -99,28 +97,28 @@ def scan_work(scan: RoadScan) -> Work[Written]:
                 save_scene(work.folder / "scene.blend")
 
         def write(report: Report) -> int:
-            return _write_files(scan, work, lambda: measure(report))
+            return _write_files(scan, work, measure, report)
 
-        points = yield Aside(write, state, READ, 1.0, work.calls)
+        points = yield Aside(write, state, READ, 1.0, work.calls, work.notes)
     return Written(points, scan.target)
 
 
-def _save_copy(scan: RoadScan, work: Workplace) -> Generator[Step, None, _Measure]:
+def _save_copy(scan: RoadScan, work: Workplace) -> Generator[Step, None, Measure]:
     """Save a copy of the open file; return the function that has a second Blender scan it."""
     scanned = {"parameters": json.loads(scan.edited.parameters.to_json()), "road": scan.road_id}
     with work.timer.stage("scene copy"):
         saved = save_open_scene(scan.scenario, work.folder, scanned)
     yield Step(READ)
 
-    def measure(report: Report) -> dict[str, Any]:
+    def measure(report: Report) -> tuple[dict[str, Any], Sequence[str]]:
         done = saved.scan(report)
         work.timer.stages.update(done.stages)
-        return done.counts
+        return done.counts, done.warnings
 
     return measure
 
 
-def _read_open_scene(scan: RoadScan, work: Workplace) -> Generator[Step, None, _Measure | None]:
+def _read_open_scene(scan: RoadScan, work: Workplace) -> Generator[Step, None, Measure | None]:
     """Copy the open scene; return the function that scans it, or None if some materials must be rendered."""
     timer = work.timer
     speed_factor, class_ids = scan.scenario.scan.traffic_speed_factor, scan.scenario.cloud.scheme().source_ids()
@@ -132,16 +130,18 @@ def _read_open_scene(scan: RoadScan, work: Workplace) -> Generator[Step, None, _
     if services is None:
         return None
 
-    def measure(report: Report) -> dict[str, Any]:
+    def measure(report: Report) -> tuple[dict[str, Any], Sequence[str]]:
         site = Site.of_road(scan.scenario, scan.road)
         with timer.stage("scene mesh"):
             scene = copied.put_together()
         report(0.02)
         with timer.stage("caster"):
             plan = site.plan(scene, services)
+        warnings = scene.warnings
         del scene
         follow_scan(timer, report)
-        return record_to_files([plan], site.files(work.folder, plan.target.origin), timer)
+        files = site.files(work.folder, plan.target.origin)
+        return record_to_files([plan], files, timer, work.note_forecast), warnings
 
     return measure
 
@@ -155,14 +155,18 @@ def _no_share(steps: Generator[float | None, None, RoadModel]) -> Generator[Step
         bpy.ops.ed.undo_push(message="Build as Edited")
 
 
-def _write_files(scan: RoadScan, work: Workplace, measure: Callable[[], dict[str, Any]]) -> int:
+def _write_files(scan: RoadScan, work: Workplace, measure: Measure, report: Report) -> int:
     """Write all files of the scan and return the number of points; for a thread, as it touches no data-blocks."""
     folder, timer = work.folder, work.timer
     files = JobFiles(scan.scenario)
-    files.write_road(folder, scan.road, timer)
-    told: dict[str, Any] = {"counts": measure()} if set(files.outputs) & set(OF_POINTS) else {}
+    with followed_models(timer, report):
+        files.write_road(folder, scan.road, timer)
+    told: dict[str, Any] = {}
+    of_scene: Sequence[str] = ()
+    if set(files.outputs) & set(OF_POINTS):
+        told["counts"], of_scene = measure(report)
     told |= {"instances": scan.road.numbers.to_dict()} | scan.edited.to_dict()
-    if warnings := empty_scan_warnings(told.get("counts", {})):
+    if warnings := [*of_scene, *empty_scan_warnings(told.get("counts", {}))]:
         told["warnings"] = warnings
     files.write_report(folder, told, timer)
     return int(told["counts"]["points"]) if "counts" in told else 0
@@ -226,7 +230,7 @@ def requested_visible_scan(context: bpy.types.Context) -> VisibleScan:
     guide = None if follows_file else choices.guide
     route = route_of(guide, context.scene, platform.kind == "tripod")
     classes = class_mapping(choices.classes, scenario)
-    return VisibleScan(scenario, route, classes, settings.folder(), settings.overwrite)
+    return VisibleScan(scenario, route, classes, settings.folder(), settings.overwrite, choices.visible)
 
 
 _last: Written | None = None

@@ -1,23 +1,29 @@
 """Helpers that scans of roads and of other scenes share: working folders, progress, services, result."""
 
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Self
+from typing import Any, Self, TypeAlias
 
 from ...base.files import output_folder
-from ...base.progress import StageTimer
+from ...base.progress import StageTimer, silent
 from ...base.scratch.folders import scratch_folder
 from ...base.turns.main_thread import MainThreadCalls
 from ...blender.scene.evaluated import CopiedScene
 from ...blender.services import SnapshotServices
 from ...scanning.colour.colour import takes_nodes
+from ...scanning.forecast import ScanForecast
 from ...scenario.scenario import Scenario
 from .job import Report, Step
 
+Measure: TypeAlias = Callable[[Report], tuple[dict[str, Any], Sequence[str]]]
+"""Scans, writes the cloud and the previews, and returns the counts and the scene's warnings. It touches no data of
+Blender."""
 READ = 0.1
 """Share of a scan's progress that the reading of the scene takes up."""
+_MODELS = 0.02
+"""Share of the rest that models of the road take up."""
 _SHARES = {"images": (0.05, 0.05), "scan": (0.05, 1.0), "files": (1.0, 1.0)}
 
 
@@ -30,12 +36,19 @@ class Workplace:
         scratch: for files that are needed as long as it lasts.
         calls: those that it has the main thread make.
         timer: of its stages.
+        notes: what the window shows while the scan runs.
     """
 
     folder: Path
     scratch: Path
     calls: MainThreadCalls = field(default_factory=MainThreadCalls)
     timer: StageTimer = field(default_factory=StageTimer)
+    notes: list[str] = field(default_factory=list)
+
+    def note_forecast(self, forecast: ScanForecast) -> None:
+        """Have the window say what a scan will take, if that is long."""
+        if forecast.is_long:
+            self.notes.append(forecast.text())
 
     @classmethod
     @contextmanager
@@ -77,8 +90,17 @@ def snapshot_services(scenario: Scenario, materials: Sequence[str], work: Workpl
         materials: the scene's.
         work: the scan's.
     """
-    services = SnapshotServices(materials, work.calls if scenario.may_render else None, work.scratch)
+    calls = work.calls if scenario.may_render else None
+    services = SnapshotServices(materials, calls, work.scratch, scenario.scan.kernels)
     return None if services.needs_renderer else services
+
+
+@contextmanager
+def followed_models(timer: StageTimer, report: Report) -> Iterator[None]:
+    """Context in which models of the road are written, before the scan: a stage timer tells the job's progress."""
+    timer.progress = lambda _, share: report(_MODELS * share)
+    yield
+    timer.progress = silent
 
 
 def follow_scan(timer: StageTimer, report: Report) -> None:

@@ -1,6 +1,6 @@
 """Scan of all that is visible in a scene without a road: along a curve, from a camera, or over the scene's extent."""
 
-from collections.abc import Callable, Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,8 @@ from ...base.errors import InputError
 from ...base.schema import read_json
 from ...blender.scene.evaluated import scanned_scene_steps
 from ...blender.scene.foreign import open_scene_warnings
+from ...blender.scene.render_state import Visible
+from ...blender.scene.units import scene_unit
 from ...jobs.job_files import JobFiles
 from ...jobs.scan.files import record_to_files
 from ...jobs.scan_scene import route_site, warnings_of_counts
@@ -22,6 +24,7 @@ from .job import Aside, Report, Step, Work
 from .rendered_scan import save_open_scene
 from .scan_steps import (
     READ,
+    Measure,
     Workplace,
     Written,
     follow_scan,
@@ -41,6 +44,7 @@ class VisibleScan:
     Attributes:
         scenario: scan, colours, files; its road isn't looked at.
         route: the scanner's way.
+        visible: whether a render's or the viewport's state of the scene is scanned.
         classes: classes by name; none if None.
         target: folder for the files.
         overwrite: replace files that are already there.
@@ -51,17 +55,20 @@ class VisibleScan:
     classes: ClassMapping | None
     target: Path
     overwrite: bool
+    visible: Visible = "render"
 
 
 def visible_scan_work(scan: VisibleScan) -> Work[Written]:
     """Generator that scans all that is visible into files, as a job's work; leaves nothing half-written.
 
     Raises:
-        InputError: a setting is wrong, the folder can't be written, or nothing that could be scanned is visible.
+        InputError: a setting is wrong, the folder can't be written, the scene's unit isn't 1 m, or nothing that could
+            be scanned is visible.
     """
     files = JobFiles(scan.scenario, road=False)
     if not set(files.outputs) & set(OF_POINTS):
         raise InputError("Outputs", None, f"must name at least one of {', '.join(OF_POINTS)}: the scene has no road")
+    _check_unit()
     with Workplace.opened(scan.target, files.names, scan.overwrite) as work:
         yield Step(0.0, "Reading")
         warnings = open_scene_warnings()
@@ -71,29 +78,38 @@ def visible_scan_work(scan: VisibleScan) -> Work[Written]:
             measure = yield from _save_copy(scan, work)
 
         def write(report: Report) -> int:
-            counts = measure(report)
+            counts, of_scene = measure(report)
             told = {"scene": bpy.path.basename(bpy.data.filepath) or None, "counts": counts}
-            told["warnings"] = warnings + warnings_of_counts(counts)
+            told["warnings"] = [*warnings, *of_scene, *warnings_of_counts(counts)]
             files.write_report(work.folder, told, work.timer)
             return int(counts["points"])
 
-        points = yield Aside(write, state, READ, 1.0, work.calls)
+        points = yield Aside(write, state, READ, 1.0, work.calls, work.notes)
     return Written(points, scan.target)
 
 
-def _read(scan: VisibleScan, work: Workplace) -> Generator[Step, None, Callable[[Report], Any] | None]:
+def _check_unit() -> None:
+    """Raise an InputError where the open scene's lengths, and with them Blender's view of ours, aren't metres."""
+    unit = scene_unit()
+    if unit != 1.0:
+        allowed = f"must be 1 (Scene properties, Units): to keep its size scale what is in the scene by {unit:g}"
+        raise InputError("Unit Scale", round(unit, 6), allowed)
+
+
+def _read(scan: VisibleScan, work: Workplace) -> Generator[Step, None, Measure | None]:
     """Copy the open scene; return the function that scans it, or None if some materials must be rendered."""
     settings, class_ids = scan.scenario.scan, scan.scenario.cloud.scheme().source_ids()
     timer = work.timer
     with timer.stage("scene mesh"):
         factor = settings.traffic_speed_factor
-        steps = scanned_scene_steps(classes=scan.classes, speed_factor=factor, number_objects=True, class_ids=class_ids)
+        further: dict[str, Any] = {"number_objects": True, "class_ids": class_ids, "visible": scan.visible}
+        steps = scanned_scene_steps(classes=scan.classes, speed_factor=factor, **further)
         copied = yield from pass_on_reading(steps)
     services = snapshot_services(scan.scenario, copied.materials, work)
     if services is None:
         return None
 
-    def measure(report: Report) -> dict[str, Any]:
+    def measure(report: Report) -> tuple[dict[str, Any], Sequence[str]]:
         with timer.stage("scene mesh"):
             scene = copied.put_together()
         if not len(scene.static) and not scene.moving:
@@ -102,22 +118,24 @@ def _read(scan: VisibleScan, work: Workplace) -> Generator[Step, None, Callable[
         with timer.stage("caster"):
             plan = site.plan(scene, services)
         follow_scan(timer, report)
-        return record_to_files([plan], site.files(work.folder, plan.target.origin), timer)
+        files = site.files(work.folder, plan.target.origin)
+        return record_to_files([plan], files, timer, work.note_forecast), scene.warnings
 
     return measure
 
 
-def _save_copy(scan: VisibleScan, work: Workplace) -> Generator[Step, None, Callable[[Report], Any]]:
+def _save_copy(scan: VisibleScan, work: Workplace) -> Generator[Step, None, Measure]:
     """Save a copy of the open file; return the function that has a second Blender scan it."""
     classes = scan.classes.to_dict() if scan.classes else None
+    job = {"route": scan.route.to_dict(), "classes": classes, "visible": scan.visible}
     with work.timer.stage("scene copy"):
-        saved = save_open_scene(scan.scenario, work.folder, {"route": scan.route.to_dict(), "classes": classes})
+        saved = save_open_scene(scan.scenario, work.folder, job)
     yield Step(READ)
 
-    def measure(report: Report) -> dict[str, Any]:
+    def measure(report: Report) -> tuple[dict[str, Any], Sequence[str]]:
         done = saved.scan(report)
         work.timer.stages.update(done.stages)
-        return done.counts
+        return done.counts, done.warnings
 
     return measure
 

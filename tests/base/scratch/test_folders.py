@@ -24,6 +24,7 @@ from synthroads_addon.base.scratch.folders import (
     temporary_files_in_scratch,
 )
 from synthroads_addon.base.scratch.locks import Owner, is_dead, read_owner, this_process, try_lock
+from tests.helpers.files.listed_folders import listed_entries
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 ROOT = Path(__file__).resolve().parents[3]
@@ -252,3 +253,17 @@ def test_a_removal_that_is_cut_off_is_ended_before_the_process_does(
         pass
     remove_scratch_folders()
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_full_folder_is_listed_by_each_process_but_not_for_each_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for number in range(1000):
+        (tmp_path / f"{number}").touch()
+    left = left_by(replace(this_process(), pid=2**22 + 5), tmp_path)
+    listed = listed_entries(monkeypatch)
+    for _ in range(200):
+        next_run(tmp_path)
+    assert not left.exists()
+    assert sum(listed) <= 200 * 60
+    assert len(listed) > 1, "it is listed again after a while"

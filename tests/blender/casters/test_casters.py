@@ -12,10 +12,13 @@ import pytest
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.random_streams import stream
+from synthroads_addon.blender import casters
 from synthroads_addon.blender.casters import NAMES, make_caster
 from synthroads_addon.blender.casters.bvhtree import BVHTreeCaster
 from synthroads_addon.blender.casters.embree import EmbreeCaster
 from synthroads_addon.blender.casters.measure import agreement, bare_rate
+from synthroads_addon.scanning.kernels.library import NoKernelError
+from synthroads_addon.scanning.kernels.packets import Packets, usable_packets
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from tools.benchmark_casters import bare_mesh
 from tools.raycast_nodes import RaycastNodesCaster
@@ -167,7 +170,7 @@ def test_threads_and_chunks_change_nothing() -> None:
     parts: dict[int, np.ndarray] = {}
 
     class Recorder:
-        name, main_thread_only = "recorder", False
+        name, main_thread_only, kernels = "recorder", False, "none"
 
         def cast(self, origins: np.ndarray, directions: np.ndarray, maximum_range: float) -> np.ndarray:
             faces = caster.cast(origins, directions, maximum_range)
@@ -208,3 +211,22 @@ def test_without_embree_the_reference_steps_in_and_embree_is_refused(monkeypatch
     assert make_caster("auto", waves(2)).name == "bvhtree"
     with pytest.raises(InputError, match=r"scan\.caster is 'embree': needs the package embreex"):
         make_caster("embree", waves(2))
+
+
+def test_embree_casts_packets_unless_they_are_turned_off_or_the_machine_has_none(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    mesh, (origins, directions) = waves(), rays(2000)
+    usable = usable_packets()
+    assert isinstance(usable, Packets), f"{usable}: python tools/build_kernels.py"
+    packed, off = make_caster("auto", mesh), make_caster("auto", mesh, "off")
+    assert (packed.name, packed.kernels) == ("embree", f"packets of {usable.width} rays")
+    assert (off.name, off.kernels) == ("embree", "off: rays are cast one by one")
+    monkeypatch.setattr(casters, "usable_packets", lambda: NoKernelError("packets-amiga-m68k.so isn't installed"))
+    alone = make_caster("embree", mesh)
+    assert alone.kernels == "none: rays are cast one by one, as packets-amiga-m68k.so isn't installed"
+    assert {type(caster) for caster in (off, alone)} == {EmbreeCaster}
+    expected = off.cast(origins, directions, RANGE)
+    for caster in (packed, alone):
+        np.testing.assert_array_equal(caster.cast(origins, directions, RANGE), expected)
+    assert make_caster("bvhtree", mesh).kernels.startswith("none")

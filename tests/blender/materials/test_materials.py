@@ -6,10 +6,10 @@ import bpy
 import numpy as np
 import pytest
 
-from synthroads_addon.blender.cameras.calculator import calculator
 from synthroads_addon.blender.materials import PROPERTY, constants, material
 from synthroads_addon.materials.table import materials
 from synthroads_addon.scanning.scene.surface_values import SurfaceInput
+from tests.helpers.scenes.cycles import calculator
 
 PLACES = 4000
 WEATHERED = (

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.arrays import Float
-from synthroads_addon.blender.cameras.calculator import calculator
 from synthroads_addon.blender.casters.embree import EmbreeCaster
 from synthroads_addon.blender.materials import RoadMaterials, material
 from synthroads_addon.blender.materials.pavement import AGE, ATTRIBUTE, SHAPE, look_group
@@ -44,6 +43,7 @@ from synthroads_addon.scanning.scene.motion import ScannedScene
 from synthroads_addon.scanning.scene.surface_values import SurfaceInput
 from synthroads_addon.scanning.scene.target import Target
 from tests.helpers.effects.road_cases import base_road
+from tests.helpers.scenes.cycles import calculator
 
 PLACES = 100_000
 

@@ -11,7 +11,6 @@ import pytest
 
 from synthroads_addon.base.arrays import Float
 from synthroads_addon.base.errors import InputError
-from synthroads_addon.blender.cameras.calculator import calculator
 from synthroads_addon.blender.cameras.stage import Passes, new_stage
 from synthroads_addon.blender.files import empty_file, save_scene
 from synthroads_addon.blender.materials import LOOK, RoadMaterials, constants
@@ -24,6 +23,7 @@ from synthroads_addon.materials.textures import texture_sets
 from synthroads_addon.materials.variation import vary_material
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.surroundings import Environment, MaterialVariation
+from tests.helpers.scenes.cycles import calculator
 from tests.helpers.scenes.small_road import build_small, small_parameters
 from tests.helpers.scenes.texture_folder import (
     BRIGHT,

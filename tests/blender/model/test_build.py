@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,6 +30,7 @@ from synthroads_addon.road.things.guardrail import Guardrail
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scenario.scenario import load_scenario
+from tests.helpers.relative_speed import quiet_seconds
 
 TOLERANCE = 0.005
 ROUNDING = 2e-4
@@ -112,12 +112,14 @@ def pieces(mesh: SceneMesh) -> list[NDArray[np.intp]]:
 
 
 def timed_edit(road: Built, role: str, name: str, value: float) -> float:
-    """Set an input of an object's modifier; return the update's processor seconds (a busy machine doesn't count)."""
+    """Set an input of an object's modifier; return the update's processor seconds, as of a quiet machine."""
     bpy.context.view_layer.update()
-    start = time.process_time()
-    set_modifier_input(road.modifier(role), name, value)
-    bpy.context.view_layer.update()
-    seconds = time.process_time() - start
+
+    def edit() -> None:
+        set_modifier_input(road.modifier(role), name, value)
+        bpy.context.view_layer.update()
+
+    seconds = quiet_seconds(edit)
     print(f"{role}, {name}: {seconds * 1000:.0f} ms")
     return seconds
 

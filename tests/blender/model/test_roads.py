@@ -15,6 +15,7 @@ from synthroads_addon.blender.model.build import BuildTarget, remove_road
 from synthroads_addon.blender.model.roads import ROAD, choose_road, renew_ids
 from synthroads_addon.blender.model.store import find_road, objects_of, recall_parameters, road_named, roads
 from synthroads_addon.blender.things.model_builder import ROLE
+from synthroads_addon.road.parameters import RoadParameters
 from tests.helpers.scenes.scene_hash import lines
 from tests.helpers.scenes.small_road import build_small, small_parameters
 
@@ -110,6 +111,23 @@ class TestSeveral:
         assert road_named(scene, second.root.name) == second.root
         with pytest.raises(InputError, match=f"--road.*{first.root.name}"):
             road_named(scene, "Elsewhere")
+
+    def test_they_lie_as_far_apart_as_on_the_map(self) -> None:
+        first = build_small(parts=ONLY)
+        data = small_parameters().to_dict()
+        data["transform"]["translate"] = np.add(data["transform"]["translate"], (200.0, -300.0, 5.0)).tolist()
+        elsewhere = RoadParameters.from_dict(data)
+        second = build_small(elsewhere, parts=ONLY, place=BuildTarget(beside=True))
+        assert tuple(first.root.location) == (0.0, 0.0, 0.0)
+        assert np.allclose(second.root.location, second.origin - first.origin)
+        assert np.abs(second.root.location).max() > 200.0
+        second.root.location.x += 7.0
+        bpy.context.view_layer.update()
+        bpy.context.view_layer.objects.active = second.root
+        data["transform"]["translate"][1] += 40.0
+        third = build_small(RoadParameters.from_dict(data), parts=ONLY)
+        assert third.root == second.root
+        assert np.allclose(third.root.location, third.origin - first.origin + (7.0, 0.0, 0.0))
 
     def test_building_one_leaves_the_other_and_all_else_as_it_is(self) -> None:
         first = build_small(parts=ONLY)

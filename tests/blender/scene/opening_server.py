@@ -10,9 +10,12 @@ import os
 import resource
 import signal
 import sys
+import tempfile
 from pathlib import Path
 
+from headless.supervision import crash_line
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.base.scratch.opened_file import note_opened_file_in, noted_file
 from synthroads_addon.blender.scene.foreign import open_scene
 
 PEAK_MB = 1500
@@ -37,9 +40,15 @@ def opened(path: Path) -> str:
 
 def opened_in_a_copy(path: Path) -> str:
     """Open a scene in a copy of this process, which is ended if it takes too long; return what came of it."""
+    with tempfile.TemporaryFile() as note:
+        return _opened_in_a_copy(path, note.fileno())
+
+
+def _opened_in_a_copy(path: Path, note: int) -> str:
     read, write = os.pipe()
     child = os.fork()
     if child == 0:
+        note_opened_file_in(note)
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, 1)
         os.dup2(nowhere, 2)
@@ -51,7 +60,11 @@ def opened_in_a_copy(path: Path) -> str:
     said = os.read(read, 1000).decode()
     os.close(read)
     _, status = os.waitpid(child, 0)
-    return said if status == 0 else f"ended by {status}"
+    if status == 0:
+        return said
+    # Blender itself crashes on some of its own files: a command's supervisor says so in a line that names the file.
+    line = crash_line(os.WTERMSIG(status), noted_file(note)) if path.suffix == ".blend" else None
+    return "refused" if line and path.name in line and line.count("\n") == 1 else f"ended by {status}"
 
 
 if __name__ == "__main__":

@@ -135,7 +135,7 @@ class TestForeignScene:
         assert tube.areas().sum() == pytest.approx(np.pi * 10.0, rel=0.1)
 
     def test_hidden_and_support_objects_are_left_out(self) -> None:
-        add_cube("Hidden").hide_viewport = True
+        add_cube("Hidden").hide_render = True
         add_cube("Support")[SUPPORT] = True
         bpy.data.objects.new("Nowhere", bpy.data.meshes.new("Nowhere"))
         add_cube("Seen").location.x = 100.0
@@ -256,7 +256,7 @@ class TestClassesByName:
 
     def test_patterns_that_nothing_matched_are_told(self) -> None:
         add_cube("House").data.materials.append(bpy.data.materials.new("Brick"))
-        add_cube("Unseen").hide_viewport = True
+        add_cube("Unseen").hide_render = True
         mapping = ClassMapping(
             objects={"H*": "bridge", "House": "pole", "Unseen": "pole"},
             materials={"Brick": "bridge", "Lack*": "vehicle"},

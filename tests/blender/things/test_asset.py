@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -102,3 +103,134 @@ def test_faults_are_named(tmp_path: Path) -> None:
         build_road(road_with(library(tmp_path, "box.blend", object="Ball")), 0.02, 0.0, ("road", "assets"))
     with pytest.raises(InputError, match="has no such asset"):
         build_road(road_with(library(tmp_path, "box.blend"), name="ball"), 0.02, 0.0, ("road", "assets"))
+
+
+# What of a file stands beside the road
+
+
+def _cube(name: str, size: float = 1.0, collection: bpy.types.Collection | None = None) -> bpy.types.Object:
+    half = size / 2.0
+    corners = [(x, y, z + half) for x in (-half, half) for y in (-half, half) for z in (-half, half)]
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(corners, [], faces)
+    item = bpy.data.objects.new(name, mesh)
+    (collection or bpy.context.scene.collection).objects.link(item)
+    return item
+
+
+def _units(system: str, scale: float, size: float) -> None:
+    bpy.context.scene.unit_settings.system = system
+    bpy.context.scene.unit_settings.scale_length = scale
+    _cube("Box", size)
+
+
+def _helper(how: str) -> None:
+    """A box of 1 m in a hull of 6 m that renders don't show."""
+    _cube("Box")
+    part = bpy.data.collections.new("Hulls")
+    bpy.context.scene.collection.children.link(part)
+    hull = _cube("UCX_Box", 6.0, part)
+    if how == "object":
+        hull.hide_render = True
+    elif how == "collection":
+        part.hide_render = True
+    elif how == "excluded":
+        bpy.context.view_layer.layer_collection.children["Hulls"].exclude = True
+    elif how == "camera":
+        hull.visible_camera = False
+
+
+def _shown_in_renders(how: str) -> None:
+    """A box of 1 m and 3 m high, of which the viewport doesn't show all."""
+    item = _cube("Box")
+    if how == "array":
+        made = item.modifiers.new("Array", "ARRAY")
+        made.count, made.show_viewport = 3, False
+        made.use_relative_offset, made.relative_offset_displace = True, (0.0, 0.0, 1.0)
+        return
+    top = _cube("Top")
+    top.location.z = 2.0
+    top.hide_viewport = how == "screen"
+    top.hide_set(how == "eye")
+
+
+def _two_scenes() -> None:
+    _cube("Box")
+    spare = bpy.data.scenes.new("Spare")
+    other = bpy.data.objects.new("Draft", bpy.data.meshes["Box"].copy())
+    spare.collection.objects.link(other)
+    other.hide_render = True
+    other.scale = (9.0, 9.0, 9.0)
+
+
+KINDS: dict[str, tuple[Any, tuple[float, float, float]]] = {
+    "metres": (lambda: _units("METRIC", 1.0, 2.0), (2.0, 2.0, 2.0)),
+    "centimetres": (lambda: _units("METRIC", 0.01, 200.0), (2.0, 2.0, 2.0)),
+    "millimetres": (lambda: _units("METRIC", 0.001, 2000.0), (2.0, 2.0, 2.0)),
+    "feet": (lambda: _units("IMPERIAL", 0.3048, 10.0), (3.048, 3.048, 3.048)),
+    "no units": (lambda: _units("NONE", 0.01, 2.0), (2.0, 2.0, 2.0)),
+    "hidden hull": (lambda: _helper("object"), (1.0, 1.0, 1.0)),
+    "hidden collection": (lambda: _helper("collection"), (1.0, 1.0, 1.0)),
+    "excluded collection": (lambda: _helper("excluded"), (1.0, 1.0, 1.0)),
+    "unseen by cameras": (lambda: _helper("camera"), (1.0, 1.0, 1.0)),
+    "shown hull": (lambda: _helper("shown"), (6.0, 6.0, 6.0)),
+    "array in renders": (lambda: _shown_in_renders("array"), (1.0, 1.0, 3.0)),
+    "off in the viewport": (lambda: _shown_in_renders("screen"), (1.0, 1.0, 3.0)),
+    "an eye that is shut": (lambda: _shown_in_renders("eye"), (1.0, 1.0, 3.0)),
+    "two scenes": (_two_scenes, (1.0, 1.0, 1.0)),
+}
+"""Files by what is in them, and the size of what stands, m."""
+
+
+def _saved(path: Path, build: Any) -> None:
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    build()
+    bpy.context.view_layer.update()
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+
+
+def _size_of_asset(library_path: Path) -> np.ndarray:
+    parameters = road_with(library_path, scale=1.0, rotation_deg=0.0)
+    build_road(parameters, 0.02, 0.0, ("terrain", "assets"))
+    mesh = scene_mesh()
+    corners = mesh.vertices[mesh.triangles[mesh.instance_id == 900]].reshape(-1, 3).astype(np.float64)
+    heading = RoadGeometry(parameters).alignment.heading(np.array([60.0]))[0] - np.pi / 2.0
+    turn = np.array([[np.cos(heading), np.sin(heading)], [-np.sin(heading), np.cos(heading)]])
+    corners[:, :2] = corners[:, :2] @ turn.T
+    return np.ptp(corners, axis=0)
+
+
+@pytest.mark.any_blender
+@pytest.mark.parametrize("kind", KINDS)
+def test_of_a_file_stands_what_its_renders_show_in_metres(kind: str, tmp_path: Path) -> None:
+    build, size = KINDS[kind]
+    _saved(tmp_path / "box.blend", build)
+    before = {name: len(getattr(bpy.data, name)) for name in ("scenes", "worlds", "cameras")}
+    assert np.allclose(_size_of_asset(library(tmp_path, "box.blend")), size, atol=1e-3)
+    assert {name: len(getattr(bpy.data, name)) for name in before} == before
+
+
+def test_an_object_that_is_named_stands_even_if_it_is_hidden(tmp_path: Path) -> None:
+    _saved(tmp_path / "box.blend", lambda: _helper("object"))
+    size = _size_of_asset(library(tmp_path, "box.blend", object="UCX_Box"))
+    assert np.allclose(size, 6.0, atol=1e-3)
+
+
+def test_a_file_that_shows_nothing_is_refused(tmp_path: Path) -> None:
+    def hidden() -> None:
+        _cube("Box").hide_render = True
+
+    _saved(tmp_path / "box.blend", hidden)
+    with pytest.raises(InputError, match="shows no objects"):
+        _size_of_asset(library(tmp_path, "box.blend"))
+
+
+def test_a_library_that_the_file_links_already_stays(tmp_path: Path) -> None:
+    _saved(tmp_path / "box.blend", lambda: _cube("Box"))
+    with bpy.data.libraries.load(str(tmp_path / "box.blend"), link=True) as (_, wanted):
+        wanted.objects = ["Box"]
+    assert np.allclose(_size_of_asset(library(tmp_path, "box.blend")), 1.0, atol=1e-3)
+    assert len(bpy.data.libraries) == 1
+    assert [item.name for item in bpy.data.scenes if item.library is not None] == []

@@ -43,3 +43,14 @@ def test_a_picture_is_made(tmp_path: Path, only: str, capsys: pytest.CaptureFixt
     picture = np.asarray(Image.open(tmp_path / f"{only}.png").convert("L"), dtype=np.float64)
     assert picture.shape == (90, 160)
     assert picture.std() > 5.0
+
+
+def test_a_picture_has_the_same_bytes_again(tmp_path: Path) -> None:
+    """Blender and Cycles write dates, names of files and the seconds that it took into theirs."""
+    for name in ("first", "second"):
+        words = ["--only", "materials-lit", "--width", "48", "--samples", "1", "--quiet", "--output"]
+        assert command("gallery", [*words, str(tmp_path / name)]) == 0
+    first, second = (tmp_path / name / "materials-lit.png" for name in ("first", "second"))
+    assert first.read_bytes() == second.read_bytes()
+    with Image.open(first) as picture:
+        assert not picture.info

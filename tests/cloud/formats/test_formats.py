@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
-from synthroads_addon.cloud.formats.base import CloudWriter
 from synthroads_addon.cloud.formats.registry import ENDINGS, open_cloud, open_writer
+from synthroads_addon.cloud.formats.writer import CloudWriter
 from synthroads_addon.cloud.layers import ATTRIBUTES, DEFAULT_ATTRIBUTES, LAYERS, layer_arrays
 from synthroads_addon.cloud.points import PointBlock, concatenate
 from synthroads_addon.cloud.tools.convert import convert
@@ -198,9 +198,16 @@ def test_full_disk_is_one_error_and_leaves_nothing(tmp_path: Path, points, endin
     assert list(tmp_path.iterdir()) == []
 
 
-def test_folder_that_is_not_there(tmp_path: Path, ending: str) -> None:
-    with pytest.raises(OutputError, match="cannot be written"):
-        write(tmp_path / "nowhere" / f"cloud{ending}")
+def test_folders_that_are_not_there_are_made(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / "new" / "folder" / f"cloud{ending}"
+    write(path)
+    assert [*path.parent.iterdir()] == [path]
+
+
+def test_a_file_in_the_place_of_the_folder_is_said(tmp_path: Path, ending: str) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputError):
+        write(tmp_path / "file" / f"cloud{ending}")
 
 
 def test_not_a_number_is_refused(tmp_path: Path, points, ending: str) -> None:
@@ -211,6 +218,20 @@ def test_not_a_number_is_refused(tmp_path: Path, points, ending: str) -> None:
         with pytest.raises(OutputError):
             write(tmp_path / f"cloud{ending}", replace(block, **{name: array}))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_number_beyond_the_fields_precision_is_kept_or_refused(tmp_path: Path, points, ending: str) -> None:
+    """Single precision would make infinity of it, and the file couldn't be read again."""
+    path = tmp_path / f"cloud{ending}"
+    odd = replace(points, intensity=np.where(np.arange(len(points)) == 7, 1e300, points.intensity))
+    if ending in (".ply", ".e57"):
+        with pytest.raises(OutputError, match=r"is 1e\+300: intensity must be at most 3\.4e\+38, as the"):
+            write(path, odd, attributes=())
+        assert list(tmp_path.iterdir()) == []
+        return
+    writer = write(path, odd, attributes=())
+    assert writer.clipped == (ending in (".las", ".laz"))
+    assert ending != ".npz" or read(path).intensity[7] == 1e300
 
 
 def test_truncated_files_are_refused(tmp_path: Path, points, ending: str) -> None:
@@ -287,7 +308,7 @@ def test_ply_is_read_by_an_independent_reader(tmp_path: Path, points) -> None:
     np.testing.assert_array_equal(np.stack([vertex["x"], vertex["y"], vertex["z"]], axis=1), block.xyz)
     np.testing.assert_array_equal(vertex["red"], block.rgb[:, 0] >> 8)
     np.testing.assert_array_equal(vertex["nx"], block.normal[:, 0])
-    np.testing.assert_array_equal(vertex["instance_id"], block.instance_id)
+    np.testing.assert_array_equal(vertex["scalar_instance_id"], block.instance_id)
     lines = (tmp_path / "cloud.ply").read_bytes().split(b"end_header")[0].splitlines()
     assert max(map(len, lines)) < 256
 

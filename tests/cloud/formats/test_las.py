@@ -2,6 +2,8 @@
 
 import json
 import struct
+import tracemalloc
+from contextlib import ExitStack
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -60,6 +62,19 @@ def test_blocks_make_the_same_file_as_one(tmp_path: Path, points) -> None:
     write(tmp_path / "two.laz", points.select(half), points.select(~half))
     assert (tmp_path / "one.laz").read_bytes() == (tmp_path / "two.laz").read_bytes()
     assert len(concatenate([points.select(half), points.select(~half)])) == len(points)
+
+
+def test_many_open_files_of_few_points_take_little_memory(tmp_path: Path, points) -> None:
+    """As tiles are: a full buffer for each would be 18 MB."""
+    few = points.select(slice(0, 10))
+    tracemalloc.start()
+    with ExitStack() as stack:
+        for number in range(40):
+            path = tmp_path / f"{number}.laz"
+            stack.enter_context(LasWriter(path, 25832, ORIGIN, SCALE)).write(few)
+        most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 40 * 500_000
 
 
 def test_too_bright_points_are_clipped_and_counted(tmp_path: Path, points) -> None:

@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import laspy
 import numpy as np
 import pytest
 
@@ -15,6 +16,7 @@ from synthroads_addon.cloud.points import PointBlock, concatenate
 from synthroads_addon.cloud.tools.divide import crop, merge, points_in_rings, tile
 from synthroads_addon.cloud.tools.subsample import keep_one_per_cell
 from tests.helpers.clouds.random_points import make_points
+from tests.helpers.files.listed_folders import listed_entries
 
 ORIGIN = np.array([294_000.0, 5_628_000.0, 180.0])
 
@@ -116,3 +118,16 @@ def test_small_tiles_are_left_out_and_nothing_is_written_where_all_are(tmp_path:
     with pytest.raises(InputError, match="--fewest"):
         tile(tmp_path / "a.laz", tmp_path / "none", 60.0, fewest=10_000)
     assert not (tmp_path / "none").exists()
+
+
+@pytest.mark.parametrize("count", [100, 600])
+def test_names_that_are_listed_for_a_tile_dont_grow_with_their_number(
+    count: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    listed = listed_entries(monkeypatch)
+    las = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
+    corner = np.arange(count)
+    las.x, las.y, las.z = corner % 25 * 2.0 + 1.0, corner // 25 * 2.0 + 1.0, 0.0 * corner
+    las.write(tmp_path / "a.las")
+    assert len(tile(tmp_path / "a.las", tmp_path / "tiles", 2.0)["tiles"]) == count
+    assert 0 < sum(listed) < 60 * count

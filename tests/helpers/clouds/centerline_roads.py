@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ml.data.axis import MeasuredAxis
 from ml.data.corridor import Truth
 from ml.data.points import Points
 from ml.data.roads import LearningRoad
 from synthroads_addon.base.random_streams import stream
+from synthroads_addon.road.axes.measured_axis import MeasuredAxis
 
 Float = NDArray[np.float64]
 REAL = Path(__file__).resolve().parents[3].parent / "shared" / "real"

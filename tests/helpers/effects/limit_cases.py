@@ -102,9 +102,10 @@ CASES: dict[str, LimitCase] = {
     "landscape.forest_share.maximum": LimitCase(value=0.3),
     "landscape.meadow_share.maximum": LimitCase(value=0.3),
     "epsg": LimitCase(value=25833),
+    "height_epsg": LimitCase(value=7837),
     "textures": LimitCase(value=str(TEXTURES)),
     "assets": LimitCase(value=["roadside"]),
 }
 """Path of a limit -> how it is looked at; see `LimitCase`."""
-SAYS = {"epsg"}
+SAYS = {"epsg", "height_epsg"}
 """Limits that only say something: in which coordinates the road stands."""

@@ -147,6 +147,7 @@ CASES: dict[str, Case] = {
     "metadata.title": Case(value="Another"),
     "metadata.generator": Case(value="another hand"),
     "metadata.referenceSystem": Case(value="https://www.opengis.net/def/crs/EPSG/0/25833"),
+    "metadata.heightReferenceSystem": Case(value="https://www.opengis.net/def/crs/EPSG/0/7837"),
     "Alignment.vertical[].radius": Case(at="Alignment.vertical[1].radius"),
     "Carriageway.side": Case(owner="right", value="left", also={"objects.left.side": "right"}),
     **{f"Carriageway.{name}": Case(owner="right") for name in (*WIDTHS, "lanes[].width")},

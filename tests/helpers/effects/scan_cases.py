@@ -69,6 +69,10 @@ WEATHERS = {"clear": 20000.0, "haze": 3000.0, "fog": 300.0, "rain": 3000.0, "sno
 """Weather -> a visibility of it, m."""
 
 
+LATE = str(FILES / "late_trajectory.csv")
+"""Trajectory that begins at some second of the GPS week."""
+
+
 def _platform_cases() -> dict[str, ScanCase]:
     cases = {}
     for kind, fields in PLATFORMS.items():
@@ -84,6 +88,8 @@ def _platform_cases() -> dict[str, ScanCase]:
     cases["scan.platform[tripod].stations"] = ScanCase(value=[20.0], given=tripod)
     moved = platform("trajectory", **PLATFORMS["trajectory"])
     cases["scan.platform[trajectory].file"] = ScanCase(value=str(FILES / "other_trajectory.csv"), given=moved)
+    cases["scan.platform[trajectory].height_shift"] = ScanCase(value=3.0, given=moved)
+    cases["scan.platform[trajectory].keep_time"] = ScanCase(given=platform("trajectory", file=LATE))
     return cases
 
 

@@ -32,7 +32,8 @@ def twin(name: str) -> Callable[[RoadParameters], Any]:
 
 
 SAYS: dict[str, Callable[[RoadParameters], Any]] = {
-    **{f"metadata.{name}": set_of for name in ("identifier", "title", "generator", "referenceSystem")},
+    **{f"metadata.{name}": set_of for name in ("identifier", "title", "generator")},
+    **{f"metadata.{name}": set_of for name in ("referenceSystem", "heightReferenceSystem")},
     "design_class": findings,
     **{f"Asset.twin_types.{name}": twin(name) for name in ("cityjson", "ifc", "opendrive")},
     "LineMarking.turnout": findings,

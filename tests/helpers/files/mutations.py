@@ -20,6 +20,8 @@ from synthroads_addon.base.errors import SynthRoadsError
 LONGEST = 10.0
 """Seconds of the processor that a reader may take for one file of a few kilobytes."""
 FUZZ_SEED = os.environ.get("FUZZ_SEED") or None
+FUZZ_CASES = int(os.environ.get("FUZZ_CASES") or 10_000)
+"""Cases of commands that `make fuzz` runs."""
 _ROOM = 4 << 30  # bytes of address space that a reader may take beyond what is taken already
 
 Part = dict[str, Any] | list[Any]

@@ -114,10 +114,10 @@ class OpenDrive:
     def _read(cls, root: ElementTree.Element, road: ElementTree.Element) -> OpenDrive:
         header, shift = root.find("header"), root.find("header/offset")
         assert header is not None
-        assert shift is not None
         assert (header.get("revMajor"), header.get("revMinor")) == ("1", "8")
-        assert number(shift, "hdg") == 0.0
-        found = cls(root, road, number(road, "length"), np.array([number(shift, name) for name in "xyz"]))
+        assert shift is None or number(shift, "hdg") == 0.0
+        offset = np.zeros(3) if shift is None else np.array([number(shift, name) for name in "xyz"])
+        found = cls(root, road, number(road, "length"), offset)
         items = road.findall("lanes/laneSection")
         starts = [number(item, "s") for item in items] + [found.length]
         for item, start, end in zip(items, starts[:-1], starts[1:], strict=True):

@@ -35,6 +35,14 @@ class FakeLayout:
             return [whole, *(line for line in more if line.startswith(" "))]
         return [f"{'  ' if self._what else ''}{line}" for line in inner]
 
+    def place_of(self, name: str) -> str | None:
+        """Return the kind of the layout that a property was drawn in, such as row; None if it wasn't."""
+        for item in self._items:
+            place = item.place_of(name) if isinstance(item, FakeLayout) else None
+            if place or (isinstance(item, str) and item.split()[1:2] == [name]):
+                return place or self._what
+        return None
+
     def texts(self, width: float) -> list[tuple[str, float, float]]:
         """Return the texts of labels, buttons and checkboxes in a layout of a width, pixels.
 

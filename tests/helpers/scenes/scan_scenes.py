@@ -29,6 +29,7 @@ class BruteForce:
     mesh: SceneMesh
     name: str = "brute force"
     main_thread_only: bool = False
+    kernels: str = "none"
 
     def cast(self, origins, directions, maximum_range):
         best, hit = np.full(len(origins), np.inf), np.full(len(origins), -1, dtype=np.int32)

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from headless.commands import command
+from synthroads_addon.base.changes import apply_change
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.files import empty_file
 from synthroads_addon.blender.model.build import build_road
@@ -27,7 +28,7 @@ from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scanning.beam import RINGS
 from synthroads_addon.scanning.scene.height_errors import mesh_height_errors
-from synthroads_addon.scenario.scenario import Scenario, apply_change, load_scenario
+from synthroads_addon.scenario.scenario import Scenario, load_scenario
 
 pytestmark = pytest.mark.any_blender
 
@@ -144,7 +145,7 @@ def test_a_scene_that_is_there_is_scanned_within_a_tolerance(tmp_path: Path) -> 
         data: Any = Scenario().to_dict()
         flown = ("scan.platform.height=40", "scan.platform.speed=60", "scan.relief=0")
         for change in (*flown, "colour.rgb=false", 'outputs=["cloud"]', *changes):
-            data = apply_change(data, change)
+            data = apply_change(data, change, Scenario)
         return scan_scene(SceneScan(Scenario.from_dict(data), tmp_path / folder, scene, up="z"))
 
     loose, tight = (scanned(f"{size}", f"tolerance=position={size}")["choice"] for size in ("2m", "4mm"))

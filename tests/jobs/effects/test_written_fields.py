@@ -16,6 +16,8 @@ from tests.helpers.effects.written_fields import WRITTEN
 
 pytestmark = [pytest.mark.any_blender, pytest.mark.keep_scene, pytest.mark.slow]
 
+SHADES = ("red", "green", "blue", "intensity")
+
 JOB: dict[str, Any] = {
     "road": {
         "length": 60.0,
@@ -63,14 +65,17 @@ def test_nothing_changes_but_what_the_field_names(usual: Path, tmp_path: Path, p
     before, after, promised = digests(usual), digests(tmp_path / "out"), WRITTEN[path]
     assert after.keys() - before.keys() == promised.adds
     assert before.keys() - after.keys() == promised.removes
-    assert {name for name in before.keys() & after.keys() if before[name] != after[name]} == promised.changes
-    if "cloud.laz" in promised.changes:
+    changed = {name for name in before.keys() & after.keys() if before[name] != after[name]}
+    assert promised.changes <= changed <= promised.changes | promised.ties
+    if "cloud.laz" in promised.changes | promised.ties:
         was, now = (by_pulse(folder / "cloud.laz") for folder in (usual, tmp_path / "out"))
         assert {"X", "Y", "Z", "intensity", "red", "class_id"} <= was.keys() & now.keys()
         _, mine, theirs = np.intersect1d(was["gps_time"], now["gps_time"], return_indices=True)
         assert len(mine) >= promised.same * max(len(was["X"]), len(now["X"]))
         for name in was.keys() & now.keys():
-            assert np.mean(was[name][mine] == now[name][theirs]) >= promised.same, name
+            digits = promised.digits if name in SHADES else 0
+            apart = np.abs(was[name][mine].astype(np.float64) - now[name][theirs])
+            assert np.mean(apart <= digits) >= promised.same, name
 
 
 def test_sections_are_scanned_one_by_one() -> None:

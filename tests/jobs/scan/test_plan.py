@@ -18,6 +18,7 @@ from synthroads_addon.materials.table import Material, materials
 from synthroads_addon.road.surroundings import Environment
 from synthroads_addon.scanning.colour.colour import LayerSource, MaterialLayers, surface_constants
 from synthroads_addon.scanning.colour.request import LayerRequest
+from synthroads_addon.scanning.colour.transparency import Transparency
 from synthroads_addon.scanning.plan import ScanConditions, ScanPlan
 from synthroads_addon.scanning.record import CollectedBlocks, record
 from synthroads_addon.scanning.relief.normal_images import NormalImage
@@ -41,14 +42,17 @@ class StandIns:
     def __init__(self) -> None:
         self.asked: list[Any] = []
 
-    def caster(self, name: str, mesh: SceneMesh) -> Caster:
-        self.asked.append(("caster", name))
+    def caster(self, name: str, mesh: SceneMesh, kernels: str) -> Caster:
+        self.asked.append(("caster", name, kernels))
         return BruteForce(mesh)
 
     def reflectance_varies(self, names: Sequence[str]) -> bool:
         return False
 
     def normal_images(self, names: Sequence[str]) -> dict[int, NormalImage]:
+        return {}
+
+    def transparencies(self, names: Sequence[str]) -> dict[int, Transparency]:
         return {}
 
     def materials(self, names: Sequence[str]) -> list[Material]:
@@ -111,8 +115,8 @@ def test_the_effects_of_the_weather_are_in_the_plan_unless_an_attenuation_is_giv
 def test_it_asks_the_services_for_what_the_scenario_wants() -> None:
     services = StandIns()
     points = recorded(planned(services, cloud={"attributes": ["normal", "noise_free", "roughness"]}))
-    ((_, name), (_, wanted, spacing)) = services.asked
-    assert (name, wanted) == ("embree", {"rgb", "roughness"})
+    ((_, name, kernels), (_, wanted, spacing)) = services.asked
+    assert (name, kernels, wanted) == ("embree", "auto", {"rgb", "roughness"})
     assert spacing == Scenario.from_dict({"fidelity": "draft"}).colour.settings("draft", 60.0).image_spacing
     assert len(points) > 100
     assert np.allclose(points.xyz[:, 2], 180.0, atol=1e-4), "every point lies on the plane"

@@ -68,7 +68,7 @@ def test_the_model_is_used_along_the_path_and_leaves_no_files(
         prediction.output.write_text(json.dumps({"features": [line(0.0, 100.0, 0.75)]}), encoding="utf-8")
 
     monkeypatch.setattr(learned_axis, "task", lambda name: SimpleNamespace(predict=predict))
-    predictor = learned_axis.learned_axis(tmp_path / "run", tmp_path / "cloud.laz", tmp_path)
+    predictor = learned_axis.learned_axis(tmp_path / "run", tmp_path / "cloud.laz")
     cloud: Any = SimpleNamespace(origin=ORIGIN)
     offset, _ = predictor(cloud, PATH)
     assert offset == pytest.approx(0.75)
@@ -78,7 +78,7 @@ def test_the_model_is_used_along_the_path_and_leaves_no_files(
 
 def test_only_a_finished_run_of_a_centreline_model_will_do(tmp_path: FilePath, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(MissingFileError):
-        learned_axis.learned_axis(tmp_path / "none", tmp_path / "cloud.laz", tmp_path)
+        learned_axis.learned_axis(tmp_path / "none", tmp_path / "cloud.laz")
     _run_of("segmentation", monkeypatch)
     with pytest.raises(InputError, match="a centreline model is needed"):
-        learned_axis.learned_axis(tmp_path, tmp_path / "cloud.laz", tmp_path)
+        learned_axis.learned_axis(tmp_path, tmp_path / "cloud.laz")

@@ -13,13 +13,13 @@ import pytest
 from ml.centerline.find_road import centerline_geojson, corridor_json, find_road
 from ml.centerline.predictor import CenterlinePredictor, Regression, UseOptions, smooth_line, target_errors
 from ml.data import strips
-from ml.data.axis import MeasuredAxis
 from ml.data.corridor import CORRIDOR
 from ml.data.frames import Frames, displace_frames, frames_along, read_path
 from ml.data.roads import LearningRoad
 from ml.networks.centerline.models import TARGETS
 from ml.scores.calibration import IntervalCalibration
 from synthroads_addon.base.errors import InputError, MissingFileError
+from synthroads_addon.road.axes.measured_axis import MeasuredAxis
 from tests.helpers.clouds.centerline_batches import SETTINGS, small
 from tests.helpers.clouds.road_data_sets import write_cloud
 from tests.helpers.roads import analytic_roads

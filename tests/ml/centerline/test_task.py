@@ -169,6 +169,7 @@ def test_a_run_that_is_begun_anew_isnt_finished_by_the_one_before(trained: Train
     shutil.copytree(trained().folder, tmp_path / "run")
     assert (tmp_path / "run" / CALIBRATION).is_file()
     again = Run.start(tmp_path / "run", configuration(data), overwrite=True)
+    again.begin()
     assert not (tmp_path / "run" / CALIBRATION).exists()
     with pytest.raises(Cancelled):
         task.train(again, Stop(6))

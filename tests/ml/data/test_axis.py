@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ml.data.axis import MeasuredAxis
 from ml.data.frames import Frames, displace_frames, estimated_path, frames_along, random_deviation, read_path, sequences
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.road.axes.measured_axis import MeasuredAxis
 
 RADIUS = 300.0
 REAL = Path(__file__).resolve().parents[3].parent / "shared" / "real"

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ml.data.axis import MeasuredAxis
 from ml.data.corridor import CORRIDOR, Truth, truths
 from ml.data.frames import Frames, displace_frames, frames_along
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.road.axes.measured_axis import MeasuredAxis
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.objects import WidthPoint
 from synthroads_addon.road.parameters import RoadParameters

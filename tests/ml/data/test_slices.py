@@ -11,7 +11,6 @@ import pytest
 import torch
 from torch.utils.data import DataLoader
 
-from ml.data.axis import MeasuredAxis
 from ml.data.corridor import CORRIDOR, Truth
 from ml.data.effects import SequenceEffects
 from ml.data.effects.slices import mirror, turn_round
@@ -32,6 +31,7 @@ from ml.data.slices import (
     make_sample,
 )
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.road.axes.measured_axis import MeasuredAxis
 from tests.helpers.roads.analytic_roads import roads
 
 REAL = Path(__file__).resolve().parents[3].parent / "shared" / "real"

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import subprocess
 import sys
 import time
 from multiprocessing.process import BaseProcess
+from pathlib import Path
 from typing import Any
 
 import pytest
 import torch
 
 from ml.data.workers import load_batches
+
+ROOT = Path(__file__).resolve().parents[3]
 
 
 class SlowCrops:
@@ -46,3 +50,31 @@ def test_workers_that_a_signal_ends_with_the_training_leave_no_traceback(monkeyp
     del batches
     assert len(workers) == 2
     assert [str(fault.exc_value) for fault in ignored] == []
+
+
+IN_A_LONG_FOLDER = """
+import sys, tempfile
+import torch
+from ml.data.workers import load_batches
+
+print([batch.tolist() for batch in load_batches(torch.arange(4.0), [[0, 1], [2, 3]], torch.stack, 1)])
+"""
+
+
+def test_batches_arrive_where_the_folder_for_temporary_files_has_a_long_name(tmp_path: Path) -> None:
+    """As on clusters: a socket's name has 107 characters at most, and without one nothing would ever arrive."""
+    (long := tmp_path / ("long" * 20)).mkdir()
+    environment = os.environ | {"TMPDIR": str(long), "PYTHONPATH": str(ROOT)}
+    short = {path.name for path in Path("/tmp").glob(".partial-*")}
+    done = subprocess.run(
+        [sys.executable, "-c", IN_A_LONG_FOLDER],
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (0, "[[0.0, 1.0], [2.0, 3.0]]\n"), done.stderr
+    assert "Traceback" not in done.stderr
+    assert list(long.iterdir()) == []
+    assert {path.name for path in Path("/tmp").glob(".partial-*")} <= short

@@ -14,6 +14,7 @@ from ml.data.sources import Source, read_tiles
 from ml.data.yardsticks import load_yardstick, yardstick_names
 from synthroads_addon.base.classes import class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError
+from synthroads_addon.base.remarks import collected_remarks
 
 SCHEME = class_scheme("5")
 XYZ = np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 0.1], [2.0, 0.5, 0.2], [3.0, 1.5, 1.0], [4.0, 1.0, 2.0]])
@@ -32,7 +33,7 @@ def tiles_of(folder: Path, yardstick: str, split: str | None) -> list[tuple[list
 
 def write_ply(path: Path, fields: list[tuple[str, str, np.ndarray]]) -> None:
     """Write a binary PLY file with properties (name, PLY's type, values)."""
-    words = {"double": "<f8", "float": "<f4", "uchar": "u1", "int": "<i4", "uint": "<u4"}
+    words = {"double": "<f8", "float": "<f4", "uchar": "u1", "int": "<i4", "uint": "<u4", "ushort": "<u2"}
     record = np.zeros(len(XYZ), dtype=[(name, words[kind]) for name, kind, _ in fields])
     for name, _, values in fields:
         record[name] = values
@@ -121,6 +122,49 @@ def test_streets_of_truecity_by_the_names_of_its_classes(tmp_path: Path) -> None
     (tmp_path / "labels.json").write_text(json.dumps(names))
     ((classes, _, _),) = tiles_of(tmp_path, "truecity", "test")
     assert classes == ["road_furniture", "road", "ground", "-", "vegetation"]
+
+
+@pytest.mark.parametrize("columns", [4, 7])
+@pytest.mark.parametrize("kind", ["float32", "float64"])
+@pytest.mark.parametrize(
+    ("place", "split"), [("test", "test"), ("val", "validation"), ("train/datav2_0_octree_fps", "train")]
+)
+def test_arrays_of_truecity_as_its_repository_describes_them(
+    tmp_path: Path, place: str, split: str, kind: str, columns: int
+) -> None:
+    (tmp_path / place).mkdir(parents=True)
+    labels = np.array([0.0, 1.0, 10.0, 5.0, np.nan])
+    rows = np.column_stack([XYZ, labels, np.ones((5, columns - 4))]).astype(kind)
+    np.save(tmp_path / place / "block_000001.npy", rows)
+    with collected_remarks() as remarks:
+        ((classes, places, strength),) = tiles_of(tmp_path, "truecity", split)
+    assert (classes, strength) == (["road", "ground", "vegetation", "-", "-"], None)
+    assert places == pytest.approx(XYZ, abs=1e-3)
+    assert any("taken for 0 RoadSurface, 1 GroundSurface" in remark for remark in remarks)
+    assert any("columns after the fourth" in remark for remark in remarks) == (columns > 4)
+
+
+@pytest.mark.parametrize(
+    "array", [np.zeros((5, 3)), np.zeros(5), np.array([["a"] * 4] * 5), np.full((5, 4), np.inf), np.array([{}] * 4)]
+)
+def test_arrays_that_are_no_points_are_refused(tmp_path: Path, array: np.ndarray) -> None:
+    (tmp_path / "test").mkdir()
+    np.save(tmp_path / "test/block.npy", array, allow_pickle=True)
+    with pytest.raises(InputError, match=r"block\.npy"):
+        tiles_of(tmp_path, "truecity", "test")
+
+
+@pytest.mark.parametrize("kind", ["int", "ushort", "float"])
+def test_tiles_of_dales_objects_whose_points_are_called_testing(tmp_path: Path, kind: str) -> None:
+    axes = [(name, "double", XYZ[:, at]) for at, name in enumerate("xyz")]
+    fields = [("intensity", kind, np.full(5, 6553.5)), ("sem_class", "uchar", np.array([1, 2, 3, 5, 0]))]
+    write_ply(tmp_path / "test/5080_54400_new.ply", [*axes, *fields, ("ins_class", "int", np.arange(5))])
+    text = (tmp_path / "test/5080_54400_new.ply").read_bytes().replace(b"element vertex", b"element testing")
+    (tmp_path / "test/5080_54400_new.ply").write_bytes(text)
+    ((classes, places, strength),) = tiles_of(tmp_path, "dales-objects", "test")
+    assert classes == ["ground", "vegetation", "road_furniture", "-", "-"]
+    assert places == pytest.approx(XYZ, abs=1e-3)
+    assert strength == pytest.approx(0.1, abs=2e-5)
 
 
 @pytest.mark.parametrize("name", yardstick_names())

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ml.data.axis import MeasuredAxis
 from ml.data.frames import Frames
 from ml.data.roads import LearningRoad, read_measured
 from ml.scores import baselines
@@ -32,6 +31,7 @@ from ml.scores.metrics import Spread
 from ml.scores.pictures import PictureView, corridor_picture, lines_picture
 from ml.scores.tables import COLUMNS, as_data, cell, report, table, write_tables
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.road.axes.measured_axis import MeasuredAxis
 from tests.helpers.clouds.centerline_roads import REAL, strip_road
 from tests.helpers.roads import analytic_roads
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ml.data.axis import MeasuredAxis
 from ml.data.corridor import Truth
 from ml.data.points import Points
 from ml.data.roads import LearningRoad
 from ml.scores.paint import REACH, with_painted_line
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.road.axes.measured_axis import MeasuredAxis
 
 
 def swaying_road(paint: float = 1.5, sway: float = 0.4, bare: tuple[float, float] = (0.0, 0.0)) -> LearningRoad:

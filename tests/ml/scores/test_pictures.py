@@ -37,3 +37,9 @@ def test_a_view_shows_where_the_labelled_points_are() -> None:
     assert alone > 0.3
     assert brown(coord, segment) > 0.98 * alone
     assert 0.0 < brown(near, np.full(len(near), IGNORED, dtype=np.int16)) < 0.5 * alone, "predicted, but no truth"
+
+
+def test_names_of_classes_may_hold_what_matplotlib_takes_for_formulas() -> None:
+    coord = np.random.default_rng(1).uniform(0.0, 20.0, (500, 3)).astype(np.float32)
+    tile = CloudTile("a", np.zeros(3), coord, None, None, np.zeros(500, dtype=np.int16))
+    assert comparison(tile, np.zeros(500, dtype=np.int16), ["$^_$", "_road"]).startswith(b"\x89PNG")

@@ -9,14 +9,16 @@ import numpy as np
 import pytest
 import torch
 
+from headless.predict import labelled
 from ml.data.crops import CropSettings, Item
 from ml.data.tiles import Scaling
 from ml.scores.confusion import Confusion
 from ml.segmentation import prediction
 from ml.segmentation.prediction import PREDICTED, Labelling, predict_file
 from ml.segmentation.scoring import label_tile, nearest_labels, overlapping_pieces, piece_scores
-from synthroads_addon.base.classes import class_scheme
+from synthroads_addon.base.classes import UNLABELLED, class_scheme
 from synthroads_addon.base.errors import InputError, MissingFileError, OutputError
+from synthroads_addon.base.remarks import collected_remarks
 from tests.helpers.clouds.road_tiles import road_tile
 from tests.helpers.clouds.segmentation_data import road_block, write_cloud
 
@@ -131,6 +133,11 @@ def others_cloud(path: Path, count: int = 30_000) -> laspy.LasData:
     return laspy.read(path)
 
 
+def usable(las: laspy.LasData) -> np.ndarray:
+    """Return the mask of the points that are neither withheld nor noise."""
+    return ~(np.asarray(las.withheld, dtype=bool) | np.isin(np.asarray(las.classification), (7, 18)))
+
+
 def test_prediction_keeps_everything_and_adds_the_class(tmp_path: Path, labelling: Labelling) -> None:
     before = others_cloud(tmp_path / "in.laz")
     result = predict_file(tmp_path / "in.laz", tmp_path / "out.laz", labelling)
@@ -152,9 +159,10 @@ def test_prediction_keeps_everything_and_adds_the_class(tmp_path: Path, labellin
     assert (before.header.scales == after.header.scales).all()
     assert (before.header.mins == after.header.mins).all()
     truth = road_block(30_000, 5, length=130.0).class_id
-    assert (np.asarray(after[PREDICTED]) == truth).mean() > 0.85
+    seen = usable(before)
+    assert (np.asarray(after[PREDICTED]) == truth)[seen].mean() > 0.85
     assert result["points"] == 30_000
-    assert sum(result["classes"].values()) == 30_000
+    assert sum(result["classes"].values()) == seen.sum()
     assert result["points_per_second"] > 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["in.laz", "out.laz"]
 
@@ -176,7 +184,8 @@ def test_tiles_of_a_file_see_what_lies_around_them(tmp_path: Path) -> None:
     plan = np.column_stack([found.x, found.y])
     inside = np.all((plan - plan.min(axis=0) > 4.0) & (plan.max(axis=0) - plan > 4.0), axis=1)
     # Tiles of 48 m end within the cloud of 130 m, and no point there may see less than 3 m to any side.
-    assert inside.sum() > 20_000
+    inside &= usable(found)
+    assert inside.sum() > 10_000
     assert (np.asarray(found[PREDICTED])[inside] == scheme.rows[1].id).all()
     assert (np.asarray(found[PREDICTED]) == scheme.rows[0].id).any()
 
@@ -225,6 +234,39 @@ def test_a_second_prediction_replaces_the_first_and_codes_follow(tmp_path: Path,
     codes = class_scheme("5").las_codes()
     assert (np.asarray(once.classification) == codes[np.asarray(once[PREDICTED])]).all()
     assert (np.asarray(once["class_id"]) == road_block(5000, 5).class_id).all()  # the truth stays
+
+
+def test_withheld_points_and_noise_are_seen_by_no_network_and_stay_as_they_are(
+    tmp_path: Path, labelling: Labelling, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same classes as without them, though they lie among the others and far around them, at any size of block."""
+    las = others_cloud(tmp_path / "in.las", 6_000)
+    las.header.system_identifier = las.header.generating_software = ""
+    las.classification[::10], las.withheld[::7] = 7, 1
+    las.z[~usable(las)] -= 40.0
+    las.x[~usable(las)] -= 500.0
+    las.write(tmp_path / "in.las")
+    clean = las[usable(las)]
+    clean.write(tmp_path / "clean.las")
+    monkeypatch.setattr(prediction, "BLOCK", 500)
+    with collected_remarks() as remarks:
+        told = predict_file(tmp_path / "in.las", tmp_path / "out.las", labelling, classification=True)
+    predict_file(tmp_path / "clean.las", tmp_path / "clean-out.las", labelling, classification=True)
+    found, expected = laspy.read(tmp_path / "out.las"), laspy.read(tmp_path / "clean-out.las")
+    seen = usable(las)
+    assert 500 < seen.sum() < 5_500
+    assert (found.points.array[seen] == expected.points.array).all()
+    assert set(np.asarray(found[PREDICTED])[~seen].tolist()) == {UNLABELLED}
+    assert (np.asarray(found.classification)[~seen] == np.asarray(las.classification)[~seen]).all()
+    assert (told["points"], told["left_out"]) == (6_000, (~seen).sum())
+    assert [("withheld" in text, "noise" in text) for text in remarks] == [(True, False), (False, True)]
+    told["output"] = "out.las"
+    assert f"{(~seen).sum():,} of them withheld or noise" in labelled(told)
+    las.withheld[:] = 1
+    las.write(tmp_path / "all.las")
+    with pytest.raises(InputError, match="no points to be labelled: all are withheld or noise"):
+        predict_file(tmp_path / "all.las", tmp_path / "none.las", labelling)
+    assert not (tmp_path / "none.las").exists()
 
 
 def test_bad_input_is_told_and_leaves_nothing(tmp_path: Path, labelling: Labelling) -> None:

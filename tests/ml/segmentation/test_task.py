@@ -182,6 +182,7 @@ def test_fine_tuning_begins_with_what_synthetic_data_taught(data: Path, tmp_path
     task.train(Run.start(tmp_path / "tuned", changed, overwrite=True))  # nor with what another seed did
     assert not same(first, weights(tmp_path / "tuned" / PRETRAINING))
     begun = Run.start(tmp_path / "tuned", changed, overwrite=True)  # nor with what the same seed learned of other data
+    begun.begin()
     assert not (begun.folder / PRETRAINING).exists()
 
 
@@ -307,6 +308,40 @@ def test_commands_train_evaluate_and_predict(data: Path, tmp_path: Path, capsys:
     assert told["points"] == 1500
     found = np.asarray(laspy.read(tmp_path / "labelled.laz")["predicted_class"])
     assert np.bincount(found, minlength=5).tolist() == list(told["classes"].values())
+    _check_usual_output(tmp_path, capsys)
+
+
+def _check_usual_output(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Label two clouds of one name by a folder's run from elsewhere: each result lies beside its cloud, and says so."""
+    run = str(folder / "run")
+    for place in ("a", "b"):
+        (folder / place).mkdir()
+        write_cloud(folder / place / "cloud.laz", road_block(1500, 9, 20.0))
+        assert cli.main(["predict", run, str(folder / place / "cloud.laz")]) == 0
+        output = folder / place / "cloud-predicted.laz"
+        said = capsys.readouterr().out.splitlines()
+        assert said[0].startswith(f"written {output}: 1,500 points with the attribute predicted_class (")
+        assert said[1].split() == ["class", "points", "share"]
+        names = [row.name for row in class_scheme("5").rows]
+        rows = [line.split() for line in said[2:-1]]
+        assert [row[0] for row in rows] == names
+        assert sum(int(row[1].replace(",", "")) for row in rows) == 1500
+        assert sum(float(row[2].rstrip("%")) for row in rows) == pytest.approx(100.0, abs=0.3)
+        assert said[-1] == f"next: synthroads cloud preview {output} --output {folder / place / 'cloud-predicted'}"
+        assert cli.main(said[-1].split()[2:]) == 0, "what it says to do next works"
+        shown = capsys.readouterr().out
+        assert "preview_predicted.png shows predicted_class" in shown
+        assert "preview_class.png shows class_id" in shown
+    assert cli.main(["predict", run, str(folder / "a" / "cloud.laz")]) == 2
+    refused = capsys.readouterr().err
+    assert refused.startswith(f"error: {folder / 'a' / 'cloud-predicted.laz'}: is there already; --overwrite")
+    assert "--output is" not in refused
+    assert cli.main(["predict", run, str(folder / "a" / "cloud.laz"), "--overwrite", "--quiet"]) == 0
+    assert capsys.readouterr().out == ""
+    assert cli.main(["predict", run, str(folder / "a" / "cloud.laz"), "--overwrite", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["attribute"], told["output"]) == ("predicted_class", str(folder / "a" / "cloud-predicted.laz"))
+    assert told["next"].startswith("synthroads cloud preview ")
 
 
 def test_a_checkpoint_of_another_network_is_refused(data: Path, tmp_path: Path) -> None:
@@ -465,6 +500,7 @@ def test_clouds_of_one_name_have_results_of_their_own(trained: Trained, tmp_path
         (tmp_path / name).mkdir()
     sets = Evaluation([tmp_path / "set.v1", tmp_path / "set.v2"], "test", tmp_path / "out")
     assert task._names(sets) == ["set.v1-test", "set.v2-test"]
+    assert task._names(Evaluation([Path("/")], "test", tmp_path)) == ["-test"]
     with pytest.raises(InputError, match="is given twice"):
         task.evaluate(run, Evaluation([clouds[0], clouds[0]], "test", tmp_path / "out"))
 

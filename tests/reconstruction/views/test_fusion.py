@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from synthroads_addon.base.arrays import Float
-from synthroads_addon.reconstruction.views.fusion import fuse
+from synthroads_addon.reconstruction.views.fusion import fuse, mean_axis
 from synthroads_addon.reconstruction.views.view import View
 
 STATIONS: Float = 5.0 * np.arange(40) + 2.5
@@ -68,3 +68,19 @@ def test_without_any_view_nothing_is_known() -> None:
     axis = fuse(STATIONS, [view("lines", np.nan, 0.05)])
     assert np.isnan(axis.raw).all()
     assert np.isinf(axis.std).all()
+
+
+def test_axes_of_several_grids_are_averaged_but_for_slips() -> None:
+    first, other = fuse(STATIONS, [view("a", 0.0, 0.1)]), fuse(STATIONS, [view("a", 0.02, 0.2)])
+    slipped = fuse(STATIONS, [view("a", np.where(STATIONS < 100.0, 0.04, 3.75), 0.1)])
+    axis = mean_axis(first, [other, slipped])
+    assert axis.raw[:10] == pytest.approx(0.02, abs=1e-9)
+    assert axis.raw[24:] == pytest.approx(0.01, abs=1e-9)
+    assert axis.offsets[24:] == pytest.approx(0.01, abs=1e-6)
+    assert axis.std[24:] == pytest.approx(0.15, rel=0.01), "no surer than the grids are"
+    assert axis.views == first.views
+
+
+def test_what_the_first_grid_does_not_show_is_not_measured_by_others() -> None:
+    hidden = fuse(STATIONS, [view("a", np.where(STATIONS < 100.0, 0.0, np.nan), 0.1)])
+    assert np.isnan(mean_axis(hidden, [fuse(STATIONS, [view("a", 0.0, 0.1)])]).raw[20:]).all()

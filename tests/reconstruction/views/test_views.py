@@ -125,6 +125,12 @@ def test_lines_that_do_not_say_which_is_the_axis_leave_it_open() -> None:
     assert view_period(profiles([(-4.0, 4.0)]), False, 0.0).seen == 0.0
 
 
+def test_the_markings_period_is_less_sure_near_the_ends_where_no_window_reaches_beyond() -> None:
+    std = view_period(profiles([(-3.5, 3.5)], dashes=(0.0,)), False, 0.0).std
+    assert std[10:20].max() < 0.15
+    assert min(std[0], std[-1]) > 0.35
+
+
 def test_without_contrast_nothing_is_seen() -> None:
     plain = profiles([])
     assert view_brightness(plain, [0.0], False).seen == 0.0

@@ -403,7 +403,7 @@ def test_speeds_are_those_of_the_signs(tmp_path: Path) -> None:
     read = written(RoadParameters.from_dict(data), tmp_path)
     for part in read.roads:
         (kind,) = part.road.findall("type/speed")
-        assert kind.get("max") == "no limit"
+        assert (kind.get("max"), kind.get("unit")) == ("no limit", "km/h")
         found = [speeds(part, s) for s in (300.0, 600.0, 800.0, 1000.0, 1500.0)]
         right, left = [{130.0}, {100.0}, {100.0}, {130.0}, {130.0}], [{120.0}, {120.0}, {80.0}, {80.0}, {130.0}]
         assert found == (right if part.side == "right" else left)

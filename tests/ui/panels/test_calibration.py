@@ -1,5 +1,6 @@
 """The panel "Calibration": its buttons do what the library does, and leave nothing behind."""
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,10 @@ from synthroads_addon.blender.materials import material
 from synthroads_addon.blender.materials.image import base_color_image
 from synthroads_addon.calibration.job import CalibrationJob, MaterialTarget, calibrate, save_fitted
 from synthroads_addon.materials.table import materials
+from synthroads_addon.ui.fields import room
 from synthroads_addon.ui.panels import calibration
 from tests.helpers.clouds.calibration_cloud import labelled, striped
+from tests.helpers.scenes.fake_layout import drawn
 
 
 @pytest.fixture(autouse=True)
@@ -92,6 +95,38 @@ def test_classes_beside_an_axis(settings: Any, tmp_path: Path) -> None:
     assert ratio * (1.0 + paint.retroreflection / paint.reflectivity) > 1.5
 
 
+def test_an_axis_changes_what_the_usual_materials_are_compared_with(settings: Any) -> None:
+    def told() -> list[str]:
+        return [row.told for row in settings.classes]
+
+    assert told() == ["road", "road_marking"]
+    settings.classes[1].told = "60"
+    settings.axis = "axis.csv"
+    assert told() == ["paved", "60"]
+    bpy.ops.synthroads.add_calibration_class()
+    assert told() == ["paved", "60", "line"]
+    settings.axis = ""
+    assert told() == ["road", "60", "road_marking"]
+
+
+def test_results_name_their_percentiles(settings: Any, tmp_path: Path) -> None:
+    labels(settings, labelled(tmp_path / "real.laz", 30.0, 40.0))
+    assert bpy.ops.synthroads.compare_intensities() == {"FINISHED"}
+    lines = calibration.result_lines(calibration.latest.compared[0])
+    assert lines[2] == "Percentiles 25, 50, 75, 90:"
+    assert [line.partition(":")[0] for line in lines[3:]] == ["Real", "Expected", "Error / IQR"]
+    assert all(len(line.partition(":")[2].split()) == 4 for line in lines[3:])
+
+
+@pytest.mark.parametrize(("width", "kind"), [(300.0, "column"), (600.0, "row")], ids=["as at first", "wide"])
+def test_what_is_fitted_is_not_cut_off(settings: Any, monkeypatch: pytest.MonkeyPatch, width: float, kind: str) -> None:
+    """The names stand side by side only where there is room: in the sidebar as it is at first there isn't."""
+    monkeypatch.setattr(room, "sidebar_width", lambda: width)
+    settings.real = "real.laz"
+    layout = drawn(calibration.SYNTHROADS_PT_calibration, bpy.context)
+    assert layout.place_of("parts") == kind
+
+
 def test_materials_of_the_scene_are_this_roads(settings: Any) -> None:
     material("asphalt")
     item = next(item for item in bpy.data.materials if item.get("synthroads_material") == "asphalt")
@@ -126,18 +161,71 @@ def test_a_materials_image_is_its_texture(settings: Any) -> None:
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("angles", "0 x", "Incidence"),
-        ("angles", "95", "--incidence-deg"),
-        ("ranges", "", "--range"),
-        ("real", "/nowhere/none.laz", "none.laz"),
+        ("angles", "0 x", "Incidence is '0 x': must be numbers"),
+        ("angles", "95", r"Incidence is \[95.0\]: must be 0 to below 90 degrees"),
+        ("ranges", "", r"Ranges is \[\]: must be above 0"),
+        ("real", "/nowhere/none.laz", "none.laz: no such file"),
+        ("real", "text.laz", "text.laz: is not a LAS file"),
+        ("real", "notes.txt", "must end in .laz"),
+        ("real", ".", "is a folder, not a cloud|must end in .laz"),
     ],
 )
-def test_what_is_wrong_is_said(settings: Any, name: str, value: str, message: str) -> None:
-    setattr(settings, name, value)
+@pytest.mark.parametrize("button", ["compare_intensities", "fit_materials"])
+def test_what_is_wrong_is_said(settings: Any, tmp_path: Path, button: str, name: str, value: str, message: str) -> None:
+    for file in ("text.laz", "notes.txt"):
+        (tmp_path / file).write_text("no cloud")
+    settings.real = str(labelled(tmp_path / "real.laz", 30.0, 40.0))
+    setattr(settings, name, str(tmp_path / value) if name == "real" else value)
     for row in settings.classes:
         row.told = "1"
-    with pytest.raises(RuntimeError, match=message):
-        bpy.ops.synthroads.compare_intensities()
+    assert re.search(message, refusal(button))
+
+
+@pytest.mark.parametrize("button", ["compare_intensities", "fit_materials"])
+@pytest.mark.parametrize(
+    ("chosen", "message"),
+    [
+        ({"class_field": "nothing"}, "nothing"),
+        ({"class_field": ""}, "Material asphalt is 40: no point has it"),
+        ({"told": "99"}, "99"),
+        ({"told": "no_such_class"}, "no_such_class"),
+        ({"told": ""}, "Material asphalt is '': must be a number: the attribute has no names"),
+        ({"material": "unobtainium"}, "must be a material of the table"),
+        ({"material": "paint_white"}, "each material once"),
+        ({"axis": "none.csv", "told": "paved"}, "none.csv"),
+        ({"axis": "text.laz", "told": "paved"}, "text.laz"),
+        ({"axis": "far.csv", "told": "paved"}, "0 points have an intensity, at least 200 are needed"),
+        ({"axis": "far.csv", "told": "40"}, "must be paved or line beside an axis"),
+        ({"axis": "far.csv", "paved": "1"}, "must be pairs FROM TO"),
+        ({"axis": "far.csv", "lines": "x"}, "Lines is 'x': must be numbers"),
+        ({"table": "text.laz"}, "text.laz"),
+        ({"decibels": 0.5}, "Decibels is 0.5: must be 1 to 200 dB"),
+    ],
+)
+def test_wrong_clouds_and_classes_are_a_sentence(
+    settings: Any, tmp_path: Path, button: str, chosen: dict[str, Any], message: str
+) -> None:
+    labels(settings, labelled(tmp_path / "real.laz", 30.0, 40.0))
+    (tmp_path / "text.laz").write_text("no cloud")
+    (tmp_path / "far.csv").write_text("x,y,z\n90000,0,0\n90100,0,0\n90200,0,0\n")
+    for name, value in chosen.items():
+        owner = settings.classes[0] if name in ("told", "material") else settings
+        setattr(owner, name, str(tmp_path / value) if name in ("axis", "table") else value)
+    if chosen.get("told") == "paved":
+        settings.classes[1].told = "line"
+    assert message in refusal(button)
+    assert calibration.latest is None
+
+
+def refusal(button: str) -> str:
+    """Return what a button refuses with: one sentence without options of the command line."""
+    with pytest.raises(RuntimeError) as caught:
+        getattr(bpy.ops.synthroads, button)()
+    text = str(caught.value).strip()
+    assert text.startswith("Error: "), text
+    assert "\n" not in text, text
+    assert "--" not in text, text
+    return text
 
 
 def test_a_texture_needs_an_image(settings: Any) -> None:

@@ -68,3 +68,7 @@ def test_a_dropped_parameter_set_is_built_at_once(tmp_path: Path) -> None:
     root = find_road(bpy.context.scene)
     assert root is not None
     assert recall_parameters(root) == road
+
+
+def test_a_cloud_is_imported_as_a_road() -> None:
+    assert "synthroads.road_from_scan" in drawn(file_menus._draw_import)

@@ -27,6 +27,7 @@ from synthroads_addon.ui.fields.inherited import SOURCES
 from synthroads_addon.ui.fields.properties import PATHS
 from synthroads_addon.ui.fields.sheets import SHEETS, fields_of
 from synthroads_addon.ui.panels import panels, presets
+from synthroads_addon.ui.work import build
 from tests.helpers.scenes.fake_layout import drawn
 
 SNAPSHOTS = Path(__file__).parent / "snapshots"
@@ -38,6 +39,8 @@ EXCEPTIONS = {
     "time_budget": "likewise",
 }
 """Fields of the scenario that no panel shows, and why."""
+OF_ROAD = ("title", "seed", "fidelity", "geometric_tolerance", "vegetation_detail", "road")
+"""Parts of the scenario that a road is built from."""
 
 
 @pytest.fixture(autouse=True)
@@ -87,12 +90,89 @@ def test_the_road_panel_says_what_the_road_was_built_from(panel: Any) -> None:
     for built_from, said in (
         ("", ["label 'Built by a command, not from these settings' <FILE>"]),
         ('["file", "mine.json"]', ["label 'Built from mine.json' <FILE>"]),
-        ("{}", ["label 'Changed since it was built' <INFO>"]),
+        ("[]", ["label 'Changed since it was built' <INFO>"]),
         (panel.road_values(), []),
     ):
         remember(road, parameters, scenario, built_from)
         lines = layout("road").splitlines()
         assert [line for line in lines if line.startswith(("label 'Built", "label 'Changed"))] == said
+
+
+def road_properties(group: Any, path: str = "") -> Iterator[tuple[Any, str, str]]:
+    """Yield (property group, name, path) of all properties that a road is built from, by Blender's own list of them."""
+    for prop in group.bl_rna.properties:
+        below = f"{path}.{prop.identifier}".lstrip(".")
+        if prop.identifier in ("rna_type", "name"):
+            continue
+        if not path and below.removeprefix("own_") not in OF_ROAD:
+            continue
+        if prop.type == "POINTER":
+            yield from road_properties(getattr(group, prop.identifier), below)
+        else:
+            yield group, prop.identifier, below
+
+
+def set_another_value(group: Any, name: str) -> None:
+    """Set a property to a value that it doesn't have, as a user may."""
+    prop, value = group.bl_rna.properties[name], getattr(group, name)
+    if prop.type == "BOOLEAN":
+        setattr(group, name, not value)
+    elif prop.type == "ENUM":
+        items = prop.enum_items.keys()
+        setattr(group, name, value ^ {items[0]} if prop.is_enum_flag else next(item for item in items if item != value))
+    elif prop.type == "STRING":
+        setattr(group, name, value + "1")
+    elif prop.type == "COLLECTION":
+        value.add().file = "mine.json"
+    else:
+        setattr(group, name, prop.hard_max if value != prop.hard_max else prop.hard_min)
+
+
+def says_changed() -> bool:
+    """Return whether the panel of the road says that its settings have changed."""
+    return "label 'Changed since it was built' <INFO>" in layout("road").splitlines()
+
+
+def test_every_setting_that_is_shown_says_that_the_road_has_changed(panel: Any) -> None:
+    scenario = load_scenario("rq31-600m", ["road.length=20"])
+    parameters = sample_road(scenario.road, 1)
+    road = build_road(parameters, 0.02, 0.0).root
+    panel.road.cross_section = BY_HAND
+    for group, name, _ in road_properties(panel):
+        if name.startswith("own_"):
+            setattr(group, name, True)
+    seen = set()
+    for group, name, path in road_properties(panel):
+        remember(road, parameters, scenario, panel.road_values())
+        assert not says_changed(), f"before {path}"
+        set_another_value(group, name)
+        assert says_changed(), path
+        if name == "cross_section":
+            group.cross_section = BY_HAND
+        if name.startswith("own_"):
+            setattr(group, name, True)
+        seen.add(path)
+    wanted = [path for path in PATHS if path.partition(".")[0] in OF_ROAD]
+    missing = [path for path in wanted if not {path, f"{path}_minimum"} & seen]
+    assert missing == []
+
+
+def test_what_is_not_given_is_no_change(panel: Any) -> None:
+    panel.road.own_radius = False
+    before = panel.road_values()
+    panel.road.radius_minimum += 1.0
+    panel.road.cross_section_by_hand.median += 1.0
+    assert panel.road_values() == before
+
+
+def test_building_clears_what_has_changed(panel: Any) -> None:
+    panel.road.length, panel.road.half_width, panel.seed = 40.0, 20.0, 5
+    bpy.ops.synthroads.build()
+    assert not says_changed()
+    panel.road.grass_density += 0.1
+    assert says_changed()
+    bpy.ops.synthroads.build()
+    assert not says_changed()
 
 
 def test_panels_stand_in_their_order() -> None:
@@ -277,7 +357,7 @@ def test_random_road_draws_the_next_seed_and_builds_it(panel: Any) -> None:
     panel.road.length, panel.road.half_width, panel.seed = 60.0, 20.0, 5
     assert bpy.ops.synthroads.random_road() == {"FINISHED"}
     first = panel.seed
-    assert first == presets.next_seed(5) != 5
+    assert first == build.next_seed(5) != 5
     road = find_road(bpy.context.scene)
     scenario = panel.scenario()
     expected = sample_road(scenario.road, first, scenario.title).to_json()
@@ -299,7 +379,7 @@ def test_a_random_road_that_cannot_be_leaves_the_seed(panel: Any) -> None:
 def test_a_menu_of_a_thousand_seeds_repeats_none() -> None:
     seed, seen = 1, set()
     for _ in range(1000):
-        seed = presets.next_seed(seed)
+        seed = build.next_seed(seed)
         seen.add(seed)
     assert len(seen) == 1000
 

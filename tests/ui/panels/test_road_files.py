@@ -16,6 +16,7 @@ from synthroads_addon.road.parameters import RoadParameters, read_parameters
 from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import Scenario, load_scenario
 from synthroads_addon.ui.panels.road_files import source_file_name
+from synthroads_addon.ui.work.long_operator import LongOperator
 from tests.helpers.scenes.panel_road import SAME, cheap, road, road_file, settings, small_pictures
 
 __all__ = ["cheap", "road", "road_file", "settings", "small_pictures"]
@@ -185,3 +186,16 @@ def test_a_folder_that_cannot_be_written_is_a_message(cheap: Any, tmp_path: Path
 def test_saving_needs_a_road(cheap: Any, tmp_path: Path) -> None:
     with pytest.raises(RuntimeError, match="Build a road first"):
         bpy.ops.synthroads.save_road(filepath=str(tmp_path / "mine.json"))
+
+
+def test_what_was_assumed_of_an_axis_is_told(cheap: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[str] = []
+    say = LongOperator._say
+
+    def note(self: LongOperator, message: str, remarks: list[str]) -> set[str]:
+        told.extend(remarks)
+        return say(self, message, remarks)
+
+    monkeypatch.setattr(LongOperator, "_say", note)
+    assert bpy.ops.synthroads.load_axis(filepath=str(axis_file(tmp_path))) == {"FINISHED"}
+    assert ["axis.csv names no system: its coordinates are taken for EPSG:25832" in text for text in told] == [True]

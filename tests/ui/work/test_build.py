@@ -6,13 +6,16 @@ from collections.abc import Callable, Generator
 from typing import Any
 
 import bpy
+import numpy as np
 import pytest
+from mathutils import Vector
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.blender.model import build as model_module
 from synthroads_addon.blender.model.build import build_road, build_steps
+from synthroads_addon.blender.model.roads import root_above
 from synthroads_addon.blender.model.stage import DataBlockLog, remove_staged
-from synthroads_addon.blender.model.store import find_road, recall
+from synthroads_addon.blender.model.store import find_road, recall, roads
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.blender.things.model_builder import ROLE
 from synthroads_addon.blender.things.registry import model_parts
@@ -25,6 +28,7 @@ from synthroads_addon.ui.work.unseen import build_unseen
 from tests.helpers.scenes.kept_groups import KeptGroups
 from tests.helpers.scenes.panel_road import (  # noqa: F401
     SAME,
+    SMALL,
     block_counts,
     cheap,
     choose,
@@ -314,3 +318,68 @@ def test_a_growing_road_is_evaluated_but_not_drawn() -> None:
     assert not any(layer.hide_viewport for layer in layers)
     road = model.objects["Road"].evaluated_get(bpy.context.evaluated_depsgraph_get())
     assert len(road.data.polygons) > 100
+
+
+# --- one more road ---------------------------------------------------------------------------------------------------
+
+
+def outline(root: bpy.types.Object) -> np.ndarray:
+    """Return the plan coordinates of all vertices of a road's visible parts, m: not by the way of the panel."""
+    graph = bpy.context.evaluated_depsgraph_get()
+    points = []
+    for use in graph.object_instances:
+        item = use.instance_object if use.is_instance else use.object
+        owner = use.parent if use.is_instance else use.object
+        if root_above(owner.original) == root and item.type == "MESH" and len(item.data.vertices):
+            flat = np.empty(3 * len(item.data.vertices), np.float32)
+            item.data.vertices.foreach_get("co", flat)
+            matrix = np.array(use.matrix_world)
+            points.append(flat.reshape(-1, 3) @ matrix[:2, :3].T + matrix[:2, 3])
+    return np.concatenate(points)
+
+
+def apart(one: np.ndarray, other: np.ndarray) -> float:
+    """Return the widest gap, m, between two sets of points across any straight line; negative if none parts them."""
+    angles = np.radians(np.arange(360))
+    gaps = [(other @ d).min() - (one @ d).max() for d in np.column_stack([np.cos(angles), np.sin(angles)])]
+    return float(max(gaps))
+
+
+def test_one_more_road_is_another_and_stands_beside_the_first(cheap: Any) -> None:  # noqa: F811
+    choose(cheap, **{"road.length": 60.0})
+    bpy.ops.synthroads.build()
+    (first,) = roads(bpy.context.scene)
+    before = outline(first)
+    bpy.ops.synthroads.build(beside=True)
+    second = next(root for root in roads(bpy.context.scene) if root != first)
+    assert find_road(bpy.context.scene) == second
+    assert np.array_equal(outline(first), before), "the first stays where it is"
+    assert apart(before, outline(second)) > 5.0
+    assert recall(second)[1].seed == cheap.seed != recall(first)[1].seed == SMALL["seed"]
+    assert recall(second)[0].alignment != recall(first)[0].alignment
+    assert second["synthroads_built_from"] == cheap.road_values()
+    place = tuple(second.location)
+    bpy.ops.synthroads.build()
+    assert tuple(second.location) == place, "built again it stays beside the first"
+
+
+def test_one_more_road_leaves_the_users_own_free(cheap: Any) -> None:  # noqa: F811
+    choose(cheap, **{"road.length": 60.0})
+    bpy.ops.mesh.primitive_cube_add(size=40.0, location=(10.0, 0.0, 0.0))
+    cube = bpy.context.object
+    bpy.ops.synthroads.build(beside=True)
+    (root,) = roads(bpy.context.scene)
+    corners = np.array([cube.matrix_world @ Vector(corner) for corner in cube.bound_box])[:, :2]
+    assert apart(corners, outline(root)) > 5.0
+    assert cheap.seed == SMALL["seed"], "no road has it yet"
+
+
+def test_one_more_road_that_cannot_be_leaves_the_seed(cheap: Any) -> None:  # noqa: F811
+    choose(cheap, **{"road.length": 60.0})
+    bpy.ops.synthroads.build()
+    cheap.road.own_radius = True
+    cheap.road.radius_minimum = cheap.road.radius_maximum = 10.0
+    with pytest.raises(RuntimeError, match="radius"):
+        bpy.ops.synthroads.build(beside=True)
+    assert cheap.seed == SMALL["seed"]
+    assert len(roads(bpy.context.scene)) == 1

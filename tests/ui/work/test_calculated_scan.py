@@ -115,13 +115,19 @@ def test_what_the_user_changes_meanwhile_is_not_in_the_scan(boards: Any, tmp_pat
     assert cloud(tmp_path / "out") == cloud(tmp_path / "again")
 
 
-def test_an_image_that_is_gone_ends_the_scan(boards: Any, tmp_path: Path) -> None:
+@pytest.mark.parametrize("kernels", ["auto", "off"])
+def test_an_image_that_is_gone_ends_the_scan_if_cycles_shows_it(boards: Any, tmp_path: Path, kernels: str) -> None:
+    choose(boards, **{"scan.kernels": kernels})
     job = job_of_the_panel()
     job.start()
     while job.touches_scene:
         job.tick(0.0)
     bpy.data.images.remove(bpy.data.images["Fields"])
     wait_for_end(job)
+    if kernels == "auto":
+        assert job.error is None
+        assert (tmp_path / "out" / "cloud.laz").exists()
+        return
     assert "image of the material" in str(job.error)
     assert not (tmp_path / "out").exists()
 

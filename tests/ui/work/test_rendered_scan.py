@@ -106,7 +106,12 @@ def test_the_scene_that_the_window_shows_is_scanned_as_it_is_now(road: Any, tmp_
     shown = len(scene_mesh().triangles)
     layer = bpy.context.scene.view_layers.new("Less")
     bpy.context.window.view_layer = layer
-    bpy.data.objects["Delineators"].hide_set(True, view_layer=layer)
+    posts, apart = bpy.data.objects["Delineators"], bpy.data.collections.new("Apart")
+    bpy.context.scene.collection.children.link(apart)
+    for collection in posts.users_collection:
+        collection.objects.unlink(posts)
+    apart.objects.link(posts)
+    layer.layer_collection.children["Apart"].exclude = True
     assert bpy.ops.synthroads.scan() == {"FINISHED"}
     scanned = json.loads((tmp_path / "out" / "report.json").read_text())["counts"]["triangles"]
     assert scanned == len(scene_mesh().triangles) < shown
@@ -126,12 +131,10 @@ def test_a_cancelled_scan_leaves_nothing_and_no_process(
     while not started or (when == "later" and job.share < 0.2):
         assert job.tick(0.0)
         time.sleep(0.002)
-    begin = time.perf_counter()
     job.stop()
     wait_for_end(job)
-    assert time.perf_counter() - begin < 5.0
     assert isinstance(job.error, Cancelled)
-    assert started[0].returncode is not None
+    assert started[0].returncode not in (None, 0), "it is killed, not waited for"
     assert not (tmp_path / "out").exists()
 
 

@@ -11,19 +11,24 @@ import pytest
 
 import synthroads_addon
 from synthroads_addon.base.errors import Cancelled
+from synthroads_addon.base.progress import Progress
 from synthroads_addon.blender.compat import set_modifier_input
 from synthroads_addon.blender.model.store import find_road
 from synthroads_addon.blender.things.model_builder import ROLE
+from synthroads_addon.jobs import job_files
 from synthroads_addon.jobs.generate import Job as PipelineJob
 from synthroads_addon.jobs.generate import generate
 from synthroads_addon.jobs.job_files import FILES
 from synthroads_addon.jobs.scan.plan import Site
 from synthroads_addon.road.parameters import read_parameters
+from synthroads_addon.scanning import forecast
 from synthroads_addon.scenario.scenario import load_scenario
 from synthroads_addon.ui.work import scan
 from synthroads_addon.ui.work.job import PanelJob, running_job
+from synthroads_addon.ui.work.long_operator import draw_job
 from synthroads_addon.ui.work.scan import scan_work
 from synthroads_addon.ui.work.scan_steps import Written
+from tests.helpers.scenes.fake_layout import FakeLayout
 from tests.helpers.scenes.panel_road import (  # noqa: F401
     SAME,
     block_counts,
@@ -78,6 +83,32 @@ def test_a_scan_leaves_the_scene_as_it_was(road: Any) -> None:  # noqa: F811
     before, counts = digest(), block_counts()
     assert bpy.ops.synthroads.scan() == {"FINISHED"}
     assert block_counts() == counts
+    assert digest() == before
+
+
+def test_a_scan_is_cancelled_while_models_of_its_road_are_written(
+    road: Any,  # noqa: F811
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """They come first: a long road's take minutes."""
+    told: list[Any] = []
+
+    def write(*_: Any, progress: Progress) -> None:
+        progress("IFC", 0.5)
+        told.append(job.share)
+        job.stop()
+        progress("IFC", 0.6)
+        told.append("went on")
+
+    monkeypatch.setattr(job_files, "write_twin", write)
+    choose(road, twin={"geojson"}, output=str(tmp_path / "models"))
+    before = digest()
+    job = PanelJob("Scan", scan_work(scan.requested_scan(bpy.context)))
+    with pytest.raises(Cancelled):
+        job.run()
+    assert told == [pytest.approx(0.1 + 0.9 * 0.5 * 0.02)]
+    assert not (tmp_path / "models").exists()
     assert digest() == before
 
 
@@ -191,6 +222,20 @@ def test_the_thread_touches_no_data_of_blender(road: Any, tmp_path: Path, monkey
     bpy.context.scene.synthroads.output = str(tmp_path / "again")
     bpy.ops.synthroads.scan()
     assert (tmp_path / "out" / "cloud.laz").read_bytes() == (tmp_path / "again" / "cloud.laz").read_bytes()
+
+
+@pytest.mark.parametrize("long", [True, False])
+def test_a_long_scan_is_announced_below_its_progress(road: Any, monkeypatch: pytest.MonkeyPatch, long: bool) -> None:  # noqa: F811
+    """The number of pulses, size, time and memory, as long as it lasts; of a short one nothing."""
+    monkeypatch.setattr(forecast, "LONG", 0.0 if long else 1e9)
+    job, shown = job_of_the_panel(), set()
+    job.start()
+    while job.tick(0.0):
+        draw_job(layout := FakeLayout())
+        shown |= {line for line in layout.lines if "pulses" in line}
+    assert job.error is None
+    assert bool(shown) == long
+    assert job.notes == []
 
 
 @pytest.mark.any_blender

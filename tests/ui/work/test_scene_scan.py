@@ -14,6 +14,8 @@ from synthroads_addon.cloud.formats.registry import open_cloud
 from synthroads_addon.ui.panels.scene_scan import unclassified
 from synthroads_addon.ui.work import scan as scan_module
 from tests.helpers.scenes.panel_road import choose, settings, small_pictures
+from tests.helpers.scenes.scene_hash import changes, lines
+from tests.helpers.scenes.transparent_materials import CASES, Nodes, add_card
 
 __all__ = ["settings", "small_pictures"]
 
@@ -102,7 +104,7 @@ def test_what_is_visible_is_scanned_with_its_classes(yard: Any) -> None:
 
 def test_along_a_curve(yard: Any) -> None:
     """Strips of a scanner 12 m above a curve along y at x = -15 lie there, and not over the middle."""
-    bpy.data.objects["Box"].hide_viewport = True
+    bpy.data.objects["Box"].hide_render = True
     yard.scan.platform.lateral_offsets = "0"
     yard.scan.own_field_of_view_deg, yard.scan.field_of_view_deg = True, 20.0
     guide(curve((-15.0, -18.0, 0.0), (-15.0, 18.0, 0.0)))
@@ -144,3 +146,56 @@ def test_an_empty_scene_is_a_message(settings: Any, tmp_path: Path) -> None:
     with pytest.raises(RuntimeError, match="nothing visible in it has faces"):
         bpy.ops.synthroads.scan()
     assert not (tmp_path / "out").exists()
+
+
+def test_a_scene_in_other_units_is_a_message(yard: Any) -> None:
+    bpy.context.scene.unit_settings.scale_length = 0.01
+    with pytest.raises(RuntimeError, match=r"Unit Scale is 0.01: must be 1 .*by 0.01"):
+        bpy.ops.synthroads.scan()
+    assert not Path(yard.output).exists()
+    bpy.context.scene.unit_settings.system = "NONE"
+    assert bpy.ops.synthroads.scan() == {"FINISHED"}
+
+
+@pytest.mark.parametrize(
+    ("visible", "boxes", "source"), [("render", 2, "material"), ("viewport", 1, "material"), ("render", 2, "images")]
+)
+def test_the_panel_scans_and_says_what_the_command_does(yard: Any, visible: str, boxes: int, source: str) -> None:
+    """A box that the viewport hides, hair, and a card that is clear: seen, named and passed as by `synthroads scan`."""
+    choose(yard, **CHEAP | {"colour.source": source})
+    twin = bpy.data.objects.new("Twin", bpy.data.objects["Box"].data)
+    twin.location = (-8.0, 3.0, 2.0)
+    bpy.context.scene.collection.objects.link(twin)
+    bpy.context.view_layer.update()
+    twin.hide_viewport = True
+    settings = bpy.data.objects["Box"].modifiers.new("Fur", "PARTICLE_SYSTEM").particle_system.settings
+    settings.type, settings.render_type, settings.count = "HAIR", "PATH", 3
+    nodes = Nodes()
+    CASES["noise"].build(nodes)
+    add_card(nodes.item, size=2.0, height=9.0)
+    bpy.context.scene.synthroads_scene_scan.visible = visible
+    bpy.context.view_layer.update()
+    before = lines()
+    points, _, report = scanned(yard)
+    assert changes(before) == []
+    high = points[(points[:, 2] > 0.5) & (points[:, 2] < 8.0)]
+    assert len(set((high[:, 0] > 0.0).tolist())) == boxes
+    text = " ".join(report["warnings"])
+    assert "Box: hair can't be scanned" in text
+    assert "the transparency of the material 'Clear' can't be worked out (Noise Texture" in text
+
+
+@pytest.mark.parametrize("source", ["material", "images"])
+def test_remarks_of_either_blender_are_in_the_report(yard: Any, source: str) -> None:
+    """Steps of coordinates far from the origin, and faces whose vertices are of two classes."""
+    choose(yard, **CHEAP | {"colour.source": source})
+    box = bpy.data.objects["Box"]
+    layer = box.data.attributes.new("class_id", "INT", "POINT")
+    layer.data.foreach_set("value", [4] * 4 + [5] * 4)
+    for item in bpy.data.objects:
+        item.location.x += 20_000.0
+    bpy.context.view_layer.update()
+    _, _, report = scanned(yard)
+    (mixed,) = (text for text in report["remarks"] if "faces have vertices of several class_id" in text)
+    assert mixed.startswith("Box: 4 faces")
+    assert len([text for text in report["remarks"] if "are held in steps of 2 mm" in text]) == 1

@@ -7,7 +7,6 @@ import pytest
 import torch
 
 from ml.configuration import from_data
-from ml.data.axis import MeasuredAxis
 from ml.data.corridor import CORRIDOR
 from ml.data.frames import displace_frames, frames_along
 from ml.data.slices import mirror_batch
@@ -16,6 +15,7 @@ from ml.networks.centerline.models import TARGETS, both_ways
 from ml.networks.centerline.refinement import parabola
 from ml.registry import networks
 from synthroads_addon.base.errors import InputError
+from synthroads_addon.road.axes.measured_axis import MeasuredAxis
 from tests.helpers.clouds.centerline_batches import MODELS, batch, moved, select, small
 
 

@@ -1,0 +1,55 @@
+"""Work that libraries do for long without Python, as renders: a signal ends the command all the same, without delay."""
+
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from headless import ENDS, ignore_end_signals
+from headless.commands import report_interrupt
+from synthroads_addon.base.scratch.folders import remove_scratch_folders
+
+GRACE = 1.0
+"""Seconds in which the main thread may end the work by itself, as it does unless a library holds it."""
+
+
+@contextmanager
+def ended_promptly() -> Iterator[None]:
+    """Context in which a signal ends the process within `GRACE`, whatever the main thread does; Unix alone.
+
+    Files must appear under their names only when they are whole, and no process of ours be at work.
+    """
+    if sys.platform == "win32" or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    hear, say = os.pipe()
+    os.set_blocking(say, False)
+    over = threading.Event()
+    before = signal.set_wakeup_fd(say, warn_on_full_buffer=False)
+    threading.Thread(target=_wait_for_signal, args=(hear, over), daemon=True).start()
+    try:
+        yield
+    finally:
+        over.set()
+        signal.set_wakeup_fd(before)
+        os.close(say)  # the thread ends with the pipe
+
+
+def _wait_for_signal(hear: int, over: threading.Event) -> None:
+    """End the process if a signal comes that ends it and the work isn't over a while later."""
+    signal.pthread_sigmask(signal.SIG_BLOCK, ENDS)  # the main thread is to hear them
+    while heard := os.read(hear, 1):
+        ends = heard[0] in ENDS and signal.getsignal(heard[0]) not in (signal.SIG_IGN, signal.SIG_DFL)
+        if ends and not over.wait(GRACE):
+            _leave()
+    os.close(hear)
+
+
+def _leave() -> None:
+    """Clean up and end the process with exit code 130."""
+    ignore_end_signals()
+    code = report_interrupt()
+    remove_scratch_folders()
+    os._exit(code)

@@ -1,0 +1,97 @@
+"""Values of texts that somebody typed for a field, by the type that the field is declared with."""
+
+import difflib
+import json
+from collections.abc import Iterator, Sequence
+from types import NoneType, UnionType
+from typing import Annotated, Any, Union, get_args, get_origin
+
+from pydantic import BaseModel, TypeAdapter, ValidationError
+
+from ..errors import SynthRoadsError
+
+
+def typed_value(model: type[BaseModel], path: str, text: str) -> Any:
+    """Return the value that a text stands for: JSON where the field takes that, else the text as it stands.
+
+    ``5`` is a number for a field of numbers and the text "5" for one of text; ``null`` takes a value away everywhere.
+
+    Args:
+        model: that the path begins in.
+        path: dotted, e.g. ``scan.platform.height``; of one that isn't there, JSON is taken where the text is JSON.
+        text: what was typed, e.g. ``80``, ``draft`` or ``["laz"]``.
+    """
+    try:
+        value = json.loads(text)
+    except (ValueError, RecursionError):
+        return text
+    if value is None or isinstance(value, str):
+        return value
+    kinds = [one for kind in declared_kinds(model, path.split(".")) for one in alternatives(kind)]
+    if isinstance(value, (dict, list)) and set(kinds) - {str, NoneType}:
+        return value
+    return text if not _is_taken(value, kinds) and _is_taken(text, kinds) else value
+
+
+def declared_kinds(kind: Any, path: Sequence[str]) -> list[Any]:
+    """Return the types that the field at a path is declared with in all classes that it may lie in; none: no field.
+
+    Args:
+        kind: a class of fields, or any other type, in which the path begins.
+        path: names of the fields, outermost first.
+    """
+    if not path:
+        return [kind]
+    kinds: list[Any] = []
+    for one in alternatives(kind):
+        if isinstance(one, type) and issubclass(one, BaseModel):
+            named = (field for name, field in one.model_fields.items() if path[0] == (field.alias or name))
+            kinds += [inner for field in named for inner in declared_kinds(field.annotation, path[1:])]
+        elif get_origin(one) is dict:
+            kinds += declared_kinds(get_args(one)[1], path[1:])
+    return kinds
+
+
+def nearest_path(model: type[BaseModel], name: str) -> str:
+    """Return `` (did you mean 'road.length'?)`` for the field of a class, or within its groups, most like a name.
+
+    Of several fields of that name the outermost is meant; an empty string if none is like it.
+    """
+    paths: dict[str, str] = {}
+    level: list[tuple[str, Any]] = [("", model)]
+    while level:
+        below: list[tuple[str, Any]] = []
+        for above, kind in level:
+            for one in alternatives(kind):
+                if not (isinstance(one, type) and issubclass(one, BaseModel)):
+                    continue
+                for key, field in one.model_fields.items():
+                    called = field.alias or key
+                    if called not in paths:
+                        paths[called] = f"{above}{called}"
+                        below.append((f"{above}{called}.", field.annotation))
+        level = below
+    close = difflib.get_close_matches(name, paths, n=1, cutoff=0.6)
+    return f" (did you mean '{paths[close[0]]}'?)" if close else ""
+
+
+def alternatives(kind: Any) -> Iterator[Any]:
+    """Yield the types of which a type is the union, nested ones too, without annotations."""
+    if get_origin(kind) is Annotated:
+        yield from alternatives(get_args(kind)[0])
+    elif get_origin(kind) in (Union, UnionType):
+        for one in get_args(kind):
+            yield from alternatives(one)
+    else:
+        yield kind
+
+
+def _is_taken(value: Any, kinds: Sequence[Any]) -> bool:
+    """Return whether a value is valid for one of some types; limits of the field don't count."""
+    for kind in kinds:
+        try:
+            TypeAdapter(kind).validate_python(value)
+        except (ValidationError, SynthRoadsError):
+            continue
+        return True
+    return False

@@ -1,0 +1,114 @@
+"""Parts of an open scene that aren't scanned as declared, as sentences: hair, displacement, missing images."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+import bpy
+
+from ..materials import scene_name
+from ..materials.image import nodes_without_image, trees_below
+from ..materials.surface_layers import PROPERTY, material_output
+from ..materials.transparency import read_transparency
+
+_KINDS = {
+    "CURVES": "hair curves",
+    "POINTCLOUD": "points",
+    "VOLUME": "a volume",
+    "GREASEPENCIL": "Grease Pencil",
+    "GPENCIL": "Grease Pencil",
+}
+"""Kinds of evaluated objects that renders show and that have no faces."""
+_MOST_NAMES = 5
+"""Names that a sentence lists at most."""
+
+
+class LeftOut:
+    """Collector of what renders show and scans don't, while a scene is read.
+
+    Attributes:
+        users: names of the objects that have each material, by the material's name in the scene.
+    """
+
+    def __init__(self) -> None:
+        self.users: dict[str, set[str]] = {}
+        self._without_faces: dict[str, set[str]] = {}
+        self._holdouts: set[str] = set()
+
+    def see_kind(self, item: bpy.types.Object) -> None:
+        """Take note of an evaluated object that isn't a mesh."""
+        if item.type in _KINDS:
+            self._without_faces.setdefault(_KINDS[item.type], set()).add(item.original.name)
+
+    def see_object(self, item: bpy.types.Object, slots: Collection[str]) -> None:
+        """Take note of an object that is scanned, with the names of its materials in the scene."""
+        for name in slots:
+            self.users.setdefault(name, set()).add(item.name)
+        if item.is_holdout:
+            self._holdouts.add(item.name)
+
+    def see_hair(self, depsgraph: bpy.types.Depsgraph) -> None:
+        """Take note of the hair in an evaluated scene that particle systems draw as strands."""
+        for item in depsgraph.objects:
+            systems = [modifier for modifier in item.modifiers if modifier.type == "PARTICLE_SYSTEM"]
+            for modifier in systems:
+                settings = modifier.particle_system.settings
+                if modifier.show_viewport and settings.type == "HAIR" and settings.render_type == "PATH":
+                    self._without_faces.setdefault("hair", set()).add(item.original.name)
+
+    def warnings(self, layer: bpy.types.ViewLayer) -> tuple[str, ...]:
+        """Return all that was found as sentences, and what the materials in use declare in vain."""
+        found = [
+            f"{names_of(names)}: {kind} can't be scanned, as there are no faces"
+            for kind, names in sorted(self._without_faces.items())
+        ]
+        if self._holdouts:
+            found.append(f"{names_of(self._holdouts)}: is a holdout, and is scanned as the solid that it is")
+        if layer.material_override is not None:
+            found.append(f"the view layer's material override {layer.material_override.name!r} isn't looked at")
+        return (*found, *material_warnings(self.users))
+
+
+def material_warnings(users: Mapping[str, Collection[str]]) -> list[str]:
+    """Return warnings about materials of others: what they declare that scans don't show, and what was assumed.
+
+    Args:
+        users: names of the objects that have each material, by the material's name in the scene.
+    """
+    warnings: list[str] = []
+    shown = {name: item for item in bpy.data.materials if (name := scene_name(item)) in users}
+    missing: dict[str, set[str]] = {}
+    for name, item in sorted(shown.items()):
+        if item.node_tree is None or PROPERTY in item:
+            continue
+        if obstacle := read_transparency(item).obstacle:
+            text = f"the transparency of the material {name!r} can't be worked out ({obstacle}): it is scanned as solid"
+            warnings.append(text)
+        if _is_displaced(item):
+            text = f"the material {name!r} displaces the surface when it is rendered: it is scanned where its mesh is"
+            warnings.append(f"{names_of(users[name])}: {text}" if users[name] else text)
+        for node in (node for tree in trees_below(item.node_tree) for node in nodes_without_image(tree)):
+            if any(output.is_linked for output in node.outputs):
+                image = (
+                    f"the image {node.image.filepath or node.image.name!r}"
+                    if node.image
+                    else "an image texture's image"
+                )
+                missing.setdefault(image, set()).add(name)
+    for image, names in sorted(missing.items()):
+        text = "is missing or can't be read as a picture: what stands in the socket that it feeds takes its place"
+        warnings.append(f"{image} of the material {names_of(names)} {text}")
+    return warnings
+
+
+def _is_displaced(item: bpy.types.Material) -> bool:
+    end = material_output(item.node_tree)
+    methods = ("DISPLACEMENT", "BOTH")
+    return end is not None and end.inputs["Displacement"].is_linked and item.displacement_method in methods
+
+
+def names_of(names: Collection[str]) -> str:
+    """Return some names as a list in a sentence, shortened where they are many."""
+    some = sorted(names)
+    rest = len(some) - _MOST_NAMES
+    return ", ".join(some[:_MOST_NAMES]) + (f" and {rest} more" if rest > 0 else "")

@@ -1,0 +1,34 @@
+"""Colours of files as 16-bit sRGB: what full brightness is, by what a file declares, or else by its largest value."""
+
+import numpy as np
+
+from ..base.arrays import AnyArray, UInt16
+
+EIGHT_BITS, SIXTEEN_BITS = 255.0, 65535.0
+_BRIGHTNESSES = (1.0, EIGHT_BITS, SIXTEEN_BITS)
+
+
+def full_brightness(largest: float, *, whole: bool = True) -> float:
+    """Return the stored value of full brightness, by the largest value of a file that declares none.
+
+    Files of 16-bit or floating-point fields often hold 8 bits or shares from 0 to 1.
+
+    Args:
+        largest: of all channels of all points.
+        whole: whether the field holds whole numbers: a share of 1 is then no possibility.
+
+    Returns:
+        255 or 65535; of floating-point fields 1 as well; a larger largest value itself.
+    """
+    return next((full for full in _BRIGHTNESSES[whole:] if largest <= full), float(largest))
+
+
+def brightness_text(full: float) -> str:
+    """Return in words what stored colours count to."""
+    return {1.0: "shares from 0 to 1", EIGHT_BITS: "8 bits (0 to 255)"}.get(full, f"numbers from 0 to {full:,.0f}")
+
+
+def sixteen_bits(values: AnyArray, full: float) -> UInt16:
+    """Return colours of any shape as 16 bits, from stored values whose full brightness is given; NaN is dark."""
+    share = np.clip(np.nan_to_num(np.asarray(values, dtype=np.float64)) / full, 0.0, 1.0)
+    return np.rint(share * SIXTEEN_BITS).astype(np.uint16)

@@ -1,0 +1,1 @@
+"""Axes of roads in files: read, written, and stations and offsets beside them."""

@@ -1,0 +1,301 @@
+"""`MeasuredAxis`: a line along a road by running length, with the gaps that a measured one has.
+
+All that is told by station and offset beside a polyline is told by it: training truth, scores, materials beside an
+axis. Two lines have frames of their own: a road's `Alignment`, which is exact, and the path of a reconstruction, whose
+heading turns from metre to metre and not at vertices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...base.arrays import Bool, Float, Index
+from ...base.errors import InputError
+from ...base.maps.places import Placement
+from ...base.remarks import assume
+from ..geometry import RoadGeometry
+from .centerline import read_axis
+
+GAP = 3.5
+"""Neighbouring points of a measured axis that lie farther apart than so many times their usual distance, and than so
+many metres, leave a gap between them."""
+_EVEN_SHARE, _EVEN_FACTOR = 0.7, 2.0
+"""An axis is one of evenly spaced points, which can have gaps, where this share of its steps is within this factor of
+their median; else it is a drawn line with vertices where they are needed."""
+_CELL = 8.0
+"""Edge of the cells of points that share the segments among which each one's nearest is looked for, m."""
+_RUN = 32
+"""Segments that are looked at as one, by the circle around them, first."""
+_PAIRS = 100_000
+"""Pairs of point or frame and segment that are tried at once: their arrays stay in the cache."""
+
+
+class MeasuredAxis:
+    """A 3D polyline with gaps, parametrised by station: running length in plan, m, counted across gaps as well.
+
+    Attributes:
+        points: (N, 3) float64 vertices, m.
+        joined: (N - 1,) bool, whether the line runs from a vertex to the next one; False: a gap.
+        station: (N,) float64 running length in plan, m, strictly increasing from 0.
+    """
+
+    def __init__(self, points: ArrayLike, joined: ArrayLike | None = None) -> None:
+        vertices = np.asarray(points, dtype=np.float64)
+        if vertices.ndim != 2 or vertices.shape[1] not in (2, 3) or not np.isfinite(vertices).all():
+            raise InputError("axis", vertices.shape, "must be (N, 2) or (N, 3) finite coordinates")
+        if vertices.shape[1] == 2:
+            vertices = np.column_stack([vertices, np.zeros(len(vertices))])
+        lengths = np.hypot(*np.diff(vertices[:, :2], axis=0).T)
+        links = np.ones(len(lengths), dtype=bool) if joined is None else np.asarray(joined, dtype=bool)
+        # A vertex that stands on the one before would have no direction.
+        keep = np.concatenate([[True], lengths > 1e-9])
+        self.points = vertices[keep]
+        self.joined = links[keep[1:]]
+        self.station = np.concatenate([[0.0], np.cumsum(lengths[keep[1:]])])
+        if len(self.points) < 2:
+            raise InputError("axis", len(self.points), "must have at least two distinct points")
+
+    @classmethod
+    def read(cls, path: Path, gap: float | None = None, place: Placement | None = None) -> MeasuredAxis:
+        """Read an axis from CSV (a header that names x, y and perhaps z) or GeoJSON; tell the user of gaps.
+
+        Args:
+            path: the file; its columns other than x, y and z aren't used.
+            gap: points farther apart than this (m) aren't joined; None: see `usual_gap` for the points of CSV; the
+                line of GeoJSON has no gaps, since that is what a LineString is.
+            place: the coordinate system that it is wanted in, see `read_axis`.
+
+        Raises:
+            MissingFileError, InputError: see `read_axis`.
+        """
+        points = read_axis(path, place)
+        steps = np.hypot(*np.diff(points[:, :2], axis=0).T)
+        if gap is None:
+            gap = np.inf if path.suffix.lower() in (".geojson", ".json") else usual_gap(steps)
+        apart = steps > gap
+        if apart.any():
+            count, most = np.count_nonzero(apart), float(steps[apart].max())
+            steps_text = "1 step" if count == 1 else f"{count:,} steps"
+            text = f"{steps_text} of more than {gap:.3g} m between its points, {most:.1f} m at most, count as gaps"
+            assume(f"{path.name}: {text}")
+        return cls(points, ~apart)
+
+    @classmethod
+    def of_road(cls, geometry: RoadGeometry, step: float = 0.5) -> MeasuredAxis:
+        """Return the centreline of a road's exact geometry as a polyline in the road's local coordinates.
+
+        Vertices lie ``step`` apart at most; chords of 0.5 m are 0.1 mm off a radius of 280 m.
+        """
+        stations = np.linspace(0.0, geometry.length, max(2, int(np.ceil(geometry.length / step)) + 1))
+        return cls(np.column_stack([geometry.alignment.position(stations), geometry.profile.elevation(stations)]))
+
+    @property
+    def length(self) -> float:
+        """Return the line's length in plan, gaps included, m."""
+        return float(self.station[-1])
+
+    def translate(self, by: ArrayLike) -> MeasuredAxis:
+        """Return the line moved by a vector (3,), m."""
+        return MeasuredAxis(self.points + np.asarray(by, dtype=np.float64), self.joined)
+
+    @cached_property
+    def parts(self) -> Float:
+        """First and last station (K, 2), m, of every stretch without a gap; lone vertices between gaps are left out."""
+        ends = np.flatnonzero(~self.joined)
+        first, last = np.concatenate([[0], ends + 1]), np.concatenate([ends, [len(self.points) - 1]])
+        long = last > first
+        return np.column_stack([self.station[first[long]], self.station[last[long]]])
+
+    def stations(self, spacing: float = 1.0) -> Float:
+        """Return the stations (K,), m, that are multiples of `spacing` (m) and lie in no gap."""
+        every = spacing * np.arange(int(np.floor(self.length / spacing)) + 1)
+        return every[self.inside(every)]
+
+    def inside(self, station: ArrayLike) -> Bool:
+        """Return whether there is a line at the stations (M,): not in a gap, nor beyond the ends."""
+        at = np.asarray(station, dtype=np.float64)
+        # A vertex at a gap's edge belongs to the line.
+        after = self.joined[np.clip(np.searchsorted(self.station, at, "right") - 1, 0, len(self.joined) - 1)]
+        before = self.joined[np.clip(np.searchsorted(self.station, at, "left") - 1, 0, len(self.joined) - 1)]
+        return (after | before) & (at >= 0.0) & (at <= self.length)
+
+    def position(self, station: ArrayLike) -> Float:
+        """Return the points (M, 2) in plan at stations (M,), m; NaN in gaps and beyond the ends."""
+        at = np.asarray(station, dtype=np.float64)
+        found = np.column_stack([np.interp(at, self.station, self.points[:, column]) for column in (0, 1)])
+        found[~self.inside(at)] = np.nan
+        return found
+
+    def elevation(self, station: ArrayLike) -> Float:
+        """Return the line's elevations (M,) at stations (M,), m; NaN in gaps and beyond the ends."""
+        at = np.asarray(station, dtype=np.float64)
+        return np.where(self.inside(at), np.interp(at, self.station, self.points[:, 2]), np.nan)
+
+    def direction(self, station: ArrayLike, reach: float = 2.0) -> Float:
+        """Return the line's direction (M,), rad counter-clockwise from x; NaN in gaps and beyond the ends.
+
+        It is that of the chord from ``reach`` before to ``reach`` behind, cut at gaps and ends, so that measured points
+        that jump by centimetres don't turn it.
+        """
+        at = np.asarray(station, dtype=np.float64)
+        low, high = self._part_around(at)
+        back, ahead = np.maximum(at - reach, low), np.minimum(at + reach, high)
+        # At an end the chord is one-sided, and on a curve would be turned: take it as short as the nearer end allows.
+        even = np.minimum(at - back, ahead - at)
+        even = np.where(even > 0.25 * reach, even, np.nan)
+        back, ahead = np.where(np.isnan(even), back, at - even), np.where(np.isnan(even), ahead, at + even)
+        chord = self.position(ahead) - self.position(back)
+        return np.where(self.inside(at), np.arctan2(chord[:, 1], chord[:, 0]), np.nan)
+
+    def project(self, xy: ArrayLike) -> tuple[Float, Float]:
+        """Return station and offset (left positive, m) of points (M, 2) or (M, 3): the foot on the nearest segment.
+
+        Gaps are bridged by straight lines, and before and behind the ends the line goes on straight, so that every
+        point has a station; `inside` says where it means something.
+        """
+        points = np.asarray(xy, dtype=np.float64)[:, :2]
+        station, offset = np.empty(len(points)), np.empty(len(points))
+        for rows, segments in self._candidates(points):
+            for first in range(0, len(rows), step := max(1, _PAIRS // len(segments))):
+                some = rows[first : first + step]
+                station[some], offset[some] = self._nearest_foot(points[some], segments)
+        return station, offset
+
+    def beside(self, xy: ArrayLike, reach: float, past: float = 0.0) -> tuple[Float, Float]:
+        """Return station and offset (left positive, m) of points (M, 2) or (M, 3) beside the line; NaN elsewhere.
+
+        Args:
+            xy: the points.
+            reach: points farther from the line than this, m, are beside none of it.
+            past: points up to this, m, past an end or into a gap are beside it as well.
+        """
+        station, offset = self.project(xy)
+        there = (np.abs(offset) <= reach) & (self.distance_to_line(station) <= past)
+        return np.where(there, station, np.nan), np.where(there, offset, np.nan)
+
+    def distance_to_line(self, station: ArrayLike) -> Float:
+        """Return how far along (M,), m, it is from stations (M,) to the nearest that isn't in a gap; 0 on the line."""
+        at = np.asarray(station, dtype=np.float64)
+        if not len(self.parts):
+            return np.full(at.shape, np.inf)
+        after = np.clip(np.searchsorted(self.parts[:, 0], at, "right"), 0, len(self.parts) - 1)
+        before = np.maximum(after - 1, 0)
+        gaps = [np.maximum(self.parts[i, 0] - at, at - self.parts[i, 1]) for i in (before, after)]
+        return np.maximum(np.minimum(*gaps), 0.0)
+
+    def crossing(self, origin: ArrayLike, direction: ArrayLike, reach: float = 60.0) -> tuple[Float, Float]:
+        """Return y (m) and station (m) where the y axis of each of M frames crosses the line; NaN where it doesn't.
+
+        Args:
+            origin: (M, 2) origins of the frames.
+            direction: (M,) directions of their x axes, rad.
+            reach: crossings farther than this from the origin don't count, m.
+
+        Returns:
+            y in the frame (M,), m, of the crossing nearest to the origin, and its station (M,); NaN where there is
+            none, in gaps above all.
+        """
+        start, heading = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
+        y, station = np.full(len(start), np.nan), np.full(len(start), np.nan)
+        rows = max(1, _PAIRS // len(self.points))
+        for first in range(0, len(start), rows):
+            some = slice(first, first + rows)
+            y[some], station[some] = self._crossing(start[some], heading[some], reach)
+        return y, station
+
+    def _crossing(self, origin: Float, direction: Float, reach: float) -> tuple[Float, Float]:
+        dx = self.points[None, :, 0] - origin[:, None, 0]
+        dy = self.points[None, :, 1] - origin[:, None, 1]
+        cos, sin = np.cos(direction)[:, None], np.sin(direction)[:, None]
+        x, y = cos * dx + sin * dy, cos * dy - sin * dx
+        row, at = np.nonzero(((x[:, :-1] > 0.0) != (x[:, 1:] > 0.0)) & self.joined)
+        share = x[row, at] / (x[row, at] - x[row, at + 1])
+        across = y[row, at] + share * (y[row, at + 1] - y[row, at])
+        order = np.argsort(-np.abs(across), kind="stable")  # the nearest is written last
+        order = order[np.abs(across[order]) <= reach]
+        found, station = np.full(len(origin), np.nan), np.full(len(origin), np.nan)
+        found[row[order]] = across[order]
+        along = self.station[at] + share * (self.station[at + 1] - self.station[at])
+        station[row[order]] = along[order]
+        return found, station
+
+    def _part_around(self, at: Float) -> tuple[Float, Float]:
+        """Return the first and the last station of the gapless stretch that each station lies on, m."""
+        if not len(self.parts):
+            return at, at
+        index = np.clip(np.searchsorted(self.parts[:, 0], at, "right") - 1, 0, len(self.parts) - 1)
+        return self.parts[index, 0], self.parts[index, 1]
+
+    @cached_property
+    def _segments(self) -> Float:
+        """Return of each segment (6, N - 1) its begin and unit vector, and between which running lengths feet lie."""
+        begin, length = self.points[:-1, :2], np.diff(self.station)
+        unit = np.diff(self.points[:, :2], axis=0) / length[:, None]
+        low, high = np.zeros(len(length)), length.copy()
+        low[0], high[-1] = -np.inf, np.inf  # the ends go on
+        return np.stack([*begin.T, *unit.T, low, high])
+
+    @cached_property
+    def _circles(self) -> tuple[Float, Float]:
+        """Return centres (2, K) and radii (K,), m, of circles around each run of `_RUN` segments; cached."""
+        starts = np.arange(0, len(self.joined), _RUN)
+        runs = [self.points[at : at + _RUN + 1, :2] for at in starts]
+        centres = np.array([run.mean(axis=0) for run in runs])
+        radii = [np.hypot(*(run - centre).T).max() for run, centre in zip(runs, centres, strict=True)]
+        return centres.T, np.array(radii)
+
+    def _candidates(self, points: Float) -> Iterator[tuple[Index, Index]]:
+        """Yield indices of points (M, 2) in one cell each, and those of all segments that can be nearest to them."""
+        if not len(points):
+            return
+        cell = np.floor(points / _CELL).astype(np.int64)
+        low = cell.min(axis=0)
+        key = (cell[:, 0] - low[0]) * (cell[:, 1].max() - low[1] + 1) + (cell[:, 1] - low[1])
+        order = np.argsort(key, kind="stable")
+        starts = np.flatnonzero(np.diff(key[order], prepend=key[order[0]] - 1))
+        (x, y), radii = self._circles
+        last, diagonal = len(self.joined) - 1, np.sqrt(2.0) * _CELL
+        for rows in np.split(order, starts[1:]):
+            middle = (cell[rows[0]] + 0.5) * _CELL
+            away = np.hypot(x - middle[0], y - middle[1])
+            # A point is at most half a diagonal from the middle: its nearest segment is at most a diagonal farther.
+            runs = np.flatnonzero(away - radii <= (away + radii).min() + diagonal)
+            segments = (runs[:, None] * _RUN + np.arange(_RUN)).ravel()
+            segments = np.r_[0, segments[(segments > 0) & (segments < last)], last] if last else np.zeros(1, np.intp)
+            distance = np.sqrt(self._feet(middle[None], segments)[2][0])
+            yield rows, segments[distance <= distance.min() + diagonal]
+
+    def _feet(self, points: Float, segments: Index) -> tuple[Float, Float, Float]:
+        """Return how far along S segments the feet of P points (P, 2) are, offsets and squared distances (P, S)."""
+        x, y, east, north, low, high = self._segments[:, segments]
+        dx, dy = points[:, 0, None] - x, points[:, 1, None] - y
+        along, across = east * dx + north * dy, east * dy - north * dx
+        foot = np.clip(along, low, high)
+        return foot, across, (along - foot) ** 2 + across**2
+
+    def _nearest_foot(self, points: Float, segments: Index) -> tuple[Float, Float]:
+        """Return station and offset (P,) of points (P, 2): of the foot on the nearest of some segments."""
+        foot, across, distance = self._feet(points, segments)
+        best = distance.argmin(axis=1)
+        row = np.arange(len(points))
+        # Outside a bend the foot of many points is the corner: their offset is the distance, not that from the chord.
+        offset = np.copysign(np.sqrt(distance[row, best]), across[row, best])
+        return self.station[segments[best]] + foot[row, best], offset
+
+
+def usual_gap(steps: Float) -> float:
+    """Return the distance (m) beyond which neighbouring points of an axis with these steps (N,), m, leave a gap.
+
+    It is `GAP` times their median, and no less than `GAP` metres; infinite for lines whose points aren't evenly spaced.
+    """
+    moved = steps[steps > 0.0]
+    if not len(moved):
+        return np.inf
+    middle = float(np.median(moved))
+    even = (moved <= _EVEN_FACTOR * middle) & (moved * _EVEN_FACTOR >= middle)
+    return max(GAP, GAP * middle) if even.mean() >= _EVEN_SHARE else np.inf

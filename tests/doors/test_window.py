@@ -1,0 +1,108 @@
+"""By mouse in the window of a real Blender: from Preferences > Install from Disk to a scanned cloud that is shown.
+
+`../shared/real_blender` brings a Blender with a window (Debian's 5.2, Python 3.14) into a folder of its own, once:
+`build/real_blender`, or the one that SYNTHROADS_BLENDER_ROOT names. Each run has a new home folder in it.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import laspy
+import numpy as np
+import pytest
+
+from tests.doors.documented import ROOT
+
+HERE = Path(__file__).parent
+REAL_BLENDER = ROOT.parent / "shared" / "real_blender"
+CHOSEN = "SYNTHROADS_BLENDER_ROOT"
+INSIDE = "/mnt/project"
+"""Where enter.sh shows a folder of this machine inside."""
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not (REAL_BLENDER / "setup.sh").exists(), reason="no ../shared/real_blender"),
+    pytest.mark.skipif(sys.platform != "linux" or os.geteuid() != 0, reason="a root of its own needs Linux and root"),
+    pytest.mark.skipif(
+        importlib.util.find_spec("bpy") is None, reason="Blender's own tool, which packs, comes with bpy"
+    ),
+]
+
+
+@pytest.fixture(scope="module")
+def blender_root() -> Path:
+    """Return the folder with the real Blender, set up if it isn't there yet."""
+    root = Path(os.environ.get(CHOSEN) or ROOT / "build" / "real_blender")
+    if not (root / "usr" / "bin" / "blender").exists():
+        part = root.with_name(f"{root.name}.part")  # one that isn't complete is never taken for one that is
+        shutil.rmtree(part, ignore_errors=True)
+        part.parent.mkdir(parents=True, exist_ok=True)
+        _run(["bash", REAL_BLENDER / "setup.sh", "sid", part], 1800.0)
+        part.rename(root)
+    return root
+
+
+@pytest.fixture(scope="module")
+def worked(blender_root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder in which `scan_by_mouse` was run: with ``home`` and ``out``."""
+    folder = tmp_path_factory.mktemp("window")
+    build = ["tools/build_extension.py", "--platform", "linux-x64", "--blender", "5.2-debian"]
+    _run([sys.executable, *build, "--output-dir", folder / "dist"], 1200.0)
+    (folder / "home").mkdir()
+    (archive,) = (folder / "dist").glob("synthroads-*.zip")
+    archive.rename(folder / "home" / archive.name)
+    for file in (REAL_BLENDER / "window.sh", HERE / "by_mouse.py", HERE / "scan_by_mouse.py"):
+        shutil.copyfile(file, folder / file.name)
+    inside = [
+        "env",
+        f"HOME={INSIDE}/home",
+        "bash",
+        f"{INSIDE}/window.sh",
+        f"{INSIDE}/scan_by_mouse.py",
+        f"{INSIDE}/out",
+    ]
+    said = _run(["bash", REAL_BLENDER / "enter.sh", blender_root, folder, *inside], 3600.0, may_fail=True)
+    assert (folder / "out" / "answers.json").exists(), said
+    return folder
+
+
+def _run(command: list[str | Path], seconds: float, *, may_fail: bool = False) -> str:
+    """Run a command from the repository's root, and end it with all that it started where it takes too long."""
+    words = list(map(str, command))
+    process = subprocess.Popen(
+        words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True
+    )
+    try:
+        said, _ = process.communicate(timeout=seconds)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        pytest.fail(f"{' '.join(words)}: not within {seconds:.0f} s\n{process.communicate()[0]}")
+    assert may_fail or process.returncode == 0, said
+    return said
+
+
+def test_a_user_gets_from_the_zip_to_a_shown_cloud_by_mouse(worked: Path) -> None:
+    answers: dict[str, Any] = json.loads((worked / "out" / "answers.json").read_text(encoding="utf-8"))
+    assert answers.get("failed") is None, answers["failed"]
+    assert "bl_ext.user_default.synthroads" in answers["enabled"]
+    assert answers["road"] > 5, "no road in the scene"
+    with laspy.open(worked / "home" / "scan" / "cloud.laz") as file:
+        cloud = file.read()
+    assert len(cloud) > 10_000
+    assert len(np.unique(cloud.classification)) > 5
+    length = np.ptp(np.column_stack([cloud.x, cloud.y]), axis=0).max()
+    assert 50.0 < length < 250.0, "the length that was typed: 60 m"
+    assert answers["shown"] == [len(cloud), len(cloud)]
+
+
+def test_blender_writes_no_traceback(worked: Path) -> None:
+    assert "Traceback" not in (worked / "out" / "blender.log").read_text(encoding="utf-8", errors="replace")
