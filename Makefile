@@ -15,7 +15,7 @@ NOX = $(RUNNER)/bin/python -m nox
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test doors test-slow test-cluster fuzz lint judges docs weights extension clean distclean
+.PHONY: help demo test quick doors test-slow test-cluster fuzz lint judges docs weights extension clean distclean
 
 help: ## say what there is
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  make \1|\2/p' $(MAKEFILE_LIST) | awk -F'|' '{ printf "%-18s %s\n", $$1, $$2 }'
@@ -26,6 +26,9 @@ demo: $(RUNNER)/made ## make 600 m of motorway and scan it: out/demo
 
 test: $(RUNNER)/made ## check the source and run the tests on both Blender LTS releases
 	@$(NOX)
+
+quick: $(RUNNER)/made ## for two minutes, the tests nearest to what changed against the branch main
+	@$(NOX) -s quick
 
 test-slow: $(RUNNER)/made ## the tests that take long, and the documentation's own
 	@TEST_MARKERS=slow $(NOX) -s tests docs summary

@@ -134,6 +134,12 @@ def lint(session: nox.Session) -> None:
 
 
 @nox.session(python=False)
+def quick(session: nox.Session) -> None:
+    """Run the tests nearest to what changed against `main`; arguments are those of tools/quick_tests.py."""
+    session.run(python_of(session, f"tests-{HERE}"), "tools/quick_tests.py", *session.posargs, interrupt_timeout=10)
+
+
+@nox.session(python=False)
 def weights(session: nox.Session) -> None:
     """Make the models that come with the package anew; arguments are those of tools/make_weights.py."""
     session.run(python_of(session, f"tests-{HERE}"), "tools/make_weights.py", *session.posargs)
