@@ -1,4 +1,4 @@
-"""The command lines, Python snippets and files that README, docs/start.md and the tutorials show to users.
+"""The command lines, Python snippets and files that README, docs/tasks.md, docs/start.md and the tutorials show to users.
 
 It needs nothing but Python itself: environments as users make them hold none of the tests' packages.
 """
@@ -15,6 +15,7 @@ from typing import Literal
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = (
     ROOT / "README.md",
+    ROOT / "docs" / "tasks.md",
     ROOT / "docs" / "start.md",
     ROOT / "docs" / "tutorials" / "data-engineer.md",
     ROOT / "docs" / "tutorials" / "modeller.md",
