@@ -318,7 +318,7 @@ def _split_names(text: str) -> list[str]:
 def _add_common_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the flags that all sub-commands share: ``--quiet``, ``--verbose``, ``--json``."""
     amount = parser.add_mutually_exclusive_group()
-    text = "no progress and no notes: print errors only, and the result where it is written to no file"
+    text = "print errors only; if no output file is given, also print the result"
     amount.add_argument("--quiet", action="store_true", help=text)
     amount.add_argument("--verbose", action="store_true", help="print settings, versions and times of stages as well")
     parser.add_argument("--json", action="store_true", help="print the result as JSON on standard output")
