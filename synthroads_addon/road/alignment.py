@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import Float, Int
 from ..base.errors import InputError
+from ..base.loops import point_loops
 
 Kind = Literal["line", "arc", "clothoid"]
 
@@ -167,6 +168,12 @@ class Alignment:
 
     def _evaluate(self, station: Float) -> tuple[Float, Float, Float, Float]:
         """Return x and y less the start's (m), heading (rad) and curvature (1/m), each (N,), at stations (N,)."""
+        if (loops := point_loops()) is not None:
+            columns = (self._middles, self._halves, self._bends, self._slopes, self._headings)
+            x, y, heading, bend = loops.evaluate_pieces(
+                station, (self._borders, *columns, self._series_x, self._series_y)
+            )
+            return x, y, heading, bend
         piece = np.searchsorted(self._borders, station, side="right")
         u = station - self._middles[piece]
         v = u / self._halves[piece]

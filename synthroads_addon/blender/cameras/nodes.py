@@ -221,6 +221,8 @@ class NodeLayers:
 
         def layer(name: str) -> Float32:
             """Return a layer's values at the lit points: evaluated where it varies, else the material's constant."""
+            if (values := constants.chosen(name, rows, channels.get(name), points.material)) is not None:
+                return values
             if name not in channels:
                 return take_rows(constants.values[name], material)
             use = np.take(constants.varies[name], material)

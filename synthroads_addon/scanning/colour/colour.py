@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import AnyArray, ArrayRows, Bool, Float, Float32, Index, UInt8, UInt16, take_rows
+from ...base.loops import point_loops
 from ...base.turns.main_thread import MainThreadCalls
 from ...cloud.points import NO_MATERIAL
 from ...materials.table import Material
@@ -121,6 +122,8 @@ class SeenPoints(ArrayRows):
     @cached_property  # several ask for it
     def towards_scanner(self) -> Float32:
         """Return the unit vectors (N, 3) from the points to the scanner."""
+        if (loops := point_loops()) is not None:
+            return loops.towards(self.position, self.scanner)
         towards = (self.scanner - self.position).astype(np.float32)
         towards /= np.maximum(np.sqrt(np.einsum("ij,ij->i", towards, towards)), 1e-9)[:, None]
         return np.asarray(towards)
@@ -177,6 +180,19 @@ class SurfaceConstants:
         if len(rest):
             result[rest] = take_rows(means, np.take(material, rest))
         return result
+
+    def chosen(self, name: str, rows: Index | None, own: Float32 | None, material: UInt16) -> Float32 | None:
+        """Return a layer's values (K, ...) at points by compiled loops, the means where materials don't vary; or None.
+
+        Args:
+            name: of the layer.
+            rows: (K,) of the points; None for all.
+            own: (N, C) values of all N points; None to have means alone.
+            material: (N,) indices.
+        """
+        if (loops := point_loops()) is None:
+            return None
+        return loops.layer(rows, own, material, self.varies[name], self.values[name])
 
     def varying_layers(self, wanted: frozenset[str]) -> tuple[str, ...]:
         """Return the names of the wanted layers that vary in some material, in the order of `MATERIAL_LAYERS`."""
@@ -267,9 +283,13 @@ class MaterialLayers:
             wanted: layers.
         """
         found = source != FROM_MATERIAL
+        everywhere = bool(found.all())
         layers: dict[str, Float32] = {}
         for name in sorted(needed_layers(wanted, self.mode)):
-            if name in channels:
+            values = self.constants.chosen(name, None, channels.get(name), points.material) if everywhere else None
+            if values is not None:
+                layers[name] = values
+            elif name in channels:
                 use = found & np.take(self.constants.varies[name], points.material)
                 layers[name] = self.constants.complete(name, channels[name].copy(), use, points.material)
             else:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import Float, Float32, Index, take_rows
+from ...base.loops import point_loops
 from ..scene.mesh import SceneMesh
 from ..scene.motion import MovingMesh
 from ..scene.surface_values import SurfaceInput, corner_shares
@@ -72,8 +73,11 @@ class SceneSurfaces:
         normal = np.asarray(towards, np.float64)
         if number:  # what stands is in the scene's own frame
             place, normal = (place - begin) @ rotation, normal @ rotation
-        corners = take_rows(mesh.vertices, take_rows(mesh.triangles, faces))
-        shares = corner_shares(corners.astype(np.float64), place)
+        if (loops := point_loops()) is not None:
+            shares = loops.corner_shares(mesh.vertices, mesh.triangles, faces, place)
+        else:
+            corners = take_rows(mesh.vertices, take_rows(mesh.triangles, faces))
+            shares = corner_shares(corners.astype(np.float64), place)
         for what, values in result.items():
             found = np.zeros(len(rows), bool)
             if mesh.surface is not None:

@@ -1,0 +1,110 @@
+"""Loops over points that a compiled library may do in place of NumPy, to the same bytes, and whether they are in use."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Protocol
+
+from .arrays import AnyArray, Bool, Float, Float32, Index, UInt16
+
+
+class PointLoops(Protocol):
+    """Interface of the loops; each gives the bytes of the NumPy code that asks for it: `scanning.kernels.points`."""
+
+    def towards(self, place: Float, seen_from: Float) -> Float32:
+        """Return the unit vectors (N, 3) from places (N, 3) to where they are seen from (N, 3)."""
+        ...
+
+    def layer(
+        self, rows: Index | None, own: Float32 | None, material: UInt16, varies: Bool, means: Float32
+    ) -> Float32 | None:
+        """Return a layer's values (K, ...) at rows (K,) of points; None where it can't.
+
+        Args:
+            rows: of the points; None for all of them.
+            own: (N, C) of the points, for materials that vary; None where none does.
+            material: (N,) of the points.
+            varies: (M,) whether a material does.
+            means: (M, C) or (M,) of the materials.
+        """
+        ...
+
+    def halves(self, normal: Float32, view: Float32, sun: Float32) -> tuple[Float32, Float32, Float32]:
+        """Return cosines (N,) of the view, of the half vector to the normal, both cut, and of it to the view."""
+        ...
+
+    def reflected(self, tables: Sequence[AnyArray], limits: Sequence[float], surfaces: Sequence[Float32]) -> Float32:
+        """Return what surfaces throw back (N, 3) by tables of albedos, see `scanning.colour.reflection`."""
+        ...
+
+    def corner_shares(self, vertices: Float32, triangles: AnyArray, faces: Index, place: Float) -> Float:
+        """Return the weights (N, 3) of the corners of faces (N,) at places (N, 3)."""
+        ...
+
+    def interpolate(
+        self,
+        rows: Index,
+        use: Index,
+        triangle: Index,
+        elements: AnyArray,
+        mirrored: Bool,
+        shares: Float,
+        values: Float32,
+        result: Float32,
+    ) -> bool:
+        """Write values between corners into rows (K,) of a result (N, 4); return whether it could.
+
+        Args:
+            rows: of the result and of the shares (N, 3).
+            use, triangle: (K,) place that the mesh stands at, and triangle of the mesh.
+            elements: (T, 3) rows of the values by triangle.
+            mirrored: (U,) by place that the mesh stands at.
+            shares: of the corners.
+            values: (n, 4).
+            result: where to.
+        """
+        ...
+
+    def raised(self, height: Float, cosine: Float, normal: Float32, place: Float, distance: Float) -> tuple[Float, Float]:
+        """Return places (N, 3) and ranges (N,) shifted along normals (N, 3) by heights (N,), 0 for those that stay."""
+        ...
+
+    def approached(
+        self,
+        rough: Index,
+        height: Float,
+        cosine: Float,
+        material: UInt16,
+        reach: Float,
+        towards: Float32,
+        place: Float,
+        distance: Float,
+    ) -> tuple[Float, Float]:
+        """Return places (N, 3) and ranges (N,) of which rows ``rough`` (K,) are nearer along their beams by heights."""
+        ...
+
+    def evaluate_pieces(self, station: Float, pieces: Sequence[Float]) -> Float:
+        """Return x, y, heading and curvature (4, N) at stations (N,) on the pieces of an alignment."""
+        ...
+
+
+_in_use: list[PointLoops] = []
+"""Those that are in use, the last ones first."""
+
+
+@contextmanager
+def loops_by(loops: PointLoops | None) -> Iterator[None]:
+    """Context in which these loops are done in place of NumPy, in all threads; with None by NumPy. Results are the same."""
+    if loops is not None:
+        _in_use.append(loops)
+    try:
+        yield
+    finally:
+        if loops is not None:
+            _in_use.remove(loops)
+
+
+def point_loops() -> PointLoops | None:
+    """Return the loops that are in use; None where NumPy does all."""
+    return next(iter(_in_use[-1:]), None)

@@ -1,0 +1,265 @@
+"""What is worked out for each point, in compiled loops, beside `points.c`: the bytes of NumPy, see `base.loops`."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from ...base.arrays import AnyArray, Bool, Float, Float32, Index, UInt16
+from .library import NoKernelError, load_kernel
+
+_POINTER, _INT64, _INT32 = ctypes.c_void_p, ctypes.c_int64, ctypes.c_int32
+_FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
+    "towards": (None, (_INT64, *[_POINTER] * 3)),
+    "halves": (None, (_INT64, *[_POINTER] * 6)),
+    "reflected": (_INT32, (_INT64, *[_POINTER] * 3)),
+    "layer": (None, (_INT64, _POINTER, _INT64, *[_POINTER] * 5)),
+    "shares": (None, (_INT64, *[_POINTER] * 5)),
+    "interpolate": (None, (_INT64, *[_POINTER] * 8)),
+    "raise": (None, (_INT64, *[_POINTER] * 7)),
+    "approach": (None, (_INT64, _INT64, *[_POINTER] * 10)),
+    "evaluate": (None, (_INT64, *[_POINTER] * 3)),
+}
+"""What each function of points.c returns and takes."""
+
+
+class _Tables(ctypes.Structure):
+    """Tables of albedos; as `Tables` in points.c."""
+
+    _fields_ = (
+        *((name, _POINTER) for name in ("once", "albedo", "average")),
+        *((name, _INT64) for name in ("roughs", "views", "levels")),
+        ("first", ctypes.c_float * 3),
+        ("scale", ctypes.c_float * 3),
+        ("matt", ctypes.c_float),
+        ("brightest", ctypes.c_float),
+    )
+
+
+class _Pieces(ctypes.Structure):
+    """Pieces of an alignment; as `Pieces` in points.c."""
+
+    _fields_ = (
+        *((name, _POINTER) for name in ("borders", "middles", "halves", "bends", "slopes", "headings")),
+        *((name, _POINTER) for name in ("series_x", "series_y")),
+        ("pieces", _INT64),
+        ("terms", _INT64),
+    )
+
+
+def _as(kind: Any, shape: tuple[int, ...], **arrays: AnyArray) -> list[AnyArray]:
+    """Return arrays of this shape, C-contiguous and of this type; raise ValueError for another shape."""
+    for name, array in arrays.items():
+        if array.shape != shape:
+            raise ValueError(f"{name} {array.shape}: must be {shape}")
+    return [np.ascontiguousarray(array, kind) for array in arrays.values()]
+
+
+class CompiledPoints:
+    """The loops of `base.loops.PointLoops`, compiled; any threads may use it side by side.
+
+    Args:
+        suffix: of the functions: ``_narrow`` for those that any processor has.
+
+    Raises:
+        NoKernelError: this machine has none.
+    """
+
+    def __init__(self, suffix: str = "") -> None:
+        library = load_kernel("points")
+        self._functions: dict[str, Any] = {}
+        for name, (result, arguments) in _FUNCTIONS.items():
+            function = getattr(library, f"synthroads_{name}{suffix}")
+            function.restype, function.argtypes = result, list(arguments)
+            self._functions[name] = function
+
+    def towards(self, place: Float, seen_from: Float) -> Float32:
+        """Return the unit vectors (N, 3) from places (N, 3) to where they are seen from (N, 3)."""
+        place, seen_from = _as(np.float64, (len(place), 3), place=place, seen_from=seen_from)
+        result = np.empty(place.shape, np.float32)
+        self._functions["towards"](len(place), place.ctypes.data, seen_from.ctypes.data, result.ctypes.data)
+        return result
+
+    def layer(
+        self, rows: Index | None, own: Float32 | None, material: UInt16, varies: Bool, means: Float32
+    ) -> Float32 | None:
+        """Return a layer's values (K, ...) at rows (K,) of points; None where rows or materials aren't there.
+
+        Args:
+            rows: of the points; None for all of them.
+            own: (N, C) of the points, for materials that vary; None where none does.
+            material: (N,) of the points.
+            varies: (M,) whether a material does.
+            means: (M, C) or (M,) of the materials.
+        """
+        kinds, width = len(means), means.size // max(1, len(means))
+        chosen = len(material) if rows is None else len(rows)
+        if not chosen:
+            return np.empty((0, *means.shape[1:]), np.float32)
+        if int(material.max()) >= kinds or not (rows is None or (0 <= rows.min() and rows.max() < len(material))):
+            return None
+        (varies,), (material,) = _as(np.bool_, (kinds,), varies=varies), _as(np.uint16, material.shape, all=material)
+        rows = None if rows is None else np.ascontiguousarray(rows, np.int64)
+        means = np.ascontiguousarray(means, np.float32)
+        if own is not None:
+            (own,) = _as(np.float32, (len(material), width), own=own)
+        result = np.empty((chosen, *means.shape[1:]), np.float32)
+        rows_at, own_at = (None if array is None else array.ctypes.data for array in (rows, own))
+        self._functions["layer"](
+            *(chosen, rows_at, width, own_at),
+            *(array.ctypes.data for array in (material, varies, means, result)),
+        )
+        return result
+
+    def halves(self, normal: Float32, view: Float32, sun: Float32) -> tuple[Float32, Float32, Float32]:
+        """Return cosines (N,) of the view, of the half vector to the normal, both cut, and of it to the view."""
+        count = len(normal)
+        normal, view = _as(np.float32, (count, 3), normal=normal, view=view)
+        (sun,) = _as(np.float32, (3,), sun=sun)
+        seen, across, between = np.empty((3, count), np.float32)
+        arrays = (normal, view, sun, seen, across, between)
+        self._functions["halves"](count, *(array.ctypes.data for array in arrays))
+        return seen, across, between
+
+    def reflected(self, tables: Sequence[AnyArray], limits: Sequence[float], surfaces: Sequence[Float32]) -> Float32:
+        """Return what surfaces throw back (N, 3).
+
+        Args:
+            tables: the albedo after one bounce (R, V), that of dielectrics (R, V, L), and the former's mean (R,).
+            limits: first value and scale of roughness, cosine of the view and root of the reflectance; the
+                reflectance of a specular of 1, and the largest.
+            surfaces: colours (N, 3) and, (N,) each: roughness, its fourth power, metallic, specular; cosines of the
+                sun, of the view, of the half vector to normal and view; fifth powers for metals.
+
+        Raises:
+            IndexError: a roughness or a cosine is no number.
+        """
+        once, albedo = (np.ascontiguousarray(table, np.float32) for table in tables[:2])
+        average = np.ascontiguousarray(tables[2], np.float64)
+        first, scale = ((ctypes.c_float * 3)(*limits[part:6:2]) for part in (0, 1))
+        count = len(surfaces[0])
+        (color,) = _as(np.float32, (count, 3), color=surfaces[0])
+        rest = [_as(np.float32, (count,), surfaces=array)[0] for array in surfaces[1:]]
+        told = _Tables(
+            *(table.ctypes.data for table in (once, albedo, average)), *albedo.shape, first, scale, *limits[6:]
+        )
+        if once.shape != albedo.shape[:2] or average.shape != once.shape[:1] or len(rest) != 9:
+            raise ValueError(f"tables {once.shape}, {albedo.shape}, {average.shape}, {len(rest)} values")
+        result = np.empty((count, 3), np.float32)
+        addresses = (_POINTER * 10)(*(array.ctypes.data for array in (color, *rest)))
+        if self._functions["reflected"](count, ctypes.byref(told), addresses, result.ctypes.data):
+            raise IndexError("a roughness or a cosine is no number")
+        return result
+
+    def corner_shares(self, vertices: Float32, triangles: AnyArray, faces: Index, place: Float) -> Float:
+        """Return the weights (N, 3) of the corners of faces (N,) at places (N, 3).
+
+        Raises:
+            IndexError: a face isn't there.
+        """
+        count = len(faces)
+        if count and not (0 <= faces.min() and faces.max() < len(triangles)):
+            raise IndexError(f"faces {faces.min()} to {faces.max()} of {len(triangles)}")
+        (faces,), (place,) = _as(np.int64, (count,), faces=faces), _as(np.float64, (count, 3), place=place)
+        (vertices,) = _as(np.float32, (len(vertices), 3), vertices=vertices)
+        (triangles,) = _as(np.int32, (len(triangles), 3), triangles=triangles)
+        result = np.empty((count, 3))
+        arrays = (vertices, triangles, faces, place, result)
+        self._functions["shares"](count, *(array.ctypes.data for array in arrays))
+        return result
+
+    def interpolate(
+        self,
+        rows: Index,
+        use: Index,
+        triangle: Index,
+        elements: AnyArray,
+        mirrored: Bool,
+        shares: Float,
+        values: Float32,
+        result: Float32,
+    ) -> bool:
+        """Write values between corners into rows (K,) of a result (N, 4); return False where the types are others.
+
+        The rows, the uses and the triangles must be there: only the types are looked at.
+        """
+        kinds = (np.int64, np.int64, np.int64, np.int32, np.bool_, np.float64, np.float32, np.float32)
+        arrays = (rows, use, triangle, elements, mirrored, shares, values, result)
+        if any(one.dtype != kind or not one.flags.c_contiguous for one, kind in zip(arrays, kinds, strict=True)):
+            return False
+        self._functions["interpolate"](len(rows), *(array.ctypes.data for array in arrays))
+        return True
+
+    def raised(self, height: Float, cosine: Float, normal: Float32, place: Float, distance: Float) -> tuple[Float, Float]:
+        """Return places (N, 3) and ranges (N,) shifted along normals (N, 3) by heights (N,), 0 for those that stay."""
+        count = len(height)
+        height, cosine, distance = _as(np.float64, (count,), height=height, cosine=cosine, distance=distance)
+        (normal,), (place,) = _as(np.float32, (count, 3), normal=normal), _as(np.float64, (count, 3), place=place)
+        moved, after = np.empty((count, 3)), np.empty(count)
+        arrays = (height, cosine, normal, place, distance, moved, after)
+        self._functions["raise"](count, *(array.ctypes.data for array in arrays))
+        return moved, after
+
+    def approached(
+        self,
+        rough: Index,
+        height: Float,
+        cosine: Float,
+        material: UInt16,
+        reach: Float,
+        towards: Float32,
+        place: Float,
+        distance: Float,
+    ) -> tuple[Float, Float]:
+        """Return places (N, 3) and ranges (N,) of which rows ``rough`` (K,) are nearer along their beams by heights.
+
+        Args:
+            rough: (K,) ascending.
+            height, cosine: (K,) heights of the relief, m, and cosines of the incidence angles.
+            material: (N,) indices; of rough ones there is a reach.
+            reach: (M,) by material, within which a beam that grazes the relief meets some peak, m.
+            towards: (N, 3) unit vectors to the scanner.
+            place, distance: (N, 3), (N,) m.
+        """
+        chosen, count = len(rough), len(distance)
+        height, cosine = _as(np.float64, (chosen,), height=height, cosine=cosine)
+        (rough,), (reach,) = _as(np.int64, (chosen,), rough=rough), _as(np.float64, (len(reach),), reach=reach)
+        (material,), (distance,) = _as(np.uint16, (count,), material=material), _as(np.float64, (count,), range=distance)
+        (towards,), (place,) = _as(np.float32, (count, 3), towards=towards), _as(np.float64, (count, 3), place=place)
+        moved, after = np.empty((count, 3)), np.empty(count)
+        arrays = (rough, height, cosine, material, reach, towards, place, distance, moved, after)
+        self._functions["approach"](count, chosen, *(array.ctypes.data for array in arrays))
+        return moved, after
+
+    def evaluate_pieces(self, station: Float, pieces: Sequence[Float]) -> Float:
+        """Return x, y, heading and curvature (4, N) at stations (N,) on P pieces of an alignment.
+
+        Args:
+            station: m.
+            pieces: their borders (P - 1,), ascending; middles, half lengths, bends, slopes and headings (P,); and
+                the series (T + 1, P) of x and y.
+        """
+        kept = [np.ascontiguousarray(array, np.float64) for array in (station, *pieces)]
+        station, borders, *columns, series_x, series_y = kept
+        terms, count = len(series_x) - 1, len(columns[0])
+        if len(borders) != count - 1 or any(one.shape != (count,) for one in columns) or len(columns) != 5:
+            raise ValueError(f"pieces {[one.shape for one in kept[1:]]}")
+        if series_x.shape != (terms + 1, count) or series_y.shape != series_x.shape:
+            raise ValueError(f"series {series_x.shape}, {series_y.shape}: ({terms + 1}, {count})")
+        told = _Pieces(*(array.ctypes.data for array in kept[1:]), count, terms)
+        result = np.empty((4, len(station)))
+        self._functions["evaluate"](len(station), station.ctypes.data, ctypes.byref(told), result.ctypes.data)
+        return result
+
+
+@cache
+def usable_points() -> CompiledPoints | NoKernelError:
+    """Return the compiled loops, or why this machine has none; found out once."""
+    try:
+        return CompiledPoints()
+    except NoKernelError as error:
+        return error
