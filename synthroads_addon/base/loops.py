@@ -4,9 +4,40 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
-from .arrays import AnyArray, Bool, Float, Float32, Index, UInt16
+from .arrays import AnyArray, Bool, Float, Float32, Index, Int, UInt8, UInt16
+
+
+class PackedPoints(NamedTuple):
+    """N points and how LAS records hold them.
+
+    Attributes:
+        xyz: (N, 3) m.
+        intensity, gps_time: (N,).
+        rgb: (N, 3).
+        return_number, number_of_returns, class_id: (N,).
+        codes: (C,) of the classes.
+        scan_angle_deg: (N,).
+        strip: (N,) from 0.
+        offset: (3,) of the coordinates, m.
+        per_metre, per_intensity, per_degree: steps.
+    """
+
+    xyz: Float
+    intensity: Float
+    gps_time: Float
+    rgb: UInt16
+    return_number: UInt8
+    number_of_returns: UInt8
+    class_id: UInt8
+    codes: UInt8
+    scan_angle_deg: Float32
+    strip: UInt16
+    offset: Float
+    per_metre: float
+    per_intensity: float
+    per_degree: float
 
 
 class PointLoops(Protocol):
@@ -82,6 +113,22 @@ class PointLoops(Protocol):
         distance: Float,
     ) -> tuple[Float, Float]:
         """Return places (N, 3) and ranges (N,) of which rows ``rough`` (K,) are nearer along their beams by heights."""
+        ...
+
+    def daylight(self, sun: Float32, color: Float32, normal: Float32, above: Float32, below: Float32) -> Float32:
+        """Return the light (N, 3), cut to 0 to 1, of the sun (N, 3) and what surfaces throw back of an even sky."""
+        ...
+
+    def encoded(self, linear: Float32, power: Float32) -> UInt16:
+        """Return 16-bit sRGB (N, 3) of linear values of 0 to 1 and of these to the power of 1 / 2.4."""
+        ...
+
+    def pack(self, record: AnyArray, points: PackedPoints) -> tuple[Float, Int] | None:
+        """Fill in LAS records (N,) of point format 7, without extra bytes; None where a value doesn't fit.
+
+        Returns:
+            the least and the largest coordinates (2, 3) as stored, and how many points have each return number (16,).
+        """
         ...
 
     def evaluate_pieces(self, station: Float, pieces: Sequence[Float]) -> Float:

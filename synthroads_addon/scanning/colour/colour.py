@@ -58,6 +58,7 @@ MATERIAL_LAYERS: dict[str, int] = {"base_color": 3, "roughness": 1, "metallic": 
 FROM_MATERIAL, FROM_NODES, NEARBY, FROM_RETURN = 0, 253, 254, 255
 """`LayerValues.source` of a material's mean, of its nodes at the very return, of a place of the same material close by,
 and of a pixel per return; n in between is the n-th best image."""
+_SRGB_POWER = np.float32(1 / 2.4)
 _FALSE_COLOUR = ("roughness", "metallic", "specular")
 
 
@@ -225,7 +226,9 @@ def decode_srgb(stored: Float) -> Float:
 def encode_srgb(linear: NDArray[np.floating]) -> UInt16:
     """Return linear colours as 16-bit sRGB (IEC 61966-2-1), clipped to what that can show."""
     linear = np.clip(np.asarray(linear, np.float32), 0.0, 1.0)
-    curve = np.float32(1.055) * np.power(linear, np.float32(1 / 2.4)) - np.float32(0.055)
+    if (loops := point_loops()) is not None:
+        return loops.encoded(linear, np.power(linear, _SRGB_POWER))
+    curve = np.float32(1.055) * np.power(linear, _SRGB_POWER) - np.float32(0.055)
     encoded = np.where(linear <= 0.0031308, np.float32(12.92) * linear, curve)
     return np.asarray(encoded * np.float32(65535.0) + np.float32(0.5), dtype=np.uint16)
 
@@ -312,6 +315,10 @@ class MaterialLayers:
             sun = color * self.light.sunlight(points.normal)
             if "sun" in channels:
                 sun[found] = channels["sun"][found]
+        if everywhere and "sky" not in channels and self.clouds is None and (loops := point_loops()) is not None:
+            light, normal = self.light, np.asarray(points.normal, np.float32)
+            linear = loops.daylight(sun, color, normal, *(np.asarray(one, np.float32) for one in (light.above, light.below)))
+            return loops.encoded(linear, np.power(linear, _SRGB_POWER))
         sky = color * self.light.sky(points.normal)
         if "sky" in channels:
             sky[found] = channels["sky"][found]

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ...base.arrays import AnyArray, Bool, Float, Float32, Index, UInt16
+from ...base.arrays import AnyArray, Bool, Float, Float32, Index, Int, UInt16
+from ...base.loops import PackedPoints
 from .library import NoKernelError, load_kernel
 
 _POINTER, _INT64, _INT32 = ctypes.c_void_p, ctypes.c_int64, ctypes.c_int32
@@ -22,9 +23,14 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "interpolate": (None, (_INT64, *[_POINTER] * 8)),
     "raise": (None, (_INT64, *[_POINTER] * 7)),
     "approach": (None, (_INT64, _INT64, *[_POINTER] * 10)),
+    "daylight": (None, (_INT64, *[_POINTER] * 6)),
+    "encode": (None, (_INT64, *[_POINTER] * 3)),
+    "pack": (_INT32, (_INT64, _POINTER, _INT64, *[_POINTER] * 3)),
     "evaluate": (None, (_INT64, *[_POINTER] * 3)),
 }
 """What each function of points.c returns and takes."""
+_RECORD = 36
+"""Bytes of a LAS record of point format 7."""
 
 
 class _Tables(ctypes.Structure):
@@ -37,6 +43,20 @@ class _Tables(ctypes.Structure):
         ("scale", ctypes.c_float * 3),
         ("matt", ctypes.c_float),
         ("brightest", ctypes.c_float),
+    )
+
+
+class _Records(ctypes.Structure):
+    """Points and how they are stored; as `Points` in points.c."""
+
+    _fields_ = (
+        *((name, _POINTER) for name in ("place", "intensity", "time", "rgb", "number", "of", "class_id", "codes")),
+        *((name, _POINTER) for name in ("angle", "strip")),
+        ("offset", ctypes.c_double * 3),
+        ("per_step", ctypes.c_double),
+        ("brightness", ctypes.c_double),
+        ("per_angle", ctypes.c_float),
+        ("classes", _INT32),
     )
 
 
@@ -234,6 +254,58 @@ class CompiledPoints:
         arrays = (rough, height, cosine, material, reach, towards, place, distance, moved, after)
         self._functions["approach"](count, chosen, *(array.ctypes.data for array in arrays))
         return moved, after
+
+    def daylight(self, sun: Float32, color: Float32, normal: Float32, above: Float32, below: Float32) -> Float32:
+        """Return the light (N, 3), cut to 0 to 1, of the sun (N, 3) and what surfaces throw back of an even sky.
+
+        Args:
+            sun: thrown back of it.
+            color, normal: (N, 3) of the surfaces.
+            above, below: (3,) light on a surface that faces straight up, and down.
+        """
+        sun, color, normal = _as(np.float32, (len(sun), 3), sun=sun, color=color, normal=normal)
+        above, below = _as(np.float32, (3,), above=above, below=below)
+        result = np.empty(sun.shape, np.float32)
+        arrays = (sun, color, normal, above, below, result)
+        self._functions["daylight"](len(sun), *(array.ctypes.data for array in arrays))
+        return result
+
+    def encoded(self, linear: Float32, power: Float32) -> UInt16:
+        """Return 16-bit sRGB (N, 3) of linear values of 0 to 1 and of these to the power of 1 / 2.4."""
+        linear, power = _as(np.float32, linear.shape, linear=linear, power=power)
+        result = np.empty(linear.shape, np.uint16)
+        self._functions["encode"](linear.size, linear.ctypes.data, power.ctypes.data, result.ctypes.data)
+        return result
+
+    def pack(self, record: AnyArray, points: PackedPoints) -> tuple[Float, Int] | None:
+        """Fill in LAS records (N,) of point format 7, without extra bytes; None where a value or a type doesn't fit.
+
+        Args:
+            record: C-contiguous; the first 36 bytes of each are filled in.
+            points: what is stored.
+
+        Returns:
+            the least and the largest coordinates (2, 3) as stored, and how many points have each return number (16,).
+        """
+        arrays, count = points[:10], len(record)
+        shapes = ((count, 3), (count,), (count,), (count, 3), *[(count,)] * 3, points.codes.shape, (count,), (count,))
+        kinds = [*[np.float64] * 3, np.uint16, *[np.uint8] * 4, np.float32, np.uint16]
+        if any(
+            one.dtype != kind or one.shape != shape or not one.flags.c_contiguous
+            for one, kind, shape in zip(arrays, kinds, shapes, strict=True)
+        ):
+            return None
+        if not record.flags.c_contiguous or record.itemsize < _RECORD:
+            raise ValueError(f"records of {record.itemsize} bytes")
+        told = _Records(
+            *(one.ctypes.data for one in arrays),
+            (ctypes.c_double * 3)(*points.offset),
+            *(points.per_metre, points.per_intensity, points.per_degree, len(points.codes)),
+        )
+        extremes, by_return = np.array([[np.inf] * 3, [-np.inf] * 3]), np.zeros(16, np.int64)
+        filled = (record.ctypes.data, extremes.ctypes.data, by_return.ctypes.data)
+        fits = self._functions["pack"](count, ctypes.byref(told), record.itemsize, *filled)
+        return (extremes, by_return) if fits else None
 
     def evaluate_pieces(self, station: Float, pieces: Sequence[Float]) -> Float:
         """Return x, y, heading and curvature (4, N) at stations (N,) on P pieces of an alignment.
