@@ -123,6 +123,10 @@ class PointLoops(Protocol):
         """Return 16-bit sRGB (N, 3) of linear values of 0 to 1 and of these to the power of 1 / 2.4."""
         ...
 
+    def spread(self, rows: Index, values: Float32, result: Float32, scale: Float32 | None = None) -> None:
+        """Write values (K, C), each component times its scale (C,) if there is one, into rows (K,) of a result (N, C)."""
+        ...
+
     def pack(self, record: AnyArray, points: PackedPoints) -> tuple[Float, Int] | None:
         """Fill in LAS records (N,) of point format 7, without extra bytes; None where a value doesn't fit.
 

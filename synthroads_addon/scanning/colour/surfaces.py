@@ -28,11 +28,11 @@ class SceneSurfaces:
         self._poses = [(np.eye(3), np.zeros(3)), *(_initial_pose(part) for part in moving)]
         self._firsts = np.cumsum([0, *(len(mesh) for mesh in self._meshes)])
 
-    def read(self, inputs: Iterable[SurfaceInput], points: SeenPoints) -> dict[SurfaceInput, Float32]:
-        """Return each surface input's values (N, 4) at N points; 0 where the surface lacks it, as renderers have it."""
+    def read(self, inputs: Iterable[SurfaceInput], points: SeenPoints, rows: Index) -> dict[SurfaceInput, Float32]:
+        """Return each surface input's values (K, 4) at rows (K,) of points; 0 where the surface lacks it, as renderers."""
         if points.face is None:
-            return {what: np.zeros((len(points), 4), np.float32) for what in sorted(inputs)}
-        return self.read_places(inputs, points.face, points.position, points.normal)
+            return {what: np.zeros((len(rows), 4), np.float32) for what in sorted(inputs)}
+        return self.read_places(inputs, *(take_rows(one, rows) for one in (points.face, points.position, points.normal)))
 
     def read_places(
         self, inputs: Iterable[SurfaceInput], face: Index, place: Float, normal: NDArray[np.floating] | None = None

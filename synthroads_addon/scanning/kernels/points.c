@@ -443,3 +443,19 @@ INLINE int any_pack(int64_t count, const Points *p, int64_t size, uint8_t *restr
 EXPORT_WIDE(int, pack,
             (int64_t count, const Points *points, int64_t size, uint8_t *records, double *extremes, int64_t *by_return),
             (count, points, size, records, extremes, by_return))
+
+/* Writes values (chosen, width) into rows of `result`, each component times its `scale` (width) if there is one. */
+INLINE void any_spread(int64_t chosen, int64_t width, const int64_t *restrict rows, const float *restrict values,
+                       const float *restrict scale, float *restrict result)
+{
+    for (int64_t i = 0; i < chosen; i++)
+        for (int64_t j = 0; j < width; j++) {
+            const float value = values[i * width + j];
+            result[rows[i] * width + j] = scale ? value * scale[j] : value;
+        }
+}
+
+EXPORT_WIDE(void, spread,
+            (int64_t chosen, int64_t width, const int64_t *rows, const float *values, const float *scale,
+             float *result),
+            (chosen, width, rows, values, scale, result))

@@ -26,6 +26,7 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "daylight": (None, (_INT64, *[_POINTER] * 6)),
     "encode": (None, (_INT64, *[_POINTER] * 3)),
     "pack": (_INT32, (_INT64, _POINTER, _INT64, *[_POINTER] * 3)),
+    "spread": (None, (_INT64, _INT64, *[_POINTER] * 4)),
     "evaluate": (None, (_INT64, *[_POINTER] * 3)),
 }
 """What each function of points.c returns and takes."""
@@ -276,6 +277,25 @@ class CompiledPoints:
         result = np.empty(linear.shape, np.uint16)
         self._functions["encode"](linear.size, linear.ctypes.data, power.ctypes.data, result.ctypes.data)
         return result
+
+    def spread(self, rows: Index, values: Float32, result: Float32, scale: Float32 | None = None) -> None:
+        """Write values (K, C), each component times its scale (C,) if there is one, into rows (K,) of a result (N, C).
+
+        Raises:
+            IndexError: a row isn't there.
+        """
+        count, width = values.shape
+        if not count:
+            return
+        if not (0 <= rows.min() and rows.max() < len(result)):
+            raise IndexError(f"rows {rows.min()} to {rows.max()} of {len(result)}")
+        if result.dtype != np.float32 or not result.flags.c_contiguous or result.shape[1:] != (width,):
+            raise ValueError(f"result {result.dtype} {result.shape}: must be float32 ({len(result)}, {width})")
+        (rows,), (values,) = _as(np.int64, (count,), rows=rows), _as(np.float32, (count, width), values=values)
+        if scale is not None:
+            (scale,) = _as(np.float32, (width,), scale=scale)
+        at = None if scale is None else scale.ctypes.data
+        self._functions["spread"](count, width, rows.ctypes.data, values.ctypes.data, at, result.ctypes.data)
 
     def pack(self, record: AnyArray, points: PackedPoints) -> tuple[Float, Int] | None:
         """Fill in LAS records (N,) of point format 7, without extra bytes; None where a value or a type doesn't fit.
