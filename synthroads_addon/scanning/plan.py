@@ -274,8 +274,12 @@ class ScanPlan:
         caster = self.target.caster
         if not isinstance(caster, PacketScene):
             return caster.kernels
-        ways = {"pulses": self.pulse_kernel, "noise": usable_noise(), "poses": usable_poses()}
-        ways["points"] = usable_points()
+        ways = {
+            "pulses": self.pulse_kernel,
+            "noise": usable_noise(),
+            "poses": usable_poses(),
+            "points": usable_points(),
+        }
         parts = [
             f"{of} {f'by NumPy: {way}' if isinstance(way, NoKernelError) else 'compiled'}" for of, way in ways.items()
         ]

@@ -61,11 +61,11 @@ def shots(setting: ScannerSetting, first: int, count: int, with_frame: bool = Fa
 
 def _look_up_shots(table: PulseRays, first: int, count: int) -> PulseRays:
     """Return ``count`` shots from ``first`` on of a table of shots, which repeats."""
-    arrays = (table.time, table.scan_angle, table.direction, table.in_plane, table.across, table.beam)
-    time, scan_angle, *rest = (None if array is None else _repeated(array, first, count) for array in arrays)
-    assert time is not None
-    assert scan_angle is not None
-    return PulseRays(time, scan_angle, *rest)
+    time, scan_angle, direction = (
+        _repeated(array, first, count) for array in (table.time, table.scan_angle, table.direction)
+    )
+    others = (table.in_plane, table.across, table.beam)
+    return PulseRays(time, scan_angle, direction, *(None if one is None else _repeated(one, first, count) for one in others))
 
 
 def _repeated(table: AnyArray, first: int, count: int) -> AnyArray:
