@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple, Protocol
 
@@ -127,6 +127,10 @@ class PointLoops(Protocol):
         """Write values (K, C), each component times its scale (C,) if there is one, into rows (K,) of a result (N, C)."""
         ...
 
+    def inputs(self, rows: Index, source: Float, shift: Float | None, unit: float) -> Float32:
+        """Return vectors (K, 3) of rows (K,) of others (N, 3) as (K, 4), the last 0; with a shift (3,), in a unit."""
+        ...
+
     def pack(self, record: AnyArray, points: PackedPoints) -> tuple[Float, Int] | None:
         """Fill in LAS records (N,) of point format 7, without extra bytes; None where a value doesn't fit.
 
@@ -137,6 +141,20 @@ class PointLoops(Protocol):
 
     def evaluate_pieces(self, station: Float, pieces: Sequence[Float]) -> Float:
         """Return x, y, heading and curvature (4, N) at stations (N,) on the pieces of an alignment."""
+        ...
+
+
+    def find_feet(
+        self, evaluate: Callable[[Float], tuple[Float, ...]], places: Sequence[Float], brackets: Sequence[Float], most: int
+    ) -> tuple[Float, Float, Float]:
+        """Return the feet of points on an alignment, see `road.alignment.Alignment`: stations, rests and offsets (N,).
+
+        Args:
+            evaluate: gives x, y, heading and curvature (K,) at stations (K,).
+            places: x and y (N,).
+            brackets: first guesses of the stations, and the least and largest that they may be, (N,) each.
+            most: iterations.
+        """
         ...
 
 

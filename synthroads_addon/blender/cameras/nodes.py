@@ -198,10 +198,13 @@ class NodeLayers:
         for number in spans:
             for what in calculator.inputs_of(number):
                 asked.setdefault(what, []).append(number)
-        values = {what: np.zeros((len(rows), 4), np.float32) for what in asked}
+        values, loops = {what: np.zeros((len(rows), 4), np.float32) for what in asked}, point_loops()
         together: dict[tuple[int, ...], list[SurfaceInput]] = {}
         for what, numbers in asked.items():
-            if what == POSITION:
+            if loops is not None and what in (POSITION, TRUE_NORMAL) and points.normal.dtype == np.float64:
+                source, shift = (points.position, self._frame) if what == POSITION else (points.normal, None)
+                values[what] = loops.inputs(rows, source, shift, self._unit)
+            elif what == POSITION:
                 values[what][:, :3] = (take_rows(points.position, rows) + self._frame) / self._unit
             elif what in _OF_POINT:
                 values[what][:, :3] = _OF_POINT[what](points, rows)

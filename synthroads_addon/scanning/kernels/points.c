@@ -1,11 +1,13 @@
 /* What is worked out for each point after it was met: where its light comes from and goes to, where on its triangle it
  * lies, what is raised below it. NumPy's code is the reference, operation by operation:
  *   colour.colour.SeenPoints.towards_scanner, colour.reflection.reflected_sunlight,
- *   scene.surface_values.corner_shares and _interpolate, relief.micro_relief.shift_by_relief, road.alignment._evaluate.
+ *   scene.surface_values.corner_shares and _interpolate, relief.micro_relief.shift_by_relief; more in loops/.
  *
  * What needs a power or an angle, and products by linear algebra, are NumPy's and given.
  */
 #include "kernel.h"
+#include "loops/axis.h"
+#include "loops/records.h"
 
 INLINE float larger(float a, float b)
 {
@@ -304,50 +306,6 @@ EXPORT_WIDE(void, approach,
             (count, chosen, rough, height, cosine, material, reach, towards, place, range, moved, distance))
 
 
-/* Pieces of an alignment; as `_Pieces` in points.py. */
-typedef struct {
-    const double *borders; /* (pieces - 1), ascending */
-    const double *middles, *halves, *bends, *slopes, *headings;
-    const double *series_x, *series_y; /* (terms + 1, pieces) */
-    int64_t pieces, terms;
-} Pieces;
-
-/* Writes x, y, heading and curvature (4, count) at stations. */
-INLINE void any_evaluate(int64_t count, const double *restrict station, const Pieces *p, double *restrict result)
-{
-    const double *restrict series_x = p->series_x, *restrict series_y = p->series_y;
-    int64_t at = 0;
-    for (int64_t i = 0; i < count; i++) {
-        const double s = station[i];
-        /* The number of borders that aren't above it; neighbours mostly lie on one piece. */
-        if (!((at == 0 || p->borders[at - 1] <= s) && (at == p->pieces - 1 || s < p->borders[at]))) {
-            int64_t low = 0, high = p->pieces - 1;
-            while (low < high) {
-                const int64_t middle = (low + high) / 2;
-                if (s < p->borders[middle])
-                    high = middle;
-                else
-                    low = middle + 1;
-            }
-            at = low;
-        }
-        const double u = s - p->middles[at], v = u / p->halves[at];
-        double x = series_x[p->terms * p->pieces + at], y = series_y[p->terms * p->pieces + at];
-        for (int64_t n = p->terms - 1; n >= 0; n--) {
-            x = x * v + series_x[n * p->pieces + at];
-            y = y * v + series_y[n * p->pieces + at];
-        }
-        const double bend = p->bends[at], slope = p->slopes[at] * u;
-        result[i] = x;
-        result[count + i] = y;
-        result[2 * count + i] = p->headings[at] + u * (bend + 0.5 * slope);
-        result[3 * count + i] = bend + slope;
-    }
-}
-
-EXPORT_WIDE(void, evaluate, (int64_t count, const double *station, const Pieces *pieces, double *result),
-            (count, station, pieces, result))
-
 /* Writes light (count, 3), cut to 0 to 1: what the sun gives and what surfaces of these colours (count, 3) throw back of
  * the sky by their normals (count, 3). */
 INLINE void any_daylight(int64_t count, const float *restrict sun, const float *restrict color,
@@ -382,68 +340,6 @@ INLINE void any_encode(int64_t count, const float *restrict linear, const float 
 EXPORT_WIDE(void, encode, (int64_t count, const float *linear, const float *power, uint16_t *result),
             (count, linear, power, result))
 
-/* Points and how they are stored; as `_Records` in points.py. */
-typedef struct {
-    const double *place; /* (count, 3) */
-    const double *intensity, *time;
-    const uint16_t *rgb; /* (count, 3) */
-    const uint8_t *number, *of, *class_id, *codes;
-    const float *angle;
-    const uint16_t *strip;
-    double offset[3], per_step, brightness;
-    float per_angle;
-    int32_t classes;
-} Points;
-
-#define SHIFT 6755399441055744.0 /* its sum with a number rounds this, halves to even ones */
-
-/* Fills in LAS records of format 7 (LAS 1.4 R15, table 15), `size` bytes each; extremes of coordinates (2, 3), points by
- * return (16). Returns 0, and what is filled in means nothing, where a value doesn't fit. */
-INLINE int any_pack(int64_t count, const Points *p, int64_t size, uint8_t *restrict records, double *restrict extremes,
-                    int64_t *restrict by_return)
-{
-    int fits = 1;
-    for (int64_t i = 0; i < count; i++) {
-        uint8_t *restrict record = records + i * size;
-        for (int j = 0; j < 3; j++) {
-            const double steps = (p->place[3 * i + j] - p->offset[j]) * p->per_step;
-            const double whole = (steps + SHIFT) - SHIFT;
-            const int inside = whole >= -2147483648.0 && whole < 2147483648.0;
-            const int32_t stored = inside ? (int32_t)whole : 0;
-            fits &= inside;
-            extremes[j] = whole < extremes[j] ? whole : extremes[j];
-            extremes[3 + j] = whole > extremes[3 + j] ? whole : extremes[3 + j];
-            __builtin_memcpy(record + 4 * j, &stored, 4);
-        }
-        const double bright = (p->intensity[i] * p->brightness + SHIFT) - SHIFT, time = p->time[i];
-        const double angle = ((double)(p->angle[i] * p->per_angle) + SHIFT) - SHIFT;
-        const uint8_t number = p->number[i], of = p->of[i], class_id = p->class_id[i];
-        const int usual = bright >= 0.0 && bright <= 65535.0 && angle >= -30000.0 && angle <= 30000.0 &&
-                          __builtin_fabs(time) <= 1.7976931348623157e308 && number <= 15 && of <= 15 &&
-                          class_id < p->classes;
-        fits &= usual;
-        if (!usual)
-            continue;
-        const uint16_t intensity = (uint16_t)(int32_t)bright, source = (uint16_t)(p->strip[i] + 1);
-        const int16_t scan_angle = (int16_t)(int32_t)angle;
-        __builtin_memcpy(record + 12, &intensity, 2);
-        record[14] = (uint8_t)(number | of << 4);
-        record[15] = 0;
-        record[16] = p->codes[class_id];
-        record[17] = 0;
-        __builtin_memcpy(record + 18, &scan_angle, 2);
-        __builtin_memcpy(record + 20, &source, 2);
-        __builtin_memcpy(record + 22, &time, 8);
-        __builtin_memcpy(record + 30, p->rgb + 3 * i, 6);
-        by_return[number]++;
-    }
-    return fits;
-}
-
-EXPORT_WIDE(int, pack,
-            (int64_t count, const Points *points, int64_t size, uint8_t *records, double *extremes, int64_t *by_return),
-            (count, points, size, records, extremes, by_return))
-
 /* Writes values (chosen, width) into rows of `result`, each component times its `scale` (width) if there is one. */
 INLINE void any_spread(int64_t chosen, int64_t width, const int64_t *restrict rows, const float *restrict values,
                        const float *restrict scale, float *restrict result)
@@ -459,3 +355,22 @@ EXPORT_WIDE(void, spread,
             (int64_t chosen, int64_t width, const int64_t *rows, const float *values, const float *scale,
              float *result),
             (chosen, width, rows, values, scale, result))
+
+/* Writes vectors (chosen, 3) of rows of `source` into the first three of four numbers each; with a `shift` (3), what that
+ * makes of them in this unit. */
+INLINE void any_inputs(int64_t chosen, const int64_t *restrict rows, const double *restrict source,
+                       const double *restrict shift, double unit, float *restrict result)
+{
+    for (int64_t i = 0; i < chosen; i++) {
+        for (int j = 0; j < 3; j++) {
+            const double value = source[3 * rows[i] + j];
+            result[4 * i + j] = (float)(shift ? (value + shift[j]) / unit : value);
+        }
+        result[4 * i + 3] = 0.0f;
+    }
+}
+
+EXPORT_WIDE(void, inputs,
+            (int64_t chosen, const int64_t *rows, const double *source, const double *shift, double unit,
+             float *result),
+            (chosen, rows, source, shift, unit, result))

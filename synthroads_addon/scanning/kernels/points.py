@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
 
@@ -27,6 +27,9 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "encode": (None, (_INT64, *[_POINTER] * 3)),
     "pack": (_INT32, (_INT64, _POINTER, _INT64, *[_POINTER] * 3)),
     "spread": (None, (_INT64, _INT64, *[_POINTER] * 4)),
+    "inputs": (None, (_INT64, *[_POINTER] * 3, ctypes.c_double, _POINTER)),
+    "measure": (None, (_INT64, _POINTER)),
+    "step": (_INT64, (_INT64, _POINTER, _POINTER)),
     "evaluate": (None, (_INT64, *[_POINTER] * 3)),
 }
 """What each function of points.c returns and takes."""
@@ -58,6 +61,16 @@ class _Records(ctypes.Structure):
         ("brightness", ctypes.c_double),
         ("per_angle", ctypes.c_float),
         ("classes", _INT32),
+    )
+
+
+class _Feet(ctypes.Structure):
+    """Feet on an alignment that are sought; as `Feet` in points.c."""
+
+    _fields_ = tuple(
+        (name, _POINTER)
+        for name in ("x", "y", "station", "low", "high", "along", "offset", "active")
+        + ("px", "py", "cosine", "sine", "bend", "turn", "lever")
     )
 
 
@@ -296,6 +309,49 @@ class CompiledPoints:
             (scale,) = _as(np.float32, (width,), scale=scale)
         at = None if scale is None else scale.ctypes.data
         self._functions["spread"](count, width, rows.ctypes.data, values.ctypes.data, at, result.ctypes.data)
+
+    def inputs(self, rows: Index, source: Float, shift: Float | None, unit: float) -> Float32:
+        """Return vectors (K, 3) of rows (K,) of others (N, 3) as (K, 4), the last 0; with a shift (3,), in a unit.
+
+        Raises:
+            IndexError: a row isn't there.
+        """
+        if len(rows) and not (0 <= rows.min() and rows.max() < len(source)):
+            raise IndexError(f"rows {rows.min()} to {rows.max()} of {len(source)}")
+        (rows,), (source,) = _as(np.int64, rows.shape, rows=rows), _as(np.float64, (len(source), 3), source=source)
+        if shift is not None:
+            (shift,) = _as(np.float64, (3,), shift=shift)
+        result, at = np.empty((len(rows), 4), np.float32), None if shift is None else shift.ctypes.data
+        self._functions["inputs"](len(rows), rows.ctypes.data, source.ctypes.data, at, unit, result.ctypes.data)
+        return result
+
+    def find_feet(
+        self, evaluate: Callable[[Float], tuple[Float, ...]], places: Sequence[Float], brackets: Sequence[Float], most: int
+    ) -> tuple[Float, Float, Float]:
+        """Return the feet of points on an alignment, see `road.alignment.Alignment`: stations, rests and offsets (N,).
+
+        Args:
+            evaluate: gives x, y, heading and curvature (K,) at stations (K,).
+            places: x and y (N,).
+            brackets: first guesses of the stations, and the least and largest that they may be, (N,) each.
+            most: iterations.
+        """
+        count = len(places[0])
+        x, y = _as(np.float64, (count,), x=places[0], y=places[1])
+        station, low, high = (np.array(one, np.float64) for one in brackets)
+        _as(np.float64, (count,), station=station, low=low, high=high)
+        along, offset, active, left = np.empty(count), np.empty(count), np.arange(count), count
+        for _ in range(most):
+            px, py, heading, bend = (np.ascontiguousarray(one) for one in evaluate(station[active[:left]]))
+            cosine, sine, turn, lever = np.cos(heading), np.sin(heading), np.empty(left), np.empty(left)
+            arrays = (x, y, station, low, high, along, offset, active, px, py, cosine, sine, bend, turn, lever)
+            told = _Feet(*(one.ctypes.data for one in arrays))
+            self._functions["measure"](left, ctypes.byref(told))
+            angle = np.arctan2(turn, lever)
+            left = self._functions["step"](left, ctypes.byref(told), angle.ctypes.data)
+            if not left:
+                break
+        return station, along, offset
 
     def pack(self, record: AnyArray, points: PackedPoints) -> tuple[Float, Int] | None:
         """Fill in LAS records (N,) of point format 7, without extra bytes; None where a value or a type doesn't fit.
