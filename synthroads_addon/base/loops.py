@@ -1,4 +1,4 @@
-"""Loops over points that a compiled library may do in place of NumPy, to the same bytes, and whether they are in use."""
+"""Loops over points that a compiled library may do in place of NumPy, to the same bytes; whether they are in use."""
 
 from __future__ import annotations
 
@@ -97,7 +97,9 @@ class PointLoops(Protocol):
         """
         ...
 
-    def raised(self, height: Float, cosine: Float, normal: Float32, place: Float, distance: Float) -> tuple[Float, Float]:
+    def raised(
+        self, height: Float, cosine: Float, normal: Float32, place: Float, distance: Float
+    ) -> tuple[Float, Float]:
         """Return places (N, 3) and ranges (N,) shifted along normals (N, 3) by heights (N,), 0 for those that stay."""
         ...
 
@@ -124,7 +126,7 @@ class PointLoops(Protocol):
         ...
 
     def spread(self, rows: Index, values: Float32, result: Float32, scale: Float32 | None = None) -> None:
-        """Write values (K, C), each component times its scale (C,) if there is one, into rows (K,) of a result (N, C)."""
+        """Write values (K, C), times a scale (C,) if there is one, into rows (K,) of a result (N, C)."""
         ...
 
     def inputs(self, rows: Index, source: Float, shift: Float | None, unit: float) -> Float32:
@@ -143,9 +145,12 @@ class PointLoops(Protocol):
         """Return x, y, heading and curvature (4, N) at stations (N,) on the pieces of an alignment."""
         ...
 
-
     def find_feet(
-        self, evaluate: Callable[[Float], tuple[Float, ...]], places: Sequence[Float], brackets: Sequence[Float], most: int
+        self,
+        evaluate: Callable[[Float], tuple[Float, ...]],
+        places: Sequence[Float],
+        brackets: Sequence[Float],
+        most: int,
     ) -> tuple[Float, Float, Float]:
         """Return the feet of points on an alignment, see `road.alignment.Alignment`: stations, rests and offsets (N,).
 
@@ -164,7 +169,7 @@ _in_use: list[PointLoops] = []
 
 @contextmanager
 def loops_by(loops: PointLoops | None) -> Iterator[None]:
-    """Context in which these loops are done in place of NumPy, in all threads; with None by NumPy. Results are the same."""
+    """Context in which these loops take NumPy's place in all threads; with None NumPy does all. Results are the same."""
     if loops is not None:
         _in_use.append(loops)
     try:

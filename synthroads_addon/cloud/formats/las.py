@@ -123,14 +123,30 @@ class LasWriter(CloudWriter):
         """Fill in what every LAS record has, without flags, by compiled loops; return False where NumPy has to."""
         if (loops := point_loops()) is None:
             return False
-        names = (*("xyz", "intensity", "gps_time", "rgb", "return_number"), *("number_of_returns", "class_id"))
-        values = (*(getattr(block, name) for name in names), self._codes, block.scan_angle_deg, block.strip)
-        steps = (1.0 / SCALE, self.intensity_scale, 1.0 / SCAN_ANGLE_STEP)
-        filled = loops.pack(record, PackedPoints(*values, self._header.offsets, *steps))
+        points = PackedPoints(
+            xyz=block.xyz,
+            intensity=block.intensity,
+            gps_time=block.gps_time,
+            rgb=block.rgb,
+            return_number=block.return_number,
+            number_of_returns=block.number_of_returns,
+            class_id=block.class_id,
+            codes=self._codes,
+            scan_angle_deg=block.scan_angle_deg,
+            strip=block.strip,
+            offset=self._header.offsets,
+            per_metre=1.0 / SCALE,
+            per_intensity=self.intensity_scale,
+            per_degree=1.0 / SCAN_ANGLE_STEP,
+        )
+        filled = loops.pack(record, points)
         if filled is None:
             return False
         (low, high), by_return = filled
-        self._low, self._high = np.minimum(self._low, low.astype(np.int64)), np.maximum(self._high, high.astype(np.int64))
+        self._low, self._high = (
+            np.minimum(self._low, low.astype(np.int64)),
+            np.maximum(self._high, high.astype(np.int64)),
+        )
         self._by_return += by_return
         return True
 

@@ -317,7 +317,9 @@ class MaterialLayers:
                 sun[found] = channels["sun"][found]
         if everywhere and "sky" not in channels and self.clouds is None and (loops := point_loops()) is not None:
             light, normal = self.light, np.asarray(points.normal, np.float32)
-            linear = loops.daylight(sun, color, normal, *(np.asarray(one, np.float32) for one in (light.above, light.below)))
+            linear = loops.daylight(
+                sun, color, normal, *(np.asarray(one, np.float32) for one in (light.above, light.below))
+            )
             return loops.encoded(linear, np.power(linear, _SRGB_POWER))
         sky = color * self.light.sky(points.normal)
         if "sky" in channels:

@@ -80,11 +80,12 @@ def _by_loops(
     """Return the sunlight that surfaces reflect by compiled loops, see `reflected_sunlight`; powers are NumPy's."""
     color, roughness, metallic, specular = layers
     seen, across, between = loops.halves(*vectors)
-    rough, rise = np.maximum(roughness, _SMOOTHEST), np.zeros_like(between)
+    rough, rise = np.asarray(np.maximum(roughness, _SMOOTHEST), np.float32), np.zeros_like(between)
     metal = np.flatnonzero(metallic > 0.0)
     rise[metal] = (1.0 - np.clip(between[metal], 0.0, 1.0)) ** 5
     tables = _tables()
-    surfaces = (color, rough, rough**4, metallic, specular, towards_sun, seen, across, between, rise)
+    square = np.asarray(rough**4, np.float32)
+    surfaces: list[Float32] = [color, rough, square, metallic, specular, towards_sun, seen, across, between, rise]
     return loops.reflected(tables.arrays, (*tables.steps, _MATT_F0, _BRIGHTEST), surfaces)
 
 

@@ -29,10 +29,12 @@ class SceneSurfaces:
         self._firsts = np.cumsum([0, *(len(mesh) for mesh in self._meshes)])
 
     def read(self, inputs: Iterable[SurfaceInput], points: SeenPoints, rows: Index) -> dict[SurfaceInput, Float32]:
-        """Return each surface input's values (K, 4) at rows (K,) of points; 0 where the surface lacks it, as renderers."""
+        """Return each surface input's values (K, 4) at rows (K,) of points; 0 where the surface lacks it."""
         if points.face is None:
             return {what: np.zeros((len(rows), 4), np.float32) for what in sorted(inputs)}
-        return self.read_places(inputs, *(take_rows(one, rows) for one in (points.face, points.position, points.normal)))
+        return self.read_places(
+            inputs, *(take_rows(one, rows) for one in (points.face, points.position, points.normal))
+        )
 
     def read_places(
         self, inputs: Iterable[SurfaceInput], face: Index, place: Float, normal: NDArray[np.floating] | None = None

@@ -65,11 +65,13 @@ def _look_up_shots(table: PulseRays, first: int, count: int) -> PulseRays:
         _repeated(array, first, count) for array in (table.time, table.scan_angle, table.direction)
     )
     others = (table.in_plane, table.across, table.beam)
-    return PulseRays(time, scan_angle, direction, *(None if one is None else _repeated(one, first, count) for one in others))
+    return PulseRays(
+        time, scan_angle, direction, *(None if one is None else _repeated(one, first, count) for one in others)
+    )
 
 
 def _repeated(table: AnyArray, first: int, count: int) -> AnyArray:
-    """Return the columns (..., count) from ``first`` on of a table (..., M) that repeats: whole stretches are copied."""
+    """Return the columns (..., count) from ``first`` on of a table (..., M) that repeats, copied in stretches."""
     length = table.shape[-1]
     if first + count <= length:
         return table[..., first : first + count].copy()

@@ -1,4 +1,4 @@
-"""What is worked out for each point, in compiled loops, beside `points.c`: the bytes of NumPy, see `base.loops`."""
+"""Loops over points that are compiled, beside `points.c`: byte for byte what NumPy makes, see `base.loops`."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "step": (_INT64, (_INT64, _POINTER, _POINTER)),
     "evaluate": (None, (_INT64, *[_POINTER] * 3)),
 }
-"""What each function of points.c returns and takes."""
+"""Results and arguments of the functions of points.c, by name."""
 _RECORD = 36
 """Bytes of a LAS record of point format 7."""
 
@@ -134,7 +134,7 @@ class CompiledPoints:
         chosen = len(material) if rows is None else len(rows)
         if not chosen:
             return np.empty((0, *means.shape[1:]), np.float32)
-        if int(material.max()) >= kinds or not (rows is None or (0 <= rows.min() and rows.max() < len(material))):
+        if int(material.max()) >= kinds or not (rows is None or (rows.min() >= 0 and rows.max() < len(material))):
             return None
         (varies,), (material,) = _as(np.bool_, (kinds,), varies=varies), _as(np.uint16, material.shape, all=material)
         rows = None if rows is None else np.ascontiguousarray(rows, np.int64)
@@ -196,7 +196,7 @@ class CompiledPoints:
             IndexError: a face isn't there.
         """
         count = len(faces)
-        if count and not (0 <= faces.min() and faces.max() < len(triangles)):
+        if count and not (faces.min() >= 0 and faces.max() < len(triangles)):
             raise IndexError(f"faces {faces.min()} to {faces.max()} of {len(triangles)}")
         (faces,), (place,) = _as(np.int64, (count,), faces=faces), _as(np.float64, (count, 3), place=place)
         (vertices,) = _as(np.float32, (len(vertices), 3), vertices=vertices)
@@ -228,7 +228,9 @@ class CompiledPoints:
         self._functions["interpolate"](len(rows), *(array.ctypes.data for array in arrays))
         return True
 
-    def raised(self, height: Float, cosine: Float, normal: Float32, place: Float, distance: Float) -> tuple[Float, Float]:
+    def raised(
+        self, height: Float, cosine: Float, normal: Float32, place: Float, distance: Float
+    ) -> tuple[Float, Float]:
         """Return places (N, 3) and ranges (N,) shifted along normals (N, 3) by heights (N,), 0 for those that stay."""
         count = len(height)
         height, cosine, distance = _as(np.float64, (count,), height=height, cosine=cosine, distance=distance)
@@ -262,7 +264,10 @@ class CompiledPoints:
         chosen, count = len(rough), len(distance)
         height, cosine = _as(np.float64, (chosen,), height=height, cosine=cosine)
         (rough,), (reach,) = _as(np.int64, (chosen,), rough=rough), _as(np.float64, (len(reach),), reach=reach)
-        (material,), (distance,) = _as(np.uint16, (count,), material=material), _as(np.float64, (count,), range=distance)
+        (material,), (distance,) = (
+            _as(np.uint16, (count,), material=material),
+            _as(np.float64, (count,), range=distance),
+        )
         (towards,), (place,) = _as(np.float32, (count, 3), towards=towards), _as(np.float64, (count, 3), place=place)
         moved, after = np.empty((count, 3)), np.empty(count)
         arrays = (rough, height, cosine, material, reach, towards, place, distance, moved, after)
@@ -300,7 +305,7 @@ class CompiledPoints:
         count, width = values.shape
         if not count:
             return
-        if not (0 <= rows.min() and rows.max() < len(result)):
+        if not (rows.min() >= 0 and rows.max() < len(result)):
             raise IndexError(f"rows {rows.min()} to {rows.max()} of {len(result)}")
         if result.dtype != np.float32 or not result.flags.c_contiguous or result.shape[1:] != (width,):
             raise ValueError(f"result {result.dtype} {result.shape}: must be float32 ({len(result)}, {width})")
@@ -316,7 +321,7 @@ class CompiledPoints:
         Raises:
             IndexError: a row isn't there.
         """
-        if len(rows) and not (0 <= rows.min() and rows.max() < len(source)):
+        if len(rows) and not (rows.min() >= 0 and rows.max() < len(source)):
             raise IndexError(f"rows {rows.min()} to {rows.max()} of {len(source)}")
         (rows,), (source,) = _as(np.int64, rows.shape, rows=rows), _as(np.float64, (len(source), 3), source=source)
         if shift is not None:
@@ -326,7 +331,11 @@ class CompiledPoints:
         return result
 
     def find_feet(
-        self, evaluate: Callable[[Float], tuple[Float, ...]], places: Sequence[Float], brackets: Sequence[Float], most: int
+        self,
+        evaluate: Callable[[Float], tuple[Float, ...]],
+        places: Sequence[Float],
+        brackets: Sequence[Float],
+        most: int,
     ) -> tuple[Float, Float, Float]:
         """Return the feet of points on an alignment, see `road.alignment.Alignment`: stations, rests and offsets (N,).
 
@@ -363,7 +372,9 @@ class CompiledPoints:
         Returns:
             the least and the largest coordinates (2, 3) as stored, and how many points have each return number (16,).
         """
-        arrays, count = points[:10], len(record)
+        count = len(record)
+        arrays: list[AnyArray] = [points.xyz, points.intensity, points.gps_time, points.rgb, points.return_number]
+        arrays += [points.number_of_returns, points.class_id, points.codes, points.scan_angle_deg, points.strip]
         shapes = ((count, 3), (count,), (count,), (count, 3), *[(count,)] * 3, points.codes.shape, (count,), (count,))
         kinds = [*[np.float64] * 3, np.uint16, *[np.uint8] * 4, np.float32, np.uint16]
         if any(

@@ -248,9 +248,7 @@ def _footprint(distance: Float, cosine: Float, divergence: float) -> tuple[Float
     return across / np.maximum(cosine, _LEAST_COSINE), across
 
 
-def _shift_along_normals(
-    points: PointBlock, height: Float, cosine: Float, arrays: tuple[str, str]
-) -> PointBlock:
+def _shift_along_normals(points: PointBlock, height: Float, cosine: Float, arrays: tuple[str, str]) -> PointBlock:
     """Return the points with arrays of places and ranges shifted along their normals.
 
     Args:

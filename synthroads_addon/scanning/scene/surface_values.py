@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...base.loops import point_loops
 from ...base.arrays import AnyArray, Bool, Float, Float32, Index, take_rows
+from ...base.loops import point_loops
 
 
 class SurfaceInput(NamedTuple):
@@ -206,7 +206,7 @@ def corner_shares(corners: Float, place: Float) -> Float:
 
 def _dot(one: Float, other: Float) -> Float:
     """Return the dot products (N,) of vectors (N, 3), in an order of their own: einsum's depends on the processor."""
-    return one[:, 0] * other[:, 0] + one[:, 2] * other[:, 2] + one[:, 1] * other[:, 1]
+    return np.asarray(one[:, 0] * other[:, 0] + one[:, 2] * other[:, 2] + one[:, 1] * other[:, 1])
 
 
 @dataclass

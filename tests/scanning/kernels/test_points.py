@@ -1,4 +1,4 @@
-"""What is worked out for each point by compiled loops: byte for byte that of NumPy."""
+"""Compiled loops over points: byte for byte those of NumPy."""
 
 from __future__ import annotations
 
