@@ -169,7 +169,7 @@ _in_use: list[PointLoops] = []
 
 @contextmanager
 def loops_by(loops: PointLoops | None) -> Iterator[None]:
-    """Context in which these loops take NumPy's place in all threads; with None NumPy does all. Results are the same."""
+    """Context in which these loops take NumPy's place in all threads; with None NumPy does all. Results are alike."""
     if loops is not None:
         _in_use.append(loops)
     try:

@@ -28,7 +28,13 @@ from synthroads_addon.scanning.colour.surfaces import SceneSurfaces
 from synthroads_addon.scanning.kernels.points import CompiledPoints, usable_points
 from synthroads_addon.scanning.relief.micro_relief import BeamEnds, micro_relief, shift_by_relief
 from synthroads_addon.scanning.scene.mesh import SceneMesh
-from synthroads_addon.scanning.scene.surface_values import MeshValues, PartValues, SurfaceInput, SurfaceValues
+from synthroads_addon.scanning.scene.surface_values import (
+    MeshValues,
+    PartValues,
+    SurfaceInput,
+    SurfaceValues,
+    corner_shares,
+)
 from tests.helpers.clouds.random_points import make_points
 
 pytestmark = pytest.mark.any_blender
@@ -176,6 +182,8 @@ def test_values_between_the_corners_of_triangles(kernel: CompiledPoints, count: 
     for loops in (None, kernel):
         with loops_by(loops):
             found.append(SceneSurfaces(mesh).read_places(inputs, face, place))
+    shares = corner_shares(mesh.vertices[mesh.triangles[face]].astype(np.float64), place)
+    same(kernel.corner_shares(mesh.vertices, mesh.triangles, face, place), shares)
     for what in inputs:
         same(found[1][what], found[0][what])
         assert count < 100 or found[0][what].any()
@@ -221,10 +229,14 @@ def test_stations_of_an_alignment(kernel: CompiledPoints, count: int) -> None:
     station = np.sort(random.uniform(-30.0, 530.0, count))
     station[: count // 5] = random.choice([0.0, 120.0, 200.0, 500.0, np.nextafter(120.0, 0.0)], count // 5)
     beside = random.uniform(-20, 20, count)
-    expected = axis.frame(station), axis.project(axis.place(station, beside))
-    with loops_by(kernel):
-        found = axis.frame(station), axis.project(axis.place(station, beside))
-    for mine, theirs in zip(found, expected, strict=True):
+    guess, far = station + random.uniform(-9, 9, count), random.normal(0, 400, (count, 2)) + [5e5, 5e6]
+    found = []
+    for loops in (None, kernel):
+        with loops_by(loops):
+            places = axis.place(station, beside)
+            near = (axis.project_near(places, guess, reach) for reach in (0.5, 8.0))
+            found.append([axis.frame(station), axis.project(places), axis.project(far), *near])
+    for theirs, mine in zip(*found, strict=True):
         for one, other in zip(mine, theirs, strict=True):
             same(one, other)
 
@@ -290,6 +302,21 @@ def test_las_records_whose_values_are_cut_or_refused(kernel: CompiledPoints, tmp
             assert told[0] == told[1]
 
 
+@pytest.mark.parametrize("count", COUNTS)
+def test_vectors_that_materials_ask_for(kernel: CompiledPoints, count: int) -> None:
+    random = stream(count, "inputs")
+    rows, source = random.permutation(count)[: count // 2], random.normal(0, 9, (count, 3))
+    shift = np.array([3e5, -7.0, 1.0])
+        random.permutation(count)[: count // 2],
+        random.normal(0, 9, (count, 3)),
+        np.array([3e5, -7, 1]),
+    )
+    expected = np.zeros((2, len(rows), 4), np.float32)
+    expected[0, :, :3], expected[1, :, :3] = source[rows], (source[rows] + shift) / 0.3048
+    same(kernel.inputs(rows, source, None, 0.3048), expected[0])
+    same(kernel.inputs(rows, source, shift, 0.3048), expected[1])
+
+
 @pytest.mark.parametrize("scaled", [False, True])
 def test_rows_that_are_spread(kernel: CompiledPoints, scaled: bool) -> None:
     random = stream(1, "spread")
@@ -304,6 +331,8 @@ def test_arrays_that_do_not_match_are_refused(kernel: CompiledPoints) -> None:
     rows, values = np.array([0, 5]), np.zeros((2, 3), np.float32)
     with pytest.raises(IndexError, match="rows 0 to 5 of 4"):
         kernel.spread(rows, values, np.zeros((4, 3), np.float32))
+    with pytest.raises(IndexError, match="rows 0 to 5 of 4"):
+        kernel.inputs(rows, np.zeros((4, 3)), None, 1.0)
     with pytest.raises(ValueError, match=r"result float64 \(9, 3\): must be float32 \(9, 3\)"):
         kernel.spread(rows, values, np.zeros((9, 3)))
     with pytest.raises(ValueError, match=r"seen_from \(4, 3\): must be \(5, 3\)"):
