@@ -307,10 +307,6 @@ def test_vectors_that_materials_ask_for(kernel: CompiledPoints, count: int) -> N
     random = stream(count, "inputs")
     rows, source = random.permutation(count)[: count // 2], random.normal(0, 9, (count, 3))
     shift = np.array([3e5, -7.0, 1.0])
-        random.permutation(count)[: count // 2],
-        random.normal(0, 9, (count, 3)),
-        np.array([3e5, -7, 1]),
-    )
     expected = np.zeros((2, len(rows), 4), np.float32)
     expected[0, :, :3], expected[1, :, :3] = source[rows], (source[rows] + shift) / 0.3048
     same(kernel.inputs(rows, source, None, 0.3048), expected[0])
