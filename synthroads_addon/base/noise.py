@@ -12,6 +12,7 @@ on surfaces of any tilt and place. The lattice is turned from octave to octave a
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -95,7 +96,7 @@ def noise_field(
     """
     if not 1 <= octaves <= MAX_OCTAVES:
         raise ValueError(f"octaves must be 1 to {MAX_OCTAVES}")
-    keys = stream(seed, "noise field").integers(0, 2**32, MAX_OCTAVES, dtype=np.uint32)
+    keys = _keys(seed)
     variance = DECAY ** np.arange(octaves)
     gains = np.sqrt(variance / variance.sum()).astype(np.float32)
     cells = np.atleast_1d(2.0 / np.asarray(wavelength, dtype=np.float64))
@@ -117,6 +118,14 @@ def noise_field(
             point = [coordinate * 2.0 for coordinate in point]
         result[part] = total
     return result
+
+
+@lru_cache(maxsize=64)
+def _keys(seed: int) -> Hash:
+    """Return the keys of a field's octaves (`MAX_OCTAVES`,), which many blocks of points ask for; not to be changed."""
+    keys = stream(seed, "noise field").integers(0, 2**32, MAX_OCTAVES, dtype=np.uint32)
+    keys.flags.writeable = False
+    return keys
 
 
 def mean_deviation(long: Float, short: Float) -> Float32:

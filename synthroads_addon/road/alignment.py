@@ -23,6 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base.arrays import Float, Int
 from ..base.errors import InputError
+from ..base.loops import point_loops
 
 Kind = Literal["line", "arc", "clothoid"]
 
@@ -40,6 +41,7 @@ _NODE_SPACING = 20.0  # m, of the coarse nodes that start a projection
 _LEAF = 4096  # points projected at a time: their temporaries stay in the cache
 _PAIRS = 1_000_000  # distances held at a time
 _BLOCK = 65_536  # stations evaluated at a time
+_ITERATIONS = 60
 _REACH = 0.98  # of the radius that an offset may use
 
 
@@ -167,6 +169,12 @@ class Alignment:
 
     def _evaluate(self, station: Float) -> tuple[Float, Float, Float, Float]:
         """Return x and y less the start's (m), heading (rad) and curvature (1/m), each (N,), at stations (N,)."""
+        if (loops := point_loops()) is not None:
+            columns = (self._middles, self._halves, self._bends, self._slopes, self._headings)
+            x, y, heading, bend = loops.evaluate_pieces(
+                station, (self._borders, *columns, self._series_x, self._series_y)
+            )
+            return x, y, heading, bend
         piece = np.searchsorted(self._borders, station, side="right")
         u = station - self._middles[piece]
         v = u / self._halves[piece]
@@ -303,10 +311,12 @@ class Alignment:
         step that leaves the bracket, which narrows by the sign of g, is replaced by bisection.
         Returns station, the rest g along the tangent (0 but at the road's ends) and the offset d.
         """
+        if (loops := point_loops()) is not None:
+            return loops.find_feet(self._evaluate, (x, y), (station, low, high), _ITERATIONS)
         station, low, high = station.copy(), low.copy(), high.copy()
         along, offset = np.empty_like(station), np.empty_like(station)
         active = np.arange(len(station))
-        for _ in range(60):
+        for _ in range(_ITERATIONS):
             s = station[active]
             px, py, heading, bend = self._evaluate(s)
             dx, dy, cos, sin = x[active] - px, y[active] - py, np.cos(heading), np.sin(heading)

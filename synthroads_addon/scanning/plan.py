@@ -28,6 +28,7 @@ from .forecast import ScanForecast, forecast_scan
 from .kernels.library import NoKernelError
 from .kernels.noise import CompiledNoise, usable_noise
 from .kernels.packets import PacketScene
+from .kernels.points import CompiledPoints, usable_points
 from .kernels.poses import CompiledPoses, usable_poses
 from .kernels.pulses import PulseKernel
 from .multipath import Multipath
@@ -261,13 +262,24 @@ class ScanPlan:
         poses = usable_poses()
         return poses if isinstance(poses, CompiledPoses) and isinstance(self.target.caster, PacketScene) else None
 
+    @cached_property
+    def point_loops(self) -> CompiledPoints | None:
+        """Return the compiled loops over points once they are measured; None for NumPy, likewise."""
+        points = usable_points()
+        return points if isinstance(points, CompiledPoints) and isinstance(self.target.caster, PacketScene) else None
+
     @property
     def _kernels(self) -> str:
         """Return by what way rays are cast, pulses followed and random fields worked out, for the report."""
         caster = self.target.caster
         if not isinstance(caster, PacketScene):
             return caster.kernels
-        ways = {"pulses": self.pulse_kernel, "noise": usable_noise(), "poses": usable_poses()}
+        ways = {
+            "pulses": self.pulse_kernel,
+            "noise": usable_noise(),
+            "poses": usable_poses(),
+            "points": usable_points(),
+        }
         parts = [
             f"{of} {f'by NumPy: {way}' if isinstance(way, NoKernelError) else 'compiled'}" for of, way in ways.items()
         ]

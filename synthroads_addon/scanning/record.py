@@ -8,6 +8,7 @@ from itertools import islice
 from threading import current_thread, main_thread
 from typing import Any, Protocol, TypeAlias, TypeVar
 
+from ..base.loops import loops_by
 from ..base.machine import available_cores, freed_memory_kept, linear_algebra_on_one_thread
 from ..base.noise import noise_by
 from ..base.progress import StageTimer
@@ -106,7 +107,12 @@ def scan_blocks(plan: ScanPlan, source: LayerSource | None = None) -> Generator[
         source: of colours and layers; what it renders, the main thread renders. Without it the blocks are as they were
             measured.
     """
-    with linear_algebra_on_one_thread(), freed_memory_kept(), noise_by(plan.noise_kernel):
+    with (
+        linear_algebra_on_one_thread(),
+        freed_memory_kept(),
+        noise_by(plan.noise_kernel),
+        loops_by(plan.point_loops),
+    ):
         yield from _results(plan, source)
 
 

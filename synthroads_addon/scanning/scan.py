@@ -479,6 +479,9 @@ class BlockScan:
         assert sun is not None
         result = sun @ normal > 0.0
         towards = np.flatnonzero(result & (face >= 0))
-        begin = position[:, towards] + _OFF_SURFACE * normal[:, towards]
+        # Columns are chosen several times as fast by `take` as by indexing.
+        begin = np.take(normal, towards, axis=1)
+        begin *= _OFF_SURFACE
+        begin += np.take(position, towards, axis=1)
         result[towards] = self.plan.target.unobstructed(begin, sun, time[towards], motions)
         return result

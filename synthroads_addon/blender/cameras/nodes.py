@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from threading import Lock
 from typing import Any, Protocol
 
 import numpy as np
 
 from ...base.arrays import AnyArray, Bool, Float32, Index, UInt16, take_rows
+from ...base.loops import point_loops
 from ...base.turns.main_thread import MainThreadCalls
 from ...scanning.colour.colour import (
     FROM_NODES,
@@ -181,29 +183,41 @@ class NodeLayers:
 
         worked_out = self._calls.call(calculate) if calculator.main_thread else calculate()
         for name, array in worked_out.items():
-            channels[name][rows] = array
+            if (loops := point_loops()) is not None:
+                loops.spread(rows, array, channels[name])
+            else:
+                channels[name][rows] = array
 
     def _inputs(
         self, calculator: LayerCalculator, points: SeenPoints, rows: Index, material: UInt16
     ) -> dict[SurfaceInput, Float32]:
-        """Return the values (N, 4) float32 of all inputs that the materials of the N points `rows` read."""
+        """Return the values (N, 4) float32 of all inputs that the materials (ascending) of the points `rows` read."""
         asked: dict[SurfaceInput, list[int]] = {}
-        for number in np.unique(material).tolist():
+        starts = [0, *(np.flatnonzero(material[1:] != material[:-1]) + 1).tolist()]
+        spans = dict(zip(material[starts].tolist(), pairwise([*starts, len(material)]), strict=True))
+        for number in spans:
             for what in calculator.inputs_of(number):
                 asked.setdefault(what, []).append(number)
-        values = {what: np.zeros((len(rows), 4), np.float32) for what in asked}
+        values, loops = {what: np.zeros((len(rows), 4), np.float32) for what in asked}, point_loops()
         together: dict[tuple[int, ...], list[SurfaceInput]] = {}
         for what, numbers in asked.items():
-            if what == POSITION:
+            if loops is not None and what in (POSITION, TRUE_NORMAL) and points.normal.dtype == np.float64:
+                source, shift = (points.position, self._frame) if what == POSITION else (points.normal, None)
+                values[what] = loops.inputs(rows, source, shift, self._unit)
+            elif what == POSITION:
                 values[what][:, :3] = (take_rows(points.position, rows) + self._frame) / self._unit
             elif what in _OF_POINT:
                 values[what][:, :3] = _OF_POINT[what](points, rows)
             else:
                 together.setdefault(tuple(numbers), []).append(what)
         for several, inputs in together.items():
-            mine = np.flatnonzero(np.isin(material, several))
-            for what, array in self._surfaces.read(inputs, points.select(rows[mine])).items():
-                values[what][mine] = array
+            places = [spans[number] for number in several]
+            mine = rows if len(places) == len(spans) else np.concatenate([rows[start:end] for start, end in places])
+            for what, array in self._surfaces.read(inputs, points, mine).items():
+                first = 0
+                for start, end in places:
+                    values[what][start:end] = array[first : first + end - start]
+                    first += end - start
         return values
 
     def _sunlight(self, points: SeenPoints, channels: dict[str, Float32]) -> Float32:
@@ -221,6 +235,8 @@ class NodeLayers:
 
         def layer(name: str) -> Float32:
             """Return a layer's values at the lit points: evaluated where it varies, else the material's constant."""
+            if (values := constants.chosen(name, rows, channels.get(name), points.material)) is not None:
+                return values
             if name not in channels:
                 return take_rows(constants.values[name], material)
             use = np.take(constants.varies[name], material)
@@ -231,5 +247,8 @@ class NodeLayers:
         shares = reflected_sunlight(
             color, roughness, metallic, specular, take_rows(normal, rows), view, light.direction
         )
-        result[rows] = shares * light.sun.astype(np.float32)
+        if (loops := point_loops()) is not None:
+            loops.spread(rows, shares, result, light.sun.astype(np.float32))
+        else:
+            result[rows] = shares * light.sun.astype(np.float32)
         return result

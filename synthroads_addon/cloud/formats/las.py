@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from ...base.arrays import AnyArray, Float
 from ...base.classes import ClassScheme, asprs_scheme, class_scheme, numbered_scheme, stored_scheme
 from ...base.errors import InputError, OutputError
+from ...base.loops import PackedPoints, point_loops
 from ...base.schema import canonical_json
 from ..colours import SIXTEEN_BITS, sixteen_bits
 from ..flags import FLAGS
@@ -112,6 +113,45 @@ class LasWriter(CloudWriter):
 
     def _pack(self, block: PointBlock, record: AnyArray) -> None:
         """Fill in LAS records, in place, with the points of a block."""
+        if not self._packed_by_loops(block, record):
+            self._pack_standard(block, record)
+        record["classification_flags"], record["user_data"] = self._pack_flags(block), block.more.get("user_data", 0)
+        for column in self.columns:
+            record[column.name] = self.stored_integers(column, block)
+
+    def _packed_by_loops(self, block: PointBlock, record: AnyArray) -> bool:
+        """Fill in what every LAS record has, without flags, by compiled loops; return False where NumPy has to."""
+        if (loops := point_loops()) is None:
+            return False
+        points = PackedPoints(
+            xyz=block.xyz,
+            intensity=block.intensity,
+            gps_time=block.gps_time,
+            rgb=block.rgb,
+            return_number=block.return_number,
+            number_of_returns=block.number_of_returns,
+            class_id=block.class_id,
+            codes=self._codes,
+            scan_angle_deg=block.scan_angle_deg,
+            strip=block.strip,
+            offset=self._header.offsets,
+            per_metre=1.0 / SCALE,
+            per_intensity=self.intensity_scale,
+            per_degree=1.0 / SCAN_ANGLE_STEP,
+        )
+        filled = loops.pack(record, points)
+        if filled is None:
+            return False
+        (low, high), by_return = filled
+        self._low, self._high = (
+            np.minimum(self._low, low.astype(np.int64)),
+            np.maximum(self._high, high.astype(np.int64)),
+        )
+        self._by_return += by_return
+        return True
+
+    def _pack_standard(self, block: PointBlock, record: AnyArray) -> None:
+        """Fill in, in place, what every LAS record has, without flags."""
         self._pack_coordinates(block.xyz, record)
         brightness = block.intensity * self.intensity_scale
         np.rint(brightness, out=brightness)
@@ -127,9 +167,6 @@ class LasWriter(CloudWriter):
         record["gps_time"] = self.check_finite(block.gps_time, "gps_time")
         record["scan_angle"] = self._scan_angle(block)
         record["point_source_id"] = self.to_integers(block.strip, "uint16", "strip") + np.uint16(1)
-        record["classification_flags"], record["user_data"] = self._pack_flags(block), block.more.get("user_data", 0)
-        for column in self.columns:
-            record[column.name] = self.stored_integers(column, block)
         record["classification"] = np.take(self._codes, self.to_integers(block.class_id, "uint8", "class_id"))
 
     def _pack_coordinates(self, xyz: Float, record: AnyArray) -> None:

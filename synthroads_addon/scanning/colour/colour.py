@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import AnyArray, ArrayRows, Bool, Float, Float32, Index, UInt8, UInt16, take_rows
+from ...base.loops import point_loops
 from ...base.turns.main_thread import MainThreadCalls
 from ...cloud.points import NO_MATERIAL
 from ...materials.table import Material
@@ -57,6 +58,7 @@ MATERIAL_LAYERS: dict[str, int] = {"base_color": 3, "roughness": 1, "metallic": 
 FROM_MATERIAL, FROM_NODES, NEARBY, FROM_RETURN = 0, 253, 254, 255
 """`LayerValues.source` of a material's mean, of its nodes at the very return, of a place of the same material close by,
 and of a pixel per return; n in between is the n-th best image."""
+_SRGB_POWER = np.float32(1 / 2.4)
 _FALSE_COLOUR = ("roughness", "metallic", "specular")
 
 
@@ -121,6 +123,8 @@ class SeenPoints(ArrayRows):
     @cached_property  # several ask for it
     def towards_scanner(self) -> Float32:
         """Return the unit vectors (N, 3) from the points to the scanner."""
+        if (loops := point_loops()) is not None:
+            return loops.towards(self.position, self.scanner)
         towards = (self.scanner - self.position).astype(np.float32)
         towards /= np.maximum(np.sqrt(np.einsum("ij,ij->i", towards, towards)), 1e-9)[:, None]
         return np.asarray(towards)
@@ -178,6 +182,19 @@ class SurfaceConstants:
             result[rest] = take_rows(means, np.take(material, rest))
         return result
 
+    def chosen(self, name: str, rows: Index | None, own: Float32 | None, material: UInt16) -> Float32 | None:
+        """Return a layer's values (K, ...) at points by compiled loops, the means where materials don't vary; or None.
+
+        Args:
+            name: of the layer.
+            rows: (K,) of the points; None for all.
+            own: (N, C) values of all N points; None to have means alone.
+            material: (N,) indices.
+        """
+        if (loops := point_loops()) is None:
+            return None
+        return loops.layer(rows, own, material, self.varies[name], self.values[name])
+
     def varying_layers(self, wanted: frozenset[str]) -> tuple[str, ...]:
         """Return the names of the wanted layers that vary in some material, in the order of `MATERIAL_LAYERS`."""
         return tuple(name for name in MATERIAL_LAYERS if name in wanted and bool(self.varies[name].any()))
@@ -209,7 +226,9 @@ def decode_srgb(stored: Float) -> Float:
 def encode_srgb(linear: NDArray[np.floating]) -> UInt16:
     """Return linear colours as 16-bit sRGB (IEC 61966-2-1), clipped to what that can show."""
     linear = np.clip(np.asarray(linear, np.float32), 0.0, 1.0)
-    curve = np.float32(1.055) * np.power(linear, np.float32(1 / 2.4)) - np.float32(0.055)
+    if (loops := point_loops()) is not None:
+        return loops.encoded(linear, np.power(linear, _SRGB_POWER))
+    curve = np.float32(1.055) * np.power(linear, _SRGB_POWER) - np.float32(0.055)
     encoded = np.where(linear <= 0.0031308, np.float32(12.92) * linear, curve)
     return np.asarray(encoded * np.float32(65535.0) + np.float32(0.5), dtype=np.uint16)
 
@@ -267,9 +286,13 @@ class MaterialLayers:
             wanted: layers.
         """
         found = source != FROM_MATERIAL
+        everywhere = bool(found.all())
         layers: dict[str, Float32] = {}
         for name in sorted(needed_layers(wanted, self.mode)):
-            if name in channels:
+            values = self.constants.chosen(name, None, channels.get(name), points.material) if everywhere else None
+            if values is not None:
+                layers[name] = values
+            elif name in channels:
                 use = found & np.take(self.constants.varies[name], points.material)
                 layers[name] = self.constants.complete(name, channels[name].copy(), use, points.material)
             else:
@@ -292,6 +315,12 @@ class MaterialLayers:
             sun = color * self.light.sunlight(points.normal)
             if "sun" in channels:
                 sun[found] = channels["sun"][found]
+        if everywhere and "sky" not in channels and self.clouds is None and (loops := point_loops()) is not None:
+            light, normal = self.light, np.asarray(points.normal, np.float32)
+            linear = loops.daylight(
+                sun, color, normal, *(np.asarray(one, np.float32) for one in (light.above, light.below))
+            )
+            return loops.encoded(linear, np.power(linear, _SRGB_POWER))
         sky = color * self.light.sky(points.normal)
         if "sky" in channels:
             sky[found] = channels["sky"][found]

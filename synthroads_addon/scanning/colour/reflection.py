@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import Float, Float32
+from ...base.loops import PointLoops, point_loops
 
 _COSINES, _ROUGHNESSES, _LEVELS = 24, 16, 12
 """Grid of the tables: cosine of the view, roughness, and root of the reflectance at a right angle."""
@@ -24,6 +25,8 @@ _SMOOTHEST = 0.08
 """Least roughness: smoother surfaces throw the sun into a spot that no return lies in."""
 _MATT_F0 = 0.08
 """Reflectance at a right angle of a specular of 1; that of 0.5 is glass's, 4 %."""
+_BRIGHTEST = 0.999
+"""Largest reflectance at a right angle."""
 
 
 def reflected_sunlight(
@@ -39,6 +42,8 @@ def reflected_sunlight(
     """
     sun32 = sun.astype(np.float32)
     towards_sun = np.clip(normal @ sun32, 0.0, None)
+    if (loops := point_loops()) is not None:
+        return _by_loops(loops, (color, roughness, metallic, specular), (normal, view, sun32), towards_sun)
     towards_view = np.clip(np.einsum("ij,ij->i", normal, view), 1e-4, 1.0)
     half = view + sun32
     half /= np.maximum(np.sqrt(np.einsum("ij,ij->i", half, half)), 1e-6)[:, None]
@@ -48,7 +53,7 @@ def reflected_sunlight(
     tables = _tables()
     place = tables.place(rough, towards_view)
     bounced = tables.once(place), tables.average(place)
-    level = np.minimum(_MATT_F0 * specular, 0.999)
+    level = np.minimum(_MATT_F0 * specular, _BRIGHTEST)
     root = np.sqrt(level)
     albedo, average = tables.albedo(place, root), _mean_fresnel(level, root)
     again = _compensation(average, bounced)
@@ -64,6 +69,24 @@ def reflected_sunlight(
         inside = bounced[0][metal, None], bounced[1][metal, None]
         result[metal] += (metallic[metal] * gloss[metal])[:, None] * fresnel * _compensation(mean, inside)
     return np.asarray(result, np.float32)
+
+
+def _by_loops(
+    loops: PointLoops,
+    layers: tuple[Float32, Float32, Float32, Float32],
+    vectors: tuple[Float32, Float32, Float32],
+    towards_sun: Float32,
+) -> Float32:
+    """Return the sunlight that surfaces reflect by compiled loops, see `reflected_sunlight`; powers are NumPy's."""
+    color, roughness, metallic, specular = layers
+    seen, across, between = loops.halves(*vectors)
+    rough, rise = np.asarray(np.maximum(roughness, _SMOOTHEST), np.float32), np.zeros_like(between)
+    metal = np.flatnonzero(metallic > 0.0)
+    rise[metal] = (1.0 - np.clip(between[metal], 0.0, 1.0)) ** 5
+    tables = _tables()
+    square = np.asarray(rough**4, np.float32)
+    surfaces: list[Float32] = [color, rough, square, metallic, specular, towards_sun, seen, across, between, rise]
+    return loops.reflected(tables.arrays, (*tables.steps, _MATT_F0, _BRIGHTEST), surfaces)
 
 
 _Bounced = tuple[Float32, Float32]
@@ -152,6 +175,16 @@ class _AlbedoTables:
         self._cosine, self._rough, self._root = (
             (axis[0], (len(axis) - 1) / (axis[-1] - axis[0]), len(axis) - 1) for axis in (cosine, rough, root)
         )
+
+    @property
+    def arrays(self) -> tuple[Float32, Float32, Float]:
+        """Return the tables: (R, V) after one bounce, (R, V, L) of dielectrics, and (R,) means of the first."""
+        return self._once, self._albedo, self._average
+
+    @property
+    def steps(self) -> tuple[float, ...]:
+        """Return first value and scale of the grids of roughness, cosine and root."""
+        return *self._rough[:2], *self._cosine[:2], *self._root[:2]
 
     def place(self, rough: Float32, view: Float32) -> _Place:
         """Return where roughnesses and cosines of the view (N,) lie in the tables."""

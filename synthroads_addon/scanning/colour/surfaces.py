@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.arrays import Float, Float32, Index, take_rows
+from ...base.loops import point_loops
 from ..scene.mesh import SceneMesh
 from ..scene.motion import MovingMesh
 from ..scene.surface_values import SurfaceInput, corner_shares
@@ -27,11 +28,13 @@ class SceneSurfaces:
         self._poses = [(np.eye(3), np.zeros(3)), *(_initial_pose(part) for part in moving)]
         self._firsts = np.cumsum([0, *(len(mesh) for mesh in self._meshes)])
 
-    def read(self, inputs: Iterable[SurfaceInput], points: SeenPoints) -> dict[SurfaceInput, Float32]:
-        """Return each surface input's values (N, 4) at N points; 0 where the surface lacks it, as renderers have it."""
+    def read(self, inputs: Iterable[SurfaceInput], points: SeenPoints, rows: Index) -> dict[SurfaceInput, Float32]:
+        """Return each surface input's values (K, 4) at rows (K,) of points; 0 where the surface lacks it."""
         if points.face is None:
-            return {what: np.zeros((len(points), 4), np.float32) for what in sorted(inputs)}
-        return self.read_places(inputs, points.face, points.position, points.normal)
+            return {what: np.zeros((len(rows), 4), np.float32) for what in sorted(inputs)}
+        return self.read_places(
+            inputs, *(take_rows(one, rows) for one in (points.face, points.position, points.normal))
+        )
 
     def read_places(
         self, inputs: Iterable[SurfaceInput], face: Index, place: Float, normal: NDArray[np.floating] | None = None
@@ -72,8 +75,11 @@ class SceneSurfaces:
         normal = np.asarray(towards, np.float64)
         if number:  # what stands is in the scene's own frame
             place, normal = (place - begin) @ rotation, normal @ rotation
-        corners = take_rows(mesh.vertices, take_rows(mesh.triangles, faces))
-        shares = corner_shares(corners.astype(np.float64), place)
+        if (loops := point_loops()) is not None:
+            shares = loops.corner_shares(mesh.vertices, mesh.triangles, faces, place)
+        else:
+            corners = take_rows(mesh.vertices, take_rows(mesh.triangles, faces))
+            shares = corner_shares(corners.astype(np.float64), place)
         for what, values in result.items():
             found = np.zeros(len(rows), bool)
             if mesh.surface is not None:

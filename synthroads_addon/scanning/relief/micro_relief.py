@@ -14,6 +14,7 @@ import numpy as np
 
 from ...base.arrays import AnyArray, Float, Index
 from ...base.errors import InputError
+from ...base.loops import point_loops
 from ...base.noise import noise_field
 from ...cloud.points import PointBlock
 from ...materials.table import UNKNOWN, Material, entry_of, materials
@@ -172,12 +173,18 @@ def shift_by_relief(
     cosine = np.cos(np.radians(points.incidence_deg.astype(np.float64)))
     if raised is not None:
         for arrays in (("xyz", "range"), ("true_xyz", "true_range")):
-            points = _shift_along_normals(points, np.flatnonzero(raised), raised, cosine, arrays)
+            points = _shift_along_normals(points, raised, cosine, arrays)
     if not len(rough):
         return points
     assert points.material is not None
     cosine = np.take(cosine, rough)
     height = ReliefField(points, ends, relief, strength, seed, octaves).heights(rough, cosine=cosine)
+    if (loops := point_loops()) is not None:
+        reach = _NEXT_PEAK * relief.wavelength
+        place, distance = loops.approached(
+            *(rough, height, cosine, points.material, reach, ends.towards, points.xyz, points.range)
+        )
+        return points.with_arrays({"xyz": place, "range": distance})
     wavelength = np.take(relief.wavelength, np.take(points.material, rough))
     # The sine times the height over the way to the next peak.
     least = np.sqrt(1.0 - cosine**2)
@@ -241,22 +248,23 @@ def _footprint(distance: Float, cosine: Float, divergence: float) -> tuple[Float
     return across / np.maximum(cosine, _LEAST_COSINE), across
 
 
-def _shift_along_normals(
-    points: PointBlock, rows: Index, height: Float, cosine: Float, arrays: tuple[str, str]
-) -> PointBlock:
-    """Return the points of which some rows (K,) have arrays of places and ranges shifted along their normals.
+def _shift_along_normals(points: PointBlock, height: Float, cosine: Float, arrays: tuple[str, str]) -> PointBlock:
+    """Return the points with arrays of places and ranges shifted along their normals.
 
     Args:
         points: N points.
-        rows: (K,) those that are shifted.
-        height: (N,) by how much, m.
+        height: (N,) by how much, m; 0 for those that stay.
         cosine: (N,) of their incidence angles.
         arrays: names of places and ranges.
     """
     place, distance = (points.array(name) for name in arrays)
-    if place is None or distance is None or not len(rows):
+    if place is None or distance is None or not height.any():
         return points
     assert points.normal is not None
+    if (loops := point_loops()) is not None:
+        moved = loops.raised(height, cosine, points.normal, place, distance)
+        return points.with_arrays(dict(zip(arrays, moved, strict=True)))
+    rows = np.flatnonzero(height)
     place, distance = place.copy(), distance.copy()
     height, cosine, before = (np.take(values, rows) for values in (height, cosine, distance))
     place[rows] = np.take(place, rows, axis=0) + height[:, None] * np.take(points.normal, rows, axis=0)

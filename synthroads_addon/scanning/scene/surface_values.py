@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.arrays import AnyArray, Bool, Float, Float32, Index, take_rows
+from ...base.loops import point_loops
 
 
 class SurfaceInput(NamedTuple):
@@ -112,6 +113,9 @@ class SurfaceValues:
             if what.kind == "object":
                 values = _in_frame(part, use, place[mine])
             else:
+                if _interpolate_into(result, part, what, (mine, use, triangle), shares):
+                    found[mine] = True
+                    continue
                 values = _interpolate(part, what, use, triangle, take_rows(shares, mine))
                 if values is not None and what.kind in _NORMALS:
                     values[:, :3] = _oriented_normals(part, use, values[:, :3], normal[mine], what.kind == "normal")
@@ -148,6 +152,26 @@ def _oriented_normals(part: PartValues, use: Index, normal: Float32, towards: Fl
     return np.asarray(result * (sign / np.maximum(np.linalg.norm(result, axis=1), 1e-12))[:, None])
 
 
+def _interpolate_into(
+    result: Float32, part: PartValues, what: SurfaceInput, places: tuple[Index, Index, Index], shares: Float
+) -> bool:
+    """Interpolate an input's values in a part's triangles by compiled loops, see `_interpolate`; return whether it was.
+
+    Args:
+        result: (N, 4) where they go.
+        part: the part.
+        what: the input; no normals, which are turned afterwards.
+        places: rows of the result (H,), places that the part stands at, and its triangles.
+        shares: (N, 3) weights of the corners.
+    """
+    loops, entry = point_loops(), part.values.get(what)
+    if loops is None or entry is None or entry.domain in ("object", "face") or what.kind in _NORMALS:
+        return False
+    rows, use, triangle = places
+    elements = part.corners if entry.domain == "corner" else part.points
+    return loops.interpolate(rows, use, triangle, elements, part.mirrored, shares, entry.values, result)
+
+
 def _interpolate(part: PartValues, what: SurfaceInput, use: Index, triangle: Index, shares: Float) -> Float32 | None:
     """Return an input's values (H, 4), interpolated in the part's triangles; None if the part lacks it."""
     entry = part.values.get(what)
@@ -171,14 +195,18 @@ def corner_shares(corners: Float, place: Float) -> Float:
     """Return the barycentric weights (N, 3) of places (N, 3) in triangles (N, 3, 3); outside ones are moved inside."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     u, v, w = b - a, c - a, place - a
-    uu, uv, vv = (np.einsum("ij,ij->i", *pair) for pair in ((u, u), (u, v), (v, v)))
-    wu, wv = np.einsum("ij,ij->i", w, u), np.einsum("ij,ij->i", w, v)
+    (uu, uv, vv), (wu, wv) = (_dot(u, u), _dot(u, v), _dot(v, v)), (_dot(w, u), _dot(w, v))
     with np.errstate(divide="ignore", invalid="ignore"):
         below = uu * vv - uv * uv
         second, third = (vv * wu - uv * wv) / below, (uu * wv - uv * wu) / below
     shares = np.stack([1.0 - second - third, second, third], axis=1)
     shares = np.clip(np.nan_to_num(shares, nan=1.0 / 3.0), 0.0, None)
     return np.asarray(shares / np.maximum(shares.sum(axis=1, keepdims=True), 1e-30))
+
+
+def _dot(one: Float, other: Float) -> Float:
+    """Return the dot products (N,) of vectors (N, 3), in an order of their own: einsum's depends on the processor."""
+    return np.asarray(one[:, 0] * other[:, 0] + one[:, 2] * other[:, 2] + one[:, 1] * other[:, 1])
 
 
 @dataclass

@@ -9,12 +9,14 @@ import bpy
 import numpy as np
 import pytest
 
+from synthroads_addon.base.loops import loops_by
 from synthroads_addon.blender.cameras import MaterialSnapshot, layer_source
 from synthroads_addon.blender.cameras import programs as module
 from synthroads_addon.blender.cameras.nodes import NodeLayers
 from synthroads_addon.blender.scene.evaluated import scene_mesh
 from synthroads_addon.scanning.colour.colour import FROM_NODES, LayerValues, SeenPoints
 from synthroads_addon.scanning.kernels.library import NoKernelError
+from synthroads_addon.scanning.kernels.points import CompiledPoints, usable_points
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from tests.helpers.scenes.coded_scene import job
 
@@ -93,6 +95,19 @@ def test_without_unknown_nodes_nothing_is_rendered(
     assert not rendered
     assert "by_cycles" not in report
     np.testing.assert_allclose(found.arrays["base_color"], expected.arrays["base_color"], atol=1e-5)
+
+
+def test_compiled_loops_around_materials_change_nothing(scene: tuple[SceneMesh, SeenPoints]) -> None:
+    mesh, points = scene
+    loops, results = usable_points(), []
+    assert isinstance(loops, CompiledPoints), "python tools/build_kernels.py"
+    wanted = {"base_color", "roughness", "metallic", "specular", "rgb"}
+    for used in (None, loops):
+        with loops_by(used), layer_source(job(mesh, wanted, source="nodes")) as layers:
+            results.append(layers.sample(replace(points), frozenset(wanted)))
+    for name, values in results[0].arrays.items():
+        assert values.tobytes() == results[1].arrays[name].tobytes(), name
+    assert np.ptp(results[0].arrays["rgb"], axis=0).all()
 
 
 @pytest.mark.parametrize("reason", ["no library", "another Blender", "other colours"])

@@ -93,10 +93,11 @@ def test_points_are_those_of_single_rays_but_for_ties(name: str) -> None:
 def test_compiled_loops_make_the_points_that_numpy_makes(noise: dict[str, float]) -> None:
     plan = plans("leaves")["auto"]
     plan = replace(plan, noise=plan.noise.model_copy(update=noise))
-    assert plan.summary()["kernels"].endswith("; pulses compiled; noise compiled; poses compiled")
-    assert None not in (plan.pose_kernel, plan.noise_kernel)
+    assert plan.summary()["kernels"].endswith("; pulses compiled; noise compiled; poses compiled; points compiled")
+    assert None not in (plan.pose_kernel, plan.noise_kernel, plan.point_loops)
     numpys = replace(plan)
-    vars(numpys).update(pulse_kernel=NoKernelError("compared with"), pose_kernel=None, noise_kernel=None)
+    none = dict.fromkeys(("pose_kernel", "noise_kernel", "point_loops"))
+    vars(numpys).update(none, pulse_kernel=NoKernelError("compared with"))
     assert "; pulses by NumPy: compared with; " in numpys.summary()["kernels"]
     found, expected = (measured(one) for one in (plan, numpys))
     assert len(found.points) > 50_000
