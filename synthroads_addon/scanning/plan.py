@@ -231,21 +231,12 @@ class ScanPlan:
 
     @cached_property
     def pulse_kernel(self) -> PulseKernel | NoKernelError:
-        """Return the compiled loops that follow the scan's pulses, or why NumPy does: what these leave out."""
-        several = self.rays_per_pulse > 1
-        left_out = {
-            "things move": bool(self.target.moving),
-            "materials are clear in places": self.openings is not None and self.openings.clear is not None,
-            "the beam is cylindrical": self.beam == "cylindrical" and several,
-            "footprints are spared": self.spares,
-            "the air sends echoes": bool(self.effects),
-            "surfaces mirror": self.multipath is not None,
-        }
-        for reason, found in left_out.items():
-            if found:
-                return NoKernelError(reason)
+        """Return the compiled loops that follow the scan's pulses, or why NumPy does."""
+        parallel = self.beam == "cylindrical"
         try:
-            return PulseKernel(self.target, self.surfaces, self.setting, self.pattern, self.gaps, self.attenuation)
+            return PulseKernel(
+                self.target, self.surfaces, self.setting, self.pattern, self.openings, self.attenuation, parallel
+            )
         except NoKernelError as error:
             return error
 

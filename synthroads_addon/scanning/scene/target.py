@@ -26,7 +26,7 @@ _NO_FACE = {"class_id": UNLABELLED, "instance_id": 0, "material": NO_MATERIAL, "
 
 
 @dataclass(frozen=True)
-class _TargetPart:
+class TargetPart:
     """One mesh of the target, static or moving, with its caster, its face planes and its bounds.
 
     Attributes:
@@ -260,6 +260,11 @@ class Target:
         return results
 
     @property
+    def moving_parts(self) -> list[TargetPart]:
+        """Return the moving parts, in the order of ``moving``."""
+        return self._parts[1:]
+
+    @property
     def static_planes(self) -> Float:
         """Return the planes (4, F) of the static mesh's faces, see `FacePlanes`."""
         return self._parts[0].planes.planes
@@ -292,23 +297,23 @@ def _join_arrays(arrays: list[AnyArray]) -> AnyArray:
     return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
 
 
-def _part(mesh: SceneMesh, caster: Caster, first: int) -> _TargetPart:
+def _part(mesh: SceneMesh, caster: Caster, first: int) -> TargetPart:
     bounds = mesh.vertex_bounds()
     low, high = np.zeros((2, 3)) if bounds is None else bounds
     centre = (low + high) / 2.0
     half = (high - low) / 2.0
     radius = float(np.linalg.norm(half)) + 1e-3
-    return _TargetPart(caster, FacePlanes(mesh), first, len(mesh.triangles), centre, half, radius)
+    return TargetPart(caster, FacePlanes(mesh), first, len(mesh.triangles), centre, half, radius)
 
 
-def _clear_scanner(track: Track, part: _TargetPart, scanner: Float) -> Track:
+def _clear_scanner(track: Track, part: TargetPart, scanner: Float) -> Track:
     """Return a moving part's track, absent where it meets the scanner's vehicle, whose places are (3, K)."""
     offset = _unrotate(track.rotation, scanner - track.position)
     away = (np.abs(offset.T - part.centre) > part.half + CLEARANCE).any(axis=1)
     return replace(track, present=track.present & away)
 
 
-def _cast(part: _TargetPart, origins: Float, directions: Float, maximum_range: float) -> FirstHits:
+def _cast(part: TargetPart, origins: Float, directions: Float, maximum_range: float) -> FirstHits:
     """Return rays' first hits on one part, in its body frame; faces are numbered among those of all parts."""
     shape = directions.shape[1:]
     found = part.caster.cast(*_as_rays(origins, directions), maximum_range)
@@ -354,7 +359,7 @@ def _as_rows(vectors: Float, shape: tuple[int, ...]) -> Float32:
     return result.reshape(-1, 3)
 
 
-def _cast_moving(part: _TargetPart, track: Track, rays: Bundles, maximum_range: float, nearest: FirstHits) -> None:
+def _cast_moving(part: TargetPart, track: Track, rays: Bundles, maximum_range: float, nearest: FirstHits) -> None:
     """Replace, in place, farther hits in ``nearest`` by those on a moving part; all arrays are flat."""
     near = rays.rays_near(track, part.centre, part.radius)
     if not len(near):
@@ -368,7 +373,7 @@ def _cast_moving(part: _TargetPart, track: Track, rays: Bundles, maximum_range: 
         values[near[closer]] = closer_values[closer]
 
 
-def _clear_blocked(part: _TargetPart, track: Track, rays: Bundles, reach: float, free: Bool) -> None:
+def _clear_blocked(part: TargetPart, track: Track, rays: Bundles, reach: float, free: Bool) -> None:
     """Clear, in place, ``free`` of the rays that a moving part blocks within their reach (m)."""
     near = rays.rays_near(track, part.centre, part.radius)
     near = near[free[near]]
@@ -392,7 +397,13 @@ def _crosses_box(begin: Float, towards: Float, reach: Float, half: Float) -> Boo
 
 def _unrotate(rotation: Float, vectors: Float) -> Float:
     """Return vectors (3, N), each rotated by the inverse of its matrix (9, N)."""
-    return np.asarray(np.einsum("jin,jn->in", rotation.reshape(3, 3, -1), vectors))
+    result = np.empty_like(vectors)
+    product = np.empty(vectors.shape[1])
+    for i in range(3):
+        np.multiply(rotation[i], vectors[0], out=result[i])
+        for j in (1, 2):
+            result[i] += np.multiply(rotation[3 * j + i], vectors[j], out=product)
+    return result
 
 
 def _damage_of(instance: NDArray[np.uint32], damages: Mapping[int, int]) -> UInt8:
