@@ -88,6 +88,14 @@ def test_pulses_in_all_directions() -> None:
     assert_same(planned(soup(300), 19, moving=traffic()), pulses)
 
 
+def test_bodies_that_are_fast_beside_the_pulses() -> None:
+    """Their way is many times their size while a bundle of pulses is fired."""
+    pulses = downwards(2000)
+    fast = [MovingMesh(soup(90, 3, 1.5), LinearMotion((90.0, 0.0, 0.0), (-15.0, 5.0 * i, 5.0))) for i in (-1, 0, 1)]
+    echoes = assert_same(planned(soup(5), 7, moving=fast), replace(pulses, time=np.linspace(0.0, 0.5, 2000)))
+    assert len(echoes.pulse) > 30
+
+
 def test_only_things_that_move_are_met() -> None:
     """A static scene that no ray meets, and whose rays so go on for kilometres."""
     far = soup(5)
