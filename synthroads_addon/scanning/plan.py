@@ -262,7 +262,20 @@ class ScanPlan:
         parts = [
             f"{of} {f'by NumPy: {way}' if isinstance(way, NoKernelError) else 'compiled'}" for of, way in ways.items()
         ]
+        if isinstance(self.pulse_kernel, PulseKernel) and (left := self._left_to_numpy):
+            parts[0] += f", by NumPy: {', '.join(left)}"
         return "; ".join([caster.kernels, *parts])
+
+    @property
+    def _left_to_numpy(self) -> list[str]:
+        """Return what of pulses that are followed by compiled loops is worked out by NumPy nonetheless."""
+        parts = {
+            "what panes let through": self.openings is not None and self.openings.clear is not None,
+            "which footprints are spared": self.spares,
+            "echoes of the air": bool(self.effects),
+            "what surfaces mirror": self.multipath is not None,
+        }
+        return [part for part, there in parts.items() if there]
 
     @property
     def rays_per_pulse(self) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
@@ -17,14 +17,16 @@ from synthroads_addon.scanning.beam import RINGS, outer_radii
 from synthroads_addon.scanning.colour.surfaces import SceneSurfaces
 from synthroads_addon.scanning.colour.transparency import SeeThrough, Transparency
 from synthroads_addon.scanning.effects import EchoChanges, PulseHits
+from synthroads_addon.scanning.kernels.pulses import PulseKernel
 from synthroads_addon.scanning.multipath import Mirrors, Multipath
 from synthroads_addon.scanning.plan import ScanPlan
+from synthroads_addon.scanning.scan import BlockScan
 from synthroads_addon.scanning.scene.bare_ground import BareGround
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.motion import LinearMotion, MovingMesh
 from synthroads_addon.scanning.scene.surface_values import ALONG, POSITION, SurfaceInput
-from synthroads_addon.scanning.trace import CLEAR_LAYERS
-from tests.helpers.scenes.kernel_scenes import NAMES, assert_same, downwards, planned, soup, stack
+from synthroads_addon.scanning.trace import CLEAR_LAYERS, Hits
+from tests.helpers.scenes.kernel_scenes import NAMES, assert_bytes, assert_same, downwards, planned, soup, stack
 from tests.helpers.scenes.scan_scenes import mesh_of
 
 pytestmark = pytest.mark.any_blender
@@ -97,6 +99,21 @@ def test_more_panes_than_a_ray_passes(name: str) -> None:
     assert_same(plan, downwards(500))
 
 
+def test_panes_that_rounding_puts_before_themselves() -> None:
+    """Kilometres from the origin rays begin again before the very pane that they have passed."""
+    mesh, away = stack(9, "glass"), np.array([3e4, 0.0, 0.0])
+    mesh = with_vertices(mesh, mesh.vertices.astype(np.float64) + away)
+    pulses = downwards(3000)
+    plan = with_panes(planned(mesh, 7), mesh, (1,))
+    assert_same(plan, replace(pulses, origin=pulses.origin + away[:, None]))
+
+
+def with_vertices(mesh: SceneMesh, vertices: np.ndarray) -> SceneMesh:
+    """Return a mesh with other vertices, which are tilted so that they lie between numbers of single precision."""
+    tilted = vertices + np.stack([np.zeros(len(vertices)), np.zeros(len(vertices)), 0.3 * (vertices[:, 0] - 3e4)], axis=1)
+    return replace(mesh, vertices=tilted.astype(np.float32))
+
+
 @pytest.mark.parametrize("rays", RINGS)
 @pytest.mark.parametrize("changes", [{}, {"attenuation": 0.02}, {"range_resolution": 3.0}])
 def test_parallel_rays(rays: int, changes: dict[str, Any]) -> None:
@@ -157,6 +174,31 @@ def test_drops_and_mirrors(rays: int, what: str, attenuation: float) -> None:
     )
     echoes = assert_same(changed, downwards(2001))
     assert len(echoes.pulse) > len(assert_same(plan, downwards(2001)).pulse)
+
+
+def test_all_that_rays_meet_is_known_as_numpy_knows_it() -> None:
+    """What changes echoes before they are grouped gets the hits of all rays."""
+    plan, pulses = planned(soup(2500), 7, moving=driving(), divergence=WIDE, attenuation=0.01), downwards(2001)
+    kernel, motions = plan.pulse_kernel, plan.target.motions(0.0, 0.1, 0.01)
+    assert isinstance(kernel, PulseKernel)
+    numpys = BlockScan(plan)
+    expected = numpys._trace(pulses, motions)
+    (found, signals), theirs = kernel.follow(pulses, motions), numpys.signals(expected)
+    assert_bytes(found.ray, expected.ray)
+    assert_bytes(found.rays.share, expected.rays.share)
+    for mine, other in ((found.first, expected.first), (found.behind, expected.behind)):
+        met = other.face >= 0
+        for field in fields(Hits):
+            assert_bytes(*(np.broadcast_to(getattr(one, field.name), met.shape)[met] for one in (mine, other)))
+    for mine, other in zip(signals, theirs, strict=True):
+        assert_bytes(mine.distance, other.distance)
+        assert_bytes(mine.intensity, other.intensity)
+    rows = np.arange(0, found.count, 7)
+    rows = rows[np.isfinite(expected.pick("distance", rows))]
+    for mine, other in zip(found.ends(rows), expected.ends(rows), strict=True):
+        assert_bytes(mine, other)
+    assert_bytes(found.directions(rows), expected.directions(rows))
+    assert_bytes(found.times(rows), expected.times(rows))
 
 
 @pytest.mark.parametrize("seed", range(8))
