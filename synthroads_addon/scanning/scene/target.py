@@ -1,6 +1,6 @@
 """Target of rays: the static scene and what moves in it, their faces numbered one after the other."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
@@ -118,10 +118,10 @@ class Target:
     def instances(self, faces: Index, times: Float) -> AnyArray:
         """Return the instance numbers of faces (H,) met at times (H,), s; on later passes a vehicle has another."""
         result = np.array(self.face_values("instance_id", faces), dtype=np.uint32)
-        for part, moving in zip(self._parts[1:], self.moving, strict=True):
+        for number, mine in self._on_moving(faces):
+            moving = self.moving[number]
             if moving.again is None:
                 continue
-            mine = np.flatnonzero((faces >= part.first) & (faces < part.first + part.count))
             passes = moving.motion.passes(times[mine])
             later = passes > 0
             result[mine[later]] = moving.again.first + (passes[later] - 1) * moving.again.step
@@ -247,12 +247,9 @@ class Target:
             vectors: (3, H) each; turned only.
         """
         results = (places.copy(), *(vector.copy() for vector in vectors))
-        for part, moving, track in zip(self._parts[1:], self.moving, motions, strict=True):
-            mine = np.flatnonzero((faces >= part.first) & (faces < part.first + part.count))
-            if not len(mine):
-                continue
-            rotation, place, _ = track.at(times[mine])
-            begin_rotation, begin_place, _ = moving.motion.pose(np.zeros(1))
+        for number, mine in self._on_moving(faces):
+            rotation, place, _ = motions[number].at(times[mine])
+            begin_rotation, begin_place, _ = self.moving[number].motion.pose(np.zeros(1))
             local = _unrotate(rotation, places[:, mine] - place)
             results[0][:, mine] = begin_rotation[0] @ local + begin_place[0][:, None]
             for result, vector in zip(results[1:], vectors, strict=True):
@@ -278,19 +275,26 @@ class Target:
 
         Those of no face, -1, are any.
         """
-        if not self.moving and self.triangles:
-            return self._parts[0].planes.normals(faces, along)
-        result = np.empty((3, len(faces)))
-        for number, part in enumerate(self._parts):
-            mine = np.flatnonzero((faces >= part.first) & (faces < part.first + part.count))
-            if not len(mine):
-                continue
+        static = self._parts[0]
+        # Of faces that move these are of none; they are replaced.
+        result = static.planes.normals(faces, along) if static.count else np.empty((3, len(faces)))
+        for number, mine in self._on_moving(faces):
+            part = self._parts[number + 1]
             normal = part.planes.normals(faces[mine] - part.first, along[mine])
-            if number:
-                rotation, _, _ = motions[number - 1].at(times[mine])
-                normal = np.einsum("ijn,jn->in", rotation.reshape(3, 3, -1), normal)
-            result[:, mine] = normal
+            rotation, _, _ = motions[number].at(times[mine])
+            result[:, mine] = np.einsum("ijn,jn->in", rotation.reshape(3, 3, -1), normal)
         return result
+
+    def _on_moving(self, faces: Index) -> Iterator[tuple[int, Index]]:
+        """Yield the number of each moving part of which there are faces, and which (M,) of the faces (H,) these are."""
+        if not self.moving:
+            return
+        rows = np.flatnonzero(faces >= self._parts[1].first)
+        some = faces[rows]
+        for number, part in enumerate(self._parts[1:]):
+            mine = rows[(some >= part.first) & (some < part.first + part.count)]
+            if len(mine):
+                yield number, mine
 
 
 def _join_arrays(arrays: list[AnyArray]) -> AnyArray:
