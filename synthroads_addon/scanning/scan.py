@@ -15,7 +15,8 @@ from .beam import conical_directions, cylindrical_offsets, outer_radii
 from .colour.colour import SeenPoints
 from .devices.shots import shots
 from .effects import apply_effect
-from .kernels.pulses import PulseKernel, TracedPulses
+from .kernels.hits import TracedPulses
+from .kernels.pulses import PulseKernel
 from .knots import Track
 from .multipath import Multipath
 from .noise import measured_pose, shares, speckle_factors, standard_exponential, standard_normal, trajectory_errors

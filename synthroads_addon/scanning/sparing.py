@@ -11,7 +11,7 @@ import numpy as np
 from ..base.arrays import AnyArray, ArrayRows, Bool, Float, Index, Int
 from ..materials.surfaces import brightness_of
 from .beam import beam_radii, conical_directions, cylindrical_offsets, outer_radii
-from .kernels.pulses import TracedPulses
+from .kernels.hits import TracedPulses
 from .knots import Track
 from .plan import ScanPlan
 from .pulses import Pulses

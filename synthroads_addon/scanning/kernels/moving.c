@@ -21,7 +21,7 @@ typedef struct {
     double radius, square, fastest; /* of the ball, m; squared; of its middle, m/s */
 } Part;
 
-/* Rays: the pulses' from the k-th of each on, or `count` of a list that go on at `start`. As `_Cast` in moving.py. */
+/* Rays: the pulses' from the k-th of each on, or `count` of a list that go on at `start`. As `_Rays` in moving.py. */
 typedef struct {
     int64_t from, count;
     const int64_t *list;
@@ -33,7 +33,7 @@ typedef struct {
     float limit;
 } Rays;
 
-/* Work space: bounds of bundles, which are near, and rays that are to be cast. As in moving.py. */
+/* Work space: bounds of bundles, which are near, and rays that are to be cast. As `MovingParts.cast` in moving.py has it. */
 typedef struct {
     double *bounds, *turned;  /* (bundles, BOUNDS); (BUFFER, 6) */
     uint8_t *near;            /* (bundles) */

@@ -76,7 +76,9 @@ class MovingParts:
         self._casters.append(part.caster)
         track_numbers = (way.shape[1], track.begin, track.spacing, *(array.ctypes.data for array in arrays))
         numbers = (part.radius, part.radius**2, fastest)
-        self._bodies.append(_Part(cast, None, scene, part.first, part.count, planes.ctypes.data, *track_numbers, *numbers))
+        self._bodies.append(
+            _Part(cast, None, scene, part.first, part.count, planes.ctypes.data, *track_numbers, *numbers)
+        )
 
     def cast(
         self,
@@ -116,7 +118,9 @@ class MovingParts:
         bodies = (_Part * len(casts))(*self._bodies)
         for body, one in zip(bodies, casts, strict=True):
             body.casts = ctypes.addressof(one)
-        self._kernel.call(ctypes.byref(shape.native), ctypes.byref(beams), len(casts), bodies, ctypes.byref(rays), pointers(*work))
+        self._kernel.call(
+            ctypes.byref(shape.native), ctypes.byref(beams), len(casts), bodies, ctypes.byref(rays), pointers(*work)
+        )
 
 
 class MovingKernel:

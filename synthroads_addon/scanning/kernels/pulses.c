@@ -29,35 +29,35 @@ typedef struct {
     float limit;
 } Scene;
 
-/* Hits whose surface sends light back the way that it came; as `_Shining` in pulses.py. NumPy adds what they do. */
+/* Hits whose surface sends light back the way that it came; as `ShiningHits` in hits.py. NumPy adds what they do. */
 typedef struct {
     int64_t *hit;
     double *cosine, *brightness, *share; /* brightness: without it */
     uint16_t *material;
 } Shining;
 
-/* Light that goes on behind surfaces; as `_Passed` in pulses.py. `face`, `step`: NULL where nothing is clear in places. */
+/* Light that goes on behind surfaces; as `Passed` in hits.py. `face`, `step`: NULL where nothing is clear in places. */
 typedef struct {
     int64_t *ray; /* k * P + p */
     double *left, *start, *step;
     int32_t *face;
 } Passed;
 
-/* Hits, (K, P) or (N); as `_Met` in pulses.py. `fading`: the exponent of what the air leaves. `along` is NULL where
+/* Hits, (K, P) or (N); as `Met` in hits.py. `fading`: the exponent of what the air leaves. `along` is NULL where
  * rays are weighed as they are cast, `share`, of the energy that a surface takes, where it isn't asked for. */
 typedef struct {
     int32_t *face;
     double *distance, *intensity, *weight, *fading, *along, *share;
 } Met;
 
-/* Hits behind surfaces, (N) at most; as `_Behind` in pulses.py. */
+/* Hits behind surfaces, (N) at most; as `Behind` in hits.py. */
 typedef struct {
     int64_t *ray;
     Met met;
 } Behind;
 
 /* What rays on their way behind surfaces meet, (N) each, and the share that it lets through, no number where its
- * material says so; NULL where all do. As `_Ahead` in pulses.py. */
+ * material says so; NULL where all do. As `Ahead` in hits.py. */
 typedef struct {
     int32_t *face;
     double *distance, *along;

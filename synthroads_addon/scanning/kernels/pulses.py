@@ -10,25 +10,26 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 import numpy as np
 
 from ...base.arrays import AnyArray, Float, Index
-from ...materials.reflectance import EDGE_ON, retroreflection
+from ...materials.reflectance import EDGE_ON
 from ...materials.surfaces import Surfaces
 from ..beam import BeamPattern
 from ..devices.device import ScannerSetting
 from ..knots import Track
 from ..pulses import Pulses
-from ..receiving.radiometry import NEAREST, received_intensity
-from ..returns import LEAST_REFLECTANCE, BothSignals, Echoes, HitSignals
+from ..receiving.radiometry import NEAREST
+from ..returns import LEAST_REFLECTANCE, BothSignals, Echoes
 from ..scene.gaps import CORNERS
 from ..scene.target import FirstHits, Target
 from ..trace import BEYOND, BEYOND_CLEAR, CLEAR_LAYERS, FAINTEST, LAYERS, Hits, Openings, TracedRays
-from .beams import DOUBLE, INT64, POINTER, Beams, BeamRays, BeamShape, pointers
+from .beams import DOUBLE, INT64, POINTER, BeamRays, Beams, BeamShape, pointers
+from .hits import Ahead, HitRows, LateHits, OnwardLight, ShiningHits, TracedPulses, address_of
 from .library import NoKernelError, load_kernel
 from .moving import MovingKernel, MovingParts
 from .packets import PacketScene
@@ -59,226 +60,23 @@ class _Scene(ctypes.Structure):
     )
 
 
-class _Met(ctypes.Structure):
-    """Hits; as `Met` in pulses.c."""
-
-    _fields_ = tuple((name, POINTER) for name in ("face", "distance", "intensity", "weight", "fading", "along", "share"))
-
-
-class _Behind(ctypes.Structure):
-    """Hits behind surfaces; as `Behind` in pulses.c."""
-
-    _fields_ = (("ray", POINTER), ("met", _Met))
-
-
-def _address(array: AnyArray | None) -> int | None:
-    return None if array is None else array.ctypes.data
-
-
-class _Passed(ctypes.Structure):
-    """Light that goes on; as `Passed` in pulses.c."""
-
-    _fields_ = tuple((name, POINTER) for name in ("ray", "left", "start", "step", "face"))
-
-
-class _Ahead(ctypes.Structure):
-    """What rays on their way meet; as `Ahead` in pulses.c."""
-
-    _fields_ = tuple((name, POINTER) for name in ("face", "distance", "along", "through"))
-
-
 @dataclass(frozen=True)
-class _Hits:
-    """Hits and what they send back, (N,) each.
+class _Block:
+    """A block's rays and what moves meanwhile.
 
     Attributes:
-        face: number of the face.
-        distance: m; inf where it is out of reach.
-        intensity: received, without what the air takes.
-        weight: in mean ranges.
-        fading: exponent of what the air leaves; None where it takes nothing.
-        along: n . d of the face's normal and the ray; None where it is worked out again for those that are asked for.
-        share: of the pulse's energy that the surface takes; None where nobody asks.
+        rays: of its pulses.
+        beams: the pulses for C.
+        kept: arrays of these.
+        motions: tracks of the target's moving parts.
+        moving: those; None without any.
     """
 
-    face: AnyArray
-    distance: Float
-    intensity: Float
-    weight: Float
-    fading: Float | None
-    along: Float | None
-    share: Float | None
-
-    @classmethod
-    def of(cls, count: int, fades: bool, along: bool, share: bool) -> _Hits:
-        """Return room for so many hits."""
-        distance, intensity, weight = (np.empty(count) for _ in range(3))
-        others = (np.empty(count) if wanted else None for wanted in (fades, along, share))
-        return cls(np.empty(count, np.int32), distance, intensity, weight, *others)
-
-    @property
-    def native(self) -> _Met:
-        """Return the addresses of the arrays."""
-        return _Met(*(_address(getattr(self, name)) for name, _ in _Met._fields_))
-
-    def select(self, count: int) -> _Hits:
-        """Return the first hits."""
-        arrays = (getattr(self, field.name) for field in fields(self))
-        return _Hits(*(None if array is None else array[:count] for array in arrays))
-
-    def fade(self) -> None:
-        """Turn the exponents of what the air leaves into factors, in place."""
-        if self.fading is not None:
-            with np.errstate(under="ignore"):
-                np.exp(self.fading, out=self.fading)
-
-    def signals(self, shape: tuple[int, ...]) -> HitSignals:
-        """Return what hits send back, less what the air takes, in a shape; `fade` has been called."""
-        intensity = self.intensity if self.fading is None else self.intensity * self.fading
-        return HitSignals(*(array.reshape(shape) for array in (self.distance, self.weight, intensity)))
-
-
-@dataclass(frozen=True)
-class _Late:
-    """Hits behind surfaces that let light through, (N,) each.
-
-    Attributes:
-        ray: k * P + p for ray k of pulse p.
-        hits: the rest; they always have ``along``.
-    """
-
-    ray: Index
-    hits: _Hits
-
-    @classmethod
-    def of(cls, count: int, fades: bool, share: bool) -> _Late:
-        """Return room for so many hits."""
-        return cls(np.empty(count, np.int64), _Hits.of(count, fades, along=True, share=share))
-
-    @property
-    def native(self) -> _Behind:
-        """Return the addresses of the arrays."""
-        return _Behind(self.ray.ctypes.data, self.hits.native)
-
-    @classmethod
-    def join(cls, parts: list[_Late], fades: bool, share: bool) -> _Late:
-        """Return hits in the order of the parts."""
-        if not parts:
-            return cls.of(0, fades, share)
-        hits = [part.hits for part in parts]
-        columns = ([getattr(one, field.name) for one in hits] for field in fields(_Hits))
-        joined = (None if column[0] is None else np.concatenate(column) for column in columns)
-        return cls(np.concatenate([part.ray for part in parts]), _Hits(*joined))
-
-
-@dataclass(frozen=True)
-class _Light:
-    """Room for rays that go on behind surfaces, (N,) each; see `trace._Passed`.
-
-    Attributes:
-        ray, left, start: as there.
-        step, face: likewise; None where no material is clear in places.
-    """
-
-    ray: Index
-    left: Float
-    start: Float
-    step: Float | None
-    face: AnyArray | None
-
-    @classmethod
-    def of(cls, count: int, clear: bool) -> _Light:
-        """Return room for so many rays."""
-        seen = (np.empty(count), np.empty(count, np.int32)) if clear else (None, None)
-        return cls(np.empty(count, np.int64), np.empty(count), np.empty(count), *seen)
-
-    @property
-    def native(self) -> _Passed:
-        """Return the addresses of the arrays."""
-        return _Passed(*(_address(getattr(self, name)) for name, _ in _Passed._fields_))
-
-    def onward(self, count: int) -> tuple[Index, Float, Float | None, float]:
-        """Return the first so many rays, see `MovingParts.cast`."""
-        return self.ray[:count], self.start[:count], None if self.step is None else self.step[:count], BEYOND
-
-
-@dataclass(frozen=True)
-class TracedPulses:
-    """Hits that gave a block's echoes; hit i gave echo i.
-
-    Attributes:
-        target: what was scanned.
-        pulses: the block's.
-        pulse: (N,) of each hit.
-        face: (N,) that was hit.
-        along: (N,) n . d of its normal and the ray.
-        distance: (N,) range of the hit, m.
-        direction: (3, N) of its ray.
-        begin: (3, N) where its ray begins, local, m; None for where its pulse does.
-    """
-
-    target: Target
-    pulses: Pulses
-    pulse: Index
-    face: Index
-    along: Float
-    distance: Float
-    direction: Float
-    begin: Float | None
-
-    @property
-    def count(self) -> int:
-        """Return the number of hits."""
-        return len(self.pulse)
-
-    def pick(self, name: str, hits: Index) -> AnyArray:
-        """Return the named attribute of chosen hits, ``material`` that of their faces."""
-        if name == "material":
-            return np.take(self.target.material, np.take(self.face, hits)).astype(np.intp)
-        return np.asarray(np.take(getattr(self, name), hits))
-
-    def ends(self, hits: Index) -> tuple[Float, Float]:
-        """Return where chosen hits are and where their rays begin, (3, N) each, local, m."""
-        begin = self.begins(hits)
-        return begin + np.take(self.distance, hits) * self.directions(hits), begin
-
-    def begins(self, hits: Index) -> Float:
-        """Return where the rays of chosen hits begin, (3, N) local, m."""
-        if self.begin is not None:
-            return np.take(self.begin, hits, axis=1)
-        return np.take(self.pulses.origin, np.take(self.pulse, hits), axis=1)
-
-    def directions(self, hits: Index) -> Float:
-        """Return the directions (3, N) of chosen hits' rays."""
-        return np.take(self.direction, hits, axis=1)
-
-    def times(self, hits: Index) -> Float:
-        """Return when the rays of chosen hits (N,) were emitted, s."""
-        return np.take(self.pulses.time, np.take(self.pulse, hits))
-
-
-class _Shining:
-    """Room for hits whose surface sends light back the way that it came.
-
-    Args:
-        count: hits at most.
-    """
-
-    def __init__(self, count: int) -> None:
-        self._hit = np.empty(count, np.int64)
-        self._cosine, self._brightness, self._share = (np.empty(count) for _ in range(3))
-        self._material = np.empty(count, np.uint16)
-        self.native = pointers(self._hit, self._cosine, self._brightness, self._share, self._material)
-
-    def shine(self, surfaces: Surfaces, hits: _Hits, count: int) -> None:
-        """Add, in place, to the intensities of hits what their surfaces send back; ``count`` of them do."""
-        if not count:
-            return
-        hit, material = self._hit[:count], self._material[:count]
-        retro, lobe = np.take(surfaces.retro, material), np.take(surfaces.inverse_lobe_squared, material)
-        brightness = self._brightness[:count] + retroreflection(self._cosine[:count], retro, lobe)
-        brightness *= self._share[:count]
-        hits.intensity[hit] = received_intensity(brightness, np.take(hits.distance, hit))
+    rays: BeamRays
+    beams: Beams
+    kept: list[AnyArray]
+    motions: list[Track]
+    moving: MovingParts | None
 
 
 class PulseKernel:
@@ -339,9 +137,7 @@ class PulseKernel:
             setting.maximum_range,
         )
 
-    def trace(
-        self, pulses: Pulses, motions: list[Track], axis: FirstHits | None = None
-    ) -> tuple[TracedPulses, Echoes]:
+    def trace(self, pulses: Pulses, motions: list[Track], axis: FirstHits | None = None) -> tuple[TracedPulses, Echoes]:
         """Return the echoes of pulses, hit i that of echo i, and the hits that gave them.
 
         Args:
@@ -349,14 +145,12 @@ class PulseKernel:
             motions: tracks of the target's moving parts.
             axis: (P,) what the first ray of each pulse meets, where it has been cast already.
         """
-        rays, beams, kept = self._aimed(pulses, motions, axis)
-        first, late = self._followed(rays, beams, motions, axis, shares=False)
+        block = self._aimed(pulses, motions, axis)
+        first, late = self._followed(block, axis, shares=False)
         made, columns = self._grouped(len(pulses.time), first, late)
         pulse, hit, *others = (column[:made].copy() for column in columns)
-        echoes = Echoes(pulse, np.arange(made), *others)
-        traced = self._described(beams, pulses, first, late, pulse, hit)
-        del kept  # until here C has read the pulses
-        return traced, echoes
+        traced = self._described(block, pulses, first, late, pulse, hit)
+        return traced, Echoes(pulse, np.arange(made), *others)
 
     def follow(self, pulses: Pulses, motions: list[Track]) -> tuple[TracedRays, BothSignals]:
         """Return all that the rays of pulses meet, and its signals, for what changes them before they are grouped.
@@ -365,12 +159,11 @@ class PulseKernel:
             pulses: any.
             motions: tracks of the target's moving parts.
         """
-        rays, beams, kept = self._aimed(pulses, motions, None)
-        first, late = self._followed(rays, beams, motions, None, shares=True)
-        del kept
+        block = self._aimed(pulses, motions, None)
+        first, late = self._followed(block, None, shares=True)
         shape = (self._rays, len(pulses.time))
         hits = (self._hits(first, shape), self._hits(late.hits, (len(late.ray),)))
-        return TracedRays(rays, *hits, late.ray), (first.signals(shape), late.hits.signals((len(late.ray),)))
+        return TracedRays(block.rays, *hits, late.ray), (first.signals(shape), late.hits.signals((len(late.ray),)))
 
     def group(self, signals: BothSignals, ray: Index) -> Echoes:
         """Return the echoes of pulses, two or more, as `returns.group_returns` does.
@@ -380,14 +173,14 @@ class PulseKernel:
             ray: (B,) rays of these, as k * P + p.
         """
         first, behind = (
-            _Hits(np.empty(0, np.int32), *(np.ascontiguousarray(array) for array in arrays), None, None, None)
+            HitRows(np.empty(0, np.int32), *(np.ascontiguousarray(array) for array in arrays), None, None, None)
             for arrays in ((one.distance, one.intensity, one.weight) for one in signals)
         )
-        late = _Late(np.ascontiguousarray(ray, np.int64), behind)
+        late = LateHits(np.ascontiguousarray(ray, np.int64), behind)
         made, columns = self._grouped(signals[0].distance.shape[1], first, late)
         return Echoes(*(column[:made].copy() for column in columns))
 
-    def _hits(self, hits: _Hits, shape: tuple[int, ...]) -> Hits:
+    def _hits(self, hits: HitRows, shape: tuple[int, ...]) -> Hits:
         """Return hits as NumPy has them."""
         face = hits.face.astype(np.intp).reshape(shape)
         material = np.take(self._target.material, face, mode="clip").astype(np.intp)
@@ -395,51 +188,48 @@ class PulseKernel:
         assert hits.share is not None
         return Hits(face, material, *(array.reshape(shape) for array in (hits.distance, hits.along, hits.share)))
 
-    def _aimed(
-        self, pulses: Pulses, motions: list[Track], axis: FirstHits | None
-    ) -> tuple[BeamRays, Beams, list[AnyArray]]:
-        """Return the rays of pulses, and the same for C with the arrays that must stay meanwhile."""
+    def _aimed(self, pulses: Pulses, motions: list[Track], axis: FirstHits | None) -> _Block:
+        """Return the rays of pulses at what they are cast at."""
         reach = None
         if self._shape.parallel:
             farthest = self._setting.maximum_range
             met = axis or self._target.cast(pulses.origin, pulses.direction, farthest, pulses.time, motions)
             reach = met.distance
         rays = BeamRays.of(self._shape, pulses, reach)
-        return rays, *rays.native()
+        return _Block(rays, *rays.native(), motions, None if self._moving is None else self._moving.at(motions))
 
-    def _followed(
-        self, rays: BeamRays, beams: Beams, motions: list[Track], axis: FirstHits | None, shares: bool
-    ) -> tuple[_Hits, _Late]:
-        """Return what rays meet first, (K, P), and behind it, with what the air leaves."""
-        moving = None if self._moving is None else self._moving.at(motions)
+    def _followed(self, block: _Block, axis: FirstHits | None, shares: bool) -> tuple[HitRows, LateHits]:
+        """Return what rays meet first, (K, P), and behind it, with what the air leaves.
+
+        Args:
+            block: of pulses.
+            axis: see `trace`.
+            shares: hits have shares of the energy.
+        """
         # What is asked before rays are weighed is asked of all rays at once.
-        apart = bool(moving) or self._clear is not None or axis is not None or self._shape.parallel
-        count = len(rays.time)
+        apart = bool(block.moving) or self._clear is not None or axis is not None or self._shape.parallel or shares
+        count = len(block.rays.time)
         size, lot = self._rays * count, max(_LEAST_LOT, _LOT // self._rays // _LEAST_LOT * _LEAST_LOT)
-        first = _Hits.of(size, self._fades, along=apart or shares, share=shares)
-        light = _Light.of(size if self._surfaces.permeable else 0, self._clear is not None)
-        shining = _Shining(size if self._surfaces.retroreflective else 0)
+        first = HitRows.of(size, self._fades, along=apart, share=shares)
+        light = OnwardLight.of(size if self._surfaces.permeable else 0, self._clear is not None)
+        shining = ShiningHits(size if self._surfaces.retroreflective else 0)
         rows = np.empty((2, max(lot * self._rays, _BUFFER) * 3), np.float32)
         turned, found = np.empty(3 * lot * self._rays), np.empty(lot * self._rays, np.int32)
         counts, length, casts = np.zeros(2, np.int64), np.empty(self._rays, np.int64), self._caster.casting()
         work = [lot, *(array.ctypes.data for array in (*rows, turned, found))]
-        scene, pulses = ctypes.byref(self._scene), ctypes.byref(beams)
+        scene, pulses = ctypes.byref(self._scene), ctypes.byref(block.beams)
         head, met = (scene, ctypes.byref(casts), pulses), ctypes.byref(first.native)
-        if apart or shares:
-            begin = 0
-            if axis is not None:
-                begin = 1
-                assert first.along is not None
-                for mine, theirs in zip((first.face, first.distance, first.along), axis, strict=True):
-                    mine[:count] = theirs
-            self._kernel.synthroads_cast_first(*head, met, begin, *work)
+        if apart:
             assert first.along is not None
-            known = (first.face, first.distance, first.along)
-            if moving:
-                moving.cast(self._shape, beams, begin, None, known, self._setting.maximum_range)
-            through = self._through(rays, None, *known, motions)
+            known, begin = (first.face, first.distance, first.along), int(axis is not None)
+            for mine, theirs in zip(known, axis or (), strict=False):
+                mine[:count] = theirs
+            self._kernel.synthroads_cast_first(*head, met, begin, *work)
+            if block.moving:
+                block.moving.cast(self._shape, block.beams, begin, None, known, self._setting.maximum_range)
+            through = self._through(block, None, *known)
             onward = self._kernel.synthroads_weigh_first(
-                *(scene, pulses, met, _address(through), ctypes.byref(light.native), shining.native),
+                *(scene, pulses, met, address_of(through), ctypes.byref(light.native), shining.native),
                 *(counts.ctypes.data, length.ctypes.data),
             )
         else:
@@ -448,45 +238,42 @@ class PulseKernel:
                 length.ctypes.data,
             )
         shining.shine(self._surfaces, first, int(counts[0]))
-        layers: list[_Late] = []
+        layers: list[LateHits] = []
         most = (LAYERS if self._clear is None else CLEAR_LAYERS) - 1
         while onward and len(layers) < most:
-            late = _Late.of(onward, self._fades, shares)
-            onward = self._step(rays, beams, moving, motions, light, onward, late, shining, counts, rows)
+            late = LateHits.of(onward, self._fades, shares)
+            onward = self._step(block, light, onward, late, shining, counts, rows)
             shining.shine(self._surfaces, late.hits, int(counts[1]))
-            layers.append(_Late(late.ray[: counts[0]], late.hits.select(int(counts[0]))))
-        behind = _Late.join(layers, self._fades, shares)
+            layers.append(LateHits(late.ray[: counts[0]], late.hits.select(int(counts[0]))))
+        behind = LateHits.join(layers, self._fades, shares)
         for hits in (first, behind.hits):
             hits.fade()
         return first, behind
 
     def _step(
         self,
-        rays: BeamRays,
-        beams: Beams,
-        moving: MovingParts | None,
-        motions: list[Track],
-        light: _Light,
+        block: _Block,
+        light: OnwardLight,
         count: int,
-        late: _Late,
-        shining: _Shining,
+        late: LateHits,
+        shining: ShiningHits,
         counts: Index,
         rows: AnyArray,
     ) -> int:
         """Fill in what so many rays meet that go on, and return how many of them do again."""
         face, distance, along = np.empty(count, np.int32), np.empty(count), np.empty(count)
-        ahead, casts = _Ahead(*(_address(array) for array in (face, distance, along)), None), self._caster.casting()
-        scene, pulses = ctypes.byref(self._scene), ctypes.byref(beams)
+        ahead, casts = Ahead(*(address_of(array) for array in (face, distance, along)), None), self._caster.casting()
+        scene, pulses = ctypes.byref(self._scene), ctypes.byref(block.beams)
         passed = ctypes.byref(light.native)
         work = [array.ctypes.data for array in rows]
         self._kernel.synthroads_cast_behind(
             *(scene, ctypes.byref(casts), pulses, passed, count, ctypes.byref(ahead), *work)
         )
-        if moving:
+        if block.moving:
             met, farthest = (face, distance, along), self._setting.maximum_range
-            moving.cast(self._shape, beams, 0, light.onward(count), met, farthest)
-        through = self._through(rays, light.onward(count), face, distance, along, motions)
-        ahead.through = _address(through)
+            block.moving.cast(self._shape, block.beams, 0, light.onward(count), met, farthest)
+        through = self._through(block, light.onward(count), face, distance, along)
+        ahead.through = address_of(through)
         return int(
             self._kernel.synthroads_weigh_behind(
                 *(scene, pulses, passed, count, ctypes.byref(ahead), ctypes.byref(late.native)),
@@ -496,20 +283,18 @@ class PulseKernel:
 
     def _through(
         self,
-        rays: BeamRays,
+        block: _Block,
         onward: tuple[Index, Float, Float | None, float] | None,
         face: AnyArray,
         distance: Float,
         along: Float,
-        motions: list[Track],
     ) -> Float | None:
         """Return the shares of light that rays keep behind what is clear in places, no number for other materials.
 
         Args:
-            rays: of the pulses.
+            block: of pulses.
             onward: see `MovingParts.cast`.
             face, distance, along: what they meet, (K, P) in a row, or (N,) of those that go on.
-            motions: tracks of the target's moving parts.
         """
         if self._clear is None:
             return None
@@ -526,14 +311,14 @@ class PulseKernel:
             ray = on[some]
             here = start[some] + (beyond if step is None else step[some]) + here
         if len(some):
-            origin, direction = rays.pick(ray)
+            origin, direction = block.rays.pick(ray)
             result[some] = self._clear.transmitted(
                 *(self._target, material[some].astype(np.intp), face[some].astype(np.intp), along[some]),
-                *(origin + here * direction, np.take(rays.time, ray % len(rays.time)), motions),
+                *(origin + here * direction, np.take(block.rays.time, ray % len(block.rays.time)), block.motions),
             )
         return result
 
-    def _grouped(self, count: int, first: _Hits, late: _Late) -> tuple[int, list[AnyArray]]:
+    def _grouped(self, count: int, first: HitRows, late: LateHits) -> tuple[int, list[AnyArray]]:
         """Return the number of echoes of so many pulses, and their pulses, hits, ranges, intensities and weights."""
         behind = len(late.ray)
         lot = max(_LEAST_LOT, _LOT // self._rays // _LEAST_LOT * _LEAST_LOT)
@@ -551,15 +336,15 @@ class PulseKernel:
         return made, columns
 
     def _described(
-        self, beams: Beams, pulses: Pulses, first: _Hits, late: _Late, pulse: Index, hit: Index
+        self, block: _Block, pulses: Pulses, first: HitRows, late: LateHits, pulse: Index, hit: Index
     ) -> TracedPulses:
         """Return what is known of the hits (N,) of echoes."""
         made = len(hit)
         face, along, distance, direction = np.empty(made, np.int64), np.empty(made), np.empty(made), np.empty((3, made))
         begin = np.empty((3, made)) if self._shape.parallel else None
         self._kernel.synthroads_describe(
-            *(ctypes.byref(item) for item in (self._scene, beams, first.native, late.native)),
-            *(made, *(_address(array) for array in (hit, face, along, distance, begin, direction))),
+            *(ctypes.byref(item) for item in (self._scene, block.beams, first.native, late.native)),
+            *(made, *(address_of(array) for array in (hit, face, along, distance, begin, direction))),
         )
         return TracedPulses(self._target, pulses, pulse, face, along, distance, direction, begin)
 

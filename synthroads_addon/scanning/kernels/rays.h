@@ -17,14 +17,14 @@ typedef struct {
 /* packets.c's synthroads_cast. */
 typedef void (*Cast)(void *casts, void *scene, int64_t count, const CastRays *rays, int32_t *found);
 
-/* The rays of a pulse; as `_Shape` in pulses.py. */
+/* The rays of a pulse; as `Shape` in beams.py. */
 typedef struct {
     int64_t rays;                                      /* K per pulse */
     const double *stretch, *in_plane, *across, *share; /* (K): factors on axis and beam's axes; energy */
     int32_t parallel;                                  /* 1: they begin side by side; 0: they diverge */
 } Shape;
 
-/* P pulses; as `_Beams` in pulses.py. (3, P) each, and (P). Of parallel rays the beam's axes are as long as its range. */
+/* P pulses; as `Beams` in beams.py. (3, P) each, and (P). Of parallel rays the beam's axes are as long as its range. */
 typedef struct {
     int64_t pulses;
     const double *origin, *direction, *in_plane, *across, *time;

@@ -11,9 +11,10 @@ import numpy as np
 from synthroads_addon.base.random_streams import stream
 from synthroads_addon.materials.surfaces import surfaces_of
 from synthroads_addon.materials.table import materials
+from synthroads_addon.scanning.kernels.hits import TracedPulses
 from synthroads_addon.scanning.kernels.library import NoKernelError
 from synthroads_addon.scanning.kernels.packets import USUAL, Packets, PacketScene, usable_packets
-from synthroads_addon.scanning.kernels.pulses import PulseKernel, TracedPulses
+from synthroads_addon.scanning.kernels.pulses import PulseKernel
 from synthroads_addon.scanning.plan import ScanPlan
 from synthroads_addon.scanning.pulses import Pulses
 from synthroads_addon.scanning.returns import Echoes
@@ -40,7 +41,13 @@ class Cast(PacketScene):
         super().__init__(packets, mesh.vertices, mesh.triangles, packing=replace(USUAL, **packing))
 
 
-def planned(mesh: SceneMesh, rays: int = 7, packing: dict[str, Any] | None = None, moving: Sequence[MovingMesh] = (), **changes: Any) -> ScanPlan:
+def planned(
+    mesh: SceneMesh,
+    rays: int = 7,
+    packing: dict[str, Any] | None = None,
+    moving: Sequence[MovingMesh] = (),
+    **changes: Any,
+) -> ScanPlan:
     """Return the plan of a scan of a mesh by packets, with everything of its materials that light meets.
 
     Args:

@@ -1,4 +1,4 @@
-"""Panes, spared footprints, parallel rays, drops and mirrors, by compiled loops: byte for byte what NumPy makes of them."""
+"""Panes, spared footprints, parallel rays, drops and mirrors, compiled: byte for byte what NumPy makes of them."""
 
 from __future__ import annotations
 
@@ -43,7 +43,9 @@ def here_and_there(values: Mapping[SurfaceInput, np.ndarray]) -> np.ndarray:
 
 def with_panes(plan: ScanPlan, mesh: SceneMesh, clear: tuple[int, ...]) -> ScanPlan:
     """Return the plan with materials that are clear in places."""
-    see = SeeThrough(SceneSurfaces(mesh), dict.fromkeys(clear, Transparency(frozenset({POSITION, ALONG}), here_and_there)))
+    see = SeeThrough(
+        SceneSurfaces(mesh), dict.fromkeys(clear, Transparency(frozenset({POSITION, ALONG}), here_and_there))
+    )
     surfaces = surfaces_of((materials()[name] for name in mesh.materials), "oren_nayar", clear=clear)
     return replace(plan, surfaces=surfaces, transparency=see)
 
@@ -81,7 +83,9 @@ def driving() -> list[MovingMesh]:
 @pytest.mark.parametrize("moving", [False, True])
 def test_materials_that_are_clear_in_places(rays: int, moving: bool) -> None:
     mesh = soup(2500)
-    plan = planned(mesh, rays, moving=driving() if moving else (), divergence=WIDE, frame_origin=np.array([3e5, 7.0, 1.0]))
+    plan = planned(
+        mesh, rays, moving=driving() if moving else (), divergence=WIDE, frame_origin=np.array([3e5, 7.0, 1.0])
+    )
     echoes = assert_same(with_panes(plan, mesh, (0, 3, 4)), downwards(2001))
     assert len(echoes.pulse) != len(assert_same(plan, downwards(2001)).pulse)
 
@@ -110,7 +114,9 @@ def test_panes_that_rounding_puts_before_themselves() -> None:
 
 def with_vertices(mesh: SceneMesh, vertices: np.ndarray) -> SceneMesh:
     """Return a mesh with other vertices, which are tilted so that they lie between numbers of single precision."""
-    tilted = vertices + np.stack([np.zeros(len(vertices)), np.zeros(len(vertices)), 0.3 * (vertices[:, 0] - 3e4)], axis=1)
+    tilted = vertices + np.stack(
+        [np.zeros(len(vertices)), np.zeros(len(vertices)), 0.3 * (vertices[:, 0] - 3e4)], axis=1
+    )
     return replace(mesh, vertices=tilted.astype(np.float32))
 
 

@@ -37,7 +37,7 @@ class Turning:
 
 
 def traffic(seed: int = 4) -> list[MovingMesh]:
-    """Return bodies of all kinds of materials: some in the way, one far away, one that is nowhere, one without faces."""
+    """Return bodies of all materials: some in the way, one far away, one that is nowhere, one without faces."""
     random, result = stream(seed, "traffic"), list[MovingMesh]()
     for number in range(6):
         place = tuple(random.uniform(-12.0, 12.0, 3))
@@ -92,7 +92,9 @@ def test_bodies_that_are_fast_beside_the_pulses() -> None:
     """Their way is many times their size while a bundle of pulses is fired, which all run to one spot."""
     count = 640
     down = np.repeat([[0.0], [1e-6], [-1.0]], count, axis=1)
-    pulses = replace(pulses_of(np.repeat([[0.0], [0.0], [30.0]], count, axis=1), down), time=np.linspace(0.0, 5.0, count))
+    pulses = replace(
+        pulses_of(np.repeat([[0.0], [0.0], [30.0]], count, axis=1), down), time=np.linspace(0.0, 5.0, count)
+    )
     fast = [MovingMesh(soup(90, 3, 2.5), LinearMotion((90.0, 0.0, 0.0), (x, 0.0, 5.0))) for x in (-225.0, -180.0)]
     echoes = assert_same(planned(soup(5), 7, moving=fast), pulses)
     assert len(echoes.pulse) > 5
@@ -117,7 +119,10 @@ def test_processors_without_wide_instructions_agree(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(kernel._moving, "call", call)
     narrow = SimpleNamespace(synthroads_group=_load().synthroads_group, synthroads_describe=_load().synthroads_describe)
     for name in ("cast_first", "weigh_first", "cast_behind", "weigh_behind"):
-        function, known = getattr(load_kernel("pulses"), f"synthroads_{name}_narrow"), getattr(_load(), f"synthroads_{name}")
+        function, known = (
+            getattr(load_kernel("pulses"), f"synthroads_{name}_narrow"),
+            getattr(_load(), f"synthroads_{name}"),
+        )
         function.restype, function.argtypes = known.restype, known.argtypes
         setattr(narrow, f"synthroads_{name}", function)
     monkeypatch.setattr(kernel, "_kernel", narrow)

@@ -23,7 +23,16 @@ from synthroads_addon.scanning.scene.caster import FacePlanes
 from synthroads_addon.scanning.scene.mesh import SceneMesh
 from synthroads_addon.scanning.scene.motion import LinearMotion, MovingMesh, ScannedScene
 from synthroads_addon.scanning.scene.target import Target
-from tests.helpers.scenes.kernel_scenes import Cast, assert_bytes, assert_same, downwards, planned, pulses_of, soup, stack
+from tests.helpers.scenes.kernel_scenes import (
+    Cast,
+    assert_bytes,
+    assert_same,
+    downwards,
+    planned,
+    pulses_of,
+    soup,
+    stack,
+)
 from tests.helpers.scenes.scan_scenes import BruteForce, mesh_of, plane, scan_of
 
 pytestmark = pytest.mark.any_blender
@@ -55,6 +64,8 @@ class Forced(Cast):
 
 
 _CALLED = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 2, ctypes.c_int64, *[ctypes.c_void_p] * 2)
+
+
 @pytest.mark.parametrize("rays", RINGS)
 @pytest.mark.parametrize("attenuation", [0.0, 0.02])
 def test_leaves_panes_and_reflectors_send_back_the_same_bytes(rays: int, attenuation: float) -> None:
