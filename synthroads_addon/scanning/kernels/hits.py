@@ -44,7 +44,7 @@ class Passed(ctypes.Structure):
 
 
 class Ahead(ctypes.Structure):
-    """What rays on their way meet; as `Ahead` in pulses.c."""
+    """Hits of rays that go on, before they are weighed; as `Ahead` in pulses.c."""
 
     _fields_ = tuple((name, POINTER) for name in ("face", "distance", "along", "through"))
 

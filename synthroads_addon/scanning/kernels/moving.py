@@ -1,4 +1,4 @@
-"""What rays meet of what moves, in a compiled loop, beside `moving.c`: the bytes of `scene.target.Target.cast`."""
+"""Rays cast at moving things in a compiled loop, beside `moving.c`: the bytes of `scene.target.Target.cast`."""
 
 from __future__ import annotations
 

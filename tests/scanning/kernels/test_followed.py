@@ -183,7 +183,7 @@ def test_drops_and_mirrors(rays: int, what: str, attenuation: float) -> None:
 
 
 def test_all_that_rays_meet_is_known_as_numpy_knows_it() -> None:
-    """What changes echoes before they are grouped gets the hits of all rays."""
+    """Effects and mirrors, which change echoes before they are grouped, get the hits of all rays."""
     plan, pulses = planned(soup(2500), 7, moving=driving(), divergence=WIDE, attenuation=0.01), downwards(2001)
     kernel, motions = plan.pulse_kernel, plan.target.motions(0.0, 0.1, 0.01)
     assert isinstance(kernel, PulseKernel)
