@@ -10,9 +10,9 @@ import numpy as np
 
 from ..base.arrays import Bool, Float, Index
 
-_AT_ONCE = 256
+_AT_ONCE = 1024
 """Knots whose poses are worked out at once: for so many it takes hardly longer than for a few."""
-_KEPT = 16
+_KEPT = 6
 """So many times `_AT_ONCE` knots are kept, for the blocks that are being scanned and those that follow."""
 NODES = 6
 """Poses from which those between the middle two are worked out, by the polynomial through them."""

@@ -127,8 +127,7 @@ class Multipath:
         first, rays = traced.first, traced.rays
         before, pulse = np.take(first.distance, ray), ray % len(rays.time)
         normal = target.normals(np.take(first.face, ray), np.take(first.along, ray), rays.time[pulse], motions)
-        direction = np.take(rays.direction.reshape(3, -1), ray, axis=1)
-        origin = np.take(rays.origin.reshape(3, -1), ray if rays.origin.shape[1] > 1 else pulse, axis=1)
+        origin, direction = rays.pick(ray)
         place = origin + before * direction + _OFF_SURFACE * normal
         away = direction - 2.0 * np.einsum("ij,ij->j", direction, normal) * normal
         met = target.cast(place, away, setting.maximum_range, rays.time[pulse], motions)

@@ -232,21 +232,12 @@ class ScanPlan:
 
     @cached_property
     def pulse_kernel(self) -> PulseKernel | NoKernelError:
-        """Return the compiled loops that follow the scan's pulses, or why NumPy does: what these leave out."""
-        several = self.rays_per_pulse > 1
-        left_out = {
-            "things move": bool(self.target.moving),
-            "materials are clear in places": self.openings is not None and self.openings.clear is not None,
-            "the beam is cylindrical": self.beam == "cylindrical" and several,
-            "footprints are spared": self.spares,
-            "the air sends echoes": bool(self.effects),
-            "surfaces mirror": self.multipath is not None,
-        }
-        for reason, found in left_out.items():
-            if found:
-                return NoKernelError(reason)
+        """Return the compiled loops that follow the scan's pulses, or why NumPy does."""
+        parallel = self.beam == "cylindrical"
         try:
-            return PulseKernel(self.target, self.surfaces, self.setting, self.pattern, self.gaps, self.attenuation)
+            return PulseKernel(
+                self.target, self.surfaces, self.setting, self.pattern, self.openings, self.attenuation, parallel
+            )
         except NoKernelError as error:
             return error
 
@@ -283,7 +274,20 @@ class ScanPlan:
         parts = [
             f"{of} {f'by NumPy: {way}' if isinstance(way, NoKernelError) else 'compiled'}" for of, way in ways.items()
         ]
+        if isinstance(self.pulse_kernel, PulseKernel) and (left := self._left_to_numpy):
+            parts[0] += f", by NumPy: {', '.join(left)}"
         return "; ".join([caster.kernels, *parts])
+
+    @property
+    def _left_to_numpy(self) -> list[str]:
+        """Return what of pulses that are followed by compiled loops is worked out by NumPy nonetheless."""
+        parts = {
+            "what panes let through": self.openings is not None and self.openings.clear is not None,
+            "which footprints are spared": self.spares,
+            "echoes of the air": bool(self.effects),
+            "what surfaces mirror": self.multipath is not None,
+        }
+        return [part for part, there in parts.items() if there]
 
     @property
     def rays_per_pulse(self) -> int:

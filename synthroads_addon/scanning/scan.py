@@ -15,6 +15,7 @@ from .beam import conical_directions, cylindrical_offsets, outer_radii
 from .colour.colour import SeenPoints
 from .devices.shots import shots
 from .effects import apply_effect
+from .kernels.hits import TracedPulses
 from .kernels.pulses import PulseKernel
 from .knots import Track
 from .multipath import Multipath
@@ -187,30 +188,49 @@ class BlockScan:
             motions: tracks of the target's moving parts.
             key: of random streams.
         """
-        plan, setting, kernel = self.plan, self.plan.setting, self.plan.pulse_kernel
-        if isinstance(kernel, PulseKernel) and len(pulses.time) > 1:
-            return *kernel.trace(pulses), _Tally(len(pulses.time) * plan.rays_per_pulse)
-        if not plan.spares:
+        plan, setting = self.plan, self.plan.setting
+        if plan.spares:
+            return self._spared_echoes(pulses, motions)
+        compiled, tally = self._kernel_of(len(pulses.time)), _Tally(len(pulses.time) * plan.rays_per_pulse)
+        if compiled is not None and not self._off_surfaces:
+            return *compiled.trace(pulses, motions), tally
+        if compiled is None:
             traced = self._trace(pulses, motions)
             signals = self.signals(traced)
-            if plan.multipath is not None:
-                traced, signals = self.add_ghosts(plan.multipath, traced, signals, motions)
-            for effect in plan.effects if self._in_air else ():
-                random = stream(plan.seed, f"effect {effect.name}", strip.index, key)
-                traced, signals = apply_effect(effect, random, setting, plan.attenuation, pulses, traced, signals)
-            echoes = group_returns(*signals, traced.pulse, setting.range_resolution)
-            return traced, echoes, _Tally(traced.first.face.size)
+        else:
+            traced, signals = compiled.follow(pulses, motions)
+        if plan.multipath is not None:
+            traced, signals = self.add_ghosts(plan.multipath, traced, signals, motions)
+        for effect in plan.effects if self._in_air else ():
+            random = stream(plan.seed, f"effect {effect.name}", strip.index, key)
+            traced, signals = apply_effect(effect, random, setting, plan.attenuation, pulses, traced, signals)
+        if compiled is None:
+            return traced, group_returns(*signals, traced.pulse, setting.range_resolution), tally
+        return traced, compiled.group(signals, traced.ray), tally
+
+    def _kernel_of(self, pulses: int) -> PulseKernel | None:
+        """Return the compiled loops for so many pulses; None for NumPy, as for a single one: see `PulseKernel`."""
+        kernel = self.plan.pulse_kernel
+        return kernel if isinstance(kernel, PulseKernel) and pulses > 1 else None
+
+    def _spared_echoes(self, pulses: Pulses, motions: list[Track]) -> tuple[Traced, Echoes, _Tally]:
+        """Return what `traced_echoes` does where footprints that meet one plane alone aren't cast in full."""
+        plan, setting = self.plan, self.plan.setting
         met = plan.target.cast(pulses.origin, pulses.direction, setting.maximum_range, pulses.time, motions)
         sparing = Sparing(plan)
         spared = sparing.find(pulses, met, motions)
         others = np.ones(len(pulses.time), bool)
         others[spared.pulse] = others[sparing.find_missing(pulses, met, motions)] = False
         full = np.flatnonzero(others)
-        traced = self._trace(pulses.select(full), motions, met.take(full))
-        echoes = group_returns(*self.signals(traced), traced.pulse, setting.range_resolution)
+        traced: TracedRays | TracedPulses
+        if (compiled := self._kernel_of(len(full))) is not None:
+            traced, echoes = compiled.trace(pulses.select(full), motions, met.take(full))
+        else:
+            traced = self._trace(pulses.select(full), motions, met.take(full))
+            echoes = group_returns(*self.signals(traced), traced.pulse, setting.range_resolution)
         echoes = replace(echoes, pulse=full[echoes.pulse])
         echoes = merge_echoes(echoes, sparing.echoes(spared, traced.count))
-        rays = traced.first.face.size + len(met.face) - len(full)
+        rays = len(met.face) + (plan.rays_per_pulse - 1) * len(full)
         tally = _Tally(rays, count_footprints(plan.target, met, spared))
         return PartlyTraced(traced, spared, pulses), echoes, tally
 

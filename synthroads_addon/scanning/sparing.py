@@ -11,13 +11,14 @@ import numpy as np
 from ..base.arrays import AnyArray, ArrayRows, Bool, Float, Index, Int
 from ..materials.surfaces import brightness_of
 from .beam import beam_radii, conical_directions, cylindrical_offsets, outer_radii
-from .kernels.pulses import TracedPulses
+from .kernels.hits import TracedPulses
 from .knots import Track
 from .plan import ScanPlan
 from .pulses import Pulses
 from .receiving.radiometry import received_intensity
 from .returns import LEAST_REFLECTANCE, Echoes
 from .scene.bare_ground import CREASE
+from .scene.bundles import dot
 from .scene.target import FirstHits, Target
 from .trace import TracedRays
 
@@ -98,7 +99,7 @@ class Sparing:
         spans, steepness = [], np.empty((len(rows), 2))
         for i, axis in enumerate((pulses.in_plane, pulses.across)):
             across = np.take(axis, rows, axis=1)
-            slope = _dot(across, normal)
+            slope = dot(across, normal)
             slope /= along
             steepness[:, i] = slope
             across -= slope * direction
@@ -215,7 +216,7 @@ class PartlyTraced:
         pulses: of the block.
     """
 
-    traced: TracedRays
+    traced: TracedRays | TracedPulses
     spared: SparedPulses
     pulses: Pulses
 
@@ -263,11 +264,3 @@ def count_footprints(target: Target, met: FirstHits, spared: SparedPulses) -> In
     one = spared.one_ray
     of_spared = [target.face_values("class_id", spared.face[rows]) for rows in (one, ~one)]
     return np.array([np.bincount(classes, minlength=256) for classes in (of_axes, *of_spared)], np.int64)
-
-
-def _dot(a: Float, b: Float) -> Float:
-    """Return the products (N,) of vectors (3, N)."""
-    result = a[0] * b[0]
-    for i in (1, 2):
-        result += a[i] * b[i]
-    return np.asarray(result)

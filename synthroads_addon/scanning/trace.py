@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -23,8 +23,23 @@ CLEAR_LAYERS = 256
 """Surfaces that a ray passes at most where some are clear in places: those take nothing of it."""
 BEYOND = 1e-3
 """A ray goes on this far, m, behind the surface that it has passed: farther than float32 rounds."""
-_BEYOND_CLEAR = 1e-4
+BEYOND_CLEAR = 1e-4
 """Likewise behind one that is clear in places: a sign's or a marking's picture often lies a millimetre above a wall."""
+
+
+class PulseRays(Protocol):
+    """Interface of K rays of each of P pulses, as `Rays`, which may be worked out where they are asked for."""
+
+    @property
+    def share(self) -> Float:
+        """Return the shares (K, 1) of the pulse's energy."""
+
+    @property
+    def time(self) -> Float:
+        """Return when the pulses are emitted, (P,), s."""
+
+    def pick(self, ray: Index) -> tuple[Float, Float]:
+        """Return origins and directions (3, N) of chosen rays, as k * P + p for ray k of pulse p."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +98,7 @@ class TracedRays:
         ray: (B,) rays of these: k * P + p for ray k of pulse p.
     """
 
-    rays: Rays
+    rays: PulseRays
     first: Hits
     behind: Hits
     ray: Index
@@ -109,7 +124,7 @@ class TracedRays:
 
     def directions(self, hits: Index) -> Float:
         """Return the directions (3, N) of chosen hits' rays."""
-        return np.take(self.rays.direction.reshape(3, -1), self.ray_of(hits), axis=1)
+        return self.rays.pick(self.ray_of(hits))[1]
 
     def times(self, hits: Index) -> Float:
         """Return when the rays of chosen hits (N,) were emitted, s."""
@@ -272,7 +287,7 @@ class _Onward:
         """Return how far (N,), m, rays go on behind surfaces that they have passed, by material; None: all alike."""
         if not self.clear:
             return None
-        return np.where(np.take(self.surfaces.clear, material), _BEYOND_CLEAR, BEYOND)
+        return np.where(np.take(self.surfaces.clear, material), BEYOND_CLEAR, BEYOND)
 
     def transmitted(
         self, on: Index, face: Index | None, material: Index, along: Float | None, distance: Float

@@ -51,8 +51,8 @@ def test_blocks_side_by_side_share_what_is_worked_out() -> None:
     kept = PoseCache(body.pose)
     blocks = [(0.31 * number, 0.31 * (number + 1), 0.01) for number in range(50)]
     kept.track(0.0, 15.5, 0.01)
-    assert body.asked == 7  # 1,550 knots, 256 at once
+    assert body.asked == 2  # 1,550 knots, 1,024 at once
     with ThreadPoolExecutor(4) as pool:
         for found, block in zip(pool.map(lambda block: kept.track(*block), blocks), blocks, strict=True):
             assert_same(found, Track.between(Waltz().pose, *block))
-    assert body.asked == 7
+    assert body.asked == 2

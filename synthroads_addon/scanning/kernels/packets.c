@@ -9,7 +9,7 @@
  * Rays are packed in the order in which they come, from the first of a call on: what a ray meets depends on the call
  * alone, never on threads.
  */
-#include "kernel.h"
+#include "rays.h"
 
 #define INVALID 0xFFFFFFFFu
 #define EVERY_FEATURE 0xFFFFFFFFu
@@ -49,14 +49,7 @@ typedef struct {
     int32_t changes;    /* in those; from call to call, where rays are cast by several */
 } Casts;
 
-/* Rays, row by row; as `_Rays` in packets.py. */
-typedef struct {
-    const float *origin, *direction; /* 3 numbers per ray */
-    const float *limit;              /* range within which a hit counts, m */
-    int64_t limit_step;              /* 1: a limit per ray; 0: one for all */
-} Rays;
-
-static void fill(Number *packet, const Rays *rays, int64_t first, int count, const int width)
+static void fill(Number *packet, const CastRays *rays, int64_t first, int count, const int width)
 {
     for (int j = 0; j < width; j++) {
         int64_t i = first + (j < count ? j : 0); /* lanes that are left over repeat the first ray, and aren't cast */
@@ -98,7 +91,7 @@ static int coherent(const Number *packet, const Casts *casts, const int width)
 }
 
 static inline __attribute__((always_inline)) void cast_all(
-    Casts *casts, void *scene, int64_t rays_in_all, const Rays *rays, int32_t *found, const int width)
+    Casts *casts, void *scene, int64_t rays_in_all, const CastRays *rays, int32_t *found, const int width)
 {
     Number packet[ROWS * WIDEST] __attribute__((aligned(64)));
     int32_t valid[WIDEST] __attribute__((aligned(64)));
@@ -129,7 +122,7 @@ static inline __attribute__((always_inline)) void cast_all(
 }
 
 /* Writes the number of the first face that each ray meets, -1 for none; or 1 where it meets anything, else 0. */
-EXPORT void synthroads_cast(Casts *casts, void *scene, int64_t count, const Rays *rays, int32_t *found)
+EXPORT void synthroads_cast(Casts *casts, void *scene, int64_t count, const CastRays *rays, int32_t *found)
 {
     if (casts->width == 16)
         cast_all(casts, scene, count, rays, found, 16);

@@ -2,72 +2,67 @@
  * light pass, weighed and grouped into returns. The arithmetic of scanning/trace.py, scanning/scene and
  * scanning/returns.py in the very order in which NumPy does it there, so that the results are the same bytes. What
  * needs exp or arccos is left to NumPy, between `synthroads_first`, `synthroads_behind` and `synthroads_group`.
+ * Where more is asked of rays before they are weighed, whether they meet what moves (moving.c), or what clear materials
+ * let through, they are cast and weighed one after the other: `synthroads_cast_first` and `synthroads_weigh_first`.
  */
-#include "kernel.h"
+#include "rays.h"
 
-#define INFINITE __builtin_inf()
 #define CORNERS 4
-#define BUFFER 1024 /* rays cast at once behind surfaces: whole packets of any width */
-
-/* packets.c's synthroads_cast, and its `Rays`. */
-typedef struct {
-    const float *origin, *direction, *limit;
-    int64_t limit_step;
-} CastRays;
-typedef void (*Cast)(void *casts, void *scene, int64_t count, const CastRays *rays, int32_t *found);
 
 /* What is scanned and how, the same for all blocks; as `_Scene` in pulses.py. */
 typedef struct {
     Cast cast;
     void *scene;
-    int64_t rays;                                     /* K per pulse */
-    const double *stretch, *in_plane, *across, *share; /* (K) of the rays: factors on axis and beam's axes; energy */
-    int64_t faces;
+    const Shape *shape;
+    int64_t faces;                                     /* of what doesn't move */
     const double *planes;                              /* (4, faces) */
-    const uint16_t *material;                          /* (faces) */
+    const uint16_t *material;                          /* of all faces */
     const double *reflectivity, *facet_a, *facet_b;    /* (M) of materials, as all that follow */
     const double *transmission, *open_below, *gap_size;
-    const uint8_t *pervious, *gappy, *shining;
+    const uint8_t *pervious, *gappy, *shining, *clear;
     const double *corners;                             /* (CORNERS, 3) */
     double frame[3], gap_area;
     uint32_t gap_key;
-    int32_t gaps;                                      /* whether leaves and gaps are told apart */
+    int32_t gaps, open;                                /* whether leaves and gaps are told apart; any is, or panes are */
     double nearest, farthest, attenuation;
-    double faintest, beyond, edge_on, closest, least_reflectance;
+    double faintest, beyond, beyond_clear, edge_on, closest, least_reflectance;
     float limit;
 } Scene;
 
-/* Hits whose surface sends light back the way that it came; as `_Shining` in pulses.py. NumPy adds what they do. */
+/* Hits whose surface sends light back the way that it came; as `ShiningHits` in hits.py. NumPy adds what they do. */
 typedef struct {
     int64_t *hit;
     double *cosine, *brightness, *share; /* brightness: without it */
     uint16_t *material;
 } Shining;
 
-/* Light that goes on behind surfaces; as `_Passed` in pulses.py. */
+/* Light that goes on behind surfaces; as `Passed` in hits.py. `face`, `step`: NULL where nothing is clear in places. */
 typedef struct {
     int64_t *ray; /* k * P + p */
-    double *left, *start;
+    double *left, *start, *step;
+    int32_t *face;
 } Passed;
 
-/* Hits, (K, P) or (N); as `_Met` in pulses.py. `fading`: the exponent of what the air leaves. */
+/* Hits, (K, P) or (N); as `Met` in hits.py. `fading`: the exponent of what the air leaves. `along` is NULL where
+ * rays are weighed as they are cast, `share`, of the energy that a surface takes, where it isn't asked for. */
 typedef struct {
     int32_t *face;
-    double *distance, *intensity, *weight, *fading;
+    double *distance, *intensity, *weight, *fading, *along, *share;
 } Met;
 
-/* Hits behind surfaces, (N) at most; as `_Behind` in pulses.py. */
+/* Hits behind surfaces, (N) at most; as `Behind` in hits.py. */
 typedef struct {
     int64_t *ray;
-    double *along;
     Met met;
 } Behind;
 
-/* P pulses; as `_Beams` in pulses.py. (3, P) each. */
+/* What rays on their way behind surfaces meet, (N) each, and the share that it lets through, no number where its
+ * material says so; NULL where all do. As `Ahead` in hits.py. */
 typedef struct {
-    int64_t pulses;
-    const double *origin, *direction, *in_plane, *across;
-} Beams;
+    int32_t *face;
+    double *distance, *along;
+    const double *through;
+} Ahead;
 
 INLINE double floor_of(double x)
 {
@@ -85,41 +80,6 @@ INLINE uint32_t hash_cell(const double *cell, uint32_t key)
     node = mix_bits(node + low_bits(cell[2]) * 0xC2B2AE3Du);
     node *= 0x846CA68Bu;
     return node ^ (node >> 15);
-}
-
-/* A ray of a pulse. */
-typedef struct {
-    double origin[3], direction[3];
-} Ray;
-
-INLINE Ray ray_of(const Scene *scene, const Beams *beams, int64_t k, int64_t p)
-{
-    Ray ray;
-    for (int i = 0; i < 3; i++) {
-        int64_t at = i * beams->pulses + p;
-        ray.origin[i] = beams->origin[at];
-        ray.direction[i] = beams->direction[at];
-        if (scene->rays > 1) {
-            ray.direction[i] = ray.direction[i] * scene->stretch[k] + beams->in_plane[at] * scene->in_plane[k];
-            ray.direction[i] += beams->across[at] * scene->across[k];
-        }
-    }
-    return ray;
-}
-
-/* FacePlanes.intersect: the range to a face's plane, and n . d. */
-INLINE double range_to(const Scene *scene, int32_t face, const double *origin, const double *direction,
-                              double *along)
-{
-    const double *plane = scene->planes + face;
-    double height = plane[3 * scene->faces] - plane[0] * origin[0], product = plane[0] * direction[0];
-    for (int i = 1; i < 3; i++) {
-        double normal = plane[i * scene->faces];
-        product += normal * direction[i];
-        height -= normal * origin[i];
-    }
-    *along = product;
-    return height / product;
 }
 
 /* The share of its light that a ray keeps behind a material. */
@@ -166,103 +126,150 @@ INLINE int weigh(const Scene *scene, const Met *met, int64_t at, uint16_t materi
         (reflectivity > scene->least_reflectance ? reflectivity : scene->least_reflectance) * share;
     if (met->fading)
         met->fading[at] = reach * -scene->attenuation;
+    if (met->share)
+        met->share[at] = share;
     return listed;
 }
 
-INLINE int finite(double x)
+/* How far rays go on behind a surface that they have passed, m. */
+INLINE double step_behind(const Scene *scene, uint16_t material)
 {
-    return x > -INFINITE && x < INFINITE;
+    return scene->clear[material] ? scene->beyond_clear : scene->beyond;
+}
+
+/* Writes the first hit of a ray; where light goes on behind it, lists the ray as the next of its k's. Returns 1 where
+ * the hit shines. `through`: no number where the material says it. `ray`: only needed where that lets light pass. */
+INLINE int settle_first(const Scene *scene, const Met *met, const Passed *passed, int64_t *length,
+                        const Shining *shining, int64_t shine, int64_t k, int64_t p, int64_t pulses, const Ray *ray,
+                        int32_t face, double distance, double along, double through)
+{
+    const int64_t at = k * pulses + p;
+    if (face < 0 || !finite(distance)) {
+        met->face[at] = -1;
+        met->distance[at] = INFINITE;
+        met->intensity[at] = met->weight[at] = 0.0;
+        if (met->fading)
+            met->fading[at] = -INFINITE;
+        if (met->share)
+            met->share[at] = scene->shape->share[k];
+        return 0;
+    }
+    met->face[at] = face;
+    const uint16_t material = scene->material[face];
+    double reached = distance < scene->nearest ? INFINITE : distance, share = scene->shape->share[k];
+    if (scene->pervious[material] && distance < scene->farthest) {
+        if (through != through)
+            through = transmitted(scene, ray, material, distance, share);
+        double left = share * through;
+        share *= 1.0 - through;
+        if (scene->open && through == 1.0)
+            reached = INFINITE;
+        if (left > scene->faintest * scene->shape->share[k]) {
+            const int64_t last = k * pulses + length[k]++;
+            passed->ray[last] = at;
+            passed->left[last] = left;
+            passed->start[last] = distance;
+            if (passed->face) {
+                passed->face[last] = face;
+                passed->step[last] = step_behind(scene, material);
+            }
+        }
+    }
+    return weigh(scene, met, at, material, along, reached, share, shining, shine);
+}
+
+/* Makes the rays of some pulses, from the k-th ray of each on, and casts them, a pulse's together.
+ *
+ * `lot`: pulses done together, 16 or a multiple. `rows`: (lot * K * 3) numbers each of origins and directions;
+ * `turned`: (lot * K * 3) directions; `found`: (count, K - from).
+ */
+INLINE void cast_lot(const Scene *scene, void *casts, const Beams *beams, int64_t begin, int64_t count, int64_t from,
+                     int64_t lot, float *rows_of_origins, float *rows, double *turned, int32_t *found)
+{
+    const Shape *shape = scene->shape;
+    const int64_t rays = shape->rays, some = rays - from, pulses = beams->pulses, step = lot * rays;
+    for (int i = 0; i < 3; i++) {
+        const double *origin = beams->origin + i * pulses + begin, *axis = beams->direction + i * pulses + begin;
+        const double *first = beams->in_plane + i * pulses + begin, *second = beams->across + i * pulses + begin;
+        for (int64_t k = from; k < rays; k++) {
+            double *out = turned + i * step + k * lot;
+            const int64_t column = k - from;
+            if (rays > 1 && !shape->parallel) {
+                const double stretch = shape->stretch[k], x = shape->in_plane[k], y = shape->across[k];
+                for (int64_t p = 0; p < count; p++)
+                    out[p] = axis[p] * stretch + first[p] * x + second[p] * y;
+            } else {
+                for (int64_t p = 0; p < count; p++)
+                    out[p] = axis[p];
+            }
+            for (int64_t p = 0; p < count; p++) {
+                rows[3 * (p * some + column) + i] = (float)out[p];
+                rows_of_origins[3 * (p * some + column) + i] = (float)origin[p];
+            }
+            if (rays > 1 && shape->parallel) {
+                const double x = shape->in_plane[k], y = shape->across[k];
+                for (int64_t p = 0; p < count; p++)
+                    rows_of_origins[3 * (p * some + column) + i] = (float)(origin[p] + (first[p] * x + second[p] * y));
+            }
+        }
+    }
+    const CastRays cast = {rows_of_origins, rows, &scene->limit, 0};
+    scene->cast(casts, scene->scene, count * some, &cast, found);
+}
+
+/* Puts the rays that go on, listed by k, one after the other; returns their number. */
+INLINE int64_t close_up(int64_t rays, int64_t pulses, const int64_t *length, const Passed *passed)
+{
+    int64_t on = 0;
+    for (int64_t k = 0; k < rays; k++) {
+        for (int64_t j = 0; j < length[k]; j++, on++) {
+            const int64_t from = k * pulses + j;
+            passed->ray[on] = passed->ray[from];
+            passed->left[on] = passed->left[from];
+            passed->start[on] = passed->start[from];
+            if (passed->face) {
+                passed->face[on] = passed->face[from];
+                passed->step[on] = passed->step[from];
+            }
+        }
+    }
+    return on;
 }
 
 /* Casts all rays of pulses and writes their first hits, (K, P), and the rays that go on, ordered by ray and pulse.
  *
- * `lot`: pulses done together, 16 or a multiple. `rows`: (lot * K * 3) numbers each of origins and directions;
- * `turned`: (lot * K * 3) directions; `found`: (lot * K).
- * Returns the number of rays that go on; counts[0]: of shining hits.
+ * For `lot` and what follows it see `cast_lot`. Returns the number of rays that go on; counts[0]: of shining hits.
  */
 INLINE int64_t any_first(const Scene *scene, void *casts, const Beams *beams, const Met *met,
                          const Passed *passed, const Shining *shining, int64_t *counts, int64_t lot,
                          float *rows_of_origins, float *rows, double *turned, int32_t *found, int64_t *length)
 {
-    const int64_t rays = scene->rays, pulses = beams->pulses;
+    const int64_t rays = scene->shape->rays, pulses = beams->pulses, step = lot * rays;
     int64_t shine = 0;
     for (int64_t k = 0; k < rays; k++)
         length[k] = 0;
     for (int64_t begin = 0; begin < pulses; begin += lot) {
-        const int64_t count = pulses - begin < lot ? pulses - begin : lot, step = lot * rays;
-        for (int i = 0; i < 3; i++) {
-            const double *origin = beams->origin + i * pulses + begin, *axis = beams->direction + i * pulses + begin;
-            const double *first = beams->in_plane + i * pulses + begin, *second = beams->across + i * pulses + begin;
-            for (int64_t k = 0; k < rays; k++) {
-                double *out = turned + i * step + k * lot;
-                if (rays > 1) {
-                    const double stretch = scene->stretch[k], x = scene->in_plane[k], y = scene->across[k];
-                    for (int64_t p = 0; p < count; p++)
-                        out[p] = axis[p] * stretch + first[p] * x + second[p] * y;
-                } else {
-                    for (int64_t p = 0; p < count; p++)
-                        out[p] = axis[p];
-                }
-                for (int64_t p = 0; p < count; p++) {
-                    rows[3 * (p * rays + k) + i] = (float)out[p];
-                    rows_of_origins[3 * (p * rays + k) + i] = (float)origin[p];
-                }
-            }
-        }
-        const CastRays cast = {rows_of_origins, rows, &scene->limit, 0};
-        scene->cast(casts, scene->scene, count * rays, &cast, found);
+        const int64_t count = pulses - begin < lot ? pulses - begin : lot;
+        cast_lot(scene, casts, beams, begin, count, 0, lot, rows_of_origins, rows, turned, found);
         for (int64_t k = 0; k < rays; k++) {
             for (int64_t p = 0; p < count; p++) {
-                const int64_t at = k * pulses + begin + p;
-                int32_t face = found[p * rays + k];
-                double distance = INFINITE, along = 0.0, share = scene->share[k];
+                const int32_t face = found[p * rays + k];
+                double distance = INFINITE, along = 0.0;
                 Ray ray;
                 if (face >= 0) {
                     for (int i = 0; i < 3; i++) {
                         ray.origin[i] = beams->origin[i * pulses + begin + p];
                         ray.direction[i] = turned[i * step + k * lot + p];
                     }
-                    distance = range_to(scene, face, ray.origin, ray.direction, &along);
+                    distance = range_to(scene->planes, scene->faces, face, ray.origin, ray.direction, &along);
                 }
-                if (face < 0 || !finite(distance)) {
-                    met->face[at] = -1;
-                    met->distance[at] = INFINITE;
-                    met->intensity[at] = met->weight[at] = 0.0;
-                    if (met->fading)
-                        met->fading[at] = -INFINITE;
-                    continue;
-                }
-                met->face[at] = face;
-                const uint16_t material = scene->material[face];
-                double reached = distance < scene->nearest ? INFINITE : distance;
-                if (scene->pervious[material] && distance < scene->farthest) {
-                    double through = transmitted(scene, &ray, material, distance, share);
-                    double left = share * through;
-                    share *= 1.0 - through;
-                    if (scene->gaps && through == 1.0)
-                        reached = INFINITE;
-                    if (left > scene->faintest * scene->share[k]) {
-                        const int64_t last = k * pulses + length[k]++;
-                        passed->ray[last] = at;
-                        passed->left[last] = left;
-                        passed->start[last] = distance;
-                    }
-                }
-                shine += weigh(scene, met, at, material, along, reached, share, shining, shine);
+                shine += settle_first(scene, met, passed, length, shining, shine, k, begin + p, pulses, &ray, face,
+                                      distance, along, __builtin_nan(""));
             }
         }
     }
     counts[0] = shine;
-    int64_t on = 0;
-    for (int64_t k = 0; k < rays; k++) { /* each ray's own, one after the other */
-        for (int64_t j = 0; j < length[k]; j++, on++) {
-            const int64_t from = k * pulses + j;
-            passed->ray[on] = passed->ray[from];
-            passed->left[on] = passed->left[from];
-            passed->start[on] = passed->start[from];
-        }
-    }
-    return on;
+    return close_up(rays, pulses, length, passed);
 }
 
 EXPORT_WIDE(int64_t, first,
@@ -271,20 +278,91 @@ EXPORT_WIDE(int64_t, first,
              *found, int64_t *length),
             (scene, casts, beams, met, passed, shining, counts, lot, rows_of_origins, rows, turned, found, length))
 
-/* Casts rays on from the surfaces that they have passed; writes the hits within reach, and those rays that go on again
- * into the same lists. Returns their number; counts: of hits, of shining ones. `rows`: (BUFFER, 3) each. */
-INLINE int64_t any_behind(const Scene *scene, void *casts, const Beams *beams, const Passed *passed,
-                          int64_t count, const Behind *behind, const Shining *shining, int64_t *counts,
-                          float *rows_of_origins, float *rows, int32_t *found)
+/* Writes face, range and n . d of what the rays of pulses meet of what doesn't move, from the k-th of each on. */
+INLINE void any_cast_first(const Scene *scene, void *casts, const Beams *beams, const Met *met, int64_t from,
+                           int64_t lot, float *rows_of_origins, float *rows, double *turned, int32_t *found)
+{
+    const int64_t rays = scene->shape->rays, pulses = beams->pulses, step = lot * rays;
+    for (int64_t begin = 0; begin < pulses; begin += lot) {
+        const int64_t count = pulses - begin < lot ? pulses - begin : lot;
+        cast_lot(scene, casts, beams, begin, count, from, lot, rows_of_origins, rows, turned, found);
+        for (int64_t k = from; k < rays; k++) {
+            for (int64_t p = 0; p < count; p++) {
+                const int64_t at = k * pulses + begin + p;
+                const int32_t face = found[p * (rays - from) + k - from];
+                double distance = INFINITE, along = 0.0;
+                if (face >= 0) {
+                    Ray ray;
+                    if (scene->shape->parallel) {
+                        ray = ray_of(scene->shape, beams, k, begin + p);
+                    } else {
+                        for (int i = 0; i < 3; i++) {
+                            ray.origin[i] = beams->origin[i * pulses + begin + p];
+                            ray.direction[i] = turned[i * step + k * lot + p];
+                        }
+                    }
+                    distance = range_to(scene->planes, scene->faces, face, ray.origin, ray.direction, &along);
+                }
+                const int hit = face >= 0 && finite(distance);
+                met->face[at] = hit ? face : -1;
+                met->distance[at] = hit ? distance : INFINITE;
+                met->along[at] = along;
+            }
+        }
+    }
+}
+
+EXPORT_WIDE(void, cast_first,
+            (const Scene *scene, void *casts, const Beams *beams, const Met *met, int64_t from, int64_t lot, float
+             *rows_of_origins, float *rows, double *turned, int32_t *found),
+            (scene, casts, beams, met, from, lot, rows_of_origins, rows, turned, found))
+
+/* Does with what was met what `synthroads_first` does. `through`: (K, P) as in `Ahead`, or NULL. */
+INLINE int64_t any_weigh_first(const Scene *scene, const Beams *beams, const Met *met, const double *through,
+                               const Passed *passed, const Shining *shining, int64_t *counts, int64_t *length)
+{
+    const int64_t rays = scene->shape->rays, pulses = beams->pulses;
+    int64_t shine = 0;
+    for (int64_t k = 0; k < rays; k++) {
+        length[k] = 0;
+        for (int64_t p = 0; p < pulses; p++) {
+            const int64_t at = k * pulses + p;
+            const int32_t face = met->face[at];
+            Ray ray;
+            if (face >= 0 && scene->pervious[scene->material[face]])
+                ray = ray_of(scene->shape, beams, k, p);
+            shine += settle_first(scene, met, passed, length, shining, shine, k, p, pulses, &ray, face,
+                                  met->distance[at], met->along[at], through ? through[at] : __builtin_nan(""));
+        }
+    }
+    counts[0] = shine;
+    return close_up(rays, pulses, length, passed);
+}
+
+EXPORT_WIDE(int64_t, weigh_first,
+            (const Scene *scene, const Beams *beams, const Met *met, const double *through, const Passed *passed, const
+             Shining *shining, int64_t *counts, int64_t *length),
+            (scene, beams, met, through, passed, shining, counts, length))
+
+/* How far along its ray, m, light goes on that has passed a surface. */
+INLINE double onward(const Scene *scene, const Passed *passed, int64_t j)
+{
+    return passed->start[j] + (passed->step ? passed->step[j] : scene->beyond);
+}
+
+/* Casts rays on from the surfaces that they have passed; writes what they meet of what doesn't move, and how far behind
+ * where they go on. `rows`: (BUFFER, 3) each. */
+INLINE void any_cast_behind(const Scene *scene, void *casts, const Beams *beams, const Passed *passed, int64_t count,
+                            const Ahead *ahead, float *rows_of_origins, float *rows)
 {
     const int64_t pulses = beams->pulses;
-    int64_t on = 0, hits = 0, shine = 0;
     for (int64_t begin = 0; begin < count; begin += BUFFER) {
         const int64_t some = count - begin < BUFFER ? count - begin : BUFFER;
+        int32_t *found = ahead->face + begin;
         for (int64_t j = 0; j < some; j++) {
             const int64_t at = passed->ray[begin + j];
-            const Ray ray = ray_of(scene, beams, at / pulses, at % pulses);
-            const double start = passed->start[begin + j] + scene->beyond;
+            const Ray ray = ray_of(scene->shape, beams, at / pulses, at % pulses);
+            const double start = onward(scene, passed, begin + j);
             for (int i = 0; i < 3; i++) {
                 rows_of_origins[3 * j + i] = (float)(ray.origin[i] + start * ray.direction[i]);
                 rows[3 * j + i] = (float)ray.direction[i];
@@ -293,33 +371,72 @@ INLINE int64_t any_behind(const Scene *scene, void *casts, const Beams *beams, c
         const CastRays cast = {rows_of_origins, rows, &scene->limit, 0};
         scene->cast(casts, scene->scene, some, &cast, found);
         for (int64_t j = 0; j < some; j++) {
+            ahead->distance[begin + j] = INFINITE;
             if (found[j] < 0)
                 continue;
-            const int64_t at = passed->ray[begin + j], k = at / pulses;
-            const Ray ray = ray_of(scene, beams, k, at % pulses);
-            const double start = passed->start[begin + j] + scene->beyond, left = passed->left[begin + j];
-            double place[3], along;
+            const int64_t at = passed->ray[begin + j];
+            const Ray ray = ray_of(scene->shape, beams, at / pulses, at % pulses);
+            const double start = onward(scene, passed, begin + j);
+            double place[3];
             for (int i = 0; i < 3; i++)
                 place[i] = ray.origin[i] + start * ray.direction[i];
-            double distance = range_to(scene, found[j], place, ray.direction, &along);
-            if (!finite(distance))
-                continue;
-            distance = start + distance;
-            const uint16_t material = scene->material[found[j]];
-            const double through = transmitted(scene, &ray, material, distance, scene->share[k]);
-            const double taken = left * (1.0 - through);
-            if (taken > 0.0 && !(distance < scene->nearest || distance > scene->farthest) && distance < INFINITE) {
-                behind->ray[hits] = at;
-                behind->along[hits] = along;
-                behind->met.face[hits] = found[j];
-                shine += weigh(scene, &behind->met, hits, material, along, distance, taken, shining, shine);
-                hits++;
+            const double distance = range_to(scene->planes, scene->faces, found[j], place, ray.direction,
+                                             ahead->along + begin + j);
+            if (finite(distance))
+                ahead->distance[begin + j] = distance;
+            else
+                found[j] = -1;
+        }
+    }
+}
+
+EXPORT_WIDE(void, cast_behind,
+            (const Scene *scene, void *casts, const Beams *beams, const Passed *passed, int64_t count, const Ahead
+             *ahead, float *rows_of_origins, float *rows),
+            (scene, casts, beams, passed, count, ahead, rows_of_origins, rows))
+
+/* Writes the hits behind surfaces that are within reach, and those rays that go on again into the same lists. Returns
+ * their number; counts: of hits, of shining ones. */
+INLINE int64_t any_weigh_behind(const Scene *scene, const Beams *beams, const Passed *passed, int64_t count,
+                                const Ahead *ahead, const Behind *behind, const Shining *shining, int64_t *counts)
+{
+    const int64_t pulses = beams->pulses;
+    int64_t on = 0, hits = 0, shine = 0;
+    for (int64_t j = 0; j < count; j++) {
+        const int32_t face = ahead->face[j];
+        if (face < 0)
+            continue;
+        const int64_t at = passed->ray[j], k = at / pulses;
+        const double distance = onward(scene, passed, j) + ahead->distance[j], left = passed->left[j];
+        const double along = ahead->along[j], share = scene->shape->share[k];
+        const uint16_t material = scene->material[face];
+        double through = ahead->through ? ahead->through[j] : __builtin_nan("");
+        if (through != through) {
+            const Ray ray = ray_of(scene->shape, beams, k, at % pulses);
+            through = transmitted(scene, &ray, material, distance, share);
+        }
+        double step = step_behind(scene, material);
+        if (passed->face && face == passed->face[j]) { /* no ray meets a flat face twice */
+            through = 1.0;
+            step = 4.0 * passed->step[j];
+        }
+        const double taken = left * (1.0 - through);
+        if (taken > 0.0 && !(distance < scene->nearest || distance > scene->farthest) && distance < INFINITE) {
+            behind->ray[hits] = at;
+            behind->met.along[hits] = along;
+            behind->met.face[hits] = face;
+            shine += weigh(scene, &behind->met, hits, material, along, distance, taken, shining, shine);
+            hits++;
+        }
+        if (left * through > scene->faintest * share) { /* behind what has been read */
+            passed->ray[on] = at;
+            passed->left[on] = left * through;
+            passed->start[on] = distance;
+            if (passed->face) {
+                passed->face[on] = face;
+                passed->step[on] = step;
             }
-            if (left * through > scene->faintest * scene->share[k]) { /* behind what has been read */
-                passed->ray[on] = at;
-                passed->left[on] = left * through;
-                passed->start[on++] = distance;
-            }
+            on++;
         }
     }
     counts[0] = hits;
@@ -327,10 +444,10 @@ INLINE int64_t any_behind(const Scene *scene, void *casts, const Beams *beams, c
     return on;
 }
 
-EXPORT_WIDE(int64_t, behind,
-            (const Scene *scene, void *casts, const Beams *beams, const Passed *passed, int64_t count, const Behind
-             *behind, const Shining *shining, int64_t *counts, float *rows_of_origins, float *rows, int32_t *found),
-            (scene, casts, beams, passed, count, behind, shining, counts, rows_of_origins, rows, found))
+EXPORT_WIDE(int64_t, weigh_behind,
+            (const Scene *scene, const Beams *beams, const Passed *passed, int64_t count, const Ahead *ahead, const
+             Behind *behind, const Shining *shining, int64_t *counts),
+            (scene, beams, passed, count, ahead, behind, shining, counts))
 
 /* A sum as NumPy's `add` makes it of numbers side by side: in eight parts, of long rows by halves. */
 static double sum_in_parts(const double *values, int64_t count)
@@ -546,25 +663,27 @@ EXPORT_WIDE(int64_t, group,
              *echoes),
             (rays, pulses, first, count, late, resolution, lot, sums, head, tail, next, lists, echoes))
 
-/* Writes of the hits (count) of echoes: face, n . d, range of the hit and direction (3, count) of its ray. */
+/* Writes of the hits (count) of echoes: face, n . d, range of the hit, begin and direction (3, count) of its ray. */
 EXPORT void synthroads_describe(const Scene *scene, const Beams *beams, const Met *first, const Behind *late,
                                 int64_t count, const int64_t *hit, int64_t *face, double *along, double *distance,
-                                double *direction)
+                                double *begin, double *direction)
 {
-    const int64_t pulses = beams->pulses, size = scene->rays * pulses;
+    const int64_t pulses = beams->pulses, size = scene->shape->rays * pulses;
     for (int64_t i = 0; i < count; i++) {
         const int64_t behind = hit[i] - size, at = behind < 0 ? hit[i] : late->ray[behind];
-        const Ray ray = ray_of(scene, beams, at / pulses, at % pulses);
-        for (int j = 0; j < 3; j++)
+        const Ray ray = ray_of(scene->shape, beams, at / pulses, at % pulses);
+        const Met *met = behind < 0 ? first : &late->met;
+        const int64_t row = behind < 0 ? hit[i] : behind;
+        for (int j = 0; j < 3; j++) {
             direction[j * count + i] = ray.direction[j];
-        if (behind < 0) {
-            face[i] = first->face[at];
-            distance[i] = first->distance[at];
-            range_to(scene, first->face[at], ray.origin, ray.direction, along + i);
-        } else {
-            face[i] = late->met.face[behind];
-            distance[i] = late->met.distance[behind];
-            along[i] = late->along[behind];
+            if (begin)
+                begin[j * count + i] = ray.origin[j];
         }
+        face[i] = met->face[row];
+        distance[i] = met->distance[row];
+        if (met->along)
+            along[i] = met->along[row];
+        else
+            range_to(scene->planes, scene->faces, met->face[row], ray.origin, ray.direction, along + i);
     }
 }

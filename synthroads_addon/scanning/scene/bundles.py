@@ -68,9 +68,9 @@ class Bundles:
         rays = rays[rays < len(self.times)]
         towards = track.along(way, self.times[rays]) - self.origins[:, rays]
         direction = self.directions[:, rays]
-        ahead = np.einsum("in,in->n", towards, direction)
+        ahead = dot(towards, direction)
         towards -= np.clip(ahead, 0.0, self.reach[rays]) * direction
-        return rays[np.einsum("in,in->n", towards, towards) <= radius**2]
+        return rays[dot(towards, towards) <= radius**2]
 
     def _bundles_near(self, track: Track, way: Float, radius: float) -> Index:
         """Return the indices of the bundles whose cone touches a ball with centres ``way`` (3, K) at the knots."""
@@ -83,6 +83,14 @@ class Bundles:
         seen_under = np.arcsin(np.minimum(room / np.maximum(away, 1e-300), 1.0))
         touched = (away <= room) | (off_axis <= self.angle + seen_under)
         return np.flatnonzero(touched & (away <= self.farthest + room))
+
+
+def dot(a: Float, b: Float) -> Float:
+    """Return the products (N,) of vectors (3, N): component by component, in an order that compiled loops have too."""
+    result = a[0] * b[0]
+    for i in (1, 2):
+        result += a[i] * b[i]
+    return np.asarray(result)
 
 
 def _box(values: Float, starts: Index) -> tuple[Float, Float]:

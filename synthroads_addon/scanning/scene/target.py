@@ -1,6 +1,6 @@
 """Target of rays: the static scene and what moves in it, their faces numbered one after the other."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
@@ -26,7 +26,7 @@ _NO_FACE = {"class_id": UNLABELLED, "instance_id": 0, "material": NO_MATERIAL, "
 
 
 @dataclass(frozen=True)
-class _TargetPart:
+class TargetPart:
     """One mesh of the target, static or moving, with its caster, its face planes and its bounds.
 
     Attributes:
@@ -118,10 +118,10 @@ class Target:
     def instances(self, faces: Index, times: Float) -> AnyArray:
         """Return the instance numbers of faces (H,) met at times (H,), s; on later passes a vehicle has another."""
         result = np.array(self.face_values("instance_id", faces), dtype=np.uint32)
-        for part, moving in zip(self._parts[1:], self.moving, strict=True):
+        for number, mine in self._on_moving(faces):
+            moving = self.moving[number]
             if moving.again is None:
                 continue
-            mine = np.flatnonzero((faces >= part.first) & (faces < part.first + part.count))
             passes = moving.motion.passes(times[mine])
             later = passes > 0
             result[mine[later]] = moving.again.first + (passes[later] - 1) * moving.again.step
@@ -247,17 +247,19 @@ class Target:
             vectors: (3, H) each; turned only.
         """
         results = (places.copy(), *(vector.copy() for vector in vectors))
-        for part, moving, track in zip(self._parts[1:], self.moving, motions, strict=True):
-            mine = np.flatnonzero((faces >= part.first) & (faces < part.first + part.count))
-            if not len(mine):
-                continue
-            rotation, place, _ = track.at(times[mine])
-            begin_rotation, begin_place, _ = moving.motion.pose(np.zeros(1))
+        for number, mine in self._on_moving(faces):
+            rotation, place, _ = motions[number].at(times[mine])
+            begin_rotation, begin_place, _ = self.moving[number].motion.pose(np.zeros(1))
             local = _unrotate(rotation, places[:, mine] - place)
             results[0][:, mine] = begin_rotation[0] @ local + begin_place[0][:, None]
             for result, vector in zip(results[1:], vectors, strict=True):
                 result[:, mine] = begin_rotation[0] @ _unrotate(rotation, vector[:, mine])
         return results
+
+    @property
+    def moving_parts(self) -> list[TargetPart]:
+        """Return the moving parts, in the order of ``moving``."""
+        return self._parts[1:]
 
     @property
     def static_planes(self) -> Float:
@@ -273,42 +275,49 @@ class Target:
 
         Those of no face, -1, are any.
         """
-        if not self.moving and self.triangles:
-            return self._parts[0].planes.normals(faces, along)
-        result = np.empty((3, len(faces)))
-        for number, part in enumerate(self._parts):
-            mine = np.flatnonzero((faces >= part.first) & (faces < part.first + part.count))
-            if not len(mine):
-                continue
+        static = self._parts[0]
+        # Of faces that move these are of none; they are replaced.
+        result = static.planes.normals(faces, along) if static.count else np.empty((3, len(faces)))
+        for number, mine in self._on_moving(faces):
+            part = self._parts[number + 1]
             normal = part.planes.normals(faces[mine] - part.first, along[mine])
-            if number:
-                rotation, _, _ = motions[number - 1].at(times[mine])
-                normal = np.einsum("ijn,jn->in", rotation.reshape(3, 3, -1), normal)
-            result[:, mine] = normal
+            rotation, _, _ = motions[number].at(times[mine])
+            result[:, mine] = np.einsum("ijn,jn->in", rotation.reshape(3, 3, -1), normal)
         return result
+
+    def _on_moving(self, faces: Index) -> Iterator[tuple[int, Index]]:
+        """Yield the number of each moving part of which there are faces, and which (M,) of the faces (H,) these are."""
+        if not self.moving:
+            return
+        rows = np.flatnonzero(faces >= self._parts[1].first)
+        some = faces[rows]
+        for number, part in enumerate(self._parts[1:]):
+            mine = rows[(some >= part.first) & (some < part.first + part.count)]
+            if len(mine):
+                yield number, mine
 
 
 def _join_arrays(arrays: list[AnyArray]) -> AnyArray:
     return arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
 
 
-def _part(mesh: SceneMesh, caster: Caster, first: int) -> _TargetPart:
+def _part(mesh: SceneMesh, caster: Caster, first: int) -> TargetPart:
     bounds = mesh.vertex_bounds()
     low, high = np.zeros((2, 3)) if bounds is None else bounds
     centre = (low + high) / 2.0
     half = (high - low) / 2.0
     radius = float(np.linalg.norm(half)) + 1e-3
-    return _TargetPart(caster, FacePlanes(mesh), first, len(mesh.triangles), centre, half, radius)
+    return TargetPart(caster, FacePlanes(mesh), first, len(mesh.triangles), centre, half, radius)
 
 
-def _clear_scanner(track: Track, part: _TargetPart, scanner: Float) -> Track:
+def _clear_scanner(track: Track, part: TargetPart, scanner: Float) -> Track:
     """Return a moving part's track, absent where it meets the scanner's vehicle, whose places are (3, K)."""
     offset = _unrotate(track.rotation, scanner - track.position)
     away = (np.abs(offset.T - part.centre) > part.half + CLEARANCE).any(axis=1)
     return replace(track, present=track.present & away)
 
 
-def _cast(part: _TargetPart, origins: Float, directions: Float, maximum_range: float) -> FirstHits:
+def _cast(part: TargetPart, origins: Float, directions: Float, maximum_range: float) -> FirstHits:
     """Return rays' first hits on one part, in its body frame; faces are numbered among those of all parts."""
     shape = directions.shape[1:]
     found = part.caster.cast(*_as_rays(origins, directions), maximum_range)
@@ -354,7 +363,7 @@ def _as_rows(vectors: Float, shape: tuple[int, ...]) -> Float32:
     return result.reshape(-1, 3)
 
 
-def _cast_moving(part: _TargetPart, track: Track, rays: Bundles, maximum_range: float, nearest: FirstHits) -> None:
+def _cast_moving(part: TargetPart, track: Track, rays: Bundles, maximum_range: float, nearest: FirstHits) -> None:
     """Replace, in place, farther hits in ``nearest`` by those on a moving part; all arrays are flat."""
     near = rays.rays_near(track, part.centre, part.radius)
     if not len(near):
@@ -368,7 +377,7 @@ def _cast_moving(part: _TargetPart, track: Track, rays: Bundles, maximum_range: 
         values[near[closer]] = closer_values[closer]
 
 
-def _clear_blocked(part: _TargetPart, track: Track, rays: Bundles, reach: float, free: Bool) -> None:
+def _clear_blocked(part: TargetPart, track: Track, rays: Bundles, reach: float, free: Bool) -> None:
     """Clear, in place, ``free`` of the rays that a moving part blocks within their reach (m)."""
     near = rays.rays_near(track, part.centre, part.radius)
     near = near[free[near]]
@@ -392,7 +401,13 @@ def _crosses_box(begin: Float, towards: Float, reach: Float, half: Float) -> Boo
 
 def _unrotate(rotation: Float, vectors: Float) -> Float:
     """Return vectors (3, N), each rotated by the inverse of its matrix (9, N)."""
-    return np.asarray(np.einsum("jin,jn->in", rotation.reshape(3, 3, -1), vectors))
+    result = np.empty_like(vectors)
+    product = np.empty(vectors.shape[1])
+    for i in range(3):
+        np.multiply(rotation[i], vectors[0], out=result[i])
+        for j in (1, 2):
+            result[i] += np.multiply(rotation[3 * j + i], vectors[j], out=product)
+    return result
 
 
 def _damage_of(instance: NDArray[np.uint32], damages: Mapping[int, int]) -> UInt8:

@@ -89,17 +89,8 @@ def test_points_are_those_of_single_rays_but_for_ties(name: str) -> None:
         np.testing.assert_array_equal(getattr(again, field), getattr(packed, field))
 
 
-@pytest.mark.parametrize("noise", [{}, {"position_sigma": 0.02, "attitude_sigma_deg": 0.01, "angle_sigma_mrad": 0.1}])
-def test_compiled_loops_make_the_points_that_numpy_makes(noise: dict[str, float]) -> None:
-    plan = plans("leaves")["auto"]
-    plan = replace(plan, noise=plan.noise.model_copy(update=noise))
-    assert plan.summary()["kernels"].endswith("; pulses compiled; noise compiled; poses compiled; points compiled")
-    assert None not in (plan.pose_kernel, plan.noise_kernel, plan.point_loops)
-    numpys = replace(plan)
-    none = dict.fromkeys(("pose_kernel", "noise_kernel", "point_loops"))
-    vars(numpys).update(none, pulse_kernel=NoKernelError("compared with"))
-    assert "; pulses by NumPy: compared with; " in numpys.summary()["kernels"]
-    found, expected = (measured(one) for one in (plan, numpys))
+def assert_same(found: BlockResult, expected: BlockResult) -> None:
+    """Check that two scans have the same points, byte for byte, and counts."""
     assert len(found.points) > 50_000
     for field, values in found.points.attributes().items():
         theirs = expected.points.attributes()[field]
@@ -107,3 +98,40 @@ def test_compiled_loops_make_the_points_that_numpy_makes(noise: dict[str, float]
         assert values.tobytes() == theirs.tobytes(), field
     assert (found.pulses, found.rays) == (expected.pulses, expected.rays)
     assert found.below_threshold == expected.below_threshold
+    np.testing.assert_array_equal(found.footprints, expected.footprints)
+
+
+def by_numpy(plan: ScanPlan) -> ScanPlan:
+    """Return the plan with rays in packets, and all else done by NumPy."""
+    result = replace(plan)
+    none = dict.fromkeys(("pose_kernel", "noise_kernel", "point_loops"))
+    vars(result).update(none, pulse_kernel=NoKernelError("compared with"))
+    assert "; pulses by NumPy: compared with; " in result.summary()["kernels"]
+    return result
+
+
+@pytest.mark.parametrize("noise", [{}, {"position_sigma": 0.02, "attitude_sigma_deg": 0.01, "angle_sigma_mrad": 0.1}])
+def test_compiled_loops_make_the_points_that_numpy_makes(noise: dict[str, float]) -> None:
+    plan = plans("leaves")["auto"]
+    plan = replace(plan, noise=plan.noise.model_copy(update=noise))
+    assert plan.summary()["kernels"].endswith("; pulses compiled; noise compiled; poses compiled; points compiled")
+    assert None not in (plan.pose_kernel, plan.noise_kernel, plan.point_loops)
+    assert_same(measured(plan), measured(by_numpy(plan)))
+
+
+@pytest.mark.parametrize(
+    ("name", "left"),
+    [
+        ("spared", ", by NumPy: which footprints are spared"),
+        ("vehicles, mirrors, rain", ", by NumPy: echoes of the air, what surfaces mirror"),
+        ("cylindrical beam", ""),
+        ("one ray", ""),
+    ],
+)
+def test_whatever_is_scanned_numpy_makes_the_same_points(name: str, left: str) -> None:
+    plan = plans(name)["auto"]
+    assert plan.summary()["kernels"].endswith(f"; pulses compiled{left}; noise compiled; poses compiled; points compiled")
+    assert bool(plan.target.moving) == (name != "spared")
+    found = [measured(replace(plan, threads=threads)) for threads in (1, 2)]
+    for one in found:
+        assert_same(one, measured(by_numpy(plan)))
