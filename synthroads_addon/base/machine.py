@@ -145,12 +145,21 @@ def _limit_linear_algebra() -> Callable[[], None]:
 def _keep_freed_memory() -> Callable[[], None]:
     """Have the C library keep freed memory, where it can; return what has it given back, now and from now on."""
     _set_malloc(_KEEPING)
+    before = _set_huge_pages(False)
 
     def give_back() -> None:
+        _set_huge_pages(before)
         _set_malloc(_USUAL)
         release_memory()
 
     return give_back
+
+
+def _set_huge_pages(wanted: bool) -> bool:
+    """Have NumPy ask the system for huge pages for large arrays, or not, where it can; return whether it did before."""
+    with suppress(ImportError, AttributeError):  # NumPy's own switch, which is also NUMPY_MADVISE_HUGEPAGE
+        return bool(import_module("numpy._core.multiarray")._set_madvise_hugepage(wanted))
+    return wanted
 
 
 def _set_malloc(values: Mapping[int, int]) -> None:
@@ -182,7 +191,9 @@ def freed_memory_kept() -> Iterator[None]:
     """Context in which freed memory is kept for what comes next, for work that takes and frees large arrays in turns.
 
     The system clears each page that it hands out, and page faults are dear. In the end all that is free is given back.
-    Threads may hold it side by side. It does something where the C library is glibc.
+    NumPy asks for no huge pages meanwhile: 2 MB that are handed out at once are cleared at once, however little of them
+    is used, and in a virtual machine they may have to be fetched from its host.
+    Threads may hold it side by side. It does something where the C library is glibc, or NumPy asks for huge pages.
     """
     with _kept_memory.held():
         yield

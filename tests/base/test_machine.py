@@ -6,6 +6,7 @@ import ctypes
 import mmap
 import platform
 import resource
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -65,3 +66,22 @@ def test_what_is_freed_is_used_again_meanwhile_and_given_back_in_the_end() -> No
     assert memory_mb() < before + 10.0
     use_and_free()
     assert memory_mb() < before + 70.0  # no more than the C library keeps by itself
+
+
+def asks_for_huge_pages() -> bool:
+    """Return whether NumPy asks the system for huge pages for large arrays."""
+    return bool(import_module("numpy._core.multiarray")._get_madvise_hugepage())
+
+
+@pytest.mark.parametrize("usual", [True, False])
+def test_no_huge_pages_are_asked_for_meanwhile(usual: bool) -> None:
+    set_huge_pages = import_module("numpy._core.multiarray")._set_madvise_hugepage
+    before = set_huge_pages(usual)
+    try:
+        with freed_memory_kept():
+            with freed_memory_kept():
+                assert not asks_for_huge_pages()
+            assert not asks_for_huge_pages()
+        assert asks_for_huge_pages() == usual
+    finally:
+        set_huge_pages(before)
