@@ -6,7 +6,7 @@ import os
 import platform
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from importlib import import_module
 from pathlib import Path
 from threading import Lock
@@ -136,8 +136,7 @@ def _nothing() -> None:
 
 
 def _limit_linear_algebra() -> Callable[[], None]:
-    """Have linear algebra take one thread; return what gives it those back that it had."""
-    import_module("scipy.linalg")  # has a library of its own, which can be limited only when it is loaded
+    """Have the linear algebra that is loaded take one thread; return what gives it those back that it had."""
     limit = threadpool_limits(1, user_api="blas")
     return cast(Callable[[], None], limit.restore_original_limits)
 
@@ -170,19 +169,30 @@ def _set_malloc(values: Mapping[int, int]) -> None:
             mallopt(parameter, value)
 
 
-_one_thread, _kept_memory = _Shared(_limit_linear_algebra), _Shared(_keep_freed_memory)
+def _limit_with_scipy() -> Callable[[], None]:
+    """Do the same once SciPy's linear algebra is loaded: it has a library of its own, which can't be limited before."""
+    import_module("scipy.linalg")
+    return _limit_linear_algebra()
+
+
+_one_thread, _scipy_too = _Shared(_limit_linear_algebra), _Shared(_limit_with_scipy)
+_kept_memory = _Shared(_keep_freed_memory)
 
 
 @contextmanager
-def linear_algebra_on_one_thread() -> Iterator[None]:
-    """Context, also a decorator, in which linear algebra of NumPy and SciPy begins no threads of its own.
+def linear_algebra_on_one_thread(scipy: bool = False) -> Iterator[None]:
+    """Context, also a decorator, in which linear algebra of NumPy, and of SciPy if asked, begins no threads of its own.
 
     For work whose result is written: sums over several threads have other last bits on machines with other cores. And
     for work that is shared out to threads: after each product OpenBLAS's threads keep a core busy for a while, waiting
     for the next. Threads may hold it side by side. Other linear algebra in the process, but for PyTorch's, is limited
     meanwhile as well.
+
+    Args:
+        scipy: the work uses SciPy, which is loaded beforehand: a third of a second of processor time, and 15 MB, which
+            other work needn't spend. What is loaded of it already is limited in any case.
     """
-    with _one_thread.held():
+    with _one_thread.held(), _scipy_too.held() if scipy else nullcontext():
         yield
 
 

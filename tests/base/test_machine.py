@@ -6,6 +6,8 @@ import ctypes
 import mmap
 import platform
 import resource
+import subprocess
+import sys
 from importlib import import_module
 
 import numpy as np
@@ -85,3 +87,22 @@ def test_no_huge_pages_are_asked_for_meanwhile(usual: bool) -> None:
         assert asks_for_huge_pages() == usual
     finally:
         set_huge_pages(before)
+
+
+IN_CONTEXT = """
+import sys
+from threadpoolctl import threadpool_info
+from synthroads_addon.base.machine import linear_algebra_on_one_thread
+
+with linear_algebra_on_one_thread({}):
+    threads = {{library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}}
+    print(sorted(threads), "scipy.linalg" in sys.modules)
+"""
+
+
+@pytest.mark.parametrize("scipy", [False, True])
+def test_scipy_is_loaded_only_for_work_that_uses_it(scipy: bool) -> None:
+    """A scan uses none, and its process needn't spend the time and the memory."""
+    words = [sys.executable, "-c", IN_CONTEXT.format(f"scipy={scipy}")]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["[1]", str(scipy)]
