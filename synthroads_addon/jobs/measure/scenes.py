@@ -2,7 +2,7 @@
 
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
 from pathlib import Path
@@ -37,8 +37,10 @@ from ..scan_scene import SceneScan, open_and_read, scene_site
 
 _BLOCKS, _BARE_BLOCKS = 48, 12
 """Blocks that are scanned, spread over the path, and those of which the rays are cast by Embree alone."""
-_TURNS = 4
+_TURNS = 3
 """Times that a scan and Embree alone are measured in turn; the best of each counts, as other work only slows."""
+_SIZES = (2, 6)
+"""Blocks of scans that are compared for what a scan takes besides its pulses."""
 _NOT_PACKED = Packing(least_cosine=2.0)
 
 Rays = tuple[Float32, Float32]
@@ -161,17 +163,11 @@ def _scan(site: Site, plan: ScanPlan) -> tuple[dict[str, Any], float, float]:
 
 def _fixed_seconds(site: Site, plan: ScanPlan) -> float:
     """Return the processor time, s, that a scan takes besides its pulses: of two sizes, extrapolated to no pulse."""
-    every = tuple(plan.blocks())
-    half = every[: len(every) // 2]
-    if not half:
-        return _least(lambda: _scan(site, plan)[1])
+    every, (few, many) = tuple(plan.blocks()), _SIZES
 
-    def seconds(blocks: tuple[Block, ...]) -> float:
-        return _scan(site, replace(plan, chosen_blocks=blocks))[1]
+    def seconds(count: int) -> float:
+        blocks = tuple(every[number % len(every)] for number in range(count))
+        return min(_scan(site, replace(plan, chosen_blocks=blocks))[1] for _ in range(2 * _TURNS))
 
-    return 2.0 * _least(lambda: seconds(half)) - _least(lambda: seconds(half + half))
-
-
-def _least(seconds: Callable[[], float]) -> float:
-    """Return the least of several measurements."""
-    return min(seconds() for _ in range(_TURNS))
+    of_few = seconds(few)
+    return of_few - few * (seconds(many) - of_few) / (many - few)
