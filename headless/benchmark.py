@@ -9,13 +9,14 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from contextlib import ExitStack
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.benchmark_table import DEMO, QUICK, TABLE, add_scaling, beside_lines, judge_lines, markdown
+from headless.benchmark_table import DEMO, QUICK, TABLE, add_scaling, beside_lines, join_runs, judge_lines, markdown
 from headless.commands import Outcome, add_changes_argument, entry
 from headless.marked_documents import put_tables
 from headless.messages import progress_bar
@@ -24,7 +25,7 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import output_folder
 from synthroads_addon.base.machine import available_cores, cores_of_children, machine
 from synthroads_addon.base.progress import Progress
-from synthroads_addon.base.schema import canonical_json
+from synthroads_addon.base.schema import canonical_json, read_json
 from synthroads_addon.scenario.scenario import Scenario, load_scenario
 
 PARTS = ("demo", "waves", "road", "start")
@@ -64,6 +65,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_changes_argument(parser)
     parser.add_argument("--quick", action="store_true", help="a small scene: to see that all works, in seconds")
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
+    text = "keep what the folder holds already of other parts and numbers of cores, measured on this machine"
+    parser.add_argument("--resume", action="store_true", help=text)
     parser.add_argument(_PART, metavar="JSON", help=argparse.SUPPRESS)
 
 
@@ -74,15 +77,19 @@ def run(arguments: argparse.Namespace) -> Outcome:
         return 0, result, canonical_json(result)
     _check(arguments)
     found: dict[str, Any] = {}
+    kept = _read_kept(arguments)
 
     def measure() -> dict[str, str]:
         found.update(_measure_all(arguments))
+        if kept:
+            found["runs"] = join_runs(kept["runs"], found["runs"])
+        add_scaling(found["runs"])
         return {TABLE: markdown(found)}
 
     with ExitStack() as opened:
         folder = None
         if arguments.output:
-            folder = opened.enter_context(output_folder(arguments.output, _FILES, arguments.overwrite))
+            folder = opened.enter_context(output_folder(arguments.output, _FILES, arguments.overwrite or arguments.resume))
         table = put_tables(arguments.document, [TABLE], measure)[TABLE]
         if folder:
             (folder / _FILES[0]).write_text(canonical_json(found), encoding="utf-8")
@@ -125,7 +132,6 @@ def _runs(arguments: argparse.Namespace, about: dict[str, Any], folder: Path) ->
         for step, part in enumerate(own):
             progress(f"{part}, {cores}", (number + step / len(arguments.parts)) / len(arguments.cores))
             found = _measure_in_process({**about, "part": part, "scene": str(folder / f"{part}.obj")}, cores)
-            run["blender"] = found["blender"]
             run["floors"] += found["floors"]
             for name in ("lines", "stages", "scans"):
                 run[name] |= found.get(name, {})
@@ -133,13 +139,34 @@ def _runs(arguments: argparse.Namespace, about: dict[str, Any], folder: Path) ->
             run["beside"] = _measure_beside(arguments, folder, cores, progress)
             run["lines"] |= beside_lines(run["beside"])
         runs.append(run)
-    add_scaling(runs)
-    versions = {"Blender": runs[0]["blender"]} if own else {}
-    return {
-        "machine": machine(versions | {"Python": platform.python_version()}),
-        "quick": arguments.quick,
-        "runs": runs,
-    }
+    return {"machine": _machine(), "quick": arguments.quick, "runs": runs}
+
+
+def _machine() -> str:
+    """Return the machine in words, with the versions of Blender and Python."""
+    return machine({"Blender": version("bpy"), "Python": platform.python_version()})
+
+
+def _read_kept(arguments: argparse.Namespace) -> dict[str, Any] | None:
+    """Return the result in the output's folder that this one is to be joined with; None without one.
+
+    Raises:
+        InputError: it is of another machine, or of a small scene and this one isn't, or the other way round.
+    """
+    if not arguments.resume:
+        return None
+    if not arguments.output:
+        raise InputError("--resume", None, "needs --output, the folder whose result is kept")
+    path = arguments.output / _FILES[0]
+    if arguments.overwrite:
+        raise InputError("--resume", None, "can't be given with --overwrite, which keeps nothing")
+    if not path.is_file():
+        return None
+    kept: dict[str, Any] = read_json(path)
+    for name, now in (("machine", _machine()), ("quick", arguments.quick)):
+        if kept.get(name) != now:
+            raise InputError(f"{path}: {name}", kept.get(name), f"must be {now!r}, as now; --overwrite replaces it")
+    return kept
 
 
 def _measure_in_process(part: dict[str, Any], cores: int) -> dict[str, Any]:
@@ -215,7 +242,7 @@ def _measure_part(part: dict[str, Any]) -> dict[str, Any]:
         result = {}
     else:
         result = _measure_mesh(name, Path(part["scene"]), quick)
-    return result | {"blender": sys.modules["bpy"].app.version_string}
+    return result
 
 
 def _measure_mesh(name: str, scene: Path, quick: bool) -> dict[str, Any]:

@@ -97,13 +97,30 @@ def _pulse_rate(measured: dict[str, Any]) -> float:
     return float(measured["pulses"]) / measured["scan"] / 1e6
 
 
+def join_runs(kept: list[dict[str, Any]], measured: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return runs by cores in which what was measured now takes the place of what was kept under the same names."""
+    joined = {run["cores"]: run for run in kept}
+    for run in measured:
+        before = joined.get(run["cores"], {})
+        both = {name: before.get(name, {}) | run[name] for name in ("lines", "stages", "scans")}
+        rows = {name: _join_rows(before.get(name, []), run[name]) for name in ("floors", "beside")}
+        joined[run["cores"]] = {"cores": run["cores"]} | both | rows
+    return [joined[cores] for cores in sorted(joined)]
+
+
+def _join_rows(kept: list[dict[str, Any]], measured: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    return list(({row["name"]: row for row in kept} | {row["name"]: row for row in measured}).values())
+
+
 def add_scaling(runs: list[dict[str, Any]]) -> None:
     """Add to the run on `CORES` cores how much faster its slowest-growing scan of a mesh is than on one, in place."""
     by_cores = {run["cores"]: run for run in runs}
-    if {1, CORES} <= by_cores.keys() and by_cores[1]["scans"]:
+    if {1, CORES} <= by_cores.keys():
         one, several = by_cores[1]["scans"], by_cores[CORES]["scans"]
-        gains = [several[name]["pulses_per_second"] / one[name]["pulses_per_second"] for name in one]
-        by_cores[CORES]["lines"]["scaling"] = min(gains)
+        both = one.keys() & several.keys()
+        gains = [several[name]["pulses_per_second"] / one[name]["pulses_per_second"] for name in both]
+        if gains:
+            by_cores[CORES]["lines"]["scaling"] = min(gains)
 
 
 def markdown(result: dict[str, Any]) -> str:
@@ -140,9 +157,10 @@ def _limits(result: dict[str, Any]) -> list[str]:
 def _stages(result: dict[str, Any]) -> list[str]:
     runs = result["runs"]
     rows = []
-    for name in runs[0]["stages"]:
-        seconds = [_number(run["stages"][name]["seconds"], 2) for run in runs]
-        rows.append([name, *seconds, _number(runs[-1]["stages"][name]["peak_memory_mb"], 0)])
+    for name in max((run["stages"] for run in runs), key=len):
+        several = [run["stages"].get(name, {}) for run in runs]
+        memory = next((stage["peak_memory_mb"] for stage in reversed(several) if stage), None)
+        rows.append([name, *(_number(stage.get("seconds"), 2) for stage in several), _number(memory, 0)])
     titles = ["stage of the demo job (s)", *(str(run["cores"]) for run in runs), "peak memory (MB)"]
     return markdown_table(titles, rows) if rows else []
 
@@ -160,8 +178,10 @@ def _floors(result: dict[str, Any]) -> list[str]:
 
 def _cores(result: dict[str, Any]) -> list[str]:
     """Return the table of scans of meshes by the cores that they may use."""
-    runs, rows = result["runs"], []
-    for name, first in runs[0]["scans"].items():
+    rows = []
+    for name in max((run["scans"] for run in result["runs"]), key=len):
+        runs = [run for run in result["runs"] if name in run["scans"]]
+        first = runs[0]["scans"][name]
         for run in runs:
             scan = run["scans"][name]
             gain = scan["pulses_per_second"] / first["pulses_per_second"]

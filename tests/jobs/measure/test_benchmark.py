@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from headless.benchmark_table import LIMITS, TABLE, add_scaling, beside_lines, judge_lines, markdown
+from headless.benchmark_table import LIMITS, TABLE, add_scaling, beside_lines, join_runs, judge_lines, markdown
 from headless.cli import main
 from headless.marked_documents import BEGIN, END
 
@@ -79,6 +79,21 @@ def test_another_version_is_held_against_rates_and_memory() -> None:
     assert "| first scan of a new process | 2 | processor seconds | 3.00 | 4.00 | 500 | 400 |" in table
 
 
+def test_parts_that_were_measured_apart_are_joined() -> None:
+    kept, now = a_result(False, model=2.0, casting=50.0)["runs"], a_result(False, casting=70.0)["runs"][1:]
+    now[0]["stages"] = {}
+    now[0]["scans"] = {"road_1": now[0]["scans"]["waves_1"]}
+    now[0]["floors"] = [{"name": name, "unit": "", "ours": 1.0, "floor": 4.0} for name in ("writing", "scan")]
+    one, two = join_runs(kept, now)
+    assert one == kept[0]
+    assert two["lines"] == {"model": 2.0, "casting": 70.0}
+    assert two["stages"] == kept[1]["stages"]
+    assert two["scans"].keys() == {"waves_1", "road_1"}
+    assert [(row["name"], row["floor"]) for row in two["floors"]] == [("writing", 4.0), ("scan", 4.0)]
+    assert "| road, 1 ray per pulse | 2 |" in markdown(a_result(False) | {"runs": [one, two]})
+    assert join_runs([], now) == join_runs(now, now)
+
+
 @pytest.mark.slow
 def test_a_quick_run_measures_every_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     page = tmp_path / "page.md"
@@ -122,6 +137,8 @@ def test_bad_input_is_refused_before_anything_is_measured(
     assert "--beside is 'nowhere': must be a folder that holds the package synthroads_addon" in capfd.readouterr().err
     assert main(["benchmark", "--cores", "1", "--parts", "start"]) == 2
     assert "start is measured beside another version: --beside names it" in capfd.readouterr().err
+    assert main(["benchmark", "--cores", "1", "--resume"]) == 2
+    assert "--resume: needs --output" in capfd.readouterr().err
     assert main(["benchmark", "--document", "/nowhere/x.md", "--cores", "1"]) == 2
     assert "--document is '/nowhere/x.md': cannot be read" in capfd.readouterr().err
 
@@ -134,3 +151,15 @@ def test_an_occupied_folder_is_refused_before_anything_is_measured(
     assert main(["benchmark", "--cores", "1", "--output", str(tmp_path)]) == 2
     assert "already holds benchmark.md" in capfd.readouterr().err
     assert (tmp_path / "benchmark.md").read_text() == "mine"
+
+
+def test_a_result_of_another_machine_is_not_joined(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("headless.benchmark._measure_all", lambda _: pytest.fail("measured"))
+    (tmp_path / "benchmark.json").write_text(json.dumps(a_result(False)))
+    words = ["benchmark", "--cores", "1", "--output", str(tmp_path), "--resume"]
+    assert main(words) == 2
+    assert "machine is 'A processor, 2 cores': must be '" in capfd.readouterr().err
+    assert main([*words, "--overwrite"]) == 2
+    assert "--resume: can't be given with --overwrite" in capfd.readouterr().err
