@@ -29,7 +29,7 @@ from synthroads_addon.base.schema import canonical_json, read_json
 from synthroads_addon.scenario.scenario import Scenario, load_scenario
 
 PARTS = ("demo", "waves", "road", "start")
-"""What is measured: the demo job; scans of waves and of a road as meshes; and, beside another version, a first scan."""
+"""Parts that are measured: the demo job, scans of waves and a road as meshes, and another version's first scan too."""
 _FILES = ["benchmark.json", "benchmark.md"]
 _PART = "--part"
 _BESIDE = "--beside"
@@ -89,7 +89,9 @@ def run(arguments: argparse.Namespace) -> Outcome:
     with ExitStack() as opened:
         folder = None
         if arguments.output:
-            folder = opened.enter_context(output_folder(arguments.output, _FILES, arguments.overwrite or arguments.resume))
+            folder = opened.enter_context(
+                output_folder(arguments.output, _FILES, arguments.overwrite or arguments.resume)
+            )
         table = put_tables(arguments.document, [TABLE], measure)[TABLE]
         if folder:
             (folder / _FILES[0]).write_text(canonical_json(found), encoding="utf-8")
@@ -231,13 +233,13 @@ def _measure_part(part: dict[str, Any]) -> dict[str, Any]:
     """Measure one part in this process, and return its figures; ``road file`` writes the road as a mesh."""
     name, quick = part["part"], part["quick"]
     if name == "demo":
-        from synthroads_addon.jobs.measure.benchmark import measure_demo
+        from synthroads_addon.jobs.measure.benchmark import measure_demo  # likewise
 
         result = measure_demo(_scenario(part["scenario"], part["changes"], quick))
     elif name == "road file":
-        from synthroads_addon.jobs.measure.scenes import road_mesh
+        from synthroads_addon.jobs.measure.scenes import road_mesh  # likewise
 
-        mesh = road_mesh(load_scenario("rq31-600m", _QUICK_ROAD if quick else [_ROAD_LENGTH]))
+        mesh = road_mesh(load_scenario("rq31-600m", [_ROAD_LENGTH, *(_QUICK_ROAD if quick else ())]))
         write_obj(Path(part["scene"]), mesh.vertices, mesh.triangles)
         result = {}
     else:
@@ -248,15 +250,18 @@ def _measure_part(part: dict[str, Any]) -> dict[str, Any]:
 def _measure_mesh(name: str, scene: Path, quick: bool) -> dict[str, Any]:
     """Scan a mesh; return its lines and rates, see `headless.benchmark_table.LIMITS`."""
     from synthroads_addon.base.changes import apply_change
-    from synthroads_addon.jobs.measure.scenes import measure_scene
-    from synthroads_addon.jobs.scan_scene import SceneScan
+    from synthroads_addon.base.progress import StageTimer, peak_memory_mb
+    from synthroads_addon.jobs.measure.scenes import measure_scene  # in this process alone: it starts Blender
+    from synthroads_addon.jobs.scan_scene import SceneScan, open_and_read, scene_site
 
     data: Any = Scenario().to_dict()
     changes = _ROAD if name == "road" else (*_WAVES, _FAST if quick else _SLOW)
     for change in changes:
         data = apply_change(data, change, Scenario)
     job = SceneScan(Scenario.from_dict(data), Path("out"), scene, up="z")
-    found = measure_scene(job, name, _RAYS[name])
+    before, timer = peak_memory_mb() or 0.0, StageTimer()
+    opened, road, _ = open_and_read(job, None, timer, {})
+    found = measure_scene(scene_site(job, opened.static, road), opened, scene, name, _RAYS[name], timer)
     packed = {rays: rate.get("packets", rate["single rays"]) for rays, rate in found["rates"].items()}
     lines = {f"{name}_{rays}": 100.0 * rate["ours"] / packed[rays] for rays, rate in found["rates"].items()}
     scans = {
@@ -268,7 +273,7 @@ def _measure_mesh(name: str, scene: Path, quick: bool) -> dict[str, Any]:
         for rays, rate in found["rates"].items()
     }
     if name == "waves":
-        memory = 1e6 * found["memory_mb"] / found["triangles"]
+        memory = 1e6 * (found["memory_mb"] - before) / len(opened.static)
         lines |= {"waves_memory": memory, "waves_opening": found["opening"], "waves_fixed": found["fixed"]}
     return {"lines": lines, "floors": found["floors"], "scans": scans}
 

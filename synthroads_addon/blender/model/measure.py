@@ -26,11 +26,11 @@ def seconds_of(work: Callable[[], object]) -> float:
     return time.perf_counter() - begin
 
 
-def panel_edit(model: RoadModel, parameters: RoadParameters) -> tuple[float, float]:
+def panel_edit(model: RoadModel, parameters: RoadParameters) -> tuple[float, int]:
     """Measure changing a lane's width up to the updated view; hides the vegetation.
 
     Returns:
-        median seconds of such changes, and of changes of a grid of Blender's own that has as many faces as the road.
+        median seconds of several such changes, there and back; triangles of the road, which each of them makes anew.
     """
     for name in parameters.of_type(Vegetation):
         if name in model.objects:
@@ -39,44 +39,14 @@ def panel_edit(model: RoadModel, parameters: RoadParameters) -> tuple[float, flo
     road = model.objects["Road"]
     modifier = road.modifiers[0]
     side = "Left" if parameters.carriageway("left") else "Right"
-    name = f"{side} Lane 1 Width"
-
-    def change(by: float) -> None:
-        set_modifier_input(modifier, name, modifier_input(modifier, name) + by)
+    name, runs = f"{side} Lane 1 Width", []
+    for change in (0.05, -0.05) * _EDITS:
+        set_modifier_input(modifier, name, modifier_input(modifier, name) + change)
         road.update_tag()
-
-    ours = _median_update(change)
-    faces = len(road.evaluated_get(bpy.context.evaluated_depsgraph_get()).data.polygons)
-    return ours, _median_update(_grid_of_nodes(faces))
-
-
-def _median_update(change: Callable[[float], None]) -> float:
-    """Return the median seconds that the view's update takes after a change by some centimetres, there and back."""
-    runs = []
-    for by in (0.05, -0.05) * _EDITS:
-        change(by)
         runs.append(seconds_of(bpy.context.view_layer.update))
-    return sorted(runs)[len(runs) // 2]
-
-
-def _grid_of_nodes(faces: int) -> Callable[[float], None]:
-    """Add an object with a node group that makes a grid of so many faces; return what changes its width by some m."""
-    group = bpy.data.node_groups.new("Bare Grid", "GeometryNodeTree")
-    group.interface.new_socket("Mesh", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    grid, end = group.nodes.new("GeometryNodeMeshGrid"), group.nodes.new("NodeGroupOutput")
-    side = max(2, round(faces**0.5) + 1)
-    grid.inputs["Vertices X"].default_value = grid.inputs["Vertices Y"].default_value = side
-    group.links.new(grid.outputs["Mesh"], end.inputs[0])
-    item = bpy.data.objects.new("Bare Grid", bpy.data.meshes.new("Bare Grid"))
-    bpy.context.scene.collection.objects.link(item)
-    item.modifiers.new("Nodes", "NODES").node_group = group
-    bpy.context.view_layer.update()
-
-    def change(by: float) -> None:
-        grid.inputs["Size X"].default_value += by
-        item.update_tag()
-
-    return change
+    mesh = road.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    mesh.calc_loop_triangles()
+    return sorted(runs)[len(runs) // 2], len(mesh.loop_triangles)
 
 
 def bare_mesh_seconds(triangles: int) -> float:

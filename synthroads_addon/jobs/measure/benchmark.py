@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import laspy
-import numpy as np
 
 from ...base.machine import available_cores
 from ...base.progress import StageTimer, peak_memory_mb
@@ -82,7 +81,7 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         assert plan.request is not None
         if scenario.colour.source != "material":
             floors.append(measure_rendering(plan.request, _VIEWS))
-    edit, bare_edit = panel_edit(model, road.parameters)
+    edit, edited = panel_edit(model, road.parameters)
     building = sum(timer.stages[name]["seconds"] or 0.0 for name in ("parameters", "model", "scene mesh"))
     least = files.counts.points / whole["floor"] / 1e6
     lines = {
@@ -90,7 +89,7 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         "memory_mb": memory,
         "job": seconds / least,
         "model": building / bare_mesh_seconds(plan.target.triangles),
-        "panel_edit": edit / bare_edit,
+        "panel_edit": edit / bare_mesh_seconds(edited),
         "casting": 100.0 * own["ours"] / own["floor"],
         "writing": 100.0 * writing["ours"] / writing["floor"],
     }

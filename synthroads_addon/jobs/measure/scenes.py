@@ -29,11 +29,11 @@ from ...scanning.plan import ScanPlan
 from ...scanning.scan import BlockScan
 from ...scanning.scene.caster import Caster
 from ...scanning.scene.mesh import SceneMesh
+from ...scanning.scene.motion import ScannedScene
 from ...scenario.scenario import Scenario
 from ..open_scene import RoadScene
 from ..scan.files import record_to_files
 from ..scan.plan import Site
-from ..scan_scene import SceneScan, open_and_read, scene_site
 
 _BLOCKS, _BARE_BLOCKS = 48, 12
 """Blocks that are scanned, spread over the path, and those of which the rays are cast by Embree alone."""
@@ -77,30 +77,32 @@ def rays_of_blocks(plan: ScanPlan, blocks: Sequence[Block]) -> Rays:
     return origins, directions
 
 
-def measure_scene(job: SceneScan, title: str, rays_per_pulse: Sequence[int]) -> dict[str, Any]:
-    """Open a scene's file and scan it with each number of rays per pulse, in turn with Embree alone on the same rays.
+def measure_scene(
+    site: Site, scene: ScannedScene, file: Path, title: str, rays_per_pulse: Sequence[int], timer: StageTimer
+) -> dict[str, Any]:
+    """Scan an opened scene with each number of rays per pulse, in turn with Embree alone on the same rays.
 
     Rates of scans are those of a second of all threads' processor time, from the first pulse to the file's end.
 
     Args:
-        job: the scan; its file is an .obj with z up. What it writes is lost.
+        site: of its scan; what is written is lost.
+        scene: as it was read.
+        file: that it was opened from, an .obj with z up; it is imported again, and the open file is lost.
         title: of the scene, for names of rates.
         rays_per_pulse: numbers of rays, of `RINGS`.
+        timer: of the stages so far, in which it was opened and read.
 
     Returns:
         ``rates`` by rays per pulse: million rays per processor second of the scan (``ours``), of Embree in packets and
         of its single rays, million pulses per second by the clock (``pulses_per_second``), and the share of the cores'
-        time that it used (``busy``); ``floors``: name, unit, ours and floor; ``triangles``; ``memory_mb`` that opening it took; ``opening`` up to the first pulse, in times of what
-        Blender's importer alone takes; ``fixed`` seconds of processor time that a scan takes besides its pulses.
+        time that it used (``busy``); ``floors``: name, unit, ours and floor; ``memory_mb``: the process's peak once the
+        caster is built; ``opening`` up to the first pulse, in times of what Blender's importer alone takes; ``fixed``
+        seconds of processor time that a scan takes besides its pulses.
     """
-    assert job.scene is not None
-    before, timer = peak_memory_mb() or 0.0, StageTimer()
-    read, road, _ = open_and_read(job, None, timer, {})
-    site = scene_site(job, read.static, road)
     with timer.stage("caster"):
-        plan = replace(site.plan(read, BlenderServices()), threads=available_cores())
-    memory = (peak_memory_mb() or 0.0) - before
-    bare = _bare_casters(plan, read.static)
+        plan = replace(site.plan(scene, BlenderServices()), threads=available_cores())
+    memory = peak_memory_mb() or 0.0
+    bare = _bare_casters(plan, scene.static)
     rates = {rays: _rates_in_turn(site, replace(plan, rings=RINGS[rays]), bare) for rays in rays_per_pulse}
     fixed = _fixed_seconds(site, replace(plan, rings=RINGS[1]))
     floors = [
@@ -113,11 +115,10 @@ def measure_scene(job: SceneScan, title: str, rays_per_pulse: Sequence[int]) -> 
         for rays, rate in rates.items()
         for kind in bare
     ]
-    importing = min(bare_import_seconds(job.scene) for _ in range(2))
+    importing = min(bare_import_seconds(file) for _ in range(2))
     return {
         "rates": rates,
         "floors": floors,
-        "triangles": len(read.static),
         "memory_mb": memory,
         "opening": timer.seconds / importing,
         "fixed": fixed,
