@@ -1,37 +1,52 @@
-"""Measure each stage of the demo job beside its floor, and hold the job against what it must reach."""
+"""Measure each stage of the demo job, and scans of meshes, beside what others' code alone takes, in the same run."""
 
 import argparse
 import json
+import os
 import platform
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from contextlib import ExitStack
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from headless.benchmark_table import DEMO, QUICK, TABLE, judge_lines, markdown
+from headless.benchmark_table import DEMO, QUICK, TABLE, add_scaling, beside_lines, join_runs, judge_lines, markdown
 from headless.commands import Outcome, add_changes_argument, entry
 from headless.marked_documents import put_tables
 from headless.messages import progress_bar
-from headless.waves import CELLS, write_waves
+from headless.waves import CELLS, write_obj, write_waves
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.files import output_folder
 from synthroads_addon.base.machine import available_cores, cores_of_children, machine
-from synthroads_addon.base.schema import canonical_json
+from synthroads_addon.base.progress import Progress
+from synthroads_addon.base.schema import canonical_json, read_json
 from synthroads_addon.scenario.scenario import Scenario, load_scenario
 
+PARTS = ("demo", "waves", "road", "start")
+"""Parts that are measured: the demo job, scans of waves and a road as meshes, and another version's first scan too."""
 _FILES = ["benchmark.json", "benchmark.md"]
 _PART = "--part"
-_WAVES = (
-    "scan.device=generic-polygon", "scan.platform.height=80", "scan.platform.speed=10", "scan.relief=0",
-    "colour.source=material", 'cloud.formats=["las"]', 'outputs=["cloud"]',
+_BESIDE = "--beside"
+_MESH = ("scan.relief=0", "colour.source=material", 'cloud.formats=["las"]', 'outputs=["cloud"]')
+_WAVES = (*_MESH, "scan.device=generic-polygon", "scan.platform.height=80")
+_ROAD = (
+    *_MESH, "scan.device=riegl-minivux-3uav", "scan.pulse_rate_khz=200", "scan.field_of_view_deg=180",
+    "scan.lines_per_second=100", "scan.platform.height=60", "scan.platform.speed=8",
 )  # fmt: skip
+_ROAD_LENGTH = "road.length=100"
+_QUICK_ROAD = ("road.length=20", "road.half_width=20", "fidelity=draft")
 _QUICK_CELLS = 60
-_QUICK_WAVES = ("scan.platform.speed=100",)
+_SLOW, _MIDDLE, _FAST = (f"scan.platform.speed={speed}" for speed in (2, 10, 100))
+"""Of the waves 5 million pulses, 1 million, and a tenth of that."""
+_RAYS = {"waves": (1, 19), "road": (1, 7, 19)}
+_PAIRS = 3
+"""Times that both versions scan in turn."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,11 +56,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--document", type=Path, metavar="FILE", help="fill the tables of this Markdown file as well")
     text = "numbers of cores (1, and 2 where there are so many)"
     parser.add_argument("--cores", nargs="+", type=int, default=cores, metavar="N", help=text)
+    text = f"any of {', '.join(PARTS)} (all; start, the first scan of a new process, needs {_BESIDE})"
+    parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS), metavar="PART", help=text)
+    text = "folder of another version, a checkout or where it is installed, whose scans are measured in turn with these"
+    parser.add_argument(_BESIDE, type=Path, metavar="FOLDER", help=text)
     text = "scene to measure on (%(default)s)"
     parser.add_argument("--scenario", default="rq31-600m", metavar="NAME_OR_FILE", help=text)
     add_changes_argument(parser)
     parser.add_argument("--quick", action="store_true", help="a small scene: to see that all works, in seconds")
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
+    text = "keep what the folder holds already of other parts and numbers of cores, measured on this machine"
+    parser.add_argument("--resume", action="store_true", help=text)
     parser.add_argument(_PART, metavar="JSON", help=argparse.SUPPRESS)
 
 
@@ -54,22 +75,23 @@ def run(arguments: argparse.Namespace) -> Outcome:
     if arguments.part:
         result = _measure_part(json.loads(arguments.part))
         return 0, result, canonical_json(result)
-    outputs = _scenario(arguments.scenario, arguments.changes, arguments.quick).outputs
-    if "cloud" not in outputs:
-        raise InputError("outputs", list(outputs), "must have the cloud, on which writing is measured")
-    for cores in arguments.cores:
-        if not 1 <= cores <= available_cores():
-            raise InputError("--cores", cores, f"must be 1 to {available_cores()}, the cores that are there")
+    _check(arguments)
     found: dict[str, Any] = {}
+    kept = _read_kept(arguments)
 
     def measure() -> dict[str, str]:
         found.update(_measure_all(arguments))
+        if kept:
+            found["runs"] = join_runs(kept["runs"], found["runs"])
+        add_scaling(found["runs"])
         return {TABLE: markdown(found)}
 
     with ExitStack() as opened:
         folder = None
         if arguments.output:
-            folder = opened.enter_context(output_folder(arguments.output, _FILES, arguments.overwrite))
+            folder = opened.enter_context(
+                output_folder(arguments.output, _FILES, arguments.overwrite or arguments.resume)
+            )
         table = put_tables(arguments.document, [TABLE], measure)[TABLE]
         if folder:
             (folder / _FILES[0]).write_text(canonical_json(found), encoding="utf-8")
@@ -77,73 +99,183 @@ def run(arguments: argparse.Namespace) -> Outcome:
     return 0, found, table + _verdict(found)
 
 
+def _check(arguments: argparse.Namespace) -> None:
+    """Raise an InputError for what can't be measured, before anything is."""
+    outputs = _scenario(arguments.scenario, arguments.changes, arguments.quick).outputs
+    if "cloud" not in outputs:
+        raise InputError("outputs", list(outputs), "must have the cloud, on which writing is measured")
+    for cores in arguments.cores:
+        if not 1 <= cores <= available_cores():
+            raise InputError("--cores", cores, f"must be 1 to {available_cores()}, the cores that are there")
+    beside = arguments.beside
+    if beside and not (beside / "synthroads_addon" / "__init__.py").is_file():
+        raise InputError(_BESIDE, str(beside), "must be a folder that holds the package synthroads_addon")
+    if arguments.parts == ["start"] and not beside:
+        raise InputError("--parts", arguments.parts, f"start is measured beside another version: {_BESIDE} names it")
+
+
 def _measure_all(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Measure the demo job and the waves scene on each requested number of cores; return the results for the tables."""
-    with tempfile.TemporaryDirectory(prefix="synthroads-") as folder:
-        scene = Path(folder) / "waves.obj"
-        triangles = write_waves(scene, _QUICK_CELLS if arguments.quick else CELLS)
-        return _runs(arguments, {"scene": str(scene), "triangles": triangles})
+    """Measure the wanted parts on each requested number of cores; return the results for the tables."""
+    about = {"quick": arguments.quick, "scenario": arguments.scenario, "changes": arguments.changes}
+    with tempfile.TemporaryDirectory(prefix="synthroads-") as text:
+        folder = Path(text)
+        write_waves(folder / "waves.obj", _QUICK_CELLS if arguments.quick else CELLS)
+        write_waves(folder / "start.obj", _QUICK_CELLS)
+        if "road" in arguments.parts:
+            _measure_in_process({**about, "part": "road file", "scene": str(folder / "road.obj")}, arguments.cores[0])
+        return _runs(arguments, about, folder)
 
 
-def _runs(arguments: argparse.Namespace, waves: dict[str, Any]) -> dict[str, Any]:
+def _runs(arguments: argparse.Namespace, about: dict[str, Any], folder: Path) -> dict[str, Any]:
     progress, runs = progress_bar(arguments), []
-    about = {"quick": arguments.quick, "scenario": arguments.scenario, "changes": arguments.changes, **waves}
-    parts = ["demo", "waves_1", "waves_19"]
+    own = [part for part in arguments.parts if part != "start"]
     for number, cores in enumerate(arguments.cores):
-        measured: dict[str, Any] = {"lines": {}}
-        for step, part in enumerate(parts):
-            progress(f"{part}, {cores}", (number * len(parts) + step) / (len(parts) * len(arguments.cores)))
-            result_of_part = _measure_in_process({**about, "part": part}, cores)
-            measured |= result_of_part | {"lines": measured["lines"] | result_of_part["lines"]}
-        runs.append(measured | {"cores": cores})
-    versions = {"Blender": runs[0]["blender"], "Python": platform.python_version()}
-    return {"machine": machine(versions), "quick": arguments.quick, "runs": runs}
+        run: dict[str, Any] = {"cores": cores, "lines": {}, "floors": [], "stages": {}, "scans": {}, "beside": []}
+        for step, part in enumerate(own):
+            progress(f"{part}, {cores}", (number + step / len(arguments.parts)) / len(arguments.cores))
+            found = _measure_in_process({**about, "part": part, "scene": str(folder / f"{part}.obj")}, cores)
+            run["floors"] += found["floors"]
+            for name in ("lines", "stages", "scans"):
+                run[name] |= found.get(name, {})
+        if arguments.beside:
+            run["beside"] = _measure_beside(arguments, folder, cores, progress)
+            run["lines"] |= beside_lines(run["beside"])
+        runs.append(run)
+    return {"machine": _machine(), "quick": arguments.quick, "runs": runs}
+
+
+def _machine() -> str:
+    """Return the machine in words, with the versions of Blender and Python."""
+    return machine({"Blender": version("bpy"), "Python": platform.python_version()})
+
+
+def _read_kept(arguments: argparse.Namespace) -> dict[str, Any] | None:
+    """Return the result in the output's folder that this one is to be joined with; None without one.
+
+    Raises:
+        InputError: it is of another machine, or of a small scene and this one isn't, or the other way round.
+    """
+    if not arguments.resume:
+        return None
+    if not arguments.output:
+        raise InputError("--resume", None, "needs --output, the folder whose result is kept")
+    path = arguments.output / _FILES[0]
+    if arguments.overwrite:
+        raise InputError("--resume", None, "can't be given with --overwrite, which keeps nothing")
+    if not path.is_file():
+        return None
+    kept: dict[str, Any] = read_json(path)
+    for name, now in (("machine", _machine()), ("quick", arguments.quick)):
+        if kept.get(name) != now:
+            raise InputError(f"{path}: {name}", kept.get(name), f"must be {now!r}, as now; --overwrite replaces it")
+    return kept
 
 
 def _measure_in_process(part: dict[str, Any], cores: int) -> dict[str, Any]:
     """Measure a part in a new process limited to so many cores, and return its result."""
     command = [sys.executable, str(Path(__file__).resolve()), _PART, json.dumps(part), "--json"]
+    return _json_of(command, part["part"], cores)
+
+
+def _json_of(command: Sequence[str], name: str, cores: int, path: Path | None = None) -> dict[str, Any]:
+    """Run a command on so many cores, with a folder on Python's path; return the JSON that it prints last."""
+    environment = os.environ | ({"PYTHONPATH": str(path)} if path else {})
     with cores_of_children(cores):
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
     if done.returncode:
-        raise RuntimeError(f"{part['part']} failed: {done.stderr.strip()}")
-    result: dict[str, Any] = json.loads(done.stdout)
+        raise RuntimeError(f"{name} failed: {done.stderr.strip()}")
+    result: dict[str, Any] = json.loads(done.stdout[done.stdout.index("{") :])
     return result
 
 
+def _measure_beside(
+    arguments: argparse.Namespace, folder: Path, cores: int, progress: Progress
+) -> list[dict[str, Any]]:
+    """Scan with this version and the other in turn, each scan in a process of its own; return rows of both's figures.
+
+    Processor times are medians. Each row: ``name``, and ``ours`` and ``other`` with what
+    `headless.benchmark_beside.measure` returns.
+    """
+    root, script = Path(__file__).resolve().parents[1], str(Path(__file__).with_name("benchmark_beside.py"))
+    versions = {"ours": root, "other": arguments.beside.resolve()}
+    rows = []
+    for name, scene, changes in _scans_beside(arguments):
+        several: dict[str, list[dict[str, Any]]] = {side: [] for side in versions}
+        for turn in range(1 if arguments.quick else _PAIRS):
+            for side in list(versions)[:: -1 if turn % 2 else 1]:
+                progress(f"{name}, {side}, {cores}", 0.0)
+                command = [sys.executable, script, str(folder / f"{scene}.obj"), *changes]
+                several[side].append(_json_of(command, f"{name} by {versions[side]}", cores, versions[side]))
+        rows.append({"name": name, "scene": scene} | {side: _medians(found) for side, found in several.items()})
+    return rows
+
+
+def _scans_beside(arguments: argparse.Namespace) -> list[tuple[str, str, tuple[str, ...]]]:
+    """Return the scans that are measured with both versions: name of the line, scene, changes of the scenario."""
+    scans = []
+    for scene, changes in (("waves", _WAVES), ("road", _ROAD)):
+        for rays in _RAYS[scene] if scene in arguments.parts else ():
+            further: tuple[str, ...] = (f"scan.rays_per_pulse={rays}",)
+            if scene == "waves":
+                further += (_FAST if arguments.quick else _SLOW if rays == 1 else _MIDDLE,)
+            scans.append((f"{scene}_{rays}", scene, (*changes, *further)))
+    if "start" in arguments.parts:
+        scans.append(("start", "start", (*_WAVES, _FAST)))
+    return scans
+
+
+def _medians(several: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return each figure's median over several measurements, of an odd number."""
+    return {name: sorted(one[name] or 0.0 for one in several)[len(several) // 2] for name in several[0]}
+
+
 def _measure_part(part: dict[str, Any]) -> dict[str, Any]:
-    """Measure one part (`demo`, `waves_1` or `waves_19`) in this process, and return its figures."""
-    if part["part"] == "demo":
-        from synthroads_addon.jobs.measure.benchmark import measure_demo
+    """Measure one part in this process, and return its figures; ``road file`` writes the road as a mesh."""
+    name, quick = part["part"], part["quick"]
+    if name == "demo":
+        from synthroads_addon.jobs.measure.benchmark import measure_demo  # likewise
 
-        result = measure_demo(_scenario(part["scenario"], part["changes"], part["quick"]))
+        result = measure_demo(_scenario(part["scenario"], part["changes"], quick))
+    elif name == "road file":
+        from synthroads_addon.jobs.measure.scenes import road_mesh  # likewise
+
+        mesh = road_mesh(load_scenario("rq31-600m", [_ROAD_LENGTH, *(_QUICK_ROAD if quick else ())]))
+        write_obj(Path(part["scene"]), mesh.vertices, mesh.triangles)
+        result = {}
     else:
-        rays = int(part["part"].removeprefix("waves_"))
-        result = {"lines": _measure_waves(rays, part)}
-    return result | {"blender": sys.modules["bpy"].app.version_string}
+        result = _measure_mesh(name, Path(part["scene"]), quick)
+    return result
 
 
-def _measure_waves(rays: int, part: dict[str, Any]) -> dict[str, float]:
-    """Scan the waves scene; return pulses or rays per second (millions), bytes per triangle and seconds to open it."""
+def _measure_mesh(name: str, scene: Path, quick: bool) -> dict[str, Any]:
+    """Scan a mesh; return its lines and rates, see `headless.benchmark_table.LIMITS`."""
     from synthroads_addon.base.changes import apply_change
-    from synthroads_addon.base.progress import peak_memory_mb
-    from synthroads_addon.jobs.scan_scene import SceneScan, scan_scene
+    from synthroads_addon.base.progress import StageTimer, peak_memory_mb
+    from synthroads_addon.jobs.measure.scenes import measure_scene  # in this process alone: it starts Blender
+    from synthroads_addon.jobs.scan_scene import SceneScan, open_and_read, scene_site
 
     data: Any = Scenario().to_dict()
-    for change in (*_WAVES, *(_QUICK_WAVES if part["quick"] else ()), f"scan.rays_per_pulse={rays}"):
+    changes = _ROAD if name == "road" else (*_WAVES, _FAST if quick else _SLOW)
+    for change in changes:
         data = apply_change(data, change, Scenario)
-    with tempfile.TemporaryDirectory(prefix="synthroads-") as text:
-        output = Path(text) / "out"
-        before = peak_memory_mb() or 0.0
-        report = scan_scene(SceneScan(Scenario.from_dict(data), output, Path(part["scene"]), up="z"))
-    stages, counts = report["stages"], report["counts"]
-    seconds = stages["scan"]["seconds"]
-    if rays > 1:
-        # As HELIOS++ counts them: all that the pulses have, also where these are known to meet nothing.
-        return {"waves_rays": counts["pulses"] * rays / seconds / 1e6}
-    opening = sum(stages[name]["seconds"] for name in ("scene", "scene mesh", "caster"))
-    memory = 1e6 * ((stages["caster"]["peak_memory_mb"] or 0.0) - before) / part["triangles"]
-    return {"waves_pulses": counts["pulses"] / seconds / 1e6, "waves_memory": memory, "waves_opening": opening}
+    job = SceneScan(Scenario.from_dict(data), Path("out"), scene, up="z")
+    before, timer = peak_memory_mb() or 0.0, StageTimer()
+    opened, road, _ = open_and_read(job, None, timer, {})
+    found = measure_scene(scene_site(job, opened.static, road), opened, scene, name, _RAYS[name], timer)
+    packed = {rays: rate.get("packets", rate["single rays"]) for rays, rate in found["rates"].items()}
+    lines = {f"{name}_{rays}": 100.0 * rate["ours"] / packed[rays] for rays, rate in found["rates"].items()}
+    scans = {
+        f"{name}_{rays}": {
+            "pulses_per_second": rate["pulses_per_second"],
+            "processor_rate": rate["ours"],
+            "busy": rate["busy"],
+        }
+        for rays, rate in found["rates"].items()
+    }
+    if name == "waves":
+        memory = 1e6 * (found["memory_mb"] - before) / len(opened.static)
+        lines |= {"waves_memory": memory, "waves_opening": found["opening"], "waves_fixed": found["fixed"]}
+    return {"lines": lines, "floors": found["floors"], "scans": scans}
 
 
 def _scenario(name: str, changes: list[str], quick: bool) -> Scenario:

@@ -46,19 +46,81 @@ class Limit:
 
 LIMITS = {
     "points": Limit("points of the demo job", "million", 15.0, False, 1),
-    "seconds": Limit("demo job in all", "s", 120.0, True, 1),
     "memory_mb": Limit("demo job, memory", "MB", 3000.0, True, 0),
-    "parameters": Limit("parameters", "s", 1.0, True),
-    "model": Limit("model", "s", 8.0, True),
-    "panel_edit": Limit("panel edit to updated view", "s", 0.2, True, 3),
-    "casting": Limit("casting and radiometry, of the bare caster's rate", "%", 60.0, False, 0),
-    "writing": Limit("writing LAZ", "million points/s", 3.0, False),
-    "waves_pulses": Limit("waves, 1 ray per pulse", "million pulses/s", 1.6, False),
-    "waves_rays": Limit("waves, 19 rays per pulse", "million rays/s", 2.55, False),
+    "job": Limit("demo job in all; Embree and lazrs alone for its rays and points", "times", 7.0, True, 1),
+    "model": Limit("parameters, model and scene mesh; Blender alone for as many triangles", "times", 4.0, True, 1),
+    "panel_edit": Limit("panel edit to updated view; Blender alone for as many triangles", "times", 8.0, True, 1),
+    "casting": Limit("casting and radiometry; Embree alone", "%", 60.0, False, 0),
+    "writing": Limit("writing LAZ; lazrs alone", "%", 80.0, False, 0),
+    "rendering": Limit("rendering, all layers; Cycles, the picture alone", "%", 80.0, False, 0),
+    "waves_1": Limit("waves, 1 ray per pulse; Embree alone", "%", 20.0, False, 0),
+    "waves_19": Limit("waves, 19 rays per pulse; Embree alone", "%", 40.0, False, 0),
     "waves_memory": Limit("waves, memory", "B/triangle", 500.0, True, 0),
-    "waves_opening": Limit("waves, opening", "s", 4.2, True),
+    "waves_opening": Limit("waves, opening; Blender's importer alone", "times", 3.0, True, 1),
+    "waves_fixed": Limit("waves, what a scan takes besides its pulses, processor time", "s", 0.08, True),
+    "road_1": Limit("road, 1 ray per pulse; Embree alone", "%", 10.0, False, 0),
+    "road_7": Limit("road, 7 rays per pulse; Embree alone", "%", 25.0, False, 0),
+    "road_19": Limit("road, 19 rays per pulse; Embree alone", "%", 33.0, False, 0),
+    "scaling": Limit("two cores against one, by the clock; the least of all scans of meshes", "times", 1.9, False),
+    "waves_1_beside": Limit("waves, 1 ray per pulse; the other version", "times", 1.0, False),
+    "waves_19_beside": Limit("waves, 19 rays per pulse; the other version", "times", 1.0, False),
+    "road_1_beside": Limit("road, 1 ray per pulse; the other version", "times", 1.0, False),
+    "road_7_beside": Limit("road, 7 rays per pulse; the other version", "times", 1.0, False),
+    "road_19_beside": Limit("road, 19 rays per pulse; the other version", "times", 1.0, False),
+    "start_beside": Limit("first scan of a new process, its processor time; the other version", "times", 1.0, True),
+    "memory_beside": Limit("memory of a scan, the worst of these; the other version", "times", 1.0, True),
 }
-"""Lines by name."""
+"""Lines by name. Whatever measures speed is held against another's code that does the same in the same run: as many
+times its time, or so much of its rate."""
+_PROCESSOR_RATE = "million pulses per processor second"
+
+
+def beside_lines(rows: list[dict[str, Any]]) -> dict[str, float]:
+    """Return the lines of scans that were measured beside another version, see `headless.benchmark`.
+
+    Args:
+        rows: ``name``, and ``ours`` and ``other``, each with ``scan``, ``whole``, ``pulses`` and ``memory_mb``.
+    """
+    lines = {}
+    for row in rows:
+        ours, other = row["ours"], row["other"]
+        if row["name"] == "start":
+            lines["start_beside"] = ours["whole"] / other["whole"]
+        else:
+            lines[f"{row['name']}_beside"] = _pulse_rate(ours) / _pulse_rate(other)
+    if rows:
+        lines["memory_beside"] = max(row["ours"]["memory_mb"] / max(row["other"]["memory_mb"], 1.0) for row in rows)
+    return lines
+
+
+def _pulse_rate(measured: dict[str, Any]) -> float:
+    return float(measured["pulses"]) / measured["scan"] / 1e6
+
+
+def join_runs(kept: list[dict[str, Any]], measured: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Return runs by cores in which what was measured now takes the place of what was kept under the same names."""
+    joined = {run["cores"]: run for run in kept}
+    for run in measured:
+        before = joined.get(run["cores"], {})
+        both = {name: before.get(name, {}) | run[name] for name in ("lines", "stages", "scans")}
+        rows = {name: _join_rows(before.get(name, []), run[name]) for name in ("floors", "beside")}
+        joined[run["cores"]] = {"cores": run["cores"]} | both | rows
+    return [joined[cores] for cores in sorted(joined)]
+
+
+def _join_rows(kept: list[dict[str, Any]], measured: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    return list(({row["name"]: row for row in kept} | {row["name"]: row for row in measured}).values())
+
+
+def add_scaling(runs: list[dict[str, Any]]) -> None:
+    """Add to the run on `CORES` cores how much faster its slowest-growing scan of a mesh is than on one, in place."""
+    by_cores = {run["cores"]: run for run in runs}
+    if {1, CORES} <= by_cores.keys():
+        one, several = by_cores[1]["scans"], by_cores[CORES]["scans"]
+        both = one.keys() & several.keys()
+        gains = [several[name]["pulses_per_second"] / one[name]["pulses_per_second"] for name in both]
+        if gains:
+            by_cores[CORES]["lines"]["scaling"] = min(gains)
 
 
 def markdown(result: dict[str, Any]) -> str:
@@ -66,7 +128,8 @@ def markdown(result: dict[str, Any]) -> str:
     lines = [f"Machine: {result['machine']}", ""]
     if result["quick"]:
         lines += ["A quick run on a small scene: it shows that all works, and nothing of the speed.", ""]
-    return "\n".join([*lines, *_limits(result), "", *_stages(result), "", *_floors(result)]) + "\n"
+    tables = [_limits(result), _stages(result), _floors(result), _cores(result), _beside(result)]
+    return "\n\n".join(["\n".join([*lines, *tables[0]]), *("\n".join(table) for table in tables[1:] if table)]) + "\n"
 
 
 def judge_lines(result: dict[str, Any]) -> Iterator[tuple[str, float, bool]]:
@@ -94,10 +157,12 @@ def _limits(result: dict[str, Any]) -> list[str]:
 def _stages(result: dict[str, Any]) -> list[str]:
     runs = result["runs"]
     rows = []
-    for name in runs[0]["stages"]:
-        seconds = [_number(run["stages"][name]["seconds"], 2) for run in runs]
-        rows.append([name, *seconds, _number(runs[-1]["stages"][name]["peak_memory_mb"], 0)])
-    return markdown_table(["stage of the demo job (s)", *(str(run["cores"]) for run in runs), "peak memory (MB)"], rows)
+    for name in max((run["stages"] for run in runs), key=len):
+        several = [run["stages"].get(name, {}) for run in runs]
+        memory = next((stage["peak_memory_mb"] for stage in reversed(several) if stage), None)
+        rows.append([name, *(_number(stage.get("seconds"), 2) for stage in several), _number(memory, 0)])
+    titles = ["stage of the demo job (s)", *(str(run["cores"]) for run in runs), "peak memory (MB)"]
+    return markdown_table(titles, rows) if rows else []
 
 
 def _floors(result: dict[str, Any]) -> list[str]:
@@ -107,7 +172,46 @@ def _floors(result: dict[str, Any]) -> list[str]:
             share = 100.0 * floor["ours"] / floor["floor"]
             values = [_number(floor[side], 2) for side in ("ours", "floor")]
             rows.append([floor["name"], str(run["cores"]), floor["unit"], *values, f"{share:.0f}"])
-    return markdown_table(["beside its floor", "cores", "unit", "ours", "floor", "ours of the floor (%)"], rows)
+    titles = ["beside its floor", "cores", "unit", "ours", "floor", "ours of the floor (%)"]
+    return markdown_table(titles, rows) if rows else []
+
+
+def _cores(result: dict[str, Any]) -> list[str]:
+    """Return the table of scans of meshes by the cores that they may use."""
+    rows = []
+    for name in max((run["scans"] for run in result["runs"]), key=len):
+        runs = [run for run in result["runs"] if name in run["scans"]]
+        first = runs[0]["scans"][name]
+        for run in runs:
+            scan = run["scans"][name]
+            gain = scan["pulses_per_second"] / first["pulses_per_second"]
+            growth = first["processor_rate"] / scan["processor_rate"]
+            cells = [_number(value, 2) for value in (scan["pulses_per_second"], gain, growth)]
+            rows.append([_scan_title(name), str(run["cores"]), *cells, f"{100.0 * scan['busy']:.0f}"])
+    titles = ["scan", "cores", "million pulses/s", "times as fast", "processor time, times", "cores busy (%)"]
+    return markdown_table(titles, rows) if rows else []
+
+
+def _beside(result: dict[str, Any]) -> list[str]:
+    """Return the table of scans that both versions did."""
+    rows = []
+    for run in result["runs"]:
+        for row in run["beside"]:
+            ours, other = row["ours"], row["other"]
+            start = row["name"] == "start"
+            cells = [one["whole"] if start else _pulse_rate(one) for one in (ours, other)]
+            memory = [_number(one["memory_mb"], 0) for one in (ours, other)]
+            unit = "processor seconds" if start else _PROCESSOR_RATE
+            title = "first scan of a new process" if start else _scan_title(row["name"])
+            rows.append([title, str(run["cores"]), unit, *(_number(cell, 2) for cell in cells), *memory])
+    titles = ["beside another version", "cores", "unit", "ours", "the other's", "memory (MB)", "the other's"]
+    return markdown_table(titles, rows) if rows else []
+
+
+def _scan_title(name: str) -> str:
+    """Return the name of a scan of a mesh in words, ``waves_19``: waves, 19 rays per pulse."""
+    scene, _, rays = name.partition("_")
+    return f"{scene}, {rays} {'ray' if rays == '1' else 'rays'} per pulse"
 
 
 def _number(value: float | None, digits: int) -> str:

@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--overwrite", action="store_true", help="replace files that are already there")
 
 
-@linear_algebra_on_one_thread()
+@linear_algebra_on_one_thread(scipy=True)
 def run(arguments: argparse.Namespace) -> Outcome:
     """Run `synthroads reconstruct`; return exit code (3 if doubtful), report as JSON data and printed text."""
     from synthroads_addon.reconstruction.report import TOLERANCES, run_reconstruction

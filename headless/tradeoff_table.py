@@ -38,6 +38,7 @@ TABLES: dict[str, tuple[str, ...]] = {
     "model and beam": ("seconds", "model_seconds", "peak_memory_mb", "triangles", "rays_per_second"),
     "points": ("seconds", "peak_memory_mb"),
     "colours": ("seconds", "image_seconds", "peak_memory_mb", "images", "megapixels", *_SHARES),
+    "kernels": ("seconds", "image_seconds", "peak_memory_mb", "rays_per_second"),
     "light": ("seconds", "image_seconds", "peak_memory_mb"),
     "presets": ("seconds", "model_seconds", "image_seconds", "peak_memory_mb", "triangles"),
 }

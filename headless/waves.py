@@ -23,7 +23,12 @@ def wave_mesh(cells: int = CELLS) -> tuple[NDArray[np.float32], NDArray[np.int32
 def write_waves(path: Path, cells: int = CELLS) -> int:
     """Write the mesh of waves as an .obj file with z up; return the number of triangles."""
     vertices, triangles = wave_mesh(cells)
+    write_obj(path, vertices, triangles)
+    return len(triangles)
+
+
+def write_obj(path: Path, vertices: NDArray[np.float32], triangles: NDArray[np.int32]) -> None:
+    """Write vertices (V, 3), m, and triangles (T, 3) as an .obj file."""
     with path.open("w", encoding="ascii") as file:
         np.savetxt(file, vertices, fmt="v %.6f %.6f %.6f")
         np.savetxt(file, triangles + 1, fmt="f %d %d %d")
-    return len(triangles)

@@ -6,7 +6,7 @@ import os
 import platform
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from importlib import import_module
 from pathlib import Path
 from threading import Lock
@@ -136,8 +136,7 @@ def _nothing() -> None:
 
 
 def _limit_linear_algebra() -> Callable[[], None]:
-    """Have linear algebra take one thread; return what gives it those back that it had."""
-    import_module("scipy.linalg")  # has a library of its own, which can be limited only when it is loaded
+    """Have the linear algebra that is loaded take one thread; return what gives it those back that it had."""
     limit = threadpool_limits(1, user_api="blas")
     return cast(Callable[[], None], limit.restore_original_limits)
 
@@ -145,12 +144,21 @@ def _limit_linear_algebra() -> Callable[[], None]:
 def _keep_freed_memory() -> Callable[[], None]:
     """Have the C library keep freed memory, where it can; return what has it given back, now and from now on."""
     _set_malloc(_KEEPING)
+    before = _set_huge_pages(False)
 
     def give_back() -> None:
+        _set_huge_pages(before)
         _set_malloc(_USUAL)
         release_memory()
 
     return give_back
+
+
+def _set_huge_pages(wanted: bool) -> bool:
+    """Have NumPy ask the system for huge pages for large arrays, or not, where it can; return whether it did before."""
+    with suppress(ImportError, AttributeError):  # NumPy's own switch, which is also NUMPY_MADVISE_HUGEPAGE
+        return bool(import_module("numpy._core.multiarray")._set_madvise_hugepage(wanted))
+    return wanted
 
 
 def _set_malloc(values: Mapping[int, int]) -> None:
@@ -161,19 +169,30 @@ def _set_malloc(values: Mapping[int, int]) -> None:
             mallopt(parameter, value)
 
 
-_one_thread, _kept_memory = _Shared(_limit_linear_algebra), _Shared(_keep_freed_memory)
+def _limit_with_scipy() -> Callable[[], None]:
+    """Do the same once SciPy's linear algebra is loaded: it has a library of its own, which can't be limited before."""
+    import_module("scipy.linalg")
+    return _limit_linear_algebra()
+
+
+_one_thread, _scipy_too = _Shared(_limit_linear_algebra), _Shared(_limit_with_scipy)
+_kept_memory = _Shared(_keep_freed_memory)
 
 
 @contextmanager
-def linear_algebra_on_one_thread() -> Iterator[None]:
-    """Context, also a decorator, in which linear algebra of NumPy and SciPy begins no threads of its own.
+def linear_algebra_on_one_thread(scipy: bool = False) -> Iterator[None]:
+    """Context, also a decorator, in which linear algebra of NumPy, and of SciPy if asked, begins no threads of its own.
 
     For work whose result is written: sums over several threads have other last bits on machines with other cores. And
     for work that is shared out to threads: after each product OpenBLAS's threads keep a core busy for a while, waiting
     for the next. Threads may hold it side by side. Other linear algebra in the process, but for PyTorch's, is limited
     meanwhile as well.
+
+    Args:
+        scipy: the work uses SciPy, which is loaded beforehand: a third of a second of processor time, and 15 MB, which
+            other work needn't spend. What is loaded of it already is limited in any case.
     """
-    with _one_thread.held():
+    with _one_thread.held(), _scipy_too.held() if scipy else nullcontext():
         yield
 
 
@@ -182,7 +201,9 @@ def freed_memory_kept() -> Iterator[None]:
     """Context in which freed memory is kept for what comes next, for work that takes and frees large arrays in turns.
 
     The system clears each page that it hands out, and page faults are dear. In the end all that is free is given back.
-    Threads may hold it side by side. It does something where the C library is glibc.
+    NumPy asks for no huge pages meanwhile: 2 MB that are handed out at once are cleared at once, however little of them
+    is used, and in a virtual machine they may have to be fetched from its host.
+    Threads may hold it side by side. It does something where the C library is glibc, or NumPy asks for huge pages.
     """
     with _kept_memory.held():
         yield

@@ -252,7 +252,7 @@ def calibration_steps(job: CalibrationJob) -> Generator[float, None, Calibration
     Raises:
         InputError: an input is wrong, or the classes can't be explained by materials.
     """
-    with linear_algebra_on_one_thread():
+    with linear_algebra_on_one_thread(scipy=True):
         return (yield from _calibration_steps(job))
 
 

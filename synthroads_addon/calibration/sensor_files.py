@@ -138,7 +138,7 @@ class FittedSensor:
         return {"estimate": self.estimate.to_dict(), "refined": refined, **fitted}
 
 
-@linear_algebra_on_one_thread()
+@linear_algebra_on_one_thread(scipy=True)
 def fit_sensor(result: Calibration, simulated: bool = True) -> FittedSensor:
     """Return the sensor that explains the first class of a calibration, which must be pavement.
 

@@ -118,7 +118,7 @@ def compare_steps(synthetic: Path, real: Path, seed: int = 1) -> Generator[float
     Raises:
         InputError: a cloud can't be read, has too little pavement, or none of the other side's density.
     """
-    with linear_algebra_on_one_thread():
+    with linear_algebra_on_one_thread(scipy=True):
         return (yield from _compare_steps(synthetic, real, seed))
 
 

@@ -51,7 +51,7 @@ class Centreline:
     notes: tuple[str, ...]
 
 
-@linear_algebra_on_one_thread()
+@linear_algebra_on_one_thread(scipy=True)
 def find_centreline(cloud: RoadCloud, options: Options | None = None, progress: Progress = silent) -> Centreline:
     """Return the centreline of the road that a cloud shows, by all views of it, with its deviations and doubts.
 

@@ -81,7 +81,7 @@ class ReconstructedRoad:
     report: dict[str, Any]
 
 
-@linear_algebra_on_one_thread()
+@linear_algebra_on_one_thread(scipy=True)
 def run_reconstruction(job: ReconstructionJob, progress: Progress = silent) -> ReconstructedRoad:
     """Read a cloud, reconstruct the road in it, and report how far both are apart.
 

@@ -6,6 +6,9 @@ import ctypes
 import mmap
 import platform
 import resource
+import subprocess
+import sys
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -65,3 +68,41 @@ def test_what_is_freed_is_used_again_meanwhile_and_given_back_in_the_end() -> No
     assert memory_mb() < before + 10.0
     use_and_free()
     assert memory_mb() < before + 70.0  # no more than the C library keeps by itself
+
+
+def asks_for_huge_pages() -> bool:
+    """Return whether NumPy asks the system for huge pages for large arrays."""
+    return bool(import_module("numpy._core.multiarray")._get_madvise_hugepage())
+
+
+@pytest.mark.parametrize("usual", [True, False])
+def test_no_huge_pages_are_asked_for_meanwhile(usual: bool) -> None:
+    set_huge_pages = import_module("numpy._core.multiarray")._set_madvise_hugepage
+    before = set_huge_pages(usual)
+    try:
+        with freed_memory_kept():
+            with freed_memory_kept():
+                assert not asks_for_huge_pages()
+            assert not asks_for_huge_pages()
+        assert asks_for_huge_pages() == usual
+    finally:
+        set_huge_pages(before)
+
+
+IN_CONTEXT = """
+import sys
+from threadpoolctl import threadpool_info
+from synthroads_addon.base.machine import linear_algebra_on_one_thread
+
+with linear_algebra_on_one_thread({}):
+    threads = {{library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}}
+    print(sorted(threads), "scipy.linalg" in sys.modules)
+"""
+
+
+@pytest.mark.parametrize("scipy", [False, True])
+def test_scipy_is_loaded_only_for_work_that_uses_it(scipy: bool) -> None:
+    """A scan uses none, and its process needn't spend the time and the memory."""
+    words = [sys.executable, "-c", IN_CONTEXT.format(f"scipy={scipy}")]
+    done = subprocess.run(words, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["[1]", str(scipy)]

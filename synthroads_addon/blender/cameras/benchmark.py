@@ -1,35 +1,21 @@
-"""Measurements of the benchmark in Blender: rendering beside bare rendering, and the time that an edit takes."""
+"""Measurement of the benchmark in Blender: rendering beside bare rendering."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import bpy
 
-from ...road.parameters import RoadParameters
-from ...road.surroundings import Vegetation
 from ...scanning.colour.request import LayerRequest
 from ...scanning.colour.views import View
-from ..compat import modifier_input, set_modifier_input
-from ..model.build import RoadModel
+from ..model.measure import seconds_of
 from . import image_views, layer_source
 from .images import aim
 from .light import daylight
 from .stage import Passes, RenderStage, stage
-
-_EDITS = 3
-"""Changes there and back whose times are measured."""
-
-
-def seconds_of(work: Callable[[], object]) -> float:
-    """Call a function; return its wall-clock time, s."""
-    begin = time.perf_counter()
-    work()
-    return time.perf_counter() - begin
 
 
 def measure_rendering(request: LayerRequest, count: int) -> dict[str, Any]:
@@ -77,20 +63,3 @@ def _render_picture(bare: RenderStage, view: View) -> None:
     render = bare.scene.render
     render.resolution_x, render.resolution_y, render.resolution_percentage = *view.size, 100
     bpy.ops.render.render(scene=bare.scene.name)
-
-
-def panel_edit(model: RoadModel, parameters: RoadParameters) -> float:
-    """Return the median seconds from changing a lane's width to the updated view; hides the vegetation."""
-    for name in parameters.of_type(Vegetation):
-        if name in model.objects:
-            model.objects[name].hide_viewport = True
-    bpy.context.view_layer.update()
-    road = model.objects["Road"]
-    modifier = road.modifiers[0]
-    side = "Left" if parameters.carriageway("left") else "Right"
-    name, runs = f"{side} Lane 1 Width", []
-    for change in (0.05, -0.05) * _EDITS:
-        set_modifier_input(modifier, name, modifier_input(modifier, name) + change)
-        road.update_tag()
-        runs.append(seconds_of(bpy.context.view_layer.update))
-    return sorted(runs)[len(runs) // 2]

@@ -6,34 +6,30 @@ A process measures one number of cores: those that it may use.
 import tempfile
 from collections import deque
 from collections.abc import Callable
-from copy import copy
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import laspy
-import numpy as np
-from numpy.typing import NDArray
 
-from ...base.arrays import Float32
 from ...base.machine import available_cores
 from ...base.progress import StageTimer, peak_memory_mb
-from ...blender.cameras.benchmark import measure_rendering, panel_edit, seconds_of
+from ...blender.cameras.benchmark import measure_rendering
 from ...blender.casters.measure import bare_rate
 from ...blender.files import empty_file
+from ...blender.model.measure import bare_mesh_seconds, panel_edit, seconds_of
 from ...cloud.formats.registry import open_cloud
 from ...road.geometry import RoadGeometry
 from ...sampling.road import sample_road
 from ...scanning.beam import RINGS
 from ...scanning.plan import ScanPlan
 from ...scanning.record import scan_blocks
-from ...scanning.scan import BlockScan
 from ...scenario.scenario import Scenario
 from ..job_files import JobFiles
 from ..open_scene import RoadScene
 from ..scan.files import CloudFiles, record_to_files
+from .scenes import rays_of_blocks, spread_blocks
 
 _CAST_BLOCKS, _WRITTEN_BLOCKS = 48, 96
 """Blocks on which casting (spread over the scan) and writing are measured beside their floors: so many that what is
@@ -53,8 +49,7 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
     """Run the demo job and measure its stages, memory and rates beside bare libraries; the open file is lost.
 
     Returns:
-        ``cores``; ``stages`` with seconds and peak memory; ``lines`` by the names of
-        `headless.benchmark_table.LIMITS`;
+        ``stages`` with seconds and peak memory; ``lines`` by the names of `headless.benchmark_table.LIMITS`;
         ``floors``: name, unit, ours and floor.
     """
     timer = StageTimer()
@@ -81,21 +76,27 @@ def measure_demo(scenario: Scenario) -> dict[str, Any]:
         own = casting[plan.rays_per_pulse]
         scanning = timer.stages["scan"]["seconds"]
         assert scanning is not None
-        floors = [*casting.values(), writing, _scan_rate(files, scanning, own, writing)]
+        whole = _scan_rate(files, scanning, own, writing)
+        floors = [*casting.values(), writing, whole]
         assert plan.request is not None
         if scenario.colour.source != "material":
             floors.append(measure_rendering(plan.request, _VIEWS))
+    edit, edited = panel_edit(model, road.parameters)
+    building = sum(timer.stages[name]["seconds"] or 0.0 for name in ("parameters", "model", "scene mesh"))
+    least = files.counts.points / whole["floor"] / 1e6
     lines = {
         "points": files.counts.points / 1e6,
-        "seconds": seconds,
         "memory_mb": memory,
-        "parameters": timer.stages["parameters"]["seconds"],
-        "model": timer.stages["model"]["seconds"],
-        "panel_edit": panel_edit(model, road.parameters),
+        "job": seconds / least,
+        "model": building / bare_mesh_seconds(plan.target.triangles),
+        "panel_edit": edit / bare_mesh_seconds(edited),
         "casting": 100.0 * own["ours"] / own["floor"],
-        "writing": writing["ours"],
+        "writing": 100.0 * writing["ours"] / writing["floor"],
     }
-    return {"cores": available_cores(), "stages": timer.stages, "lines": lines, "floors": floors}
+    if scenario.colour.source != "material":
+        lines["rendering"] = 100.0 * floors[-1]["ours"] / floors[-1]["floor"]
+    stages = timer.stages | {"panel edit": {"seconds": edit, "peak_memory_mb": None}}
+    return {"stages": stages, "lines": lines, "floors": floors}
 
 
 def _scan_rate(files: CloudFiles, seconds: float, casting: Rate, writing: Rate) -> Rate:
@@ -118,21 +119,10 @@ def _measure_casting(plan: ScanPlan) -> Rate:
 
     Of spared footprints all rays count: the bare caster has to cast them.
     """
-    threads, every = available_cores(), list(plan.blocks())
-    blocks = [every[i] for i in np.unique(np.linspace(0, len(every) - 1, _CAST_BLOCKS + 2).astype(int)[1:-1])]
-    part, target, kept = plan.target._parts[0], copy(plan.target), list[tuple[Float32, Float32]]()
-    caster = part.caster
-
-    def cast_and_keep(origins: Float32, directions: Float32, maximum_range: float) -> NDArray[np.int32]:
-        kept.append((origins.copy(), directions.copy()))
-        return caster.cast(origins, directions, maximum_range)
-
-    keeping: Any = SimpleNamespace(name=caster.name, main_thread_only=False, kernels=caster.kernels, cast=cast_and_keep)
-    target._parts, target.caster = [replace(part, caster=keeping), *target._parts[1:]], keeping
-    for block in blocks:
-        BlockScan(replace(plan, target=target, ground=None)).scan_block(*block)
-    origins, directions = map(np.concatenate, zip(*kept, strict=True))
-    few = replace(plan, chosen_blocks=tuple(blocks), threads=threads)
+    threads, caster = available_cores(), plan.target._parts[0].caster
+    blocks = spread_blocks(plan, _CAST_BLOCKS)
+    origins, directions = rays_of_blocks(plan, blocks)
+    few = replace(plan, chosen_blocks=blocks, threads=threads)
 
     def ours() -> float:
         return len(origins) / seconds_of(lambda: deque(scan_blocks(few), maxlen=0))

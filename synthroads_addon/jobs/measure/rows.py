@@ -91,6 +91,7 @@ def measure_row(scenario_name: str, knob: str, value: Any) -> dict[str, Any]:
         "model_seconds": round(built - start, 3),
         "caster_seconds": round(ready - built, 3),
         "triangles": plan.target.triangles,
+        "kernels": plan.summary()["kernels"],
         "machine": machine({"Blender": sys.modules["bpy"].app.version_string}),
         **{name: round(cost, 3) if isinstance(cost, float) else cost for name, cost in costs.items()},
         "errors": {name: round(error, 6) for name, error in errors.items()},

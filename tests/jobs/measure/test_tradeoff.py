@@ -108,6 +108,18 @@ def test_plants_that_are_left_out_are_an_error(tmp_path: Path) -> None:
     assert few["labels_percent"] > all_of_them["labels_percent"] + 1.0
 
 
+@pytest.mark.slow
+@pytest.mark.any_blender
+def test_compiled_loops_leave_the_errors_as_they_are(tmp_path: Path) -> None:
+    compiled, plain = (row(tmp_path, "kernels", value, "road.length=20") for value in ("auto", "off"))
+    assert plain["kernels"].startswith("off: ")
+    assert not compiled["kernels"].startswith("off: ")
+    assert compiled["errors"].keys() == plain["errors"].keys() >= {"position_mm", "relief_mm", "colour_95"}
+    assert plain["errors"]["position_mm"] > 0.0
+    for name in ("position_mm", "intensity_percent", "relief_mm"):
+        assert compiled["errors"][name] == pytest.approx(plain["errors"][name], rel=0.02, abs=1e-3), name
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

@@ -1,0 +1,95 @@
+"""How fast a road's model is built and edited, beside what Blender alone takes for as much geometry."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...road.parameters import RoadParameters
+from ...road.surroundings import Vegetation
+from ..compat import modifier_input, set_modifier_input
+from ..files import empty_file, stderr_if_it_succeeds
+from .build import RoadModel
+
+_EDITS = 3
+"""Changes there and back whose times are measured."""
+
+
+def seconds_of(work: Callable[[], object]) -> float:
+    """Call a function; return its wall-clock time, s."""
+    begin = time.perf_counter()
+    work()
+    return time.perf_counter() - begin
+
+
+def panel_edit(model: RoadModel, parameters: RoadParameters) -> tuple[float, int]:
+    """Measure changing a lane's width up to the updated view; hides the vegetation.
+
+    Returns:
+        median seconds of several such changes, there and back; triangles of the road, which each of them makes anew.
+    """
+    for name in parameters.of_type(Vegetation):
+        if name in model.objects:
+            model.objects[name].hide_viewport = True
+    bpy.context.view_layer.update()
+    road = model.objects["Road"]
+    modifier = road.modifiers[0]
+    side = "Left" if parameters.carriageway("left") else "Right"
+    name, runs = f"{side} Lane 1 Width", []
+    for change in (0.05, -0.05) * _EDITS:
+        set_modifier_input(modifier, name, modifier_input(modifier, name) + change)
+        road.update_tag()
+        runs.append(seconds_of(bpy.context.view_layer.update))
+    mesh = road.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    mesh.calc_loop_triangles()
+    return sorted(runs)[len(runs) // 2], len(mesh.loop_triangles)
+
+
+def bare_mesh_seconds(triangles: int) -> float:
+    """Return the seconds that Blender alone takes to make a mesh of so many triangles from arrays, and to read it back.
+
+    It is a flat grid, an object of its own in the open file, which is gone afterwards.
+    """
+    side = max(1, round((triangles / 2) ** 0.5))
+    corner = (np.arange(side)[:, None] * (side + 1) + np.arange(side)).ravel()
+    faces = np.concatenate(
+        [
+            np.column_stack([corner, corner + 1, corner + side + 2]),
+            np.column_stack([corner, corner + side + 2, corner + side + 1]),
+        ]
+    ).astype(np.int32)
+    x, y = np.meshgrid(np.arange(side + 1, dtype=np.float32), np.arange(side + 1, dtype=np.float32))
+    vertices = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size, np.float32)])
+    mesh = bpy.data.meshes.new("Bare Mesh")
+    item = bpy.data.objects.new("Bare Mesh", mesh)
+
+    def make_and_read() -> None:
+        mesh.vertices.add(len(vertices))
+        mesh.vertices.foreach_set("co", vertices.ravel())
+        mesh.loops.add(faces.size)
+        mesh.loops.foreach_set("vertex_index", faces.ravel())
+        mesh.polygons.add(len(faces))
+        mesh.polygons.foreach_set("loop_start", np.arange(0, faces.size, 3, dtype=np.int32))
+        mesh.update(calc_edges=True)
+        bpy.context.scene.collection.objects.link(item)
+        evaluated = item.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+        evaluated.calc_loop_triangles()
+        evaluated.vertices.foreach_get("co", np.empty(vertices.size, np.float32))
+        evaluated.loop_triangles.foreach_get("vertices", np.empty(faces.size, np.int32))
+
+    try:
+        return seconds_of(make_and_read)
+    finally:
+        bpy.data.objects.remove(item)
+        bpy.data.meshes.remove(mesh)
+
+
+def bare_import_seconds(path: Path) -> float:
+    """Return the seconds that Blender's importer alone takes for an .obj file with z up; the open file is lost."""
+    empty_file()
+    with stderr_if_it_succeeds():
+        return seconds_of(lambda: bpy.ops.wm.obj_import(filepath=str(path), up_axis="Z", forward_axis="Y"))
