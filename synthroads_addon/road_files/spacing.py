@@ -1,0 +1,155 @@
+"""Points of a line cleaned before a road is fitted to them, and what is told of how far apart they are.
+
+Each remark names a place: the number of a point as the file counts it, from 1, and its coordinates on the map.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..base.arrays import Bool, Float, Int
+from ..base.errors import InputError
+from ..base.remarks import assume, warn
+
+_SAME = 1e-6
+"""Points no farther apart than this, m, are one."""
+_STILL = 0.05
+"""Steps shorter than this share of the usual one are those of a stop, if there are several."""
+_FEWEST_STILL = 3
+_BACK = np.cos(np.radians(150.0))
+"""Cosine of the change of direction from which on a line goes back."""
+_FARTHEST_BACK = 100.0
+"""Metres that points may go back and be left out; a line that goes on doing so is another one."""
+_TOLD_SAGITTA = 0.1
+"""Distance of a bend from the chord between two points, m, from which on it is told: twice the fit's tolerance."""
+_SHOWN = 3
+"""Places that are named one by one."""
+
+
+def cleaned(name: str, points: Float) -> Float:
+    """Return the points (M, 3) of a line that moves on, without those of stops, doubled ones and those that go back.
+
+    Args:
+        name: of the file, for remarks.
+        points: (N, 3), m, in order.
+
+    Raises:
+        InputError: the line turns back and doesn't come on again within 100 m, or fewer than two points are left.
+    """
+    number = np.arange(1, len(points) + 1)
+    points, number = _without_doubled(name, points, number)
+    points, number = _without_stops(name, points, number)
+    points, number = _without_backward(name, points, number)
+    if len(points) < 2:
+        raise InputError(name, None, f"at least two distinct points are needed, {len(points)} is left of its line")
+    return points
+
+
+def _place(points: Float, number: Int, at: int) -> str:
+    east, north = points[at, :2].tolist()
+    return f"point {number[at]} ({east:.2f}, {north:.2f})"
+
+
+def _steps(points: Float) -> Float:
+    return np.hypot(*np.diff(points[:, :2], axis=0).T)
+
+
+def _without_doubled(name: str, points: Float, number: Int) -> tuple[Float, Int]:
+    again = np.concatenate([[False], _steps(points) <= _SAME])
+    if again.any():
+        first = _place(points, number, int(again.argmax()))
+        assume("%s: %d points that are where the one before is are left out, the first is %s", name, again.sum(), first)
+    return points[~again], number[~again]
+
+
+def _without_stops(name: str, points: Float, number: Int) -> tuple[Float, Int]:
+    """Return the points with one in place of those of each stop: their mean."""
+    step = _steps(points)
+    if len(step) < 2 * _FEWEST_STILL:
+        return points, number
+    short = step < _STILL * float(np.median(step))
+    kept, moved, told = np.ones(len(points), dtype=bool), points.copy(), list[str]()
+    for first, last in _runs(short):
+        if last - first < _FEWEST_STILL:
+            continue
+        rows = slice(first, last + 1)
+        moved[first] = points[rows].mean(axis=0)
+        kept[first + 1 : last + 1] = False
+        told.append(f"{last - first + 1} at {_place(points, number, first)}")
+    if told:
+        more = f" and at {len(told) - _SHOWN} more places" if len(told) > _SHOWN else ""
+        assume("%s stands still: of points that hardly move one is kept: %s%s", name, ", ".join(told[:_SHOWN]), more)
+    return moved[kept], number[kept]
+
+
+def _runs(flags: Bool) -> list[tuple[int, int]]:
+    """Return first and last point of each run of steps that are flagged."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+
+
+def _without_backward(name: str, points: Float, number: Int) -> tuple[Float, Int]:
+    """Return the points without those that lie behind where the line has been."""
+    kept, dropped, told = list(range(min(2, len(points)))), 0, list[str]()
+    at = 2
+    while at < len(points):
+        before = points[kept[-1], :2] - points[kept[-2], :2]
+        step = points[at, :2] - points[kept[-1], :2]
+        length = float(np.hypot(*step))
+        if float(step @ before) > _BACK * length * float(np.hypot(*before)):
+            kept.append(at)
+            at += 1
+            continue
+        first = at
+        while at < len(points) and float((points[at, :2] - points[kept[-1], :2]) @ before) <= 0.0:
+            back = float(np.hypot(*(points[at, :2] - points[kept[-1], :2])))
+            if back > _FARTHEST_BACK:
+                raise InputError(
+                    f"{name}: {_place(points, number, kept[-1])}",
+                    None,
+                    f"the line turns back here, by {back:.0f} m and more: no road does. Cut the file there",
+                )
+            at += 1
+        dropped += at - first
+        told.append(_place(points, number, first))
+    if dropped:
+        more = f" and at {len(told) - _SHOWN} more places" if len(told) > _SHOWN else ""
+        warn("%s goes back: %d points are left out, from %s%s", name, dropped, ", ".join(told[:_SHOWN]), more)
+    return points[kept], number[kept]
+
+
+def widest_sagitta(points: Float) -> tuple[float, float, float, int]:
+    """Return the largest distance (m) that a bend through points (N, 3) may have from the chord between two of them.
+
+    Between two points a bend of the curvature that the line has at one of them, by the circle through the point and its
+    neighbours, is curvature * length^2 / 8 off the chord (the arc's sagitta).
+
+    Returns:
+        the distance (m), the chord's length (m), the radius (m; infinite without a bend) and the chord's first point.
+    """
+    chord = np.diff(points[:, :2], axis=0)
+    length = np.hypot(*chord.T)
+    if len(length) < 2:
+        return 0.0, float(length.max(initial=0.0)), np.inf, 0
+    before, after = chord[:-1], chord[1:]
+    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    across = np.hypot(*(before + after).T)
+    bend = 2.0 * np.abs(cross) / np.maximum(length[:-1] * length[1:] * across, 1e-12)
+    at_ends = np.maximum(np.concatenate([[0.0], bend]), np.concatenate([bend, [0.0]]))
+    sagitta = at_ends * length**2 / 8.0
+    at = int(sagitta.argmax())
+    return float(sagitta[at]), float(length[at]), float(1.0 / max(at_ends[at], 1e-12)), at
+
+
+def tell_spacing(name: str, points: Float) -> float:
+    """Warn where points (N, 3), m, are too far apart for the bends between them; return the largest sagitta, m."""
+    sagitta, length, radius, at = widest_sagitta(points)
+    if sagitta > _TOLD_SAGITTA:
+        along = float(_steps(points)[:at].sum())
+        east, north = points[at, :2].tolist()
+        warn(
+            "%s: points are %.0f m apart at %.0f m (%.2f, %.2f) in a bend of %.0f m radius: between them the road may lie "
+            "up to %.2f m beside the chord, which no fit can know better",
+            name, length, along, east, north, radius, sagitta,
+        )  # fmt: skip
+    return sagitta
