@@ -138,7 +138,7 @@ def _midway(first: _Dense, second: _Dense, here: Float, there: Float, stretch: t
         middle = 0.5 * (nodes + feet)[beside]
         _, near = tree.query(middle)
         station = first.stations[near] + ((middle - first.points[near]) * first.directions[near]).sum(axis=1)
-        keep = (station >= low - 1e-6) & (station <= high + 1e-6)
+        keep = (station >= low - _STEP) & (station <= high + _STEP)
         rows.append(np.column_stack([station[keep], middle[keep]]))
     found = np.concatenate(rows)
     found = found[np.argsort(found[:, 0], kind="stable")]

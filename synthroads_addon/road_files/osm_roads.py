@@ -28,6 +28,8 @@ _SAME_WIDTH = 2.0
 """Metres by which the distance of two carriageways may differ along the road without a word."""
 _Span = tuple[float, float, Mapping[str, str]]
 """Begin, end (m) and tags of a stretch."""
+_Carriageways = Mapping[str, Sequence[_Span]]
+"""Stretches of each carriageway, by the direction that it leads to; empty where a road has one alone."""
 T = TypeVar("T")
 
 
@@ -78,11 +80,9 @@ def _with_heights(points: Float) -> Float:
 
 def _of_chain(chain: Chain, not_paired: str | None) -> PointLine:
     spans = list(chain.spans())
-    section, left_out, remarks = _told(spans)
+    section, left_out, remarks = _told({"": spans})
     if not_paired:
         remarks = (*remarks, f"another carriageway has its name, and isn't paired with it: {not_paired}")
-    if chain.directed and not chain.link:
-        remarks = (*remarks, "its axis is the middle of one carriageway: --offset-from-path METRES moves it aside")
     missing = sum(way.missing for way in {way.number: way for way in chain.ways}.values())
     if missing:
         left_out = (*left_out, f"nodes that the file lacks: {missing}")
@@ -96,9 +96,9 @@ def _of_chain(chain: Chain, not_paired: str | None) -> PointLine:
 def _of_pair(pair: Pair) -> PointLine:
     first = _within(pair.one.spans(), lambda s: s - pair.begin, pair.end - pair.begin)
     second = _within(pair.other.spans(), _stations_on(pair), pair.end - pair.begin)
-    section, left_out, remarks = _told(first + second, both=(first, second))
+    section, left_out, remarks = _told({_heading(pair.one): first, _heading(pair.other): second})
     low, high = pair.spread_range
-    section = replace(section, spread=pair.spread)
+    section = replace(section, spread=pair.spread, one_way=False)
     if high - low > _SAME_WIDTH:
         left_out += (f"median: the carriageways are {low:.1f} to {high:.1f} m apart, {pair.spread:.1f} m all along",)
     names = f"{_heading(pair.one)} and {_heading(pair.other)}"
@@ -147,37 +147,35 @@ def _within(spans: Iterable[_Span], station: Callable[[float], float], length: f
     return rows
 
 
-def _told(
-    spans: Sequence[_Span], both: tuple[Sequence[_Span], Sequence[_Span]] | None = None
-) -> tuple[MappedSection, tuple[str, ...], tuple[str, ...]]:
+def _told(carriageways: _Carriageways) -> tuple[MappedSection, tuple[str, ...], tuple[str, ...]]:
     """Return what the tags of a road say of its section, what is left out of them, and remarks."""
+    spans = [span for rows in carriageways.values() for span in rows]
     left_out, remarks = list[str](), list[str]()
-    lanes = _most(spans, lambda tags: lanes_each_way(tags)[0])
-    counts = {count for _, _, tags in spans if (count := lanes_each_way(tags)[0]) is not None}
-    if len(counts) > 1:
-        rows = _stretches(spans, lambda tags: lanes_each_way(tags)[0], "{} lanes")
+    lanes, one_way = _most(spans, lambda tags: lanes_each_way(tags)[0]), driving_direction(spans[0][2]) != 0
+    if len(_values(spans, lambda tags: lanes_each_way(tags)[0])) > 1:
+        rows = _stretches(carriageways, lambda tags: lanes_each_way(tags)[0], "{} lanes")
         left_out.append(f"lanes that begin or end: {rows}; {lanes} each way all along")
-    remarks += sorted({odd for _, _, tags in spans if (odd := lanes_each_way(tags)[1])})
-    lane_width, fault = _lane_width(spans, lanes, both is not None or _one_way(spans))
+    remarks += sorted(_values(spans, lambda tags: lanes_each_way(tags)[1]))
+    lane_width, fault = _lane_width(spans, lanes, one_way)
     left_out += [fault] if fault else []
     speed = _most(spans, lambda tags: kilometres_per_hour(tags.get("maxspeed"))[0])
-    remarks += sorted({odd for _, _, tags in spans if (odd := kilometres_per_hour(tags.get("maxspeed"))[1])})
-    limits = {tags["maxspeed"] for _, _, tags in spans if "maxspeed" in tags}
-    if len(limits) > 1:
-        left_out.append(f"limits of speed: {_stretches(spans, lambda tags: tags.get('maxspeed'), 'maxspeed={!r}')}")
+    remarks += sorted(_values(spans, lambda tags: kilometres_per_hour(tags.get("maxspeed"))[1]))
+    if len(_values(spans, lambda tags: tags.get("maxspeed"))) > 1:
+        rows = _stretches(carriageways, lambda tags: tags.get("maxspeed"), "maxspeed={}")
+        left_out.append(f"limits of speed: {rows}")
     for key in ("bridge", "tunnel"):
-        rows = _stretches(spans, lambda tags, key=key: _there(tags.get(key)), f"{key}={{}}", tags_too="layer")
+        rows = _stretches(carriageways, lambda tags, key=key: _there(tags.get(key)), f"{key}={{}}", "layer")
         left_out += [f"structures: {rows}"] if rows else []
     surface = _most(spans, lambda tags: tags.get("surface"))
-    known = {tags["surface"] for _, _, tags in spans if "surface" in tags}
+    known = _values(spans, lambda tags: tags.get("surface"))
     if len(known) > 1 or any(word not in _PAVED for word in known):
-        left_out.append(f"surfaces: {_stretches(spans, lambda tags: tags.get('surface'), 'surface={}')}")
-    section = MappedSection(lanes, lane_width, None, speed, _PAVED.get(surface or ""))
+        left_out.append(f"surfaces: {_stretches(carriageways, lambda tags: tags.get('surface'), 'surface={}')}")
+    section = MappedSection(lanes, lane_width, None, one_way, speed, _PAVED.get(surface or ""))
     return section, tuple(left_out), tuple(remarks)
 
 
-def _one_way(spans: Sequence[_Span]) -> bool:
-    return driving_direction(spans[0][2]) != 0
+def _values(spans: Sequence[_Span], value: Callable[[Mapping[str, str]], T | None]) -> set[T]:
+    return {found for _, _, tags in spans if (found := value(tags)) is not None}
 
 
 def _there(value: str | None) -> str | None:
@@ -209,21 +207,24 @@ def _most(spans: Sequence[_Span], value: Callable[[Mapping[str, str]], T | None]
 
 
 def _stretches(
-    spans: Sequence[_Span], value: Callable[[Mapping[str, str]], object], text: str, tags_too: str | None = None
+    carriageways: _Carriageways, value: Callable[[Mapping[str, str]], object], text: str, also: str | None = None
 ) -> str:
-    """Return where a value holds, as text; stretches that follow each other with the same value are one."""
-    rows: list[tuple[str, float, float]] = []
-    for begin, end, tags in sorted(spans, key=lambda span: span[:2]):
-        found = value(tags)
-        if found is None:
-            continue
-        shown = text.format(str(found)[:40] if isinstance(found, str) else found)
-        if tags_too and tags_too in tags:
-            shown += f" {tags_too}={tags[tags_too][:10]}"
-        near = [n for n, row in enumerate(rows) if row[0] == shown and begin <= row[2] + 1.0]
-        if near:
-            rows[near[-1]] = (shown, rows[near[-1]][1], max(rows[near[-1]][2], end))
-        else:
-            rows.append((shown, begin, end))
-    texts = [f"{shown} from {begin:.0f} m to {end:.0f} m" for shown, begin, end in rows[:_SHOWN]]
-    return ", ".join(texts) + (f" and {len(rows) - _SHOWN} more" if len(rows) > _SHOWN else "")
+    """Return where a value holds on each carriageway, as text; stretches of one value in a row are one."""
+    texts = list[str]()
+    for name, spans in carriageways.items():
+        rows: list[tuple[str, float, float]] = []
+        for begin, end, tags in sorted(spans, key=lambda span: span[:2]):
+            found = value(tags)
+            if found is None:
+                continue
+            shown = text.format(str(found)[:40])
+            if also and also in tags:
+                shown += f" {also}={tags[also][:10]}"
+            if rows and rows[-1][0] == shown and begin <= rows[-1][2] + 1.0:
+                rows[-1] = (shown, rows[-1][1], max(rows[-1][2], end))
+            else:
+                rows.append((shown, begin, end))
+        shown_rows = [f"{shown} from {begin:.0f} m to {end:.0f} m" for shown, begin, end in rows[:_SHOWN]]
+        more = f" and {len(rows) - _SHOWN} more" if len(rows) > _SHOWN else ""
+        texts += [(f"{name}: " if name else "") + ", ".join(shown_rows) + more] if rows else []
+    return "; ".join(texts)

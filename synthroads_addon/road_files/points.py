@@ -28,6 +28,7 @@ class MappedSection:
         lanes: of one direction; None where it doesn't say.
         lane_width: m; None where it doesn't say.
         spread: distance (m) of the middles of both carriageways' lanes; None where it has one line for both.
+        one_way: whether the line is one carriageway alone.
         speed: largest that is allowed, km/h; None without a limit, or where it doesn't say.
         pavement: ``asphalt`` or ``concrete``; None where it says neither.
     """
@@ -35,6 +36,7 @@ class MappedSection:
     lanes: int | None = None
     lane_width: float | None = None
     spread: float | None = None
+    one_way: bool = False
     speed: float | None = None
     pavement: str | None = None
 

@@ -5,6 +5,8 @@ Each remark names a place: the number of a point as the file counts it, from 1, 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..base.arrays import Bool, Float, Int
@@ -22,16 +24,19 @@ _FARTHEST_BACK = 100.0
 """Metres that points may go back and be left out; a line that goes on doing so is another one."""
 _TOLD_SAGITTA = 0.1
 """Distance of a bend from the chord between two points, m, from which on it is told: twice the fit's tolerance."""
+_REACH = 5.0
+"""Distance, m, to either side over which the direction of a path is taken."""
 _SHOWN = 3
 """Places that are named one by one."""
 
 
-def cleaned(name: str, points: Float) -> Float:
+def cleaned(name: str, points: Float, apart: float = 0.0) -> Float:
     """Return the points (M, 3) of a line that moves on, without those of stops, doubled ones and those that go back.
 
     Args:
         name: of the file, for remarks.
         points: (N, 3), m, in order.
+        apart: least distance of the points that are kept, m; 0 keeps all.
 
     Raises:
         InputError: the line turns back and doesn't come on again within 100 m, or fewer than two points are left.
@@ -39,6 +44,9 @@ def cleaned(name: str, points: Float) -> Float:
     number = np.arange(1, len(points) + 1)
     points, number = _without_doubled(name, points, number)
     points, number = _without_stops(name, points, number)
+    if apart > 0.0 and len(points) > 1:
+        kept = thinned(points, apart)
+        points, number = points[kept], number[kept]
     points, number = _without_backward(name, points, number)
     if len(points) < 2:
         raise InputError(name, None, f"at least two distinct points are needed, {len(points)} is left of its line")
@@ -141,9 +149,10 @@ def widest_sagitta(points: Float) -> tuple[float, float, float, int]:
     return float(sagitta[at]), float(length[at]), float(1.0 / max(at_ends[at], 1e-12)), at
 
 
-def tell_spacing(name: str, points: Float) -> float:
-    """Warn where points (N, 3), m, are too far apart for the bends between them; return the largest sagitta, m."""
-    sagitta, length, radius, at = widest_sagitta(points)
+def tell_spacing(name: str, lines: Sequence[Float]) -> float:
+    """Warn where points (N, 3), m, of lines are too far apart for the bends between them; return the largest sagitta."""
+    worst = max(range(len(lines)), key=lambda n: widest_sagitta(lines[n])[0])
+    points, (sagitta, length, radius, at) = lines[worst], widest_sagitta(lines[worst])
     if sagitta > _TOLD_SAGITTA:
         along = float(_steps(points)[:at].sum())
         east, north = points[at, :2].tolist()
@@ -153,3 +162,44 @@ def tell_spacing(name: str, points: Float) -> float:
             name, length, along, east, north, radius, sagitta,
         )  # fmt: skip
     return sagitta
+
+
+def thinned(points: Float, apart: float) -> Int:
+    """Return which points (M,) of a line (N, 3) are at least some metres from the one kept before, and its last one."""
+    kept, plan = [0], points[:, :2].tolist()
+    east, north = plan[0]
+    for at in range(1, len(plan)):
+        if (plan[at][0] - east) ** 2 + (plan[at][1] - north) ** 2 >= apart * apart:
+            kept.append(at)
+            east, north = plan[at]
+    if kept[-1] != len(plan) - 1:
+        kept = [*(kept if len(kept) == 1 else kept[:-1]), len(plan) - 1]
+    return np.array(kept)
+
+
+def moved_aside(name: str, points: Float, offset: float, height: float) -> Float:
+    """Return the points (N, 3) of a line beside another one, at the same places along it.
+
+    The direction at a point is that of the line's chord over 5 m to either side.
+
+    Args:
+        name: of the file, for messages.
+        points: of the other one, m.
+        offset: of the line, m; positive to the left in the direction of the points.
+        height: that the line lies lower, m.
+
+    Raises:
+        InputError: a bend is so sharp that no line runs so far on its inner side.
+    """
+    station = np.concatenate([[0.0], np.cumsum(_steps(points))])
+    ahead, behind = (np.clip(station + reach, 0.0, station[-1]) for reach in (_REACH, -_REACH))
+    place = [[np.interp(at, station, points[:, axis]) for axis in (0, 1)] for at in (ahead, behind)]
+    chord = np.array(place[0]).T - np.array(place[1]).T
+    unit = chord / np.maximum(np.hypot(*chord.T), 1e-9)[:, None]
+    beside = points + np.column_stack([-offset * unit[:, 1], offset * unit[:, 0], np.full(len(points), -height)])
+    back = (np.diff(beside[:, :2], axis=0) * np.diff(points[:, :2], axis=0)).sum(axis=1) <= 0.0
+    if back.any():
+        at = int(back.argmax())
+        allowed = f"the path bends too sharply for that at {_place(points, np.arange(1, len(points) + 1), at)}"
+        raise InputError(f"{name}: --offset-from-path", offset, allowed)
+    return beside
