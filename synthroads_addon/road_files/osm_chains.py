@@ -14,8 +14,8 @@ import numpy as np
 from ..base.arrays import Float
 from .osm_tags import driving_direction
 
-EARTH = 6_371_008.8
-"""Mean radius, m: lengths beside each other on a map need no better."""
+_AXIS, _SQUARE = 6_378_137.0, 6.694379990141e-3
+"""Semi-major axis, m, and squared eccentricity of the ellipsoid of WGS 84 (EPSG:7030)."""
 _SHARPEST_JOINT = math.radians(60.0)
 """Where ways of one name meet at more than this, rad, the road doesn't go on from one to the other."""
 
@@ -98,17 +98,24 @@ class Chain:
 
 
 def steps(points: Float) -> Float:
-    """Return the distances (N - 1,), m, between points (N, 2) of longitude and latitude on a sphere."""
-    longitude, latitude = np.radians(points).T
-    up, along = np.diff(latitude), np.diff(longitude)
-    half = np.sin(up / 2.0) ** 2 + np.cos(latitude[:-1]) * np.cos(latitude[1:]) * np.sin(along / 2.0) ** 2
-    return 2.0 * EARTH * np.arcsin(np.sqrt(np.minimum(half, 1.0)))
+    """Return the distances (N - 1,), m, between neighbours among points (N, 2) of longitude and latitude, degrees."""
+    step = np.diff(points, axis=0)
+    step[:, 0] -= 360.0 * np.round(step[:, 0] / 360.0)
+    return np.hypot(*(step * _metres_per_degree(0.5 * (points[:-1, 1] + points[1:, 1]))).T)
 
 
 def on_plane(points: Float, origin: Float) -> Float:
     """Return points (N, 2) of longitude and latitude, degrees, as metres east and north of an origin (2,)."""
-    scale = np.radians(1.0) * EARTH * np.array([math.cos(math.radians(float(origin[1]))), 1.0])
-    return (points - origin) * scale
+    return (points - origin) * _metres_per_degree(origin[1])
+
+
+def _metres_per_degree(latitude: Float) -> Float:
+    """Return metres east and north (..., 2) per degree at latitudes (...): by the ellipsoid's radii of curvature."""
+    sine = np.sin(np.radians(latitude))
+    across = _AXIS / np.sqrt(1.0 - _SQUARE * sine**2)
+    along = across * (1.0 - _SQUARE) / (1.0 - _SQUARE * sine**2)
+    scale = np.stack([across * np.cos(np.radians(latitude)), along], axis=-1)
+    return np.radians(scale)
 
 
 def chained(ways: Iterable[OsmWay]) -> list[Chain]:

@@ -75,7 +75,7 @@ def _without_stops(name: str, points: Float, number: Int) -> tuple[Float, Int]:
     step = _steps(points)
     if len(step) < 2 * _FEWEST_STILL:
         return points, number
-    short = step < _STILL * float(np.median(step))
+    short = step < _STILL * _usual(step)
     kept, moved, told = np.ones(len(points), dtype=bool), points.copy(), list[str]()
     for first, last in _runs(short):
         if last - first < _FEWEST_STILL:
@@ -88,6 +88,13 @@ def _without_stops(name: str, points: Float, number: Int) -> tuple[Float, Int]:
         more = f" and at {len(told) - _SHOWN} more places" if len(told) > _SHOWN else ""
         assume("%s stands still: of points that hardly move one is kept: %s%s", name, ", ".join(told[:_SHOWN]), more)
     return moved[kept], number[kept]
+
+
+def _usual(step: Float) -> float:
+    """Return the step (m) than which half of the way is made of longer ones: thousands of a stop don't change it."""
+    ordered = np.sort(step)
+    run = np.cumsum(ordered)
+    return float(ordered[np.searchsorted(run, 0.5 * run[-1])])
 
 
 def _runs(flags: Bool) -> list[tuple[int, int]]:
