@@ -7,7 +7,9 @@ ESRI's "Shapefile Technical Description", OGC 06-103r4 (well-known binary).
 
 from __future__ import annotations
 
+import re
 import struct
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -19,6 +21,7 @@ import numpy as np
 
 from ..base.arrays import Float
 from ..base.errors import InputError, MissingFileError, MissingPackageError
+from ..base.remarks import warn
 from .line import LineNames
 from .points import PointLine
 from .xml_text import check_size
@@ -28,6 +31,8 @@ DRIVERS = {"GeoPackage": "GPKG", "shapefile": "ESRI Shapefile", "FlatGeobuf": "F
 _NAMES = ("name", "ref", "label", "bezeichnung", "road", "strasse", "id")
 """Fields that name a line, in any case, the first that a layer has."""
 _LINE, _MULTI_LINE = 2, 5
+_ENDING = "non conformant file extension"
+"""What GDAL says of content that has no name."""
 _JOINED = 1e-3
 """Parts of a line that meet within this, in units of the file, are one."""
 _MOST_LINES = 100_000
@@ -78,18 +83,28 @@ def read_vector(path: Path, kind: str) -> list[PointLine]:
 
 @contextmanager
 def _told_in_one_line(path: Path, kind: str) -> Iterator[None]:
-    """Context that turns what GDAL says of a file into one line."""
+    """Context that turns what GDAL says of a file into one line, or remarks."""
     from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, FieldError, GeometryError
 
     try:
-        yield
+        with warnings.catch_warnings(record=True) as found:
+            warnings.simplefilter("always")
+            yield
+        for text in sorted({_one_line(warning.message) for warning in found}):
+            if _ENDING not in text:
+                warn("%s: %s", path.name, text)
     except OSError as error:
         raise MissingFileError(str(path), None, f"cannot be read ({error.strerror})") from None
     except (DataLayerError, DataSourceError, FeatureError, FieldError, GeometryError, ValueError) as error:
         if isinstance(error, InputError):
             raise
-        reason = "".join(c if c.isprintable() else " " for c in str(error))[:200]
-        raise InputError(path.name, None, f"a valid {kind} is needed ({reason})") from None
+        raise InputError(path.name, None, f"a valid {kind} is needed ({_one_line(error)})") from None
+
+
+def _one_line(said: object) -> str:
+    """Return what GDAL says as one line, without the name that content has in its memory."""
+    text = re.sub(r"/vsimem/\S*", "the file", str(said))
+    return "".join(c if c.isprintable() else " " for c in text)[:200]
 
 
 def _check_beside(path: Path, kind: str) -> None:
