@@ -84,6 +84,7 @@ ROWS = (
         ("axis.csv",),
     ),
     Small("synthroads road road.xodr --output out/road-of-mine", inputs=("road.xodr",)),
+    Small("synthroads road map.osm --output out/road-of-a-map", inputs=("map.osm",)),
     Small("synthroads generate --output out/mms --scenario mobile-mapping-300m", f"{_DRAFT} {_CLOUD}"),
     Small(
         "synthroads scan scene.glb --device velodyne-hdl-64e --height 2 --output out/own",
