@@ -43,11 +43,19 @@ def _osm(python: Path, folder: Path) -> None:
         f'<node id="{first + n}" lon="{9.0 + 0.0021 * n}" lat="{north}"/>' for north, first, _ in sides for n in range(3)
     ]
     tags = '<tag k="highway" v="motorway"/><tag k="ref" v="A 9"/><tag k="lanes" v="2"/>'
-    ways = [
-        f'<way id="{first}">{"".join(f"<nd ref='{n}'/>" for n in order)}{tags}</way>'
-        for _, first, order in sides
-    ]
+    ways = []
+    for _, first, order in sides:
+        inner = "".join(f'<nd ref="{number}"/>' for number in order)
+        ways.append(f'<way id="{first}">{inner}{tags}</way>')
     (folder / "map.osm").write_text(f'<osm version="0.6">{"".join([*nodes, *ways])}</osm>', encoding="utf-8")
+
+
+def empty_binary_map() -> bytes:
+    """Return a binary map of OpenStreetMap that holds a header alone."""
+    header = b"\x22\x0eOsmSchema-V0.6\x22\x0aDenseNodes"
+    blob = b"\x0a" + bytes([len(header)]) + header
+    head = b"\x0a\x09OSMHeader\x18" + bytes([len(blob)])
+    return len(head).to_bytes(4, "big") + head + blob
 
 
 def _scan(python: Path, folder: Path) -> None:

@@ -540,7 +540,7 @@ def _(folder: Path) -> None:
     """GDAL's virtual format and its connections are no maps here, whatever their names end in."""
     pyogrio = pytest.importorskip("pyogrio")
     shape = np.array([well_known_binary(np.array([[0.0, 0.0, 1.0], [90.0, 0.0, 2.0]]))], dtype=object)
-    names = [np.array(["outside"], dtype=object)]
+    names = [np.array(["elsewhere"], dtype=object)]
     there = folder / "outside.gpkg"
     options = {"driver": "GPKG", "geometry_type": "LineString Z", "crs": "EPSG:25832"}
     pyogrio.raw.write(there, shape, names, ["name"], **options)
@@ -550,7 +550,7 @@ def _(folder: Path) -> None:
         assert name != "a.vrt" or pyogrio.read_info(folder / name)["features"] == 1, "GDAL itself reads it"
         with pytest.raises(InputError) as caught:
             axis_from_file(folder / name, RoadScenario(), 1)
-        assert "outside" not in str(caught.value)
+        assert "elsewhere" not in str(caught.value)
     entity = f'<!DOCTYPE osm [<!ENTITY a SYSTEM "{there}">]>'
     (folder / "a.osm").write_text(f'<?xml version="1.0"?>{entity}<osm version="0.6"><node id="&a;"/></osm>')
     with pytest.raises(InputError, match="must not be there: entities aren't read"):
