@@ -311,7 +311,9 @@ def add_axis_name_argument(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--offset-from-path", type=float, metavar="METRES", help=text)
     text = "the file's points run in the middle of this lane, 0 the outermost (instead of --offset-from-path)"
     parser.add_argument("--path-lane", type=int, metavar="N", help=text)
-    text = "the file's points are so high above the road, m; with the geoid's height where they count from the ellipsoid"
+    text = (
+        "the file's points are so high above the road, m; with the geoid's height where they count from the ellipsoid"
+    )
     parser.add_argument("--height-above-road", type=float, metavar="METRES", help=text)
 
 

@@ -86,8 +86,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
 def _table(rows: list[dict[str, Any]]) -> str:
     cells = []
     for row in rows:
-        shown = (("no heights", not row["heights"]), ("in a junction", row["junction"]))
-        shown += (("one carriageway", row["carriageway"]),)
+        shown = [("no heights", not row["heights"]), ("in a junction", row["junction"])]
+        shown += [("one carriageway", row["carriageway"])]
         notes = row["fault"] or ", ".join([*filter(None, [row["kind"]]), *(text for text, so in shown if so)])
         lanes = "" if row["lanes"] is None else str(row["lanes"])
         length = "" if row["fault"] else f"{row['length']:,.1f} m"

@@ -1,4 +1,4 @@
-"""The axis of a job's road from a line of points: found in its file, cleaned, moved to where the axis is, and fitted."""
+"""The axis of a job's road from a line of points: found, cleaned, moved to where the axis is, and fitted."""
 
 from __future__ import annotations
 
@@ -141,7 +141,7 @@ def chosen_line(file: str, lines: Sequence[PointLine], name: str | None) -> Poin
     else:
         usable = [one for one in lines if one.fault is None] or list(lines)
         alone = [one for one in usable if not (one.junction or one.carriageway)] or usable
-        line = max(alone, key=lambda one: line_length(one))
+        line = max(alone, key=line_length)
     if line.fault is not None:
         raise InputError(f"{file}: {line.name}: {line.fault.field}", line.fault.value, line.fault.allowed)
     if name is None and len(lines) > 1:
@@ -166,7 +166,7 @@ def degrees_length(points: Float) -> float:
 
 
 def _in_a_system(file: str, line: PointLine, declared: MapSystem | None, scenario: RoadScenario) -> RoadScenario:
-    """Return the scenario with the coordinate system that the road is to lie in: its own, the file's, or a zone of UTM."""
+    """Return the scenario with the coordinate system for the road: its own, the file's, or a zone of UTM."""
     if declared is None or "epsg" in scenario.model_fields_set:
         return scenario
     if declared.unit is not None and declared.epsg and declared.in_metres and not declared.local:
@@ -185,7 +185,9 @@ def _prepared(file: str, points: Float, driven: bool, scenario: RoadScenario, pl
     points = cleaned(file, points, _APART if driven else 0.0)
     offset = place.aside(cross_section_of(scenario))
     if driven and offset is None:
-        text = "%s is the path of a vehicle, and is taken for the axis itself: --offset-from-path METRES (positive to the "
+        text = (
+            "%s is the path of a vehicle, and is taken for the axis itself: --offset-from-path METRES (positive to the "
+        )
         warn(text + "left) or --path-lane N says where the axis lies beside it", file)
     if driven and place.height is None:
         warn("%s: heights are those of the path: --height-above-road METRES takes them down to the road", file)

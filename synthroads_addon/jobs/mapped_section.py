@@ -1,4 +1,4 @@
-"""What a map says of a road's cross-section and traffic, as limits of a scenario: as much as a parameter set holds."""
+"""A map's words on a road's cross-section and traffic, as limits of a scenario: as much as a parameter set holds."""
 
 from __future__ import annotations
 
@@ -74,9 +74,7 @@ def _of_one_line(one_way: bool, section: StandardCrossSection) -> str:
     return f"{text} {aside:g} leaves the right one where the map has it"
 
 
-def _with_lanes(
-    name: str, mapped: MappedSection, lanes: int, scenario: RoadScenario
-) -> tuple[RoadScenario, list[str]]:
+def _with_lanes(name: str, mapped: MappedSection, lanes: int, scenario: RoadScenario) -> tuple[RoadScenario, list[str]]:
     """Return the scenario with the first cross-section for a map's lanes that meets no conflict."""
     if lanes > _MOST_LANES:
         return scenario, [f"lanes: {lanes} each way, at most {_MOST_LANES} are possible"]
@@ -87,7 +85,9 @@ def _with_lanes(
             section = cross_section_of(changed)
             widths = ", ".join(f"{width:g}" for width in section.lanes)
             shown = changed.cross_section if isinstance(changed.cross_section, str) else "by hand"
-            text = "%s: %d lanes each way: cross-section %s, lanes of %s m, median of %g m; road.lanes=N asks for others"
+            text = (
+                "%s: %d lanes each way: cross-section %s, lanes of %s m, median of %g m; road.lanes=N asks for others"
+            )
             assume(text, name, lanes, shown, widths, section.median)
             return changed, lost
     return scenario, [f"lanes: {lanes} each way, which no cross-section of {scenario.design_class} holds"]
@@ -107,9 +107,12 @@ def _candidates(
             yield update, lost
         else:
             yield {**update, "cross_section": _by_hand(section, widths, median)}, lost
-    for update, section in bases:  # without the map's widths, where they meet limits
+    for update, _ in bases:  # without the map's widths, where they meet limits
         lost = [f"lane width: {mapped.lane_width:g} m"] if mapped.lane_width is not None else []
-        yield update, [*lost, *([f"median: by {mapped.spread:.1f} m between the carriageways"] if mapped.spread else [])]
+        yield (
+            update,
+            [*lost, *([f"median: by {mapped.spread:.1f} m between the carriageways"] if mapped.spread else [])],
+        )
 
 
 def _bases(
@@ -149,9 +152,7 @@ def _by_hand(section: StandardCrossSection, lanes: tuple[float, ...], median: fl
     )
 
 
-def _median(
-    mapped: MappedSection, section: StandardCrossSection, lanes: tuple[float, ...]
-) -> tuple[float, list[str]]:
+def _median(mapped: MappedSection, section: StandardCrossSection, lanes: tuple[float, ...]) -> tuple[float, list[str]]:
     """Return the median (m) by the distance of the carriageways' middles, or the section's, and what is left out."""
     if mapped.spread is None:
         return section.median, []
@@ -159,7 +160,9 @@ def _median(
     if abs(median - section.median) <= _MEDIAN_TOLERANCE:
         return section.median, []
     if not 0.5 <= median <= _WIDEST_MEDIAN:
-        return section.median, [f"median: {mapped.spread:.1f} m between the middles of the lanes would leave {median:g} m"]
+        return section.median, [
+            f"median: {mapped.spread:.1f} m between the middles of the lanes would leave {median:g} m"
+        ]
     return median, []
 
 

@@ -126,7 +126,7 @@ def paired(one: Chain, other: Chain) -> Pair | str:
 
 
 def _midway(first: _Dense, second: _Dense, here: Float, there: Float, stretch: tuple[float, float]) -> Float:
-    """Return the places (N, 2), m, midway between nodes of either line and the other line, along the first's stretch."""
+    """Return places (N, 2), m, midway between nodes of either line and the other one, along the first's stretch."""
     rows = []
     low, high = stretch
     tree = cKDTree(first.points)

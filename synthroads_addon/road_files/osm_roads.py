@@ -57,7 +57,7 @@ def roads_of_ways(ways: Iterable[OsmWay]) -> list[PointLine]:
 
 
 def _named(line: PointLine, chain: Chain) -> tuple[str, PointLine]:
-    """Return a chain's line and its name: with the direction it leads to if it is driven in one, or its way's number."""
+    """Return a chain's line and its name, with the direction it leads to if it is driven in one."""
     if chain.label is None:
         way = chain.ways[0]
         return f"{way.tags['highway']} {way.number}", line
@@ -163,8 +163,10 @@ def _told(carriageways: _Carriageways) -> tuple[MappedSection, tuple[str, ...], 
     if len(_values(spans, lambda tags: tags.get("maxspeed"))) > 1:
         rows = _stretches(carriageways, lambda tags: tags.get("maxspeed"), "maxspeed={}")
         left_out.append(f"limits of speed: {rows}")
-    for key in ("bridge", "tunnel"):
-        rows = _stretches(carriageways, lambda tags, key=key: _there(tags.get(key)), f"{key}={{}}", "layer")
+    for rows in (
+        _stretches(carriageways, lambda tags: _there(tags.get("bridge")), "bridge={}", "layer"),
+        _stretches(carriageways, lambda tags: _there(tags.get("tunnel")), "tunnel={}", "layer"),
+    ):
         left_out += [f"structures: {rows}"] if rows else []
     surface = _most(spans, lambda tags: tags.get("surface"))
     known = _values(spans, lambda tags: tags.get("surface"))
@@ -189,7 +191,9 @@ def _lane_width(spans: Sequence[_Span], lanes: int | None, one_way: bool) -> tup
         return None, None
     width = metres(text)
     if width is None or lanes is None:
-        return None, f"width={text[:40]!r}: " + ("it is no length" if width is None else "the number of lanes is missing")
+        return None, f"width={text[:40]!r}: " + (
+            "it is no length" if width is None else "the number of lanes is missing"
+        )
     lane = width / (lanes if one_way else 2 * lanes)
     if not _NARROWEST <= lane <= _WIDEST:
         return None, f"width={text[:40]!r}: lanes would be {lane:.2f} m wide, {_NARROWEST:g} to {_WIDEST:g} are allowed"

@@ -15,8 +15,8 @@ _UNITS = {None: 1.0, "m": 1.0, "cm": 0.01, "km": 1000.0, "ft": FOOT, "feet": FOO
 _PER_HOUR = {None: 1.0, "km/h": 1.0, "kmh": 1.0, "kph": 1.0, "mph": MILE / 1000.0, "knots": 1.852}
 _SPEED_WORDS = {"walk": 7.0, "urban": 50.0, "rural": 100.0, "nsl_single": 60.0 * MILE / 1000.0}
 _SPEED_WORDS |= {"nsl_dual": 70.0 * MILE / 1000.0, "nsl_restricted": 30.0 * MILE / 1000.0, "living_street": 7.0}
-"""Speeds of words such as ``DE:urban``, km/h, as most countries have them, which is told. ``motorway`` isn't among them:
-its limit is another in each, and in Germany there is none."""
+"""Speeds of words such as ``DE:urban``, km/h, as most countries have them, which is told. ``motorway`` isn't
+among them: its limit is another in each, and in Germany there is none."""
 _YES = frozenset({"yes", "true", "1"})
 DRIVEN = frozenset(
     {"motorway", "trunk", "primary", "secondary", "tertiary", "unclassified", "residential", "living_street"}

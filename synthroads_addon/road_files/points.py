@@ -22,7 +22,7 @@ from .xml_text import child, children, finite, local_name, read_xml
 
 @dataclass(frozen=True)
 class MappedSection:
-    """What a map says of a road's cross-section and traffic.
+    """A road's cross-section and traffic, as far as a map says them.
 
     Attributes:
         lanes: of one direction; None where it doesn't say.

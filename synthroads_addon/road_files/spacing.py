@@ -12,9 +12,12 @@ import numpy as np
 from ..base.arrays import Bool, Float, Int
 from ..base.errors import InputError
 from ..base.remarks import assume, warn
+from ..road.parameters import LONGEST_ROAD
 
 _SAME = 1e-6
 """Points no farther apart than this, m, are one."""
+_LONGEST_STEP, _LONGEST_DRIVEN = 20_000.0, 1000.0
+"""Farthest that the next point of a line, and of a path, may be, m: between farther ones is no road that is known."""
 _STILL = 0.05
 """Steps shorter than this share of the usual one are those of a stop, if there are several."""
 _FEWEST_STILL = 3
@@ -39,11 +42,13 @@ def cleaned(name: str, points: Float, apart: float = 0.0) -> Float:
         apart: least distance of the points that are kept, m; 0 keeps all.
 
     Raises:
-        InputError: the line turns back and doesn't come on again within 100 m, or fewer than two points are left.
+        InputError: the line turns back and doesn't come on again within 100 m, points are kilometres apart, it is
+            longer than any road, or fewer than two points are left.
     """
     number = np.arange(1, len(points) + 1)
     points, number = _without_doubled(name, points, number)
     points, number = _without_stops(name, points, number)
+    _refuse_far(name, points, number, _LONGEST_DRIVEN if apart > 0.0 else _LONGEST_STEP)
     if apart > 0.0 and len(points) > 1:
         kept = thinned(points, apart)
         points, number = points[kept], number[kept]
@@ -51,6 +56,17 @@ def cleaned(name: str, points: Float, apart: float = 0.0) -> Float:
     if len(points) < 2:
         raise InputError(name, None, f"at least two distinct points are needed, {len(points)} is left of its line")
     return points
+
+
+def _refuse_far(name: str, points: Float, number: Int, most: float) -> None:
+    """Raise `InputError` for points too far apart (m) to be of one road, or of a road too long for one."""
+    step = _steps(points)
+    if len(step) and step.max() > most:
+        at = int(step.argmax())
+        allowed = f"the next one is {step[at] / 1000.0:,.1f} km away, at most {most / 1000.0:g} km: is a part missing?"
+        raise InputError(f"{name}: {_place(points, number, at)}", None, allowed)
+    if step.sum() > LONGEST_ROAD:
+        raise InputError(f"{name}: length, m", round(float(step.sum())), f"at most {LONGEST_ROAD:g} m are needed")
 
 
 def _place(points: Float, number: Int, at: int) -> str:
@@ -157,15 +173,15 @@ def widest_sagitta(points: Float) -> tuple[float, float, float, int]:
 
 
 def tell_spacing(name: str, lines: Sequence[Float]) -> float:
-    """Warn where points (N, 3), m, of lines are too far apart for the bends between them; return the largest sagitta."""
+    """Warn where points (N, 3), m, of lines are too far apart for the bends between them; return the sagitta, m."""
     worst = max(range(len(lines)), key=lambda n: widest_sagitta(lines[n])[0])
     points, (sagitta, length, radius, at) = lines[worst], widest_sagitta(lines[worst])
     if sagitta > _TOLD_SAGITTA:
         along = float(_steps(points)[:at].sum())
         east, north = points[at, :2].tolist()
         warn(
-            "%s: points are %.0f m apart at %.0f m (%.2f, %.2f) in a bend of %.0f m radius: between them the road may lie "
-            "up to %.2f m beside the chord, which no fit can know better",
+            "%s: points are %.0f m apart at %.0f m (%.2f, %.2f) in a bend of %.0f m radius: between them the road may "
+            "lie up to %.2f m beside the chord, which no fit can know better",
             name, length, along, east, north, radius, sagitta,
         )  # fmt: skip
     return sagitta

@@ -13,7 +13,9 @@ from .points import PointLine
 from .xml_text import check_size
 
 __all__ = ["has_times", "is_sbet", "read_sbet"]
-_ELLIPSOIDAL = "its heights count from the ellipsoid of WGS 84: --height-above-road takes the geoid's height off as well"
+_ELLIPSOIDAL = (
+    "its heights count from the ellipsoid of WGS 84: --height-above-road takes the geoid's height off as well"
+)
 
 
 def read_sbet(path: Path) -> list[PointLine]:

@@ -1,8 +1,8 @@
 """Lines of vector files of geographic information systems: GeoPackage, shapefile, FlatGeobuf, by pyogrio (GDAL).
 
-GDAL knows some eighty formats, of which some start programs, follow addresses, or call the network. So a file is told by
-its content first, opened as one of the three alone, and refused if GDAL took it for another. OGC 12-128r18 (GeoPackage),
-ESRI's "Shapefile Technical Description", OGC 06-103r4 (well-known binary).
+GDAL knows some eighty formats, of which some start programs, follow addresses, or call the network. So a file is told
+by its content first, opened as one of the three alone, and refused if GDAL took it for another. OGC 12-128r18
+(GeoPackage), ESRI's "Shapefile Technical Description", OGC 06-103r4 (well-known binary).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ _NAMES = ("name", "ref", "label", "bezeichnung", "road", "strasse", "id")
 """Fields that name a line, in any case, the first that a layer has."""
 _LINE, _MULTI_LINE = 2, 5
 _ENDING = "non conformant file extension"
-"""What GDAL says of content that has no name."""
+"""GDAL's words on content that has no name."""
 _JOINED = 1e-3
 """Parts of a line that meet within this, in units of the file, are one."""
 _MOST_LINES = 100_000
@@ -84,6 +84,7 @@ def read_vector(path: Path, kind: str) -> list[PointLine]:
 @contextmanager
 def _told_in_one_line(path: Path, kind: str) -> Iterator[None]:
     """Context that turns what GDAL says of a file into one line, or remarks."""
+    # With the library itself, which is an extra.
     from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, FieldError, GeometryError
 
     try:
@@ -112,7 +113,9 @@ def _check_beside(path: Path, kind: str) -> None:
     if kind != "shapefile":
         return
     if path.suffix.lower() != ".shp":
-        raise InputError(path.name, path.suffix, "a shapefile's name must end in .shp, as its other parts have its name")
+        raise InputError(
+            path.name, path.suffix, "a shapefile's name must end in .shp, as its other parts have its name"
+        )
     for ending in (".shx", ".dbf"):
         if not any(path.with_suffix(form).is_file() for form in (ending, ending.upper())):
             raise InputError(path.name, ending, "a shapefile has this part beside it, which is missing")
@@ -124,7 +127,7 @@ def _may_hold_lines(geometry: object) -> bool:
 
 def _lines_of(path: Path, source: Any, layer: str, kind: str) -> Iterator[tuple[str | None, PointLine]]:
     """Yield name and line of each feature of a layer that is a line."""
-    import pyogrio
+    import pyogrio  # an extra
 
     info = pyogrio.read_info(source, layer=layer)
     if info["driver"] != DRIVERS[kind]:
@@ -139,9 +142,9 @@ def _lines_of(path: Path, source: Any, layer: str, kind: str) -> Iterator[tuple[
         given = None if not field else values[0][row]
         number = row + 1 if numbers is None else int(numbers[row])
         name = str(given) if given is not None and str(given).strip() not in ("", "nan") else f"line {number}"
-        for points, fault in _line_of(f"{path.name}: {name}", shape):
-            flat = not (points.shape[1] > 2 and points[:, 2].any())
-            points = np.column_stack([points[:, :2], np.zeros(len(points)) if flat else points[:, 2]])
+        for found, fault in _line_of(f"{path.name}: {name}", shape):
+            flat = not (found.shape[1] > 2 and found[:, 2].any())
+            points = np.column_stack([found[:, :2], np.zeros(len(found)) if flat else found[:, 2]])
             yield name, PointLine("", points, not flat, f"{kind} line", system=system, fault=fault)
 
 
@@ -155,7 +158,9 @@ def _line_of(place: str, shape: bytes | None) -> Iterator[tuple[Float, InputErro
     joined = [parts[0]]
     for part in parts[1:]:
         if np.abs(part[0, :2] - joined[-1][-1, :2]).max() > _JOINED:
-            fault = InputError("parts", len(parts), "a line of one part is needed, or of parts that begin where another ends")
+            fault = InputError(
+                "parts", len(parts), "a line of one part is needed, or of parts that begin where another ends"
+            )
             yield parts[0], fault
             return
         joined.append(part[1:])
@@ -198,5 +203,7 @@ def _points(place: str, data: bytes, at: int, order: str, has_z: bool, has_m: bo
     points: Float = flat.reshape(count, width)[:, : 2 + has_z].astype(np.float64)
     if not (np.abs(points) <= _LARGEST).all():
         row = int((~(np.abs(points) <= _LARGEST)).any(axis=1).argmax())
-        raise InputError(f"{place}: point {row + 1}", points[row].tolist(), f"finite numbers up to {_LARGEST:g} are needed")
+        raise InputError(
+            f"{place}: point {row + 1}", points[row].tolist(), f"finite numbers up to {_LARGEST:g} are needed"
+        )
     return points, at + 4 + 8 * count * width

@@ -234,7 +234,7 @@ def load_scenario(name_or_file: str, changes: list[str] | None = None) -> Scenar
 
 
 def data_as_given(scenario: Scenario) -> dict[str, Any]:
-    """Return a scenario's JSON data, without a coordinate system that nobody named: the file of an axis brings its own."""
+    """Return a scenario's JSON data, without a coordinate system that nobody named: an axis brings its own."""
     data = scenario.to_dict()
     if "epsg" not in scenario.road.model_fields_set:
         data["road"] = {name: value for name, value in data["road"].items() if name != "epsg"}

@@ -40,7 +40,9 @@ def _osm(python: Path, folder: Path) -> None:
     """Write a map of OpenStreetMap with the two carriageways of a motorway, 13 m apart, 300 m long."""
     sides = ((50.0, 1, (1, 2, 3)), (50.000117, 4, (6, 5, 4)))
     nodes = [
-        f'<node id="{first + n}" lon="{9.0 + 0.0021 * n}" lat="{north}"/>' for north, first, _ in sides for n in range(3)
+        f'<node id="{first + n}" lon="{9.0 + 0.0021 * n}" lat="{north}"/>'
+        for north, first, _ in sides
+        for n in range(3)
     ]
     tags = '<tag k="highway" v="motorway"/><tag k="ref" v="A 9"/><tag k="lanes" v="2"/>'
     ways = []

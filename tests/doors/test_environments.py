@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from tests.doors.documented import documented_lines
-from tests.doors.inputs import empty_binary_map
 from tests.doors.environments import places, run
+from tests.doors.inputs import empty_binary_map
 from tests.doors.run_documented import Outcome, rows_of, run_documented
 from tests.doors.small_sizes import EXTRAS
 

@@ -17,7 +17,7 @@ from synthroads_addon.road_files.read import OF_POINTS, format_of, read_lines
 from synthroads_addon.scenario.road import RoadScenario
 from tests.helpers.files.mutations import TOKENS, accepted, damaged, for_all, fuzz
 from tests.helpers.roads.written_lines import opendrive, xodr_road
-from tests.helpers.roads.written_maps import Map, beside, bend, sbet, vector_file, well_known_binary
+from tests.helpers.roads.written_maps import Map, bend, beside, sbet, vector_file, well_known_binary
 from tests.road_files.test_landxml import KINDS, written
 from tests.road_files.test_opendrive import main_road
 
@@ -113,13 +113,18 @@ def map_files(kind: str, folder: Path) -> list[bytes]:
     if kind == "sbet":
         return [sbet(path, points).read_bytes()]
     if kind in ("osm", "pbf"):
-        return [map_of(way).pbf(path).read_bytes() if kind == "pbf" else map_of(way).xml(path).read_bytes() for way in WAYS]
+        return [
+            map_of(way).pbf(path).read_bytes() if kind == "pbf" else map_of(way).xml(path).read_bytes() for way in WAYS
+        ]
     driver = {"gpkg": "GPKG", "shp": "ESRI Shapefile", "fgb": "FlatGeobuf"}[kind]
     vector_file(path, driver, {"axis": well_known_binary(points), "short": well_known_binary(points[:3])})
     return [path.read_bytes()]
 
 
-WAYS = ({"ref": "A 9", "lanes": "2", "maxspeed": "65 mph"}, {"name": "Road", "lanes": "3", "width": "7", "highway": "primary"})
+WAYS = (
+    {"ref": "A 9", "lanes": "2", "maxspeed": "65 mph"},
+    {"name": "Road", "lanes": "3", "width": "7", "highway": "primary"},
+)
 
 
 def map_of(tags: dict[str, str]) -> Map:

@@ -145,7 +145,9 @@ def test_points_too_far_apart_for_their_bend_are_told_with_a_figure(tmp_path: Pa
             assert away(axis, scenario, walk) < float(figure[2])
 
 
-def test_bridges_lanes_and_limits_are_told_by_their_stations(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bridges_lanes_and_limits_are_told_by_their_stations(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     written, walk = Map(), motorway()[1]
     nodes = written.line(beside(walk, np.linspace(0.0, 300.0, 31).tolist(), -9.0))
     common = {"ref": "A 9", "maxspeed": "65 mph", "surface": "concrete"}

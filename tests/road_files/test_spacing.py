@@ -68,6 +68,21 @@ def test_a_line_that_turns_back_for_good_is_refused_with_the_place() -> None:
         cleaned("a.csv", there_and_back)
 
 
+@pytest.mark.parametrize(
+    ("step", "apart", "message"),
+    [
+        (21000.0, 0.0, r"point 1 \(0\.00, 0\.00\): the next one is 21\.0 km away, at most 20 km"),
+        (1500.0, 1.0, r"the next one is 1\.5 km away, at most 1 km"),
+        (4000.0, 0.0, r"length, m is 204000: at most 200000 m are needed"),
+    ],
+)
+def test_points_too_far_apart_for_one_road_are_refused(step: float, apart: float, message: str) -> None:
+    """They would be fitted for minutes, gap by gap."""
+    line = np.column_stack([step * np.arange(52), np.zeros(52), np.zeros(52)])
+    with pytest.raises(InputError, match=message):
+        cleaned("a.csv", line, apart)
+
+
 @pytest.mark.parametrize(("radius", "step"), [(800.0, 111.0), (300.0, 30.0), (60.0, 10.0)])
 def test_the_sagitta_is_that_of_the_arc(radius: float, step: float) -> None:
     found, length, bend, _ = widest_sagitta(circle(radius, step, 6.0 * step))
@@ -84,7 +99,9 @@ def test_points_too_far_apart_are_told_with_place_and_figure() -> None:
         assert bool(remarks) is told
         if told:
             assert "points are 111 m apart at" in remarks[0]
-            assert "in a bend of 800 m radius: between them the road may lie up to 1.92 m beside the chord" in remarks[0]
+            assert (
+                "in a bend of 800 m radius: between them the road may lie up to 1.92 m beside the chord" in remarks[0]
+            )
 
 
 def test_csv_is_cleaned_and_told_of_too(tmp_path: Path) -> None:

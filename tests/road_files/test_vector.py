@@ -93,7 +93,10 @@ def test_measures_are_no_heights() -> None:
     rows = np.column_stack([line(), np.arange(len(line()), dtype=float)])
     for code, columns in ((3002, [0, 1, 2, 3]), (2002, [0, 1, 3]), (0xC0000002, [0, 1, 2, 3]), (0x40000002, [0, 1, 3])):
         for order in "<>":
-            shape = struct.pack(order + "BII", order == "<", code, len(rows)) + rows[:, columns].astype(order + "f8").tobytes()
+            shape = (
+                struct.pack(order + "BII", order == "<", code, len(rows))
+                + rows[:, columns].astype(order + "f8").tobytes()
+            )
             ((points, fault),) = _line_of("a", shape)
             assert fault is None
             assert np.array_equal(points, rows[:, :3] if 2 in columns else rows[:, :2])
@@ -144,7 +147,8 @@ def test_a_shapefile_needs_its_parts(tmp_path: Path) -> None:
 def test_other_formats_are_opened_by_nobody(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A virtual format of GDAL names another file, which mustn't be read: neither under its own name nor another."""
     there = vector_file(tmp_path / "there.gpkg", "GPKG", {"axis": well_known_binary(line())})
-    text = f'<OGRVRTDataSource><OGRVRTLayer name="there"><SrcDataSource>{there}</SrcDataSource></OGRVRTLayer></OGRVRTDataSource>'
+    layer = f'<OGRVRTLayer name="there"><SrcDataSource>{there}</SrcDataSource></OGRVRTLayer>'
+    text = f"<OGRVRTDataSource>{layer}</OGRVRTDataSource>"
     for name in ("a.vrt", "a.gpkg", "a.shp"):
         (tmp_path / name).write_text(text)
         assert main(["road", str(tmp_path / name), "--list"]) == 2

@@ -10,8 +10,10 @@ from .export import SYNTHROADS_OT_export_cloud, SYNTHROADS_OT_export_twin
 from .road_files import SYNTHROADS_OT_load_axis, SYNTHROADS_OT_load_road, SYNTHROADS_OT_save_road
 from .scan_road import SYNTHROADS_OT_road_from_scan
 
-_AXES = (".csv", ".txt", ".geojson", ".xodr", ".xml", ".ifc", ".kml", ".gpx", ".osm", ".pbf")
-_AXES += (".gpkg", ".shp", ".fgb", ".sbet", ".out")
+_AXES = (
+    *(".csv", ".txt", ".geojson", ".xodr", ".xml", ".ifc", ".kml", ".gpx"),
+    *(".osm", ".pbf", ".gpkg", ".shp", ".fgb", ".sbet", ".out"),
+)
 
 
 class _DropHandler:
@@ -54,7 +56,9 @@ class SYNTHROADS_FH_cloud(_DropHandler, bpy.types.FileHandler):
 def _draw_import(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
     layout = menu.layout
     layout.operator(SYNTHROADS_OT_load_road.bl_idname, text="SynthRoads Parameter Set (.json)")
-    layout.operator(SYNTHROADS_OT_load_axis.bl_idname, text="SynthRoads Centreline (.xodr, .xml, .ifc, .osm, .gpkg, .csv, ...)")
+    layout.operator(
+        SYNTHROADS_OT_load_axis.bl_idname, text="SynthRoads Centreline (.xodr, .xml, .ifc, .osm, .gpkg, .csv, ...)"
+    )
     endings = ", ".join(AVAILABLE)
     layout.operator(SYNTHROADS_OT_road_from_scan.bl_idname, text=f"SynthRoads Road from a Scan ({endings})")
 

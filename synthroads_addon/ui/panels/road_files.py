@@ -109,7 +109,7 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
     )
 
     def read(self, path: Path, scenario: Scenario) -> tuple[RoadParameters, str]:
-        """Return a road along the file's centreline, in the file's own system unless the panel names one, and the message."""
+        """Return a road along a centreline, in the file's system unless the panel names one, and the message."""
         if scenario.road.epsg == RoadScenario.model_fields["epsg"].default:
             road = scenario.road.model_copy()
             road.model_fields_set.discard("epsg")

@@ -17,7 +17,13 @@ from tests.helpers.roads.written_lines import Walk, linear
 Points = NDArray[np.float64]
 PLACE = 500_000.0, 5_600_000.0
 """Of a line's begin in UTM, zone 32, m."""
-BEND = [(300.0, 0.0, 0.0), (80.0, 0.0, 1 / 800.0), (700.0, 1 / 800.0, 1 / 800.0), (80.0, 1 / 800.0, 0.0), (300.0, 0.0, 0.0)]
+BEND = [
+    (300.0, 0.0, 0.0),
+    (80.0, 0.0, 1 / 800.0),
+    (700.0, 1 / 800.0, 1 / 800.0),
+    (80.0, 1 / 800.0, 0.0),
+    (300.0, 0.0, 0.0),
+]
 """Length and curvatures of a motorway's bend of 800 m radius between two straights."""
 
 
