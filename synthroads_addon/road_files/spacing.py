@@ -20,11 +20,12 @@ _LONGEST_STEP, _LONGEST_DRIVEN = 20_000.0, 1000.0
 """Farthest that the next point of a line, and of a path, may be, m: between farther ones is no road that is known."""
 _STILL = 0.05
 """Steps shorter than this share of the usual one are those of a stop, if there are several."""
-_FEWEST_STILL = 3
+_FEWEST_STILL, _WANDERING = 3, 0.5
+"""Steps of a stop at least; share of their length that its points may spread over: they wander, and lead nowhere."""
 _BACK = np.cos(np.radians(150.0))
 """Cosine of the change of direction from which on a line goes back."""
 _FARTHEST_BACK = 100.0
-"""Metres that points may go back and be left out; a line that goes on doing so is another one."""
+"""Metres that points may go back and be left out; a line that goes farther back is told of, and the fit judges it."""
 _TOLD_SAGITTA = 0.1
 """Distance of a bend from the chord between two points, m, from which on it is told: twice the fit's tolerance."""
 _REACH = 5.0
@@ -42,8 +43,7 @@ def cleaned(name: str, points: Float, apart: float = 0.0) -> Float:
         apart: least distance of the points that are kept, m; 0 keeps all.
 
     Raises:
-        InputError: the line turns back and doesn't come on again within 100 m, points are kilometres apart, it is
-            longer than any road, or fewer than two points are left.
+        InputError: points are kilometres apart, the line is longer than any road, or fewer than two points are left.
     """
     number = np.arange(1, len(points) + 1)
     points, number = _without_doubled(name, points, number)
@@ -94,9 +94,10 @@ def _without_stops(name: str, points: Float, number: Int) -> tuple[Float, Int]:
     short = step < _STILL * _usual(step)
     kept, moved, told = np.ones(len(points), dtype=bool), points.copy(), list[str]()
     for first, last in _runs(short):
-        if last - first < _FEWEST_STILL:
-            continue
         rows = slice(first, last + 1)
+        extent = float(np.hypot(*np.ptp(points[rows, :2], axis=0)))
+        if last - first < _FEWEST_STILL or extent > _WANDERING * float(step[first:last].sum()):
+            continue
         moved[first] = points[rows].mean(axis=0)
         kept[first + 1 : last + 1] = False
         told.append(f"{last - first + 1} at {_place(points, number, first)}")
@@ -120,33 +121,47 @@ def _runs(flags: Bool) -> list[tuple[int, int]]:
 
 
 def _without_backward(name: str, points: Float, number: Int) -> tuple[Float, Int]:
-    """Return the points without those that lie behind where the line has been."""
-    kept, dropped, told = list(range(min(2, len(points)))), 0, list[str]()
-    at = 2
+    """Return the points without those that lie behind where the line has been, if it soon comes on again."""
+    step = np.diff(points[:, :2], axis=0)
+    length = np.hypot(*step.T)
+    turns = (step[:-1] * step[1:]).sum(axis=1) <= _BACK * length[:-1] * length[1:]
+    if not turns.any():
+        return points, number
+    plan, kept, dropped, told, at = points[:, :2], [0, 1], 0, list[str](), 2
     while at < len(points):
-        before = points[kept[-1], :2] - points[kept[-2], :2]
-        step = points[at, :2] - points[kept[-1], :2]
-        length = float(np.hypot(*step))
-        if float(step @ before) > _BACK * length * float(np.hypot(*before)):
-            kept.append(at)
-            at += 1
-            continue
+        here, before = plan[kept[-1]], plan[kept[-1]] - plan[kept[-2]]
+        step = plan[at] - here
         first = at
-        while at < len(points) and float((points[at, :2] - points[kept[-1], :2]) @ before) <= 0.0:
-            back = float(np.hypot(*(points[at, :2] - points[kept[-1], :2])))
-            if back > _FARTHEST_BACK:
-                raise InputError(
-                    f"{name}: {_place(points, number, kept[-1])}",
-                    None,
-                    f"the line turns back here, by {back:.0f} m and more: no road does. Cut the file there",
-                )
-            at += 1
-        dropped += at - first
-        told.append(_place(points, number, first))
+        if float(step @ before) <= _BACK * float(np.hypot(*step) * np.hypot(*before)):
+            at = _comes_on(plan, at, here, before)
+            if at is None:
+                text = "%s turns back at %s, for more than %g m: no road does, and what is fitted there may be none"
+                warn(text, name, _place(points, number, kept[-1]), _FARTHEST_BACK)
+                at = first
+            else:
+                dropped += at - first
+                told.append(_place(points, number, first))
+                continue
+        kept.append(at)
+        at += 1
     if dropped:
         more = f" and at {len(told) - _SHOWN} more places" if len(told) > _SHOWN else ""
         warn("%s goes back: %d points are left out, from %s%s", name, dropped, ", ".join(told[:_SHOWN]), more)
     return points[kept], number[kept]
+
+
+def _comes_on(plan: Float, first: int, here: Float, before: Float) -> int | None:
+    """Return the first point (of N, 2) from one on that lies ahead of a place, seen along the step before it.
+
+    None where the line goes farther back than `_FARTHEST_BACK` before; the number of points where it ends there.
+    """
+    for at in range(first, len(plan)):
+        step = plan[at] - here
+        if float(step @ before) > 0.0:
+            return at
+        if float(np.hypot(*step)) > _FARTHEST_BACK:
+            return None
+    return len(plan)
 
 
 def widest_sagitta(points: Float) -> tuple[float, float, float, int]:

@@ -9,6 +9,7 @@ import pytest
 
 from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.remarks import collected_remarks
+from synthroads_addon.fitting.fit import AxisRefusedError
 from synthroads_addon.jobs.axis_source import axis_from_file
 from synthroads_addon.road_files.spacing import cleaned, moved_aside, tell_spacing, widest_sagitta
 from synthroads_addon.scenario.road import RoadScenario
@@ -51,6 +52,14 @@ def test_a_stop_is_one_point() -> None:
     assert "50 at point 21" in text
 
 
+def test_short_steps_that_lead_on_are_no_stop() -> None:
+    """Between two gaps that are half of the way."""
+    line = np.column_stack([np.r_[np.arange(0.0, 200.0, 5.0), 500.0, 900.0], np.zeros(42), np.zeros(42)])
+    found, text = with_remarks(line)
+    assert np.array_equal(found, line)
+    assert text == ""
+
+
 def test_points_that_go_back_are_left_out_and_told() -> None:
     order = [*range(15), 16, 15, *range(17, 40)]
     found, text = with_remarks(STRAIGHT[order])
@@ -62,10 +71,15 @@ def test_points_that_go_back_are_left_out_and_told() -> None:
     assert "5 points are left out, from point 22 (160.00, 0.00)" in text
 
 
-def test_a_line_that_turns_back_for_good_is_refused_with_the_place() -> None:
-    there_and_back = np.concatenate([STRAIGHT, STRAIGHT[::-1]])
-    with pytest.raises(InputError, match=r"a\.csv: point 40 \(390\.00, 0\.00\): the line turns back here, by 1\d\d m"):
-        cleaned("a.csv", there_and_back)
+def test_a_line_that_turns_back_for_good_is_told_of_and_refused_by_the_fit(tmp_path: Path) -> None:
+    there_and_back = np.concatenate([STRAIGHT, STRAIGHT[:20]])
+    found, text = with_remarks(there_and_back)
+    assert np.array_equal(found, there_and_back)
+    assert "a.csv turns back at point 40 (390.00, 0.00), for more than 100 m" in text
+    rows = there_and_back + (294_000.0, 5_628_000.0, 0.0)
+    (tmp_path / "a.csv").write_text("\n".join(",".join(map(str, row)) for row in rows.tolist()))
+    with pytest.raises(AxisRefusedError, match="no road follows its points"):
+        axis_from_file(tmp_path / "a.csv", RoadScenario(), 1)
 
 
 @pytest.mark.parametrize(
@@ -73,7 +87,7 @@ def test_a_line_that_turns_back_for_good_is_refused_with_the_place() -> None:
     [
         (21000.0, 0.0, r"point 1 \(0\.00, 0\.00\): the next one is 21\.0 km away, at most 20 km"),
         (1500.0, 1.0, r"the next one is 1\.5 km away, at most 1 km"),
-        (4000.0, 0.0, r"length, m is 204000: at most 200000 m are needed"),
+        (19_900.0, 0.0, r"length, m is 1014900: at most 1e\+06 m are needed"),
     ],
 )
 def test_points_too_far_apart_for_one_road_are_refused(step: float, apart: float, message: str) -> None:

@@ -80,16 +80,19 @@ class Map:
         return path
 
 
-def motorway(offset: float = 6.5, steps: tuple[float, float] = (60.0, 75.0), **tags: str) -> tuple[Map, Walk]:
+def motorway(
+    offset: float = 6.5, steps: tuple[float, float] = (60.0, 75.0), length: float = 0.0, **tags: str
+) -> tuple[Map, Walk]:
     """Return a map of a motorway's two carriageways, of two ways each, and its axis.
 
     Args:
         offset: of a carriageway's middle from the axis, m.
         steps: distance of the nodes of the carriageway along the axis and of that against it, m.
+        length: of the line's beginning that is mapped, m; 0 for all of it.
         tags: of all of its ways.
     """
     walk, found = bend(), Map()
-    end = walk.starts[-1]
+    end = length or walk.starts[-1]
     for side, step in zip((-1.0, 1.0), steps, strict=True):
         station = np.linspace(0.0, end, round(end / step) + 1)
         nodes = found.line(beside(walk, station.tolist(), side * offset))
