@@ -16,6 +16,8 @@ _NEAREST, _FARTHEST = 4.0, 60.0
 """Distance of the two carriageways' lines, m."""
 _OPPOSITE = np.cos(np.radians(150.0))
 """Cosine up to which two directions are opposite."""
+_REACH = 0.001
+"""Degrees of latitude, more than `_FARTHEST` anywhere."""
 _STEP = 5.0
 """Distance of the places at which they are compared, m."""
 _MOST = 100_000
@@ -101,10 +103,6 @@ def paired(one: Chain, other: Chain) -> Pair | str:
     """Return two carriageways of a road as a pair, or why they are none; an empty text where they lie apart."""
     origin = one.points.mean(axis=0)
     here, there = on_plane(one.points, origin), on_plane(other.points, origin)
-    if (here.min(axis=0) > there.max(axis=0) + _FARTHEST).any() or (
-        there.min(axis=0) > here.max(axis=0) + _FARTHEST
-    ).any():
-        return ""
     first, second = _Dense.of(here), _Dense.of(there)
     feet, beside = second.feet(first.points, first.directions)
     if not beside.any():
@@ -161,18 +159,28 @@ def _longest(flags: Bool) -> tuple[int, int]:
     return best
 
 
-def pairs_of(chains: Sequence[Chain]) -> tuple[list[Pair], dict[int, str]]:
-    """Return the pairs of one road's carriageways, each in one pair at most, and why others (by index) are in none."""
+def pairs_of(chains: Sequence[Chain]) -> tuple[list[Pair], dict[int, tuple[int, str]]]:
+    """Return the pairs of one road's carriageways, each in one pair at most, and what others lie beside in vain.
+
+    The latter by the number of a chain: the number of the other one, and why the two are no pair.
+    """
     order = sorted(range(len(chains)), key=lambda n: -chains[n].length)
-    found, taken, why = list[Pair](), set[int](), dict[int, str]()
-    for first, second in itertools.combinations(order, 2):
-        if first in taken or second in taken:
-            continue
-        pair = paired(chains[first], chains[second])
-        if isinstance(pair, Pair):
-            found.append(pair)
-            taken |= {first, second}
-        elif pair:
-            why.setdefault(first, pair)
-            why.setdefault(second, pair)
-    return found, {n: text for n, text in why.items() if n not in taken}
+    low = np.array([chains[n].points.min(axis=0) for n in order]).reshape(-1, 2)
+    high = np.array([chains[n].points.max(axis=0) for n in order]).reshape(-1, 2)
+    reach = np.column_stack([1.0 / np.maximum(np.cos(np.radians(low[:, 1])), 0.01), np.ones(len(low))]) * _REACH
+    found, taken, why = list[Pair](), set[int](), dict[int, tuple[int, str]]()
+    for row, first in enumerate(order):
+        near = (low[row] - reach[row] <= high[row + 1 :]).all(axis=1) & (high[row] + reach[row] >= low[row + 1 :]).all(
+            axis=1
+        )
+        for second in (order[row + 1 + int(n)] for n in np.flatnonzero(near)):
+            if first in taken or second in taken:
+                continue
+            pair = paired(chains[first], chains[second])
+            if isinstance(pair, Pair):
+                found.append(pair)
+                taken |= {first, second}
+            elif pair:
+                why.setdefault(first, (second, pair))
+                why.setdefault(second, (first, pair))
+    return found, {n: reason for n, reason in why.items() if n not in taken}

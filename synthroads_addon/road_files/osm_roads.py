@@ -49,7 +49,9 @@ def roads_of_ways(ways: Iterable[OsmWay]) -> list[PointLine]:
         pairs, why = pairs_of(chains) if label is not None else ([], {})
         found += [(label or "", _of_pair(pair)) for pair in pairs]
         for n, chain in enumerate(chains):
-            line = replace(_of_chain(chain, why.get(n)), carriageway=any(chain in (p.one, p.other) for p in pairs))
+            other, reason = why.get(n, (n, ""))
+            lonely = f"{label} {_heading(chains[other])} isn't paired with it: {reason}" if reason else None
+            line = replace(_of_chain(chain, lonely), carriageway=any(chain in (p.one, p.other) for p in pairs))
             found.append(_named(line, chain))
     found.sort(key=lambda row: -_length(row[1].points))
     names = LineNames()
@@ -82,7 +84,7 @@ def _of_chain(chain: Chain, not_paired: str | None) -> PointLine:
     spans = list(chain.spans())
     section, left_out, remarks = _told({"": spans})
     if not_paired:
-        remarks = (*remarks, f"another carriageway has its name, and isn't paired with it: {not_paired}")
+        remarks = (*remarks, not_paired)
     missing = sum(way.missing for way in {way.number: way for way in chain.ways}.values())
     if missing:
         left_out = (*left_out, f"nodes that the file lacks: {missing}")

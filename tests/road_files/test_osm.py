@@ -15,9 +15,12 @@ from synthroads_addon.base.remarks import collected_remarks
 from synthroads_addon.jobs.axis_source import axis_from_file
 from synthroads_addon.road.geometry import alignment_of, profile_of
 from synthroads_addon.road_files.osm import read_osm, read_pbf
+from synthroads_addon.road_files.osm_chains import Chain
+from synthroads_addon.road_files.osm_pairs import Pair, paired
 from synthroads_addon.road_files.osm_tags import driving_direction, kilometres_per_hour, lanes_each_way, metres
 from synthroads_addon.scenario.road import FreeCrossSection, RoadScenario
 from synthroads_addon.scenario.scenario import load_scenario
+from synthroads_addon.scenario.without import scenario_without
 from tests.helpers.roads.written_lines import Walk
 from tests.helpers.roads.written_maps import Map, beside, motorway
 
@@ -84,7 +87,10 @@ def test_carriageways_that_part_are_no_pair(tmp_path: Path) -> None:
     written.way(written.line(np.array(rows))[::-1], {"ref": "A 9", "lanes": "2"})
     lines = read_osm(written.xml(tmp_path / "a.osm"))
     assert len(lines) == 2
-    assert all("isn't paired with it" in " ".join(line.remarks) for line in lines)
+    names = {line.name for line in lines}
+    for line in lines:
+        (other,) = names - {line.name}
+        assert f"{other} isn't paired with it: the two run beside each other over" in " ".join(line.remarks)
     assert "80 % of" in told(tmp_path / "a.osm")[2]
 
 
@@ -143,6 +149,40 @@ def test_points_too_far_apart_for_their_bend_are_told_with_a_figure(tmp_path: Pa
             assert int(figure[1]) == pytest.approx(111, abs=3)
             assert 1.5 < float(figure[2]) < 2.5, "111 m by 111 m over 8 times 800 m"
             assert away(axis, scenario, walk) < float(figure[2])
+
+
+def test_the_options_of_a_scenario_leave_a_road_where_its_map_has_it(tmp_path: Path) -> None:
+    """A change of a scenario writes all of its fields anew: the usual coordinate system isn't meant by that."""
+    path = motorway()[0].xml(tmp_path / "a.osm")
+    for changes, epsg in (
+        ([], 32632),
+        (["seed=3"], 32632),
+        (["road.half_width=40"], 32632),
+        (["road.epsg=25832"], 25832),
+    ):
+        assert told(path, load_scenario("rq31-600m", changes).road)[1].epsg == epsg
+    scenario = scenario_without(load_scenario("rq31-600m", ["seed=3"]), ["relief"])
+    assert told(path, scenario.road)[1].epsg == 32632
+
+
+def test_many_roads_of_one_name_are_paired_quickly(tmp_path: Path) -> None:
+    """A name that a map has everywhere: only what lies near each other is compared."""
+    written, walk = Map(), motorway()[1]
+    for n in range(60):
+        for side in (-6.5, 6.5):
+            points = beside(walk, [0.0, 60.0, 120.0], side) + (2000.0 * (n % 8), 2000.0 * (n // 8))
+            written.way(written.line(points)[:: 1 if side < 0 else -1], {"ref": "A 9", "lanes": "2"})
+    compared = []
+
+    def counted(one: Chain, other: Chain) -> Pair | str:
+        compared.append(1)
+        return paired(one, other)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("synthroads_addon.road_files.osm_pairs.paired", counted)
+        lines = read_osm(written.xml(tmp_path / "a.osm"))
+    assert sum(not line.carriageway for line in lines) == 60
+    assert len(compared) == 60, "of 7140 pairs of carriageways"
 
 
 def test_bridges_lanes_and_limits_are_told_by_their_stations(
