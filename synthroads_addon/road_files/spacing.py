@@ -196,7 +196,7 @@ def tell_spacing(name: str, lines: Sequence[Float]) -> float:
         east, north = points[at, :2].tolist()
         warn(
             "%s: points are %.0f m apart at %.0f m (%.2f, %.2f) in a bend of %.0f m radius: between them the road may "
-            "lie up to %.2f m beside the chord, which no fit can know better",
+            "lie up to %.2f m beside the chord: what is fitted there is a guess",
             name, length, along, east, north, radius, sagitta,
         )  # fmt: skip
     return sagitta
