@@ -16,7 +16,7 @@ from contextlib import contextmanager, suppress
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from headless import INTERRUPTED, MAPPING_FAILED, ignore_end_signals, was_stopped
 from headless.messages import messages
@@ -24,10 +24,14 @@ from synthroads_addon.base.errors import InputError, nearest_name
 from synthroads_addon.base.remarks import collected_remarks
 from synthroads_addon.base.scratch.folders import remove_scratch_folders, temporary_files_in_scratch
 
+if TYPE_CHECKING:
+    from synthroads_addon.jobs.axis_points import PathPlace
+
 EXTRAS = {
     **dict.fromkeys(("matplotlib", "skimage", "sklearn", "torch"), "ml"),
     "ifcopenshell": "twin",
     "pye57": "e57",
+    **dict.fromkeys(("osmium", "pyogrio"), "maps"),
     **dict.fromkeys(("cryptography", "dask", "dask_jobqueue", "distributed"), "cluster"),
     **dict.fromkeys(("ml_dtypes", "onnx", "onnxruntime", "onnxscript"), "onnx"),
     **dict.fromkeys(("bpy", "mathutils", "shtab", "yaml"), "blender"),
@@ -54,7 +58,10 @@ if lacking := [name for name in _NEEDED if find_spec(name) is None]:  # Blender 
 Outcome = tuple[int, dict[str, Any], str | Iterator[str]]
 """Outcome of a sub-command: exit code, result as JSON data, result as text or lines of it."""
 
-AXIS_FILES = "centreline: OpenDRIVE, LandXML, IFC, KML, GPX, CSV (x, y, z in order) or GeoJSON"
+AXIS_FILES = (
+    "centreline: OpenDRIVE, LandXML, IFC, OpenStreetMap, GeoPackage, shapefile, FlatGeobuf, SBET, KML, GPX, "
+    "CSV (x, y, z in order) or GeoJSON"
+)
 """Files that an axis is read from, for the help of commands."""
 
 SHORT_OPTIONS = {
@@ -297,9 +304,28 @@ def add_renamed_argument(parser: argparse.ArgumentParser, former: str, name: str
 
 
 def add_axis_name_argument(parser: argparse.ArgumentParser) -> None:
-    """Declare ``--axis-name``, which chooses one of a file's roads."""
+    """Declare ``--axis-name``, which chooses one of a file's roads, and where the axis lies beside a line of points."""
     text = "road or alignment of the file, by its name (the longest); `synthroads road FILE --list` lists them"
     parser.add_argument("--axis-name", metavar="NAME", help=text)
+    text = "the axis lies so far beside the file's points, m; positive to the left in their direction (0)"
+    parser.add_argument("--offset-from-path", type=float, metavar="METRES", help=text)
+    text = "the file's points run in the middle of this lane, 0 the outermost (instead of --offset-from-path)"
+    parser.add_argument("--path-lane", type=int, metavar="N", help=text)
+    text = (
+        "the file's points are so high above the road, m; with the geoid's height where they count from the ellipsoid"
+    )
+    parser.add_argument("--height-above-road", type=float, metavar="METRES", help=text)
+
+
+def axis_place(arguments: argparse.Namespace) -> "PathPlace":
+    """Return where the axis lies beside a file's points, by the arguments that `add_axis_name_argument` declares."""
+    from synthroads_addon.jobs.axis_points import PathPlace
+
+    place = PathPlace(arguments.offset_from_path, arguments.path_lane, arguments.height_above_road)
+    for option, value, most in (("offset-from-path", place.offset, 100.0), ("height-above-road", place.height, 1000.0)):
+        if value is not None and not abs(value) <= most:
+            raise InputError(f"--{option}", value, f"a length of at most {most:g} m to either side is needed")
+    return place
 
 
 def add_twin_argument(parser: argparse.ArgumentParser, default: Sequence[str] = ()) -> None:

@@ -19,6 +19,7 @@ from headless.commands import (
     add_device_argument,
     add_twin_argument,
     all_changes,
+    axis_place,
     choice_changes,
     choice_summary,
     entry,
@@ -77,7 +78,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     detail("scenario", scenario.to_dict())
     from synthroads_addon.jobs.generate import Job, generate
 
-    files = (arguments.output, arguments.parameters, arguments.axis, arguments.axis_name)
+    files = (arguments.output, arguments.parameters, arguments.axis, arguments.axis_name, axis_place(arguments))
     job = Job(scenario, *files, arguments.overwrite, new_file=True, begun=begun)
     report = generate(job, progress_bar(arguments))
     return 0, report, summary(report, arguments.output)

@@ -1,4 +1,4 @@
-"""Turn a road of another program's file (OpenDRIVE, LandXML, IFC) or a measured axis into a parameter set.
+"""Turn a road of another program's file (OpenDRIVE, LandXML, IFC), of a map, or a measured axis into a parameter set.
 
 The file's elements become the road's axis exactly; what it doesn't say comes from the scenario. Exit code 3: what the
 file says of the road's surface was left out.
@@ -20,6 +20,7 @@ from headless.commands import (
     add_axis_name_argument,
     add_changes_argument,
     all_changes,
+    axis_place,
     entry,
 )
 from synthroads_addon.base.errors import InputError
@@ -66,7 +67,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
         from synthroads_addon.road.geometry import RoadGeometry
         from synthroads_addon.road.tessellation import sample_stations
 
-        source = RoadSource(scenario, axis=arguments.file, axis_name=arguments.axis_name, pictures=arguments.output)
+        place = axis_place(arguments)
+        source = RoadSource(scenario, None, arguments.file, arguments.axis_name, place, arguments.output)
         parameters, told = source.read()
         report = told["axis"]
         road = RoadGeometry(parameters)
@@ -84,8 +86,9 @@ def run(arguments: argparse.Namespace) -> Outcome:
 def _table(rows: list[dict[str, Any]]) -> str:
     cells = []
     for row in rows:
-        shown = (("no heights", not row["heights"]), ("in a junction", row["junction"]))
-        notes = row["fault"] or ", ".join(text for text, so in shown if so)
+        shown = [("no heights", not row["heights"]), ("in a junction", row["junction"])]
+        shown += [("one carriageway", row["carriageway"])]
+        notes = row["fault"] or ", ".join([*filter(None, [row["kind"]]), *(text for text, so in shown if so)])
         lanes = "" if row["lanes"] is None else str(row["lanes"])
         length = "" if row["fault"] else f"{row['length']:,.1f} m"
         of_what = f"{row['points']} points" if row["points"] else str(row["elements"])

@@ -7,22 +7,20 @@ from typing import Any
 
 import numpy as np
 
-from ..base.arrays import Float
 from ..base.errors import InputError
 from ..base.maps.crs import LONGITUDE_LATITUDE, MapSystem
-from ..base.maps.places import Placement, bring
 from ..base.random_streams import stream
 from ..base.remarks import assume, warn
-from ..fitting.fit import axis_of_points, fit_heights, fitted_axis
+from ..fitting.fit import fit_heights
 from ..road.alignment import clip_offset, left_vectors
 from ..road.geometry import alignment_of
 from ..road.parameters import AlignmentObject
 from ..road.terrain import road_elevation_model
-from ..road_files.axis import road_axis, utm_zone
-from ..road_files.points import read_point_lines
-from ..road_files.read import OF_POINTS, READERS, format_of, named_line, read_lines
+from ..road_files.axis import road_axis
+from ..road_files.read import OF_POINTS, READERS, format_of, read_lines, read_points
 from ..sampling.alignment import sample_profile
 from ..scenario.road import RoadScenario
+from .axis_points import NOWHERE_ELSE, PathPlace, axis_of_line, line_length
 
 _SPACING = 10.0
 """Distance of the heights that are taken from an elevation model, m."""
@@ -36,81 +34,52 @@ cuts and fills."""
 
 
 def axis_from_file(
-    path: Path, scenario: RoadScenario, seed: int, name: str | None = None
+    path: Path, scenario: RoadScenario, seed: int, name: str | None = None, place: PathPlace = NOWHERE_ELSE
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     """Return the axis of a file in local coordinates, the scenario that follows from it, and a report.
 
-    Elements of OpenDRIVE, LandXML and IFC are taken over (`road_files.axis.road_axis`); points of CSV, GeoJSON, KML and
-    GPX are fitted (`fitting.fit.fitted_axis`). A file of elements without heights gets those of the scenario's
-    elevation model, else drawn ones.
+    Elements of OpenDRIVE, LandXML and IFC are taken over (`road_files.axis.road_axis`); points of all others are
+    cleaned and fitted (`axis_points.axis_of_line`). A file without heights gets those of the scenario's elevation
+    model, else drawn ones; CSV and GeoJSON without z lie at 0 m.
 
     Args:
         path: the file; its content says its format.
         scenario: limits of the road.
         seed: of what is drawn.
         name: of the road or alignment in the file; None takes the longest.
+        place: where the axis lies beside a line of points.
 
     Raises:
         AxisRefusedError: no road follows the points.
-        MissingFileError, InputError: see both functions; or a name is given for a file of points.
+        MissingFileError, InputError: see both functions; or a name is given for a file of one line, a place for one of
+            elements.
     """
     kind = format_of(path)
     if kind not in READERS:
-        if kind is None and name is not None:
-            raise InputError("--axis-name", name, "is for files of several roads or lines: this one has one of points")
-        fitted, limits, report = fitted_axis(path, scenario) if kind is None else _line_of_degrees(path, scenario, name)
-        _tell_overlap(path, fitted, limits.half_width)
-        return fitted, limits, report
-    axis, limits, report = road_axis(path, scenario, name)
+        axis, limits, report = axis_of_line(path, kind, scenario, name, place)
+    elif place.given:
+        raise InputError(place.given, path.name, f"is for lines of points and paths: {kind} says where its axis lies")
+    else:
+        axis, limits, report = road_axis(path, scenario, name)
     _tell_overlap(path, axis, limits.half_width)
-    if report["heights"] is None:
+    if report.get("heights", ()) is None:
         vertical, source = _heights(axis, limits, seed)
         axis = axis.model_copy(update={"vertical": vertical})
         report["heights"] = {"points": len(vertical), "source": source}
         assume("%s has no heights: %s", path.name, source)
-    if report["heights"].get("deviation", 0.0) > _NEAR:
-        heights = report["heights"]
-        text = "%s: parabolas are %.4f m off its heights at station %.1f m"
-        warn(text, path.name, heights["deviation"], heights["deviation_station"])
-    for step in report["heights"].get("steps_left_out", []):
-        text = "%s: heights jump by %.3f m at station %.3f m: what follows is moved to meet what is before"
-        warn(text, path.name, step["step"], step["station"])
+    if kind in READERS:
+        _tell_heights(path, report["heights"])
     return axis, limits, report
 
 
-def _line_of_degrees(
-    path: Path, scenario: RoadScenario, name: str | None
-) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
-    """Return the axis fitted to a line of KML or GPX: the one of a name, or the longest; see `axis_from_file`.
-
-    Without a coordinate system in the scenario it lies in its zone of UTM (WGS 84).
-    """
-    lines = read_point_lines(path)
-    if not lines:
-        raise InputError(path.name, None, "the file has no line of two points or more")
-    degrees = MapSystem.read(LONGITUDE_LATITUDE)
-    line = (
-        max(lines, key=lambda one: degrees_length(one.points)) if name is None else named_line(lines, name, path.name)
-    )
-    if name is None and len(lines) > 1:
-        assume("%s has %d lines: the longest, %r, is taken", path.name, len(lines), line.name)
-    if "epsg" not in scenario.model_fields_set:
-        zone = utm_zone(*line.points[len(line.points) // 2, :2].tolist())
-        scenario = scenario.model_copy(update={"epsg": zone.epsg})
-        assume("%s is in degrees: the road lies in %s; --set road.epsg=CODE names another", path.name, zone.label)
-    if not line.has_heights:
-        assume("%s has no heights: they are 0 m", path.name)
-    place = Placement.of(MapSystem.of(scenario.epsg, scenario.height_epsg))
-    points = bring(path.name, line.points, degrees, place)
-    axis, limits, report = axis_of_points(path.name, points, None, scenario)
-    return axis, limits, report | {"name": line.name}
-
-
-def degrees_length(points: Float) -> float:
-    """Return the length, m, of a line of longitudes and latitudes (N, 2 or more) on the ellipsoid of WGS 84."""
-    from pyproj import Geod  # takes a fifth of a second, and few roads come in degrees
-
-    return float(Geod(ellps="WGS84").line_length(points[:, 0], points[:, 1]))
+def _tell_heights(path: Path, heights: dict[str, Any]) -> None:
+    """Warn where a file's heights were approximated by more than is good, or moved."""
+    if heights.get("deviation", 0.0) > _NEAR:
+        text = "%s: parabolas are %.4f m off its heights at station %.1f m"
+        warn(text, path.name, heights["deviation"], heights["deviation_station"])
+    for step in heights.get("steps_left_out", []):
+        text = "%s: heights jump by %.3f m at station %.3f m: what follows is moved to meet what is before"
+        warn(text, path.name, step["step"], step["station"])
 
 
 def _tell_overlap(path: Path, axis: AlignmentObject, half_width: float) -> None:
@@ -184,17 +153,23 @@ def listed_lines(path: Path) -> list[dict[str, Any]]:
         MissingFileError, InputError: the file can't be read, or is of a format with one line alone.
     """
     nothing: dict[str, Any] = {"elements": 0, "points": 0, "lanes": None, "junction": False, "fault": None}
-    if format_of(path) in OF_POINTS:
+    nothing |= {"carriageway": False, "kind": ""}
+    if (kind := format_of(path)) in OF_POINTS:
         return [
             nothing
             | {
                 "name": line.name,
-                "length": round(degrees_length(line.points), 3),
+                "length": round(line_length(line), 3),
                 "points": len(line.points),
                 "heights": line.has_heights,
-                "system": LONGITUDE_LATITUDE,
+                "system": None if line.system is None else _shown_system(line.system),
+                "lanes": line.section.lanes if line.section else None,
+                "junction": line.junction,
+                "carriageway": line.carriageway,
+                "kind": line.source,
+                "fault": str(line.fault) if line.fault else None,
             }
-            for line in read_point_lines(path)
+            for line in read_points(path, kind)
         ]
     return [
         nothing
@@ -210,3 +185,7 @@ def listed_lines(path: Path) -> list[dict[str, Any]]:
         }
         for line in read_lines(path)
     ]
+
+
+def _shown_system(text: str) -> str:
+    return text if text == LONGITUDE_LATITUDE else MapSystem.read(text).label

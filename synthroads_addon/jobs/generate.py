@@ -20,6 +20,7 @@ from ..scanning.scene.classify import check_asset_classes
 from ..scenario.road import RoadScenario
 from ..scenario.scenario import OF_POINTS, Scenario
 from ..twin.formats import check_formats
+from .axis_points import NOWHERE_ELSE, PathPlace
 from .axis_source import axis_from_file
 from .job_files import FILES, JobFiles, empty_scan_warnings
 from .scan.plan import check_scan
@@ -36,8 +37,9 @@ class Job:
         scenario: limits, scan, fidelity and outputs.
         output: folder for the files.
         parameters: take this road instead of sampling one.
-        axis: sample a road along this centreline (CSV, GeoJSON, OpenDRIVE, LandXML, IFC).
+        axis: sample a road along this centreline: any file that `synthroads road` reads.
         axis_name: of the road or alignment in that file; None takes the longest.
+        axis_place: where the axis lies beside that file's points.
         overwrite: replace files that are already there.
         new_file: build in a new, empty Blender file instead of the open one, which is lost.
         begun: when the job began, by `time.perf_counter`, for a time budget; when `generate` is called if None.
@@ -48,6 +50,7 @@ class Job:
     parameters: Path | None = None
     axis: Path | None = None
     axis_name: str | None = None
+    axis_place: PathPlace = NOWHERE_ELSE
     overwrite: bool = False
     new_file: bool = False
     begun: float | None = None
@@ -65,6 +68,7 @@ class RoadSource:
     parameters: Path | None = None
     axis: Path | None = None
     axis_name: str | None = None
+    axis_place: PathPlace = NOWHERE_ELSE
     pictures: Path | None = None
 
     def read(self) -> tuple[RoadParameters, dict[str, Any]]:
@@ -74,7 +78,8 @@ class RoadSource:
             return read_parameters(self.parameters), {}
         if self.axis:
             with draw_refused_fit(self.pictures):
-                axis, limits, report = axis_from_file(self.axis, scenario.road, scenario.seed, self.axis_name)
+                given = (self.axis, scenario.road, scenario.seed, self.axis_name, self.axis_place)
+                axis, limits, report = axis_from_file(*given)
             return sample_road(limits, scenario.seed, scenario.title, axis), {"axis": report}
         return sample_road(scenario.road, scenario.seed, scenario.title), {}
 
@@ -89,7 +94,7 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
     """
     begun, timer = job.begun or time.perf_counter(), StageTimer(progress)
     check(job)
-    source = RoadSource(job.scenario, job.parameters, job.axis, job.axis_name, pictures=job.output)
+    source = RoadSource(job.scenario, job.parameters, job.axis, job.axis_name, job.axis_place, job.output)
     files, scene = JobFiles(job.scenario), None
     with output_folder(job.output, files.names, job.overwrite) as folder:
         road, report = make_road(source, timer)

@@ -1,1 +1,1 @@
-"""Roads and alignments in other programs' files: read exactly, and turned into the axis of a parameter set."""
+"""Roads in other programs' files, on maps and of tracks: read, and turned into the axis of a parameter set."""

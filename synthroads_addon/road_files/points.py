@@ -15,23 +15,67 @@ import numpy as np
 
 from ..base.arrays import Float
 from ..base.errors import InputError
+from ..base.maps.crs import LONGITUDE_LATITUDE
 from .line import LineNames
 from .xml_text import child, children, finite, local_name, read_xml
 
 
 @dataclass(frozen=True)
+class MappedSection:
+    """A road's cross-section and traffic, as far as a map says them.
+
+    Attributes:
+        lanes: of one direction; None where it doesn't say.
+        lane_width: m; None where it doesn't say.
+        spread: distance (m) of the middles of both carriageways' lanes; None where it has one line for both.
+        one_way: whether the line is one carriageway alone.
+        speed: largest that is allowed, km/h; None without a limit, or where it doesn't say.
+        pavement: ``asphalt`` or ``concrete``; None where it says neither.
+    """
+
+    lanes: int | None = None
+    lane_width: float | None = None
+    spread: float | None = None
+    one_way: bool = False
+    speed: float | None = None
+    pavement: str | None = None
+
+
+@dataclass(frozen=True)
 class PointLine:
-    """A line of points in WGS 84.
+    """A line of points.
 
     Attributes:
         name: as the file has it, unique in the file.
-        points: (N, 3) longitude, latitude (degrees) and height (m; 0 where the file has none).
+        points: (N, 3) in a coordinate system; heights are 0 where the file has none.
         has_heights: whether a height other than 0 is there.
+        source: format and kind, e.g. ``GPX track``.
+        system: name or WKT of the system: longitude and latitude (degrees) and height (m); None where the file names
+            none.
+        section: what a map says of the road; None for other files.
+        driven: whether it is the path of a vehicle.
+        junction: whether it is a part of a junction, taken by its name alone.
+        carriageway: whether it is one of the carriageways of another line, taken by its name alone as well.
+        left_out: what the file says of it and isn't taken over, as text with numbers.
+        remarks: what is to be told of how it was made.
+        fault: why it can't be used, where it can't.
+        outlines: lines (N, 3) that it was made of, of the same system: how far apart their points are counts; empty
+            where that is the line itself.
     """
 
     name: str
     points: Float
     has_heights: bool
+    source: str = "line"
+    system: str | None = LONGITUDE_LATITUDE
+    section: MappedSection | None = None
+    driven: bool = False
+    junction: bool = False
+    carriageway: bool = False
+    left_out: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+    fault: InputError | None = None
+    outlines: tuple[Float, ...] = ()
 
 
 def read_point_lines(path: Path) -> list[PointLine]:
@@ -50,7 +94,8 @@ def read_point_lines(path: Path) -> list[PointLine]:
             at = int(np.argmax(np.maximum(np.abs(points[:, 0]) / 360.0, np.abs(points[:, 1]) / 90.0)))
             wanted = "a longitude and a latitude in degrees are needed"
             raise InputError(f"{path.name}: {name}: point {at + 1}", points[at, :2].tolist(), wanted)
-        lines.append(PointLine(names.unique(name, "line"), points, bool(points[:, 2].any())))
+        source = "GPX line" if local_name(root) == "gpx" else "KML line"
+        lines.append(PointLine(names.unique(name, "line"), points, bool(points[:, 2].any()), source))
     return lines
 
 

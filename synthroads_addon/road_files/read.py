@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
+from os import SEEK_END
 from pathlib import Path
 from typing import TypeVar
 
@@ -11,7 +13,10 @@ from .ifc import read_ifc
 from .landxml import read_landxml
 from .line import RoadLine
 from .opendrive import read_opendrive
-from .points import PointLine
+from .osm import PBF_MARK, read_osm, read_pbf
+from .points import PointLine, read_point_lines
+from .track import is_sbet, read_sbet
+from .vector import DRIVERS, read_vector, vector_format
 
 Named = TypeVar("Named", RoadLine, PointLine)
 _HEAD = 1 << 16
@@ -21,6 +26,7 @@ _MARKS: tuple[tuple[bytes, str], ...] = (
     (b"ISO-10303-21;", "IFC"),
     (b"<kml", "KML"),
     (b"<gpx", "GPX"),
+    (b"<osm", "OpenStreetMap"),
 )
 """Bytes that the head of a file of a format holds, whatever the file is called."""
 READERS: dict[str, Callable[[Path], list[RoadLine]]] = {
@@ -29,12 +35,19 @@ READERS: dict[str, Callable[[Path], list[RoadLine]]] = {
     "IFC": read_ifc,
 }
 """Readers of files with lines of elements, by format."""
-OF_POINTS = ("KML", "GPX")
-"""Formats of files with lines of points, which `points.read_point_lines` reads."""
+OF_POINTS: dict[str, Callable[[Path], list[PointLine]]] = {
+    "KML": read_point_lines,
+    "GPX": read_point_lines,
+    "OpenStreetMap": read_osm,
+    "OpenStreetMap PBF": read_pbf,
+    "SBET": read_sbet,
+    **{name: partial(read_vector, kind=name) for name in DRIVERS},
+}
+"""Readers of files with lines of points, by format."""
 
 
 def format_of(path: Path) -> str | None:
-    """Return the format of a file by its content, a key of `READERS` or one of `OF_POINTS`; None for any other.
+    """Return the format of a file by its content, a key of `READERS` or of `OF_POINTS`; None for any other.
 
     Raises:
         MissingFileError: it can't be read.
@@ -42,10 +55,16 @@ def format_of(path: Path) -> str | None:
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD)
+            size = file.seek(0, SEEK_END)
     except OSError as error:
         raise MissingFileError(str(path), None, f"an axis file is needed here ({error.strerror})") from None
-    head = head.replace(b"\0", b"")  # UTF-16
-    return next((name for mark, name in _MARKS if mark in head), None)
+    if head[4:].startswith(PBF_MARK):
+        return "OpenStreetMap PBF"
+    if (vector := vector_format(head)) is not None:
+        return vector
+    text = head.replace(b"\0", b"")  # UTF-16
+    known = next((name for mark, name in _MARKS if mark in text), None)
+    return "SBET" if known is None and is_sbet(head, size) else known
 
 
 def read_lines(path: Path) -> list[RoadLine]:
@@ -62,6 +81,11 @@ def read_lines(path: Path) -> list[RoadLine]:
     if not lines:
         raise InputError(path.name, None, "the file has no road or alignment with elements in plan")
     return lines
+
+
+def read_points(path: Path, kind: str) -> list[PointLine]:
+    """Return the lines of a file of points of a format, a key of `OF_POINTS`; see its reader."""
+    return OF_POINTS[kind](path)
 
 
 def named_line(lines: Sequence[Named], wanted: str, file: str) -> Named:

@@ -13,24 +13,37 @@ LARGEST = 512 << 20
 """Largest file, bytes."""
 
 
+def refuse_doctype(name: str) -> None:
+    """Raise `InputError` for a document type: it may define entities, and no format of roads has one."""
+    raise InputError("document type", name, "must not be there: entities aren't read")
+
+
 class _Builder(TreeBuilder):
     def doctype(self, name: str, pubid: str | None, system: str | None) -> None:
-        """Refuse a document type: it may define entities, and no format of roads has one."""
-        raise InputError("document type", name, "must not be there: entities aren't read")
+        """Refuse a document type."""
+        refuse_doctype(name)
 
 
 def read_xml(path: Path) -> Element:
-    """Return the root of an XML file.
+    """Return the root of an XML file; raises what `parse_xml` does."""
+    found: Element = parse_xml(path, _Builder())
+    return found
+
+
+def parse_xml(path: Path, target: Any) -> Any:
+    """Return what a target of the parser makes of an XML file; it must refuse document types, as `refuse_doctype` does.
+
+    Args:
+        path: the file.
+        target: with the methods of `xml.etree.ElementTree.TreeBuilder`.
 
     Raises:
         MissingFileError: it can't be read.
         InputError: it is no XML, has a document type, or is larger than `LARGEST`.
     """
-    parser = XMLParser(target=_Builder())  # nosec B314 (a document type is refused, so there are no entities)
+    parser = XMLParser(target=target)  # nosec B314 (a document type is refused, so there are no entities)
     try:
-        size = path.stat().st_size
-        if size > LARGEST:
-            raise InputError(str(path), f"{size / 1e6:,.0f} MB", f"at most {LARGEST / 1e6:,.0f} MB are read")
+        check_size(path)
         with path.open("rb") as file:
             while part := file.read(1 << 20):
                 parser.feed(part)
@@ -39,6 +52,13 @@ def read_xml(path: Path) -> Element:
         raise MissingFileError(str(path), None, f"cannot be read ({error.strerror})") from None
     except (ParseError, ValueError, LookupError) as error:
         raise InputError(str(path), None, f"valid XML is needed ({error})") from None
+
+
+def check_size(path: Path) -> None:
+    """Raise `InputError` for a file larger than `LARGEST`, OSError for none."""
+    size = path.stat().st_size
+    if size > LARGEST:
+        raise InputError(str(path), f"{size / 1e6:,.0f} MB", f"at most {LARGEST / 1e6:,.0f} MB are read")
 
 
 def local_name(element: Element) -> str:

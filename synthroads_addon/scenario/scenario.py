@@ -230,7 +230,15 @@ def load_scenario(name_or_file: str, changes: list[str] | None = None) -> Scenar
     scenario = Scenario.from_dict(read_json(path), source=str(name_or_file))
     if not changes:
         return scenario
-    return Scenario.from_dict(with_changes(scenario.to_dict(), scenario_changes(changes)))
+    return Scenario.from_dict(with_changes(data_as_given(scenario), scenario_changes(changes)))
+
+
+def data_as_given(scenario: Scenario) -> dict[str, Any]:
+    """Return a scenario's JSON data, without a coordinate system that nobody named: an axis brings its own."""
+    data = scenario.to_dict()
+    if "epsg" not in scenario.road.model_fields_set:
+        data["road"] = {name: value for name, value in data["road"].items() if name != "epsg"}
+    return data
 
 
 def scenario_changes(changes: Iterable[str]) -> Iterator[tuple[str, Any]]:

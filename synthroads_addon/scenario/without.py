@@ -6,7 +6,7 @@ All random numbers are keyed by what they are for: leaving an effect out changes
 from collections.abc import Iterable
 
 from ..base.errors import InputError, nearest_name
-from .scenario import Scenario, scenario_changes, with_changes
+from .scenario import Scenario, data_as_given, scenario_changes, with_changes
 
 EFFECTS: dict[str, tuple[str, ...]] = {
     "noise": tuple(
@@ -67,4 +67,4 @@ def scenario_without(scenario: Scenario, effects: Iterable[str]) -> Scenario:
             raise InputError("--without", effect, allowed)
         if effect != "weather-echoes" or echoes:
             changes += EFFECTS[effect]
-    return Scenario.from_dict(with_changes(scenario.to_dict(), scenario_changes(changes))) if changes else scenario
+    return Scenario.from_dict(with_changes(data_as_given(scenario), scenario_changes(changes))) if changes else scenario

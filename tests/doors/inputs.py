@@ -36,6 +36,30 @@ def _xodr(python: Path, folder: Path) -> None:
     (folder / "road.xodr").write_text(f"<OpenDRIVE>{header}{road}</OpenDRIVE>", encoding="utf-8")
 
 
+def _osm(python: Path, folder: Path) -> None:
+    """Write a map of OpenStreetMap with the two carriageways of a motorway, 13 m apart, 300 m long."""
+    sides = ((50.0, 1, (1, 2, 3)), (50.000117, 4, (6, 5, 4)))
+    nodes = [
+        f'<node id="{first + n}" lon="{9.0 + 0.0021 * n}" lat="{north}"/>'
+        for north, first, _ in sides
+        for n in range(3)
+    ]
+    tags = '<tag k="highway" v="motorway"/><tag k="ref" v="A 9"/><tag k="lanes" v="2"/>'
+    ways = []
+    for _, first, order in sides:
+        inner = "".join(f'<nd ref="{number}"/>' for number in order)
+        ways.append(f'<way id="{first}">{inner}{tags}</way>')
+    (folder / "map.osm").write_text(f'<osm version="0.6">{"".join([*nodes, *ways])}</osm>', encoding="utf-8")
+
+
+def empty_binary_map() -> bytes:
+    """Return a binary map of OpenStreetMap that holds a header alone."""
+    header = b"\x22\x0eOsmSchema-V0.6\x22\x0aDenseNodes"
+    blob = b"\x0a" + bytes([len(header)]) + header
+    head = b"\x0a\x09OSMHeader\x18" + bytes([len(blob)])
+    return len(head).to_bytes(4, "big") + head + blob
+
+
 def _scan(python: Path, folder: Path) -> None:
     """Scan a road that is long enough to be found again, thinly, as if by somebody else."""
     options = ["--set", "road.length=180", "--set", "road.half_width=20", "--set", "scan.platform.speed=20"]
@@ -94,6 +118,7 @@ def _recipe(name: str, scenes: dict[str, str]) -> Callable[[Path, Path], None]:
 INPUTS: dict[str, Callable[[Path, Path], None]] = {
     "axis.csv": _axis,
     "road.xodr": _xodr,
+    "map.osm": _osm,
     "scan.laz": _scan,
     "scene.glb": _scene,
     "real.yaml": _real,

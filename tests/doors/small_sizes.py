@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-EXTRAS = ("ml", "twin", "e57", "cluster", "onnx")
+EXTRAS = ("ml", "twin", "e57", "maps", "cluster", "onnx")
 """Extras of pyproject.toml that users add to what `make demo` installs."""
 
 _MAKE = "the doors are behind it: it makes the environment that everything here is run in"
@@ -84,6 +84,7 @@ ROWS = (
         ("axis.csv",),
     ),
     Small("synthroads road road.xodr --output out/road-of-mine", inputs=("road.xodr",)),
+    Small("synthroads road map.osm --output out/road-of-a-map", inputs=("map.osm",)),
     Small("synthroads generate --output out/mms --scenario mobile-mapping-300m", f"{_DRAFT} {_CLOUD}"),
     Small(
         "synthroads scan scene.glb --device velodyne-hdl-64e --height 2 --output out/own",
@@ -135,6 +136,7 @@ ROWS = (
     ),
     # docs/start.md
     Small("pip install -e '.[e57]'", reason=_PIP),
+    Small("pip install -e '.[maps]'", reason=_PIP),
     Small("synthroads --help"),
     Small("pip install '.[blender,ml]'", reason=_PIP),
     Small("pip install torch==2.13.0 --index-url https://download.pytorch.org/whl/cpu", reason=_PIP),

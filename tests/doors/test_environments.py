@@ -8,6 +8,7 @@ import pytest
 
 from tests.doors.documented import documented_lines
 from tests.doors.environments import places, run
+from tests.doors.inputs import empty_binary_map
 from tests.doors.run_documented import Outcome, rows_of, run_documented
 from tests.doors.small_sizes import EXTRAS
 
@@ -71,12 +72,14 @@ def test_an_extra_goes_with_what_is_there(extra: str) -> None:
     ("extra", "words"),
     [
         ("e57", ["cloud", "convert", "out/mine/cloud.laz", "--output", "out/cloud.e57"]),
+        ("maps", ["road", "map.pbf", "--list"]),
         ("onnx", ["export", "out/run", "--output", "out/network.onnx"]),
     ],
 )
 def test_commands_that_no_page_shows(extra: str, words: list[str], folder: Path, outcomes: dict[str, Outcome]) -> None:
     """Without its extra one line says how to install it; with it the command works, or names what else it needs."""
     assert outcomes
+    (folder / "map.pbf").write_bytes(empty_binary_map())
     without = run(places()["demo"], "synthroads", *words, folder=folder)
     assert without.returncode == 2, without.stderr
     assert len(without.stderr.splitlines()) == 1

@@ -10,12 +10,14 @@ import pytest
 from hypothesis import strategies as st
 
 from synthroads_addon.base.remarks import collected_remarks
+from synthroads_addon.jobs.axis_source import axis_from_file, listed_lines
 from synthroads_addon.road.geometry import alignment_of
 from synthroads_addon.road_files.axis import road_axis
-from synthroads_addon.road_files.read import read_lines
+from synthroads_addon.road_files.read import OF_POINTS, format_of, read_lines
 from synthroads_addon.scenario.road import RoadScenario
 from tests.helpers.files.mutations import TOKENS, accepted, damaged, for_all, fuzz
 from tests.helpers.roads.written_lines import opendrive, xodr_road
+from tests.helpers.roads.written_maps import Map, bend, beside, sbet, vector_file, well_known_binary
 from tests.road_files.test_landxml import KINDS, written
 from tests.road_files.test_opendrive import main_road
 
@@ -95,3 +97,95 @@ def test_damaged_roads(tmp_path: Path, kind: str, count: int) -> None:
         accepted(lambda: use_road(path))
 
     for_all(damaged(files_of(kind, tmp_path), SHORT), count, body)
+
+
+# --- maps, vector files and tracks ----------------------------------------------------------------------------------
+
+MAPS = {"osm": None, "pbf": "osmium", "gpkg": "pyogrio", "shp": "pyogrio", "fgb": "pyogrio", "sbet": None}
+"""Kinds of files, and the library that each needs."""
+
+
+def map_files(kind: str, folder: Path) -> list[bytes]:
+    """Return small files of a kind, whose lines have few points, so that the fit is quick."""
+    station = np.linspace(0.0, 500.0, 12).tolist()
+    points = np.column_stack([beside(bend(), station), 100.0 + 0.01 * np.array(station)])
+    path = folder / f"sound.{kind}"
+    if kind == "sbet":
+        return [sbet(path, points).read_bytes()]
+    if kind in ("osm", "pbf"):
+        return [
+            map_of(way).pbf(path).read_bytes() if kind == "pbf" else map_of(way).xml(path).read_bytes() for way in WAYS
+        ]
+    driver = {"gpkg": "GPKG", "shp": "ESRI Shapefile", "fgb": "FlatGeobuf"}[kind]
+    vector_file(path, driver, {"axis": well_known_binary(points), "short": well_known_binary(points[:3])})
+    return [path.read_bytes()]
+
+
+WAYS = (
+    {"ref": "A 9", "lanes": "2", "maxspeed": "65 mph"},
+    {"name": "Road", "lanes": "3", "width": "7", "highway": "primary"},
+)
+
+
+def map_of(tags: dict[str, str]) -> Map:
+    found, walk = Map(), bend()
+    station = np.linspace(0.0, 500.0, 9)
+    for side in (-1.0, 1.0):
+        nodes = found.line(beside(walk, station.tolist(), side * 8.0))[:: int(-side)]
+        found.way(nodes[:5], {**tags, "bridge": "yes"})
+        found.way(nodes[4:], tags)
+    return found
+
+
+def use_points(path: Path) -> None:
+    """List a file's lines, take the longest, and evaluate its road."""
+    if format_of(path) not in OF_POINTS:
+        return
+    with collected_remarks() as remarks:
+        rows = listed_lines(path)
+        assert all(row["fault"] is None or row["fault"].isprintable() for row in rows)
+        axis, _, _ = axis_from_file(path, RoadScenario(), 1)
+    assert all(len(text) < 2000 and text.isprintable() for text in remarks), remarks
+    assert np.isfinite(alignment_of(axis).position(np.linspace(0.0, axis.length, 50))).all()
+
+
+@fuzz(15, 5000)
+@pytest.mark.parametrize("kind", list(MAPS))
+def test_damaged_maps(tmp_path: Path, kind: str, count: int) -> None:
+    if library := MAPS[kind]:
+        pytest.importorskip(library)
+    files, path = map_files(kind, tmp_path), tmp_path / f"sound.{kind}"
+
+    def body(content: bytes) -> None:
+        path.write_bytes(content)
+        accepted(lambda: use_points(path))
+
+    for_all(damaged(files, SHORT), count, body)
+
+
+@fuzz(15, 5000)
+def test_maps_with_odd_numbers(tmp_path: Path, count: int) -> None:
+    path = tmp_path / "a.osm"
+
+    def body(content: bytes) -> None:
+        path.write_bytes(content)
+        accepted(lambda: use_points(path))
+
+    for_all(with_odd_numbers(map_files("osm", tmp_path)), count, body)
+
+
+@fuzz(15, 5000)
+def test_paths_with_odd_numbers(tmp_path: Path, count: int) -> None:
+    path = tmp_path / "a.sbet"
+    (sound,) = map_files("sbet", tmp_path)
+    odd = st.sampled_from([0.0, -1.0, 1e-300, 1e300, np.nan, np.inf, 1.5707, 3.2, -9000.0, 1e6, 1000.005])
+    change = st.tuples(st.integers(0, len(sound) // 8 - 1), odd)
+
+    def body(changes: list[tuple[int, float]]) -> None:
+        records = np.frombuffer(sound, dtype="<f8").copy()
+        for at, value in changes:
+            records[at] = value
+        path.write_bytes(records.tobytes())
+        accepted(lambda: use_points(path))
+
+    for_all(st.lists(change, min_size=1, max_size=3), count, body)

@@ -43,6 +43,7 @@ from synthroads_addon.blender.things.asset import _collection
 from synthroads_addon.calibration.expected import read_texture
 from synthroads_addon.dataset.manifest import append_record, read_manifest
 from synthroads_addon.dataset.recipe import load_recipe, scene_jobs
+from synthroads_addon.jobs.axis_source import axis_from_file
 from synthroads_addon.materials.table import materials
 from synthroads_addon.materials.textures import texture_files
 from synthroads_addon.road.axes.centerline import read_axis
@@ -50,9 +51,11 @@ from synthroads_addon.road.elevation_model import read_elevation_model
 from synthroads_addon.road.parameters import read_parameters
 from synthroads_addon.scanning.devices.device import load_device
 from synthroads_addon.scenario.assets import read_asset_library
+from synthroads_addon.scenario.road import RoadScenario
 from synthroads_addon.scenario.scenario import load_scenario
 from tests.headless.test_dataset_overwrite import NEW, OLD, content, make
 from tests.helpers.clouds.road_data_sets import write_data_set
+from tests.helpers.roads.written_maps import well_known_binary
 from tests.helpers.scenes.transparent_files import grey_png, obj, usd
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -530,6 +533,28 @@ def _(folder: Path) -> None:
     (folder / "set" / "base_color.png").symlink_to(there)
     with pytest.raises(InputError, match="is no PNG, JPEG, OpenEXR or TIFF image"):
         texture_files(str(folder / "set"))
+
+
+@row("maps that an axis is taken from")
+def _(folder: Path) -> None:
+    """GDAL's virtual format and its connections are no maps here, whatever their names end in."""
+    pyogrio = pytest.importorskip("pyogrio")
+    shape = np.array([well_known_binary(np.array([[0.0, 0.0, 1.0], [90.0, 0.0, 2.0]]))], dtype=object)
+    names = [np.array(["elsewhere"], dtype=object)]
+    there = folder / "outside.gpkg"
+    options = {"driver": "GPKG", "geometry_type": "LineString Z", "crs": "EPSG:25832"}
+    pyogrio.raw.write(there, shape, names, ["name"], **options)
+    layer = f'<OGRVRTLayer name="outside"><SrcDataSource>{there}</SrcDataSource></OGRVRTLayer>'
+    for name in ("a.vrt", "a.gpkg", "a.shp", "a.fgb"):
+        (folder / name).write_text(f"<OGRVRTDataSource>{layer}</OGRVRTDataSource>")
+        assert name != "a.vrt" or pyogrio.read_info(folder / name)["features"] == 1, "GDAL itself reads it"
+        with pytest.raises(InputError) as caught:
+            axis_from_file(folder / name, RoadScenario(), 1)
+        assert "elsewhere" not in str(caught.value)
+    entity = f'<!DOCTYPE osm [<!ENTITY a SYSTEM "{there}">]>'
+    (folder / "a.osm").write_text(f'<?xml version="1.0"?>{entity}<osm version="0.6"><node id="&a;"/></osm>')
+    with pytest.raises(InputError, match="must not be there: entities aren't read"):
+        axis_from_file(folder / "a.osm", RoadScenario(), 1)
 
 
 @row("elevation models")

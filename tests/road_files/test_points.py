@@ -82,8 +82,10 @@ def test_a_line_without_heights_says_so(tmp_path: Path) -> None:
     _, degrees = line_in_degrees()
     degrees[:, 2] = 0.0
     with collected_remarks() as remarks:
-        axis_from_file(kml(tmp_path / "a.kml", {"axis": degrees}), RoadScenario(), 1)
-    assert "a.kml has no heights: they are 0 m" in remarks
+        axis, _, report = axis_from_file(kml(tmp_path / "a.kml", {"axis": degrees}), RoadScenario(), 1)
+    assert "a.kml has no heights: they are drawn within the limits of the scenario" in remarks
+    assert report["heights"]["points"] == len(axis.vertical)
+    assert "height" not in report
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,10 @@ from .export import SYNTHROADS_OT_export_cloud, SYNTHROADS_OT_export_twin
 from .road_files import SYNTHROADS_OT_load_axis, SYNTHROADS_OT_load_road, SYNTHROADS_OT_save_road
 from .scan_road import SYNTHROADS_OT_road_from_scan
 
-_AXES = (".csv", ".txt", ".geojson", ".xodr", ".xml", ".ifc", ".kml", ".gpx")
+_AXES = (
+    *(".csv", ".txt", ".geojson", ".xodr", ".xml", ".ifc", ".kml", ".gpx"),
+    *(".osm", ".pbf", ".gpkg", ".shp", ".fgb", ".sbet", ".out"),
+)
 
 
 class _DropHandler:
@@ -33,7 +36,7 @@ class SYNTHROADS_FH_parameters(_DropHandler, bpy.types.FileHandler):
 
 
 class SYNTHROADS_FH_axis(_DropHandler, bpy.types.FileHandler):
-    """Handler of dropped centrelines: roads of other programs (.xodr, .xml, .ifc) and measured lines (the others)."""
+    """Handler of dropped centrelines: roads of other programs (.xodr, .xml, .ifc), of maps, and measured lines."""
 
     bl_idname = "SYNTHROADS_FH_axis"
     bl_label = "SynthRoads Centreline"
@@ -53,7 +56,9 @@ class SYNTHROADS_FH_cloud(_DropHandler, bpy.types.FileHandler):
 def _draw_import(menu: bpy.types.Menu, context: bpy.types.Context) -> None:
     layout = menu.layout
     layout.operator(SYNTHROADS_OT_load_road.bl_idname, text="SynthRoads Parameter Set (.json)")
-    layout.operator(SYNTHROADS_OT_load_axis.bl_idname, text="SynthRoads Centreline (.xodr, .xml, .ifc, .csv, .geojson)")
+    layout.operator(
+        SYNTHROADS_OT_load_axis.bl_idname, text="SynthRoads Centreline (.xodr, .xml, .ifc, .osm, .gpkg, .csv, ...)"
+    )
     endings = ", ".join(AVAILABLE)
     layout.operator(SYNTHROADS_OT_road_from_scan.bl_idname, text=f"SynthRoads Road from a Scan ({endings})")
 

@@ -18,6 +18,7 @@ from ...fitting.plot import axis_picture
 from ...jobs.axis_source import axis_summary
 from ...jobs.generate import RoadSource
 from ...road.parameters import RoadParameters
+from ...scenario.road import RoadScenario
 from ...scenario.scenario import Scenario
 from ..fields.room import buttons_row
 from ..work.build import road_work, shown_place
@@ -98,16 +99,21 @@ class SYNTHROADS_OT_load_road(RoadLoader, bpy.types.Operator):
 
 
 class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
-    """Build a road along a centreline: that of an OpenDRIVE, LandXML or IFC file as it is designed, or one fitted to measured points (CSV with x, y, z, GeoJSON, KML, GPX). Its cross-section is the panel's. It takes the place of the road built before"""  # noqa: E501 (a tooltip is one line)
+    """Build a road along a centreline: that of an OpenDRIVE, LandXML or IFC file as it is designed, or one fitted to points of a map (OpenStreetMap, GeoPackage, shapefile) or a survey (CSV with x, y, z, GeoJSON, KML, GPX, SBET). Its cross-section is the panel's, with the lanes that OpenStreetMap has. It takes the place of the road built before"""  # noqa: E501 (a tooltip is one line)
 
     bl_idname = "synthroads.load_axis"
     bl_label = "Along Centreline"
     filter_glob: bpy.props.StringProperty(
-        default="*.xodr;*.xml;*.ifc;*.kml;*.gpx;*.csv;*.txt;*.geojson;*.json", options={"HIDDEN"}
+        default="*.xodr;*.xml;*.ifc;*.osm;*.pbf;*.gpkg;*.shp;*.fgb;*.kml;*.gpx;*.sbet;*.out;*.csv;*.txt;*.geojson;*.json",
+        options={"HIDDEN"},
     )
 
     def read(self, path: Path, scenario: Scenario) -> tuple[RoadParameters, str]:
-        """Fit an alignment to the file's centreline; return a road sampled along it, and the message."""
+        """Return a road along a centreline, in the file's system unless the panel names one, and the message."""
+        if scenario.road.epsg == RoadScenario.model_fields["epsg"].default:
+            road = scenario.road.model_copy()
+            road.model_fields_set.discard("epsg")
+            scenario = scenario.model_copy(update={"road": road})
         parameters, report = RoadSource(scenario, axis=path).read()
         length = parameters.alignment.length
         return parameters, f"Built {length:,.0f} m of road along {path.name}: {axis_summary(report['axis'])}"

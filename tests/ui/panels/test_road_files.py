@@ -17,6 +17,7 @@ from synthroads_addon.sampling.road import sample_road
 from synthroads_addon.scenario.scenario import Scenario, load_scenario
 from synthroads_addon.ui.panels.road_files import source_file_name
 from synthroads_addon.ui.work.long_operator import LongOperator
+from tests.helpers.roads.written_maps import motorway
 from tests.helpers.scenes.panel_road import SAME, cheap, road, road_file, settings, small_pictures
 
 __all__ = ["cheap", "road", "road_file", "settings", "small_pictures"]
@@ -79,6 +80,20 @@ def test_a_fitted_road_is_the_librarys(cheap: Any, tmp_path: Path) -> None:
     assert parameters.metadata.epsg == 25833
     assert parameters.alignment.length == pytest.approx(200.0, abs=0.01)
     assert source_file_name(find_road(bpy.context.scene)) == "axis.csv"
+
+
+def test_a_map_is_a_road_where_it_lies(cheap: Any, tmp_path: Path) -> None:
+    """In its zone of UTM, as the panel's EPSG code is the usual one; with the map's lanes."""
+    written, walk = motorway(lanes="3", steps=(30.0, 30.0), length=150.0)
+    path = written.xml(tmp_path / "map.osm")
+    assert bpy.ops.synthroads.load_axis(filepath=str(path)) == {"FINISHED"}
+    parameters, _ = built()
+    assert parameters.metadata.epsg == 32632
+    assert len(parameters.carriageway("right").lanes) == 3
+    assert parameters.alignment.length == pytest.approx(150.0, abs=6.0)
+    origin = np.array(parameters.transform.translate[:2])
+    assert np.hypot(*(origin - walk.at(75.0)[:2])) < 3.0
+    assert source_file_name(find_road(bpy.context.scene)) == "map.osm"
 
 
 @pytest.mark.slow

@@ -1,0 +1,177 @@
+"""A map's words on a road's cross-section and traffic, as limits of a scenario: as much as a parameter set holds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from ..base.remarks import assume
+from ..road.guidelines import (
+    SECTIONS_OF_CLASS,
+    STANDARD_CROSS_SECTIONS,
+    StandardCrossSection,
+    design_class_of,
+)
+from ..road.things.limits import Interval
+from ..road_files.points import MappedSection
+from ..sampling.conflicts import conflicts
+from ..sampling.section import cross_section_of
+from ..scenario.road import FreeCrossSection, RoadScenario
+
+_MOST_LANES = 8
+_LANE_TOLERANCE = 0.15
+"""Metres by which a map's width of a lane may differ from a standard's: less than maps are good for."""
+_MEDIAN_TOLERANCE = 1.5
+"""The same of the median, which follows from the distance of two lines that somebody drew over a picture."""
+_WIDEST_MEDIAN = 40.0
+_SLOWEST = 5.0
+"""Speed of cars at least, km/h."""
+
+
+def with_mapped_section(
+    name: str, mapped: MappedSection | None, scenario: RoadScenario
+) -> tuple[RoadScenario, list[str]]:
+    """Return a scenario with what a map says of a road, and what of it is left out, as texts.
+
+    Lanes become the scenario's own cross-section if it has as many, else the first standard one that has, else one by
+    hand; where a map's widths differ from those by more than maps are good for, one by hand. A scenario that says
+    ``lanes`` itself keeps its cross-section. The speed limit is the highest speed of cars.
+
+    Args:
+        name: of file and road, for remarks.
+        mapped: what the map says; None for other files.
+        scenario: limits of the road.
+    """
+    if mapped is None:
+        return scenario, []
+    lost = list[str]()
+    if mapped.lanes is None:
+        text = "%s: the map has no number of lanes: the cross-section is the scenario's"
+        assume(text, name)
+    elif scenario.lanes is not None:
+        if scenario.lanes != mapped.lanes:
+            lost.append(f"lanes: {mapped.lanes} each way, road.lanes={scenario.lanes} is taken instead")
+    else:
+        scenario, lost = _with_lanes(name, mapped, mapped.lanes, scenario)
+    if mapped.spread is None:
+        lost.append(_of_one_line(mapped.one_way, cross_section_of(scenario)))
+    if mapped.speed is not None:
+        scenario = _with_speed(name, mapped.speed, scenario)
+    if mapped.pavement is not None:
+        share = 1.0 if mapped.pavement == "concrete" else 0.0
+        pavement = scenario.pavement.model_copy(update={"concrete": share})
+        scenario = scenario.model_copy(update={"pavement": pavement})
+    return scenario, lost
+
+
+def _of_one_line(one_way: bool, section: StandardCrossSection) -> str:
+    """Return what becomes of a road that a map has as one line: a parameter set has two carriageways."""
+    if not one_way:
+        return f"lanes side by side: the road gets a median of {section.median:g} m between its directions"
+    aside = 0.5 * (section.median + math.fsum(section.lanes)) + section.inner_edge_strip
+    text = "lanes of one carriageway: the road gets two about this line, as their axis; --offset-from-path"
+    return f"{text} {aside:g} leaves the right one where the map has it"
+
+
+def _with_lanes(name: str, mapped: MappedSection, lanes: int, scenario: RoadScenario) -> tuple[RoadScenario, list[str]]:
+    """Return the scenario with the first cross-section for a map's lanes that meets no conflict."""
+    if lanes > _MOST_LANES:
+        return scenario, [f"lanes: {lanes} each way, at most {_MOST_LANES} are possible"]
+    known = set(conflicts(scenario, True))
+    for update, lost in _candidates(mapped, lanes, scenario):
+        changed = scenario.model_copy(update=update)
+        if set(conflicts(changed, True)) <= known:
+            section = cross_section_of(changed)
+            widths = ", ".join(f"{width:g}" for width in section.lanes)
+            shown = changed.cross_section if isinstance(changed.cross_section, str) else "by hand"
+            text = (
+                "%s: %d lanes each way: cross-section %s, lanes of %s m, median of %g m; road.lanes=N asks for others"
+            )
+            assume(text, name, lanes, shown, widths, section.median)
+            return changed, lost
+    return scenario, [f"lanes: {lanes} each way, which no cross-section of {scenario.design_class} holds"]
+
+
+def _candidates(
+    mapped: MappedSection, lanes: int, scenario: RoadScenario
+) -> Iterator[tuple[dict[str, Any], list[str]]]:
+    """Yield changes of a scenario that hold a map's lanes, the nearest first, and what each leaves out."""
+    bases = list(_bases(lanes, mapped.lane_width, scenario))
+    for update, section in bases:
+        widths = section.lanes
+        if mapped.lane_width is not None and abs(math.fsum(widths) / lanes - mapped.lane_width) > _LANE_TOLERANCE:
+            widths = (mapped.lane_width,) * lanes
+        median, lost = _median(mapped, section, widths)
+        if widths == section.lanes and median == section.median:
+            yield update, lost
+        else:
+            yield {**update, "cross_section": _by_hand(section, widths, median)}, lost
+    for update, _ in bases:  # without the map's widths, where they meet limits
+        lost = [f"lane width: {mapped.lane_width:g} m"] if mapped.lane_width is not None else []
+        yield (
+            update,
+            [*lost, *([f"median: by {mapped.spread:.1f} m between the carriageways"] if mapped.spread else [])],
+        )
+
+
+def _bases(
+    lanes: int, width: float | None, scenario: RoadScenario
+) -> Iterator[tuple[dict[str, Any], StandardCrossSection]]:
+    """Yield changes that give a scenario a cross-section with a number of lanes, and that cross-section."""
+    own = cross_section_of(scenario)
+    if len(own.lanes) == lanes:
+        yield {}, own
+    allowed = SECTIONS_OF_CLASS[scenario.design_class]
+    standard = [name for name in STANDARD_CROSS_SECTIONS if len(STANDARD_CROSS_SECTIONS[name].lanes) == lanes]
+    wanted = 3.75 if width is None else width
+    standard.sort(
+        key=lambda name: (
+            name not in allowed,
+            abs(math.fsum(STANDARD_CROSS_SECTIONS[name].lanes) / lanes - wanted),
+        )
+    )
+    for name in standard:
+        section = STANDARD_CROSS_SECTIONS[name]
+        yield {"cross_section": name, "design_class": design_class_of(name, scenario.design_class)}, section
+    widths = (own.lanes + own.lanes[-1:] * lanes)[:lanes]
+    section = StandardCrossSection(
+        widths, own.hard_shoulder, own.outer_edge_strip, own.inner_edge_strip, own.median, own.verge
+    )
+    yield {"cross_section": _by_hand(section, widths, own.median)}, section
+
+
+def _by_hand(section: StandardCrossSection, lanes: tuple[float, ...], median: float) -> FreeCrossSection:
+    return FreeCrossSection(
+        lanes=lanes,
+        hard_shoulder=section.hard_shoulder,
+        outer_edge_strip=section.outer_edge_strip,
+        inner_edge_strip=section.inner_edge_strip,
+        median=median,
+        verge=section.verge,
+    )
+
+
+def _median(mapped: MappedSection, section: StandardCrossSection, lanes: tuple[float, ...]) -> tuple[float, list[str]]:
+    """Return the median (m) by the distance of the carriageways' middles, or the section's, and what is left out."""
+    if mapped.spread is None:
+        return section.median, []
+    median = round(mapped.spread - 2.0 * section.inner_edge_strip - math.fsum(lanes), 1)
+    if abs(median - section.median) <= _MEDIAN_TOLERANCE:
+        return section.median, []
+    if not 0.5 <= median <= _WIDEST_MEDIAN:
+        return section.median, [
+            f"median: {mapped.spread:.1f} m between the middles of the lanes would leave {median:g} m"
+        ]
+    return median, []
+
+
+def _with_speed(name: str, speed: float, scenario: RoadScenario) -> RoadScenario:
+    """Return the scenario whose cars drive at most at a speed, km/h."""
+    most = max(speed, _SLOWEST) / 3.6
+    drawn = scenario.vehicles.speed
+    if drawn.maximum <= most:
+        return scenario
+    limits = Interval(minimum=round(min(drawn.minimum, most), 3), maximum=round(most, 3))
+    assume("%s: cars drive at most %.0f km/h, as the map says", name, 3.6 * most)
+    return scenario.model_copy(update={"vehicles": scenario.vehicles.model_copy(update={"speed": limits})})

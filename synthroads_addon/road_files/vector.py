@@ -1,0 +1,209 @@
+"""Lines of vector files of geographic information systems: GeoPackage, shapefile, FlatGeobuf, by pyogrio (GDAL).
+
+GDAL knows some eighty formats, of which some start programs, follow addresses, or call the network. So a file is told
+by its content first, opened as one of the three alone, and refused if GDAL took it for another. OGC 12-128r18
+(GeoPackage), ESRI's "Shapefile Technical Description", OGC 06-103r4 (well-known binary).
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..base.arrays import Float
+from ..base.errors import InputError, MissingFileError, MissingPackageError
+from ..base.remarks import warn
+from .line import LineNames
+from .points import PointLine
+from .xml_text import check_size
+
+DRIVERS = {"GeoPackage": "GPKG", "shapefile": "ESRI Shapefile", "FlatGeobuf": "FlatGeobuf"}
+"""GDAL's name of each format."""
+_NAMES = ("name", "ref", "label", "bezeichnung", "road", "strasse", "id")
+"""Fields that name a line, in any case, the first that a layer has."""
+_LINE, _MULTI_LINE = 2, 5
+_ENDING = "non conformant file extension"
+"""GDAL's words on content that has no name."""
+_JOINED = 1e-3
+"""Parts of a line that meet within this, in units of the file, are one."""
+_MOST_LINES = 100_000
+_LARGEST = 1e9
+"""Largest coordinate."""
+
+
+def vector_format(head: bytes) -> str | None:
+    """Return the format, a key of `DRIVERS`, of a file by its first bytes (72 at least); None for another."""
+    if head.startswith(b"SQLite format 3\0") and head[68:72] in (b"GPKG", b"GP10", b"GP11"):
+        return "GeoPackage"
+    if head.startswith(b"fgb\x03fgb"):
+        return "FlatGeobuf"
+    if len(head) >= 32 and head.startswith(b"\x00\x00\x27\x0a") and head[28:32] == b"\xe8\x03\x00\x00":
+        return "shapefile"
+    return None
+
+
+def read_vector(path: Path, kind: str) -> list[PointLine]:
+    """Return the lines of a file's layers; a name has its layer before it where there are several.
+
+    Lines of several parts are one where each begins where the one before ends; others have a `fault`. Z is the height
+    unless it is 0 everywhere; M is left aside.
+
+    Raises:
+        MissingFileError, InputError: it can't be read, or a coordinate is none.
+        MissingPackageError: pyogrio isn't installed.
+    """
+    try:
+        import pyogrio
+    except ModuleNotFoundError:
+        raise MissingPackageError(path.name, kind, "pyogrio", "maps") from None
+    lines, names = list[PointLine](), LineNames()
+    with _told_in_one_line(path, kind):
+        check_size(path)
+        # By its content alone: GDAL reads more than a file into names, and would look for others beside it.
+        source = path.resolve() if kind == "shapefile" else BytesIO(path.read_bytes())
+        _check_beside(path, kind)
+        layers = [str(layer) for layer, geometry in pyogrio.list_layers(source).tolist() if _may_hold_lines(geometry)]
+        for layer in layers:
+            before = f"{layer}: " if len(layers) > 1 else ""
+            for name, line in _lines_of(path, source, layer, kind):
+                lines.append(replace(line, name=names.unique(name and before + name, before + "line")))
+                if len(lines) > _MOST_LINES:
+                    raise InputError(path.name, None, f"at most {_MOST_LINES:,} lines are read: take those you need")
+    return lines
+
+
+@contextmanager
+def _told_in_one_line(path: Path, kind: str) -> Iterator[None]:
+    """Context that turns what GDAL says of a file into one line, or remarks."""
+    # With the library itself, which is an extra.
+    from pyogrio.errors import DataLayerError, DataSourceError, FeatureError, FieldError, GeometryError
+
+    try:
+        with warnings.catch_warnings(record=True) as found:
+            warnings.simplefilter("always")
+            yield
+        for text in sorted({_one_line(warning.message) for warning in found}):
+            if _ENDING not in text:
+                warn("%s: %s", path.name, text)
+    except OSError as error:
+        raise MissingFileError(str(path), None, f"cannot be read ({error.strerror})") from None
+    except (DataLayerError, DataSourceError, FeatureError, FieldError, GeometryError, ValueError) as error:
+        if isinstance(error, InputError):
+            raise
+        raise InputError(path.name, None, f"a valid {kind} is needed ({_one_line(error)})") from None
+
+
+def _one_line(said: object) -> str:
+    """Return what GDAL says as one line, without the name that content has in its memory."""
+    text = re.sub(r"/vsimem/\S*", "the file", str(said))
+    return "".join(c if c.isprintable() else " " for c in text)[:200]
+
+
+def _check_beside(path: Path, kind: str) -> None:
+    """Raise an error where a shapefile has another ending, by which GDAL finds its parts, or lacks one."""
+    if kind != "shapefile":
+        return
+    if path.suffix.lower() != ".shp":
+        raise InputError(
+            path.name, path.suffix, "a shapefile's name must end in .shp, as its other parts have its name"
+        )
+    for ending in (".shx", ".dbf"):
+        if not any(path.with_suffix(form).is_file() for form in (ending, ending.upper())):
+            raise InputError(path.name, ending, "a shapefile has this part beside it, which is missing")
+
+
+def _may_hold_lines(geometry: object) -> bool:
+    return geometry is not None and any(word in str(geometry) for word in ("Line", "Unknown", "Geometry"))
+
+
+def _lines_of(path: Path, source: Any, layer: str, kind: str) -> Iterator[tuple[str | None, PointLine]]:
+    """Yield name and line of each feature of a layer that is a line."""
+    import pyogrio  # an extra
+
+    info = pyogrio.read_info(source, layer=layer)
+    if info["driver"] != DRIVERS[kind]:
+        raise InputError(path.name, info["driver"], f"{DRIVERS[kind]} is needed")
+    by_case = {str(field).lower(): str(field) for field in info["fields"]}
+    field = next((by_case[name] for name in _NAMES if name in by_case), None)
+    meta, numbers, shapes, values = pyogrio.raw.read(
+        source, layer=layer, columns=[field] if field else [], return_fids=True, max_features=_MOST_LINES + 1
+    )
+    system = meta["crs"]
+    for row, shape in enumerate([] if shapes is None else shapes):
+        given = None if not field else values[0][row]
+        number = row + 1 if numbers is None else int(numbers[row])
+        name = str(given) if given is not None and str(given).strip() not in ("", "nan") else f"line {number}"
+        for found, fault in _line_of(f"{path.name}: {name}", shape):
+            flat = not (found.shape[1] > 2 and found[:, 2].any())
+            points = np.column_stack([found[:, :2], np.zeros(len(found)) if flat else found[:, 2]])
+            yield name, PointLine("", points, not flat, f"{kind} line", system=system, fault=fault)
+
+
+def _line_of(place: str, shape: bytes | None) -> Iterator[tuple[Float, InputError | None]]:
+    """Yield the points (N, 2 or 3) of a geometry in well-known binary that is a line, and its fault."""
+    if shape is None:
+        return
+    parts = [part for part in _parts(place, bytes(shape)) if len(part) > 1]
+    if not parts:
+        return
+    joined = [parts[0]]
+    for part in parts[1:]:
+        if np.abs(part[0, :2] - joined[-1][-1, :2]).max() > _JOINED:
+            fault = InputError(
+                "parts", len(parts), "a line of one part is needed, or of parts that begin where another ends"
+            )
+            yield parts[0], fault
+            return
+        joined.append(part[1:])
+    yield np.concatenate(joined), None
+
+
+def _parts(place: str, data: bytes) -> list[Float]:
+    """Return the parts (N, 2 or 3) of a line in well-known binary; none of another geometry."""
+    try:
+        kind, has_z, has_m, at, order = _head(data, 0)
+        if kind == _LINE:
+            return [_points(place, data, at, order, has_z, has_m)[0]]
+        if kind != _MULTI_LINE:
+            return []
+        (count,) = struct.unpack_from(order + "I", data, at)
+        at, parts = at + 4, []
+        for _ in range(count):
+            _, has_z, has_m, at, order = _head(data, at)
+            points, at = _points(place, data, at, order, has_z, has_m)
+            parts.append(points)
+        return parts
+    except (struct.error, ValueError, IndexError):
+        raise InputError(place, None, "a line in well-known binary is needed") from None
+
+
+def _head(data: bytes, at: int) -> tuple[int, bool, bool, int, str]:
+    """Return a geometry's kind, if it has Z and M, where its content begins, and the order of its bytes."""
+    order = "<" if data[at] == 1 else ">"
+    (code,) = struct.unpack_from(order + "I", data, at + 1)
+    if code & 0xE0000000:  # the older way, with flags
+        return code & 0xFF, bool(code & 0x80000000), bool(code & 0x40000000), at + 5, order
+    return code % 1000, code // 1000 in (1, 3), code // 1000 in (2, 3), at + 5, order
+
+
+def _points(place: str, data: bytes, at: int, order: str, has_z: bool, has_m: bool) -> tuple[Float, int]:
+    """Return a part's points (N, 2 or 3), and where it ends."""
+    (count,) = struct.unpack_from(order + "I", data, at)
+    width = 2 + has_z + has_m
+    flat = np.frombuffer(data, dtype=order + "f8", count=count * width, offset=at + 4)
+    points: Float = flat.reshape(count, width)[:, : 2 + has_z].astype(np.float64)
+    if not (np.abs(points) <= _LARGEST).all():
+        row = int((~(np.abs(points) <= _LARGEST)).any(axis=1).argmax())
+        raise InputError(
+            f"{place}: point {row + 1}", points[row].tolist(), f"finite numbers up to {_LARGEST:g} are needed"
+        )
+    return points, at + 4 + 8 * count * width
