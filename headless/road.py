@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--list", action="store_true", help="list the file's roads or alignments, and write nothing")
     parser.add_argument("--output", type=Path, metavar="DIR", help="folder for the files (needed without --list)")
     add_axis_name_argument(parser)
-    parser.add_argument("--only-axis", action="store_true", help="the axis is all that is wanted: no exit code 3")
+    parser.add_argument("--only-axis", action="store_true", help="take the axis and its heights alone: no exit code 3")
     names = ", ".join(scenario_names())
     text = f"what the file doesn't say: {names}, or a .json file (%(default)s)"
     parser.add_argument("--scenario", default="rq31-600m", metavar="NAME_OR_FILE", help=text)
@@ -62,11 +62,14 @@ def run(arguments: argparse.Namespace) -> Outcome:
     with output_folder(arguments.output, [PARAMETERS, CENTRELINE, REPORT], arguments.overwrite) as folder:
         from synthroads_addon.jobs.axis_source import axis_summary
         from synthroads_addon.jobs.generate import RoadSource
+        from synthroads_addon.jobs.whole_road import has_whole_road
         from synthroads_addon.road.axes.centerline import centerline_geojson
         from synthroads_addon.road.geometry import RoadGeometry
         from synthroads_addon.road.tessellation import sample_stations
 
-        source = RoadSource(scenario, axis=arguments.file, axis_name=arguments.axis_name, pictures=arguments.output)
+        whole = has_whole_road(arguments.file) and not arguments.only_axis
+        file = {"road" if whole else "axis": arguments.file}
+        source = RoadSource(scenario, **file, axis_name=arguments.axis_name, pictures=arguments.output)
         parameters, told = source.read()
         report = told["axis"]
         road = RoadGeometry(parameters)
@@ -76,7 +79,9 @@ def run(arguments: argparse.Namespace) -> Outcome:
         report |= {"remarks": remarks_so_far()}
         (folder / REPORT).write_text(canonical_json(report), encoding="utf-8")
     lost = [text for text in report.get("left_out", []) if text.startswith(_SURFACE)]
-    lines = [axis_summary(report), *(f"left out: {text}" for text in report.get("left_out", []))]
+    lost += ["surface"] if report.get("whole", {}).get("surface_lost") else []
+    lines = [axis_summary(report), *report.get("summary", [])]
+    lines += [f"left out: {text}" for text in report.get("left_out", [])]
     text = "\n".join([*lines, f"written to {arguments.output}"])
     return 3 if lost and not arguments.only_axis else 0, report, text
 

@@ -29,7 +29,7 @@ from ...nodes.inputs import (
 from ...nodes.strip import StripFaces, strip_group
 from .layout import TURNOUT_NAMES, aged_strips, brightness_field, detail_field, strips_of, width_field
 
-_FAR = (0.0, 1000.0)
+_FAR = (-1000.0, 1000.0)
 _UNPAVED = ("Verge", "Island")
 _WIDTHS = {"Inner Edge Strip": 0.5, "Outer Edge Strip": 0.5, "Hard Shoulder": 2.5, "Verge": 1.5}
 _LANE = 3.5
