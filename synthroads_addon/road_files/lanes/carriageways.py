@@ -12,7 +12,7 @@ from ...base.arrays import Float
 from ...base.schema import round_value
 from ...road.geometry import RoadGeometry
 from ...road.objects import Side, SignedWidthPoint, WidthPoint
-from ...road.section import Carriageway, CrossfallPoint, Lane, Pavement
+from ...road.section import Carriageway, CrossfallPoint, Lane, Pavement, Turnout
 from ..heights import HeightPiece
 from .corners import Polyline, corners, polyline
 from .loss import Loss
@@ -20,6 +20,7 @@ from .plane import Planes, RotationAxis, joined, planes
 from .records import merged
 from .shape import OUTSIDE, SideShape
 from .strips import DRIVEN
+from .turnouts import beside, read_turnouts
 
 SIDE_OF: dict[int, Side] = {1: "left", -1: "right"}
 WIDTH_TOLERANCE = 3e-4
@@ -49,12 +50,14 @@ class Pavements:
 
     Attributes:
         carriageways: by side, instance 1.
+        turnouts: by id, instance 1.
         heights: cubics of the profile in the file's stations; None where it is the file's elevation.
         lines: boundaries of each side's strips by station of the file.
         shapes: what they are made of.
     """
 
     carriageways: dict[Side, Carriageway]
+    turnouts: dict[str, Turnout]
     heights: list[HeightPiece] | None
     lines: dict[int, Polyline]
     shapes: dict[int, SideShape]
@@ -70,11 +73,36 @@ def pavements(sides: Sequence[SideShape], verge: Verge, stations: Stations, loss
         loss: what is approximated is added to it.
     """
     lines = {side.sign: _boundary_lines(side, loss) for side in sides}
-    made = _planes(sides, lines)
+    mine = {side.sign: read_turnouts(side, f"carriageway-{SIDE_OF[side.sign]}", loss) for side in sides}
+    main = {side.sign: _without_turnouts(side, lines[side.sign], mine[side.sign]) for side in sides}
+    made = _planes(sides, main)
     found: dict[Side, Carriageway] = {}
+    turnouts: dict[str, Turnout] = {}
     for side in sides:
-        found[SIDE_OF[side.sign]] = _carriageway(side, lines[side.sign], made, (verge, stations), loss)
-    return Pavements(found, made.heights, lines, {side.sign: side for side in sides})
+        found[SIDE_OF[side.sign]] = _carriageway(
+            side, main[side.sign], (made, mine[side.sign]), (verge, stations), loss
+        )
+        turnouts |= {key: _placed(item, stations) for key, item in mine[side.sign].items()}
+    return Pavements(found, turnouts, made.heights, lines, {side.sign: side for side in sides})
+
+
+def _without_turnouts(side: SideShape, line: Polyline, turnouts: dict[str, Turnout]) -> Polyline:
+    """Return a carriageway's boundaries without turnouts: the shoulder gives way to them, and the verge is wider."""
+    widths = np.diff(line.values, axis=1)
+    kept = ~beside(line.stations, turnouts)
+    kept = kept if kept.any() else np.ones(len(kept), dtype=bool)
+    shoulder, verge = paved_index(side) - 1, widths.shape[1] - 1
+    for column in (shoulder, verge):
+        widths[:, column] = np.interp(line.stations, line.stations[kept], widths[kept, column])
+    widths[:, shoulder + 1 : verge] = 0.0
+    inner = line.values[:, :1]
+    return Polyline(line.stations, np.column_stack([inner, inner + np.cumsum(widths, axis=1)]), line.jumps)
+
+
+def _placed(turnout: Turnout, stations: Stations) -> Turnout:
+    """Return a turnout at the set's station of its lowest one."""
+    start = float(stations(np.array([turnout.start_station]))[0])
+    return turnout.model_copy(update={"start_station": round_value(start, _DIGITS)})
 
 
 def _boundary_lines(side: SideShape, loss: Loss) -> Polyline:
@@ -111,9 +139,9 @@ def paved_index(side: SideShape) -> int:
 
 
 def _carriageway(
-    side: SideShape, line: Polyline, made: Planes, about: tuple[Verge, Stations], loss: Loss
+    side: SideShape, line: Polyline, drawn: tuple[Planes, dict[str, Turnout]], about: tuple[Verge, Stations], loss: Loss
 ) -> Carriageway:
-    verge, stations = about
+    (made, turnouts), (verge, stations) = drawn, about
     layout, at = side.layout, stations(line.stations)
     widths = np.diff(line.values, axis=1)
     count = len(layout.slots)
@@ -127,7 +155,7 @@ def _carriageway(
     if verge_width.max() <= _NONE:
         verge_width = np.full(len(at), verge.width)
     else:
-        slope = _verge_slope(side, loss)
+        slope = _verge_slope(side, turnouts, loss)
     inner = corners(at, line.values[:, 0])
     rise = made.rises[side.sign]
     percent = 100.0 * rise.values[:, 0]
@@ -171,11 +199,13 @@ def _offset(points: list[tuple[float, float]], stations: Float) -> float | tuple
     return tuple(SignedWidthPoint(station=round_value(s), width=round_value(w, _DIGITS)) for s, w in points)
 
 
-def _verge_slope(side: SideShape, loss: Loss) -> float:
+def _verge_slope(side: SideShape, turnouts: dict[str, Turnout], loss: Loss) -> float:
     """Return the fall, %, of a file's verge away from the pavement: the mean one, weighted by width."""
     falls, widths = 0.0, 0.0
     for stretch in range(len(side.breaks) - 1):
         at = np.linspace(side.breaks[stretch], side.breaks[stretch + 1], 3)[1:2]
+        if beside(at, turnouts).any():
+            continue
         found = side.boundaries(at, stretch)
         width = float(found.distances[0, -1] - found.distances[0, -2])
         length = float(side.breaks[stretch + 1] - side.breaks[stretch])
@@ -222,13 +252,17 @@ def _worst(side: SideShape, kinds: tuple[str, ...], rows: list[Any], loss: Loss)
     begins = np.concatenate([row[1].inner_heights for row in rows])
     ours, levels = np.concatenate([row[2] for row in rows]), np.concatenate([row[3] for row in rows])
     # Strips that are nowhere wider than 0 aren't among the set's.
-    present = [n for n in range(len(names)) if (wanted[:, n + 1] - wanted[:, n]).max() > _NONE]
-    index = [0] + [kinds.index(names[n]) + 1 + _lanes_before(names, present, n) for n in present]
+    present = [
+        n for n in range(len(names)) if (wanted[:, n + 1] - wanted[:, n]).max() > _NONE and names[n] in kinds
+    ]
+    begin = [kinds.index(names[n]) + _lanes_before(names, present, n) for n in present]
+    index = [0, *(n + 1 for n in begin)]
     verge = bool(present) and names[present[-1]] == "verge"
     columns = [0, *(n + 1 for n in present)]
     across = np.abs(ours[:, index] - wanted[:, columns])
     up = np.maximum(np.abs(levels[:, index] - heights[:, columns]), 0.0)
-    up[:, 1:] = np.maximum(up[:, 1:], np.abs(levels[:, index[:-1]] - begins[:, columns[1:]]))
+    there = np.diff(wanted, axis=1)[:, present] > _NONE
+    up[:, 1:] = np.where(there, np.maximum(up[:, 1:], np.abs(levels[:, begin] - begins[:, columns[1:]])), up[:, 1:])
     shown: dict[str, Any] = {}
     for kind, values in (("offset", across), ("height", up)):
         paved = values[:, :-1] if verge else values

@@ -96,7 +96,7 @@ def whole_road(path: Path, scenario: RoadScenario, name: str | None = None) -> W
     heights = None
     if found.heights is not None:
         heights = tuple(found.heights)
-    return WholeRoad(GivenRoad(found.carriageways), heights, found, loss, exact)
+    return WholeRoad(GivenRoad(found.carriageways, found.turnouts), heights, found, loss, exact)
 
 
 def _elements(root: Element) -> dict[str, Element]:

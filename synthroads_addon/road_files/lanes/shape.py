@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.arrays import Float
+from ...road.turnout_geometry import TURNOUT_STRIPS
 from .strips import SideLayout
 from .surface import Edge, FileSurface, LaneEdges
 
-OUTSIDE = ("outer_edge_strip", "hard_shoulder", "verge")
+OUTSIDE = ("outer_edge_strip", "hard_shoulder", *TURNOUT_STRIPS, "verge")
 """Strips outside of the lanes, from the inside out."""
 
 
