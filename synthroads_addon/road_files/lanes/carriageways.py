@@ -54,6 +54,7 @@ class Pavements:
         heights: cubics of the profile in the file's stations; None where it is the file's elevation.
         lines: boundaries of each side's strips by station of the file.
         shapes: what they are made of.
+        turnout_ids: ids of turnouts by side and instance in the file.
     """
 
     carriageways: dict[Side, Carriageway]
@@ -61,6 +62,7 @@ class Pavements:
     heights: list[HeightPiece] | None
     lines: dict[int, Polyline]
     shapes: dict[int, SideShape]
+    turnout_ids: dict[tuple[int, str], str]
 
 
 def pavements(sides: Sequence[SideShape], verge: Verge, stations: Stations, loss: Loss) -> Pavements:
@@ -73,7 +75,9 @@ def pavements(sides: Sequence[SideShape], verge: Verge, stations: Stations, loss
         loss: what is approximated is added to it.
     """
     lines = {side.sign: _boundary_lines(side, loss) for side in sides}
-    mine = {side.sign: read_turnouts(side, f"carriageway-{SIDE_OF[side.sign]}", loss) for side in sides}
+    read = {side.sign: read_turnouts(side, f"carriageway-{SIDE_OF[side.sign]}", loss) for side in sides}
+    mine = {sign: found for sign, (found, _) in read.items()}
+    names = {(sign, instance): name for sign, (_, ids) in read.items() for instance, name in ids.items()}
     main = {side.sign: _without_turnouts(side, lines[side.sign], mine[side.sign]) for side in sides}
     made = _planes(sides, main)
     found: dict[Side, Carriageway] = {}
@@ -83,7 +87,7 @@ def pavements(sides: Sequence[SideShape], verge: Verge, stations: Stations, loss
             side, main[side.sign], (made, mine[side.sign]), (verge, stations), loss
         )
         turnouts |= {key: _placed(item, stations) for key, item in mine[side.sign].items()}
-    return Pavements(found, turnouts, made.heights, lines, {side.sign: side for side in sides})
+    return Pavements(found, turnouts, made.heights, lines, {side.sign: side for side in sides}, names)
 
 
 def _without_turnouts(side: SideShape, line: Polyline, turnouts: dict[str, Turnout]) -> Polyline:

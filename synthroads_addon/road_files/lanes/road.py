@@ -22,6 +22,7 @@ from ..read import choose_line
 from ..xml_text import child, children, number, read_xml
 from .carriageways import Pavements, Verge, pavements
 from .loss import Loss
+from .marks import line_markings
 from .records import FileRoad, read_road
 from .shape import SideShape
 from .strips import driven_sides, side_layouts
@@ -96,7 +97,9 @@ def whole_road(path: Path, scenario: RoadScenario, name: str | None = None) -> W
     heights = None
     if found.heights is not None:
         heights = tuple(found.heights)
-    return WholeRoad(GivenRoad(found.carriageways, found.turnouts), heights, found, loss, exact)
+    markings = line_markings(found, lambda s: np.interp(s, *exact), scenario, loss)
+    given = GivenRoad(found.carriageways, found.turnouts, markings)
+    return WholeRoad(given, heights, found, loss, exact)
 
 
 def _elements(root: Element) -> dict[str, Element]:

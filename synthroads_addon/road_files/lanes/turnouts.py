@@ -39,9 +39,13 @@ class _Part:
     sections: tuple[int, ...]
 
 
-def read_turnouts(side: SideShape, carriageway: str, loss: Loss) -> dict[str, Turnout]:
-    """Return the turnouts beside a carriageway by id, stations those of the file; those not understood are told."""
+def read_turnouts(side: SideShape, carriageway: str, loss: Loss) -> tuple[dict[str, Turnout], dict[str, str]]:
+    """Return the turnouts beside a carriageway by id, stations those of the file, and ids by the file's instances.
+
+    Those that aren't understood are told.
+    """
     found: dict[str, Turnout] = {}
+    ids: dict[str, str] = {}
     for part in _parts(side):
         try:
             turnout = _Reader(side, part).read(carriageway)
@@ -50,9 +54,10 @@ def read_turnouts(side: SideShape, carriageway: str, loss: Loss) -> dict[str, Tu
             continue
         name = f"{turnout.kind.replace('_', '-')}-{'left' if side.sign > 0 else 'right'}"
         count = sum(other.startswith(name) for other in found) + 1
-        found[name if count == 1 else f"{name}-{count}"] = turnout
+        ids[part.instance] = name if count == 1 else f"{name}-{count}"
+        found[ids[part.instance]] = turnout
         loss.read["turnouts"] += 1
-    return found
+    return found, ids
 
 
 def has_turnouts(side: SideShape) -> bool:
