@@ -1,6 +1,6 @@
 """From a seed and limits to one road. Rules hold by construction: nothing is drawn and rejected."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from ..base.maps.crs import EPSG_URI
@@ -60,16 +60,21 @@ def sample_road(
 
     def add(items: Iterable[tuple[str, RoadObject]]) -> None:
         for name, item in list(items):
-            objects[name] = item.model_copy(update={"instance": len(objects) + 1})
+            objects[_free_id(name, objects)] = item.model_copy(update={"instance": len(objects) + 1})
 
     add(_structure(site))
     add(place_markings(site) if given is None or given.markings is None else given.markings.items())
-    add(place_furniture(site) if given is None or given.things is None else given.things.items())
-    add(place_roadside(site, objects))
+    given_things = None if given is None else given.things
+    if given_things is not None:
+        add(given_things.items())
+    else:
+        add(place_furniture(site))
+        add(place_roadside(site, objects))
     add([("terrain", site.terrain)])
     add(sample_vegetation(site))
     add(sample_vehicles(site, objects))
-    add(sample_assets(site))
+    if given_things is None:
+        add(sample_assets(site))
     add([("landscape", sample_landscape(site))])
     origin = origin_on_ground(scenario, site.alignment, site.terrain)
     section = scenario.cross_section.lower() if isinstance(scenario.cross_section, str) else "free"
@@ -89,6 +94,15 @@ def sample_road(
         materials=sample_materials(scenario, seed),
         objects=objects,
     )
+
+
+def _free_id(name: str, taken: Mapping[str, Any]) -> str:
+    """Return an id, with a number where what is given has it already."""
+    free, count = name, 1
+    while free in taken:
+        count += 1
+        free = f"{name[:56]}-{count}"
+    return free
 
 
 def sample_alignment(scenario: RoadScenario, seed: int) -> AlignmentObject:

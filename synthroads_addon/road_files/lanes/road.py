@@ -23,6 +23,8 @@ from ..xml_text import child, children, number, read_xml
 from .carriageways import Pavements, Verge, pavements
 from .loss import Loss
 from .marks import line_markings
+from .objects import things
+from .places import Places
 from .records import FileRoad, read_road
 from .shape import SideShape
 from .strips import driven_sides, side_layouts
@@ -98,7 +100,8 @@ def whole_road(path: Path, scenario: RoadScenario, name: str | None = None) -> W
     if found.heights is not None:
         heights = tuple(found.heights)
     markings = line_markings(found, lambda s: np.interp(s, *exact), scenario, loss)
-    given = GivenRoad(found.carriageways, found.turnouts, markings)
+    places = [Places(FileSurface(one), axis.alignment, lambda s: np.interp(s, *exact)) for one in roads]
+    given = GivenRoad(found.carriageways, found.turnouts, markings, things(places, loss))
     return WholeRoad(given, heights, found, loss, exact)
 
 

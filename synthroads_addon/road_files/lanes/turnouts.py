@@ -33,9 +33,10 @@ _DIGITS = 6
 
 @dataclass(frozen=True)
 class _Part:
-    """Lanes of one turnout: sections in which it has any, and the turnout's lane in each."""
+    """Lanes of one turnout: its instance and id in the file, and the sections in which it has any."""
 
     instance: str
+    id: str
     sections: tuple[int, ...]
 
 
@@ -54,7 +55,7 @@ def read_turnouts(side: SideShape, carriageway: str, loss: Loss) -> tuple[dict[s
             continue
         name = f"{turnout.kind.replace('_', '-')}-{'left' if side.sign > 0 else 'right'}"
         count = sum(other.startswith(name) for other in found) + 1
-        ids[part.instance] = name if count == 1 else f"{name}-{count}"
+        ids[part.instance] = part.id or (name if count == 1 else f"{name}-{count}")
         found[ids[part.instance]] = turnout
         loss.read["turnouts"] += 1
     return found, ids
@@ -67,14 +68,17 @@ def has_turnouts(side: SideShape) -> bool:
 
 def _parts(side: SideShape) -> Iterator[_Part]:
     by_instance: dict[str, list[int]] = {}
+    ids: dict[str, str] = {}
     for number, rows in side.layout.strips.items():
         for kind, lane in rows:
             if kind in TURNOUT_STRIPS:
-                numbers = by_instance.setdefault(lane.notes.get("instance", ""), [])
+                instance = lane.notes.get("instance", "")
+                numbers = by_instance.setdefault(instance, [])
+                ids[instance] = lane.notes.get("id", "")
                 if number not in numbers:
                     numbers.append(number)
     for instance, numbers in by_instance.items():
-        yield _Part(instance, tuple(sorted(numbers)))
+        yield _Part(instance, ids[instance], tuple(sorted(numbers)))
 
 
 class _Reader:
