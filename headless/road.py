@@ -41,6 +41,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--output", type=Path, metavar="DIR", help="folder for the files (needed without --list)")
     add_axis_name_argument(parser)
     parser.add_argument("--only-axis", action="store_true", help="take the axis and its heights alone: no exit code 3")
+    text = "print in which fields the road of an OpenDRIVE file differs from this parameter set"
+    parser.add_argument("--against", type=Path, metavar="PARAMETERS", help=text)
     names = ", ".join(scenario_names())
     text = f"what the file doesn't say: {names}, or a .json file (%(default)s)"
     parser.add_argument("--scenario", default="rq31-600m", metavar="NAME_OR_FILE", help=text)
@@ -56,6 +58,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
         rows = listed_lines(arguments.file)
         return 0, {"file": str(arguments.file), "roads": rows}, _table(rows)
+    if arguments.against is not None:
+        return _compare(arguments)
     if arguments.output is None:
         raise InputError("--output", None, "is needed: a folder for the files (or --list)")
     scenario = load_scenario(arguments.scenario, all_changes(arguments, _FIELDS))
@@ -84,6 +88,25 @@ def run(arguments: argparse.Namespace) -> Outcome:
     lines += [f"left out: {text}" for text in report.get("left_out", [])]
     text = "\n".join([*lines, f"written to {arguments.output}"])
     return 3 if lost and not arguments.only_axis else 0, report, text
+
+
+def _compare(arguments: argparse.Namespace) -> Outcome:
+    """Return the fields in which a file's road differs from a parameter set; nothing is written."""
+    if arguments.output is not None:
+        raise InputError("--output", str(arguments.output), "can't be given together with --against, which writes nothing")
+    from synthroads_addon.jobs.whole_road import differences_from
+
+    scenario = load_scenario(arguments.scenario, all_changes(arguments, _FIELDS))
+    found, _ = differences_from(arguments.file, arguments.against, scenario, arguments.axis_name)
+    rows = [one._asdict() for one in found]
+    report = {"file": str(arguments.file), "against": str(arguments.against), "differences": rows}
+    cells = [
+        (one.field, str(one.old), str(one.new), "" if one.station is None else f"at station {one.station:.1f} m")
+        for one in found
+    ]
+    if not cells:
+        return 0, report, "no field differs"
+    return 0, report, "\n".join(text_table(("field", "old", "new", ""), cells, ()))
 
 
 def _table(rows: list[dict[str, Any]]) -> str:

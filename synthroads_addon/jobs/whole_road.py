@@ -9,10 +9,12 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..base.remarks import assume
+from ..road.differences import Difference, differences
 from ..road.geometry import RoadGeometry
 from ..road.objects import nominal_width
-from ..road.parameters import AlignmentObject, RoadParameters, VerticalPoint
+from ..road.parameters import AlignmentObject, RoadParameters, VerticalPoint, read_parameters
 from ..road.section import Carriageway
+from ..road.things.registry import THINGS
 from ..road_files.lanes.carriageways import deviations
 from ..road_files.lanes.road import WholeRoad, whole_road, with_heights
 from ..road_files.opendrive import read_opendrive
@@ -56,6 +58,25 @@ def road_from_file(
     report["surface"] = deviations(found.pavements, _lifted(parameters), found.stations, found.loss)
     report["left_out"] = [text for text in report["left_out"] if not _is_taken(text)]
     return parameters, report | {"whole": found.loss.to_dict(), "summary": found.loss.lines()}
+
+
+def differences_from(
+    path: Path, against: Path, scenario: Scenario, name: str | None = None
+) -> tuple[list[Difference], dict[str, Any]]:
+    """Return in which fields the road of an OpenDRIVE file differs from a parameter set, and a report of the file.
+
+    What is compared is what the file says: line, heights, carriageways, turnouts, and markings and things if it has any.
+
+    Raises:
+        MissingFileError, InputError: a file can't be read, or a parameter set can't hold the road.
+    """
+    old = read_parameters(against)
+    new, report = road_from_file(path, scenario, name)
+    types = {"Alignment", "Carriageway", "Turnout"}
+    given = whole_road(path, scenario.road, name).given
+    types |= {"LineMarking"} if given.markings is not None else set()
+    types |= {*THINGS, "Arrow", "Hatching"} if given.things is not None else set()
+    return differences(old, new, types), report
 
 
 def _is_taken(text: str) -> bool:

@@ -27,6 +27,8 @@ _PAINTED: dict[str, type[RoadObject]] = {"Arrow": Arrow, "Hatching": Hatching}
 _PLACE = ("station", "rotation_deg", "start_station", "end_station")
 _PLANTS = frozenset({"tree", "vegetation"})
 _TELL = 0.05
+_CHANGED = 0.002
+"""Distance, m, from which an element of our own file is elsewhere than what it says of itself: it was edited."""
 _DIGITS = 6
 
 
@@ -123,19 +125,32 @@ def _own_thing(model: type[RoadObject], item: Element, notes: dict[str, str], pl
     if issubclass(model, LengthwiseThing):
         repeats = children(item, "repeat")
         ends = (repeats[0], 0.0, "Start"), (repeats[-1], number(repeats[-1], "length"), "End")
-        stations = [
+        (start, offset), (end, _) = (
             places.at(
                 np.array([number(row, "s") + more]),
-                np.array([number(row, f"t{end}")]),
-                np.array([number(row, f"zOffset{end}")]),
-            )[0]
-            for row, more, end in ends
-        ]
-        values |= {"start_station": _one(stations[0]), "end_station": _one(stations[1])}
-    elif "station" in model.model_fields:
-        station, _ = places.at(*_place(item))
-        values |= {"station": _one(station), "rotation_deg": _degrees(number(item, "hdg", 0.0))}
-    return model.from_dict(values)
+                np.array([number(row, f"t{which}")]),
+                np.array([number(row, f"zOffset{which}")]),
+            )
+            for row, more, which in ends
+        )
+        values |= {"start_station": _one(start), "end_station": _one(end)}
+        if "height" in values and abs(number(item, "height", 0.0) - values["height"]) > _CHANGED:
+            values["height"] = number(item, "height")
+        made = model.from_dict(values)
+        right, left = made.reach()
+        return _moved(made, float(offset[0]) - 0.5 * (left - right))
+    if "station" not in model.model_fields:
+        return model.from_dict(values)
+    station, offset = places.at(*_place(item))
+    values |= {"station": _one(station), "rotation_deg": _degrees(number(item, "hdg", 0.0))}
+    return _moved(model.from_dict(values), float(offset[0]))
+
+
+def _moved(made: Any, offset: float) -> RoadObject:
+    """Return an object at the offset (m) at which its element is, where another program has moved that."""
+    if abs(offset - made.offset) <= _CHANGED:
+        return made  # type: ignore[no-any-return]
+    return type(made).from_dict(made.to_dict() | {"offset": round_value(offset, _DIGITS)})  # type: ignore[no-any-return]
 
 
 def _place(item: Element) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

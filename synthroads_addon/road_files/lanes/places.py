@@ -9,6 +9,7 @@ import numpy as np
 
 from ...base.arrays import Float
 from ...road.alignment import Alignment
+from .records import SHORTEST
 from .surface import FileSurface
 
 _APPROXIMATIONS = 2
@@ -51,4 +52,6 @@ class Places:
             away = point - plan
             offset = away[:, 1] * way[:, 0] - away[:, 0] * way[:, 1]
             station = np.clip(station + (away * way).sum(axis=1) / (1.0 - bend * offset), 0.0, self.alignment.length)
-        return station, offset
+        # What begins or ends with the road does so on its plane as well.
+        ends = np.where(s <= SHORTEST, 0.0, np.where(s >= road.length - SHORTEST, self.alignment.length, station))
+        return ends, offset
