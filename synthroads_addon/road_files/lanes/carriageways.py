@@ -13,6 +13,8 @@ from ...base.schema import round_value
 from ...road.geometry import RoadGeometry
 from ...road.objects import Side, SignedWidthPoint, WidthPoint
 from ...road.section import Carriageway, CrossfallPoint, Lane, Pavement, Turnout
+from ...road.section_geometry import CarriagewaySection
+from ...road.turnout_geometry import TURNOUT_STRIPS
 from ..heights import HeightPiece
 from .corners import Polyline, corners, polyline
 from .loss import Loss
@@ -31,6 +33,8 @@ _STEEPEST_VERGE, _STEEPEST = 15.0, 12.0
 _LANE, _SHOULDER, _STRIP = (2.0, 6.0), (0.0, 6.0), (0.0, 2.0)
 _NONE = 1e-6
 _STRAIGHT_PERCENT = 2e-4
+_TURNOUTS = 5e-3
+"""The same for turnouts' strips, whose rounded noses are polylines."""
 _DIGITS = 6
 Stations = Callable[[Float], Float]
 """Stations of the parameter set at those of the file, m."""
@@ -244,13 +248,22 @@ def deviations(found: Pavements, road: RoadGeometry, stations: Stations, loss: L
             heights = levels.elevation(there)[:, None] + section.elevations(there, crossfall, ours)
             base = side.surface.road.elevation.at(at, side.inside(at, stretch))[:, None]
             rows.append((at, wanted, ours, heights - base))
-        report[SIDE_OF[sign]] = _worst(side, section.kinds, rows, loss)
+        report[SIDE_OF[sign]] = _worst(side, section, rows, stations, loss)
     return report
 
 
-def _worst(side: SideShape, kinds: tuple[str, ...], rows: list[Any], loss: Loss) -> dict[str, Any]:
+def _columns(chosen: Any, present: list[int]) -> list[int]:
+    """Return the strips whose outer boundary is in each chosen column; the inner edge is its first strip's."""
+    return [([0, *present])[n] for n in np.flatnonzero(chosen).tolist()]
+
+
+def _worst(
+    side: SideShape, section: CarriagewaySection, rows: list[Any], stations: Stations, loss: Loss
+) -> dict[str, Any]:
+    kinds, turnouts = section.kinds, {str(n): shape.turnout for n, shape in enumerate(section.turnouts)}
     names = ["inner_edge_strip", *["lane"] * len(side.layout.slots), *OUTSIDE]
     station = np.concatenate([row[0] for row in rows])
+    near = beside(stations(station), turnouts)
     wanted = np.concatenate([row[1].distances for row in rows])
     heights = np.concatenate([row[1].heights for row in rows])
     begins = np.concatenate([row[1].inner_heights for row in rows])
@@ -269,15 +282,24 @@ def _worst(side: SideShape, kinds: tuple[str, ...], rows: list[Any], loss: Loss)
     up[:, 1:] = np.where(there, np.maximum(up[:, 1:], np.abs(levels[:, begin] - begins[:, columns[1:]])), up[:, 1:])
     shown: dict[str, Any] = {}
     for kind, values in (("offset", across), ("height", up)):
-        paved = values[:, :-1] if verge else values
-        for part, what in (("pavement", paved), ("verge", values[:, -1:] if verge else values[:, :0])):
+        of_turnouts = np.array([False, *(names[n] in TURNOUT_STRIPS for n in present)])
+        of_verge = np.array([verge and n == len(columns) - 1 for n in range(len(columns))])
+        parts = (
+            ("pavement", ~of_turnouts & ~of_verge, TOLD),
+            ("turnouts", of_turnouts, _TURNOUTS),
+            ("verge", of_verge, TOLD),
+        )
+        for part, chosen, limit in parts:
+            what = values[:, chosen].copy()
+            if part == "pavement":  # the shoulder beside a turnout is its
+                what[np.ix_(near, np.array([names[n] for n in _columns(chosen, present)]) == "hard_shoulder")] = 0.0
             if not what.size:
                 continue
             row = int(what.max(axis=1).argmax())
             worst = float(what.max())
             shown[f"{part}_{kind}"] = round(worst, 6)
             shown[f"{part}_{kind}_station"] = round(float(station[row]), 3)
-            if worst > TOLD:
+            if worst > limit:
                 loss.approximate(f"{SIDE_OF[side.sign]} {part}", f"its {kind}s", worst, float(station[row]))
                 loss.surface = True
     return shown

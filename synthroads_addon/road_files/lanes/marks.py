@@ -43,7 +43,8 @@ class _Line:
 
     Attributes:
         side: of the carriageway.
-        border: lane boundary of it, counted from outside; None where the border is no lane's.
+        border: first and last of its lane boundaries, counted from outside, that lie there, as lanes between them have
+            no width; None where the border is no lane's.
         turnout: id of the turnout whose lane's edge it is.
         place: number and sign of the lane whose outer border it is, 0 for the centre lane, and section.
         start, end: stations, m.
@@ -56,7 +57,7 @@ class _Line:
     """
 
     side: SideShape
-    border: int | None
+    border: tuple[int, int] | None
     turnout: str | None
     place: tuple[int, int]
     start: float
@@ -101,8 +102,8 @@ def line_markings(
 
 def _border(
     sides: Mapping[int, SideShape], pavements: Pavements, section: int, lane: FileLane | None
-) -> tuple[SideShape, int | None, str | None]:
-    """Return the side that a lane's outer border is on, the lane boundary that it is, and the turnout's id."""
+) -> tuple[SideShape, tuple[int, int] | None, str | None]:
+    """Return the side that a lane's outer border is on, the lane boundaries that it is, and the turnout's id."""
     for sign in (-1, 1):  # the line between two directions is the right carriageway's
         side = sides.get(sign)
         if side is None or (lane is not None and lane.number * sign < 0):
@@ -110,9 +111,10 @@ def _border(
         slots = side.layout.slots
         there = [(n, slot.lanes[section]) for n, slot in enumerate(slots) if section in slot.lanes]
         if lane is not None:
-            for n, other in there:
+            for place, (n, other) in enumerate(there):
                 if other is lane:
-                    return side, len(slots) - 1 - n, None
+                    outer = there[place + 1][0] if place + 1 < len(there) else len(slots)
+                    return side, (len(slots) - outer, len(slots) - 1 - n), None
             for kind in ("turnout_lane", "ramp_inner_strip"):
                 if lane in side.layout.of_strip(section, kind):
                     return side, None, pavements.turnout_ids.get((sign, lane.notes.get("instance", "")))
@@ -121,7 +123,7 @@ def _border(
             inside = [other for other in side.surface.road.sections[section].lanes[sign]
                       if abs(other.number) < abs(first.number)]  # fmt: skip
             if (inside[-1] if inside else None) is lane:
-                return side, len(slots) - there[0][0], None
+                return side, (len(slots) - there[0][0], len(slots)), None
         if lane is not None:
             return side, None, None
     return sides.get(-1) or sides[1], None, None
@@ -129,7 +131,7 @@ def _border(
 
 def _lines_of(
     element: Element,
-    about: tuple[SideShape, int | None, str | None, tuple[int, int]],
+    about: tuple[SideShape, tuple[int, int] | None, str | None, tuple[int, int]],
     span: tuple[float, float],
     scenario: RoadScenario,
     loss: Loss,
@@ -148,7 +150,7 @@ def _lines_of(
 
 def _lines_of_mark(
     mark: Element,
-    about: tuple[SideShape, int | None, str | None, tuple[int, int]],
+    about: tuple[SideShape, tuple[int, int] | None, str | None, tuple[int, int]],
     span: tuple[float, float],
     scenario: RoadScenario,
     loss: Loss,
@@ -243,30 +245,54 @@ def _joined(lines: Sequence[_Line]) -> list[_Line]:
         runs: list[list[_Line]] = []
         for part in parts:
             last = runs[-1][-1] if runs else None
-            if last is not None and part.start - last.end < _SAME and _key(part)[:-3] == _key(last)[:-3]:
-                runs[-1].append(part)
+            border = _common(last.border, part.border) if last is not None else None
+            near = last is not None and part.start - last.end < _SAME and _key(part)[:-3] == _key(last)[:-3]
+            if near and last is not None and (border or last.border is part.border is None):
+                runs[-1].append(replace(part, border=border))
             else:
                 runs.append([part])
         for run in runs:
             broken = next((part for part in run if part.gap), run[0])
             joined.append(
-                replace(run[0], end=run[-1].end, dash=broken.dash, gap=broken.gap)
-                if not broken.gap or run[0].gap
-                else replace(run[0], end=run[-1].end, dash=broken.dash, gap=broken.gap, first=run[0].start)
+                replace(
+                    run[0],
+                    end=run[-1].end,
+                    dash=broken.dash,
+                    gap=broken.gap,
+                    border=run[-1].border,
+                    first=run[0].first if run[0].gap else run[0].start,
+                )
             )
     rest: list[_Line] = []
     for line in others:
         for n, other in enumerate(rest):
-            if abs(other.end - line.start) < _SAME and _key(other) == _key(line) and _goes_on(other, line):
-                rest[n] = replace(other, end=line.end)
+            border = _common(other.border, line.border)
+            same = border is not None or other.border is line.border is None
+            if same and abs(other.end - line.start) < _SAME and _key(other) == _key(line) and _goes_on(other, line):
+                rest[n] = replace(other, end=line.end, border=border)
                 break
         else:
             rest.append(line)
     return joined + rest
 
 
+def _common(first: tuple[int, int] | None, second: tuple[int, int] | None) -> tuple[int, int] | None:
+    """Return the lane boundaries that two lines may both lie on, None without any."""
+    if first is None or second is None:
+        return None
+    low, high = max(first[0], second[0]), min(first[1], second[1])
+    return (low, high) if low <= high else None
+
+
+def _boundary(line: _Line) -> int:
+    """Return the lane boundary that a line follows: of several the outermost or innermost of all, else the inner one."""
+    assert line.border is not None
+    low, high = line.border
+    return 0 if low == 0 and high < len(line.side.layout.slots) else high
+
+
 def _key(line: _Line) -> tuple[Any, ...]:
-    border = line.border if line.border is not None else ("free", line.place[0])
+    border = None if line.border is not None else ("free", line.place[0])
     shape = (round(line.shift, 4), round(line.width, 4), line.color, line.film)
     return (line.side.sign, line.turnout, *shape, border, round(line.dash, 4), round(line.gap, 4))
 
@@ -286,7 +312,7 @@ def _marking(line: _Line, stations: Stations) -> LineMarking:
     start, end = (float(value) for value in stations(np.array([first, line.end])))
     outwards = line.side.sign * line.shift / line.width
     kind = _kind(line, outwards)
-    more: dict[str, Any] = {"boundary": line.border or 0}
+    more: dict[str, Any] = {"boundary": _boundary(line) if line.border else 0}
     if kind == "free":
         more = {"offset": _offset(line, stations)}
     elif kind in ("turnout_edge", "gore_edge"):
@@ -317,10 +343,10 @@ def _kind(line: _Line, outwards: float) -> str:
         return line.kind if line.border is not None else "free"
     if line.border is None:
         return "free"
-    last = len(line.side.layout.slots)
-    if line.border == 0 and abs(outwards - 0.5) < _SAME:
+    last, boundary = len(line.side.layout.slots), _boundary(line)
+    if boundary == 0 and abs(outwards - 0.5) < _SAME:
         return "outer_edge"
-    if line.border == last and abs(outwards + 0.5) < _SAME:
+    if boundary == last and abs(outwards + 0.5) < _SAME:
         return "inner_edge"
     return "lane" if abs(outwards) < _SAME else "free"
 

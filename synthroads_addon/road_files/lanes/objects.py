@@ -24,7 +24,7 @@ from .places import Places
 from .signals import sign_of
 
 _PAINTED: dict[str, type[RoadObject]] = {"Arrow": Arrow, "Hatching": Hatching}
-_PLACE = ("station", "rotation_deg", "start_station", "end_station")
+_PLACE = ("station", "start_station", "end_station")
 _PLANTS = frozenset({"tree", "vegetation"})
 _TELL = 0.05
 _CHANGED = 0.002
@@ -142,7 +142,7 @@ def _own_thing(model: type[RoadObject], item: Element, notes: dict[str, str], pl
     if "station" not in model.model_fields:
         return model.from_dict(values)
     station, offset = places.at(*_place(item))
-    values |= {"station": _one(station), "rotation_deg": _degrees(number(item, "hdg", 0.0))}
+    values = {"rotation_deg": _degrees(number(item, "hdg", 0.0)), **values, "station": _one(station)}
     return _moved(model.from_dict(values), float(offset[0]))
 
 

@@ -27,7 +27,7 @@ _RAMP_TYPES = frozenset({"offRamp", "onRamp"})
 _KINDS = {"exit": "exit", "offRamp": "exit", "entry": "entry", "onRamp": "entry"}
 _FLAT = 5e-4
 """Height, m, up to which a ramp's edges lie in the main road's plane."""
-_SAME_TILT = 1e-4
+_SAME_TILT, _SAME_LIFT = 1e-4, 3e-4
 _DIGITS = 6
 
 
@@ -172,13 +172,9 @@ class _Reader:
             given["crossfall_percent"] = _rounded(100.0 * self.side.sign * fall, 4)
             given["run_off_length"] = _rounded(run_off, 2)
         if np.abs(lift).max() >= _FLAT:
-            grade = (lift[-1] - lift[-2]) / (b[-1] - b[-2])
-            radius = 2.0 * (grade * b[-1] - lift[-1]) / (grade * abs(grade))
-            if not abs(grade) * radius <= b[-2]:  # its rounding goes on to its end
-                radius = b[-1] ** 2 / (2.0 * abs(lift[-1]))
-                grade = math.copysign(b[-1] / radius, lift[-1])
-            given["grade_percent"] = _rounded(100.0 * float(grade), 4)
-            given["rounding_radius"] = _rounded(float(min(max(radius, 200.0), 50_000.0)), 1)
+            grade, radius = _grade(b, lift)
+            given["grade_percent"] = _rounded(100.0 * grade, 4)
+            given["rounding_radius"] = _rounded(min(max(radius, 200.0), 50_000.0), 1)
         return given
 
     def _ramp_plane(self, station: float) -> tuple[float, float, float]:
@@ -263,6 +259,29 @@ def _run_off(behind: Float, tilt: Float, rise: Float) -> tuple[float, float]:
     own = tilt / (fall - rise)
     part = (own > 0.02) & (own < 0.98)
     return fall, float(np.median(behind[part] / own[part])) if part.any() else usual
+
+
+def _grade(behind: Float, lift: Float) -> tuple[float, float]:
+    """Return the grade (m/m) of a ramp against the main road's, and the radius (m) of the curve at its nose.
+
+    Args:
+        behind: (N,) distances behind the nose, m.
+        lift: (N,) heights of the ramp's inner edge above the main road's plane there, m.
+    """
+    usual = float(Ramp.model_fields["rounding_radius"].default)
+    last, height = float(behind[-1]), float(abs(lift[-1]))
+    if last**2 >= 2.0 * usual * height:  # the lift is g b - g^2 R / 2 where the curve has ended
+        grade = (last - math.sqrt(last**2 - 2.0 * usual * height)) / usual
+        curve = np.minimum(behind, grade * usual)
+        usual_lift = curve**2 / (2.0 * usual) + grade * (behind - curve)
+        if np.abs(usual_lift - np.abs(lift)).max() < _SAME_LIFT:
+            return math.copysign(grade, float(lift[-1])), usual
+    grade = float((lift[-1] - lift[-2]) / (behind[-1] - behind[-2]))
+    radius = 2.0 * (grade * last - float(lift[-1])) / (grade * abs(grade))
+    if not abs(grade) * radius <= behind[-2]:  # its rounding goes on to its end
+        radius = last**2 / (2.0 * height)
+        grade = math.copysign(last / radius, float(lift[-1]))
+    return grade, radius
 
 
 def _trapezoid(rows: list[tuple[float, float]]) -> list[tuple[float, float]]:

@@ -222,6 +222,7 @@ def _types(item: Thing) -> tuple[str, str]:
 
 _SAID = ("instance", "type", "station", "rotation_deg", "start_station", "end_station")
 """Fields that an object's own attributes say."""
+_SAME_TURN = 1e-9  # rad
 
 
 def _describe(made: Element, name: str, item: RoadObject) -> None:
@@ -229,6 +230,8 @@ def _describe(made: Element, name: str, item: RoadObject) -> None:
     values = {key: value for key, value in item.to_dict().items() if key not in _SAID and value is not None}
     if not values.get("elevation"):
         values.pop("elevation", None)
+    if isinstance(item, StandingThing) and abs(item.turn - math.radians(item.rotation_deg)) > _SAME_TURN:
+        values["rotation_deg"] = item.rotation_deg  # it turns something else than the object
     if isinstance(item, Asset):
         values["asset"] = values.pop("name")
     shown = {key: value if isinstance(value, str | int | float) else compact_json(value) for key, value in values.items()}
