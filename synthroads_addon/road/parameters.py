@@ -27,7 +27,7 @@ SCHEMA_VERSION: Literal["1.0"] = "1.0"
 _EPSG_URI_PATTERN = r"^https://www\.opengis\.net/def/crs/EPSG/0/[0-9]{4,8}$"
 LONGEST_ROAD = 1e6
 """Longest alignment, m: its tables grow with its length, so that a slip in a number would fill the memory."""
-_OVERLAP = 1e-6
+_OVERLAP = 1e-4
 """Width, m, by which rounding may let the two carriageways' inner edges overlap."""
 DESIGN_CLASSES = ("EKA1A", "EKA1B", "EKA2", "EKA3")
 

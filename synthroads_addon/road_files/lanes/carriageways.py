@@ -91,7 +91,21 @@ def pavements(sides: Sequence[SideShape], verge: Verge, stations: Stations, loss
             side, main[side.sign], (made, mine[side.sign]), (verge, stations), loss
         )
         turnouts |= {key: _placed(item, stations) for key, item in mine[side.sign].items()}
+    if len(sides) == 2 and _touch(*(main[side.sign] for side in sides)):
+        inner = found["right"].inner_offset
+        mirrored = (
+            tuple(point.model_copy(update={"width": -point.width}) for point in inner)
+            if isinstance(inner, tuple)
+            else -inner
+        )
+        found["left"] = found["left"].model_copy(update={"inner_offset": mirrored})
     return Pavements(found, turnouts, made.heights, lines, {side.sign: side for side in sides}, names)
+
+
+def _touch(first: Polyline, second: Polyline) -> bool:
+    """Return whether two carriageways have one inner edge."""
+    both = first.values[:, 0] + second.at(first.stations)[:, 0]
+    return float(np.abs(both).max()) < 2.0 * WIDTH_TOLERANCE and float(np.abs(np.median(both))) < _NONE
 
 
 def _without_turnouts(side: SideShape, line: Polyline, turnouts: dict[str, Turnout]) -> Polyline:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...road.turnout_geometry import TURNOUT_STRIPS
-from .records import SIDES, FileLane, FileSection
+from .records import SHORTEST, SIDES, FileLane, FileSection
 from .surface import FileSurface, LaneEdges
 
 DRIVEN = frozenset(
@@ -201,7 +201,8 @@ def _matches(
         return []
     here, last = surface.road.sections[number], surface.road.sections[number - 1]
     at = np.array([here.start])
-    old = {edges.lane.number: edges for edges in surface.lanes(last, at, np.array([last.start]) * 0.5 + at * 0.5)[sign]}
+    before_it = np.array([max(here.start - SHORTEST, last.start)])
+    old = {edges.lane.number: edges for edges in surface.lanes(last, at, before_it)[sign]}
     new = {edges.lane.number: edges for edges in surface.lanes(here, at, at)[sign]}
     score = np.array([[_shared(old[a.number], new[b.number]) for b in after] for a in before])
     best = np.zeros((len(before) + 1, len(after) + 1))
