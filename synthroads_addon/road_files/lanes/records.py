@@ -61,7 +61,7 @@ class Cubics:
         piece = np.searchsorted(self.starts, there, side="right") - 1
         before = piece < 0
         piece = np.maximum(piece, 0)
-        a, b, c, d = np.moveaxis(self.rows[piece], -1, 0)
+        a, b, c, d = self.rows[piece].T
         u = station - self.starts[piece]
         found = b + u * (2.0 * c + 3.0 * d * u) if slope else a + u * (b + u * (c + u * d))
         return np.where(before, 0.0, found) if not self.begins else found

@@ -36,6 +36,17 @@ class LaneEdges:
     outer: Edge
 
 
+@dataclass(frozen=True)
+class _Frame:
+    """The plane at stations (N,): cosine and sine of its tilt, cosine of the grade, crossfall of the sides that have any."""
+
+    station: Float
+    cos: Float
+    sin: Float
+    climb: Float
+    falls: dict[int, Float]
+
+
 class FileSurface:
     """The surface of a road of a file.
 
@@ -64,18 +75,19 @@ class FileSurface:
 
     def centre(self, station: Float, inside: Float) -> Edge:
         """Return the centre lane's line at stations (N,)."""
-        return self._edge(station, inside, self.road.offset.at(station, inside), 0.0)
+        return self._place(self._frame(station, inside), self.road.offset.at(station, inside), 0.0)
 
     def lanes(self, section: FileSection, station: Float, inside: Float) -> dict[int, list[LaneEdges]]:
         """Return a section's lanes by the sign of their ids, from the inside out, at stations (N,)."""
         borders = section.borders(station, inside, self.road.offset.at(station, inside))
+        frame = self._frame(station, inside)
         found: dict[int, list[LaneEdges]] = {}
         for sign, lanes in section.lanes.items():
             found[sign] = []
             flat_from: Edge | None = None
             for lane, inner, outer in zip(lanes, borders[sign][:-1], borders[sign][1:], strict=True):
                 low, high = _lane_heights(lane, station)
-                edges = [self._edge(station, inside, inner, low), self._edge(station, inside, outer, high)]
+                edges = [self._place(frame, inner, low), self._place(frame, outer, high)]
                 if lane.level and flat_from is None:
                     flat_from = edges[0]
                 if flat_from is not None:  # level from the inner border on, as the standard's figures show
@@ -96,20 +108,22 @@ class FileSurface:
         bow = self._shape(station, t) - (1.0 - share) * self._shape(station, inner) - share * self._shape(station, outer)
         return Edge(offset, height + bow)
 
-    def _edge(self, station: Float, inside: Float, t: Float, height: Float | float) -> Edge:
+    def _frame(self, station: Float, inside: Float) -> _Frame:
+        tilt = self.road.superelevation.at(station, inside)
+        falls = {sign: np.tan(cubics.at(station, inside)) for sign, cubics in self.road.crossfall.items() if cubics}
+        return _Frame(station, np.cos(tilt), np.sin(tilt), self._cosine(station, inside), falls)
+
+    def _place(self, frame: _Frame, t: Float, height: Float | float) -> Edge:
         """Return where points of t (N,) lie that are so high (m) above the surface, normal to its plane."""
-        tilt, cosine = self.road.superelevation.at(station, inside), self._cosine(station, inside)
-        above = height + self._shape(station, t) + self._crossfall(station, inside, t)
-        offset = t * np.cos(tilt) - above * np.sin(tilt)
-        return Edge(offset, (t * np.sin(tilt) + above * np.cos(tilt)) / cosine)
+        above = height + self._shape(frame.station, t)
+        for sign, fall in frame.falls.items():
+            above = above - np.where(t * sign > 0.0, fall * np.abs(t), 0.0)
+        offset = t * frame.cos - above * frame.sin
+        return Edge(offset, (t * frame.sin + above * frame.cos) / frame.climb)
 
     def _cosine(self, station: Float, inside: Float) -> Float:
         grade = self.road.elevation.at(station, inside, slope=True)
         return np.asarray(1.0 / np.sqrt(1.0 + grade**2))
-
-    def _crossfall(self, station: Float, inside: Float, t: Float) -> Float:
-        fall = {sign: np.tan(cubics.at(station, inside)) for sign, cubics in self.road.crossfall.items()}
-        return np.asarray(-np.where(t >= 0.0, fall[1], fall[-1]) * np.abs(t))
 
     def _shape(self, station: Float, t: Float) -> Float:
         shapes = self.road.shapes

@@ -36,12 +36,12 @@ def check(road: RoadParameters, folder: Path) -> None:
     assert not report["whole"]["surface_lost"], report["whole"]["approximated"]
 
 
-@pytest.mark.parametrize("seed", [0, 2, 10])
+@pytest.mark.parametrize("seed", [0, 3, 12])
 def test_a_drawn_road_comes_back(tmp_path: Path, seed: int) -> None:
     check(drawn(seed), tmp_path)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(14, 64))
+@pytest.mark.parametrize("seed", range(13, 63))
 def test_fifty_drawn_roads_come_back(tmp_path: Path, seed: int) -> None:
     check(drawn(seed), tmp_path)
