@@ -13,20 +13,23 @@ import numpy as np
 from pydantic import ValidationError
 
 from ...base.schema import round_value
-from ...road.objects import RoadObject
-from ...road.section import Arrow, Hatching
+from ...road.objects import RoadObject, SignedWidthPoint
+from ...road.section import Arrow, Hatching, LineMarking
 from ...road.things.registry import THINGS
 from ...road.things.thing import LengthwiseThing
 from ..xml_text import child, children, local_name, number
+from .corners import corners
 from .kinds import thing_of
 from .loss import Loss
 from .places import Places
 from .signals import sign_of
+from .strips import driven_sides
 
 _PAINTED: dict[str, type[RoadObject]] = {"Arrow": Arrow, "Hatching": Hatching}
 _PLACE = ("station", "start_station", "end_station")
 _PLANTS = frozenset({"tree", "vegetation"})
 _TELL = 0.05
+_STRAIGHT = 2e-4
 _CHANGED = 0.002
 """Distance, m, from which an element of our own file is elsewhere than what it says of itself: it was edited."""
 _DIGITS = 6
@@ -103,7 +106,10 @@ def _things_of(item: Element, places: Places, loss: Loss) -> Iterator[tuple[str,
         if kind in _PLANTS and "hedge" not in f"{item.get('subtype')} {name}".lower():
             loss.leave_out("plants", "no single plant is a thing of the set: its vegetation is drawn")
             return
-        if kind == "roadMark" or notes.get("object_type") == "LineMarking":
+        if notes.get("object_type") == "LineMarking":
+            yield name, _loose_line(item, places)
+            return
+        if kind == "roadMark":
             loss.leave_out("painted objects", f"{item.get('subtype') or name}")
             return
         for number_of, made in enumerate(_foreign(item, places, loss), 1):
@@ -151,6 +157,34 @@ def _moved(made: Any, offset: float) -> RoadObject:
     if abs(offset - made.offset) <= _CHANGED:
         return made  # type: ignore[no-any-return]
     return type(made).from_dict(made.to_dict() | {"offset": round_value(offset, _DIGITS)})  # type: ignore[no-any-return]
+
+
+def _loose_line(item: Element, places: Places) -> LineMarking:
+    """Return a line of our own file that follows no lane: an object along corners."""
+    rows = [(number(c, "s"), number(c, "t"), number(c, "dz", 0.0)) for c in item.iter() if local_name(c) == "cornerRoad"]
+    station, offset = places.at(*np.array(rows).T)
+    mark = next(one for one in item.iter() if local_name(one) == "marking")
+    sides = driven_sides(places.surface.road.sections)
+    sign = sides[0] if len(sides) == 1 else 1 if offset.mean() > 0.0 else -1
+    points = corners(station, sign * offset, _STRAIGHT)
+    gap = number(mark, "spaceLength", 0.0)
+    start = float(station[0]) + (number(mark, "startOffset", 0.0) if gap else 0.0)
+    place: Any = tuple(
+        SignedWidthPoint(station=round_value(s, _DIGITS), width=round_value(w, _DIGITS)) for s, w in points
+    )
+    return LineMarking(
+        instance=1,
+        carriageway=f"carriageway-{'left' if sign > 0 else 'right'}",
+        kind="free",
+        color="yellow" if mark.get("color") == "yellow" else "white",
+        film_thickness=number(mark, "zOffset", 0.003),
+        offset=place if len(points) > 1 else place[0].width,
+        width=number(mark, "width"),
+        dash_length=number(mark, "lineLength") if gap else 0.0,
+        gap_length=gap,
+        start_station=round_value(start, _DIGITS),
+        end_station=round_value(float(station[-1]), _DIGITS),
+    )
 
 
 def _place(item: Element) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
