@@ -54,6 +54,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fidelity", choices=("draft", "standard", "high"), help=text)
     parser.add_argument("--parameters", type=Path, metavar="FILE", help="take this road instead of sampling one")
     parser.add_argument("--axis", type=Path, metavar="FILE", help=AXIS_FILES)
+    text = "OpenDRIVE file whose whole road is taken: lanes, surface, marks, objects, signals"
+    parser.add_argument("--road", type=Path, metavar="FILE", help=text)
     add_axis_name_argument(parser)
     add_choice_arguments(parser)
     add_allow_large_argument(parser)
@@ -79,22 +81,23 @@ def run(arguments: argparse.Namespace) -> Outcome:
     from synthroads_addon.jobs.generate import Job, generate
 
     files = (arguments.output, arguments.parameters, arguments.axis, arguments.axis_name, axis_place(arguments))
-    job = Job(scenario, *files, arguments.overwrite, new_file=True, begun=begun)
+    job = Job(scenario, *files, arguments.overwrite, arguments.road, new_file=True, begun=begun)
     report = generate(job, progress_bar(arguments))
     return 0, report, summary(report, arguments.output)
 
 
 def _check_road_changes(arguments: argparse.Namespace) -> None:
     """Raise an InputError if ``--set`` changes what of the road the given axis or parameters say themselves."""
-    if not arguments.parameters and not arguments.axis:
+    if not (arguments.parameters or arguments.axis or arguments.road):
         return
-    from synthroads_addon.jobs.generate import FROM_AXIS
+    from synthroads_addon.jobs.generate import FROM_AXIS, FROM_ROAD
 
-    option = "--parameters" if arguments.parameters else "--axis"
+    option = "--parameters" if arguments.parameters else "--axis" if arguments.axis else "--road"
+    said = FROM_ROAD if arguments.road else FROM_AXIS
     for change in arguments.changes:
         for name in _road_fields(change):
-            if arguments.parameters or name in FROM_AXIS:
-                what = "the whole road" if arguments.parameters else "course and place of the road"
+            if arguments.parameters or name in said:
+                what = "course and place of the road" if arguments.axis else "the whole road"
                 text = f"road.{name} has no effect with {option}, whose file says {what}; leave one of the two out"
                 raise InputError("--set", change, text)
 
@@ -115,7 +118,7 @@ def summary(report: dict[str, Any], output: Path) -> str:
     if "axis" in report:
         from synthroads_addon.jobs.axis_source import axis_summary
 
-        lines.append(axis_summary(report["axis"]))
+        lines += [axis_summary(report["axis"]), *report["axis"].get("summary", [])]
     if "points" in counts:
         lines.append(f"{counts['points']:,} points from {counts['pulses']:,} pulses, {counts['triangles']:,} triangles")
         if counts["below_threshold"] > counts["points"]:

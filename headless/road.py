@@ -41,7 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--list", action="store_true", help="list the file's roads or alignments, and write nothing")
     parser.add_argument("--output", type=Path, metavar="DIR", help="folder for the files (needed without --list)")
     add_axis_name_argument(parser)
-    parser.add_argument("--only-axis", action="store_true", help="the axis is all that is wanted: no exit code 3")
+    parser.add_argument("--only-axis", action="store_true", help="take the axis and its heights alone: no exit code 3")
+    text = "print in which fields the road of an OpenDRIVE file differs from this parameter set"
+    parser.add_argument("--against", type=Path, metavar="PARAMETERS", help=text)
     names = ", ".join(scenario_names())
     text = f"what the file doesn't say: {names}, or a .json file (%(default)s)"
     parser.add_argument("--scenario", default="rq31-600m", metavar="NAME_OR_FILE", help=text)
@@ -57,18 +59,25 @@ def run(arguments: argparse.Namespace) -> Outcome:
 
         rows = listed_lines(arguments.file)
         return 0, {"file": str(arguments.file), "roads": rows}, _table(rows)
+    if arguments.against is not None:
+        return _compare(arguments)
     if arguments.output is None:
         raise InputError("--output", None, "is needed: a folder for the files (or --list)")
     scenario = load_scenario(arguments.scenario, all_changes(arguments, _FIELDS))
     with output_folder(arguments.output, [PARAMETERS, CENTRELINE, REPORT], arguments.overwrite) as folder:
         from synthroads_addon.jobs.axis_source import axis_summary
         from synthroads_addon.jobs.generate import RoadSource
+        from synthroads_addon.jobs.whole_road import has_whole_road
         from synthroads_addon.road.axes.centerline import centerline_geojson
         from synthroads_addon.road.geometry import RoadGeometry
         from synthroads_addon.road.tessellation import sample_stations
 
+        whole = has_whole_road(arguments.file) and not arguments.only_axis
+        road_file, axis_file = (arguments.file, None) if whole else (None, arguments.file)
         place = axis_place(arguments)
-        source = RoadSource(scenario, None, arguments.file, arguments.axis_name, place, arguments.output)
+        source = RoadSource(
+            scenario, None, axis_file, arguments.axis_name, place, pictures=arguments.output, road=road_file
+        )
         parameters, told = source.read()
         report = told["axis"]
         road = RoadGeometry(parameters)
@@ -78,9 +87,30 @@ def run(arguments: argparse.Namespace) -> Outcome:
         report |= {"remarks": remarks_so_far()}
         (folder / REPORT).write_text(canonical_json(report), encoding="utf-8")
     lost = [text for text in report.get("left_out", []) if text.startswith(_SURFACE)]
-    lines = [axis_summary(report), *(f"left out: {text}" for text in report.get("left_out", []))]
+    lost += ["surface"] if report.get("whole", {}).get("surface_lost") else []
+    lines = [axis_summary(report), *report.get("summary", [])]
+    lines += [f"left out: {text}" for text in report.get("left_out", [])]
     text = "\n".join([*lines, f"written to {arguments.output}"])
     return 3 if lost and not arguments.only_axis else 0, report, text
+
+
+def _compare(arguments: argparse.Namespace) -> Outcome:
+    """Return the fields in which a file's road differs from a parameter set; nothing is written."""
+    if arguments.output is not None:
+        raise InputError("--output", str(arguments.output), "can't be given together with --against, which writes nothing")
+    from synthroads_addon.jobs.whole_road import differences_from
+
+    scenario = load_scenario(arguments.scenario, all_changes(arguments, _FIELDS))
+    found, _ = differences_from(arguments.file, arguments.against, scenario, arguments.axis_name)
+    rows = [one._asdict() for one in found]
+    report = {"file": str(arguments.file), "against": str(arguments.against), "differences": rows}
+    cells = [
+        (one.field, str(one.old), str(one.new), "" if one.station is None else f"at station {one.station:.1f} m")
+        for one in found
+    ]
+    if not cells:
+        return 0, report, "no field differs"
+    return 0, report, "\n".join(text_table(("field", "old", "new", ""), cells, ()))
 
 
 def _table(rows: list[dict[str, Any]]) -> str:

@@ -24,7 +24,13 @@ from .axis_points import NOWHERE_ELSE, PathPlace
 from .axis_source import axis_from_file
 from .job_files import FILES, JobFiles, empty_scan_warnings
 from .scan.plan import check_scan
+from .whole_road import road_from_file
 
+FROM_ROAD = frozenset(
+    {"length", "radius", "grade_percent", "map_origin", "cross_section", "lanes", "lane_width", "median_width"}
+    | {"turnouts", "lane_changes"}
+)
+"""Fields of a road's limits that have no effect where a whole road is given."""
 FROM_AXIS = frozenset({"length", "radius", "grade_percent", "map_origin"})
 """Fields of a road's limits that have no effect where an axis is given, which says all of that itself."""
 
@@ -41,6 +47,7 @@ class Job:
         axis_name: of the road or alignment in that file; None takes the longest.
         axis_place: where the axis lies beside that file's points.
         overwrite: replace files that are already there.
+        road: take the whole road of this OpenDRIVE file.
         new_file: build in a new, empty Blender file instead of the open one, which is lost.
         begun: when the job began, by `time.perf_counter`, for a time budget; when `generate` is called if None.
     """
@@ -52,6 +59,7 @@ class Job:
     axis_name: str | None = None
     axis_place: PathPlace = NOWHERE_ELSE
     overwrite: bool = False
+    road: Path | None = None
     new_file: bool = False
     begun: float | None = None
 
@@ -62,6 +70,7 @@ class RoadSource:
 
     Attributes:
         pictures: folder for the picture of an axis that no road follows; none is drawn if None.
+        road: OpenDRIVE file whose whole road is taken.
     """
 
     scenario: Scenario
@@ -70,12 +79,16 @@ class RoadSource:
     axis_name: str | None = None
     axis_place: PathPlace = NOWHERE_ELSE
     pictures: Path | None = None
+    road: Path | None = None
 
     def read(self) -> tuple[RoadParameters, dict[str, Any]]:
         """Return the road's parameters, and a report of the fit to a measured axis (empty without an axis)."""
         scenario = self.scenario
         if self.parameters:
             return read_parameters(self.parameters), {}
+        if self.road:
+            parameters, report = road_from_file(self.road, scenario, self.axis_name)
+            return parameters, {"axis": report}
         if self.axis:
             with draw_refused_fit(self.pictures):
                 given = (self.axis, scenario.road, scenario.seed, self.axis_name, self.axis_place)
@@ -94,7 +107,7 @@ def generate(job: Job, progress: Progress = silent) -> dict[str, Any]:
     """
     begun, timer = job.begun or time.perf_counter(), StageTimer(progress)
     check(job)
-    source = RoadSource(job.scenario, job.parameters, job.axis, job.axis_name, job.axis_place, job.output)
+    source = RoadSource(job.scenario, job.parameters, job.axis, job.axis_name, job.axis_place, job.output, job.road)
     files, scene = JobFiles(job.scenario), None
     with output_folder(job.output, files.names, job.overwrite) as folder:
         road, report = make_road(source, timer)
@@ -126,11 +139,13 @@ def check(job: Job) -> None:
     scenario = job.scenario
     check_scan(scenario)
     system = metric_system(scenario.road.epsg, scenario.road.height_epsg, "road.epsg")
-    if not (job.axis or job.parameters):
+    if not (job.axis or job.parameters or job.road):
         _tell_odd_place(scenario.road, system)
     check_formats(scenario.twin)
-    if job.parameters and job.axis:
-        raise InputError("--axis", str(job.axis), "can't be given together with --parameters")
+    sources = {"--parameters": job.parameters, "--axis": job.axis, "--road": job.road}
+    given = [name for name, path in sources.items() if path]
+    if len(given) > 1:
+        raise InputError(given[1], str(sources[given[1]]), f"can't be given together with {given[0]}")
     if not scenario.outputs and not scenario.twin:
         raise InputError("outputs", [], f"must name at least one of {', '.join(FILES)}")
 

@@ -79,6 +79,12 @@ class WidthPoint(Model):
     width: float = quantity(ge=0, le=50, unit="m", description="The width there.")
 
 
+class SignedWidthPoint(WidthPoint):
+    """A width at a station; negative where it lies on the other side of the centreline."""
+
+    width: float = quantity(ge=-50, le=50, unit="m", description="The width there.")
+
+
 def _in_order(points: tuple[WidthPoint, ...]) -> tuple[WidthPoint, ...]:
     for before, after in pairwise(points):
         if after.station <= before.station:
@@ -101,9 +107,18 @@ WidthPoints = Annotated[
     AfterValidator(_in_order),
     Tag("points"),
 ]
+SignedWidthPoints = Annotated[
+    tuple[SignedWidthPoint, ...],
+    Field(min_length=2, description="Linear in between, constant before the first point and after the last."),
+    AfterValidator(_in_order),
+    Tag("points"),
+]
 AnyWidth = float | tuple[WidthPoint, ...]
 """A width (m), or points of it along the road."""
 Width = Annotated[Annotated[float, Field(strict=True, ge=0, le=50), Tag("number")] | WidthPoints, _FORM, _METRES]
+SignedWidth = Annotated[
+    Annotated[float, Field(strict=True, ge=-50, le=50), Tag("number")] | SignedWidthPoints, _FORM, _METRES
+]
 LaneWidth = Annotated[Annotated[float, Field(strict=True, ge=2, le=6), Tag("number")] | WidthPoints, _FORM, _METRES]
 ShoulderWidth = Annotated[Annotated[float, Field(strict=True, ge=0, le=6), Tag("number")] | WidthPoints, _FORM, _METRES]
 StripWidth = Annotated[Annotated[float, Field(strict=True, ge=0, le=2), Tag("number")] | WidthPoints, _FORM, _METRES]
@@ -123,8 +138,8 @@ def width_kinks(width: AnyWidth) -> list[float]:
 
 
 def nominal_width(width: AnyWidth) -> float:
-    """Return a width's largest value along the road, m: what the cross-section says where nothing is left out."""
-    return max(point.width for point in width) if isinstance(width, tuple) else width
+    """Return a width's value farthest from 0 along the road, m: what it is where nothing is left out."""
+    return max((point.width for point in width), key=abs) if isinstance(width, tuple) else width
 
 
 def least_width(width: AnyWidth) -> float:

@@ -18,7 +18,7 @@ from pydantic import Field, model_validator
 from ..base.errors import InputError
 from ..base.maps.crs import MapSystem, compound_code, system_urn
 from ..base.schema import Model, quantity, read_json, when
-from .objects import ObjectT, RoadObject, StrictFinite
+from .objects import ObjectT, RoadObject, StrictFinite, width_at, width_kinks
 from .section import Arrow, Carriageway, Hatching, LineMarking, Median, Turnout
 from .surroundings import Environment, Landscape, MaterialVariation, Terrain, Vegetation, Vehicle
 from .things.registry import THINGS
@@ -27,6 +27,8 @@ SCHEMA_VERSION: Literal["1.0"] = "1.0"
 _EPSG_URI_PATTERN = r"^https://www\.opengis\.net/def/crs/EPSG/0/[0-9]{4,8}$"
 LONGEST_ROAD = 1e6
 """Longest alignment, m: its tables grow with its length, so that a slip in a number would fill the memory."""
+_OVERLAP = 1e-4
+"""Width, m, by which rounding may let the two carriageways' inner edges overlap."""
 DESIGN_CLASSES = ("EKA1A", "EKA1B", "EKA2", "EKA3")
 
 
@@ -189,10 +191,18 @@ class RoadParameters(Model):
         sides = [item.side for item in self.of_type(Carriageway).values()]
         if len(set(sides)) != len(sides) or not sides:
             raise ValueError("objects must contain one Carriageway per side at most, and at least one")
+        if len(sides) == 2 and self._least_median() < -_OVERLAP:
+            raise ValueError("the carriageways' inner_offset must add up to 0 or more: their pavements overlap")
         for name, item in self.objects.items():
             if fault := self._missing_reference(item):
                 raise ValueError(f"objects.{name}: {fault}")
         return self
+
+    def _least_median(self) -> float:
+        """Return the least distance of the two carriageways' inner edges along the road, m."""
+        inner = [item.inner_offset for item in self.of_type(Carriageway).values()]
+        station = [0.0, *(s for width in inner for s in width_kinks(width))]
+        return float(min(sum(width_at(width, station) for width in inner)))
 
     def _missing_reference(self, item: RoadObject) -> str:
         """Return a message if an object names a carriageway, lane or turnout that isn't there, else an empty string."""

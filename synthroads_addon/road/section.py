@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field, model_validator
 
 from ..base.schema import Model, quantity, when
-from .objects import LaneWidth, PointObject, RoadObject, ShoulderWidth, StripWidth, Width
+from .objects import LaneWidth, PointObject, RoadObject, ShoulderWidth, SignedWidth, StripWidth
 
 
 class Lane(Model):
@@ -178,7 +178,9 @@ class Carriageway(RoadObject):
     points_class: ClassVar = "road"
     type: Literal["Carriageway"] = "Carriageway"
     side: Literal["left", "right"] = Field(description="Side of the centreline.")
-    inner_offset: Width = Field(description="Distance of the inner paved edge from the centreline.")
+    inner_offset: SignedWidth = Field(
+        description="Distance of the inner paved edge from the centreline; negative where it lies beyond it."
+    )
     hard_shoulder_width: ShoulderWidth = Field(description="0 where there is none.")
     outer_edge_strip_width: StripWidth = Field(description="Outside the outermost lane.")
     lanes: tuple[Lane, ...] = Field(min_length=1, max_length=8, description="Lanes from outside to inside.")
@@ -188,7 +190,7 @@ class Carriageway(RoadObject):
         8.0, ge=0, le=15, unit="%", description="Fall of the verge away from the pavement."
     )
     crossfall: tuple[CrossfallPoint, ...] = Field(min_length=1, description="Crossfall by station.")
-    rotation_axis: Literal["carriageway_axis", "inner_edge"] = Field(
+    rotation_axis: Literal["carriageway_axis", "inner_edge", "centreline"] = Field(
         "carriageway_axis", description="Line that keeps the profile's elevation while the crossfall changes."
     )
     pavement: Pavement = Field(Pavement(), description="Surface course and damage.")
@@ -333,7 +335,10 @@ class LineMarking(Marking, RoadObject):
         0, ge=0, le=8, unit="1", description="Lane boundary, counted from the outer edge of the outermost lane."
     )
     turnout: str | None = Field(None, description="Id of the turnout, for turnout_edge and gore_edge.")
-    offset: Width = Field(0.0, description="Distance of the line's axis from the centreline, for free lines only.")
+    offset: SignedWidth = Field(
+        0.0,
+        description="Distance of the line's axis from the centreline, for free lines only; negative beyond it.",
+    )
     width: float = quantity(ge=0.05, le=1.0, unit="m", description="Width of the line.")
     dash_length: float = quantity(ge=0, le=100, unit="m", description="Length of a dash; 0 for a solid line.")
     gap_length: float = quantity(ge=0, le=100, unit="m", description="Length of a gap; 0 for a solid line.")

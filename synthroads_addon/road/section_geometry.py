@@ -107,6 +107,8 @@ class CarriagewaySection:
         inner = width_at(self.carriageway.inner_offset, np.atleast_1d(station))
         if self.carriageway.rotation_axis == "inner_edge":
             return inner
+        if self.carriageway.rotation_axis == "centreline":
+            return np.zeros(inner.shape)
         return (inner + self.main_edge(station)) / 2.0
 
     def lane_boundaries(self, station: ArrayLike) -> Float:

@@ -126,6 +126,7 @@ class ExactAxis:
         gap, gap_station: largest distance (m) between a piece's end and the next one's start, and where.
         kink, kink_station: largest change of direction there (rad), and where.
         drift, drift_station: largest distance (m) of the chained elements from the starts that the file gives them.
+        starts: stations along the alignment at which the file's pieces begin, m.
     """
 
     alignment: Alignment
@@ -137,6 +138,7 @@ class ExactAxis:
     kink_station: float
     drift: float
     drift_station: float
+    starts: tuple[float, ...] = ()
 
 
 @dataclass
@@ -177,6 +179,7 @@ def exact_axis(line: RoadLine) -> ExactAxis:
         as_parabolas(_moved(line, chain.starts, run)) if line.heights else None,
         tuple(chain.approximated),
         *(gaps[worst_gap], at[worst_gap], kinks[worst_kink], at[worst_kink], drift[worst_drift], at[worst_drift]),
+        starts=tuple(chain.starts),
     )
     _refuse_broken(line, axis)
     return axis

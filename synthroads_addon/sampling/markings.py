@@ -7,7 +7,7 @@ import numpy as np
 
 from ..base.schema import round_value
 from ..road.guidelines import LIMITS
-from ..road.objects import AnyWidth, Side
+from ..road.objects import AnyWidth, Side, WidthPoint
 from ..road.section import Arrow, Carriageway, Hatching, LineMarking, Turnout
 from ..road.turnout_geometry import TurnoutShape
 from .placing.ranges import Range, Reservations, free_ranges
@@ -60,6 +60,8 @@ class _Painter:
             # Only an outermost or innermost lane ends: one of the two beside a boundary.
             (start, end), (begin, stop) = (_lane_stretch(lanes[i].width, self.length) for i in (boundary - 1, boundary))
             span = max(start, begin), min(end, stop)
+            if span[1] <= span[0]:
+                continue  # one of both is nowhere
             line = self._line("lane", span, boundary=boundary, dash_length=dash, gap_length=gap)
             yield f"{self.name}-line-{boundary}", line
         span = (0.0, self.length)
@@ -89,7 +91,7 @@ class _Painter:
         """Yield (id, arrow) of the arrows on a lane that ends, in front of its taper."""
         lanes, ahead = self.carriageway.lanes, self.carriageway.traffic
         for index, lane in enumerate(lanes):
-            if not isinstance(lane.width, tuple):
+            if not isinstance(lane.width, tuple) or not _changes_once(lane.width):
                 continue
             before, start, _, after = lane.width if ahead > 0 else lane.width[::-1]
             if before.width < after.width:
@@ -141,6 +143,25 @@ def _lane_stretch(width: AnyWidth, length: float) -> Range:
     if not isinstance(width, tuple):
         return 0.0, length
     widths, stations = [p.width for p in width], [p.station for p in width]
+    if not _changes_once(width):
+        return _longest_stretch(np.array(stations), np.array(widths), length)
     if widths[0] < widths[-1]:
         return round_value(float(np.interp(LANE_THERE, widths, stations))), length
     return 0.0, round_value(float(np.interp(LANE_THERE, widths[::-1], stations[::-1])))
+
+
+def _changes_once(width: tuple[WidthPoint, ...]) -> bool:
+    """Return whether a drawn lane begins or ends by this width: two widths, and a taper between them."""
+    return len(width) == 4 and width[0].width == width[1].width != width[2].width == width[3].width
+
+
+def _longest_stretch(station: np.ndarray, width: np.ndarray, length: float) -> Range:
+    """Return the longest stretch (m) on which a lane of any widths (K,) by station is there; of none an empty one."""
+    fine = np.unique(np.concatenate([np.linspace(0.0, length, 2001), station.clip(0.0, length)]))
+    there = np.interp(fine, station, width) >= LANE_THERE
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(int)))
+    if not len(edges):
+        return 0.0, 0.0
+    starts, ends = fine[edges[::2]], fine[edges[1::2] - 1]
+    longest = int(np.argmax(ends - starts))
+    return round_value(float(starts[longest])), round_value(float(ends[longest]))

@@ -1,6 +1,6 @@
 """From a seed and limits to one road. Rules hold by construction: nothing is drawn and rejected."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from ..base.maps.crs import EPSG_URI
@@ -8,6 +8,7 @@ from ..base.random_streams import stream
 from ..base.schema import round_value
 from ..base.version import generator
 from ..road.geometry import alignment_of
+from ..road.given_road import GivenRoad
 from ..road.objects import RoadObject, Side
 from ..road.parameters import AlignmentObject, Metadata, RoadParameters, Transform
 from ..road.section import Carriageway, Median, Turnout
@@ -32,7 +33,11 @@ from .surroundings import (
 
 
 def sample_road(
-    scenario: RoadScenario, seed: int, title: str = "", axis: AlignmentObject | None = None
+    scenario: RoadScenario,
+    seed: int,
+    title: str = "",
+    axis: AlignmentObject | None = None,
+    given: GivenRoad | None = None,
 ) -> RoadParameters:
     """Return the parameter set of a road drawn from a seed within a scenario's limits.
 
@@ -42,6 +47,7 @@ def sample_road(
         title: title for people.
         axis: take this alignment (instance 1) instead of drawing one; its coordinates are local. It may break the
             rules of its design class.
+        given: parts along that alignment that are taken as they are; the rest is drawn around them.
 
     Raises:
         InputError: limits contradict each other; the message names them all.
@@ -49,21 +55,26 @@ def sample_road(
     if axis:
         scenario = scenario.model_copy(update={"length": round_value(axis.length)})
     check_conflicts(scenario, with_axis=axis is not None)
-    site = _sample_site(scenario, seed, axis or sample_alignment(scenario, seed))
+    site = _sample_site(scenario, seed, axis or sample_alignment(scenario, seed), given)
     objects: dict[str, Any] = {"alignment": site.alignment}
 
     def add(items: Iterable[tuple[str, RoadObject]]) -> None:
         for name, item in list(items):
-            objects[name] = item.model_copy(update={"instance": len(objects) + 1})
+            objects[_free_id(name, objects)] = item.model_copy(update={"instance": len(objects) + 1})
 
     add(_structure(site))
-    add(place_markings(site))
-    add(place_furniture(site))
-    add(place_roadside(site, objects))
+    add(place_markings(site) if given is None or given.markings is None else given.markings.items())
+    given_things = None if given is None else given.things
+    if given_things is not None:
+        add(given_things.items())
+    else:
+        add(place_furniture(site))
+        add(place_roadside(site, objects))
     add([("terrain", site.terrain)])
     add(sample_vegetation(site))
     add(sample_vehicles(site, objects))
-    add(sample_assets(site))
+    if given_things is None:
+        add(sample_assets(site))
     add([("landscape", sample_landscape(site))])
     origin = origin_on_ground(scenario, site.alignment, site.terrain)
     section = scenario.cross_section.lower() if isinstance(scenario.cross_section, str) else "free"
@@ -85,6 +96,15 @@ def sample_road(
     )
 
 
+def _free_id(name: str, taken: Mapping[str, Any]) -> str:
+    """Return an id, with a number where what is given has it already."""
+    free, count = name, 1
+    while free in taken:
+        count += 1
+        free = f"{name[:56]}-{count}"
+    return free
+
+
 def sample_alignment(scenario: RoadScenario, seed: int) -> AlignmentObject:
     """Return a drawn alignment within the limits of its design class, its middle at the local origin."""
     rng = stream(seed, "alignment")
@@ -101,11 +121,16 @@ def sample_alignment(scenario: RoadScenario, seed: int) -> AlignmentObject:
     return axis.model_copy(update={"start_x": round_value(-x, 3), "start_y": round_value(-y, 3)})
 
 
-def _sample_site(scenario: RoadScenario, seed: int, axis: AlignmentObject) -> PlacementSite:
+def _sample_site(
+    scenario: RoadScenario, seed: int, axis: AlignmentObject, given: GivenRoad | None
+) -> PlacementSite:
     """Return a drawn road without what stands on and beside it: axis, carriageways, turnouts and terrain."""
     sampler = CarriagewaySampler(scenario, seed, axis)
     carriageways: dict[Side, Carriageway] = {}
     turnouts: dict[str, Turnout] = {}
+    if given is not None:
+        carriageways = {side: sampler.pave(given.carriageways[side]) for side in SIDES if side in given.carriageways}
+        return PlacementSite(scenario, seed, axis, carriageways, dict(given.turnouts), sample_terrain(scenario, seed))
     for side in SIDES:
         carriageways[side], of_side = sampler.draw(side)
         turnouts |= of_side
@@ -114,7 +139,8 @@ def _sample_site(scenario: RoadScenario, seed: int, axis: AlignmentObject) -> Pl
 
 def _structure(site: PlacementSite) -> Iterator[tuple[str, RoadObject]]:
     """Yield (id, object) of the median, the carriageways and the turnouts."""
-    yield "median", Median(instance=1)
+    if len(site.carriageways) > 1:
+        yield "median", Median(instance=1)
     for side, carriageway in site.carriageways.items():
         yield f"carriageway-{side}", carriageway
     yield from site.turnouts.items()

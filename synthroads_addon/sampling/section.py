@@ -325,6 +325,12 @@ class CarriagewaySampler:
         road = self._carriageway(side, lanes, rng)
         return road, {name: self._lay_ramp(name, turnout, road) for name, turnout in turnouts.items()}
 
+    def pave(self, carriageway: Carriageway) -> Carriageway:
+        """Return a given carriageway with a drawn surface course; nothing is drawn that would change its surface."""
+        side = carriageway.side
+        drawn = {**self._courses.draw(side, len(carriageway.lanes)), **self._relief(side)}
+        return carriageway.model_copy(update={"pavement": Pavement(**drawn)})
+
     def _lay_ramp(self, name: str, turnout: Turnout, road: Carriageway) -> Turnout:
         return lay_ramp(self.scenario.turnouts, turnout, road, stream(self.seed, "ramp surface", name))
 

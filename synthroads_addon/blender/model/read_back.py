@@ -27,6 +27,8 @@ _ROLES = {"Terrain": "terrain"}
 """Roles of objects that are not the ids of what they show."""
 _BEAM_OF_SIDE = ("Left Beam", "Right Beam")
 _BEAMS = frozenset(_BEAM_OF_SIDE)
+_ROTATION = {"turns_about_axis": "centreline", "turns_about_inner_edge": "inner_edge"}
+"""Switches of a carriageway -> the rotation axis that they choose, the first that is on; else its own axis."""
 
 
 def edited_parameters(parameters: RoadParameters, objects: Mapping[str, bpy.types.Object]) -> RoadParameters:
@@ -76,7 +78,7 @@ def _road_inputs(parameters: RoadParameters) -> Iterator[str]:
     for carriageway in parameters.of_type(Carriageway).values():
         side = carriageway.side.title()
         fields = [width_field(strip) for strip, _ in strip_widths(carriageway)]
-        yield from (input_name(field, side) for field in (*fields, "verge_slope", "turns_about_inner_edge"))
+        yield from (input_name(field, side) for field in (*fields, "verge_slope", *_ROTATION))
     words = names_in_words(parameters)
     for name, line in parameters.of_type(LineMarking).items():
         yield from (input_name(field, f"{side_of(parameters, line)} {words[name]}") for field in LINE_FIELDS)
@@ -147,7 +149,7 @@ def _carriageway(carriageway: Carriageway, modifier: bpy.types.NodesModifier) ->
     )
     slope = carriageway.verge_slope_percent / 100.0
     changed = _input_value(slope, modifier, input_name("verge_slope", side))
-    about_edge = modifier_input(modifier, input_name("turns_about_inner_edge", side))
+    about = [axis for name, axis in _ROTATION.items() if _is_on(modifier, input_name(name, side))]
     return carriageway.model_copy(
         update={
             "inner_offset": widths["Inner Offset"],
@@ -157,9 +159,17 @@ def _carriageway(carriageway: Carriageway, modifier: bpy.types.NodesModifier) ->
             "hard_shoulder_width": widths["Hard Shoulder"],
             "verge_width": widths["Verge"],
             "verge_slope_percent": carriageway.verge_slope_percent if changed == slope else 100.0 * changed,
-            "rotation_axis": "inner_edge" if about_edge else "carriageway_axis",
+            "rotation_axis": about[0] if about else "carriageway_axis",
         }
     )
+
+
+def _is_on(modifier: bpy.types.NodesModifier, name: str) -> bool:
+    """Return whether a switch is on; False where the model of an older version has none of the name."""
+    try:
+        return bool(modifier_input(modifier, name))
+    except KeyError:
+        return False
 
 
 def _fit_damage(before: CarriagewaySection, after: CarriagewaySection) -> Pavement:
@@ -190,7 +200,7 @@ def _scale_width(width: AnyWidth, nominal: float) -> AnyWidth:
     before = nominal_width(width)
     if nominal == before:
         return width
-    return tuple(WidthPoint(station=point.station, width=nominal * point.width / max(before, 1e-9)) for point in width)
+    return tuple(WidthPoint(station=point.station, width=nominal * point.width / (before or 1e-9)) for point in width)
 
 
 def _input_value(before: float, modifier: bpy.types.NodesModifier, name: str) -> float:

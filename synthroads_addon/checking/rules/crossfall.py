@@ -70,6 +70,8 @@ def _crossfall_inside(road: Road) -> Iterator[Finding]:
 
 def _edge_lever(edges: Edges) -> float:
     """Return the largest distance of the main road's farther edge from its rotation axis, m."""
+    if edges.carriageway.rotation_axis == "centreline":
+        return float(np.maximum(np.abs(edges.at_marks.main), np.abs(edges.at_marks.inner)).max())
     width = float((edges.at_marks.main - edges.at_marks.inner).max())
     return width / (2.0 if edges.carriageway.rotation_axis == "carriageway_axis" else 1.0)
 

@@ -225,7 +225,7 @@ class Edges:
         return EdgeDistances(inner, lanes, base + full, outer, gap_low, gap_high)
 
     def inner(self, station: Float) -> Float:
-        """Return the distance (N,), m, never negative, of the inner paved edge from the centreline at N stations."""
+        """Return the distance (N,), m, of the inner paved edge from the centreline at N stations."""
         return self._inner(station)
 
     def between(self, start: float, end: float) -> Float:

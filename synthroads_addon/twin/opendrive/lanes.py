@@ -119,6 +119,9 @@ def _heights(lane: Element, plan: LanePlan, section: LaneSection, strip: LaneStr
 def _notes(lane: Element, plan: LanePlan, side: Side, strip: LaneStrip) -> None:
     add_user_data(lane, "instance", strip.instance)
     add_user_data(lane, "strip", strip.kind)
+    if strip.kind in TURNOUT_STRIPS:
+        items = plan.geometry.parameters.objects.items()
+        add_user_data(lane, "id", next(name for name, item in items if item.instance == strip.instance))
     if strip.kind == "lane":
         section = plan.frame.section
         index = len(section.carriageway.lanes) - 1 - (strip.index - section.kinds.index("lane"))

@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 
 from ...base.arrays import Float
+from ...base.schema import compact_json
 from ...road.objects import RoadObject
 from ...road.pavement.cover import painted_outlines
 from ...road.section import Arrow, Hatching, LineMarking
+from ...road.things.asset import Asset
 from ...road.things.body import Body
 from ...road.things.thing import LengthwiseThing, StandingThing, Thing
 from ...road.vegetation.species import NEEDLES
@@ -162,7 +164,7 @@ class Objects:
         for number, part in enumerate(np.split(rows, np.cumsum([len(part) for part in parts])[:-1])):
             _road_outline(outlines, number, part, item.film_thickness)
         element(made, "material", {"surface": "paint", "roadMarkColor": item.color})
-        add_object_data(made, name, item.instance, object_type=type(item).__name__)
+        _describe(made, name, item)
 
     def loose_line(self, name: str, line: LineMarking, span: tuple[float, float], part: int) -> None:
         """Add part of a line marking that follows no lane as a `roadMark` object along corners."""
@@ -218,15 +220,22 @@ def _types(item: Thing) -> tuple[str, str]:
     return kind, subtype
 
 
-_SAID = ("instance", "type", "name", "station", "elevation", "rotation_deg", "start_station", "end_station")
+_SAID = ("instance", "type", "station", "rotation_deg", "start_station", "end_station")
 """Fields that an object's own attributes say."""
+_SAME_TURN = 1e-9  # rad
 
 
-def _describe(made: Element, name: str, item: Thing) -> None:
-    """Add a thing's scalar parameters as user data, without those that its element's attributes already say."""
-    values = {key: value for key, value in item.to_dict().items() if key not in _SAID}
-    simple: dict[str, Any] = {key: value for key, value in values.items() if isinstance(value, str | int | float)}
-    add_object_data(made, name, item.instance, object_type=type(item).__name__, **simple)
+def _describe(made: Element, name: str, item: RoadObject) -> None:
+    """Add an object's parameters as user data, lists as JSON, without those that its element's attributes say."""
+    values = {key: value for key, value in item.to_dict().items() if key not in _SAID and value is not None}
+    if not values.get("elevation"):
+        values.pop("elevation", None)
+    if isinstance(item, StandingThing) and abs(item.turn - math.radians(item.rotation_deg)) > _SAME_TURN:
+        values["rotation_deg"] = item.rotation_deg  # it turns something else than the object
+    if isinstance(item, Asset):
+        values["asset"] = values.pop("name")
+    shown = {key: value if isinstance(value, str | int | float) else compact_json(value) for key, value in values.items()}
+    add_object_data(made, name, item.instance, object_type=type(item).__name__, **shown)
 
 
 def _upright_outline(body: Body) -> Float:

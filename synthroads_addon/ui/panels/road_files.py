@@ -17,6 +17,7 @@ from ...fitting.fit import AxisRefusedError
 from ...fitting.plot import axis_picture
 from ...jobs.axis_source import axis_summary
 from ...jobs.generate import RoadSource
+from ...jobs.whole_road import has_whole_road
 from ...road.parameters import RoadParameters
 from ...scenario.road import RoadScenario
 from ...scenario.scenario import Scenario
@@ -99,7 +100,7 @@ class SYNTHROADS_OT_load_road(RoadLoader, bpy.types.Operator):
 
 
 class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
-    """Build a road along a centreline: that of an OpenDRIVE, LandXML or IFC file as it is designed, or one fitted to points of a map (OpenStreetMap, GeoPackage, shapefile) or a survey (CSV with x, y, z, GeoJSON, KML, GPX, SBET). Its cross-section is the panel's, with the lanes that OpenStreetMap has. It takes the place of the road built before"""  # noqa: E501 (a tooltip is one line)
+    """Build the road of an OpenDRIVE file, or one along a centreline: that of a LandXML or IFC file as it is designed, or one fitted to points of a map (OpenStreetMap, GeoPackage, shapefile) or a survey (CSV with x, y, z, GeoJSON, KML, GPX, SBET). Its cross-section is then the panel's, with the lanes that OpenStreetMap has. It takes the place of the road built before"""  # noqa: E501 (a tooltip is one line)
 
     bl_idname = "synthroads.load_axis"
     bl_label = "Along Centreline"
@@ -109,14 +110,16 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
     )
 
     def read(self, path: Path, scenario: Scenario) -> tuple[RoadParameters, str]:
-        """Return a road along a centreline, in the file's system unless the panel names one, and the message."""
+        """Take the file's whole road, or fit an alignment to its centreline; return the road, and the message."""
         if scenario.road.epsg == RoadScenario.model_fields["epsg"].default:
             road = scenario.road.model_copy()
             road.model_fields_set.discard("epsg")
             scenario = scenario.model_copy(update={"road": road})
-        parameters, report = RoadSource(scenario, axis=path).read()
-        length = parameters.alignment.length
-        return parameters, f"Built {length:,.0f} m of road along {path.name}: {axis_summary(report['axis'])}"
+        whole = has_whole_road(path)
+        parameters, report = RoadSource(scenario, **{"road" if whole else "axis": path}).read()
+        text = f"Built {parameters.alignment.length:,.0f} m of road {'of' if whole else 'along'} {path.name}"
+        lost = "; some of its surface was left out" if report["axis"].get("whole", {}).get("surface_lost") else ""
+        return parameters, f"{text}: {axis_summary(report['axis'])}{lost}"
 
     def refuse(self, error: InputError) -> set[str]:
         """Report an error; if the fit misses its points, also keep a picture of it."""

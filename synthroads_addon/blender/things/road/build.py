@@ -78,6 +78,7 @@ def _road_inputs(
             side,
             verge_slope=carriageway.verge_slope_percent / 100.0,
             turns_about_inner_edge=carriageway.rotation_axis == "inner_edge",
+            turns_about_axis=carriageway.rotation_axis == "centreline",
             instance=carriageway.instance,
             first_station=zero,
             slab_length=carriageway.pavement.slab_length,

@@ -29,7 +29,7 @@ from ...nodes.inputs import (
 from ...nodes.strip import StripFaces, strip_group
 from .layout import TURNOUT_NAMES, aged_strips, brightness_field, detail_field, strips_of, width_field
 
-_FAR = (0.0, 1000.0)
+_FAR = (-1000.0, 1000.0)
 _UNPAVED = ("Verge", "Island")
 _WIDTHS = {"Inner Edge Strip": 0.5, "Outer Edge Strip": 0.5, "Hard Shoulder": 2.5, "Verge": 1.5}
 _LANE = 3.5
@@ -162,7 +162,11 @@ def width_fields(lanes: int, turnouts: bool = False, varying: tuple[str, ...] = 
     about |= {strip: f"{about[strip]}; the backbone says where there is less of it" for strip in varying}
     sizes = {strip: (_WIDTHS.get(strip, _LANE), 6.0) for strip in about}
     sizes |= {"Inner Offset": (2.0, 50.0), **dict.fromkeys(TURNOUT_NAMES, (0.0, 50.0))}
-    return {width_field(strip): metres(sizes[strip][0], (0.0, sizes[strip][1]), text) for strip, text in about.items()}
+    least = {"Inner Offset": -50.0}
+    return {
+        width_field(strip): metres(sizes[strip][0], (least.get(strip, 0.0), sizes[strip][1]), text)
+        for strip, text in about.items()
+    }
 
 
 class SideInputs(Inputs):
@@ -172,6 +176,7 @@ class SideInputs(Inputs):
     turns_about_inner_edge = boolean(
         False, "The inner edge keeps the axis's height while the crossfall changes, else the middle of the pavement"
     )
+    turns_about_axis = boolean(False, "The axis itself keeps its height while the crossfall changes")
     instance = instance_number()
     pavement_material = material_of("the pavement", "asphalt")
     first_station = metres(0.0, (-1e6, 1e6), "Station that the backbone's stations count from")
@@ -287,7 +292,8 @@ def _boundaries(
     plane = distances[-2]
     main = main if turnouts else plane
     plane = plane + turnouts.verge_extra_width if turnouts else plane
-    return distances, plane, op.switch(side.turns_about_inner_edge, (inner + main) * 0.5, inner)
+    of_pavement = op.switch(side.turns_about_inner_edge, (inner + main) * 0.5, inner)
+    return distances, plane, op.switch(side.turns_about_axis, of_pavement, 0.0)
 
 
 offer_group("Road", "SR Carriageway 3 Lanes", partial(carriageway_group, 3))

@@ -186,12 +186,12 @@ def varying_widths(geometry: RoadGeometry, station: Float) -> dict[str, Float]:
         section = geometry.sections["left" if layout.side == "Left" else "right"]
         for strip, width in strip_widths(section.carriageway):
             if strip in layout.varying:
-                share = width_at(width, station) / max(nominal_width(width), 1e-9)
+                share = width_at(width, station) / (nominal_width(width) or 1e-9)
                 values[attribute_name(layout.side, strip)] = share
         for marking in layout.markings:
             line = lines[layout.side, marking.name]
             if marking.varies:
-                share = width_at(line.offset, station) / max(nominal_width(line.offset), 1e-9)
+                share = width_at(line.offset, station) / (nominal_width(line.offset) or 1e-9)
                 values[attribute_name(layout.side, marking.name)] = share
         if layout.turnouts:
             values |= _turnout_widths(layout.side, section, station)

@@ -14,7 +14,7 @@ from .line import Dashes, LinePaint, marking_group
 
 _OUTWARDS = {"outer_edge": 0.5, "block": 0.5, "turnout_edge": 0.5, "inner_edge": -0.5, "gore_edge": -0.5}
 """Kind of line -> share of its width by which its middle lies outside of its boundary."""
-_FAR = (0.0, 1000.0)
+_FAR = (-1000.0, 1000.0)
 
 
 class _Width(Inputs):

@@ -1,0 +1,133 @@
+"""A job's whole road from a file: what the file says taken over, and the rest drawn around it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..base.remarks import assume
+from ..road.differences import Difference, differences
+from ..road.geometry import RoadGeometry
+from ..road.objects import nominal_width
+from ..road.parameters import AlignmentObject, RoadParameters, VerticalPoint, read_parameters
+from ..road.section import Carriageway
+from ..road.things.registry import THINGS
+from ..road_files.lanes.carriageways import deviations
+from ..road_files.lanes.road import WholeRoad, whole_road, with_heights
+from ..road_files.opendrive import read_opendrive
+from ..road_files.read import choose_line, format_of
+from ..sampling.road import sample_road
+from ..scenario.road import RoadScenario
+from ..scenario.scenario import Scenario
+from .axis_source import axis_from_file
+
+_BESIDE = 10.0
+"""Ground, m, beside the edge of a given road."""
+_OF_WHOLE = ("lanes of", "lateral profile", "objects", "signals")
+
+
+def has_whole_road(path: Path) -> bool:
+    """Return whether a file says more of a road than its line: whether it is OpenDRIVE."""
+    return format_of(path) == "OpenDRIVE"
+
+
+def road_from_file(
+    path: Path, scenario: Scenario, name: str | None = None
+) -> tuple[RoadParameters, dict[str, Any]]:
+    """Return the road of an OpenDRIVE file as a parameter set, and a report of its axis and of what became of the rest.
+
+    Args:
+        path: the file.
+        scenario: what it doesn't say.
+        name: of the road; None takes the longest that belongs to no junction.
+
+    Raises:
+        MissingFileError, InputError: it can't be read, isn't OpenDRIVE, or a parameter set can't hold it.
+    """
+    if not has_whole_road(path):
+        raise InputError(path.name, format_of(path), "OpenDRIVE is needed for a whole road: --axis takes other files")
+    if choose_line(read_opendrive(path), name, path.name).lanes is None:
+        assume("%s: the road has no lanes: its line alone is taken", path.name)
+        axis, limits, report = axis_from_file(path, scenario.road, scenario.seed, name)
+        return sample_road(limits, scenario.seed, scenario.title, axis), report
+    found = whole_road(path, scenario.road, name)
+    axis, limits, report = axis_from_file(path, scenario.road, scenario.seed, name)
+    if found.heights is not None:
+        axis, report["heights"] = _with_profile(path, axis, limits, found, name)
+    limits = _wide_enough(path, limits, found)
+    parameters = sample_road(limits, scenario.seed, scenario.title, axis, found.given)
+    report["surface"] = deviations(found.pavements, _lifted(parameters), found.stations, found.loss)
+    report["left_out"] = [text for text in report["left_out"] if not _is_taken(text)]
+    return parameters, report | {"whole": found.loss.to_dict(), "summary": found.loss.lines()}
+
+
+def differences_from(
+    path: Path, against: Path, scenario: Scenario, name: str | None = None
+) -> tuple[list[Difference], dict[str, Any]]:
+    """Return in which fields the road of an OpenDRIVE file differs from a parameter set, and a report of the file.
+
+    What is compared is what the file says: line, heights, carriageways, turnouts, and markings and things if it has any.
+
+    Raises:
+        MissingFileError, InputError: a file can't be read, or a parameter set can't hold the road.
+    """
+    old = read_parameters(against)
+    new, report = road_from_file(path, scenario, name)
+    types = {"Alignment", "Carriageway", "Turnout"}
+    given = whole_road(path, scenario.road, name).given
+    types |= {"LineMarking"} if given.markings is not None else set()
+    types |= {*THINGS, "Arrow", "Hatching"} if given.things is not None else set()
+    return differences(old, new, types), report
+
+
+def _is_taken(text: str) -> bool:
+    return text.startswith(_OF_WHOLE[:2]) or text.endswith(_OF_WHOLE[2:])
+
+
+def _with_profile(
+    path: Path, axis: AlignmentObject, limits: RoadScenario, found: WholeRoad, name: str | None
+) -> tuple[AlignmentObject, dict[str, Any]]:
+    """Return an axis with the heights that the road's planes give it, and what the report says of them."""
+    assert found.heights is not None
+    heights = with_heights(choose_line(read_opendrive(path), name, path.name), found.heights)
+    up = limits.map_origin[2]
+    points = tuple(
+        VerticalPoint(station=p.station, elevation=p.elevation - up, radius=p.radius) for p in heights.points
+    )
+    told = {"points": len(points), "deviation": heights.deviation, "deviation_station": heights.station}
+    return axis.model_copy(update={"vertical": points}), told
+
+
+def _lifted(parameters: RoadParameters) -> RoadGeometry:
+    """Return a set's geometry with heights of the map."""
+    up = parameters.transform.translate[2]
+    axis = parameters.alignment
+    vertical = tuple(p.model_copy(update={"elevation": p.elevation + up}) for p in axis.vertical)
+    name = next(key for key, item in parameters.objects.items() if item is axis)
+    objects = parameters.objects | {name: axis.model_copy(update={"vertical": vertical})}
+    return RoadGeometry(parameters.model_copy(update={"objects": objects}))
+
+
+def _wide_enough(path: Path, limits: RoadScenario, found: WholeRoad) -> RoadScenario:
+    """Return the scenario with ground that reaches beyond the road's edges."""
+    edge = max(_farthest(carriageway) for carriageway in found.given.carriageways.values()) + _BESIDE
+    if limits.half_width >= edge:
+        return limits
+    wider = float(np.ceil(edge))
+    assume("%s: the road is wide: road.half_width is %.0f m instead of %.0f m", path.name, wider, limits.half_width)
+    return limits.model_copy(update={"half_width": wider})
+
+
+def _farthest(carriageway: Carriageway) -> float:
+    widths = (
+        carriageway.inner_offset,
+        carriageway.inner_edge_strip_width,
+        *(lane.width for lane in carriageway.lanes),
+        carriageway.outer_edge_strip_width,
+        carriageway.hard_shoulder_width,
+        carriageway.verge_width,
+    )
+    return max(abs(nominal_width(widths[0])), sum(nominal_width(width) for width in widths))

@@ -1,0 +1,27 @@
+"""What another program's file says of a road, as objects of a parameter set; what it doesn't say is drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from .objects import RoadObject, Side
+from .section import Carriageway, LineMarking, Turnout
+from .things.thing import Thing
+
+
+@dataclass(frozen=True)
+class GivenRoad:
+    """The parts of a road that aren't drawn. All have the instance number 1, and ids as in a parameter set.
+
+    Attributes:
+        carriageways: by side; their ids are ``carriageway-left`` and ``carriageway-right``. Only their pavement is drawn.
+        turnouts: by id.
+        markings: by id; None where they are drawn.
+        things: by id; None where they are drawn.
+    """
+
+    carriageways: Mapping[Side, Carriageway]
+    turnouts: Mapping[str, Turnout] = field(default_factory=dict)
+    markings: Mapping[str, LineMarking | RoadObject] | None = None
+    things: Mapping[str, Thing] | None = None

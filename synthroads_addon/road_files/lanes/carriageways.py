@@ -1,0 +1,324 @@
+"""Carriageways of a parameter set from the sides of OpenDRIVE roads, and how far they are off."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...base.arrays import Float
+from ...base.schema import round_value
+from ...road.geometry import RoadGeometry
+from ...road.objects import Side, SignedWidthPoint, WidthPoint
+from ...road.section import Carriageway, CrossfallPoint, Lane, Pavement, Turnout
+from ...road.section_geometry import CarriagewaySection
+from ...road.turnout_geometry import TURNOUT_STRIPS
+from ..heights import HeightPiece
+from .corners import Polyline, corners, polyline
+from .loss import Loss
+from .plane import Planes, RotationAxis, joined, planes
+from .records import merged
+from .shape import OUTSIDE, SideShape
+from .strips import DRIVEN
+from .turnouts import beside, read_turnouts
+
+SIDE_OF: dict[int, Side] = {1: "left", -1: "right"}
+WIDTH_TOLERANCE = 3e-4
+"""Distance, m, that boundaries of strips keep from the file's cubics."""
+TOLD = 1e-3
+"""Distance, m, from which a deviation of the surface counts as lost."""
+_STEEPEST_VERGE, _STEEPEST = 15.0, 12.0
+_LANE, _SHOULDER, _STRIP = (2.0, 6.0), (0.0, 6.0), (0.0, 2.0)
+_NONE = 1e-6
+_STRAIGHT_PERCENT = 2e-4
+_TURNOUTS = 5e-3
+"""The same for turnouts' strips, whose rounded noses are polylines."""
+_DIGITS = 6
+Stations = Callable[[Float], Float]
+"""Stations of the parameter set at those of the file, m."""
+
+
+@dataclass(frozen=True)
+class Verge:
+    """The verge of a road that has none in its file: width (m) and fall (%)."""
+
+    width: float
+    slope: float = 8.0
+
+
+@dataclass(frozen=True)
+class Pavements:
+    """Carriageways that roads of a file became.
+
+    Attributes:
+        carriageways: by side, instance 1.
+        turnouts: by id, instance 1.
+        heights: cubics of the profile in the file's stations; None where it is the file's elevation.
+        lines: boundaries of each side's strips by station of the file.
+        shapes: what they are made of.
+        turnout_ids: ids of turnouts by side and instance in the file.
+    """
+
+    carriageways: dict[Side, Carriageway]
+    turnouts: dict[str, Turnout]
+    heights: list[HeightPiece] | None
+    lines: dict[int, Polyline]
+    shapes: dict[int, SideShape]
+    turnout_ids: dict[tuple[int, str], str]
+
+
+def pavements(sides: Sequence[SideShape], verge: Verge, stations: Stations, loss: Loss) -> Pavements:
+    """Return the carriageways of the sides of one road, or of two roads along one line.
+
+    Args:
+        sides: at most one of each sign.
+        verge: where the file has none.
+        stations: of the parameter set.
+        loss: what is approximated is added to it.
+    """
+    lines = {side.sign: _boundary_lines(side, loss) for side in sides}
+    read = {side.sign: read_turnouts(side, f"carriageway-{SIDE_OF[side.sign]}", loss) for side in sides}
+    mine = {sign: found for sign, (found, _) in read.items()}
+    names = {(sign, instance): name for sign, (_, ids) in read.items() for instance, name in ids.items()}
+    main = {side.sign: _without_turnouts(side, lines[side.sign], mine[side.sign]) for side in sides}
+    made = _planes(sides, main)
+    found: dict[Side, Carriageway] = {}
+    turnouts: dict[str, Turnout] = {}
+    for side in sides:
+        found[SIDE_OF[side.sign]] = _carriageway(
+            side, main[side.sign], (made, mine[side.sign]), (verge, stations), loss
+        )
+        turnouts |= {key: _placed(item, stations) for key, item in mine[side.sign].items()}
+    if len(sides) == 2 and _touch(*(main[side.sign] for side in sides)):
+        inner = found["right"].inner_offset
+        mirrored = (
+            tuple(point.model_copy(update={"width": -point.width}) for point in inner)
+            if isinstance(inner, tuple)
+            else -inner
+        )
+        found["left"] = found["left"].model_copy(update={"inner_offset": mirrored})
+    return Pavements(found, turnouts, made.heights, lines, {side.sign: side for side in sides}, names)
+
+
+def _touch(first: Polyline, second: Polyline) -> bool:
+    """Return whether two carriageways have one inner edge."""
+    both = first.values[:, 0] + second.at(first.stations)[:, 0]
+    return float(np.abs(both).max()) < 2.0 * WIDTH_TOLERANCE and float(np.abs(np.median(both))) < _NONE
+
+
+def _without_turnouts(side: SideShape, line: Polyline, turnouts: dict[str, Turnout]) -> Polyline:
+    """Return a carriageway's boundaries without turnouts: the shoulder gives way to them, and the verge is wider."""
+    widths = np.diff(line.values, axis=1)
+    kept = ~beside(line.stations, turnouts)
+    kept = kept if kept.any() else np.ones(len(kept), dtype=bool)
+    shoulder, verge = paved_index(side) - 1, widths.shape[1] - 1
+    for column in (shoulder, verge):
+        widths[:, column] = np.interp(line.stations, line.stations[kept], widths[kept, column])
+    widths[:, shoulder + 1 : verge] = 0.0
+    inner = line.values[:, :1]
+    return Polyline(line.stations, np.column_stack([inner, inner + np.cumsum(widths, axis=1)]), line.jumps)
+
+
+def _placed(turnout: Turnout, stations: Stations) -> Turnout:
+    """Return a turnout at the set's station of its lowest one."""
+    start = float(stations(np.array([turnout.start_station]))[0])
+    return turnout.model_copy(update={"start_station": round_value(start, _DIGITS)})
+
+
+def _boundary_lines(side: SideShape, loss: Loss) -> Polyline:
+    line = polyline(lambda s, n: side.boundaries(s, n).distances, side.breaks, WIDTH_TOLERANCE)
+    for station, jump in line.jumps.tolist():
+        loss.approximate("lane widths", "they jump, which takes 5 cm", jump, station)
+    widths = np.diff(line.values, axis=1)
+    if widths.min() < -TOLD:
+        at = float(line.stations[np.unravel_index(np.argmin(widths), widths.shape)[0]])
+        loss.approximate("lane widths", "they are negative, taken for 0", float(-widths.min()), at)
+        loss.surface = True
+    values = np.column_stack([line.values[:, :1], line.values[:, :1] + np.cumsum(np.maximum(widths, 0.0), axis=1)])
+    return Polyline(line.stations, values, line.jumps)
+
+
+def _planes(sides: Sequence[SideShape], lines: Mapping[int, Polyline]) -> Planes:
+    if len({id(side.surface) for side in sides}) == 1:
+        return planes(sides)
+    right, left = sorted(sides, key=lambda side: side.sign)
+    breaks = merged(np.concatenate([side.breaks for side in sides]), float(right.breaks[-1]))
+    pivots: dict[RotationAxis, dict[int, Polyline]] = {"carriageway_axis": {}, "inner_edge": {}, "centreline": {}}
+    for side in sides:
+        line, paved = lines[side.sign], paved_index(side)
+        inner, outer = line.values[:, [0]], line.values[:, [paved]]
+        rows = {"carriageway_axis": 0.5 * (inner + outer), "inner_edge": inner, "centreline": 0.0 * inner}
+        for axis in pivots:
+            pivots[axis][side.sign] = Polyline(line.stations, rows[axis], line.jumps)
+    return joined(right, left, breaks, pivots)
+
+
+def paved_index(side: SideShape) -> int:
+    """Return the number of the boundary at which the pavement ends."""
+    return 1 + len(side.layout.slots) + 2
+
+
+def _carriageway(
+    side: SideShape, line: Polyline, drawn: tuple[Planes, dict[str, Turnout]], about: tuple[Verge, Stations], loss: Loss
+) -> Carriageway:
+    (made, turnouts), (verge, stations) = drawn, about
+    layout, at = side.layout, stations(line.stations)
+    widths = np.diff(line.values, axis=1)
+    count = len(layout.slots)
+    lanes = []
+    for n, slot in enumerate(layout.slots):
+        lanes.append(Lane(width=_width(at, widths[:, 1 + n], _LANE)))
+        loss.read["lanes"] += 1
+        for kind in sorted(slot.kinds - DRIVEN):
+            loss.approximate("lanes", f"a {kind} lane between others is taken for one that is driven on")
+    verge_width, slope = widths[:, -1], verge.slope
+    if verge_width.max() <= _NONE:
+        verge_width = np.full(len(at), verge.width)
+    else:
+        slope = _verge_slope(side, turnouts, loss)
+    inner = corners(at, line.values[:, 0])
+    rise = made.rises[side.sign]
+    percent = 100.0 * rise.values[:, 0]
+    if np.abs(percent).max() > _STEEPEST:
+        worst = int(np.abs(percent).argmax())
+        off = (abs(percent[worst]) - _STEEPEST) / 100.0 * float(np.abs(line.values).max())
+        text = f"it is {abs(percent[worst]):.1f} %, at most {_STEEPEST:g} % is possible"
+        loss.approximate("crossfall", text, off, float(rise.stations[worst]))
+        loss.surface = True
+    falls = corners(stations(rise.stations), np.clip(percent, -_STEEPEST, _STEEPEST), _STRAIGHT_PERCENT)
+    return Carriageway(
+        instance=1,
+        side=SIDE_OF[side.sign],
+        inner_offset=_offset(inner, at),
+        inner_edge_strip_width=_width(at, widths[:, 0], _STRIP),
+        lanes=tuple(reversed(lanes)),
+        outer_edge_strip_width=_width(at, widths[:, 1 + count], _STRIP),
+        hard_shoulder_width=_width(at, widths[:, 2 + count], _SHOULDER),
+        verge_width=_width(at, verge_width, _SHOULDER),
+        verge_slope_percent=slope,
+        crossfall=tuple(CrossfallPoint(station=round_value(s), crossfall_percent=round_value(v, _DIGITS)) for s, v in falls),
+        rotation_axis=made.axis,
+        pavement=Pavement(),
+    )
+
+
+def _width(stations: Float, widths: Float, limits: tuple[float, float]) -> float | tuple[WidthPoint, ...]:
+    """Return a width by station, or one number where it is constant and within the limits of such."""
+    points = corners(stations, np.maximum(widths, 0.0))
+    if len(points) == 1:
+        value = round_value(points[0][1], _DIGITS)
+        if limits[0] <= value <= limits[1]:
+            return value
+        points = [(float(stations[0]), value), (float(stations[-1]), value)]
+    return tuple(WidthPoint(station=round_value(s), width=round_value(w, _DIGITS)) for s, w in points)
+
+
+def _offset(points: list[tuple[float, float]], stations: Float) -> float | tuple[SignedWidthPoint, ...]:
+    if len(points) == 1:
+        return round_value(points[0][1], _DIGITS)
+    return tuple(SignedWidthPoint(station=round_value(s), width=round_value(w, _DIGITS)) for s, w in points)
+
+
+def _verge_slope(side: SideShape, turnouts: dict[str, Turnout], loss: Loss) -> float:
+    """Return the fall, %, of a file's verge away from the pavement: the mean one, weighted by width."""
+    falls, widths = 0.0, 0.0
+    for stretch in range(len(side.breaks) - 1):
+        at = np.linspace(side.breaks[stretch], side.breaks[stretch + 1], 3)[1:2]
+        if beside(at, turnouts).any():
+            continue
+        found = side.boundaries(at, stretch)
+        width = float(found.distances[0, -1] - found.distances[0, -2])
+        length = float(side.breaks[stretch + 1] - side.breaks[stretch])
+        falls += length * float(found.inner_heights[0, -1] - found.heights[0, -1])
+        widths += length * width
+    percent = 100.0 * falls / max(widths, _NONE)
+    loss.read["verges"] += 1
+    return round_value(min(max(percent, 0.0), _STEEPEST_VERGE), 4)
+
+
+def deviations(found: Pavements, road: RoadGeometry, stations: Stations, loss: Loss) -> dict[str, Any]:
+    """Return how far the boundaries of a set's strips are from the file's, and add what is more than 1 mm off.
+
+    They are looked at at three stations of each stretch without a break, but for 5 cm behind places where widths jump.
+    """
+    report: dict[str, Any] = {}
+    levels = road.profile
+    for sign, side in found.shapes.items():
+        section, jumps = road.sections[SIDE_OF[sign]], found.lines[sign].jumps[:, 0]
+        rows = []
+        for stretch in range(len(side.breaks) - 1):
+            start, end = float(side.breaks[stretch]), float(side.breaks[stretch + 1])
+            at = start + (end - start) * np.array([0.1, 0.5, 0.9])
+            if len(jumps):
+                behind = at[:, None] - jumps
+                at = at[~((behind >= 0.0) & (behind < 0.06)).any(axis=1)]
+            if not len(at):
+                continue
+            wanted, there = side.boundaries(at, stretch), stations(at)
+            ours = section.distances(there)
+            crossfall = road.crossfall(section.carriageway, there)
+            heights = levels.elevation(there)[:, None] + section.elevations(there, crossfall, ours)
+            base = side.surface.road.elevation.at(at, side.inside(at, stretch))[:, None]
+            rows.append((at, wanted, ours, heights - base))
+        report[SIDE_OF[sign]] = _worst(side, section, rows, stations, loss)
+    return report
+
+
+def _columns(chosen: Any, present: list[int]) -> list[int]:
+    """Return the strips whose outer boundary is in each chosen column; the inner edge is its first strip's."""
+    return [([0, *present])[n] for n in np.flatnonzero(chosen).tolist()]
+
+
+def _worst(
+    side: SideShape, section: CarriagewaySection, rows: list[Any], stations: Stations, loss: Loss
+) -> dict[str, Any]:
+    kinds, turnouts = section.kinds, {str(n): shape.turnout for n, shape in enumerate(section.turnouts)}
+    names = ["inner_edge_strip", *["lane"] * len(side.layout.slots), *OUTSIDE]
+    station = np.concatenate([row[0] for row in rows])
+    near = beside(stations(station), turnouts)
+    wanted = np.concatenate([row[1].distances for row in rows])
+    heights = np.concatenate([row[1].heights for row in rows])
+    begins = np.concatenate([row[1].inner_heights for row in rows])
+    ours, levels = np.concatenate([row[2] for row in rows]), np.concatenate([row[3] for row in rows])
+    # Strips that are nowhere wider than 0 aren't among the set's.
+    present = [
+        n for n in range(len(names)) if (wanted[:, n + 1] - wanted[:, n]).max() > _NONE and names[n] in kinds
+    ]
+    begin = [kinds.index(names[n]) + _lanes_before(names, present, n) for n in present]
+    index = [0, *(n + 1 for n in begin)]
+    verge = bool(present) and names[present[-1]] == "verge"
+    columns = [0, *(n + 1 for n in present)]
+    across = np.abs(ours[:, index] - wanted[:, columns])
+    up = np.maximum(np.abs(levels[:, index] - heights[:, columns]), 0.0)
+    there = np.diff(wanted, axis=1)[:, present] > _NONE
+    up[:, 1:] = np.where(there, np.maximum(up[:, 1:], np.abs(levels[:, begin] - begins[:, columns[1:]])), up[:, 1:])
+    shown: dict[str, Any] = {}
+    for kind, values in (("offset", across), ("height", up)):
+        of_turnouts = np.array([False, *(names[n] in TURNOUT_STRIPS for n in present)])
+        of_verge = np.array([verge and n == len(columns) - 1 for n in range(len(columns))])
+        parts = (
+            ("pavement", ~of_turnouts & ~of_verge, TOLD),
+            ("turnouts", of_turnouts, _TURNOUTS),
+            ("verge", of_verge, TOLD),
+        )
+        for part, chosen, limit in parts:
+            what = values[:, chosen].copy()
+            if part == "pavement":  # the shoulder beside a turnout is its
+                what[np.ix_(near, np.array([names[n] for n in _columns(chosen, present)]) == "hard_shoulder")] = 0.0
+            if not what.size:
+                continue
+            row = int(what.max(axis=1).argmax())
+            worst = float(what.max())
+            shown[f"{part}_{kind}"] = round(worst, 6)
+            shown[f"{part}_{kind}_station"] = round(float(station[row]), 3)
+            if worst > limit:
+                loss.approximate(f"{SIDE_OF[side.sign]} {part}", f"its {kind}s", worst, float(station[row]))
+                loss.surface = True
+    return shown
+
+
+def _lanes_before(names: list[str], present: list[int], n: int) -> int:
+    """Return how many lanes lie inside of a strip that is one: they have one name."""
+    return sum(names[m] == "lane" for m in present if m < n) if names[n] == "lane" else 0

@@ -1,0 +1,167 @@
+"""Which thing of a road an object of another program is: a table of words in its type, subtype and name."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from ...road.objects import RoadObject
+from ...road.things.beacon import ConstructionBeacon
+from ...road.things.building import Building
+from ...road.things.cabinet import Cabinet
+from ...road.things.concrete_barrier import ConcreteBarrier
+from ...road.things.delineator import Delineator
+from ...road.things.fence import Fence
+from ...road.things.gantry import Gantry
+from ...road.things.guardrail import Guardrail
+from ...road.things.hedge import Hedge
+from ...road.things.noise_barrier import NoiseBarrier
+from ...road.things.pole import Pole
+from ...road.things.shaft import Shaft
+from ...road.things.traffic_light import TrafficLight
+from ...road.things.wall import Wall
+
+if TYPE_CHECKING:
+    from .objects import Stretch
+
+Size = Mapping[str, float]
+Along = Callable[["Stretch", Size], RoadObject]
+Standing = Callable[[dict[str, Any], Size], RoadObject]
+
+
+class Maker(NamedTuple):
+    """What an object becomes.
+
+    Attributes:
+        name: for people.
+        along, standing: makes the thing; none of both where it has none.
+        why: why it has none.
+        approximated: what of it isn't as in the file.
+    """
+
+    name: str = ""
+    along: Along | None = None
+    standing: Standing | None = None
+    why: str = ""
+    approximated: str = ""
+
+
+def _within(value: float, low: float, high: float, otherwise: float) -> float:
+    """Return a size (m) within limits; of one that isn't given (0) the usual."""
+    return min(max(value, low), high) if value > 0.0 else otherwise
+
+
+def _stretch(stretch: Stretch) -> dict[str, Any]:
+    return {
+        "instance": 1,
+        "start_station": stretch.start,
+        "end_station": stretch.end,
+        "offset": stretch.offset,
+    }
+
+
+def _guardrail(stretch: Stretch, size: Size) -> RoadObject:
+    height = _within(size["height"], 0.3, 1.5, 0.75)
+    return Guardrail(**_stretch(stretch), faces="left" if stretch.offset < 0.0 else "right", height=height)
+
+
+def _concrete_barrier(stretch: Stretch, size: Size) -> RoadObject:
+    foot = _within(size["width"], 0.3, 1.2, 0.54)
+    return ConcreteBarrier(**_stretch(stretch), height=_within(size["height"], 0.4, 2.0, 0.9), base_width=foot)
+
+
+def _noise_barrier(stretch: Stretch, size: Size) -> RoadObject:
+    return NoiseBarrier(**_stretch(stretch), height=_within(size["height"], 1.0, 12.0, 4.0))
+
+
+def _fence(stretch: Stretch, size: Size) -> RoadObject:
+    return Fence(**_stretch(stretch), height=_within(size["height"], 0.5, 4.0, 1.8))
+
+
+def _wall(stretch: Stretch, size: Size) -> RoadObject:
+    thick = _within(size["width"], 0.08, 1.0, 0.24)
+    return Wall(**_stretch(stretch), height=_within(size["height"], 0.3, 6.0, 1.8), thickness=thick)
+
+
+def _hedge(stretch: Stretch, size: Size) -> RoadObject:
+    wide = _within(size["width"], 0.3, 5.0, 1.2)
+    return Hedge(**_stretch(stretch), height=_within(size["height"], 0.3, 8.0, 1.8), width=wide)
+
+
+def _delineator(place: dict[str, Any], size: Size) -> RoadObject:
+    return Delineator(**place, height=_within(size["height"], 0.3, 1.5, 1.0))
+
+
+def _lamp(place: dict[str, Any], size: Size) -> RoadObject:
+    return Pole(**place, kind="lighting", height=_within(size["height"], 2.0, 30.0, 12.0))
+
+
+def _pole(place: dict[str, Any], size: Size) -> RoadObject:
+    thick = _within(2.0 * size["radius"] or size["width"], 0.05, 0.6, 0.2)
+    return Pole(**place, height=_within(size["height"], 2.0, 30.0, 6.0), diameter=thick, arm_length=0.0)
+
+
+def _beacon(place: dict[str, Any], size: Size) -> RoadObject:
+    wide, high = _within(size["width"], 0.1, 0.6, 0.25), _within(size["height"], 0.5, 2.0, 1.0)
+    return ConstructionBeacon(**place, pass_side="left" if place["offset"] < 0.0 else "right", width=wide, height=high)
+
+
+def _building(place: dict[str, Any], size: Size) -> RoadObject:
+    wide, deep = _within(size["length"], 2.0, 80.0, 11.0), _within(size["width"], 2.0, 60.0, 9.0)
+    tall = _within(size["height"], 2.0, 30.0, 5.6)
+    return Building(**place, kind="hall", width=wide, depth=deep, height=tall, roof_height=0.0)
+
+
+def _gantry(place: dict[str, Any], size: Size) -> RoadObject:
+    half, middle = 0.5 * _within(size["width"], 4.0, 80.0, 20.0), place["offset"]
+    return Gantry(**place, kind="two_sided", left_offset=middle + half, right_offset=middle - half)
+
+
+def _cabinet(place: dict[str, Any], size: Size) -> RoadObject:
+    wide, deep = _within(size["length"], 0.1, 3.0, 0.8), _within(size["width"], 0.1, 3.0, 0.4)
+    return Cabinet(**place, kind="utility", width=wide, depth=deep)
+
+
+def _phone(place: dict[str, Any], _: Size) -> RoadObject:
+    return Cabinet(**place, kind="emergency_phone")
+
+
+def _shaft(place: dict[str, Any], _: Size) -> RoadObject:
+    return Shaft(**place)
+
+
+def _light(place: dict[str, Any], size: Size) -> RoadObject:
+    return TrafficLight(**place, height=_within(size["height"], 1.5, 8.0, 3.2))
+
+
+_TABLE: tuple[tuple[str, Maker], ...] = (
+    (r"rail[-_ ]?pole|railing[-_ ]?pole|guard[-_ ]?rail[-_ ]?post", Maker(why="posts are their guardrail's")),
+    (r"guard[-_ ]?rail|crash[-_ ]?barrier|railing|leitplanke", Maker("guardrail", along=_guardrail)),
+    (r"sound[-_ ]?barrier|noise", Maker("noise barrier", along=_noise_barrier)),
+    (r"jersey|concrete|beton", Maker("concrete barrier", along=_concrete_barrier)),
+    (r"hedge|hecke", Maker("hedge", along=_hedge)),
+    (r"fence|zaun", Maker("fence", along=_fence)),
+    (r"\bwall|mauer", Maker("wall", along=_wall)),
+    (r"guide[-_ ]?post|delineator|reflector|leitpfosten", Maker("delineator", standing=_delineator)),
+    (r"gantry", Maker("gantry", standing=_gantry, approximated="a gantry has two legs at the ends of its width")),
+    (r"cone|barrel|beacon|\bbake|drum", Maker("beacon", standing=_beacon, approximated="cones and barrels are beacons")),
+    (r"street[-_ ]?lamp|lamp|street[-_ ]?light|lighting|luminaire", Maker("lighting pole", standing=_lamp)),
+    (r"traffic[-_ ]?light", Maker("traffic light", standing=_light)),
+    (r"emergency[-_ ]?(phone|call)|notruf", Maker("emergency phone", standing=_phone)),
+    (r"cabinet|utility", Maker("cabinet", standing=_cabinet)),
+    (r"manhole|shaft|gully", Maker("shaft", standing=_shaft)),
+    (r"building|house|haus\b", Maker("building", standing=_building, approximated="a building is a box of its size")),
+    (r"\bbarrier", Maker("concrete barrier", along=_concrete_barrier, approximated="a barrier is one of concrete")),
+    (r"sign", Maker(why="posts and plates of signs: signals say which")),
+    (r"\bpole|mast|post\b", Maker("pole", standing=_pole, approximated="a pole is one for lighting, without an arm")),
+    (r"\b(car|van|bus|truck|trailer|bike|motorbike|vehicle|pedestrian)\b", Maker(why="traffic is drawn")),
+)
+
+
+def thing_of(words: str) -> Maker:
+    """Return what an object with these words in its type, subtype and name becomes."""
+    for pattern, maker in _TABLE:
+        if re.search(pattern, words):
+            return maker
+    return Maker(why="no thing of the set is of their kind")

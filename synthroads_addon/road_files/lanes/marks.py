@@ -1,0 +1,373 @@
+"""Road marks of a file's lanes as line markings of a parameter set."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal, cast, get_args
+from xml.etree.ElementTree import Element  # nosec B405 (its type alone)
+
+import numpy as np
+from pydantic import ValidationError
+
+from ...base.arrays import Float
+from ...base.schema import round_value
+from ...road.objects import SignedWidthPoint
+from ...road.section import SHORTEST_DASH, LineMarking
+from ...scenario.road import RoadScenario
+from ..xml_text import child, children, number
+from .carriageways import SIDE_OF, Pavements, Stations
+from .corners import corners, polyline
+from .loss import Loss
+from .records import SHORTEST, FileLane
+from .shape import SideShape
+
+Kind = Literal["outer_edge", "lane", "inner_edge", "block", "turnout_edge", "gore_edge", "free"]
+_KINDS = frozenset(get_args(Kind))
+_OUTWARDS = {"outer_edge": 0.5, "block": 0.5, "turnout_edge": 0.5, "inner_edge": -0.5, "gore_edge": -0.5}
+"""Kind of a line -> where its axis lies from its border, outwards, in widths."""
+_PAINTED: dict[str, tuple[bool, ...]] = {
+    "solid": (True,), "broken": (False,), "solid solid": (True, True), "solid broken": (True, False),
+    "broken solid": (False, True), "broken broken": (False, False),
+}  # fmt: skip
+"""Type of a mark -> its lines from the inside out, whether each is solid."""
+_DASH, _GAP, _NARROW, _BROAD = 6.0, 12.0, 0.15, 0.30
+"""Lines of motorways where a file says no lengths or widths, m (RMS)."""
+_COLOURS = {"standard": "white", "white": "white", "yellow": "yellow"}
+_SAME = 1e-3
+
+
+@dataclass(frozen=True)
+class _Line:
+    """A line along a border of lanes within a lane section.
+
+    Attributes:
+        side: of the carriageway.
+        border: first and last of its lane boundaries, counted from outside, that lie there, as lanes between them have
+            no width; None where the border is no lane's.
+        turnout: id of the turnout whose lane's edge it is.
+        place: number and sign of the lane whose outer border it is, 0 for the centre lane, and section.
+        start, end: stations, m.
+        dash, gap: m; 0 for a solid line.
+        first: station at which a dash begins, m.
+        shift: of its axis from the border, to the left, m.
+        width, film: m.
+        color: of the paint.
+        kind, name: as our own files say them; empty in others.
+    """
+
+    side: SideShape
+    border: tuple[int, int] | None
+    turnout: str | None
+    place: tuple[int, int]
+    start: float
+    end: float
+    dash: float
+    gap: float
+    first: float
+    shift: float
+    width: float
+    film: float
+    color: str
+    kind: str
+    name: str
+
+
+def line_markings(
+    pavements: Pavements, stations: Stations, scenario: RoadScenario, loss: Loss
+) -> dict[str, LineMarking] | None:
+    """Return the line markings of a file's road by id, instance 1; None where it has no mark at all."""
+    shapes = list(pavements.shapes.values())
+    surfaces = {id(side.surface): side.surface for side in shapes}
+    lines: list[_Line] = []
+    marked = False
+    for key, surface in surfaces.items():
+        mine = {side.sign: side for side in shapes if id(side.surface) == key}
+        for section_number, section in enumerate(surface.road.sections):
+            lanes: list[tuple[int, FileLane | None, Element]] = []
+            if section.centre is not None:
+                lanes.append((0, None, section.centre))
+            lanes += [(lane.number, lane, lane.element) for side in section.lanes.values() for lane in side]
+            for lane_number, lane, element in lanes:
+                side, border, turnout = _border(mine, pavements, section_number, lane)
+                about = (side, border, turnout, (lane_number, section_number))
+                for found in _lines_of(element, about, (section.start, section.end), scenario, loss):
+                    marked = True
+                    if found is not None:
+                        lines.append(found)
+    if not marked:
+        return None
+    return _markings(lines, stations, loss)
+
+
+def _border(
+    sides: Mapping[int, SideShape], pavements: Pavements, section: int, lane: FileLane | None
+) -> tuple[SideShape, tuple[int, int] | None, str | None]:
+    """Return the side that a lane's outer border is on, the lane boundaries that it is, and the turnout's id."""
+    for sign in (-1, 1):  # the line between two directions is the right carriageway's
+        side = sides.get(sign)
+        if side is None or (lane is not None and lane.number * sign < 0):
+            continue
+        slots = side.layout.slots
+        there = [(n, slot.lanes[section]) for n, slot in enumerate(slots) if section in slot.lanes]
+        if lane is not None:
+            for place, (n, other) in enumerate(there):
+                if other is lane:
+                    outer = there[place + 1][0] if place + 1 < len(there) else len(slots)
+                    return side, (len(slots) - outer, len(slots) - 1 - n), None
+            for kind in ("turnout_lane", "ramp_inner_strip"):
+                if lane in side.layout.of_strip(section, kind):
+                    return side, None, pavements.turnout_ids.get((sign, lane.notes.get("instance", "")))
+        if there:
+            first = there[0][1]
+            inside = [other for other in side.surface.road.sections[section].lanes[sign]
+                      if abs(other.number) < abs(first.number)]  # fmt: skip
+            if (inside[-1] if inside else None) is lane:
+                return side, (len(slots) - there[0][0], len(slots)), None
+        if lane is not None:
+            return side, None, None
+    return sides.get(-1) or sides[1], None, None
+
+
+def _lines_of(
+    element: Element,
+    about: tuple[SideShape, tuple[int, int] | None, str | None, tuple[int, int]],
+    span: tuple[float, float],
+    scenario: RoadScenario,
+    loss: Loss,
+) -> Iterator[_Line | None]:
+    """Yield the lines of a lane's road marks within its section (m); None for a mark that is left out."""
+    start, end = span
+    marks = sorted(children(element, "roadMark"), key=lambda mark: number(mark, "sOffset", 0.0))
+    begins = [start + number(mark, "sOffset", 0.0) for mark in marks]
+    for mark, begin, until in zip(marks, begins, [*begins[1:], end], strict=False):
+        low, high = max(begin, start), min(until, end)
+        kind = mark.get("type", "none").strip()
+        if kind == "none" or high - low <= SHORTEST:
+            continue
+        yield from _lines_of_mark(mark, about, (low, high), scenario, loss)
+
+
+def _lines_of_mark(
+    mark: Element,
+    about: tuple[SideShape, tuple[int, int] | None, str | None, tuple[int, int]],
+    span: tuple[float, float],
+    scenario: RoadScenario,
+    loss: Loss,
+) -> Iterator[_Line | None]:
+    side, border, turnout, place = about
+    kind = mark.get("type", "none").strip()
+    shown = child(mark, "type")
+    rows = [] if shown is None else children(shown, "line")
+    if kind not in _PAINTED and not rows:
+        loss.leave_out("road marks", f"of type {kind}")
+        yield None
+        return
+    notes = {row.get("code", ""): row.get("value", "") for row in children(mark, "userData")}
+    usual = _BROAD if mark.get("weight", "standard").strip() == "bold" else _NARROW
+    width = number(mark, "width", 0.0) or (0.0 if shown is None else number(shown, "width", 0.0))
+    if not width and not (rows and all(number(row, "width", 0.0) for row in rows)):
+        loss.approximate("road marks", f"a width that isn't given is {usual:g} m")
+        width = usual
+    film = number(mark, "height", 0.0)
+    common: dict[str, Any] = {
+        "side": side, "border": border, "turnout": turnout, "place": place, "start": span[0], "end": span[1],
+        "film": film if 0.0005 <= film <= 0.006 else 0.003,
+        "kind": shown.get("name", "") if shown is not None and "instance" in notes else "",
+        "name": notes.get("id", ""),
+    }  # fmt: skip
+    if rows:
+        for row in rows:
+            dash, gap = number(row, "length", 0.0), number(row, "space", 0.0)
+            dashed = gap > 0.0
+            color = _colour(row.get("color") or mark.get("color", "standard"), loss)
+            yield _Line(
+                **common, dash=dash if dashed else 0.0, gap=gap, first=span[0] + number(row, "sOffset", 0.0),
+                shift=number(row, "tOffset", 0.0), width=number(row, "width", 0.0) or width, color=color,
+            )  # fmt: skip
+        return
+    solids = _PAINTED[kind]
+    dash, gap = scenario.markings.lane_dash or _DASH, scenario.markings.lane_gap or _GAP
+    if not all(solids):
+        loss.approximate("road marks", f"dashes and gaps that aren't given are {dash:g} m and {gap:g} m")
+    inwards = 1.0 if place[0] <= 0 else -1.0  # lines are named from the inside out, at the centre from the left
+    shifts = (0.0,) if len(solids) == 1 else (inwards * width, -inwards * width)
+    color = _colour(mark.get("color", "standard"), loss)
+    for solid, shift in zip(solids, shifts, strict=True):
+        lengths = (0.0, 0.0) if solid else (dash, gap)
+        yield _Line(**common, dash=lengths[0], gap=lengths[1], first=span[0], shift=shift, width=width, color=color)
+
+
+def _colour(name: str, loss: Loss) -> str:
+    found = _COLOURS.get(name.strip())
+    if found is None:
+        found = "yellow" if name.strip() == "orange" else "white"
+        loss.approximate("road marks", f"{name.strip()} paint is {found}")
+    return found
+
+
+def _markings(lines: Sequence[_Line], stations: Stations, loss: Loss) -> dict[str, LineMarking]:
+    found: dict[str, LineMarking] = {}
+    for line in _joined(lines):
+        name = line.name
+        if not name or name in found:
+            stem = name or f"line-{SIDE_OF[line.side.sign]}"
+            count = 1
+            while f"{stem}-{count}" in found:
+                count += 1
+            name = f"{stem}-{count}"
+        try:
+            marking = _marking(line, stations)
+        except ValidationError as error:
+            fault = error.errors(include_url=False)[0]
+            loss.leave_out("road marks", f"{'.'.join(map(str, fault['loc'])) or 'line'}: {fault['msg'].lower()}")
+            continue
+        if marking.end_station - marking.start_station > SHORTEST:
+            found[name] = marking
+            loss.read["road marks"] += 1
+    return found
+
+
+def _joined(lines: Sequence[_Line]) -> list[_Line]:
+    """Return lines with those joined that go on in the next lane section with the same dashes.
+
+    A dash that a section cuts is a solid line in our own files: what has one id is one line.
+    """
+    own: dict[str, list[_Line]] = {}
+    others: list[_Line] = []
+    for line in sorted(lines, key=lambda one: one.start):
+        if line.name and line.kind in _KINDS:
+            own.setdefault(line.name, []).append(line)
+        else:
+            others.append(line)
+    joined: list[_Line] = []
+    for parts in own.values():
+        runs: list[list[_Line]] = []
+        for part in parts:
+            last = runs[-1][-1] if runs else None
+            border = _common(last.border, part.border) if last is not None else None
+            near = last is not None and part.start - last.end < _SAME and _key(part)[:-3] == _key(last)[:-3]
+            if near and last is not None and (border or last.border is part.border is None):
+                runs[-1].append(replace(part, border=border))
+            else:
+                runs.append([part])
+        for run in runs:
+            broken = next((part for part in run if part.gap), run[0])
+            joined.append(
+                replace(
+                    run[0],
+                    end=run[-1].end,
+                    dash=broken.dash,
+                    gap=broken.gap,
+                    border=run[-1].border,
+                    first=run[0].first if run[0].gap else run[0].start,
+                )
+            )
+    rest: list[_Line] = []
+    for line in others:
+        for n, other in enumerate(rest):
+            border = _common(other.border, line.border)
+            same = border is not None or other.border is line.border is None
+            if same and abs(other.end - line.start) < _SAME and _key(other) == _key(line) and _goes_on(other, line):
+                rest[n] = replace(other, end=line.end, border=border)
+                break
+        else:
+            rest.append(line)
+    return joined + rest
+
+
+def _common(first: tuple[int, int] | None, second: tuple[int, int] | None) -> tuple[int, int] | None:
+    """Return the lane boundaries that two lines may both lie on, None without any."""
+    if first is None or second is None:
+        return None
+    low, high = max(first[0], second[0]), min(first[1], second[1])
+    return (low, high) if low <= high else None
+
+
+def _boundary(line: _Line) -> int:
+    """Return the lane boundary that a line follows: of several the outermost or innermost of all, else the inner one."""
+    assert line.border is not None
+    low, high = line.border
+    return 0 if low == 0 and high < len(line.side.layout.slots) else high
+
+
+def _key(line: _Line) -> tuple[Any, ...]:
+    border = None if line.border is not None else ("free", line.place[0])
+    shape = (round(line.shift, 4), round(line.width, 4), line.color, line.film)
+    return (line.side.sign, line.turnout, *shape, border, round(line.dash, 4), round(line.gap, 4))
+
+
+def _goes_on(first: _Line, second: _Line) -> bool:
+    """Return whether the second line's dashes are where the first's would be."""
+    period = first.dash + first.gap
+    if not period:
+        return True
+    off = (second.first - first.first) % period
+    return min(off, period - off) < _SAME
+
+
+def _marking(line: _Line, stations: Stations) -> LineMarking:
+    side = SIDE_OF[line.side.sign]
+    first = line.first if line.gap and line.first > line.start else line.start
+    start, end = (float(value) for value in stations(np.array([first, line.end])))
+    outwards = line.side.sign * line.shift / line.width
+    kind = _kind(line, outwards)
+    more: dict[str, Any] = {"boundary": _boundary(line) if line.border else 0}
+    if kind == "free":
+        more = {"offset": _offset(line, stations)}
+    elif kind in ("turnout_edge", "gore_edge"):
+        more = {"turnout": line.turnout}
+    dash, gap = line.dash, line.gap
+    if dash and (dash < SHORTEST_DASH or gap < SHORTEST_DASH):
+        dash = gap = 0.0
+    return LineMarking(
+        instance=1,
+        carriageway=f"carriageway-{side}",
+        kind=cast(Kind, kind),
+        color=cast(Literal["white", "yellow"], line.color),
+        film_thickness=line.film,
+        width=round_value(line.width, 6),
+        dash_length=round_value(dash, 6),
+        gap_length=round_value(gap, 6),
+        start_station=round_value(max(start, 0.0), 6),
+        end_station=round_value(end, 6),
+        **more,
+    )
+
+
+def _kind(line: _Line, outwards: float) -> str:
+    """Return the kind whose place is that of a line so many widths outwards from its border."""
+    if line.kind in _KINDS and abs(_OUTWARDS.get(line.kind, 0.0) - outwards) < _SAME:
+        if line.kind in ("turnout_edge", "gore_edge"):
+            return line.kind if line.turnout else "free"
+        return line.kind if line.border is not None else "free"
+    if line.border is None:
+        return "free"
+    last, boundary = len(line.side.layout.slots), _boundary(line)
+    if boundary == 0 and abs(outwards - 0.5) < _SAME:
+        return "outer_edge"
+    if boundary == last and abs(outwards + 0.5) < _SAME:
+        return "inner_edge"
+    return "lane" if abs(outwards) < _SAME else "free"
+
+
+def _offset(line: _Line, stations: Stations) -> float | tuple[SignedWidthPoint, ...]:
+    """Return the distance of a free line's axis from the centreline, by station."""
+    side, lane = line.side, line.place[0]
+
+    def border(station: Float, stretch: int) -> Float:
+        if lane == 0:
+            edge = side.surface.centre(station, side.inside(station, stretch)).offset
+        else:
+            rows = side.lanes(station, stretch)[1 if lane > 0 else -1]
+            edge = next((row.outer.offset for row in rows if row.lane.number == lane), rows[-1].outer.offset)
+        return np.asarray(side.sign * (edge + line.shift))[:, None]
+
+    inner = (side.breaks > line.start + SHORTEST) & (side.breaks < line.end - SHORTEST)
+    marks = np.array([line.start, *side.breaks[inner], line.end])
+    numbers = np.clip(np.searchsorted(side.breaks, 0.5 * (marks[:-1] + marks[1:]), side="right") - 1, 0, None)
+    found = polyline(lambda s, n: border(s, int(numbers[n])), marks, _SAME * 0.3)
+    points = corners(stations(found.stations), found.values[:, 0])
+    if len(points) == 1:
+        return round_value(points[0][1], 6)
+    return tuple(SignedWidthPoint(station=round_value(s, 6), width=round_value(w, 6)) for s, w in points)

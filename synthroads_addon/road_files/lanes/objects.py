@@ -1,0 +1,276 @@
+"""Objects and signals of an OpenDRIVE road as things of a parameter set."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, get_args
+from xml.etree.ElementTree import Element  # nosec B405 (its type alone)
+
+import numpy as np
+from pydantic import ValidationError
+
+from ...base.schema import round_value
+from ...road.objects import RoadObject, SignedWidthPoint
+from ...road.section import Arrow, Hatching, LineMarking
+from ...road.things.registry import THINGS
+from ...road.things.thing import LengthwiseThing
+from ..xml_text import child, children, local_name, number
+from .corners import corners
+from .kinds import thing_of
+from .loss import Loss
+from .places import Places
+from .signals import sign_of
+from .strips import driven_sides
+
+_PAINTED: dict[str, type[RoadObject]] = {"Arrow": Arrow, "Hatching": Hatching}
+_PLACE = ("station", "start_station", "end_station")
+_PLANTS = frozenset({"tree", "vegetation"})
+_TELL = 0.05
+_STRAIGHT = 2e-4
+_CHANGED = 0.002
+"""Distance, m, from which an element of our own file is elsewhere than what it says of itself: it was edited."""
+_DIGITS = 6
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Part of a road along which an object runs.
+
+    Attributes:
+        start, end: stations of the set, m.
+        offset: in its middle, m.
+        bow: how far its ends are from that, m.
+    """
+
+    start: float
+    end: float
+    offset: float
+    bow: float
+
+
+def things(roads: Sequence[Places], loss: Loss) -> dict[str, Any] | None:
+    """Return the things that stand on and beside roads, and painted areas, by id; None where the file has none.
+
+    Objects of our own files are read from what these say of each; others by a table of types and names.
+    """
+    found: dict[str, Any] = {}
+    anything = False
+    for places in roads:
+        road = places.surface.road.element
+        objects, signals = child(road, "objects"), child(road, "signals")
+        items = [] if objects is None else list(objects)
+        for item in items:
+            anything = True
+            for name, made in _things_of(item, places, loss):
+                _add(found, name, made, loss)
+        for item in [] if signals is None else list(signals):
+            anything = True
+            if local_name(item) != "signal":
+                loss.leave_out("signals", f"{local_name(item)} elements")
+            elif "object_type" not in _notes(item):  # ours are faces of things that are objects as well
+                for name, made in sign_of(item, places, loss):
+                    _add(found, name, made, loss)
+    return found if anything else None
+
+
+def _add(found: dict[str, Any], name: str, made: RoadObject, loss: Loss) -> None:
+    shown = "".join(letter for letter in name if letter.isascii() and (letter.isalnum() or letter in "_.-"))[:56]
+    stem = shown or type(made).__name__.lower()
+    name, count = stem, 1
+    while name in found:
+        count += 1
+        name = f"{stem}-{count}"
+    found[name] = made
+    loss.read[type(made).__name__] += 1
+
+
+def _notes(item: Element) -> dict[str, str]:
+    return {row.get("code", ""): row.get("value", "") for row in children(item, "userData")}
+
+
+def _things_of(item: Element, places: Places, loss: Loss) -> Iterator[tuple[str, RoadObject]]:
+    kind = item.get("type", "none").strip()
+    if local_name(item) != "object":
+        loss.leave_out(f"{local_name(item)}s", "the set has none of their shape")
+        return
+    notes = _notes(item)
+    name = notes.get("id") or item.get("name") or kind
+    own = THINGS.get(notes.get("object_type", "")) or _PAINTED.get(notes.get("object_type", ""))
+    try:
+        if own is not None:
+            yield name, _own_thing(own, item, notes, places)
+            return
+        if kind in _PLANTS and "hedge" not in f"{item.get('subtype')} {name}".lower():
+            loss.leave_out("plants", "no single plant is a thing of the set: its vegetation is drawn")
+            return
+        if notes.get("object_type") == "LineMarking":
+            yield name, _loose_line(item, places)
+            return
+        if kind == "roadMark":
+            loss.leave_out("painted objects", f"{item.get('subtype') or name}")
+            return
+        for number_of, made in enumerate(_foreign(item, places, loss), 1):
+            yield name if number_of == 1 else f"{name}-{number_of}", made
+    except ValidationError as error:
+        fault = error.errors(include_url=False)[0]
+        loss.leave_out(f"{kind} objects", f"{'.'.join(map(str, fault['loc'])) or 'one'}: {fault['msg'].lower()}")
+
+
+def _own_thing(model: type[RoadObject], item: Element, notes: dict[str, str], places: Places) -> RoadObject:
+    values: dict[str, Any] = {"instance": 1, "type": notes["object_type"]}
+    for field, about in model.model_fields.items():
+        code = "asset" if field == "name" else field
+        if code not in notes or field in ("instance", "type", *_PLACE):
+            continue
+        text = notes[code]
+        is_text = about.annotation is str or any(isinstance(value, str) for value in get_args(about.annotation))
+        values[field] = text if is_text else json.loads(text)
+    if issubclass(model, LengthwiseThing):
+        repeats = children(item, "repeat")
+        ends = (repeats[0], 0.0, "Start"), (repeats[-1], number(repeats[-1], "length"), "End")
+        (start, offset), (end, _) = (
+            places.at(
+                np.array([number(row, "s") + more]),
+                np.array([number(row, f"t{which}")]),
+                np.array([number(row, f"zOffset{which}")]),
+            )
+            for row, more, which in ends
+        )
+        values |= {"start_station": _one(start), "end_station": _one(end)}
+        if "height" in values and abs(number(item, "height", 0.0) - values["height"]) > _CHANGED:
+            values["height"] = number(item, "height")
+        made = model.from_dict(values)
+        right, left = made.reach()
+        return _moved(made, float(offset[0]) - 0.5 * (left - right))
+    if "station" not in model.model_fields:
+        return model.from_dict(values)
+    station, offset = places.at(*_place(item))
+    values = {"rotation_deg": _degrees(number(item, "hdg", 0.0)), **values, "station": _one(station)}
+    return _moved(model.from_dict(values), float(offset[0]))
+
+
+def _moved(made: Any, offset: float) -> RoadObject:
+    """Return an object at the offset (m) at which its element is, where another program has moved that."""
+    if abs(offset - made.offset) <= _CHANGED:
+        return made  # type: ignore[no-any-return]
+    return type(made).from_dict(made.to_dict() | {"offset": round_value(offset, _DIGITS)})  # type: ignore[no-any-return]
+
+
+def _loose_line(item: Element, places: Places) -> LineMarking:
+    """Return a line of our own file that follows no lane: an object along corners."""
+    rows = [(number(c, "s"), number(c, "t"), number(c, "dz", 0.0)) for c in item.iter() if local_name(c) == "cornerRoad"]
+    station, offset = places.at(*np.array(rows).T)
+    mark = next(one for one in item.iter() if local_name(one) == "marking")
+    sides = driven_sides(places.surface.road.sections)
+    sign = sides[0] if len(sides) == 1 else 1 if offset.mean() > 0.0 else -1
+    points = corners(station, sign * offset, _STRAIGHT)
+    gap = number(mark, "spaceLength", 0.0)
+    start = float(station[0]) + (number(mark, "startOffset", 0.0) if gap else 0.0)
+    place: Any = tuple(
+        SignedWidthPoint(station=round_value(s, _DIGITS), width=round_value(w, _DIGITS)) for s, w in points
+    )
+    return LineMarking(
+        instance=1,
+        carriageway=f"carriageway-{'left' if sign > 0 else 'right'}",
+        kind="free",
+        color="yellow" if mark.get("color") == "yellow" else "white",
+        film_thickness=number(mark, "zOffset", 0.003),
+        offset=place if len(points) > 1 else place[0].width,
+        width=number(mark, "width"),
+        dash_length=number(mark, "lineLength") if gap else 0.0,
+        gap_length=gap,
+        start_station=round_value(start, _DIGITS),
+        end_station=round_value(float(station[-1]), _DIGITS),
+    )
+
+
+def _place(item: Element) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return tuple(np.array([number(item, name, 0.0)]) for name in ("s", "t", "zOffset"))  # type: ignore[return-value]
+
+
+def _one(values: np.ndarray) -> float:
+    return round_value(max(float(values[0]), 0.0), _DIGITS)
+
+
+def _degrees(angle: float) -> float:
+    return round_value(math.degrees(angle), _DIGITS)
+
+
+def _foreign(item: Element, places: Places, loss: Loss) -> Iterator[RoadObject]:
+    """Yield the things that an object of another program becomes: one for each place, or stretch along the road."""
+    words = f"{item.get('type', '')} {item.get('subtype', '')} {item.get('name', '')}".lower()
+    maker = thing_of(words)
+    if maker.why:
+        loss.leave_out(f"{item.get('type', 'none')} objects", maker.why)
+        return
+    if maker.approximated:
+        loss.approximate(f"{item.get('type', 'none')} objects", maker.approximated)
+    size = {name: number(item, name, 0.0) for name in ("width", "length", "height", "radius")}
+    repeats = children(item, "repeat")
+    for row in repeats:
+        size["height"] = size["height"] or number(row, "heightStart", 0.0)
+        size["width"] = size["width"] or number(row, "widthStart", 0.0)
+    if maker.along:
+        for stretch in _stretches(item, repeats, places, size["length"]):
+            if stretch.bow > _TELL:
+                middle = 0.5 * (stretch.start + stretch.end)
+                loss.approximate(f"{maker.name}s", "they run at one distance from the line", stretch.bow, middle)
+            yield maker.along(stretch, size)
+        return
+    assert maker.standing is not None
+    turn = _degrees(number(item, "hdg", 0.0))
+    for s, t, z in _repeated(item, repeats):
+        station, offset = places.at(np.array([s]), np.array([t]), np.array([z]))
+        about = {"instance": 1, "station": _one(station), "offset": round_value(float(offset[0]), _DIGITS)}
+        yield maker.standing(about | {"rotation_deg": turn}, size)
+
+
+def _repeated(item: Element, repeats: Sequence[Element]) -> Iterator[tuple[float, float, float]]:
+    """Yield s, t and height of each copy of an object; of one without repeats its own place."""
+    if not repeats:
+        yield number(item, "s"), number(item, "t"), number(item, "zOffset", 0.0)
+        return
+    for row in repeats:
+        start, length = number(row, "s"), number(row, "length", 0.0)
+        step = number(row, "distance", 0.0) or length or 1.0
+        first, last = number(row, "tStart", number(item, "t", 0.0)), number(row, "tEnd", number(item, "t", 0.0))
+        low, high = number(row, "zOffsetStart", 0.0), number(row, "zOffsetEnd", 0.0)
+        for n in range(int(length / step + 1e-6) + 1):
+            share = n * step / length if length else 0.0
+            yield start + n * step, first + share * (last - first), low + share * (high - low)
+
+
+def _stretches(item: Element, repeats: Sequence[Element], places: Places, length: float) -> Iterator[Stretch]:
+    """Yield the stretches along which an object runs, joined where they go on at the same distance."""
+    rows: list[tuple[float, float, float, float]] = []
+    for row in repeats:
+        t = number(item, "t", 0.0)
+        start, run = number(row, "s"), number(row, "length")
+        rows.append((start, start + run, number(row, "tStart", t), number(row, "tEnd", t)))
+    corners = [c for outline in item.iter() if local_name(outline) == "outline" for c in children(outline, "cornerRoad")]
+    if not rows and corners:
+        s, t = np.array([(number(corner, "s"), number(corner, "t")) for corner in corners]).T
+        rows.append((float(s.min()), float(s.max()), float(t.min()), float(t.max())))
+    if not rows and length > 0.0:
+        s, t = number(item, "s"), number(item, "t")
+        rows.append((s - 0.5 * length, s + 0.5 * length, t, t))
+    found: list[Stretch] = []
+    end = places.surface.road.length
+    for start, last, first, second in rows:
+        span = np.clip(np.array([start, last]), 0.0, end)
+        station, offset = places.at(span, np.array([first, second]), np.zeros(2))
+        if station[1] - station[0] < _TELL:
+            continue
+        bow = 0.5 * abs(float(offset[1] - offset[0]))
+        new = Stretch(_one(station[:1]), _one(station[1:]), round_value(float(offset.mean()), _DIGITS), bow)
+        if found and abs(found[-1].end - new.start) < _TELL and abs(found[-1].offset - new.offset) < _TELL:
+            last_one = found.pop()
+            off = max(last_one.bow, abs(last_one.offset - new.offset) + new.bow)
+            new = Stretch(last_one.start, new.end, last_one.offset, off)
+        found.append(new)
+    yield from found
+
+

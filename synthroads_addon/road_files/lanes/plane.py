@@ -1,0 +1,132 @@
+"""The planes of a road's carriageways: heights along the line, and how each rises to the left, by station."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from ...base.arrays import Float
+from .corners import Polyline, height_pieces, polyline
+from ..heights import HeightPiece
+from .shape import SideShape
+
+RotationAxis = Literal["carriageway_axis", "inner_edge", "centreline"]
+TOLERANCE = 2e-4
+"""Height, m, that linear crossfall may be off at the pavement's edge."""
+_PROFILE_TOLERANCE = 1e-5
+_SAME = 1e-4
+"""Heights, m, that differ by less are one."""
+_SHARES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
+_REACH = 15.0
+"""Distance from the line, m, at which the tolerance holds."""
+
+
+@dataclass(frozen=True)
+class Planes:
+    """The planes of a road's carriageways.
+
+    Attributes:
+        rises: by sign of the side, values of one column by station, m/m.
+        heights: cubics of the profile; None where it is the file's elevation.
+        axis: line about which the crossfall turns.
+    """
+
+    rises: dict[int, Polyline]
+    heights: list[HeightPiece] | None
+    axis: RotationAxis
+
+
+def planes(sides: Sequence[SideShape]) -> Planes:
+    """Return the planes of one road's sides: its own, or those that fit its surface best."""
+    surface, breaks = sides[0].surface, sides[0].breaks
+    if surface.is_plane:
+
+        def rise(station: Float, stretch: int) -> Float:
+            return _REACH * surface.rise(station, sides[0].inside(station, stretch))[:, None]
+
+        found = _scaled(polyline(rise, breaks, TOLERANCE))
+        return Planes({side.sign: found for side in sides}, None, "centreline")
+
+    def fitted(station: Float, stretch: int) -> Float:
+        return _best_planes(sides, station, stretch) * np.array([1.0, *(_REACH for _ in sides)])
+
+    both = polyline(fitted, breaks, TOLERANCE)
+    rises = {
+        side.sign: Polyline(both.stations, both.values[:, [n]] / _REACH, both.jumps)
+        for n, side in enumerate(sides, 1)
+    }
+    level = Polyline(both.stations, both.values[:, :1], both.jumps)
+    if np.abs(level.values).max() < _SAME:
+        return Planes(rises, None, "centreline")
+    marks = np.union1d(breaks, both.stations)
+
+    def height(station: Float, stretch: int) -> Float:
+        middle = np.full(station.shape, 0.5 * (marks[stretch] + marks[stretch + 1]))
+        return surface.road.elevation.at(station, middle) + level.at(station)[:, 0]
+
+    return Planes(rises, height_pieces(height, marks, _PROFILE_TOLERANCE), "centreline")
+
+
+def _scaled(line: Polyline) -> Polyline:
+    return Polyline(line.stations, line.values / _REACH, line.jumps)
+
+
+def _best_planes(sides: Sequence[SideShape], station: Float, stretch: int) -> Float:
+    """Return the height on the line (m) and each side's rise (N, 1 + sides) that fit the pavement best, least squares."""
+    columns, values, weights = [], [], []
+    for n, side in enumerate(sides):
+        offset, height, width = side.paved_points(station, stretch, _SHARES)
+        row = np.zeros((*offset.shape, 1 + len(sides)))
+        row[..., 0], row[..., 1 + n] = 1.0, offset
+        columns.append(row)
+        values.append(height)
+        weights.append(width)
+    matrix, wanted = np.concatenate(columns, axis=1), np.concatenate(values, axis=1)
+    weight = np.sqrt(np.concatenate(weights, axis=1) + 1e-9)
+    if not matrix.shape[1]:
+        return np.zeros((len(station), 1 + len(sides)))
+    matrix, wanted = matrix * weight[..., None], wanted * weight
+    inverse = np.linalg.pinv(matrix, rcond=1e-9)
+    return np.asarray(np.einsum("nij,nj->ni", inverse, wanted))
+
+
+def joined(right: SideShape, left: SideShape, breaks: Float, pivots: dict[RotationAxis, dict[int, Polyline]]) -> Planes:
+    """Return the planes of two roads along one line, each with a plane of its own, as carriageways of one profile.
+
+    Of the lines about which the crossfall may turn the one is taken on which both have the same heights, or the most
+    alike ones.
+
+    Args:
+        right, left: a side of each.
+        breaks: (B,) stations between which all of both is smooth, m.
+        pivots: for each rotation axis and side its distance from the line, a column by station, m.
+    """
+    rises: dict[int, Polyline] = {}
+    for side in (right, left):
+        rises |= planes([side]).rises
+    middle = 0.5 * (breaks[:-1] + breaks[1:])
+
+    def heights(axis: RotationAxis, side: SideShape, station: Float, stretch: int) -> Float:
+        inside = np.full(station.shape, middle[stretch])
+        level = side.surface.road.elevation.at(station, inside)
+        pivot = pivots[axis][side.sign].at(station)[:, 0]
+        return np.asarray(level + side.surface.rise(station, inside) * side.sign * pivot)
+
+    def apart(axis: RotationAxis) -> float:
+        worst = 0.0
+        for stretch in range(len(middle)):
+            station = np.linspace(breaks[stretch], breaks[stretch + 1], 5)
+            both = heights(axis, right, station, stretch) - heights(axis, left, station, stretch)
+            worst = max(worst, float(np.abs(both).max()))
+        return worst
+
+    off = {axis: apart(axis) for axis in pivots}
+    axis = min(off, key=lambda name: off[name] if off[name] > _SAME else 0.0)
+
+    def height(station: Float, stretch: int) -> Float:
+        return 0.5 * (heights(axis, right, station, stretch) + heights(axis, left, station, stretch))
+
+    return Planes(rises, height_pieces(height, breaks, _PROFILE_TOLERANCE), axis)

@@ -1,0 +1,283 @@
+"""Records of an OpenDRIVE road beside its line: cubics by station, lane sections, lateral profile.
+
+ASAM OpenDRIVE 1.8.1, chapters 10.5 (elevation and lateral profiles) and 11 (lanes). Records that it no longer has are
+read as 1.4 defines them: crossfall, and borders in place of widths.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element  # nosec B405 (its type alone)
+
+import numpy as np
+
+from ...base.arrays import Float
+from ...base.errors import InputError
+from ..xml_text import child, children, number
+
+SHORTEST = 1e-6
+"""Stretches shorter than this, m, are none."""
+SIDES = (1, -1)
+"""Signs of t on both sides of the reference line, and of the ids of the lanes there: left, right."""
+
+
+@dataclass(frozen=True)
+class Cubics:
+    """Cubics by station, each from its own start to that of the next.
+
+    Attributes:
+        starts: (K,) increasing stations, m.
+        rows: (K, 4) a, b, c, d.
+        begins: whether the first holds before its start as well; else the value there is 0.
+    """
+
+    starts: Float
+    rows: Float
+    begins: bool = True
+
+    @classmethod
+    def read(cls, items: Sequence[Element], place: str = "s", shift: float = 0.0, begins: bool = True) -> Cubics:
+        """Return the cubics of elements, whose stations are counted from `shift` (m); of equal ones the last."""
+        found = {number(item, place, 0.0) + shift: [number(item, name, 0.0) for name in "abcd"] for item in items}
+        starts = sorted(found)
+        return cls(np.array(starts), np.array([found[s] for s in starts]).reshape(-1, 4), begins)
+
+    def __bool__(self) -> bool:
+        return len(self.starts) > 0
+
+    def at(self, station: Float, inside: Float | None = None, slope: bool = False) -> Float:
+        """Return values (N,), or their change per metre, at stations (N,), m.
+
+        Args:
+            station: where.
+            inside: (N,) places that say which cubic holds, so that ends of a stretch are those of its own cubic.
+            slope: whether the change per metre is wanted.
+        """
+        station = np.asarray(station, dtype=np.float64)
+        if not len(self.starts):
+            return np.zeros(station.shape)
+        there = station if inside is None else inside
+        piece = np.searchsorted(self.starts, there, side="right") - 1
+        before = piece < 0
+        piece = np.maximum(piece, 0)
+        a, b, c, d = self.rows[piece].T
+        u = station - self.starts[piece]
+        found = b + u * (2.0 * c + 3.0 * d * u) if slope else a + u * (b + u * (c + u * d))
+        return np.where(before, 0.0, found) if not self.begins else found
+
+
+@dataclass(frozen=True)
+class FileLane:
+    """A lane of a lane section.
+
+    Attributes:
+        number: its id.
+        type: as the file calls it.
+        level: whether it stays level where the road is tilted.
+        widths, borders: by station; one of the two has records, or neither.
+        heights: (K, 3) station, height of the inner and of the outer border above the road's surface, m.
+        notes: codes and values of its user data.
+        element: where its road marks are.
+    """
+
+    number: int
+    type: str
+    level: bool
+    widths: Cubics
+    borders: Cubics
+    heights: Float
+    notes: dict[str, str]
+    element: Element
+
+
+@dataclass(frozen=True)
+class FileSection:
+    """A lane section.
+
+    Attributes:
+        start, end: stations, m.
+        lanes: by the sign of their ids, from the inside out.
+        centre: the centre lane's element, None without one.
+    """
+
+    start: float
+    end: float
+    lanes: dict[int, tuple[FileLane, ...]]
+    centre: Element | None
+
+    def borders(self, station: Float, inside: Float, offset: Float) -> dict[int, list[Float]]:
+        """Return t (N,) of the borders on either side, from the centre lane out, at stations (N,), m.
+
+        Borders hold from the reference line, which no lane offset moves. On the right some programs write them as
+        positive distances: where they would be wider to the other side so, they are turned over.
+        """
+        found: dict[int, list[Float]] = {}
+        for sign, lanes in self.lanes.items():
+            edges = self._edges(lanes, sign, (station, inside, offset), 1.0)
+            if any(lane.borders for lane in lanes) and sign * float((edges[-1] - edges[0]).mean()) < 0.0:
+                edges = self._edges(lanes, sign, (station, inside, offset), -1.0)
+            found[sign] = edges
+        return found
+
+    @staticmethod
+    def _edges(
+        lanes: Sequence[FileLane], sign: int, where: tuple[Float, Float, Float], turn: float
+    ) -> list[Float]:
+        station, inside, offset = where
+        edges = [offset]
+        for lane in lanes:
+            if lane.widths:
+                edges.append(edges[-1] + sign * lane.widths.at(station, inside))
+            else:
+                edges.append(turn * lane.borders.at(station, inside) if lane.borders else edges[-1])
+        return edges
+
+
+@dataclass(frozen=True)
+class ShapeProfile:
+    """Heights across the road at one station: cubics of t."""
+
+    station: float
+    cubics: Cubics
+
+
+@dataclass(frozen=True)
+class FileRoad:
+    """What an OpenDRIVE road says beside its plan.
+
+    Attributes:
+        element: the road.
+        name: unique in the file.
+        length: m.
+        left_hand: whether traffic keeps to the left.
+        elevation, superelevation, offset: by station: m, rad, m.
+        crossfall: by sign of the side, rad, positive where it falls outwards.
+        shapes: by station.
+        sections: in order.
+    """
+
+    element: Element
+    name: str
+    length: float
+    left_hand: bool
+    elevation: Cubics
+    superelevation: Cubics
+    offset: Cubics
+    crossfall: dict[int, Cubics]
+    shapes: tuple[ShapeProfile, ...]
+    sections: tuple[FileSection, ...]
+
+    def breaks(self) -> Float:
+        """Return the stations (B,) from 0 to the length at which any record begins, m."""
+        marks = [np.array([0.0, self.length]), self.elevation.starts, self.superelevation.starts, self.offset.starts]
+        marks += [cubics.starts for cubics in self.crossfall.values()]
+        marks += [np.array([shape.station for shape in self.shapes])]
+        for section in self.sections:
+            marks.append(np.array([section.start]))
+            for lane in (*section.lanes[1], *section.lanes[-1]):
+                marks += [lane.widths.starts, lane.borders.starts, lane.heights[:, 0]]
+        return merged(np.concatenate(marks), self.length)
+
+
+def merged(stations: Float, length: float) -> Float:
+    """Return the stations from 0 to a length (m) in order, those nearer than `SHORTEST` to the one before left out."""
+    inside = np.unique(np.clip(stations, 0.0, length))
+    kept = inside[np.concatenate([[True], np.diff(inside) > SHORTEST])]
+    kept[-1] = length
+    return kept
+
+
+def read_road(road: Element, name: str, length: float, up: float = 0.0) -> FileRoad:
+    """Return what a road says beside its plan.
+
+    Args:
+        road: its element.
+        name: for messages.
+        length: of its plan, m.
+        up: height that the header adds, m.
+
+    Raises:
+        InputError: a number is none, or it has no lanes.
+    """
+    lanes = child(road, "lanes")
+    sections = [] if lanes is None else children(lanes, "laneSection")
+    if not sections or lanes is None:
+        raise InputError(f"road {name!r}: lanes", None, "has no lane section: --only-axis takes its line alone")
+    profile, lateral = child(road, "elevationProfile"), child(road, "lateralProfile")
+    rows = {} if lateral is None else {tag: children(lateral, tag) for tag in ("superelevation", "crossfall", "shape")}
+    elevation = Cubics.read([] if profile is None else children(profile, "elevation"))
+    elevation.rows[:, 0] += up
+    return FileRoad(
+        element=road,
+        name=name,
+        length=length,
+        left_hand=road.get("rule", "RHT").strip().upper() == "LHT",
+        elevation=elevation,
+        superelevation=Cubics.read(rows.get("superelevation", []), begins=False),
+        offset=Cubics.read(children(lanes, "laneOffset"), begins=False),
+        crossfall={
+            sign: Cubics.read(
+                [row for row in rows.get("crossfall", []) if row.get("side", "both") in (side, "both")], begins=False
+            )
+            for sign, side in zip(SIDES, ("left", "right"), strict=True)
+        },
+        shapes=_shapes(rows.get("shape", [])),
+        sections=_sections(sections, length),
+    )
+
+
+def _shapes(rows: Sequence[Element]) -> tuple[ShapeProfile, ...]:
+    by_station: dict[float, list[Element]] = {}
+    for row in rows:
+        by_station.setdefault(number(row, "s"), []).append(row)
+    return tuple(ShapeProfile(s, Cubics.read(by_station[s], "t")) for s in sorted(by_station))
+
+
+def _sections(items: Sequence[Element], length: float) -> tuple[FileSection, ...]:
+    """Return the lane sections in order; one that ends where it begins is none.
+
+    A section that is of one side only leaves the other side's lanes as the section before has them.
+    """
+    rows = sorted(((number(item, "s"), n) for n, item in enumerate(items)))
+    found: list[FileSection] = []
+    last: dict[int, Element] = {}
+    edges = [*(s for s, _ in rows[1:]), length]
+    for (start, n), end in zip(rows, edges, strict=True):
+        item = items[n]
+        sides = {sign: child(item, name) for sign, name in zip(SIDES, ("left", "right"), strict=True)}
+        single = item.get("singleSide", "false").strip().lower() in ("true", "1")
+        lanes = {sign: _lanes(side, sign, start) for sign, side in sides.items()}
+        if single and found:
+            lanes = {s: lanes[s] if sides[s] is not None else found[-1].lanes[s] for s in SIDES}
+        last = {sign: side for sign, side in sides.items() if side is not None} or last
+        if min(end, length) - start <= SHORTEST:
+            continue
+        centre = child(item, "center")
+        found.append(FileSection(start, min(end, length), lanes, None if centre is None else child(centre, "lane")))
+    if not found:
+        raise InputError("laneSection", None, "must begin before the road's end")
+    first = found[0]
+    if first.start > 0.0:
+        found[0] = FileSection(0.0, first.end, first.lanes, first.centre)
+    return tuple(found)
+
+
+def _lanes(side: Element | None, sign: int, start: float) -> tuple[FileLane, ...]:
+    lanes = [] if side is None else [_lane(item, start) for item in children(side, "lane")]
+    return tuple(sorted((lane for lane in lanes if lane.number * sign > 0), key=lambda lane: abs(lane.number)))
+
+
+def _lane(item: Element, start: float) -> FileLane:
+    heights = sorted([number(row, "sOffset") + start, number(row, "inner"), number(row, "outer")]
+                     for row in children(item, "height"))  # fmt: skip
+    return FileLane(
+        number=int(number(item, "id")),
+        type=item.get("type", "none").strip(),
+        level=item.get("level", "false").strip().lower() in ("true", "1"),
+        widths=Cubics.read(children(item, "width"), "sOffset", start),
+        borders=Cubics.read(children(item, "border"), "sOffset", start),
+        heights=np.array(heights).reshape(-1, 3),
+        notes={row.get("code", ""): row.get("value", "") for row in children(item, "userData")},
+        element=item,
+    )

@@ -1,0 +1,155 @@
+"""The whole road of an OpenDRIVE file as parts of a parameter set."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+from xml.etree.ElementTree import Element  # nosec B405 (its type alone)
+
+import numpy as np
+
+from ...base.arrays import Float
+from ...base.errors import InputError
+from ...base.remarks import assume
+from ...road.given_road import GivenRoad
+from ...road.guidelines import STANDARD_CROSS_SECTIONS
+from ...scenario.road import RoadScenario
+from ..heights import HeightPiece
+from ..line import LineNames, RoadLine, exact_axis
+from ..opendrive import read_opendrive
+from ..read import choose_line
+from ..xml_text import child, children, number, read_xml
+from .carriageways import Pavements, Verge, pavements
+from .loss import Loss
+from .marks import line_markings
+from .objects import things
+from .places import Places
+from .records import FileRoad, read_road
+from .shape import SideShape
+from .strips import driven_sides, side_layouts
+from .surface import FileSurface
+
+_SAME_PLAN = 1e-6
+
+
+@dataclass(frozen=True)
+class WholeRoad:
+    """A road of an OpenDRIVE file.
+
+    Attributes:
+        given: its parts for a parameter set.
+        heights: cubics of the profile, stations along the axis; None where the axis has those of the file.
+        pavements: what its carriageways are made of.
+        loss: what became of what the file says.
+        exact: stations of the parameter set at the plan's (file, set), (2, K), m.
+    """
+
+    given: GivenRoad
+    heights: tuple[HeightPiece, ...] | None
+    pavements: Pavements
+    loss: Loss
+    exact: Float
+
+    def stations(self, station: Float) -> Float:
+        """Return the stations of the set at those of the file, m."""
+        return np.interp(station, *self.exact)
+
+
+def whole_road(path: Path, scenario: RoadScenario, name: str | None = None) -> WholeRoad:
+    """Return all that an OpenDRIVE file says of a road, or of the two roads that are its carriageways.
+
+    Args:
+        path: the file.
+        scenario: what it doesn't say.
+        name: of the road; None: the longest that belongs to no junction.
+
+    Raises:
+        MissingFileError, InputError: it can't be read, or a parameter set can't hold it.
+    """
+    lines = read_opendrive(path)
+    line = choose_line(lines, name, path.name)
+    root = read_xml(path)
+    elements = _elements(root)
+    loss = Loss()
+    up = _up(root)
+    road = read_road(elements[line.name], line.name, line.length, up)
+    if road.left_hand:
+        raise InputError(f"{path.name}: road {line.name!r}: rule", "LHT", "must be RHT: --only-axis takes its line alone")
+    roads = [road, *_partner(lines, line, elements, road, up)]
+    if len(roads) > 1:
+        assume("%s: road %r runs along the same line: both are one road", path.name, roads[1].name)
+    axis = exact_axis(line)
+    exact = np.array(
+        [
+            [*(piece.station for piece in line.pieces), line.pieces[-1].station + line.pieces[-1].length],
+            [*axis.starts, axis.alignment.length],
+        ]
+    )
+    shapes: list[SideShape] = []
+    for one in roads:
+        surface = FileSurface(one)
+        layouts = side_layouts(surface, with_median=len(roads) > 1)
+        shapes += [SideShape(surface, layout, one.breaks()) for layout in layouts.values()]
+        for layout in layouts.values():
+            for _, lane, why in layout.lost:
+                loss.leave_out("lanes", why, surface=True)
+        loss.read["lane sections"] += len(one.sections)
+    found = pavements(shapes, _verge(scenario), lambda s: np.interp(s, *exact), loss)
+    heights = None
+    if found.heights is not None:
+        heights = tuple(found.heights)
+    markings = line_markings(found, lambda s: np.interp(s, *exact), scenario, loss)
+    places = [Places(FileSurface(one), axis.alignment, lambda s: np.interp(s, *exact)) for one in roads]
+    given = GivenRoad(found.carriageways, found.turnouts, markings, things(places, loss))
+    return WholeRoad(given, heights, found, loss, exact)
+
+
+def _elements(root: Element) -> dict[str, Element]:
+    """Return the roads of a file by the names that its lines have."""
+    names, found = LineNames(), dict[str, Element]()
+    for number_of, road in enumerate(children(root, "road")):
+        found[names.unique(road.get("name"), f"road {road.get('id', number_of)}")] = road
+    return found
+
+
+def _up(root: Element) -> float:
+    header = child(root, "header")
+    offset = None if header is None else child(header, "offset")
+    return 0.0 if offset is None else number(offset, "z", 0.0)
+
+
+def _partner(
+    lines: list[RoadLine], line: RoadLine, elements: dict[str, Element], road: FileRoad, up: float
+) -> list[FileRoad]:
+    """Return the road that has the same plan, and traffic on the other side alone; none if there isn't one."""
+    sides = driven_sides(road.sections)
+    if len(sides) != 1:
+        return []
+    for other in lines:
+        if other is line or other.fault or other.junction != line.junction or not _same_plan(other, line):
+            continue
+        found = read_road(elements[other.name], other.name, other.length, up)
+        if driven_sides(found.sections) == [-sides[0]]:
+            return [found]
+    return []
+
+
+def _same_plan(first: RoadLine, second: RoadLine) -> bool:
+    if len(first.pieces) != len(second.pieces):
+        return False
+    rows = [
+        [(p.station, p.length, p.x, p.y, p.heading, *(p.shape if isinstance(p.shape, tuple) else (0.0, 0.0))) for p in q]
+        for q in (first.pieces, second.pieces)
+    ]
+    return bool(np.abs(np.array(rows[0]) - np.array(rows[1])).max() < _SAME_PLAN)
+
+
+def _verge(scenario: RoadScenario) -> Verge:
+    section = scenario.cross_section
+    return Verge(STANDARD_CROSS_SECTIONS[section].verge if isinstance(section, str) else section.verge)
+
+
+def with_heights(line: RoadLine, heights: tuple[HeightPiece, ...]) -> Any:
+    """Return a line's heights from cubics in its file's stations, as intersections along its axis."""
+    return exact_axis(replace(line, heights=heights)).heights

@@ -1,0 +1,229 @@
+"""Which strip of a carriageway each lane of a file is, and which lanes are one along the road."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...base.errors import InputError
+from ...road.turnout_geometry import TURNOUT_STRIPS
+from .records import SHORTEST, SIDES, FileLane, FileSection
+from .surface import FileSurface, LaneEdges
+
+DRIVEN = frozenset(
+    {
+        "driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "slipLane", "bus", "taxi", "HOV",
+        "bidirectional", "mwyEntry", "mwyExit", "special1", "special2", "special3", "roadWorks",
+    }
+)  # fmt: skip
+"""Types of lanes that traffic drives on."""
+PAVED = frozenset({"shoulder", "border", "stop", "parking", "biking", "restricted", "shared"})
+"""Types of lanes beside them that are paved."""
+_OWN = frozenset({"median", "inner_edge_strip", "lane", "outer_edge_strip", "hard_shoulder", "verge", *TURNOUT_STRIPS})
+_MOST_LANES = 8
+_MATCH = 0.5
+"""Share of the narrower of two lanes that must lie beside the other for them to be one."""
+
+
+@dataclass
+class LaneSlot:
+    """A lane of a carriageway along the road.
+
+    Attributes:
+        lanes: of the file, by the number of their section.
+        kinds: types that they have there.
+    """
+
+    lanes: dict[int, FileLane] = field(default_factory=dict)
+
+    @property
+    def kinds(self) -> set[str]:
+        """Return the types that the file gives it."""
+        return {lane.type for lane in self.lanes.values()}
+
+
+@dataclass
+class SideLayout:
+    """The lanes of one side of a road's line as strips of its carriageway.
+
+    Attributes:
+        sign: of the lanes' ids and offsets.
+        slots: its lanes from the inside out.
+        strips: of each section, lanes by the strip that they are: ``median``, ``inner_edge_strip``,
+            ``outer_edge_strip``, ``hard_shoulder``, ``verge`` or one of the turnouts'; from the inside out.
+        across: of each section, lanes of the other side that are paved and belong to its inner edge strip.
+        lost: (section, lane, why) of lanes that no strip holds.
+    """
+
+    sign: int
+    slots: list[LaneSlot] = field(default_factory=list)
+    strips: dict[int, list[tuple[str, FileLane]]] = field(default_factory=dict)
+    across: dict[int, tuple[FileLane, ...]] = field(default_factory=dict)
+    lost: list[tuple[int, FileLane, str]] = field(default_factory=list)
+
+    def of_strip(self, section: int, kind: str) -> list[FileLane]:
+        """Return a section's lanes that are one strip, from the inside out."""
+        return [lane for name, lane in self.strips.get(section, []) if name == kind]
+
+
+def is_driven(lane: FileLane) -> bool:
+    """Return whether traffic drives on a lane."""
+    return lane.notes.get("strip") == "lane" if lane.notes.get("strip") in _OWN else lane.type in DRIVEN
+
+
+def driven_sides(sections: Sequence[FileSection]) -> list[int]:
+    """Return the signs of the sides with lanes that traffic drives on, left first."""
+    return [sign for sign in SIDES if any(is_driven(lane) for section in sections for lane in section.lanes[sign])]
+
+
+def side_layouts(surface: FileSurface, with_median: bool = False) -> dict[int, SideLayout]:
+    """Return the layout of each side that traffic drives on, by its sign.
+
+    Args:
+        surface: the file's.
+        with_median: whether another road of the file is the carriageway on the other side, so that what lies there is
+            the median.
+
+    Raises:
+        InputError: traffic drives on none; or a side has more than 8 lanes.
+    """
+    sections = surface.road.sections
+    sides = driven_sides(sections)
+    if not sides:
+        place = f"road {surface.road.name!r}: lanes"
+        raise InputError(place, None, "has no lane that traffic drives on: --only-axis takes its line alone")
+    layouts = {sign: SideLayout(sign) for sign in sides}
+    for number, section in enumerate(sections):
+        for sign, layout in layouts.items():
+            driven = _sort_lanes(layout, number, section.lanes[sign])
+            _chain(layout, number, surface, driven)
+            if -sign not in layouts and not with_median:
+                _take_across(layout, number, section.lanes[-sign])
+    for layout in layouts.values():
+        if len(layout.slots) > _MOST_LANES:
+            side = "left" if layout.sign > 0 else "right"
+            place = f"road {surface.road.name!r}: lanes on the {side}"
+            raise InputError(place, len(layout.slots), f"at most {_MOST_LANES} are possible: --only-axis takes its line")
+    return layouts
+
+
+def _sort_lanes(layout: SideLayout, number: int, lanes: Sequence[FileLane]) -> list[FileLane]:
+    """Put a section's lanes of one side into strips; return those that are lanes, from the inside out."""
+    strips = layout.strips.setdefault(number, [])
+    if any(lane.notes.get("strip") in _OWN for lane in lanes):
+        for lane in lanes:
+            kind = lane.notes.get("strip", "")
+            if kind in _OWN and kind != "lane":
+                strips.append((kind, lane))
+            elif kind != "lane":
+                layout.lost.append((number, lane, f"a {lane.type} lane among strips"))
+        return [lane for lane in lanes if lane.notes.get("strip") == "lane"]
+    places = [n for n, lane in enumerate(lanes) if is_driven(lane)]
+    if not places:
+        first, last = len(lanes), len(lanes)
+    else:
+        first, last = places[0], places[-1] + 1
+    before = list(lanes[:first]) if places else []
+    after = list(lanes[last:]) if places else list(lanes)
+    paved_from = len(before)
+    while paved_from and before[paved_from - 1].type in PAVED:
+        paved_from -= 1
+    strips += [("median", lane) for lane in before[:paved_from]]
+    strips += [("inner_edge_strip", lane) for lane in before[paved_from:]]
+    strips += _beside(layout, number, after)
+    return list(lanes[first:last])
+
+
+def _beside(layout: SideLayout, number: int, lanes: Sequence[FileLane]) -> list[tuple[str, FileLane]]:
+    """Return the strips outside of the lanes that traffic drives on: border, shoulder, verge, in this order."""
+    found: list[tuple[str, FileLane]] = []
+    reached = 0  # 0 edge strip, 1 hard shoulder, 2 verge
+    stopped = False
+    for lane in lanes:
+        if lane.type == "border" and reached == 0 and not found:
+            found.append(("outer_edge_strip", lane))
+            continue
+        paved = lane.type in PAVED and not (stopped and lane.type == "shoulder")
+        if reached < 2 and paved:
+            reached, stopped = 1, stopped or lane.type == "stop"
+            found.append(("hard_shoulder", lane))
+            continue
+        if paved:
+            layout.lost.append((number, lane, f"a {lane.type} lane outside of the verge"))
+            continue
+        reached = 2
+        found.append(("verge", lane))
+    return found
+
+
+def _take_across(layout: SideLayout, number: int, lanes: Sequence[FileLane]) -> None:
+    """Take paved lanes on the other side of a carriageway that has none there to its inner edge strip."""
+    count = 0
+    while count < len(lanes) and lanes[count].type in PAVED and lanes[count].notes.get("strip") != "median":
+        count += 1
+    layout.across[number] = tuple(lanes[:count])
+    for lane in lanes[count:]:
+        layout.lost.append((number, lane, f"a {lane.type} lane beside a single carriageway's inner edge"))
+
+
+def _chain(layout: SideLayout, number: int, surface: FileSurface, lanes: Sequence[FileLane]) -> None:
+    """Give a section's lanes to the slots that they continue, and new ones to those that continue none."""
+    before = [(n, slot) for n, slot in enumerate(layout.slots) if number - 1 in slot.lanes]
+    pairs = _matches(surface, number, layout.sign, [slot.lanes[number - 1] for _, slot in before], lanes)
+    place = {after: before[first][0] for first, after in pairs}
+    done = -1
+    for n, lane in enumerate(lanes):
+        if n in place:
+            done = place[n]
+        else:
+            later = [place[m] for m in range(n + 1, len(lanes)) if m in place]
+            end = later[0] if later else len(layout.slots)
+            free = [m for m in range(done + 1, end) if number not in layout.slots[m].lanes]
+            if free:
+                done = free[0]
+            else:
+                done += 1
+                layout.slots.insert(done, LaneSlot())
+                place = {m: at + (at >= done) for m, at in place.items()}
+        layout.slots[done].lanes[number] = lane
+
+
+def _matches(
+    surface: FileSurface, number: int, sign: int, before: Sequence[FileLane], after: Sequence[FileLane]
+) -> list[tuple[int, int]]:
+    """Return (place among those before, place among those after) of lanes that are one at a section's start.
+
+    Lanes are one where most of the narrower lies beside the other; so many are joined, in order, as can be.
+    """
+    if not before or not after:
+        return []
+    here, last = surface.road.sections[number], surface.road.sections[number - 1]
+    at = np.array([here.start])
+    before_it = np.array([max(here.start - SHORTEST, last.start)])
+    old = {edges.lane.number: edges for edges in surface.lanes(last, at, before_it)[sign]}
+    new = {edges.lane.number: edges for edges in surface.lanes(here, at, at)[sign]}
+    score = np.array([[_shared(old[a.number], new[b.number]) for b in after] for a in before])
+    best = np.zeros((len(before) + 1, len(after) + 1))
+    for i in range(len(before)):
+        for j in range(len(after)):
+            best[i + 1, j + 1] = max(best[i, j] + score[i, j], best[i, j + 1], best[i + 1, j])
+    pairs, i, j = [], len(before), len(after)
+    while i and j:
+        if score[i - 1, j - 1] > 0.0 and np.isclose(best[i, j], best[i - 1, j - 1] + score[i - 1, j - 1]):
+            i, j = i - 1, j - 1
+            pairs.append((i, j))
+        elif best[i - 1, j] >= best[i, j - 1]:
+            i -= 1
+        else:
+            j -= 1
+    return pairs[::-1]
+
+
+def _shared(first: LaneEdges, second: LaneEdges) -> float:
+    """Return the width that two lanes share, m; 0 where that is little of the narrower, or one has none."""
+    low, high = (sorted((float(edges.inner.offset[0]), float(edges.outer.offset[0]))) for edges in (first, second))
+    common = min(low[1], high[1]) - max(low[0], high[0])
+    narrower = min(low[1] - low[0], high[1] - high[0])
+    return common if narrower > 1e-3 and common > _MATCH * narrower else 0.0

@@ -1,0 +1,47 @@
+"""Our own files come in again: the same surface, and the same objects."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from synthroads_addon.road.parameters import RoadParameters
+from synthroads_addon.sampling.road import sample_road
+from tests.helpers.roads.sampled_parts import PAIRS, scenario
+from tests.helpers.roads.way_back import changed_fields, roads_apart, surface_errors, there_and_back
+
+MILLIMETRE = 1e-3
+FURTHER = {"turnouts": {"exits": 0.7, "entries": 0.7, "emergency_bays": 0.5}, "lane_changes": {"share": 0.5}}
+
+
+def drawn(seed: int) -> RoadParameters:
+    design_class, section = PAIRS[seed % len(PAIRS)]
+    length = (600.0, 1500.0, 2500.0)[seed % 3]
+    return sample_road(scenario(design_class=design_class, cross_section=section, length=length, **FURTHER), seed)
+
+
+def check(road: RoadParameters, folder: Path) -> None:
+    path, found, report = there_and_back(road, folder)
+    across, up = roads_apart(road, found)
+    assert across < MILLIMETRE
+    assert up < MILLIMETRE
+    # A reader of the standard's formulas finds the new road as near to the file as the one that it was written from.
+    before, after = surface_errors(path, road), surface_errors(path, found)
+    assert after[0] < before[0] + MILLIMETRE
+    assert after[1] < before[1] + MILLIMETRE
+    # A ramp's crossfall and run-off can't be told apart where it ends before the run-off does: its surface is the same.
+    changed = [row for row in changed_fields(road, found) if not row.field.endswith(".ramp")]
+    assert changed == []
+    assert not report["whole"]["surface_lost"], report["whole"]["approximated"]
+
+
+@pytest.mark.parametrize("seed", [0, 3, 12])
+def test_a_drawn_road_comes_back(tmp_path: Path, seed: int) -> None:
+    check(drawn(seed), tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(13, 63))
+def test_fifty_drawn_roads_come_back(tmp_path: Path, seed: int) -> None:
+    check(drawn(seed), tmp_path)
