@@ -303,6 +303,15 @@ def test_what_is_no_map_is_one_line_of_error(tmp_path: Path, text: str, message:
         axis_from_file(tmp_path / "a.osm", RoadScenario(), 1)
 
 
+def test_names_of_several_lines_are_told_on_one(tmp_path: Path) -> None:
+    path = motorway()[0].xml(tmp_path / "a.osm")
+    path.write_text(path.read_text().replace('v="A 9"', 'v="A&#10;9&#x85;"'))
+    assert {line.name for line in read_osm(path) if not line.carriageway} == {"A 9"}
+    with collected_remarks() as remarks:
+        axis_from_file(path, RoadScenario(), 1)
+    assert all(text.isprintable() for text in remarks)
+
+
 def test_values_of_tags() -> None:
     assert metres("3.5") == 3.5
     assert metres("12 ft") == pytest.approx(3.6576)
