@@ -9,7 +9,6 @@ from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..base.arrays import Float
 from .line import LineNames
@@ -124,6 +123,8 @@ def _cut(chain: Chain, pair: Pair) -> Float:
 
 def _stations_on(pair: Pair) -> Callable[[float], float]:
     """Return the function from stations of a pair's second carriageway to those of its axis, m."""
+    from scipy.spatial import cKDTree  # takes a tenth of a second, and few roads are of maps
+
     origin = pair.points[0]
     axis = on_plane(pair.points, origin)
     run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(axis, axis=0).T))])
