@@ -14,10 +14,10 @@ import numpy as np
 
 from ..base.arrays import Float
 from ..base.errors import InputError, MissingFileError, MissingPackageError
-from .osm_chains import OsmWay
 from .osm_roads import roads_of_ways
 from .osm_tags import DRIVEN
 from .points import PointLine
+from .way_chains import OsmWay
 from .xml_text import check_size, finite, on_one_line, parse_xml, refuse_doctype
 
 PBF_MARK = b"\x0a\x09OSMHeader"

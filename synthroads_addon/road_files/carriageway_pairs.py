@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.arrays import Bool, Float
-from .osm_chains import Chain, on_plane
+from .way_chains import Chain, on_plane
 
 _NEAREST, _FARTHEST = 4.0, 60.0
 """Distance of the two carriageways' lines, m."""
