@@ -14,11 +14,11 @@ import numpy as np
 
 from ..base.arrays import Float
 from ..base.errors import InputError, MissingFileError, MissingPackageError
-from .osm_chains import OsmWay
 from .osm_roads import roads_of_ways
 from .osm_tags import DRIVEN
 from .points import PointLine
-from .xml_text import check_size, finite, parse_xml, refuse_doctype
+from .way_chains import OsmWay
+from .xml_text import check_size, finite, on_one_line, parse_xml, refuse_doctype
 
 PBF_MARK = b"\x0a\x09OSMHeader"
 """Begin of the first block of a binary file, behind its length of four bytes."""
@@ -75,7 +75,7 @@ class _Data:
     def take(self, number: int, tags: Mapping[str, str], nodes: list[int]) -> None:
         """Keep a way if it is a road that is driven on."""
         if tags.get("highway") in DRIVEN and tags.get("area") != "yes":
-            self.ways[number] = dict(tags), nodes
+            self.ways[number] = {key: on_one_line(value) for key, value in tags.items()}, nodes
 
     @property
     def wanted(self) -> set[int]:

@@ -9,14 +9,13 @@ from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..base.arrays import Float
+from .carriageway_pairs import Pair, pairs_of
 from .line import LineNames
-from .osm_chains import Chain, OsmWay, chained, on_plane
-from .osm_pairs import Pair, pairs_of
 from .osm_tags import driving_direction, kilometres_per_hour, lanes_each_way, metres
 from .points import MappedSection, PointLine
+from .way_chains import Chain, OsmWay, chained, on_plane
 
 _COMPASS = ("east", "northeast", "north", "northwest", "west", "southwest", "south", "southeast")
 _NARROWEST, _WIDEST = 2.5, 4.0
@@ -36,7 +35,7 @@ T = TypeVar("T")
 def roads_of_ways(ways: Iterable[OsmWay]) -> list[PointLine]:
     """Return the roads of a map, the longest first.
 
-    Ways of one reference or name are chained (`osm_chains.chained`). Two one-way chains of a name that run beside each
+    Ways of one reference or name are chained (`way_chains.chained`). Two one-way chains of a name that run beside each
     other in opposite directions are the carriageways of a road, whose axis lies midway; it has their name, and each of
     them is there as well, named with the direction that it leads to. Ways without reference and name stand alone.
     """
@@ -124,6 +123,8 @@ def _cut(chain: Chain, pair: Pair) -> Float:
 
 def _stations_on(pair: Pair) -> Callable[[float], float]:
     """Return the function from stations of a pair's second carriageway to those of its axis, m."""
+    from scipy.spatial import cKDTree  # takes a tenth of a second, and few roads are of maps
+
     origin = pair.points[0]
     axis = on_plane(pair.points, origin)
     run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(axis, axis=0).T))])

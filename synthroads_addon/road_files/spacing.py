@@ -133,15 +133,14 @@ def _without_backward(name: str, points: Float, number: Int) -> tuple[Float, Int
         step = plan[at] - here
         first = at
         if float(step @ before) <= _BACK * float(np.hypot(*step) * np.hypot(*before)):
-            at = _comes_on(plan, at, here, before)
-            if at is None:
-                text = "%s turns back at %s, for more than %g m: no road does, and what is fitted there may be none"
-                warn(text, name, _place(points, number, kept[-1]), _FARTHEST_BACK)
-                at = first
-            else:
-                dropped += at - first
+            ahead = _comes_on(plan, first, here, before)
+            if ahead is not None:
+                dropped += ahead - first
                 told.append(_place(points, number, first))
+                at = ahead
                 continue
+            text = "%s turns back at %s, for more than %g m: no road does, and what is fitted there may be none"
+            warn(text, name, _place(points, number, kept[-1]), _FARTHEST_BACK)
         kept.append(at)
         at += 1
     if dropped:

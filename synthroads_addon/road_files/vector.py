@@ -24,7 +24,7 @@ from ..base.errors import InputError, MissingFileError, MissingPackageError
 from ..base.remarks import warn
 from .line import LineNames
 from .points import PointLine
-from .xml_text import check_size
+from .xml_text import check_size, on_one_line
 
 DRIVERS = {"GeoPackage": "GPKG", "shapefile": "ESRI Shapefile", "FlatGeobuf": "FlatGeobuf"}
 """GDAL's name of each format."""
@@ -104,8 +104,7 @@ def _told_in_one_line(path: Path, kind: str) -> Iterator[None]:
 
 def _one_line(said: object) -> str:
     """Return what GDAL says as one line, without the name that content has in its memory."""
-    text = re.sub(r"/vsimem/\S*", "the file", str(said))
-    return "".join(c if c.isprintable() else " " for c in text)[:200]
+    return on_one_line(re.sub(r"/vsimem/\S*", "the file", str(said)))[:200]
 
 
 def _check_beside(path: Path, kind: str) -> None:
@@ -141,7 +140,8 @@ def _lines_of(path: Path, source: Any, layer: str, kind: str) -> Iterator[tuple[
     for row, shape in enumerate([] if shapes is None else shapes):
         given = None if not field else values[0][row]
         number = row + 1 if numbers is None else int(numbers[row])
-        name = str(given) if given is not None and str(given).strip() not in ("", "nan") else f"line {number}"
+        known = given is not None and str(given).strip() not in ("", "nan")
+        name = on_one_line(str(given)) if known else f"line {number}"
         for found, fault in _line_of(f"{path.name}: {name}", shape):
             flat = not (found.shape[1] > 2 and found[:, 2].any())
             points = np.column_stack([found[:, :2], np.zeros(len(found)) if flat else found[:, 2]])

@@ -61,6 +61,11 @@ def check_size(path: Path) -> None:
         raise InputError(str(path), f"{size / 1e6:,.0f} MB", f"at most {LARGEST / 1e6:,.0f} MB are read")
 
 
+def on_one_line(text: str) -> str:
+    """Return a text with a space in place of each character that isn't printed, so that remarks with it are lines."""
+    return text if text.isprintable() else "".join(c if c.isprintable() else " " for c in text)
+
+
 def local_name(element: Element) -> str:
     """Return an element's name without its namespace."""
     return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""

@@ -14,10 +14,10 @@ from synthroads_addon.base.errors import InputError
 from synthroads_addon.base.remarks import collected_remarks
 from synthroads_addon.jobs.axis_source import axis_from_file
 from synthroads_addon.road.geometry import alignment_of, profile_of
+from synthroads_addon.road_files.carriageway_pairs import Pair, paired
 from synthroads_addon.road_files.osm import read_osm, read_pbf
-from synthroads_addon.road_files.osm_chains import Chain
-from synthroads_addon.road_files.osm_pairs import Pair, paired
 from synthroads_addon.road_files.osm_tags import driving_direction, kilometres_per_hour, lanes_each_way, metres
+from synthroads_addon.road_files.way_chains import Chain
 from synthroads_addon.scenario.road import FreeCrossSection, RoadScenario
 from synthroads_addon.scenario.scenario import load_scenario
 from synthroads_addon.scenario.without import scenario_without
@@ -179,7 +179,7 @@ def test_many_roads_of_one_name_are_paired_quickly(tmp_path: Path) -> None:
         return paired(one, other)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("synthroads_addon.road_files.osm_pairs.paired", counted)
+        patch.setattr("synthroads_addon.road_files.carriageway_pairs.paired", counted)
         lines = read_osm(written.xml(tmp_path / "a.osm"))
     assert sum(not line.carriageway for line in lines) == 60
     assert len(compared) == 60, "of 7140 pairs of carriageways"
@@ -301,6 +301,15 @@ def test_what_is_no_map_is_one_line_of_error(tmp_path: Path, text: str, message:
     (tmp_path / "a.osm").write_text(text)
     with pytest.raises(InputError, match=message):
         axis_from_file(tmp_path / "a.osm", RoadScenario(), 1)
+
+
+def test_names_of_several_lines_are_told_on_one(tmp_path: Path) -> None:
+    path = motorway()[0].xml(tmp_path / "a.osm")
+    path.write_text(path.read_text().replace('v="A 9"', 'v="A&#10;9&#x85;"'))
+    assert {line.name for line in read_osm(path) if not line.carriageway} == {"A 9"}
+    with collected_remarks() as remarks:
+        axis_from_file(path, RoadScenario(), 1)
+    assert all(text.isprintable() for text in remarks)
 
 
 def test_values_of_tags() -> None:

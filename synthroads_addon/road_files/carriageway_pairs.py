@@ -7,10 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..base.arrays import Bool, Float
-from .osm_chains import Chain, on_plane
+from .way_chains import Chain, on_plane
 
 _NEAREST, _FARTHEST = 4.0, 60.0
 """Distance of the two carriageways' lines, m."""
@@ -81,6 +80,8 @@ class _Dense:
 
     def feet(self, points: Float, directions: Float) -> tuple[Float, Bool]:
         """Return where points (K, 2) with directions have their feet (K, 2), and whether the line runs against them."""
+        from scipy.spatial import cKDTree  # takes a tenth of a second, and few roads are of maps
+
         _, near = cKDTree(self.points).query(points)
         here, way = self.points[near], self.directions[near]
         along = ((points - here) * way).sum(axis=1)
@@ -125,6 +126,8 @@ def paired(one: Chain, other: Chain) -> Pair | str:
 
 def _midway(first: _Dense, second: _Dense, here: Float, there: Float, stretch: tuple[float, float]) -> Float:
     """Return places (N, 2), m, midway between nodes of either line and the other one, along the first's stretch."""
+    from scipy.spatial import cKDTree  # takes a tenth of a second, and few roads are of maps
+
     rows = []
     low, high = stretch
     tree = cKDTree(first.points)
