@@ -189,8 +189,8 @@ def linear_algebra_on_one_thread(scipy: bool = False) -> Iterator[None]:
     meanwhile as well.
 
     Args:
-        scipy: the work uses SciPy, which is loaded beforehand: a third of a second of processor time, and 15 MB, which
-            other work needn't spend. What is loaded of it already is limited in any case.
+        scipy: the work uses SciPy, which is loaded beforehand: a quarter of a second of processor time, and 11 MB,
+            which other work needn't spend. What is loaded of it already is limited in any case.
     """
     with _one_thread.held(), _scipy_too.held() if scipy else nullcontext():
         yield
