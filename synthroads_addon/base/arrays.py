@@ -44,6 +44,11 @@ def take_rows(array: AnyArray, rows: Bool | NDArray[np.integer] | slice) -> AnyA
     return np.take(array, np.flatnonzero(rows) if rows.dtype == np.bool_ else rows, axis=0)
 
 
+def dot_rows(one: Float32, other: Float32) -> Float32:
+    """Return the dot products (N,) of vectors (N, 3), added one after the other: einsum's order is the processor's."""
+    return np.asarray(one[:, 0] * other[:, 0] + one[:, 1] * other[:, 1] + one[:, 2] * other[:, 2])
+
+
 def without_repeats(values: Float) -> tuple[Float, Index]:
     """Return values (N,) less those that equal the one before them, (K,), and the (N,) indices of all among these.
 

@@ -8,7 +8,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.arrays import AnyArray, ArrayRows, Bool, Float, Float32, Index, UInt8, UInt16, take_rows
+from ...base.arrays import AnyArray, ArrayRows, Bool, Float, Float32, Index, UInt8, UInt16, dot_rows, take_rows
 from ...base.loops import point_loops
 from ...base.turns.main_thread import MainThreadCalls
 from ...cloud.points import NO_MATERIAL
@@ -126,7 +126,7 @@ class SeenPoints(ArrayRows):
         if (loops := point_loops()) is not None:
             return loops.towards(self.position, self.scanner)
         towards = (self.scanner - self.position).astype(np.float32)
-        towards /= np.maximum(np.sqrt(np.einsum("ij,ij->i", towards, towards)), 1e-9)[:, None]
+        towards /= np.maximum(np.sqrt(dot_rows(towards, towards)), 1e-9)[:, None]
         return np.asarray(towards)
 
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...base.arrays import Float, Float32
+from ...base.arrays import Float, Float32, dot_rows
 from ...base.loops import PointLoops, point_loops
 
 _COSINES, _ROUGHNESSES, _LEVELS = 24, 16, 12
@@ -44,10 +44,10 @@ def reflected_sunlight(
     towards_sun = np.clip(normal @ sun32, 0.0, None)
     if (loops := point_loops()) is not None:
         return _by_loops(loops, (color, roughness, metallic, specular), (normal, view, sun32), towards_sun)
-    towards_view = np.clip(np.einsum("ij,ij->i", normal, view), 1e-4, 1.0)
+    towards_view = np.clip(dot_rows(normal, view), 1e-4, 1.0)
     half = view + sun32
-    half /= np.maximum(np.sqrt(np.einsum("ij,ij->i", half, half)), 1e-6)[:, None]
-    across, between = np.einsum("ij,ij->i", normal, half), np.einsum("ij,ij->i", view, half)
+    half /= np.maximum(np.sqrt(dot_rows(half, half)), 1e-6)[:, None]
+    across, between = dot_rows(normal, half), dot_rows(view, half)
     rough = np.maximum(roughness, _SMOOTHEST)
     gloss = _gloss(rough, towards_sun, towards_view, np.clip(across, 0.0, 1.0))
     tables = _tables()
