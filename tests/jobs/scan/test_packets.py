@@ -130,9 +130,7 @@ def test_compiled_loops_make_the_points_that_numpy_makes(
         ("one ray", ""),
     ],
 )
-def test_whatever_is_scanned_numpy_makes_the_same_points(
-    name: str, left: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_whatever_is_scanned_numpy_makes_the_same_points(name: str, left: str, monkeypatch: pytest.MonkeyPatch) -> None:
     plan = plans(name)["auto"]
     assert plan.summary()["kernels"].endswith(f"; pulses compiled{left}; noise compiled; poses compiled")
     assert bool(plan.target.moving) == (name != "spared")
