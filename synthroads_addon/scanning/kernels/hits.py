@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -81,12 +82,13 @@ class HitRows:
     @property
     def native(self) -> Met:
         """Return the addresses of the arrays."""
-        return Met(*(address_of(getattr(self, name)) for name, _ in Met._fields_))
+        return Met(*(address_of(getattr(self, one[0])) for one in Met._fields_))
 
     def select(self, count: int) -> HitRows:
         """Return the first hits."""
-        arrays = (getattr(self, field.name) for field in fields(self))
-        return HitRows(*(None if array is None else array[:count] for array in arrays))
+        arrays: list[Any] = [getattr(self, field.name) for field in fields(self)]
+        chosen: list[Any] = [None if array is None else array[:count] for array in arrays]
+        return HitRows(*chosen)
 
     def fade(self) -> None:
         """Turn the exponents of what the air leaves into factors, in place."""
@@ -129,7 +131,7 @@ class LateHits:
             return cls.of(0, fades, share)
         hits = [part.hits for part in parts]
         columns = ([getattr(one, field.name) for one in hits] for field in fields(HitRows))
-        joined = (None if column[0] is None else np.concatenate(column) for column in columns)
+        joined: list[Any] = [None if column[0] is None else np.concatenate(column) for column in columns]
         return cls(np.concatenate([part.ray for part in parts]), HitRows(*joined))
 
 
@@ -157,7 +159,7 @@ class OnwardLight:
     @property
     def native(self) -> Passed:
         """Return the addresses of the arrays."""
-        return Passed(*(address_of(getattr(self, name)) for name, _ in Passed._fields_))
+        return Passed(*(address_of(getattr(self, one[0])) for one in Passed._fields_))
 
     def onward(self, count: int) -> tuple[Index, Float, Float | None, float]:
         """Return the first so many rays, see `MovingParts.cast`."""

@@ -55,7 +55,8 @@ class MovingParts:
     """
 
     def __init__(self, kernel: MovingKernel, parts: Sequence[TargetPart], motions: Sequence[Track]) -> None:
-        self._kernel, self._kept, self._bodies, self._casters = kernel, list[AnyArray](), list[_Part](), []
+        self._kernel, self._kept = kernel, list[AnyArray]()
+        self._bodies, self._casters = list[_Part](), list[PacketScene]()
         for part, track in zip(parts, motions, strict=True):
             if part.count and track.present.any():
                 self._add(part, track)
@@ -111,7 +112,7 @@ class MovingParts:
             ray, start, step, beyond = onward
             listed = (members, ray.ctypes.data, start.ctypes.data, None if step is None else step.ctypes.data, beyond)
         rays = _Rays(begin, *listed, *(array.ctypes.data for array in (reach, face, distance, along)), maximum_range)
-        work = [np.empty((bundles, _BOUNDS)), np.empty((_BUFFER, 6)), np.empty(bundles, np.uint8)]
+        work: list[AnyArray] = [np.empty((bundles, _BOUNDS)), np.empty((_BUFFER, 6)), np.empty(bundles, np.uint8)]
         work += [np.empty(_BUFFER, np.int64), *np.empty((2, _BUFFER, 3), np.float32), np.empty(_BUFFER, np.int32)]
         # From call to call a packet's rays are judged by those before them of the same call alone.
         casts = [caster.casting() for caster in self._casters]

@@ -172,10 +172,9 @@ class PulseKernel:
             signals: of what rays (K, P) meet first, and (B,) of what lies behind.
             ray: (B,) rays of these, as k * P + p.
         """
-        first, behind = (
-            HitRows(np.empty(0, np.int32), *(np.ascontiguousarray(array) for array in arrays), None, None, None)
-            for arrays in ((one.distance, one.intensity, one.weight) for one in signals)
-        )
+        arrays = ([one.distance, one.intensity, one.weight] for one in signals)
+        kept = [[np.ascontiguousarray(array) for array in three] for three in arrays]
+        first, behind = (HitRows(np.empty(0, np.int32), a, b, c, None, None, None) for a, b, c in kept)
         late = LateHits(np.ascontiguousarray(ray, np.int64), behind)
         made, columns = self._grouped(signals[0].distance.shape[1], first, late)
         return Echoes(*(column[:made].copy() for column in columns))
