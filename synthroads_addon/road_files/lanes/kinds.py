@@ -31,7 +31,7 @@ Standing = Callable[[dict[str, Any], Size], RoadObject]
 
 
 class Maker(NamedTuple):
-    """What an object becomes.
+    """The thing that an object becomes.
 
     Attributes:
         name: for people.

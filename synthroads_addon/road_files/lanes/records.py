@@ -144,7 +144,7 @@ class ShapeProfile:
 
 @dataclass(frozen=True)
 class FileRoad:
-    """What an OpenDRIVE road says beside its plan.
+    """An OpenDRIVE road beside its plan.
 
     Attributes:
         element: the road.
