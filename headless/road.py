@@ -93,7 +93,9 @@ def run(arguments: argparse.Namespace) -> Outcome:
 def _compare(arguments: argparse.Namespace) -> Outcome:
     """Return the fields in which a file's road differs from a parameter set; nothing is written."""
     if arguments.output is not None:
-        raise InputError("--output", str(arguments.output), "can't be given together with --against, which writes nothing")
+        raise InputError(
+            "--output", str(arguments.output), "can't be given together with --against, which writes nothing"
+        )
     from synthroads_addon.jobs.whole_road import differences_from
 
     scenario = load_scenario(arguments.scenario, all_changes(arguments, _FIELDS))

@@ -34,9 +34,7 @@ def has_whole_road(path: Path) -> bool:
     return format_of(path) == "OpenDRIVE"
 
 
-def road_from_file(
-    path: Path, scenario: Scenario, name: str | None = None
-) -> tuple[RoadParameters, dict[str, Any]]:
+def road_from_file(path: Path, scenario: Scenario, name: str | None = None) -> tuple[RoadParameters, dict[str, Any]]:
     """Return the road of an OpenDRIVE file as a parameter set, and a report of its axis and of what became of the rest.
 
     Args:
@@ -69,7 +67,7 @@ def differences_from(
 ) -> tuple[list[Difference], dict[str, Any]]:
     """Return in which fields the road of an OpenDRIVE file differs from a parameter set, and a report of the file.
 
-    What is compared is what the file says: line, heights, carriageways, turnouts, and markings and things if it has any.
+    Line, heights, carriageways and turnouts are compared, and markings and things if the file has any.
 
     Raises:
         MissingFileError, InputError: a file can't be read, or a parameter set can't hold the road.

@@ -99,19 +99,26 @@ def _of_object(path: str, old: RoadObject, new: RoadObject, length: float) -> It
                     yield Difference(f"{path}.lanes.{number}", one and one.kind, other and other.kind)
                 else:
                     yield from _apart(
-                        f"{path}.lanes.{number}.width", station, width_at(one.width, station), width_at(other.width, station)
+                        f"{path}.lanes.{number}.width",
+                        station,
+                        width_at(one.width, station),
+                        width_at(other.width, station),
                     )
         elif _is_width(old, name, a) or _is_width(old, name, b):
             yield from _apart(f"{path}.{name}", station, width_at(a, station), width_at(b, station))
         elif isinstance(a, tuple) and a and isinstance(a[0], CrossfallPoint):
-            falls = [np.interp(station, *zip(*((p.station, p.crossfall_percent) for p in v), strict=True)) for v in (a, b)]
+            falls = [
+                np.interp(station, *zip(*((p.station, p.crossfall_percent) for p in v), strict=True)) for v in (a, b)
+            ]
             yield from _apart(f"{path}.{name}", station, *falls)
         elif not _same(a, b, turns=name.endswith("_deg")):
             yield Difference(f"{path}.{name}", _shown(a), _shown(b))
 
 
 def _is_width(item: RoadObject, name: str, value: Any) -> bool:
-    by_station = isinstance(value, tuple) and bool(value) and hasattr(value[0], "width") and hasattr(value[0], "station")
+    by_station = (
+        isinstance(value, tuple) and bool(value) and hasattr(value[0], "width") and hasattr(value[0], "station")
+    )
     return by_station or (isinstance(item, Carriageway) and isinstance(value, float) and name != "verge_slope_percent")
 
 

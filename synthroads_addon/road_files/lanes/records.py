@@ -121,9 +121,7 @@ class FileSection:
         return found
 
     @staticmethod
-    def _edges(
-        lanes: Sequence[FileLane], sign: int, where: tuple[Float, Float, Float], turn: float
-    ) -> list[Float]:
+    def _edges(lanes: Sequence[FileLane], sign: int, where: tuple[Float, Float, Float], turn: float) -> list[Float]:
         station, inside, offset = where
         edges = [offset]
         for lane in lanes:
