@@ -72,8 +72,8 @@ def run(arguments: argparse.Namespace) -> Outcome:
         from synthroads_addon.road.tessellation import sample_stations
 
         whole = has_whole_road(arguments.file) and not arguments.only_axis
-        file = {"road" if whole else "axis": arguments.file}
-        source = RoadSource(scenario, **file, axis_name=arguments.axis_name, pictures=arguments.output)
+        road, axis = (arguments.file, None) if whole else (None, arguments.file)
+        source = RoadSource(scenario, None, axis, arguments.axis_name, arguments.output, road)
         parameters, told = source.read()
         report = told["axis"]
         road = RoadGeometry(parameters)

@@ -49,7 +49,7 @@ def differences(old: RoadParameters, new: RoadParameters, types: Collection[str]
             continue
         if name not in before or name not in after:
             shown = [type(items[name]).__name__ if name in items else None for items in (before, after)]
-            found.append(Difference(f"objects.{name}", *shown))
+            found.append(Difference(f"objects.{name}", shown[0], shown[1]))
             continue
         found += _of_object(f"objects.{name}", before[name], after[name], new.alignment.length)
     return found
@@ -107,12 +107,14 @@ def _of_object(path: str, old: RoadObject, new: RoadObject, length: float) -> It
         elif _is_width(old, name, a) or _is_width(old, name, b):
             yield from _apart(f"{path}.{name}", station, width_at(a, station), width_at(b, station))
         elif isinstance(a, tuple) and a and isinstance(a[0], CrossfallPoint):
-            falls = [
-                np.interp(station, *zip(*((p.station, p.crossfall_percent) for p in v), strict=True)) for v in (a, b)
-            ]
-            yield from _apart(f"{path}.{name}", station, *falls)
+            yield from _apart(f"{path}.{name}", station, _crossfall(a, station), _crossfall(b, station))
         elif not _same(a, b, turns=name.endswith("_deg")):
             yield Difference(f"{path}.{name}", _shown(a), _shown(b))
+
+
+def _crossfall(points: tuple[CrossfallPoint, ...], station: np.ndarray) -> np.ndarray:
+    """Return the crossfall (N,), %, at stations (N,), m."""
+    return np.interp(station, [p.station for p in points], [p.crossfall_percent for p in points])
 
 
 def _is_width(item: RoadObject, name: str, value: Any) -> bool:

@@ -187,7 +187,7 @@ def _lines_of_mark(
         for row in rows:
             dash, gap = number(row, "length", 0.0), number(row, "space", 0.0)
             dashed = gap > 0.0
-            color = _colour(row.get("color") or mark.get("color", "standard"), loss)
+            color = _colour(row.get("color") or mark.get("color") or "standard", loss)
             yield _Line(
                 **common, dash=dash if dashed else 0.0, gap=gap, first=span[0] + number(row, "sOffset", 0.0),
                 shift=number(row, "tOffset", 0.0), width=number(row, "width", 0.0) or width, color=color,

@@ -155,8 +155,8 @@ def _own_thing(model: type[RoadObject], item: Element, notes: dict[str, str], pl
 def _moved(made: Any, offset: float) -> RoadObject:
     """Return an object at the offset (m) at which its element is, where another program has moved that."""
     if abs(offset - made.offset) <= _CHANGED:
-        return made  # type: ignore[no-any-return]
-    return type(made).from_dict(made.to_dict() | {"offset": round_value(offset, _DIGITS)})  # type: ignore[no-any-return]
+        return made
+    return type(made).from_dict(made.to_dict() | {"offset": round_value(offset, _DIGITS)})
 
 
 def _loose_line(item: Element, places: Places) -> LineMarking:

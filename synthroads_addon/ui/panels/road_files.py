@@ -110,7 +110,7 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
     def read(self, path: Path, scenario: Scenario) -> tuple[RoadParameters, str]:
         """Take the file's whole road, or fit an alignment to its centreline; return the road, and the message."""
         whole = has_whole_road(path)
-        parameters, report = RoadSource(scenario, **{"road" if whole else "axis": path}).read()
+        parameters, report = (RoadSource(scenario, road=path) if whole else RoadSource(scenario, axis=path)).read()
         text = f"Built {parameters.alignment.length:,.0f} m of road {'of' if whole else 'along'} {path.name}"
         lost = "; some of its surface was left out" if report["axis"].get("whole", {}).get("surface_lost") else ""
         return parameters, f"{text}: {axis_summary(report['axis'])}{lost}"
