@@ -48,7 +48,6 @@ def road_from_file(path: Path, scenario: Scenario, name: str | None = None) -> t
     if not has_whole_road(path):
         raise InputError(path.name, format_of(path), "OpenDRIVE is needed for a whole road: --axis takes other files")
     if choose_line(read_opendrive(path), name, path.name).lanes is None:
-        assume("%s: the road has no lanes: its line alone is taken", path.name)
         axis, limits, report = axis_from_file(path, scenario.road, scenario.seed, name)
         return sample_road(limits, scenario.seed, scenario.title, axis), report
     found = whole_road(path, scenario.road, name)

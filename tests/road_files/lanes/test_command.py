@@ -50,7 +50,8 @@ def test_the_axis_alone_is_another_road(tmp_path: Path) -> None:
 def test_a_road_without_lanes_is_its_line(tmp_path: Path) -> None:
     assert main(["road", str(road_file(tmp_path, "")), "--output", str(tmp_path / "out")]) == 0
     report = json.loads((tmp_path / "out" / "road.json").read_text())
-    assert any("has no lanes" in text for text in report["remarks"])
+    assert "whole" not in report
+    assert report["length"] == 200.0
 
 
 def test_an_edit_is_shown_as_fields(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
