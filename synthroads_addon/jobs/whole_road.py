@@ -9,13 +9,13 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..base.remarks import assume
-from ..road.differences import Difference, differences
 from ..road.geometry import RoadGeometry
 from ..road.objects import nominal_width
 from ..road.parameters import AlignmentObject, RoadParameters, VerticalPoint, read_parameters
 from ..road.section import Carriageway
 from ..road.things.registry import THINGS
 from ..road_files.lanes.carriageways import deviations
+from ..road_files.lanes.differences import Difference, differences
 from ..road_files.lanes.road import WholeRoad, whole_road, with_heights
 from ..road_files.opendrive import read_opendrive
 from ..road_files.read import choose_line, format_of

@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .geometry import profile_of
-from .objects import RoadObject, width_at
-from .parameters import AlignmentObject, RoadParameters
-from .section import Carriageway, CrossfallPoint
+from ...road.geometry import profile_of
+from ...road.objects import RoadObject, width_at
+from ...road.parameters import AlignmentObject, RoadParameters
+from ...road.section import Carriageway, CrossfallPoint
 
 TOLERANCE = 1e-3
 """Lengths (m), percents and degrees that differ by less are the same."""
