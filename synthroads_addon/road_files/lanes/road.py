@@ -19,7 +19,7 @@ from ..heights import HeightPiece
 from ..line import LineNames, RoadLine, exact_axis
 from ..opendrive import read_opendrive
 from ..read import choose_line
-from ..xml_text import child, children, number, read_xml
+from ..xml_text import child, children, local_name, number, read_xml
 from .carriageways import Pavements, Verge, pavements
 from .loss import Loss
 from .marks import line_markings
@@ -97,6 +97,8 @@ def whole_road(path: Path, scenario: RoadScenario, name: str | None = None) -> W
             for _, _, why in layout.lost:
                 loss.leave_out("lanes", why, surface=True)
         loss.read["lane sections"] += len(one.sections)
+        if speeds := sum(local_name(item) == "speed" for item in one.element.iter()):
+            loss.leave_out("speed limits", "in a parameter set signs alone say them", speeds)
     found = pavements(shapes, _verge(scenario), lambda s: np.interp(s, *exact), loss)
     heights = None
     if found.heights is not None:
