@@ -9,13 +9,13 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..base.remarks import assume
-from ..road.differences import Difference, differences
 from ..road.geometry import RoadGeometry
 from ..road.objects import nominal_width
 from ..road.parameters import AlignmentObject, RoadParameters, VerticalPoint, read_parameters
 from ..road.section import Carriageway
 from ..road.things.registry import THINGS
 from ..road_files.lanes.carriageways import deviations
+from ..road_files.lanes.differences import Difference, differences
 from ..road_files.lanes.road import WholeRoad, whole_road, with_heights
 from ..road_files.opendrive import read_opendrive
 from ..road_files.read import choose_line, format_of
@@ -34,9 +34,7 @@ def has_whole_road(path: Path) -> bool:
     return format_of(path) == "OpenDRIVE"
 
 
-def road_from_file(
-    path: Path, scenario: Scenario, name: str | None = None
-) -> tuple[RoadParameters, dict[str, Any]]:
+def road_from_file(path: Path, scenario: Scenario, name: str | None = None) -> tuple[RoadParameters, dict[str, Any]]:
     """Return the road of an OpenDRIVE file as a parameter set, and a report of its axis and of what became of the rest.
 
     Args:
@@ -50,7 +48,6 @@ def road_from_file(
     if not has_whole_road(path):
         raise InputError(path.name, format_of(path), "OpenDRIVE is needed for a whole road: --axis takes other files")
     if choose_line(read_opendrive(path), name, path.name).lanes is None:
-        assume("%s: the road has no lanes: its line alone is taken", path.name)
         axis, limits, report = axis_from_file(path, scenario.road, scenario.seed, name)
         return sample_road(limits, scenario.seed, scenario.title, axis), report
     found = whole_road(path, scenario.road, name)
@@ -69,7 +66,7 @@ def differences_from(
 ) -> tuple[list[Difference], dict[str, Any]]:
     """Return in which fields the road of an OpenDRIVE file differs from a parameter set, and a report of the file.
 
-    What is compared is what the file says: line, heights, carriageways, turnouts, and markings and things if it has any.
+    Line, heights, carriageways and turnouts are compared, and markings and things if the file has any.
 
     Raises:
         MissingFileError, InputError: a file can't be read, or a parameter set can't hold the road.

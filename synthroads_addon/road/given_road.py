@@ -1,4 +1,4 @@
-"""What another program's file says of a road, as objects of a parameter set; what it doesn't say is drawn."""
+"""Parts of a road that another program's file says, as objects of a parameter set; the rest is drawn."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class GivenRoad:
     """The parts of a road that aren't drawn. All have the instance number 1, and ids as in a parameter set.
 
     Attributes:
-        carriageways: by side; their ids are ``carriageway-left`` and ``carriageway-right``. Only their pavement is drawn.
+        carriageways: by side; their ids are ``carriageway-left`` and ``carriageway-right``. Their pavement is drawn.
         turnouts: by id.
         markings: by id; None where they are drawn.
         things: by id; None where they are drawn.

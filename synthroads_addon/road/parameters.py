@@ -188,15 +188,18 @@ class RoadParameters(Model):
         for kind in (Median, Terrain):
             if len(self.of_type(kind)) > 1:
                 raise ValueError(f"objects may contain one {kind.__name__} at most")
+        self._check_carriageways()
+        for name, item in self.objects.items():
+            if fault := self._missing_reference(item):
+                raise ValueError(f"objects.{name}: {fault}")
+        return self
+
+    def _check_carriageways(self) -> None:
         sides = [item.side for item in self.of_type(Carriageway).values()]
         if len(set(sides)) != len(sides) or not sides:
             raise ValueError("objects must contain one Carriageway per side at most, and at least one")
         if len(sides) == 2 and self._least_median() < -_OVERLAP:
             raise ValueError("the carriageways' inner_offset must add up to 0 or more: their pavements overlap")
-        for name, item in self.objects.items():
-            if fault := self._missing_reference(item):
-                raise ValueError(f"objects.{name}: {fault}")
-        return self
 
     def _least_median(self) -> float:
         """Return the least distance of the two carriageways' inner edges along the road, m."""

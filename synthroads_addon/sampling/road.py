@@ -121,9 +121,7 @@ def sample_alignment(scenario: RoadScenario, seed: int) -> AlignmentObject:
     return axis.model_copy(update={"start_x": round_value(-x, 3), "start_y": round_value(-y, 3)})
 
 
-def _sample_site(
-    scenario: RoadScenario, seed: int, axis: AlignmentObject, given: GivenRoad | None
-) -> PlacementSite:
+def _sample_site(scenario: RoadScenario, seed: int, axis: AlignmentObject, given: GivenRoad | None) -> PlacementSite:
     """Return a drawn road without what stands on and beside it: axis, carriageways, turnouts and terrain."""
     sampler = CarriagewaySampler(scenario, seed, axis)
     carriageways: dict[Side, Carriageway] = {}

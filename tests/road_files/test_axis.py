@@ -161,13 +161,14 @@ def test_the_command_writes_a_road_that_comes_back_exactly(tmp_path: Path, capsy
     assert report["remarks"] == []
 
 
-def test_lanes_that_are_left_out_give_exit_code_3(tmp_path: Path) -> None:
+def test_lanes_that_nothing_drives_on_leave_the_axis(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     road, _ = main_road(*PLACE, HEIGHTS + LANES)
     path = opendrive(tmp_path / "a.xodr", [road], UTM32)
     words = ["road", str(path), "--quiet", "--output"]
-    assert main([*words, str(tmp_path / "all")]) == 3
+    assert main([*words, str(tmp_path / "all")]) == 2
+    assert "--only-axis takes its line alone" in capsys.readouterr().err
     assert main([*words, str(tmp_path / "axis"), "--only-axis"]) == 0
-    assert json.loads((tmp_path / "all/road.json").read_text())["left_out"] == ["lanes of 1 lane sections"]
+    assert json.loads((tmp_path / "axis/road.json").read_text())["left_out"] == ["lanes of 1 lane sections"]
 
 
 def test_the_list_names_every_road(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

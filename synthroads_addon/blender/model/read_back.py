@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ...road.geometry import sections_of
-from ...road.objects import AnyWidth, RoadObject, WidthPoint, nominal_width
+from ...road.objects import AnyWidth, RoadObject, nominal_width
 from ...road.parameters import RoadParameters
 from ...road.section import Carriageway, LineMarking, Pavement
 from ...road.section_geometry import CarriagewaySection
@@ -200,7 +200,7 @@ def _scale_width(width: AnyWidth, nominal: float) -> AnyWidth:
     before = nominal_width(width)
     if nominal == before:
         return width
-    return tuple(WidthPoint(station=point.station, width=nominal * point.width / (before or 1e-9)) for point in width)
+    return tuple(point.model_copy(update={"width": nominal * point.width / (before or 1e-9)}) for point in width)
 
 
 def _input_value(before: float, modifier: bpy.types.NodesModifier, name: str) -> float:

@@ -150,8 +150,8 @@ def _planes(sides: Sequence[SideShape], lines: Mapping[int, Polyline]) -> Planes
         line, paved = lines[side.sign], paved_index(side)
         inner, outer = line.values[:, [0]], line.values[:, [paved]]
         rows = {"carriageway_axis": 0.5 * (inner + outer), "inner_edge": inner, "centreline": 0.0 * inner}
-        for axis in pivots:
-            pivots[axis][side.sign] = Polyline(line.stations, rows[axis], line.jumps)
+        for axis, of_side in pivots.items():
+            of_side[side.sign] = Polyline(line.stations, rows[axis], line.jumps)
     return joined(right, left, breaks, pivots)
 
 
@@ -198,7 +198,9 @@ def _carriageway(
         hard_shoulder_width=_width(at, widths[:, 2 + count], _SHOULDER),
         verge_width=_width(at, verge_width, _SHOULDER),
         verge_slope_percent=slope,
-        crossfall=tuple(CrossfallPoint(station=round_value(s), crossfall_percent=round_value(v, _DIGITS)) for s, v in falls),
+        crossfall=tuple(
+            CrossfallPoint(station=round_value(s), crossfall_percent=round_value(v, _DIGITS)) for s, v in falls
+        ),
         rotation_axis=made.axis,
         pavement=Pavement(),
     )
@@ -283,9 +285,7 @@ def _worst(
     begins = np.concatenate([row[1].inner_heights for row in rows])
     ours, levels = np.concatenate([row[2] for row in rows]), np.concatenate([row[3] for row in rows])
     # Strips that are nowhere wider than 0 aren't among the set's.
-    present = [
-        n for n in range(len(names)) if (wanted[:, n + 1] - wanted[:, n]).max() > _NONE and names[n] in kinds
-    ]
+    present = [n for n in range(len(names)) if (wanted[:, n + 1] - wanted[:, n]).max() > _NONE and names[n] in kinds]
     begin = [kinds.index(names[n]) + _lanes_before(names, present, n) for n in present]
     index = [0, *(n + 1 for n in begin)]
     verge = bool(present) and names[present[-1]] == "verge"

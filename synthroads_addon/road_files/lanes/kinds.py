@@ -31,7 +31,7 @@ Standing = Callable[[dict[str, Any], Size], RoadObject]
 
 
 class Maker(NamedTuple):
-    """What an object becomes.
+    """The thing that an object becomes.
 
     Attributes:
         name: for people.
@@ -145,7 +145,10 @@ _TABLE: tuple[tuple[str, Maker], ...] = (
     (r"\bwall|mauer", Maker("wall", along=_wall)),
     (r"guide[-_ ]?post|delineator|reflector|leitpfosten", Maker("delineator", standing=_delineator)),
     (r"gantry", Maker("gantry", standing=_gantry, approximated="a gantry has two legs at the ends of its width")),
-    (r"cone|barrel|beacon|\bbake|drum", Maker("beacon", standing=_beacon, approximated="cones and barrels are beacons")),
+    (
+        r"cone|barrel|beacon|\bbake|drum",
+        Maker("beacon", standing=_beacon, approximated="cones and barrels are beacons"),
+    ),
     (r"street[-_ ]?lamp|lamp|street[-_ ]?light|lighting|luminaire", Maker("lighting pole", standing=_lamp)),
     (r"traffic[-_ ]?light", Maker("traffic light", standing=_light)),
     (r"emergency[-_ ]?(phone|call)|notruf", Maker("emergency phone", standing=_phone)),

@@ -1,4 +1,4 @@
-"""What became of what a file says: read, approximated, left out; with the places."""
+"""The list of what became of a file: read, approximated, left out; with the places."""
 
 from __future__ import annotations
 

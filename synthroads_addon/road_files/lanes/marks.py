@@ -108,25 +108,32 @@ def _border(
         side = sides.get(sign)
         if side is None or (lane is not None and lane.number * sign < 0):
             continue
-        slots = side.layout.slots
-        there = [(n, slot.lanes[section]) for n, slot in enumerate(slots) if section in slot.lanes]
-        if lane is not None:
-            for place, (n, other) in enumerate(there):
-                if other is lane:
-                    outer = there[place + 1][0] if place + 1 < len(there) else len(slots)
-                    return side, (len(slots) - outer, len(slots) - 1 - n), None
-            for kind in ("turnout_lane", "ramp_inner_strip"):
-                if lane in side.layout.of_strip(section, kind):
-                    return side, None, pavements.turnout_ids.get((sign, lane.notes.get("instance", "")))
-        if there:
-            first = there[0][1]
-            inside = [other for other in side.surface.road.sections[section].lanes[sign]
-                      if abs(other.number) < abs(first.number)]  # fmt: skip
-            if (inside[-1] if inside else None) is lane:
-                return side, (len(slots) - there[0][0], len(slots)), None
+        border = _lane_border(side, section, lane)
+        if border is not None:
+            return side, border, None
+        for kind in ("turnout_lane", "ramp_inner_strip"):
+            if lane is not None and lane in side.layout.of_strip(section, kind):
+                return side, None, pavements.turnout_ids.get((sign, lane.notes.get("instance", "")))
         if lane is not None:
             return side, None, None
     return sides.get(-1) or sides[1], None, None
+
+
+def _lane_border(side: SideShape, section: int, lane: FileLane | None) -> tuple[int, int] | None:
+    """Return the lane boundaries that lie at a lane's outer border, as lanes between have no width; None if none do."""
+    slots = side.layout.slots
+    there = [(n, slot.lanes[section]) for n, slot in enumerate(slots) if section in slot.lanes]
+    for place, (n, other) in enumerate(there):
+        if other is lane:
+            outer = there[place + 1][0] if place + 1 < len(there) else len(slots)
+            return len(slots) - outer, len(slots) - 1 - n
+    if not there:
+        return None
+    lanes = side.surface.road.sections[section].lanes[side.sign]
+    inside = [other for other in lanes if abs(other.number) < abs(there[0][1].number)]
+    if (inside[-1] if inside else None) is lane:
+        return len(slots) - there[0][0], len(slots)
+    return None
 
 
 def _lines_of(
@@ -180,7 +187,7 @@ def _lines_of_mark(
         for row in rows:
             dash, gap = number(row, "length", 0.0), number(row, "space", 0.0)
             dashed = gap > 0.0
-            color = _colour(row.get("color") or mark.get("color", "standard"), loss)
+            color = _colour(row.get("color") or mark.get("color") or "standard", loss)
             yield _Line(
                 **common, dash=dash if dashed else 0.0, gap=gap, first=span[0] + number(row, "sOffset", 0.0),
                 shift=number(row, "tOffset", 0.0), width=number(row, "width", 0.0) or width, color=color,
@@ -285,7 +292,7 @@ def _common(first: tuple[int, int] | None, second: tuple[int, int] | None) -> tu
 
 
 def _boundary(line: _Line) -> int:
-    """Return the lane boundary that a line follows: of several the outermost or innermost of all, else the inner one."""
+    """Return the lane boundary that a line follows: of several the outermost or innermost of all, else the inner."""
     assert line.border is not None
     low, high = line.border
     return 0 if low == 0 and high < len(line.side.layout.slots) else high

@@ -155,13 +155,15 @@ def _own_thing(model: type[RoadObject], item: Element, notes: dict[str, str], pl
 def _moved(made: Any, offset: float) -> RoadObject:
     """Return an object at the offset (m) at which its element is, where another program has moved that."""
     if abs(offset - made.offset) <= _CHANGED:
-        return made  # type: ignore[no-any-return]
-    return type(made).from_dict(made.to_dict() | {"offset": round_value(offset, _DIGITS)})  # type: ignore[no-any-return]
+        return made
+    return type(made).from_dict(made.to_dict() | {"offset": round_value(offset, _DIGITS)})
 
 
 def _loose_line(item: Element, places: Places) -> LineMarking:
     """Return a line of our own file that follows no lane: an object along corners."""
-    rows = [(number(c, "s"), number(c, "t"), number(c, "dz", 0.0)) for c in item.iter() if local_name(c) == "cornerRoad"]
+    rows = [
+        (number(c, "s"), number(c, "t"), number(c, "dz", 0.0)) for c in item.iter() if local_name(c) == "cornerRoad"
+    ]
     station, offset = places.at(*np.array(rows).T)
     mark = next(one for one in item.iter() if local_name(one) == "marking")
     sides = driven_sides(places.surface.road.sections)
@@ -250,7 +252,9 @@ def _stretches(item: Element, repeats: Sequence[Element], places: Places, length
         t = number(item, "t", 0.0)
         start, run = number(row, "s"), number(row, "length")
         rows.append((start, start + run, number(row, "tStart", t), number(row, "tEnd", t)))
-    corners = [c for outline in item.iter() if local_name(outline) == "outline" for c in children(outline, "cornerRoad")]
+    corners = [
+        c for outline in item.iter() if local_name(outline) == "outline" for c in children(outline, "cornerRoad")
+    ]
     if not rows and corners:
         s, t = np.array([(number(corner, "s"), number(corner, "t")) for corner in corners]).T
         rows.append((float(s.min()), float(s.max()), float(t.min()), float(t.max())))
@@ -272,5 +276,3 @@ def _stretches(item: Element, repeats: Sequence[Element], places: Places, length
             new = Stretch(last_one.start, new.end, last_one.offset, off)
         found.append(new)
     yield from found
-
-

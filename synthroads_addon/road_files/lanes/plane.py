@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 
 from ...base.arrays import Float
-from .corners import Polyline, height_pieces, polyline
 from ..heights import HeightPiece
+from .corners import Polyline, height_pieces, polyline
 from .shape import SideShape
 
 RotationAxis = Literal["carriageway_axis", "inner_edge", "centreline"]
@@ -55,8 +55,7 @@ def planes(sides: Sequence[SideShape]) -> Planes:
 
     both = polyline(fitted, breaks, TOLERANCE)
     rises = {
-        side.sign: Polyline(both.stations, both.values[:, [n]] / _REACH, both.jumps)
-        for n, side in enumerate(sides, 1)
+        side.sign: Polyline(both.stations, both.values[:, [n]] / _REACH, both.jumps) for n, side in enumerate(sides, 1)
     }
     level = Polyline(both.stations, both.values[:, :1], both.jumps)
     if np.abs(level.values).max() < _SAME:
@@ -75,7 +74,7 @@ def _scaled(line: Polyline) -> Polyline:
 
 
 def _best_planes(sides: Sequence[SideShape], station: Float, stretch: int) -> Float:
-    """Return the height on the line (m) and each side's rise (N, 1 + sides) that fit the pavement best, least squares."""
+    """Return the height on the line (m) and each side's rise (N, 1 + sides) that fit the pavement best."""
     columns, values, weights = [], [], []
     for n, side in enumerate(sides):
         offset, height, width = side.paved_points(station, stretch, _SHARES)

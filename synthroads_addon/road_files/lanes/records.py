@@ -121,9 +121,7 @@ class FileSection:
         return found
 
     @staticmethod
-    def _edges(
-        lanes: Sequence[FileLane], sign: int, where: tuple[Float, Float, Float], turn: float
-    ) -> list[Float]:
+    def _edges(lanes: Sequence[FileLane], sign: int, where: tuple[Float, Float, Float], turn: float) -> list[Float]:
         station, inside, offset = where
         edges = [offset]
         for lane in lanes:
@@ -144,7 +142,7 @@ class ShapeProfile:
 
 @dataclass(frozen=True)
 class FileRoad:
-    """What an OpenDRIVE road says beside its plan.
+    """An OpenDRIVE road beside its plan.
 
     Attributes:
         element: the road.

@@ -19,7 +19,7 @@ from ..heights import HeightPiece
 from ..line import LineNames, RoadLine, exact_axis
 from ..opendrive import read_opendrive
 from ..read import choose_line
-from ..xml_text import child, children, number, read_xml
+from ..xml_text import child, children, local_name, number, read_xml
 from .carriageways import Pavements, Verge, pavements
 from .loss import Loss
 from .marks import line_markings
@@ -75,7 +75,9 @@ def whole_road(path: Path, scenario: RoadScenario, name: str | None = None) -> W
     up = _up(root)
     road = read_road(elements[line.name], line.name, line.length, up)
     if road.left_hand:
-        raise InputError(f"{path.name}: road {line.name!r}: rule", "LHT", "must be RHT: --only-axis takes its line alone")
+        raise InputError(
+            f"{path.name}: road {line.name!r}: rule", "LHT", "must be RHT: --only-axis takes its line alone"
+        )
     roads = [road, *_partner(lines, line, elements, road, up)]
     if len(roads) > 1:
         assume("%s: road %r runs along the same line: both are one road", path.name, roads[1].name)
@@ -92,9 +94,11 @@ def whole_road(path: Path, scenario: RoadScenario, name: str | None = None) -> W
         layouts = side_layouts(surface, with_median=len(roads) > 1)
         shapes += [SideShape(surface, layout, one.breaks()) for layout in layouts.values()]
         for layout in layouts.values():
-            for _, lane, why in layout.lost:
+            for _, _, why in layout.lost:
                 loss.leave_out("lanes", why, surface=True)
         loss.read["lane sections"] += len(one.sections)
+        if speeds := sum(local_name(item) == "speed" for item in one.element.iter()):
+            loss.leave_out("speed limits", "in a parameter set signs alone say them", speeds)
     found = pavements(shapes, _verge(scenario), lambda s: np.interp(s, *exact), loss)
     heights = None
     if found.heights is not None:
@@ -139,7 +143,10 @@ def _same_plan(first: RoadLine, second: RoadLine) -> bool:
     if len(first.pieces) != len(second.pieces):
         return False
     rows = [
-        [(p.station, p.length, p.x, p.y, p.heading, *(p.shape if isinstance(p.shape, tuple) else (0.0, 0.0))) for p in q]
+        [
+            (p.station, p.length, p.x, p.y, p.heading, *(p.shape if isinstance(p.shape, tuple) else (0.0, 0.0)))
+            for p in q
+        ]
         for q in (first.pieces, second.pieces)
     ]
     return bool(np.abs(np.array(rows[0]) - np.array(rows[1])).max() < _SAME_PLAN)

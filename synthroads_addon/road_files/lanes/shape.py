@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...base.arrays import Float
 from ...road.turnout_geometry import TURNOUT_STRIPS
+from .records import FileLane
 from .strips import SideLayout
 from .surface import Edge, FileSurface, LaneEdges
 
@@ -76,8 +78,8 @@ class SideShape:
         strip = _last(mine, layout.of_strip(number, "inner_edge_strip"), edge)
         rows.append((strip[0], inner) if layout.across.get(number) else strip)
         for slot in layout.slots:
-            lane = slot.lanes.get(number)
-            rows.append(_last(mine, [lane] if lane else [], rows[-1][0]))
+            there = slot.lanes.get(number)
+            rows.append(_last(mine, [] if there is None else [there], rows[-1][0]))
         for kind in OUTSIDE:
             rows.append(_last(mine, layout.of_strip(number, kind), rows[-1][0]))
         outer = np.stack([self.sign * row[0].offset for row in rows], axis=-1)
@@ -108,7 +110,7 @@ class SideShape:
         return np.stack(offsets, axis=-1), np.stack(heights, axis=-1), np.stack(weights, axis=-1)
 
 
-def _last(mine: dict[int, LaneEdges], lanes: list, before: Edge) -> tuple[Edge, Edge]:  # type: ignore[type-arg]
+def _last(mine: dict[int, LaneEdges], lanes: Sequence[FileLane], before: Edge) -> tuple[Edge, Edge]:
     """Return the outer edge of the last of some lanes, and the inner edge of the first; without any the one before."""
     if not lanes:
         return before, before

@@ -105,7 +105,9 @@ def side_layouts(surface: FileSurface, with_median: bool = False) -> dict[int, S
         if len(layout.slots) > _MOST_LANES:
             side = "left" if layout.sign > 0 else "right"
             place = f"road {surface.road.name!r}: lanes on the {side}"
-            raise InputError(place, len(layout.slots), f"at most {_MOST_LANES} are possible: --only-axis takes its line")
+            raise InputError(
+                place, len(layout.slots), f"at most {_MOST_LANES} are possible: --only-axis takes its line"
+            )
     return layouts
 
 

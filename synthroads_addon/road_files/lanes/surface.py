@@ -38,7 +38,7 @@ class LaneEdges:
 
 @dataclass(frozen=True)
 class _Frame:
-    """The plane at stations (N,): cosine and sine of its tilt, cosine of the grade, crossfall of the sides that have any."""
+    """The plane at stations (N,): cosine and sine of its tilt, cosine of the grade, crossfall of sides with any."""
 
     station: Float
     cos: Float
@@ -92,7 +92,9 @@ class FileSurface:
                     flat_from = edges[0]
                 if flat_from is not None:  # level from the inner border on, as the standard's figures show
                     beyond = flat_from
-                    edges = [Edge(edge.offset, beyond.height + rise) for edge, rise in zip(edges, (low, high), strict=True)]
+                    edges = [
+                        Edge(edge.offset, beyond.height + rise) for edge, rise in zip(edges, (low, high), strict=True)
+                    ]
                 found[sign].append(LaneEdges(lane, *edges))
         return found
 
@@ -105,7 +107,9 @@ class FileSurface:
         tilt = np.cos(self.road.superelevation.at(station, inside))
         inner, outer = edges.inner.offset / tilt, edges.outer.offset / tilt
         t = inner + share * (outer - inner)
-        bow = self._shape(station, t) - (1.0 - share) * self._shape(station, inner) - share * self._shape(station, outer)
+        bow = (
+            self._shape(station, t) - (1.0 - share) * self._shape(station, inner) - share * self._shape(station, outer)
+        )
         return Edge(offset, height + bow)
 
     def _frame(self, station: Float, inside: Float) -> _Frame:

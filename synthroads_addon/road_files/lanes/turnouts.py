@@ -183,9 +183,7 @@ class _Reader:
         last = next(e for kind in ("turnout_edge_strip", "turnout_lane") if (e := self._edges(kind, station)))
         at, stretch = np.array([station]), self._stretch(station)
         rise = float(self.side.surface.rise(at, self.side.inside(at, stretch))[0])
-        low, high = (
-            float((edge.height - rise * edge.offset)[0]) for edge in (first.inner, last.outer)
-        )
+        low, high = (float((edge.height - rise * edge.offset)[0]) for edge in (first.inner, last.outer))
         width = abs(float((last.outer.offset - first.inner.offset)[0]))
         return low, (high - low) / width, self.side.sign * rise
 

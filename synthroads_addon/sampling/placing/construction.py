@@ -10,7 +10,7 @@ import numpy as np
 from ...base.arrays import Float
 from ...base.schema import round_value
 from ...road.guidelines import CONSTRUCTION_LANE_WIDTH
-from ...road.objects import RoadObject, Side, WidthPoint, width_kinks
+from ...road.objects import RoadObject, Side, SignedWidthPoint, width_kinks
 from ...road.section import Carriageway, LineMarking
 from ...road.things.beacon import ConstructionBeacon
 from ...road.things.temporary_barrier import TemporaryBarrier
@@ -142,7 +142,7 @@ def _line(side: Side, zone: Zone, film_thickness: float) -> LineMarking:
     """Return the yellow line marking along a zone's beacons."""
     distances = zone.distance(np.array(zone.stations), LINE_DISTANCE).tolist()
     places = zip(zone.stations, distances, strict=True)
-    points = [WidthPoint(station=round_value(station), width=round_value(width)) for station, width in places]
+    points = [SignedWidthPoint(station=round_value(station), width=round_value(width)) for station, width in places]
     return LineMarking(
         instance=1,
         carriageway=f"carriageway-{side}",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -234,7 +233,9 @@ def _describe(made: Element, name: str, item: RoadObject) -> None:
         values["rotation_deg"] = item.rotation_deg  # it turns something else than the object
     if isinstance(item, Asset):
         values["asset"] = values.pop("name")
-    shown = {key: value if isinstance(value, str | int | float) else compact_json(value) for key, value in values.items()}
+    shown = {
+        key: value if isinstance(value, str | int | float) else compact_json(value) for key, value in values.items()
+    }
     add_object_data(made, name, item.instance, object_type=type(item).__name__, **shown)
 
 

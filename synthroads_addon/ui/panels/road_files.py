@@ -116,7 +116,7 @@ class SYNTHROADS_OT_load_axis(RoadLoader, bpy.types.Operator):
             road.model_fields_set.discard("epsg")
             scenario = scenario.model_copy(update={"road": road})
         whole = has_whole_road(path)
-        parameters, report = RoadSource(scenario, **{"road" if whole else "axis": path}).read()
+        parameters, report = (RoadSource(scenario, road=path) if whole else RoadSource(scenario, axis=path)).read()
         text = f"Built {parameters.alignment.length:,.0f} m of road {'of' if whole else 'along'} {path.name}"
         lost = "; some of its surface was left out" if report["axis"].get("whole", {}).get("surface_lost") else ""
         return parameters, f"{text}: {axis_summary(report['axis'])}{lost}"

@@ -9,10 +9,10 @@ import numpy as np
 
 from synthroads_addon.base.remarks import collected_remarks
 from synthroads_addon.jobs.whole_road import road_from_file
-from synthroads_addon.road.differences import Difference, differences
 from synthroads_addon.road.geometry import RoadGeometry
 from synthroads_addon.road.parameters import RoadParameters
 from synthroads_addon.road.things.registry import THINGS
+from synthroads_addon.road_files.lanes.differences import Difference, differences
 from synthroads_addon.scenario.scenario import Scenario
 from synthroads_addon.twin.opendrive.writer import write_opendrive
 from tests.helpers.files.opendrive_reader import OpenDrive

@@ -43,7 +43,8 @@ def test_what_runs_along_the_road(tmp_path: Path, words: str, kind: str) -> None
     ("words", "kind"),
     [
         ('type="guide-post"', "Delineator"), ('type="pole" subtype="reflectorPost"', "Delineator"),
-        ('type="streetLamp"', "Pole"), ('type="pole"', "Pole"), ('type="obstacle" name="TrafficCone01"', "ConstructionBeacon"),
+        ('type="streetLamp"', "Pole"), ('type="pole"', "Pole"),
+        ('type="obstacle" name="TrafficCone01"', "ConstructionBeacon"),
         ('type="building" length="12" width="8" height="6"', "Building"), ('type="gantry" width="24"', "Gantry"),
         ('type="obstacle" name="manhole"', "Shaft"), ('type="obstacle" name="emergency phone"', "Cabinet"),
     ],

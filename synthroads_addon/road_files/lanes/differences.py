@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .geometry import profile_of
-from .objects import RoadObject, width_at
-from .parameters import AlignmentObject, RoadParameters
-from .section import Carriageway, CrossfallPoint
+from ...road.geometry import profile_of
+from ...road.objects import RoadObject, width_at
+from ...road.parameters import AlignmentObject, RoadParameters
+from ...road.section import Carriageway, CrossfallPoint
 
 TOLERANCE = 1e-3
 """Lengths (m), percents and degrees that differ by less are the same."""
@@ -49,7 +49,7 @@ def differences(old: RoadParameters, new: RoadParameters, types: Collection[str]
             continue
         if name not in before or name not in after:
             shown = [type(items[name]).__name__ if name in items else None for items in (before, after)]
-            found.append(Difference(f"objects.{name}", *shown))
+            found.append(Difference(f"objects.{name}", shown[0], shown[1]))
             continue
         found += _of_object(f"objects.{name}", before[name], after[name], new.alignment.length)
     return found
@@ -99,19 +99,28 @@ def _of_object(path: str, old: RoadObject, new: RoadObject, length: float) -> It
                     yield Difference(f"{path}.lanes.{number}", one and one.kind, other and other.kind)
                 else:
                     yield from _apart(
-                        f"{path}.lanes.{number}.width", station, width_at(one.width, station), width_at(other.width, station)
+                        f"{path}.lanes.{number}.width",
+                        station,
+                        width_at(one.width, station),
+                        width_at(other.width, station),
                     )
         elif _is_width(old, name, a) or _is_width(old, name, b):
             yield from _apart(f"{path}.{name}", station, width_at(a, station), width_at(b, station))
         elif isinstance(a, tuple) and a and isinstance(a[0], CrossfallPoint):
-            falls = [np.interp(station, *zip(*((p.station, p.crossfall_percent) for p in v), strict=True)) for v in (a, b)]
-            yield from _apart(f"{path}.{name}", station, *falls)
+            yield from _apart(f"{path}.{name}", station, _crossfall(a, station), _crossfall(b, station))
         elif not _same(a, b, turns=name.endswith("_deg")):
             yield Difference(f"{path}.{name}", _shown(a), _shown(b))
 
 
+def _crossfall(points: tuple[CrossfallPoint, ...], station: np.ndarray) -> np.ndarray:
+    """Return the crossfall (N,), %, at stations (N,), m."""
+    return np.interp(station, [p.station for p in points], [p.crossfall_percent for p in points])
+
+
 def _is_width(item: RoadObject, name: str, value: Any) -> bool:
-    by_station = isinstance(value, tuple) and bool(value) and hasattr(value[0], "width") and hasattr(value[0], "station")
+    by_station = (
+        isinstance(value, tuple) and bool(value) and hasattr(value[0], "width") and hasattr(value[0], "station")
+    )
     return by_station or (isinstance(item, Carriageway) and isinstance(value, float) and name != "verge_slope_percent")
 
 
