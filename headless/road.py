@@ -31,6 +31,8 @@ from synthroads_addon.scenario.scenario import load_scenario, scenario_names
 
 PARAMETERS, CENTRELINE, REPORT = "parameters.json", "centerline.geojson", "road.json"
 _FIELDS = {"seed": "seed"}
+_LARGEST = 5.0
+"""Largest distance from a kink that a rounding may be asked for, m."""
 _SURFACE = ("lanes", "lateral profile")
 
 
@@ -40,6 +42,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--list", action="store_true", help="list the file's roads or alignments, and write nothing")
     parser.add_argument("--output", type=Path, metavar="DIR", help="folder for the files (needed without --list)")
     add_axis_name_argument(parser)
+    text = "round kinks between elements by two clothoids at most M metres off (0.05); else they are refused"
+    parser.add_argument("--round-kinks", type=_distance, nargs="?", const=0.05, metavar="M", help=text)
     parser.add_argument("--only-axis", action="store_true", help="the axis is all that is wanted: no exit code 3")
     names = ", ".join(scenario_names())
     text = f"what the file doesn't say: {names}, or a .json file (%(default)s)"
@@ -66,7 +70,13 @@ def run(arguments: argparse.Namespace) -> Outcome:
         from synthroads_addon.road.geometry import RoadGeometry
         from synthroads_addon.road.tessellation import sample_stations
 
-        source = RoadSource(scenario, axis=arguments.file, axis_name=arguments.axis_name, pictures=arguments.output)
+        source = RoadSource(
+            scenario,
+            axis=arguments.file,
+            axis_name=arguments.axis_name,
+            pictures=arguments.output,
+            round_kinks=arguments.round_kinks,
+        )
         parameters, told = source.read()
         report = told["axis"]
         road = RoadGeometry(parameters)
@@ -79,6 +89,17 @@ def run(arguments: argparse.Namespace) -> Outcome:
     lines = [axis_summary(report), *(f"left out: {text}" for text in report.get("left_out", []))]
     text = "\n".join([*lines, f"written to {arguments.output}"])
     return 3 if lost and not arguments.only_axis else 0, report, text
+
+
+def _distance(text: str) -> float:
+    """Return a distance that kinks may be rounded by, m; raise argparse's error for any other."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0.0 < value <= _LARGEST:
+        raise argparse.ArgumentTypeError(f"{text!r}: a distance above 0 and up to {_LARGEST:g} m is needed")
+    return value
 
 
 def _table(rows: list[dict[str, Any]]) -> str:

@@ -36,7 +36,7 @@ cuts and fills."""
 
 
 def axis_from_file(
-    path: Path, scenario: RoadScenario, seed: int, name: str | None = None
+    path: Path, scenario: RoadScenario, seed: int, name: str | None = None, round_kinks: float | None = None
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     """Return the axis of a file in local coordinates, the scenario that follows from it, and a report.
 
@@ -49,6 +49,7 @@ def axis_from_file(
         scenario: limits of the road.
         seed: of what is drawn.
         name: of the road or alignment in the file; None takes the longest.
+        round_kinks: distance (m) from kinks of a file's elements that roundings may keep; None refuses kinks.
 
     Raises:
         AxisRefusedError: no road follows the points.
@@ -61,7 +62,7 @@ def axis_from_file(
         fitted, limits, report = fitted_axis(path, scenario) if kind is None else _line_of_degrees(path, scenario, name)
         _tell_overlap(path, fitted, limits.half_width)
         return fitted, limits, report
-    axis, limits, report = road_axis(path, scenario, name)
+    axis, limits, report = road_axis(path, scenario, name, round_kinks)
     _tell_overlap(path, axis, limits.half_width)
     if report["heights"] is None:
         vertical, source = _heights(axis, limits, seed)

@@ -28,7 +28,7 @@ _NORTHERN, _SOUTHERN = 32600, 32700
 
 
 def road_axis(
-    path: Path, scenario: RoadScenario, name: str | None = None
+    path: Path, scenario: RoadScenario, name: str | None = None, round_kinks: float | None = None
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     """Return the axis of a road or alignment of a file, the scenario for it, and a report.
 
@@ -36,6 +36,7 @@ def road_axis(
         path: OpenDRIVE, LandXML or IFC, told by its content.
         scenario: whose coordinate system the road is to have, if it names one; else the file's is taken.
         name: of the line; None: the longest that belongs to no junction.
+        round_kinks: distance (m) from kinks that roundings may keep; None refuses them (`exact_axis`).
 
     Returns:
         the alignment in local coordinates; if the file has no heights its only vertical point is at 0 m, and the
@@ -50,7 +51,10 @@ def road_axis(
     line = choose_line(lines, name, path.name)
     if name is None and len(lines) > 1:
         assume("%s has %d roads: the longest, %r, is taken", path.name, len(lines), line.name)
-    axis = exact_axis(line)
+    axis = exact_axis(line, round_kinks)
+    for kink in axis.roundings:
+        text = "%s: the kink of %.4f rad at station %.3f m is rounded over %.2f m, %.1f mm off it"
+        warn(text, path.name, kink.angle, kink.station, kink.length, 1000.0 * kink.deviation)
     system, axis, placing = _placed(path, line, axis, scenario)
     middle = axis.alignment.position(0.5 * axis.alignment.length)
     height = axis.heights.points[0].elevation if axis.heights else 0.0
@@ -102,6 +106,16 @@ def report_of(path: Path, line: RoadLine, axis: ExactAxis) -> dict[str, Any]:
         "approximated": [
             {"kind": kind, "station": round(station, 3), "elements": count, "deviation": round(worst, 6)}
             for kind, station, count, worst in axis.approximated
+        ],
+        "rounded": [
+            {
+                "station": round(kink.station, 3),
+                "angle": round(kink.angle, 6),
+                "length": round(kink.length, 3),
+                "radius": round(1.0 / abs(kink.curvature), 3),
+                "deviation": round(kink.deviation, 6),
+            }
+            for kink in axis.roundings
         ],
         "left_out": list(line.left_out),
     }

@@ -18,6 +18,7 @@ from ..road.parameters import LONGEST_ROAD, AlignmentObject, HorizontalElement, 
 from ..road.profile import IntersectionPoint
 from .curves import Curve, as_elements
 from .heights import HeightPiece, Heights, as_parabolas
+from .kinks import Rounding, rounded
 
 GAP, KINK = 1e-3, 1e-4
 """Gaps (m) and changes of direction (rad) between elements up to which they are joined without a word."""
@@ -126,6 +127,7 @@ class ExactAxis:
         gap, gap_station: largest distance (m) between a piece's end and the next one's start, and where.
         kink, kink_station: largest change of direction there (rad), and where.
         drift, drift_station: largest distance (m) of the chained elements from the starts that the file gives them.
+        roundings: kinks that two clothoids stand for.
     """
 
     alignment: Alignment
@@ -137,6 +139,7 @@ class ExactAxis:
     kink_station: float
     drift: float
     drift_station: float
+    roundings: tuple[Rounding, ...] = ()
 
 
 @dataclass
@@ -146,12 +149,19 @@ class _Chain:
     approximated: list[tuple[str, float, int, float]] = field(default_factory=list)
 
 
-def exact_axis(line: RoadLine) -> ExactAxis:
+def exact_axis(line: RoadLine, round_kinks: float | None = None) -> ExactAxis:
     """Return a line's alignment, chained from its first element's start, and its heights.
+
+    Args:
+        line: of a file.
+        round_kinks: largest distance (m) from a kink that two clothoids may keep in its place; None refuses kinks.
 
     Raises:
         InputError: elements don't join (`GAP`, `KINK`), or there are none.
     """
+    roundings: list[Rounding] = []
+    if round_kinks is not None and line.pieces:
+        line, roundings = rounded(line, _joints(line.pieces)[1], KINK, round_kinks, SHARPEST)
     chain = _Chain()
     run = 0.0
     for piece in line.pieces:
@@ -177,6 +187,7 @@ def exact_axis(line: RoadLine) -> ExactAxis:
         as_parabolas(_moved(line, chain.starts, run)) if line.heights else None,
         tuple(chain.approximated),
         *(gaps[worst_gap], at[worst_gap], kinks[worst_kink], at[worst_kink], drift[worst_drift], at[worst_drift]),
+        roundings=tuple(roundings),
     )
     _refuse_broken(line, axis)
     return axis
@@ -252,6 +263,7 @@ def _refuse_broken(line: RoadLine, axis: ExactAxis) -> None:
         raise InputError(f"{name}: gap, m", round(axis.gap, 6), allowed)
     if axis.kink > KINK:
         allowed = f"elements must join within {KINK:g} rad, those at station {axis.kink_station:.3f} m are a kink"
+        allowed += ": --round-kinks rounds those that two clothoids can follow"
         raise InputError(f"{name}: change of direction, rad", round(axis.kink, 6), allowed)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from synthroads_addon.base.remarks import collect_remarks
+from synthroads_addon.base.remarks import collected_remarks
 from synthroads_addon.fitting.fit import axis_of_points, fit_axis
 from synthroads_addon.fitting.follow import followed, heights_followed
 from synthroads_addon.fitting.pieces import cut_into_pieces, noise_of, unrolled
@@ -38,7 +38,7 @@ def test_a_kink_becomes_a_short_arc_within_the_tolerance() -> None:
     points = np.array([[2.0 * n, 0.0] for n in range(40)])
     turned = points[-1] + np.array([[2.0 * n * np.cos(0.1), 2.0 * n * np.sin(0.1)] for n in range(1, 40)])
     found = fit_axis(np.vstack([points, turned]), follow=True)
-    assert found.horizontal.worst < 0.01
+    assert found.horizontal.worst < 0.025  # half of the tolerance
     assert len(found.alignment.elements) <= 4
     assert max(abs(e.curvature_start) for e in found.alignment.elements) <= 0.1
 
@@ -77,7 +77,7 @@ def test_pieces_are_as_few_as_the_polynomials() -> None:
 def test_a_road_that_is_off_its_points_is_told() -> None:
     _, points = sampled(EGG, 1.0)
     noisy = np.column_stack([points + np.random.default_rng(6).normal(0.0, 0.12, points.shape), np.zeros(len(points))])
-    with collect_remarks() as remarks:
+    with collected_remarks() as remarks:
         axis_of_points("track.csv", noisy + [500000.0, 5700000.0, 0.0], None, RoadScenario())
     assert any("is off its points" in str(remark) for remark in remarks)
 
