@@ -60,7 +60,7 @@ def road_axis(
     height = axis.heights.points[0].elevation if axis.heights else 0.0
     origin = np.round([*middle, height])
     check_heights(path.name, np.array([[*middle, height]]))
-    alignment = _checked_object(path, axis, origin)
+    alignment = _checked_object(path, axis, origin, line)
     update: dict[str, Any] = {"length": alignment.length, "map_origin": tuple(origin.tolist())}
     if system is not None and system.epsg:
         update |= {"epsg": system.epsg, "height_epsg": scenario.height_epsg or system.height_epsg}
@@ -68,10 +68,10 @@ def road_axis(
     return alignment, road, report_of(path, line, axis) | {"placed": placing}
 
 
-def _checked_object(path: Path, axis: ExactAxis, origin: Float) -> AlignmentObject:
+def _checked_object(path: Path, axis: ExactAxis, origin: Float, line: RoadLine) -> AlignmentObject:
     """Return an axis as the alignment of a parameter set; raise `InputError` for one beyond the limits of roads."""
     try:
-        return alignment_object(axis, origin)
+        return alignment_object(axis, origin, line)
     except ValidationError as error:
         fault = error.errors(include_url=False)[0]
         field = ".".join(str(part) for part in fault["loc"]) or "axis"

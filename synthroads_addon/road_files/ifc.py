@@ -19,7 +19,8 @@ from ..base.maps.crs import MapSystem
 from ..base.remarks import warn
 from .curves import Curve, transition
 from .heights import HeightPiece, circle
-from .line import SHORTEST, LineNames, PlanPiece, RoadLine
+from .line import SHORTEST, Equation, LineNames, PlanPiece, RoadLine
+from .xml_text import finite
 
 _SCHEMA = re.compile(rb"FILE_SCHEMA\s*\(\s*\(\s*'([^']*)'\s*\)\s*\)", re.IGNORECASE)
 _READ_AS = "IFC4X3_ADD2"
@@ -180,14 +181,49 @@ def _alignment(alignment: Any, name: str, unit: float, angle: float) -> RoadLine
     left_out = [f"{len(profiles) - 1} more profiles"] if len(profiles) > 1 else []
     left_out += ["the cant of a railway"] if cants else []
     start = getattr(plans[0], "StartDistAlong", None)
+    first, equations = _stationing(layouts, unit)
+    if first is None:
+        first = 0.0 if start is None else float(start) * unit
     return RoadLine(
         name=name,
         source="IFC alignment",
         pieces=tuple(pieces),
         heights=tuple(heights),
-        first_station=0.0 if start is None else float(start) * unit,
+        first_station=first,
+        equations=equations,
         left_out=tuple(left_out),
     )
+
+
+def _stationing(nested: list[Any], unit: float) -> tuple[float | None, tuple[Equation, ...]]:
+    """Return the count at the begin (m; None without referents) and the station equations that referents give."""
+    rows = []
+    for referent in nested:
+        if not referent.is_a("IfcReferent"):
+            continue
+        count, back = (_stated(referent, name) for name in ("Station", "IncomingStation"))
+        location = getattr(getattr(referent.ObjectPlacement, "RelativePlacement", None), "Location", None)
+        along = getattr(getattr(location, "DistanceAlong", None), "wrappedValue", None)
+        if count is not None and along is not None:
+            rows.append((float(along) * unit, count * unit, None if back is None else back * unit))
+    if not rows:
+        return None, ()
+    rows.sort(key=lambda row: row[0])
+    station, count, back = rows[0]
+    equations = tuple(Equation(at, before, there) for at, there, before in rows if before is not None)
+    return (count if back is None else back) - station, equations
+
+
+def _stated(referent: Any, name: str) -> float | None:
+    """Return a number of a referent's Pset_Stationing; None without it."""
+    for relation in getattr(referent, "IsDefinedBy", ()) or ():
+        definition = getattr(relation, "RelatingPropertyDefinition", None)
+        if getattr(definition, "Name", None) != "Pset_Stationing":
+            continue
+        for each in getattr(definition, "HasProperties", ()) or ():
+            if each.Name == name and each.is_a("IfcPropertySingleValue") and each.NominalValue is not None:
+                return finite(f"Pset_Stationing {name}", each.NominalValue.wrappedValue)
+    return None
 
 
 def _plan_piece(row: Any, run: float, unit: float, angle: float) -> PlanPiece | None:

@@ -14,7 +14,7 @@ from ..base.arrays import Float
 from ..base.errors import InputError
 from ..base.maps.crs import MapSystem
 from ..road.alignment import Alignment, Element
-from ..road.parameters import LONGEST_ROAD, AlignmentObject, HorizontalElement, VerticalPoint
+from ..road.parameters import LONGEST_ROAD, AlignmentObject, HorizontalElement, StationEquation, VerticalPoint
 from ..road.profile import IntersectionPoint
 from .curves import Curve, as_elements
 from .heights import HeightPiece, Heights, as_parabolas
@@ -267,8 +267,15 @@ def _refuse_broken(line: RoadLine, axis: ExactAxis) -> None:
         raise InputError(f"{name}: change of direction, rad", round(axis.kink, 6), allowed)
 
 
-def alignment_object(axis: ExactAxis, origin: Float) -> AlignmentObject:
-    """Return an axis as the alignment of a parameter set about an origin (3,), m, with the instance number 1."""
+def alignment_object(axis: ExactAxis, origin: Float, line: RoadLine | None = None) -> AlignmentObject:
+    """Return an axis as the alignment of a parameter set about an origin (3,), m, with the instance number 1.
+
+    Args:
+        axis: what the line became.
+        origin: m.
+        line: whose count of stations it has; None: none.
+    """
+    equations = [] if line is None else [e for e in line.equations if 0.0 <= e.station <= axis.alignment.length]
     alignment = axis.alignment
     elements = tuple(
         HorizontalElement.between(element.length, element.curvature_start, element.curvature_end)
@@ -288,4 +295,6 @@ def alignment_object(axis: ExactAxis, origin: Float) -> AlignmentObject:
             VerticalPoint(station=point.station, elevation=point.elevation - float(origin[2]), radius=point.radius)
             for point in points
         ),
+        first_station=None if line is None else line.first_station,
+        equations=tuple(StationEquation(station=e.station, ahead=e.ahead) for e in equations),
     )
