@@ -30,6 +30,7 @@ from synthroads_addon.base.text.table import text_table
 from synthroads_addon.scenario.scenario import load_scenario, scenario_names
 
 PARAMETERS, CENTRELINE, REPORT = "parameters.json", "centerline.geojson", "road.json"
+PICTURE = "deviation.png"
 _FIELDS = {"seed": "seed"}
 _LARGEST = 5.0
 """Largest distance from a kink that a rounding may be asked for, m."""
@@ -63,7 +64,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
     if arguments.output is None:
         raise InputError("--output", None, "is needed: a folder for the files (or --list)")
     scenario = load_scenario(arguments.scenario, all_changes(arguments, _FIELDS))
-    with output_folder(arguments.output, [PARAMETERS, CENTRELINE, REPORT], arguments.overwrite) as folder:
+    with output_folder(arguments.output, [PARAMETERS, CENTRELINE, REPORT, PICTURE], arguments.overwrite) as folder:
         from synthroads_addon.jobs.axis_source import axis_summary
         from synthroads_addon.jobs.generate import RoadSource
         from synthroads_addon.road.axes.centerline import centerline_geojson
@@ -76,6 +77,7 @@ def run(arguments: argparse.Namespace) -> Outcome:
             axis_name=arguments.axis_name,
             pictures=arguments.output,
             round_kinks=arguments.round_kinks,
+            deviations=folder / PICTURE,
         )
         parameters, told = source.read()
         report = told["axis"]

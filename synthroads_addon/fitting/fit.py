@@ -6,7 +6,7 @@ another alignment, give its elements back. Long axes are fitted in overlapping w
 curvature at which the one before was left, so time and memory stay proportional to the length.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
@@ -149,7 +149,9 @@ class AxisRefusedError(InputError):
         return type(self)(self.name, self.fit, picture)
 
 
-def fitted_axis(path: Path, scenario: RoadScenario) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
+def fitted_axis(
+    path: Path, scenario: RoadScenario, seen: Callable[[AxisFit], None] | None = None
+) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     """Return the alignment fitted to the points of a file (CSV, GeoJSON), the scenario for it, and a report.
 
     Returns:
@@ -163,11 +165,15 @@ def fitted_axis(path: Path, scenario: RoadScenario) -> tuple[AlignmentObject, Ro
     """
     place = Placement.of(MapSystem.of(scenario.epsg, scenario.height_epsg))
     points, declared = read_declared_axis(path, place)
-    return axis_of_points(path.name, points, declared, scenario)
+    return axis_of_points(path.name, points, declared, scenario, seen)
 
 
 def axis_of_points(
-    name: str, points: Float, declared: MapSystem | None, scenario: RoadScenario
+    name: str,
+    points: Float,
+    declared: MapSystem | None,
+    scenario: RoadScenario,
+    seen: Callable[[AxisFit], None] | None = None,
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     """Return the alignment fitted to points (N, 3) of the scenario's coordinate system, m, as `fitted_axis` does.
 
@@ -176,6 +182,7 @@ def axis_of_points(
         points: in their order along the road.
         declared: system that the file names, whose heights count where the scenario's has none.
         scenario: limits of the road.
+        seen: gets the fit, to draw it.
     """
     system = MapSystem.of(scenario.epsg, scenario.height_epsg)
     heights = scenario.height_epsg
@@ -185,6 +192,8 @@ def axis_of_points(
     fit = fit_axis(points - origin, follow=True)
     fit.check(name)
     _tell_misfit(name, fit)
+    if seen:
+        seen(fit)
     alignment = alignment_object(fit)
     road = scenario.model_copy(
         update={"length": alignment.length, "map_origin": tuple(origin.tolist()), "height_epsg": heights}

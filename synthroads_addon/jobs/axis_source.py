@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +13,14 @@ from ..base.errors import InputError
 from ..base.maps.crs import LONGITUDE_LATITUDE, MapSystem
 from ..base.maps.places import Placement, bring
 from ..base.random_streams import stream
-from ..base.remarks import assume, warn
-from ..fitting.fit import axis_of_points, fit_heights, fitted_axis
+from ..base.remarks import assume, collected_remarks, warn
+from ..fitting.fit import AxisFit, axis_of_points, fit_heights, fitted_axis
+from ..fitting.plot import axis_picture, deviation_picture
 from ..road.alignment import clip_offset, left_vectors
 from ..road.geometry import alignment_of
 from ..road.parameters import AlignmentObject
 from ..road.terrain import road_elevation_model
-from ..road_files.axis import road_axis, utm_zone
+from ..road_files.axis import line_deviation, road_axis, utm_zone
 from ..road_files.points import read_point_lines
 from ..road_files.read import OF_POINTS, READERS, format_of, named_line, read_lines
 from ..sampling.alignment import sample_profile
@@ -36,7 +38,12 @@ cuts and fills."""
 
 
 def axis_from_file(
-    path: Path, scenario: RoadScenario, seed: int, name: str | None = None, round_kinks: float | None = None
+    path: Path,
+    scenario: RoadScenario,
+    seed: int,
+    name: str | None = None,
+    round_kinks: float | None = None,
+    picture: Path | None = None,
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     """Return the axis of a file in local coordinates, the scenario that follows from it, and a report.
 
@@ -50,6 +57,7 @@ def axis_from_file(
         seed: of what is drawn.
         name: of the road or alignment in the file; None takes the longest.
         round_kinks: distance (m) from kinks of a file's elements that roundings may keep; None refuses kinks.
+        picture: file for a picture of how far the file's line or points are from the axis; none is drawn if None.
 
     Raises:
         AxisRefusedError: no road follows the points.
@@ -59,10 +67,19 @@ def axis_from_file(
     if kind not in READERS:
         if kind is None and name is not None:
             raise InputError("--axis-name", name, "is for files of several roads or lines: this one has one of points")
-        fitted, limits, report = fitted_axis(path, scenario) if kind is None else _line_of_degrees(path, scenario, name)
+        fits: list[AxisFit] = []
+        if kind is None:
+            fitted, limits, report = fitted_axis(path, scenario, fits.append)
+        else:
+            fitted, limits, report = _line_of_degrees(path, scenario, name, fits.append)
+        if picture:
+            axis_picture(fits[0], path.name).save(picture, "PNG")
         _tell_overlap(path, fitted, limits.half_width)
         return fitted, limits, report
     axis, limits, report = road_axis(path, scenario, name, round_kinks)
+    if picture:
+        with collected_remarks():  # they were made a line above
+            deviation_picture(path.name, *line_deviation(path, name, round_kinks)).save(picture, "PNG")
     _tell_overlap(path, axis, limits.half_width)
     if report["heights"] is None:
         vertical, source = _heights(axis, limits, seed)
@@ -80,7 +97,7 @@ def axis_from_file(
 
 
 def _line_of_degrees(
-    path: Path, scenario: RoadScenario, name: str | None
+    path: Path, scenario: RoadScenario, name: str | None, seen: Callable[[AxisFit], None]
 ) -> tuple[AlignmentObject, RoadScenario, dict[str, Any]]:
     """Return the axis fitted to a line of KML or GPX: the one of a name, or the longest; see `axis_from_file`.
 
@@ -103,7 +120,7 @@ def _line_of_degrees(
         assume("%s has no heights: they are 0 m", path.name)
     place = Placement.of(MapSystem.of(scenario.epsg, scenario.height_epsg))
     points = bring(path.name, line.points, degrees, place)
-    axis, limits, report = axis_of_points(path.name, points, None, scenario)
+    axis, limits, report = axis_of_points(path.name, points, None, scenario, seen)
     return axis, limits, report | {"name": line.name}
 
 

@@ -60,6 +60,7 @@ class RoadSource:
     Attributes:
         pictures: folder for the picture of an axis that no road follows; none is drawn if None.
         round_kinks: distance (m) from an axis' kinks that roundings may keep; None refuses kinks.
+        deviations: file for the picture of how far an axis' file is from it; none is drawn if None.
     """
 
     scenario: Scenario
@@ -68,6 +69,7 @@ class RoadSource:
     axis_name: str | None = None
     pictures: Path | None = None
     round_kinks: float | None = None
+    deviations: Path | None = None
 
     def read(self) -> tuple[RoadParameters, dict[str, Any]]:
         """Return the road's parameters, and a report of the fit to a measured axis (empty without an axis)."""
@@ -76,7 +78,7 @@ class RoadSource:
             return read_parameters(self.parameters), {}
         if self.axis:
             with draw_refused_fit(self.pictures):
-                given = self.axis, scenario.road, scenario.seed, self.axis_name, self.round_kinks
+                given = self.axis, scenario.road, scenario.seed, self.axis_name, self.round_kinks, self.deviations
                 axis, limits, report = axis_from_file(*given)
             return sample_road(limits, scenario.seed, scenario.title, axis), {"axis": report}
         return sample_road(scenario.road, scenario.seed, scenario.title), {}

@@ -17,8 +17,9 @@ from ..base.maps.places import check_heights
 from ..base.remarks import assume, warn
 from ..road.alignment import Alignment
 from ..road.parameters import AlignmentObject
+from ..road.profile import Profile
 from ..scenario.road import RoadScenario
-from .line import ExactAxis, RoadLine, alignment_object, exact_axis
+from .line import ExactAxis, RoadLine, alignment_object, exact_axis, heights_at, sampled
 from .read import choose_line, read_lines
 
 _ARM = 50.0
@@ -66,6 +67,26 @@ def road_axis(
         update |= {"epsg": system.epsg, "height_epsg": scenario.height_epsg or system.height_epsg}
     road = scenario.model_copy(update=update)
     return alignment, road, report_of(path, line, axis) | {"placed": placing}
+
+
+def line_deviation(
+    path: Path, name: str | None = None, round_kinks: float | None = None
+) -> tuple[float, Float, Float, Float | None]:
+    """Return how far a file's line is from the axis that `road_axis` takes from it.
+
+    Returns:
+        the axis' length, and of places of the line at most a metre apart the stations, the distances to the left of
+        the axis and the heights above it (N,), m; None for the heights where the file has none.
+    """
+    line = choose_line(read_lines(path), name, path.name)
+    axis = exact_axis(line, round_kinks)
+    places, given = sampled(line)
+    station, across = axis.alignment.project(places)
+    station = np.clip(station, 0.0, axis.alignment.length)
+    if axis.heights is None:
+        return axis.alignment.length, station, across, None
+    profile = Profile(axis.heights.points)
+    return axis.alignment.length, station, across, heights_at(line, given) - profile.elevation(station)
 
 
 def _checked_object(path: Path, axis: ExactAxis, origin: Float, line: RoadLine) -> AlignmentObject:

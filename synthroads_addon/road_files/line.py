@@ -229,6 +229,34 @@ def end_pose(piece: PlanPiece) -> tuple[float, float, float]:
     return float(position[0]), float(position[1]), float(heading)
 
 
+def sampled(line: RoadLine) -> tuple[Float, Float]:
+    """Return places (N, 2) along a line's pieces as the file has them, a metre or less apart, and stations (N,), m."""
+    places, stations = [], []
+    for piece in line.pieces:
+        long = piece.shape.length if isinstance(piece.shape, Curve) else piece.length
+        along = np.linspace(0.0, long, max(2, min(_SAMPLES, math.ceil(long) + 1)))
+        if isinstance(piece.shape, Curve):
+            inner = piece.shape.positions(along) @ np.array([1.0, 1j]) * np.exp(1j * piece.heading)
+            places.append(np.column_stack([inner.real, inner.imag]) + [piece.x, piece.y])
+        else:
+            alone = Alignment([Element(piece.length, *piece.shape)], piece.x, piece.y, piece.heading)
+            places.append(alone.position(along))
+        stations.append(piece.station + along * (piece.length / long))
+    return np.vstack(places), np.concatenate(stations)
+
+
+def heights_at(line: RoadLine, station: Float) -> Float:
+    """Return the file's heights (N,), m, at stations (N,) of a line with heights; end grades go on beyond its ends."""
+    starts = np.array([piece.start for piece in line.heights])
+    owner = np.clip(np.searchsorted(starts, station, "right") - 1, 0, len(starts) - 1)
+    rows = np.array([(h.start, h.end, h.elevation, h.grade, h.square, h.cube) for h in line.heights])[owner]
+    first, last, level, grade, square, cube = rows.T
+    u = np.clip(station, first, last) - first
+    beyond = station - first - u
+    there = level + u * (grade + u * (square + u * cube))
+    return np.asarray(there + beyond * (grade + u * (2.0 * square + 3.0 * u * cube)))
+
+
 def _drift(alignment: Alignment, pieces: Sequence[PlanPiece], starts: Sequence[float]) -> list[float]:
     """Return how far (m) the chained elements are from the start of each piece."""
     given = np.array([(piece.x, piece.y) for piece in pieces])
