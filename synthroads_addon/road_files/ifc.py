@@ -30,6 +30,10 @@ _KINDS = {
 }  # fmt: skip
 """Kinds of transition curves by IFC's names for them."""
 _LARGEST = 512 << 20
+_LONGEST = 200
+"""Letters of the library's own words in an error."""
+_DAMAGES = (ArithmeticError, AttributeError, LookupError, RecursionError, RuntimeError, TypeError, ValueError)
+"""Errors of the library, and of attributes that are missing or of another kind, in damaged files."""
 
 
 def read_ifc(path: Path) -> list[RoadLine]:
@@ -39,6 +43,20 @@ def read_ifc(path: Path) -> list[RoadLine]:
         MissingFileError, InputError: it can't be read, `ifcopenshell` isn't installed, or a segment isn't understood.
     """
     model = _open(path)
+    try:
+        return _lines(path, model)
+    except _DAMAGES as error:
+        raise InputError(path.name, None, f"a whole IFC file is needed ({_first_line(error)})") from None
+
+
+def _first_line(error: Exception) -> str:
+    """Return the first line of an error, shortened, its letters printable."""
+    said = next(iter(str(error).splitlines()), type(error).__name__)[:_LONGEST]
+    return "".join(letter if letter.isprintable() else "?" for letter in said)
+
+
+def _lines(path: Path, model: Any) -> list[RoadLine]:
+    """Return the alignments of a model, those that can't be used with their fault."""
     unit, angle = _units(model)
     system, place = _map(path, model, unit)
     names, lines = LineNames(), list[RoadLine]()
@@ -78,7 +96,7 @@ def _open(path: Path) -> Any:
             copy.write_bytes(data)
             return ifcopenshell.open(str(copy))
     except (RuntimeError, OSError, ValueError, ifcopenshell.Error) as error:
-        raise InputError(path.name, None, f"a readable IFC file is needed ({str(error).splitlines()[0]})") from None
+        raise InputError(path.name, None, f"a readable IFC file is needed ({_first_line(error)})") from None
 
 
 def _units(model: Any) -> tuple[float, float]:
