@@ -6,6 +6,7 @@ the grade) is linear on each element; it may jump from one element to the next. 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -201,7 +202,7 @@ def joined(pieces: Sequence[Piece], station: Float, order: int) -> Model:
     """Return the model of pieces, with short elements between those that meet at an angle (order 2)."""
     knots, kinds = [float(station[0])], [_kind(pieces[0], order)]
     smooth: list[bool] = []
-    for before, after in zip(pieces[:-1], pieces[1:], strict=True):
+    for before, after in itertools.pairwise(pieces):
         low, high = float(station[before.last]), float(station[after.first])
         wide = high - low
         least = 0.5 * (float(station[before.first]) + low) if before.first < before.last else low
@@ -320,17 +321,13 @@ def _richer(model: Model, element: int, place: float) -> Iterator[Model]:
             smooth[knot] = False
             yield replace(model, smooth=smooth)
     for near in range(max(0, element - 1), min(model.size, element + 2)):
-        for kind in (EQUAL, FREE):
-            if kind < model.kinds[near]:
-                yield _of_kind(model, near, kind)
-    for knot in (element, element + 1):  # put in at a border
+        yield from (_of_kind(model, near, kind) for kind in (EQUAL, FREE) if kind < model.kinds[near])
+    for knot in (element, element + 1):
         if 0 < knot < model.size:
-            for kind in (ZERO, EQUAL, FREE) if model.order == 2 else (EQUAL, FREE):
-                yield _put_in(model, knot, kind)
-    low, high = model.knots[element], model.knots[element + 1]
-    if low + _SHORT < place < high - _SHORT:
-        for smooth_there in (False, True):
-            yield _split(model, element, place, smooth_there)
+            kinds = (ZERO, EQUAL, FREE) if model.order == 2 else (EQUAL, FREE)
+            yield from (_put_in(model, knot, kind) for kind in kinds)
+    if model.knots[element] + _SHORT < place < model.knots[element + 1] - _SHORT:
+        yield from (_split(model, element, place, smooth_there) for smooth_there in (False, True))
 
 
 def _put_in(model: Model, knot: int, kind: int) -> Model:

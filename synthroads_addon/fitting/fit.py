@@ -264,9 +264,7 @@ def _written_radius(radius: float) -> float:
 
 
 @linear_algebra_on_one_thread()
-def fit_axis(
-    points: ArrayLike, tolerance: float = 0.05, design_ends: bool = False, follow: bool = False
-) -> AxisFit:
+def fit_axis(points: ArrayLike, tolerance: float = 0.05, design_ends: bool = False, follow: bool = False) -> AxisFit:
     """Return the alignment and profile fitted to the points of an axis, with the points' deviations.
 
     Args:

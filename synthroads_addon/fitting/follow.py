@@ -144,11 +144,12 @@ def _window(station: Float, values: Float, order: int, fine: float) -> Match:
     tolerance = min(fine, coarser[-1])
     pieces = cut_into_pieces(station, values, degrees, tolerance)
     for coarse in coarser:
-        if coarse > tolerance:
-            if _too_many(pieces, len(station)) if order == 2 else True:
-                rough = cut_into_pieces(station, values, degrees, coarse)
-                if order == 2 or len(pieces) > _MANY * len(rough) + 2:
-                    pieces, tolerance = rough, coarse
+        # Of a plan elements are wanted as they are, unless the points don't tell them; of heights as few as will do.
+        if coarse <= tolerance or (order == 2 and not _too_many(pieces, len(station))):
+            continue
+        rough = cut_into_pieces(station, values, degrees, coarse)
+        if order == 2 or len(pieces) > _MANY * len(rough) + 2:
+            pieces, tolerance = rough, coarse
     allowed = max(_PLAY * tolerance, _ALLOWED)
     found = match(joined(pieces, station, order), station, values, 0.1 * tolerance)
     return simplified(repaired(found, station, values, allowed), station, values, allowed)

@@ -18,7 +18,7 @@ from ..base.arrays import Float, Int
 _QUARTER = 0.3186
 """Quantile of |x| below which a quarter of a normal distribution with standard deviation 1 lies."""
 _COSTS = {1: 2.0, 2: 3.0, 3: 3.5}
-"""What a piece of a degree costs: fewer and simpler pieces are preferred."""
+"""Cost of a piece by its degree: fewer and simpler pieces are preferred."""
 _CORE = 0.1
 """Share of a piece's points at either end that its polynomial is not taken from, if enough are left."""
 
@@ -41,8 +41,10 @@ class Piece(NamedTuple):
 
     def derivative(self, order: int) -> np.polynomial.Polynomial:
         """Return the polynomial (0), or a derivative of it, of the station less the centre."""
-        return np.polynomial.Polynomial(self.coefficients).deriv(order) if order else np.polynomial.Polynomial(
-            self.coefficients
+        return (
+            np.polynomial.Polynomial(self.coefficients).deriv(order)
+            if order
+            else np.polynomial.Polynomial(self.coefficients)
         )
 
     def at(self, station: float, order: int = 0) -> float:

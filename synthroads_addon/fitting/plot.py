@@ -30,7 +30,7 @@ FILE = "axis-fit.png"
 """Name of the picture beside a job's files."""
 _WIDTH, _PANEL, _ROW, _MARGIN, _LEFT = 1200, 200, 290, 16, 90
 _FINE = 1e-4
-"""What a picture of a file's line reaches at least, m."""
+"""Least reach of a picture of a file's line, m."""
 _RED: Color = (200, 30, 40)
 
 

@@ -91,7 +91,8 @@ def _round(before: PlanPiece, after: PlanPiece, tolerance: float) -> tuple[list[
     if solution is None:
         return None
     one, two, middle = solution
-    pair = Alignment([Element(one, float(k1), middle), Element(two, middle, float(k2))], *start, float(heading))
+    elements = [Element(one, float(k1), middle), Element(two, middle, float(k2))]
+    pair = Alignment(elements, float(start[0]), float(start[1]), float(heading))
     corner = np.array([[after.x, after.y]])
     deviation = float(abs(pair.project(corner)[1][0]))
     inner, towards, _ = pair.frame(one)

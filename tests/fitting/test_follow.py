@@ -10,7 +10,9 @@ from synthroads_addon.fitting.fit import axis_of_points, fit_axis
 from synthroads_addon.fitting.follow import followed, heights_followed
 from synthroads_addon.fitting.pieces import cut_into_pieces, noise_of, unrolled
 from synthroads_addon.road.alignment import Alignment, Element
+from synthroads_addon.road.geometry import alignment_of
 from synthroads_addon.road.profile import IntersectionPoint, Profile
+from synthroads_addon.sampling.road import sample_alignment
 from synthroads_addon.scenario.road import RoadScenario
 from tests.helpers.relative_speed import quiet_seconds
 
@@ -86,3 +88,20 @@ def test_following_takes_no_longer_than_the_usual_fit() -> None:
     _, points = sampled(JUMPS, 2.0)
     usual = quiet_seconds(lambda: fit_axis(points))
     assert quiet_seconds(lambda: fit_axis(points, follow=True)) < usual
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("step", "right"), [(2.0, 12), (10.0, 5)])
+def test_drawn_axes_come_back_from_points(step: float, right: int) -> None:
+    """The figures of docs/roads.md: `-s` shows them."""
+    worst, same = 0.0, 0
+    for seed in range(20):
+        truth = alignment_of(sample_alignment(RoadScenario(length=1500.0), seed))
+        station = np.append(np.arange(0.0, truth.length, step), truth.length)
+        found = fit_axis(np.round(truth.position(station), 4), follow=True).alignment
+        off = truth.project(found.position(np.linspace(0.0, found.length, 1500)))[1]
+        worst = max(worst, float(np.abs(off).max()))
+        same += [e.kind for e in found.elements] == [e.kind for e in truth.elements]
+    print(f"every {step:g} m: elements of {same} of 20 axes come back, all within {1000.0 * worst:.1f} mm")
+    assert worst < 0.05
+    assert same >= right

@@ -112,9 +112,7 @@ def test_kilometre_boards_stand_where_the_count_says() -> None:
 
 
 def boards(road: RoadParameters) -> set[tuple[float, str]]:
-    return {
-        (round(item.station, 3), item.text) for item in road.objects.values() if item.type == "KilometreBoard"
-    }
+    return {(round(item.station, 3), item.text) for item in road.objects.values() if item.type == "KilometreBoard"}
 
 
 def test_sets_without_stations_read_as_before() -> None:
